@@ -1,0 +1,69 @@
+# One word does all of it, on a fresh machine too: make demo, make test.
+# Needs Python 3.11 or later and no root. Everything is kept in .venv.
+
+SHELL := /bin/bash
+.SHELLFLAGS := -eu -o pipefail -c
+.DELETE_ON_ERROR:
+.DEFAULT_GOAL := help
+
+PYTHON ?= $(firstword $(foreach name,python3.11 python3.12 python3.13 python3,$(shell command -v $(name))) python3)
+VENV := .venv
+BIN := $(VENV)/bin
+POT := robolink/locale/robolink.pot
+
+.PHONY: help
+help: ## Show what can be made.
+	@sed -nE 's/^([a-z]+):.*## (.*)/make \1\t\2/p' Makefile | expand -t 16
+
+.PHONY: demo
+demo: $(VENV)/.installed ## Install robolink and show a nozzle change on a simulated robot.
+	$(BIN)/robolink demo
+
+.PHONY: test
+test: check ## Install everything, check the sources and run all tests.
+	$(BIN)/python -m pytest -n 2
+
+.PHONY: check
+check: $(VENV)/.installed-dev ## Check style, types and who imports whom.
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+.PHONY: bench
+bench: $(VENV)/.installed-dev ## Measure against a raw client and print the ratios.
+	$(BIN)/python -m benchmarks
+
+.PHONY: messages
+messages: $(VENV)/.installed-dev ## Collect every sentence shown to a person.
+	$(BIN)/pybabel --quiet extract --keywords=tr --no-default-keywords --no-location \
+		--omit-header --sort-output --width=100 --output-file=$(POT) \
+		robolink cli/robolink_cli simulators/robolink_simulators
+
+.PHONY: build
+build: $(VENV)/.installed-dev ## Build the wheel and the source archive into dist/.
+	$(BIN)/python -m hatchling build -t sdist -t wheel
+
+.PHONY: clean
+clean: ## Remove everything that was made.
+	rm -rf $(VENV) dist build .pytest_cache .mypy_cache .ruff_cache .hypothesis
+
+# A stamp is written last, so that a set-up that was interrupted is made again.
+$(VENV)/.installed-dev: $(VENV)/.installed
+	$(BIN)/python -m pip install --quiet --editable '.[dev]'
+	touch $@
+
+$(VENV)/.installed: pyproject.toml $(VENV)/.created
+	$(BIN)/python -m pip install --quiet --editable .
+	touch $@
+
+$(VENV)/.created:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
+		echo "robolink needs Python 3.11 or later; $(PYTHON) is not. Name one: make PYTHON=/path/to/python3.11" >&2; \
+		exit 1; }
+	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || { \
+		echo "$(PYTHON) cannot make virtual environments. On Debian and Ubuntu the package" \
+			"python$$($(PYTHON) -c 'import sys; print("%d.%d" % sys.version_info[:2])')-venv is missing." >&2; \
+		exit 1; }
+	$(PYTHON) -m venv $(VENV)
+	touch $@

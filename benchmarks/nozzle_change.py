@@ -1,0 +1,48 @@
+"""A whole simulated two-pose nozzle change on ``sim://``: wall time and time-warp factor."""
+
+from collections.abc import Iterator
+from statistics import median
+from time import perf_counter_ns
+
+from robolink_cli._operator import AssistedOperator
+from robolink_simulators.hosting.in_process import simulator_named, unregister
+
+import robolink
+from benchmarks.table import Figure
+from robolink.nozzle_change import ChangePlan, NozzleChange
+
+ROUNDS = 9
+
+
+def measure_nozzle_change() -> Iterator[Figure]:
+    """Yield wall milliseconds, simulated seconds and their ratio."""
+    runs = [_change(seed) for seed in range(ROUNDS + 1)][1:]
+    wall_s = median(wall for wall, _ in runs)
+    simulated_s = median(simulated for _, simulated in runs)
+    yield Figure("two-pose nozzle change on sim://, wall time", f"{wall_s * 1000:.0f} ms")
+    yield Figure("   the same in simulated time", f"{simulated_s:.1f} s")
+    yield Figure("   time-warp factor (simulated over wall)", f"{simulated_s / wall_s:.0f} x")
+
+
+def _change(seed: int) -> tuple[float, float]:
+    name = f"bench-{seed}"
+    with robolink.connect(f"epson+sim://{name}?seed={seed}") as controller:
+        world = simulator_named(name).world
+
+        def look() -> tuple[float, float, float]:
+            seen = world.operator.look(1)
+            return seen.dx_mm, seen.dy_mm, seen.dz_mm
+
+        controller.motors(True)
+        simulated_ns = controller.clock.now_ns()
+        start = perf_counter_ns()
+        NozzleChange(
+            controller,
+            ChangePlan(1, ask_before_write=False),
+            operator=AssistedOperator(look, lambda _: None),
+            show=lambda _: None,
+        ).run()
+        wall_ns = perf_counter_ns() - start
+        simulated_ns = controller.clock.now_ns() - simulated_ns
+    unregister(name)
+    return wall_ns / 1e9, simulated_ns / 1e9

@@ -1,0 +1,109 @@
+"""The one place where errors become exit codes and text.
+
+====  =====================================================================
+code  meaning
+====  =====================================================================
+0     done
+1     ``compare`` found a difference
+2     usage or configuration is wrong; nothing was sent
+3     the controller is not reached, or the link broke
+4     the two sides do not understand each other
+5     the controller, or a check of its state, said no
+6     outcome unknown: sent, not answered
+7     the measurements do not support a result
+8     verification failed; the old value was put back
+9     a person declined
+70    a defect in robolink
+130   interrupted
+141   whoever read the output has left
+====  =====================================================================
+"""
+
+import os
+import traceback
+from typing import Final
+
+import click
+
+from robolink import errors
+from robolink.messages import tr
+from robolink_cli._render import dumps
+
+USAGE: Final = 2
+BUG: Final = 70
+INTERRUPTED: Final = 130
+READER_LEFT: Final = 141
+
+# The first class that fits decides. A tool number that does not exist is a mistake in the
+# command (2). A tool that was changed meanwhile, is undefined, or did not keep what was
+# written is the controller's no (5): nothing was rolled back, so it cannot be 8.
+EXIT_CODES: Final[tuple[tuple[type[errors.RobolinkError], int], ...]] = (
+    (errors.DeclinedError, 9),
+    (errors.VerifyError, 8),
+    (errors.CalibrationError, 7),
+    (errors.OutcomeUnknownError, 6),
+    (errors.ToolIndexError, USAGE),
+    (errors.ReservedToolError, USAGE),
+    (errors.ToolError, 5),
+    (errors.ControllerError, 5),
+    (errors.ProtocolError, 4),
+    (errors.TransportError, 3),
+    (errors.ConfigError, USAGE),
+)
+
+
+def exit_code(error: BaseException) -> int:
+    """Return the exit code that ``error`` stands for."""
+    if isinstance(error, (KeyboardInterrupt, EOFError, click.Abort)):
+        return INTERRUPTED
+    if isinstance(error, click.ClickException):
+        return USAGE
+    return next((code for kind, code in EXIT_CODES if isinstance(error, kind)), BUG)
+
+
+def report(error: BaseException, *, as_json: bool) -> int:
+    """Tell a person, or a machine, about ``error``; return the exit code."""
+    code = exit_code(error)
+    if os.environ.get("ROBOLINK_DEBUG"):
+        traceback.print_exception(error)
+    if as_json:
+        click.echo(error_document(error))
+    elif isinstance(error, click.ClickException):
+        error.show()
+    else:
+        what, remedy = _sentences(error)
+        click.echo(f"robolink: {what}", err=True)
+        if remedy:
+            click.echo(f"  {remedy}", err=True)
+    return code
+
+
+def error_document(error: BaseException) -> str:
+    """Return the JSON document that stands for ``error``."""
+    what, remedy = _sentences(error)
+    ours = isinstance(error, errors.RobolinkError)
+    body = {
+        "kind": type(error).__name__,
+        "what": what,
+        "remedy": remedy,
+        "reason": getattr(error, "reason", None) if ours else None,
+        "code": (getattr(error, "code", None) or None) if ours else None,
+    }
+    return dumps("robolink/error/1", {"error": body, "exit_code": exit_code(error)})
+
+
+def _sentences(error: BaseException) -> tuple[str, str]:
+    if isinstance(error, errors.RobolinkError):
+        return error.what, error.remedy
+    if isinstance(error, click.ClickException):
+        return error.format_message(), tr("'robolink COMMAND --help' shows what can be given.")
+    if exit_code(error) == INTERRUPTED:
+        return tr("Interrupted."), ""
+    return (
+        tr(
+            "A defect in robolink: {kind}: {error}",
+            kind=type(error).__name__,
+            error=error,
+        ),
+        tr("Set ROBOLINK_DEBUG=1 to see where, and report it with that text."),
+    )

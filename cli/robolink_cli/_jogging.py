@@ -1,0 +1,52 @@
+"""Jogging through the runner, so that its limits and its watch hold."""
+
+from collections.abc import Callable
+
+from robolink.controllers.epson import EpsonController
+from robolink.messages import tr
+from robolink.model import MotionProfile, Pose, WorkBox
+from robolink.runner import Operator, Runner, RunSettings, ask_for_pose, jog_target
+from robolink_cli._operator import TerminalOperator
+
+
+def jog_by_steps(controller: EpsonController, steps: str, speed_mm_s: float, box_mm: float) -> Pose:
+    """Make one move of ``steps`` and return where the tool is then."""
+    return _runner(controller, TerminalOperator(_silent), speed_mm_s, box_mm).jog(steps)
+
+
+def jog_on_terminal(
+    controller: EpsonController, speed_mm_s: float, box_mm: float, show: Callable[[str], None]
+) -> Pose:
+    """Let a person jog until an empty line, and return where the tool is then."""
+    runner = _runner(controller, TerminalOperator(show), speed_mm_s, box_mm)
+    return runner.run(ask_for_pose(tr("Jog the tool.")))
+
+
+def plan_jog(
+    controller: EpsonController, steps: str, speed_mm_s: float, box_mm: float
+) -> list[str]:
+    """Return the requests that :func:`jog_by_steps` would send; refuse what it would refuse."""
+    group = controller.groups[0]
+    settings = _settings(group.pose(), speed_mm_s, box_mm)
+    target, path = jog_target(group.pose(), steps, settings)
+    settings.box.check(target)
+    profile = MotionProfile(path, settings.speed_percent, settings.speed_mm_s)
+    return [
+        controller.wire("Execute", statement) for statement in group.statements_for(target, profile)
+    ]
+
+
+def _runner(
+    controller: EpsonController, operator: Operator, speed_mm_s: float, box_mm: float
+) -> Runner:
+    group = controller.groups[0]
+    return Runner(controller, group, operator, _settings(group.pose(), speed_mm_s, box_mm))
+
+
+def _settings(start: Pose, speed_mm_s: float, box_mm: float) -> RunSettings:
+    box = WorkBox.around(start, xy_mm=box_mm, below_mm=box_mm, above_mm=box_mm)
+    return RunSettings(box, speed_mm_s=speed_mm_s)
+
+
+def _silent(text: str) -> None:
+    """Show nothing: the result is shown by the command."""

@@ -1,0 +1,65 @@
+"""Where the controller's password comes from. Never from the command line or a URL."""
+
+import os
+from pathlib import Path
+
+from robolink.errors import ConfigError
+from robolink.messages import tr
+from robolink.model import Secret
+
+KEYRING_SERVICE = "robolink"
+
+
+def find_password(identity: str, *, password_file: Path | None = None) -> Secret | None:
+    """Return the password for a controller, None when there is none.
+
+    The first that has one wins: the system's keyring (service ``robolink``, user
+    ``identity``); ``password_file`` or the file that ROBOLINK_PASSWORD_FILE names;
+    ROBOLINK_PASSWORD.
+
+    Raises:
+        ConfigError: The file cannot be read, or others than its owner may read it.
+    """
+    stored = _from_keyring(identity)
+    if stored is not None:
+        return stored
+    named = os.environ.get("ROBOLINK_PASSWORD_FILE")
+    path = password_file or (Path(named) if named else None)
+    if path is not None:
+        return _from_file(path)
+    value = os.environ.get("ROBOLINK_PASSWORD")
+    return None if value is None else Secret(value)
+
+
+def _from_keyring(identity: str) -> Secret | None:
+    try:
+        import keyring
+        from keyring.errors import KeyringError
+    except ImportError:
+        return None
+    try:
+        value = keyring.get_password(KEYRING_SERVICE, identity)
+    except KeyringError:
+        # No keyring service, or a locked one, as on most cell computers: the other sources
+        # are asked, and without any the controller itself says that it wants a password.
+        return None
+    return None if value is None else Secret(value)
+
+
+def _from_file(path: Path) -> Secret:
+    try:
+        with path.open(encoding="utf-8") as file:
+            # Windows keeps access in lists, not in these bits.
+            if os.name == "posix" and os.fstat(file.fileno()).st_mode & 0o077:
+                raise ConfigError(
+                    tr("Others than its owner may read the password file {path}.", path=path),
+                    remedy=tr("Run: chmod 600 {path}", path=path),
+                )
+            return Secret(file.readline().rstrip("\r\n"))
+    except (OSError, UnicodeError) as error:
+        # The cause of a UnicodeError would show bytes of the password.
+        cause = error.strerror if isinstance(error, OSError) else tr("it is not UTF-8 text")
+        raise ConfigError(
+            tr("The password file {path} cannot be read: {cause}.", path=path, cause=cause),
+            remedy=tr("Give a file whose first line is the password and nothing else."),
+        ) from (error if isinstance(error, OSError) else None)

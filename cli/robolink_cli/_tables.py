@@ -1,0 +1,75 @@
+"""Tables for people."""
+
+from collections.abc import Mapping, Sequence
+
+from robolink.messages import tr
+from robolink_cli._render import say, table
+from robolink_cli._views import number, offset_cells
+
+AXES = ("X mm", "Y mm", "Z mm", "U deg", "V deg", "W deg")
+
+
+def show_status(payload: Mapping[str, object]) -> None:
+    """Print the state in words, then the flags that are on."""
+    say(f"{payload['controller']}: {payload['state']}")
+    if payload["code"]:
+        say(tr("  code {code:04d} {text}", code=payload["code"], text=payload["text"]).rstrip())
+    on = [key for key, value in payload.items() if value is True]
+    say(tr("  flags: {flags}", flags=", ".join(on).replace("_", " ") or tr("none")))
+    tool = payload["selected_tool"]
+    if tool is not None:
+        say(tr("  tool in force: {tool}", tool=tool))
+
+
+def show_pose(payload: Mapping[str, object]) -> None:
+    """Print a pose and the joints."""
+    title = tr("tool {tool} in local {local}, hand {hand}", **payload)
+    table(title, AXES, [offset_cells(payload)])
+    joints = payload["joints"]
+    if isinstance(joints, Sequence):
+        say(tr("  joints: {joints}", joints="  ".join(number(j) for j in joints)))
+
+
+def show_tools(tools: Mapping[str, Mapping[str, object] | None], selected: int) -> None:
+    """Print the defined tools; the one in force is marked."""
+    rows = []
+    for tool, offset in tools.items():
+        if offset is not None:
+            mark = "*" if int(tool) == selected else " "
+            rows.append([f"{mark}{tool}", *offset_cells(offset)])
+    table(tr("tools (* in force)"), (tr("tool"), *AXES), rows)
+    missing = [tool for tool, offset in tools.items() if offset is None]
+    if missing:
+        say(tr("  undefined: {tools}", tools=", ".join(missing)))
+
+
+def show_change(
+    tool: int,
+    before: Mapping[str, object] | None,
+    after: Mapping[str, object] | None,
+    *,
+    after_name: str,
+    unmeasured: Sequence[str] = (),
+) -> None:
+    """Print an offset before and after, and which components were not measured."""
+    rows = [
+        [tr("before"), *offset_cells(before)],
+        [after_name, *offset_cells(after)],
+    ]
+    if before and after:
+        delta = {key: _difference(after[key], before[key]) for key in before}
+        rows.append([tr("change"), *offset_cells(delta)])
+    table(tr("tool {tool}", tool=tool), ("", *AXES), rows)
+    for name in unmeasured:
+        if after is not None and name[0] in "xyzu":
+            say(
+                tr(
+                    "  {axis} kept at {value}: not measured",
+                    axis=name[0].upper(),
+                    value=number(after[name]),
+                )
+            )
+
+
+def _difference(a: object, b: object) -> float:
+    return float(str(a)) - float(str(b))

@@ -1,0 +1,132 @@
+"""What commands show: plain payloads, and the tables made from them."""
+
+from collections.abc import Mapping
+
+from robolink.calibration import VerifyResult
+from robolink.controllers.epson import EpsonController, Finding
+from robolink.errors import RejectedError
+from robolink.model import Pose, ToolOffset, ToolReceipt
+from robolink.nozzle_change import Proposal
+
+COMPONENTS = ("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
+
+
+def offset_payload(offset: ToolOffset | None) -> dict[str, float] | None:
+    """Return an offset with its units in the keys, ``None`` for an undefined tool."""
+    if offset is None:
+        return None
+    return dict(zip(COMPONENTS, offset.components(), strict=True))
+
+
+def pose_payload(pose: Pose) -> dict[str, object]:
+    """Return a pose with its units in the keys."""
+    payload: dict[str, object] = dict(zip(COMPONENTS, pose.coordinates(), strict=True))
+    return payload | {"hand": pose.hand, "local": pose.local, "tool": pose.tool}
+
+
+def receipt_payload(receipt: ToolReceipt) -> dict[str, object]:
+    """Return what a write or clear did."""
+    return {
+        "tool": receipt.tool,
+        "before": offset_payload(receipt.before),
+        "requested": offset_payload(receipt.requested),
+        "read_back": offset_payload(receipt.read_back),
+        "skipped": receipt.skipped,
+        "unconditional": receipt.unconditional,
+    }
+
+
+def proposal_payload(proposal: Proposal) -> dict[str, object]:
+    """Return a calibration's proposal next to what is stored."""
+    result = proposal.result
+    return {
+        "tool": proposal.tool,
+        "method": result.method,
+        "before": offset_payload(proposal.before),
+        "proposed": offset_payload(result.offset),
+        "measured": list(result.measured),
+        "kept": list(result.kept),
+        "change_mm": proposal.change_mm,
+        "reference_point_mm": list(result.reference_point_mm),
+        "sigma_gain": result.sigma_gain,
+        "warnings": list(result.warnings),
+        "poses": [pose_payload(pose) for pose in result.inputs],
+    }
+
+
+def verification_payload(result: VerifyResult | None) -> dict[str, object] | None:
+    """Return the drift about the new tip."""
+    if result is None:
+        return None
+    return {
+        "max_drift_mm": result.max_drift_mm,
+        "tolerance_mm": result.tolerance_mm,
+        "passed": result.passed,
+        "drifts": [
+            {
+                "u_deg": drift.u_deg,
+                "dx_mm": drift.dx_mm,
+                "dy_mm": drift.dy_mm,
+                "distance_mm": drift.distance_mm,
+            }
+            for drift in result.drifts
+        ],
+    }
+
+
+def finding_payload(finding: Finding) -> dict[str, object]:
+    """Return what was found out about an open marker."""
+    return {
+        "operation": finding.marker.operation,
+        "kind": finding.marker.kind,
+        "request": finding.marker.request,
+        "begun_at": finding.marker.begun_at,
+        "verdict": finding.verdict,
+        "sentence": finding.sentence,
+        "action": finding.action,
+    }
+
+
+def status_payload(controller: EpsonController) -> dict[str, object]:
+    """Return the state; what needs Execute is left out where Execute is not available.
+
+    While production runs only the flags are read (epson.md 1.3).
+    """
+    status = controller.status()
+    payload: dict[str, object] = {
+        "controller": controller.identity,
+        "state": status.state,
+        "remote": status.remote,
+        "ready": status.ready,
+        "running": status.running,
+        "paused": status.paused,
+        "fault": status.fault,
+        "serious_fault": status.serious_fault,
+        "emergency_stop": status.emergency_stop,
+        "guard_open": status.guard_open,
+        "warning": status.warning,
+        "teach": status.teach,
+        "test": status.test,
+        "code": status.code,
+        "text": "",
+        "selected_tool": None,
+    }
+    if status.code:
+        payload["text"] = controller.error_text(status.code)
+    if status.remote and status.ready and not (status.fault or status.guard_open):
+        try:
+            payload["selected_tool"] = controller.tools.selected()
+        except RejectedError:
+            # A controller that serves monitoring only shows nothing in its flags.
+            payload["selected_tool"] = None
+    return payload
+
+
+def number(value: object) -> str:
+    """Return a table cell for a length or an angle."""
+    return f"{value:.3f}" if isinstance(value, (int, float)) else "-"
+
+
+def offset_cells(offset: Mapping[str, object] | None) -> list[str]:
+    """Return six table cells for an offset payload."""
+    return [number(offset[name]) if offset else "-" for name in COMPONENTS]

@@ -1,0 +1,94 @@
+"""``robolink``: the commands, and how one is run."""
+
+import os
+import sys
+from collections.abc import Sequence
+from typing import Final, NoReturn
+
+import click
+
+from robolink import __version__
+from robolink.messages import tr
+from robolink_cli._console import colour_wanted, leave_pipe, tolerate_any_console
+from robolink_cli._context import shared_options
+from robolink_cli._exit import READER_LEFT, report
+from robolink_cli._lazy import LazyGroup
+from robolink_cli._render import print_document
+
+COMMANDS: Final = {
+    "demo": (
+        "robolink_cli.demo:demo",
+        tr("A nozzle change on a simulated robot, from clogged to proved."),
+    ),
+    "sim": ("robolink_cli.sim:sim", tr("Serve a simulated controller.")),
+    "status": ("robolink_cli.operate:status", tr("What the controller is doing.")),
+    "where": ("robolink_cli.operate:where", tr("Where the robot is, and with which tool.")),
+    "stop": ("robolink_cli.operate:stop", tr("Stop every motion.")),
+    "reset": ("robolink_cli.operate:reset", tr("Clear an error of the controller.")),
+    "motors": ("robolink_cli.operate:motors", tr("Switch the motors on or off.")),
+    "resolve": (
+        "robolink_cli.operate:resolve",
+        tr("Settle what was begun and not proved finished."),
+    ),
+    "tool": ("robolink_cli.tools:tool", tr("Read, write, clear and select tool offsets.")),
+    "jog": ("robolink_cli.jog:jog", tr("Move a small step, in Power Low.")),
+    "calibrate": (
+        "robolink_cli.calibrate:calibrate",
+        tr("Measure a tool offset, propose it, write it and prove it."),
+    ),
+}
+"""Name, where it is, one-line help; in the order of the help page."""
+
+
+@click.group(
+    cls=LazyGroup,
+    lazy=COMMANDS,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    help=tr(
+        "Measure, write and prove tool offsets on EPSON robots.\n\n"
+        "The options stand before or after the command's name."
+    ),
+)
+@click.version_option(__version__, prog_name="robolink", message="%(prog)s %(version)s")
+@shared_options
+def cli() -> None:
+    """Root of the commands."""
+
+
+def main() -> NoReturn:
+    """Run the command line of this process and exit."""
+    sys.exit(run(sys.argv[1:]))
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Run one command line; return the exit code (the table is in ``_exit``)."""
+    tolerate_any_console()
+    try:
+        code = _answer(arguments)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        leave_pipe()
+        return READER_LEFT
+    return code
+
+
+def _answer(arguments: Sequence[str]) -> int:
+    if "_ROBOLINK_COMPLETE" in os.environ:
+        cli.main(list(arguments), prog_name="robolink")  # answers the shell and exits
+    try:
+        return _invoke(arguments)
+    except click.exceptions.Exit as end:
+        return end.exit_code
+    except BrokenPipeError:
+        raise
+    except (Exception, KeyboardInterrupt) as error:
+        # Looked for by hand, because the arguments may be what is wrong.
+        return report(error, as_json="--json" in arguments)
+
+
+def _invoke(arguments: Sequence[str]) -> int:
+    colour = colour_wanted()
+    with cli.make_context("robolink", list(arguments), color=colour) as context:
+        code = cli.invoke(context)
+        print_document(context)
+    return code if isinstance(code, int) else 0

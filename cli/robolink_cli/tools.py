@@ -1,0 +1,154 @@
+"""tool list, get, set, clear, select: the tool table."""
+
+from dataclasses import replace
+
+import click
+
+from robolink.messages import tr
+from robolink_cli._consent import agree, dry_run_option, yes_option
+from robolink_cli._context import CliContext, controller_options, open_controller
+from robolink_cli._render import say
+
+
+@click.group()
+def tool() -> None:
+    """Read and change the tool offsets stored in the controller."""
+
+
+@tool.command("list")
+@controller_options
+def list_tools(context: CliContext) -> None:
+    """Show all tools and which one is in force."""
+    from robolink_cli._tables import show_tools
+    from robolink_cli._views import offset_payload
+
+    with open_controller(context) as controller:
+        stored, selected = controller.tools.read_all(), controller.tools.selected()
+    tools = {str(number): offset_payload(offset) for number, offset in stored.items()}
+    payload: dict[str, object] = {"selected_tool": selected, "tools": tools}
+    context.emit("tools", payload, lambda: show_tools(tools, selected))
+
+
+@tool.command("get")
+@click.argument("number", type=int)
+@controller_options
+def get(context: CliContext, number: int) -> None:
+    """Show one tool; 0 is the flange."""
+    from robolink_cli._tables import show_tools
+    from robolink_cli._views import offset_payload
+
+    with open_controller(context) as controller:
+        offset, selected = controller.tools.read(number), controller.tools.selected()
+    value = offset_payload(offset)
+    payload: dict[str, object] = {
+        "tool": number,
+        "defined": value is not None,
+        "offset": value,
+        "selected": selected == number,
+    }
+    context.emit("tool", payload, lambda: show_tools({str(number): value}, selected))
+
+
+@tool.command("set")
+@click.argument("number", type=int)
+@click.option("--x", type=float, help="mm from the flange.")
+@click.option("--y", type=float, help="mm from the flange.")
+@click.option("--z", type=float, help="mm from the flange.")
+@click.option("--u", type=float, help="Degrees about Z.")
+@click.option("--v", type=float, help="Degrees about Y; six-axis robots only.")
+@click.option("--w", type=float, help="Degrees about X; six-axis robots only.")
+@controller_options
+@dry_run_option
+@yes_option
+def set_tool(
+    context: CliContext, number: int, dry_run: bool, yes: bool, **given: float | None
+) -> None:
+    """Write a tool offset; components that are not given are kept."""
+    from robolink.errors import ConfigError
+    from robolink.model import ToolOffset
+    from robolink_cli._tables import show_change
+    from robolink_cli._views import offset_payload, receipt_payload
+
+    units = {"x": "x_mm", "y": "y_mm", "z": "z_mm", "u": "u_deg", "v": "v_deg", "w": "w_deg"}
+    changes = {units[axis]: value for axis, value in given.items() if value is not None}
+    if not changes:
+        raise ConfigError(
+            tr("No component was given."), remedy=tr("Give at least one of --x --y --z --u.")
+        )
+    # Checks the numbers before a connection is made.
+    ToolOffset(**changes)
+    with open_controller(context) as controller:
+        before = controller.tools.read(number)
+        wanted = replace(before or ToolOffset(), **changes)
+        kept = [name for name in units.values() if name not in changes]
+        shown = offset_payload(before), offset_payload(wanted)
+        if dry_run:
+            statements = controller.tools.preview_write(number, wanted)
+            context.show_requests([controller.wire("Execute", text) for text in statements])
+            return
+        if not context.json:
+            show_change(number, *shown, after_name=tr("new"))
+            agree(tr("Write this to tool {number}?", number=number), yes=yes)
+        receipt = controller.tools.write(number, wanted, expected=before)
+    payload = receipt_payload(receipt) | {"kept": kept}
+    done = (
+        tr("already stored, nothing was written") if receipt.skipped else tr("written, read back")
+    )
+    context.emit(
+        "tool-write",
+        payload,
+        lambda: say(tr("tool {number}: {done}", number=number, done=done)),
+    )
+
+
+@tool.command("clear")
+@click.argument("number", type=int)
+@controller_options
+@dry_run_option
+@yes_option
+def clear(context: CliContext, number: int, dry_run: bool, yes: bool) -> None:
+    """Remove a tool's definition."""
+    from robolink_cli._views import receipt_payload
+
+    with open_controller(context) as controller:
+        before = controller.tools.read(number)
+        if dry_run:
+            statements = controller.tools.preview_clear(number)
+            context.show_requests([controller.wire("Execute", text) for text in statements])
+            return
+        if not context.json:
+            agree(tr("Clear tool {number}?", number=number), yes=yes)
+        receipt = controller.tools.clear(number, expected=before)
+    done = tr("was undefined already") if receipt.skipped else tr("cleared, read back")
+    context.emit(
+        "tool-clear",
+        receipt_payload(receipt),
+        lambda: say(tr("tool {number}: {done}", number=number, done=done)),
+    )
+
+
+@tool.command("select")
+@click.argument("number", type=int)
+@controller_options
+@dry_run_option
+@yes_option
+def select(context: CliContext, number: int, dry_run: bool, yes: bool) -> None:
+    """Put a tool in force; the choice survives power-off. 0 is the flange."""
+    with open_controller(context) as controller:
+        before = controller.tools.selected()
+        if dry_run:
+            statements = controller.tools.preview_select(number)
+            context.show_requests([controller.wire("Execute", text) for text in statements])
+            return
+        if not context.json and before != number:
+            agree(
+                tr("Select tool {number} in place of {before}?", number=number, before=before),
+                yes=yes,
+            )
+        controller.tools.select(number)
+    payload: dict[str, object] = {"before": before, "selected_tool": number}
+    context.emit(
+        "tool-select",
+        payload,
+        lambda: say(tr("tool in force: {number} (was {before})", number=number, before=before)),
+    )

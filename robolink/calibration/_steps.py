@@ -1,0 +1,35 @@
+"""The vocabulary in which a procedure asks for things to happen.
+
+A procedure is a generator. It yields steps and is sent what came of them; its return value
+is a proposal. It knows no controller, no clock and no person, so it can be tested by feeding
+it numbers, shown before anything moves, and replayed from a record.
+"""
+
+from collections.abc import Generator
+from dataclasses import dataclass
+from typing import TypeVar
+
+from robolink.model import Path, Pose
+
+
+@dataclass(frozen=True, slots=True)
+class Move:
+    """Drive the frame in force to ``target``; answered with the pose that was reached."""
+
+    target: Pose
+    path: Path
+    purpose: str
+
+
+@dataclass(frozen=True, slots=True)
+class Ask:
+    """Let a person bring the tip onto the reference point; answered with the pose then."""
+
+    instruction: str
+
+
+Step = Move | Ask
+
+T = TypeVar("T")
+Procedure = Generator[Step, Pose, T]
+"""Yields steps, is sent the measured pose after each, returns a result."""

@@ -1,0 +1,97 @@
+"""Tool offset from two flange poses on one reference point.
+
+With the tip on the same point in both poses, ``p1 + Rz(U1) t = p2 + Rz(U2) t``, hence
+
+    (Rz(U1) - Rz(U2)) t = p2 - p1
+
+EPSON's formula ``t = (p2 - p1) / 2`` is the case U1 = 0, U2 = 180. The closed form below
+holds for any two angles (calibration.md 1.1): with d = p2 - p1, h = (U2 - U1) / 2 and
+m = Rz(-(U1 + U2) / 2) d,
+
+    t = (-m_y, m_x) / (2 sin h)
+
+Two poses leave no degree of freedom: no residual exists, and the result cannot tell its own
+error. Each length has the standard deviation of one placement times 1 / (sqrt2 sin|h|).
+"""
+
+import math
+
+from robolink.calibration._checks import check_poses, keep_unmeasured
+from robolink.calibration._result import CalibrationResult
+from robolink.errors import CalibrationError
+from robolink.messages import tr
+from robolink.model import Pose, ToolOffset, angle_difference_deg, rotate_xy
+
+MEASURED = ("x_mm", "y_mm")
+
+MIN_ROTATION_DEG = 30.0
+"""Refuse below this difference of U (calibration.md 2)."""
+
+WARN_ROTATION_DEG = 90.0
+
+
+def solve_two_pose(
+    first: Pose,
+    second: Pose,
+    *,
+    stored: ToolOffset | None = None,
+    min_rotation_deg: float = MIN_ROTATION_DEG,
+    allow_mixed_hand: bool = False,
+) -> CalibrationResult:
+    """Return the offset of a tip that touched one point in both flange poses.
+
+    Args:
+        first: Flange pose (Tool 0), mm and degrees.
+        second: Flange pose with another U; the order does not matter.
+        stored: The offset stored now; Z, U, V and W are kept from it, or 0 without one.
+        min_rotation_deg: Smallest difference of U, modulo 360, that is accepted.
+        allow_mixed_hand: Warn instead of refusing when the arm was configured differently.
+
+    Raises:
+        CalibrationError: ``degenerate_angles``, ``insufficient_rotation``, ``non_finite``,
+            ``suspect_units``, ``mixed_hand``, ``mixed_local``, ``mixed_tool`` or
+            ``implausible_offset``.
+    """
+    warnings = check_poses((first, second), allow_mixed_hand=allow_mixed_hand)
+    rotation_deg = abs(angle_difference_deg(second.u_deg, first.u_deg))
+    half = math.radians(angle_difference_deg(second.u_deg, first.u_deg) / 2)
+    _require_rotation(rotation_deg, half, min_rotation_deg)
+    if rotation_deg < WARN_ROTATION_DEG:
+        warnings = (*warnings, "small_rotation")
+    d_x, d_y = second.x_mm - first.x_mm, second.y_mm - first.y_mm
+    mean_deg = first.u_deg + math.degrees(half)
+    m_x, m_y = rotate_xy(d_x, d_y, -mean_deg)
+    scale = 2 * math.sin(half)
+    t_x, t_y = -m_y / scale, m_x / scale
+    at_x, at_y = rotate_xy(t_x, t_y, first.u_deg)
+    return CalibrationResult(
+        method="two_pose",
+        offset=keep_unmeasured(stored, x_mm=t_x, y_mm=t_y),
+        measured=MEASURED,
+        kept=("z_mm", "u_deg", "v_deg", "w_deg"),
+        reference_point_mm=(first.x_mm + at_x, first.y_mm + at_y),
+        sigma_gain=1 / (math.sqrt(2) * abs(math.sin(half))),
+        warnings=warnings,
+        inputs=(first, second),
+    )
+
+
+def _require_rotation(rotation_deg: float, half: float, minimum_deg: float) -> None:
+    if rotation_deg < 1e-9:
+        raise CalibrationError(
+            "degenerate_angles",
+            tr("Both poses have the same U; the offset cannot be found from them."),
+            remedy=tr("Turn the tool, best by 180 degrees, and touch the point again."),
+        )
+    if rotation_deg < minimum_deg:
+        gain = 1 / (math.sqrt(2) * abs(math.sin(half)))
+        raise CalibrationError(
+            "insufficient_rotation",
+            tr(
+                "The poses differ by {rotation:.2f} degrees in U only; every placement error "
+                "would count {gain:.1f} times.",
+                rotation=rotation_deg,
+                gain=gain,
+            ),
+            remedy=tr("Turn by at least {minimum:.0f} degrees, best by 180.", minimum=minimum_deg),
+        )

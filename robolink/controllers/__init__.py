@@ -1,0 +1,3 @@
+"""Codec + transport + semantics = a machine that can be used."""
+
+from robolink.controllers._connect import connect as connect

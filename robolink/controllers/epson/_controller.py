@@ -1,0 +1,217 @@
+"""An EPSON controller on Remote Ethernet."""
+
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
+from types import TracebackType
+from typing import Self
+
+from robolink.controllers.epson._answers import require_ready
+from robolink.controllers.epson._guarded import MarkerDesk, ProcedureLock
+from robolink.controllers.epson._motion import EpsonGroup, request_abort
+from robolink.controllers.epson._preserve import Preserver
+from robolink.controllers.epson._resolve import Resolver
+from robolink.controllers.epson._session import EpsonSession
+from robolink.controllers.epson._tools import EpsonToolTable
+from robolink.controllers.epson._window import CommandWindow
+from robolink.errors import (
+    ControllerFaultError,
+    NotReadyError,
+    NotReadyReason,
+    ReadBackError,
+    RobolinkError,
+)
+from robolink.messages import tr
+from robolink.model import (
+    Capabilities,
+    ControllerStatus,
+    MotionProfile,
+    OutcomeLog,
+)
+from robolink.protocols import spel
+from robolink.protocols.epson_text import EpsonTextCodec, Request, Role
+from robolink.timing import Clock
+
+
+class EpsonController:
+    """A logged-in EPSON controller. Use it as a context manager.
+
+    Args:
+        session: A session that has logged in.
+        outcomes: Where doubtful outcomes of this controller are kept.
+        remote_timeout_s: The remote time-out set on the controller, as a person states it;
+            0 (never) forbids motion.
+    """
+
+    def __init__(
+        self, session: EpsonSession, outcomes: OutcomeLog, *, remote_timeout_s: float
+    ) -> None:
+        self._session = session
+        self._outcomes = outcomes
+        self._window = CommandWindow(session)
+        self._lock = ProcedureLock(session.identity)
+        self._desk = MarkerDesk(session, outcomes)
+        self._group = EpsonGroup(
+            session, self._window, self._desk, self._lock, remote_timeout_s=remote_timeout_s
+        )
+        self._tools = EpsonToolTable(self._window, self._desk, self._lock, self._group.robot)
+        self._preserver = Preserver(
+            session, self._window, self._desk, self._lock, tools=self._tools, group=self._group
+        )
+        self.resolver = Resolver(
+            self._desk, tools=self._tools, group=self._group, preserver=self._preserver
+        )
+
+    @property
+    def identity(self) -> str:
+        """The URL without its options."""
+        return self._session.identity
+
+    @property
+    def clock(self) -> Clock:
+        """The clock on which the controller's time passes."""
+        return self._session.clock
+
+    @property
+    def capabilities(self) -> Capabilities:
+        """Everything that this package can ask for."""
+        return Capabilities(tool_write=True, motion=True, motors=True)
+
+    @property
+    def tools(self) -> EpsonToolTable:
+        """Tools 1 to 15."""
+        return self._tools
+
+    @property
+    def groups(self) -> Sequence[EpsonGroup]:
+        """The one robot that Execute acts on."""
+        return (self._group,)
+
+    @property
+    def outcomes(self) -> OutcomeLog:
+        """Open markers of this controller."""
+        return self._outcomes
+
+    @property
+    def exchanges(self) -> int:
+        """Requests sent so far."""
+        return self._session.exchanges
+
+    def status(self) -> ControllerStatus:
+        """Read the state flags."""
+        return self._window.status()
+
+    def error_text(self, code: int) -> str:
+        """Return the controller's own text for an error number, empty where it has none."""
+        return self._window.error_text(code)
+
+    def stop(self) -> None:
+        """Stop: abort our own movement, else stop the controller's tasks.
+
+        May be called from any thread while another waits on a motion.
+        """
+        request_abort(self._session)
+
+    def reset_fault(self) -> None:
+        """Send Reset because a person asked for it; it may switch outputs off.
+
+        Raises:
+            NotReadyError: A reset cannot help now (emergency stop pressed, serious error,
+                a program is running).
+            ControllerFaultError: The error is still there afterwards.
+        """
+        with self._lock.held("Reset"):
+            self._require_resettable(self.status())
+            self._session.exchange("Reset")
+            status = self.status()
+            if status.fault or status.serious_fault:
+                raise ControllerFaultError(
+                    tr("The reset did not clear error {code:04d}.", code=status.code),
+                    code=status.code,
+                    remedy=tr("Remove the cause; a serious error needs the power switched off."),
+                    controller=self.identity,
+                    request="Reset",
+                )
+            if status.remote and status.ready:
+                self._group.settings.slow_down(MotionProfile())
+
+    def robot_number(self) -> int:
+        """Read which robot motors and statements act on."""
+        (number,) = self._session.exchange("GetCurRobot").fields
+        return spel.parse_integer(number)
+
+    def wire(self, name: str, *parameters: str) -> str:
+        """Return a request as it would be sent, for a person to read."""
+        return EpsonTextCodec(Role.HOST).send(Request(name, parameters)).decode("ascii").strip()
+
+    def motors(self, on: bool) -> None:
+        """Switch the motors of the robot in force, and prove it.
+
+        Raises:
+            NotReadyError: The state forbids it.
+            ReadBackError: The motors are not as asked.
+        """
+        name = "SetMotorsOn" if on else "SetMotorsOff"
+        with self._lock.held(name):
+            self._window.require_ready(name)
+            self._session.exchange(name, str(self.robot_number()))
+            if on:
+                self._group.settings.slow_down(MotionProfile())
+            if (spel.parse_integer(self._window.printed(spel.print_motor())) != 0) is not on:
+                raise ReadBackError(
+                    tr("The motors are not {wanted}.", wanted=tr("on") if on else tr("off")),
+                    remedy=tr("Look at the controller; nothing was repeated."),
+                    controller=self.identity,
+                    request=name,
+                )
+
+    def require_settled(self, request: str) -> None:
+        """Refuse ``request`` while something earlier is unsettled.
+
+        Raises:
+            OutcomeUnknownError: Names it.
+        """
+        self._desk.require_settled(request)
+
+    def preserved(self, reason: str) -> AbstractContextManager[None]:
+        """Put back the tool, power and speed in force; see the model."""
+        return self._preserver.preserved(reason)
+
+    def close(self) -> None:
+        """Abort what nobody waited on, log out where that does no harm, close. Idempotent.
+
+        Logging out while a task runs raises an error on the controller (epson.md 1.1), so
+        the connection is just closed then.
+        """
+        try:
+            if self._session.alive:
+                self._group.abort_unfinished()
+                status = self.status()
+                if not (status.running or status.paused):
+                    self._session.exchange("Logout")
+        except RobolinkError:
+            pass  # the link is going away in any case; markers keep what is in doubt
+        finally:
+            self._session.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def _require_resettable(self, status: ControllerStatus) -> None:
+        if status.serious_fault or status.emergency_stop or status.running or not status.remote:
+            require_ready(status, controller=self.identity, request="Reset")
+        if status.guard_open:
+            raise NotReadyError(
+                tr("The safety guard is open."),
+                reason=NotReadyReason.GUARD_OPEN,
+                remedy=tr("Close it before the reset."),
+                controller=self.identity,
+                request="Reset",
+            )

@@ -1,0 +1,131 @@
+"""Commands that change something: marked before they leave, cleared when proved.
+
+The command classes of design part 4 (faults_and_speed.md A3):
+
+=====  ==========================================  =======================================
+class  here                                        when no answer comes
+=====  ==========================================  =======================================
+READ   GetStatus, Print ..., TLSet, Where          ask again on a new link
+SET    TLSet n, TLClr n, Tool n                    OutcomeUnknownError; read back, resolve
+MOVE   Go, Move                                    OutcomeUnknownError; never sent again
+STOP   Abort, Stop                                 may be repeated
+=====  ==========================================  =======================================
+
+Speed, SpeedS, Power and the motors need no marker: they are set and read back before each
+move, and a lost answer leaves nothing that the next connection would not set again.
+"""
+
+import threading
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+
+from robolink.controllers.epson._session import EpsonSession, outcome_unknown
+from robolink.errors import (
+    BusyError,
+    OutcomeUnknownError,
+    RemoteProtocolError,
+    TransportError,
+)
+from robolink.markers import new_operation, wall_label
+from robolink.messages import tr
+from robolink.model import Marker, MarkerKind, OutcomeLog
+from robolink.protocols.spel import Statement
+
+
+class ProcedureLock:
+    """Lets one thread at a time run a procedure on a controller; others are told at once."""
+
+    def __init__(self, identity: str) -> None:
+        self._lock = threading.RLock()
+        self._identity = identity
+
+    @contextmanager
+    def held(self, request: str) -> Iterator[None]:
+        """Hold the procedure lock.
+
+        Raises:
+            BusyError: Another thread holds it.
+        """
+        if not self._lock.acquire(blocking=False):
+            raise BusyError(
+                tr("{request} has to wait: another operation is under way.", request=request),
+                remedy=tr("Wait for it to end; stopping is possible at any time."),
+                controller=self._identity,
+                request=request,
+            )
+        try:
+            yield
+        finally:
+            self._lock.release()
+
+
+class MarkerDesk:
+    """Writes and clears the durable markers of one controller."""
+
+    def __init__(self, session: EpsonSession, outcomes: OutcomeLog) -> None:
+        self._session = session
+        self._outcomes = outcomes
+        self._selection: Marker | None = None
+
+    def begin(self, kind: MarkerKind, request: str, details: Mapping[str, object]) -> Marker:
+        """Store a new marker durably; raises ConfigError when that is impossible."""
+        marker = Marker(new_operation(), kind, request, wall_label(), dict(details))
+        self._outcomes.begin(marker)
+        if kind is MarkerKind.SELECTION:
+            self._selection = marker
+        return marker
+
+    def note_selection(self, tool: int) -> None:
+        """Record, in the marker of the procedure under way, which tool is in force now."""
+        marker = self._selection
+        if marker is not None:
+            details = {**marker.details, "now": tool}
+            self._selection = Marker(
+                marker.operation, marker.kind, marker.request, marker.begun_at, details
+            )
+            self._outcomes.begin(self._selection)
+
+    def clear(self, marker: Marker) -> None:
+        """Forget a marker whose outcome is proved."""
+        self._outcomes.clear(marker.operation)
+        if self._selection is not None and marker.operation == self._selection.operation:
+            self._selection = None
+
+    def require_settled(self, request: str) -> None:
+        """Refuse to go on while something earlier is unsettled.
+
+        The marker of the procedure that is running here does not count.
+
+        Raises:
+            OutcomeUnknownError: Names what is unsettled.
+        """
+        for marker in self._outcomes.open_markers():
+            if self._selection is not None and marker.operation == self._selection.operation:
+                continue
+            raise OutcomeUnknownError(
+                tr(
+                    "{request!r} was not sent: {earlier!r} of {when} is not settled.",
+                    request=request,
+                    earlier=marker.request,
+                    when=marker.begun_at,
+                ),
+                remedy=tr("Run 'robolink resolve' first; motion is blocked until then."),
+                controller=self._session.identity,
+                request=request,
+            )
+
+    @contextmanager
+    def doubt(self, statement: Statement) -> Iterator[None]:
+        """Turn a lost answer inside the block into OutcomeUnknownError."""
+        try:
+            yield
+        except (TransportError, RemoteProtocolError) as error:
+            raise outcome_unknown(
+                error,
+                controller=self._session.identity,
+                request=statement,
+                marker_note=tr(
+                    "It was not sent again. Look at the robot, connect again and run "
+                    "'robolink resolve'; motion is blocked until then."
+                ),
+            ) from error

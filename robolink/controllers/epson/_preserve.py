@@ -1,0 +1,124 @@
+"""Puts back what a procedure changed: the tool, the power mode and the speed.
+
+A calibration works in Tool 0, and the selection survives power-off (epson.md 3.1): left
+there, the next program would drive the flange where the nozzle tip belongs. So a durable
+marker names the cell's own tool before anything is changed, and goes only when that tool
+has been read back.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from robolink.controllers.epson._guarded import MarkerDesk, ProcedureLock
+from robolink.controllers.epson._motion import EpsonGroup
+from robolink.controllers.epson._session import EpsonSession
+from robolink.controllers.epson._settings import PowerAndSpeed
+from robolink.controllers.epson._tools import EpsonToolTable
+from robolink.controllers.epson._window import CommandWindow
+from robolink.errors import ConfigError, RobolinkError
+from robolink.messages import tr
+from robolink.model import Marker, MarkerKind
+
+
+@dataclass(frozen=True, slots=True)
+class InForce:
+    """What a procedure must leave as it found it."""
+
+    tool: int
+    settings: PowerAndSpeed
+
+    def to_details(self) -> dict[str, object]:
+        """Return plain values for a marker."""
+        return {
+            "tool": self.tool,
+            "now": self.tool,
+            "power_high": self.settings.power_high,
+            "speed_percent": list(self.settings.speed_percent),
+            "speed_s_mm_s": list(self.settings.speed_s_mm_s),
+        }
+
+    @classmethod
+    def from_marker(cls, marker: Marker) -> "InForce":
+        """Return what ``marker`` says is to be put back.
+
+        Raises:
+            ConfigError: The marker was written by something else.
+        """
+        try:
+            details = marker.details
+            tool, high = details["tool"], details["power_high"]
+            speed, speed_s = details["speed_percent"], details["speed_s_mm_s"]
+            if not (
+                isinstance(tool, int) and isinstance(speed, list) and isinstance(speed_s, list)
+            ):
+                raise TypeError
+            a, b, c = (int(value) for value in speed)
+            d, e, f = (float(value) for value in speed_s)
+        except (KeyError, TypeError, ValueError) as error:
+            raise ConfigError(
+                tr("The marker of {when} cannot be understood.", when=marker.begun_at),
+                remedy=tr("Select the right tool by hand, then 'robolink resolve --forget'."),
+            ) from error
+        return cls(tool, PowerAndSpeed(bool(high), (a, b, c), (d, e, f)))
+
+
+class Preserver:
+    """Remembers at the start of a procedure, restores at its end."""
+
+    def __init__(
+        self,
+        session: EpsonSession,
+        window: CommandWindow,
+        desk: MarkerDesk,
+        lock: ProcedureLock,
+        *,
+        tools: EpsonToolTable,
+        group: EpsonGroup,
+    ) -> None:
+        self._session = session
+        self._window = window
+        self._desk = desk
+        self._lock = lock
+        self._tools = tools
+        self._group = group
+
+    @contextmanager
+    def preserved(self, reason: str) -> Iterator[None]:
+        """See :meth:`robolink.model.Controller.preserved`."""
+        with self._lock.held(reason):
+            self._desk.require_settled(reason)
+            self._window.require_ready(reason)
+            before = InForce(self._tools.selected(), self._group.settings.read())
+            marker = self._desk.begin(MarkerKind.SELECTION, reason, before.to_details())
+            try:
+                yield
+            except BaseException as error:
+                self._restore_after(error, before, marker)
+                raise
+            self.restore(before, marker)
+
+    def restore(self, before: InForce, marker: Marker) -> None:
+        """Put ``before`` back, read it back, and forget ``marker``."""
+        self._group.abort_unfinished()
+        self._tools.select(before.tool)
+        self._group.settings.restore(before.settings)
+        self._desk.clear(marker)
+
+    def _restore_after(self, error: BaseException, before: InForce, marker: Marker) -> None:
+        """Restore while ``error`` is on its way; if impossible, let it say what is left."""
+        try:
+            self.restore(before, marker)
+        except RobolinkError as second:
+            if isinstance(error, RobolinkError):
+                error.remedy = " ".join(
+                    (
+                        error.remedy,
+                        tr(
+                            "The tool of before, tool {tool}, could not be selected again "
+                            "({cause}) 'robolink resolve' offers it.",
+                            tool=before.tool,
+                            cause=second.what,
+                        ),
+                    )
+                ).strip()

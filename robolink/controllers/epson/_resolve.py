@@ -1,0 +1,150 @@
+"""Settles what an earlier process left open: by reading, and with a person's word.
+
+Nothing is sent again. A value that was being written is read; a robot that was told to move
+is looked at; the cell's own tool is selected again when a person says so.
+"""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from robolink.controllers.epson._guarded import MarkerDesk
+from robolink.controllers.epson._motion import EpsonGroup
+from robolink.controllers.epson._preserve import InForce, Preserver
+from robolink.controllers.epson._tools import TOLERANCE, EpsonToolTable, describe
+from robolink.messages import tr
+from robolink.model import Marker, MarkerKind, ToolOffset
+from robolink.protocols import spel
+
+
+class Verdict(StrEnum):
+    """What reading the controller says about an open marker."""
+
+    DONE = "done"
+    NOT_APPLIED = "not applied"
+    CONFLICT = "conflict"
+    LOOK = "look"
+    NOT_RESTORED = "not restored"
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """An open marker and what is true now.
+
+    Attributes:
+        marker: What was begun.
+        verdict: What became of it.
+        sentence: The same for a person.
+        action: What settling it will do beyond forgetting it, empty for nothing.
+    """
+
+    marker: Marker
+    verdict: Verdict
+    sentence: str
+    action: str = ""
+
+
+class Resolver:
+    """Examines and settles open markers."""
+
+    def __init__(
+        self, desk: MarkerDesk, *, tools: EpsonToolTable, group: EpsonGroup, preserver: Preserver
+    ) -> None:
+        self._desk = desk
+        self._tools = tools
+        self._group = group
+        self._preserver = preserver
+
+    def examine(self, marker: Marker) -> Finding:
+        """Read what is needed to judge ``marker``; changes nothing."""
+        if marker.kind is MarkerKind.MOVE:
+            return self._examine_move(marker)
+        if marker.kind is MarkerKind.SELECTION:
+            return self._examine_selection(marker)
+        if "select" in marker.details:
+            return self._examine_select(marker)
+        return self._examine_write(marker)
+
+    def settle(self, finding: Finding) -> None:
+        """Do what ``finding.action`` says and forget the marker."""
+        if finding.verdict is Verdict.NOT_RESTORED:
+            self._preserver.restore(InForce.from_marker(finding.marker), finding.marker)
+        else:
+            self._desk.clear(finding.marker)
+
+    def forget(self, marker: Marker) -> None:
+        """Forget a marker on a person's word alone."""
+        self._desk.clear(marker)
+
+    def _examine_write(self, marker: Marker) -> Finding:
+        tool = int(str(marker.details["tool"]))
+        now = self._tools.read(tool)
+        requested = _offset(marker.details.get("requested"))
+        before = _offset(marker.details.get("before"))
+        if _same(now, requested):
+            verdict = Verdict.DONE
+            sentence = tr("Tool {tool} holds the new value {now}.", tool=tool, now=describe(now))
+        elif _same(now, before):
+            verdict = Verdict.NOT_APPLIED
+            sentence = tr(
+                "Tool {tool} still holds the old value {now}; the write did not take.",
+                tool=tool,
+                now=describe(now),
+            )
+        else:
+            verdict = Verdict.CONFLICT
+            sentence = tr(
+                "Tool {tool} holds {now}: neither the old value {before} nor the new one "
+                "{requested}.",
+                tool=tool,
+                now=describe(now),
+                before=describe(before),
+                requested=describe(requested),
+            )
+        return Finding(marker, verdict, sentence)
+
+    def _examine_select(self, marker: Marker) -> Finding:
+        now, wanted = self._tools.selected(), int(str(marker.details["select"]))
+        verdict = Verdict.DONE if now == wanted else Verdict.NOT_APPLIED
+        return Finding(marker, verdict, tr("Tool {now} is selected now.", now=now))
+
+    def _examine_move(self, marker: Marker) -> Finding:
+        pose = self._group.pose()
+        sentence = tr(
+            "The robot stands still at X {x} Y {y} Z {z} U {u} (tool {tool}); the move went to "
+            "{target}. Look at it: nothing is sent again.",
+            x=spel.decimal(pose.x_mm),
+            y=spel.decimal(pose.y_mm),
+            z=spel.decimal(pose.z_mm),
+            u=spel.decimal(pose.u_deg),
+            tool=pose.tool,
+            target=marker.request,
+        )
+        return Finding(marker, Verdict.LOOK, sentence)
+
+    def _examine_selection(self, marker: Marker) -> Finding:
+        before, now = InForce.from_marker(marker), self._tools.selected()
+        if now == before.tool and self._group.settings.read() == before.settings:
+            return Finding(
+                marker,
+                Verdict.DONE,
+                tr("Tool {tool} is selected, as it was before.", tool=now),
+            )
+        return Finding(
+            marker,
+            Verdict.NOT_RESTORED,
+            tr(
+                "Tool {now} is selected; before {reason!r} it was tool {before}.",
+                now=now,
+                reason=marker.request,
+                before=before.tool,
+            ),
+            tr("select tool {tool} again, with the power mode and speed of then", tool=before.tool),
+        )
+
+
+def _offset(value: object) -> ToolOffset | None:
+    return ToolOffset(*value) if isinstance(value, list) else None
+
+
+def _same(a: ToolOffset | None, b: ToolOffset | None) -> bool:
+    return a is b if a is None or b is None else a.matches(b, TOLERANCE)

@@ -1,0 +1,242 @@
+"""The tool table of an EPSON controller: TLSet, TLClr, Tool (epson.md 3.1)."""
+
+from collections.abc import Sequence
+
+from robolink.controllers.epson._guarded import MarkerDesk, ProcedureLock
+from robolink.controllers.epson._robot import RobotFacts
+from robolink.controllers.epson._window import CommandWindow
+from robolink.errors import (
+    ReadBackError,
+    ReservedToolError,
+    ToolChangedError,
+    ToolError,
+    ToolIndexError,
+    UndefinedToolError,
+)
+from robolink.messages import tr
+from robolink.model import ANY, Expected, MarkerKind, ToolOffset, ToolReceipt
+from robolink.protocols import spel
+
+DECIMALS = 3
+"""Places that a printed point shows (epson.md 3.3, from a real capture)."""
+
+TOLERANCE = 0.5 * 10**-DECIMALS
+"""Two values that this controller prints alike are equal."""
+
+
+class EpsonToolTable:
+    """Tools 1 to 15 in the controller's flash, and the selected one.
+
+    Every write is compare-and-set and read back. A value that is stored already is not
+    written again: TLSet wears the flash (epson.md 3.1).
+    """
+
+    def __init__(
+        self, window: CommandWindow, desk: MarkerDesk, lock: ProcedureLock, robot: RobotFacts
+    ) -> None:
+        self._window = window
+        self._desk = desk
+        self._lock = lock
+        self._robot = robot
+
+    def indices(self) -> Sequence[int]:
+        """Return 1 to 15; Tool 0 is the flange."""
+        return range(1, 16)
+
+    def read_all(self) -> dict[int, ToolOffset | None]:
+        """Read all fifteen from one TLSet listing."""
+        self._window.require_ready("TLSet")
+        listed = spel.parse_tool_listing(self._window.printed(spel.list_tools()))
+        return {tool: listed.get(tool) for tool in self.indices()}
+
+    def read(self, tool: int) -> ToolOffset | None:
+        """Read one tool, ``None`` when it is undefined; Tool 0 reads as all zeros."""
+        self._check_index(tool, lowest=0)
+        self._window.require_ready(f"TLSet {tool}")
+        return self._read(tool)
+
+    def write(self, tool: int, offset: ToolOffset, *, expected: Expected) -> ToolReceipt:
+        """Write and read back; see :class:`robolink.model.ToolTable`."""
+        self._check_writable(tool)
+        requested = offset.rounded(DECIMALS)
+        with self._lock.held(f"TLSet {tool}"):
+            self._window.require_ready(f"TLSet {tool}")
+            six_axes = self._robot.read().six_axes
+            self._check_axes(requested, six_axes=six_axes)
+            statement = spel.set_tool(tool, requested, six_axes=six_axes)
+            return self._change(tool, requested, expected, statement)
+
+    def preview_write(self, tool: int, offset: ToolOffset) -> tuple[spel.Statement, ...]:
+        """Return what :meth:`write` would send besides its reads; reads only.
+
+        Empty when the value is stored already.
+        """
+        self._check_writable(tool)
+        self._window.require_ready(f"TLSet {tool}")
+        requested = offset.rounded(DECIMALS)
+        six_axes = self._robot.read().six_axes
+        self._check_axes(requested, six_axes=six_axes)
+        if _same(self._read(tool), requested):
+            return ()
+        return (spel.set_tool(tool, requested, six_axes=six_axes),)
+
+    def preview_clear(self, tool: int) -> tuple[spel.Statement, ...]:
+        """Return what :meth:`clear` would send besides its reads."""
+        self._check_writable(tool)
+        return () if self.read(tool) is None else (spel.clear_tool(tool),)
+
+    def preview_select(self, tool: int) -> tuple[spel.Statement, ...]:
+        """Return what :meth:`select` would send besides its reads."""
+        self._require_defined(tool)
+        return () if self.selected() == tool else (spel.select_tool(tool),)
+
+    def clear(self, tool: int, *, expected: Expected) -> ToolReceipt:
+        """Clear and read back; see :class:`robolink.model.ToolTable`."""
+        self._check_writable(tool)
+        with self._lock.held(f"TLClr {tool}"):
+            self._window.require_ready(f"TLClr {tool}")
+            return self._change(tool, None, expected, spel.clear_tool(tool))
+
+    def selected(self) -> int:
+        """Read which tool is in force; the selection survives power-off (epson.md 3.1)."""
+        self._window.require_ready("Print Tool")
+        return self._selected()
+
+    def select(self, tool: int) -> None:
+        """Put ``tool`` in force and read the selection back."""
+        self._check_index(tool, lowest=0)
+        statement = spel.select_tool(tool)
+        with self._lock.held(statement):
+            self._window.require_ready(statement)
+            before = self._selected()
+            if before == tool:
+                return
+            self._require_defined(tool)
+            marker = self._desk.begin(MarkerKind.SET, statement, {"select": tool, "before": before})
+            self._desk.note_selection(tool)
+            with self._desk.doubt(statement):
+                self._window.command(statement)
+                found = self._selected()
+            self._desk.clear(marker)
+            if found != tool:
+                raise ReadBackError(
+                    tr(
+                        "Tool {tool} was selected, but the controller says that tool {found} is "
+                        "in force.",
+                        tool=tool,
+                        found=found,
+                    ),
+                    remedy=tr("Do not move the robot; look at the controller's Tool setting."),
+                    request=statement,
+                )
+
+    def _change(
+        self, tool: int, requested: ToolOffset | None, expected: Expected, statement: spel.Statement
+    ) -> ToolReceipt:
+        before = self._read(tool)
+        unconditional = expected is ANY
+        if _same(before, requested):
+            return ToolReceipt(
+                tool, before, requested, before, skipped=True, unconditional=unconditional
+            )
+        if expected is not ANY and not _same(before, expected):
+            raise ToolChangedError(
+                tr(
+                    "Tool {tool} holds {found}, not the expected {expected}; nothing was written.",
+                    tool=tool,
+                    found=describe(before),
+                    expected=describe(expected),
+                ),
+                remedy=tr(
+                    "Someone changed it: a program that runs TLSet at its start, the pendant, or "
+                    "a restored project. Read it again and decide anew."
+                ),
+                request=statement,
+            )
+        marker = self._desk.begin(
+            MarkerKind.SET,
+            statement,
+            {"tool": tool, "before": _plain(before), "requested": _plain(requested)},
+        )
+        with self._desk.doubt(statement):
+            self._window.command(statement)
+            found = self._read(tool)
+        self._desk.clear(marker)
+        if not _same(found, requested):
+            raise ReadBackError(
+                tr(
+                    "Tool {tool} was written as {requested}, but reads back as {found}.",
+                    tool=tool,
+                    requested=describe(requested),
+                    found=describe(found),
+                ),
+                remedy=tr(
+                    "Do not run the cell with it. Before the write it held {before}.",
+                    before=describe(before),
+                ),
+                request=statement,
+            )
+        return ToolReceipt(tool, before, requested, found, unconditional=unconditional)
+
+    def _read(self, tool: int) -> ToolOffset | None:
+        if tool == 0:
+            return ToolOffset()
+        defined = self._window.printed(spel.print_tool_defined(tool))
+        if not spel.parse_boolean(defined):
+            return None
+        point = spel.parse_point(self._window.printed(spel.print_tool(tool)))
+        return ToolOffset(*point.coordinates)
+
+    def _require_defined(self, tool: int) -> None:
+        # Tool n on an undefined tool leaves the controller in error (epson.md 1.5).
+        if self.read(tool) is None:
+            raise UndefinedToolError(
+                tr("Tool {tool} is not defined, so it was not selected.", tool=tool),
+                remedy=tr("Define it first, with a calibration or 'robolink tool set'."),
+                request=spel.select_tool(tool),
+            )
+
+    def _selected(self) -> int:
+        return spel.parse_integer(self._window.printed(spel.print_selected_tool()))
+
+    def _check_index(self, tool: int, *, lowest: int) -> None:
+        if isinstance(tool, bool) or not isinstance(tool, int) or not lowest <= tool <= 15:
+            raise ToolIndexError(
+                tr("There is no tool {tool}.", tool=tool),
+                remedy=tr("EPSON controllers have tools {lowest} to 15.", lowest=lowest),
+            )
+
+    def _check_writable(self, tool: int) -> None:
+        if tool == 0:
+            raise ReservedToolError(
+                tr("Tool 0 is the flange itself and is never written."),
+                remedy=tr("Choose a tool from 1 to 15."),
+            )
+        self._check_index(tool, lowest=1)
+
+    def _check_axes(self, offset: ToolOffset, *, six_axes: bool) -> None:
+        if not six_axes and (offset.v_deg or offset.w_deg):
+            raise ToolError(
+                tr("This robot has four axes: a tool's V and W must be 0."),
+                remedy=tr("Leave V and W out."),
+            )
+
+
+def describe(offset: ToolOffset | None) -> str:
+    """Return an offset as a person reads it."""
+    if offset is None:
+        return tr("undefined")
+    names = ("X", "Y", "Z", "U", "V", "W")
+    pairs = zip(names, offset.components(), strict=True)
+    shown = [(n, v) for n, v in pairs if n not in "VW" or v]
+    return " ".join(f"{name} {spel.decimal(value, DECIMALS)}" for name, value in shown)
+
+
+def _same(a: ToolOffset | None, b: ToolOffset | None) -> bool:
+    if a is None or b is None:
+        return a is b
+    return a.matches(b, TOLERANCE)
+
+
+def _plain(offset: ToolOffset | None) -> list[float] | None:
+    return None if offset is None else list(offset.components())

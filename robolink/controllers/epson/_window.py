@@ -1,0 +1,135 @@
+"""Statements run through Execute, as if typed in the controller's command window."""
+
+from robolink.controllers.epson._answers import (
+    NOT_EXECUTED,
+    rejected,
+    require_ready,
+    status_from_flags,
+)
+from robolink.controllers.epson._session import EpsonSession
+from robolink.errors import ControllerFaultError, RejectedError, RemoteProtocolError
+from robolink.messages import tr
+from robolink.model import ControllerStatus
+from robolink.protocols.epson_text import Refusal, Reply, parse_status
+from robolink.protocols.spel import Statement
+
+
+class CommandWindow:
+    """Runs typed SPEL+ statements that do not move the robot, and explains failures.
+
+    How a failed statement is answered is not documented (epson.md 1.5): anything but ``0``
+    for a command, or but printed text for a query, counts as failure, and the status tells
+    the rest.
+    """
+
+    def __init__(self, session: EpsonSession) -> None:
+        self._session = session
+
+    def status(self) -> ControllerStatus:
+        """Read the flags; legal at any time after the login."""
+        flags, code = parse_status(self._session.exchange("GetStatus"))
+        return status_from_flags(flags, code)
+
+    def require_ready(self, request: str) -> ControllerStatus:
+        """Read the flags and hold ``request`` back if Execute would be refused.
+
+        Raises:
+            NotReadyError: Names the condition.
+        """
+        status = self.status()
+        require_ready(status, controller=self._session.identity, request=request)
+        return status
+
+    def command(self, statement: Statement) -> None:
+        """Run a statement that prints nothing.
+
+        Raises:
+            RejectedError: It was refused and not carried out.
+            ControllerFaultError: It failed and put the controller in error.
+        """
+        self.check(statement, self._session.execute(statement))
+
+    def printed(self, query: Statement) -> str:
+        """Run a statement that prints, and return what it printed.
+
+        Raises:
+            RejectedError, ControllerFaultError: As for :meth:`command`.
+        """
+        answer = self._session.execute(query)
+        if isinstance(answer, Reply) and answer.text is not None:
+            # A failed statement may be answered by a text too; the flags would show it.
+            if not answer.text.lstrip().startswith("!"):
+                return answer.text
+        elif isinstance(answer, Reply) and answer.fields == ("0",):
+            raise RemoteProtocolError(
+                tr("{query} printed nothing.", query=query),
+                remedy=tr("This controller's SPEL+ differs from the documented one; report it."),
+                controller=self._session.identity,
+                request=query,
+            )
+        raise self.failure(query, answer)
+
+    def check(self, statement: Statement, answer: Reply | Refusal) -> None:
+        """Raise unless ``answer`` says that ``statement`` ran."""
+        if not (isinstance(answer, Reply) and answer.text is None and answer.fields == ("0",)):
+            raise self.failure(statement, answer)
+
+    def failure(
+        self, statement: Statement, answer: Reply | Refusal
+    ) -> RejectedError | ControllerFaultError:
+        """Find out why ``statement`` did not run."""
+        controller = self._session.identity
+        if isinstance(answer, Refusal) and answer.code in NOT_EXECUTED:
+            return rejected(answer, controller=controller, request=statement)
+        status = self.status()
+        if status.fault or status.emergency_stop or status.guard_open or status.serious_fault:
+            return self.fault(status, statement)
+        return RejectedError(
+            tr("The controller did not run {statement!r}.", statement=statement),
+            code=answer.code if isinstance(answer, Refusal) else status.code,
+            remedy=tr("It answered: {answer}.", answer=_shown(answer)),
+            controller=controller,
+            request=statement,
+        )
+
+    def fault(self, status: ControllerStatus, statement: str) -> ControllerFaultError:
+        """Return the error for a controller that stopped ``statement``."""
+        if status.emergency_stop:
+            cause, remedy = tr("the emergency stop was pressed"), tr("Release it, then reset.")
+        elif status.guard_open:
+            cause, remedy = tr("the safety guard was opened"), tr("Close it, then reset.")
+        else:
+            cause = tr("error {code:04d}", code=status.code)
+            text = self.error_text(status.code)
+            cause = f"{cause} ({text})" if text else cause
+            remedy = tr("Find the cause, then run 'robolink reset' (it may switch outputs off).")
+        return ControllerFaultError(
+            tr(
+                "{statement!r} was ended by the controller: {cause}.",
+                statement=statement,
+                cause=cause,
+            ),
+            code=status.code,
+            remedy=tr("Nothing was repeated. {remedy}", remedy=remedy),
+            controller=self._session.identity,
+            request=statement,
+        )
+
+    def error_text(self, code: int) -> str:
+        """Return the controller's own text for ``code``, empty where it has none.
+
+        GetErrMsg exists on newer firmware only (epson.md 1.8); older ones refuse it.
+        """
+        if not code or (self._session.pending and self._session.pending.answer is None):
+            return ""
+        try:
+            reply = self._session.exchange("GetErrMsg", str(code), "0")
+        except RejectedError:
+            return ""
+        return ",".join(reply.fields).strip()
+
+
+def _shown(answer: Reply | Refusal) -> str:
+    if isinstance(answer, Refusal):
+        return f"!{answer.name},{answer.code}"
+    return answer.text if answer.text is not None else ",".join(answer.fields)

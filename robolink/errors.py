@@ -1,0 +1,250 @@
+"""Every exception that robolink raises on purpose.
+
+::
+
+    RobolinkError
+    ├── ConfigError (ValueError)           a URL, an option or a file is wrong; nothing was sent
+    │   └── LimitError                     a target or a change lies outside the stated limits
+    ├── TransportError                     the wire
+    │   ├── ConnectError (ConnectionError) no link
+    │   │   └── LoginUnansweredError       a link, but nobody answers the login
+    │   ├── TransportTimeoutError (TimeoutError)
+    │   ├── TransportClosedError           we closed it
+    │   └── TransportBrokenError           they, or the cable, did
+    ├── ProtocolError                      never raised as such
+    │   ├── LocalProtocolError             we asked for something illegal
+    │   └── RemoteProtocolError            what they sent makes no sense; the session is dead
+    ├── ControllerError                    a well-formed "no"
+    │   ├── RejectedError                  the controller refused the request
+    │   │   └── LoginRefusedError          wrong password, or one is demanded
+    │   ├── NotReadyError                  refused here: the state would not allow it (.reason)
+    │   ├── ControllerFaultError           the controller is in error
+    │   ├── MotionTimeoutError             a movement took too long and was aborted
+    │   └── BusyError                      another operation of this process is under way
+    ├── OutcomeUnknownError                sent, not answered: the machine may or may not have acted
+    ├── ToolError
+    │   ├── ToolIndexError · ReservedToolError · UndefinedToolError
+    │   ├── ToolChangedError               not the value that was expected; nothing was written
+    │   └── ReadBackError                  written, but another value came back
+    ├── CalibrationError                   the data do not give a trustworthy result (.code)
+    ├── VerifyError                        the drift about the new tip is too large
+    └── DeclinedError                      a person said no
+
+Each error says what happened (:attr:`~RobolinkError.what`) and what to do next
+(:attr:`~RobolinkError.remedy`); ``str(error)`` is both. Foreign exceptions are converted
+at the transport boundary only, always ``from`` the original.
+"""
+
+from enum import StrEnum
+
+
+class RobolinkError(Exception):
+    """Root of the tree.
+
+    Args:
+        what: What happened, one sentence.
+        remedy: What to do next, one sentence; may be empty when ``what`` says it.
+        controller: Identity or URL of the controller concerned, without any password.
+        request: The request under way, as it may be shown to a person.
+        raw: The bytes that were read and could not be used.
+    """
+
+    def __init__(
+        self,
+        what: str,
+        *,
+        remedy: str = "",
+        controller: str = "",
+        request: str = "",
+        raw: bytes = b"",
+    ) -> None:
+        super().__init__(what)
+        self.what = what
+        self.remedy = remedy
+        self.controller = controller
+        self.request = request
+        self.raw = raw
+
+    def __str__(self) -> str:
+        return f"{self.what} {self.remedy}".rstrip()
+
+
+class ConfigError(RobolinkError, ValueError):
+    """A URL, an option, a value or a file is wrong. Nothing was sent."""
+
+
+class LimitError(ConfigError):
+    """A target, a step or a change lies outside the limits in force. Nothing was sent."""
+
+
+class TransportError(RobolinkError):
+    """The wire failed."""
+
+
+class ConnectError(TransportError, ConnectionError):
+    """No link could be made."""
+
+
+class LoginUnansweredError(ConnectError):
+    """The port answers, the login does not.
+
+    EPSON controllers serve one remote client at a time (epson.md 1.1); what a second one
+    sees is not documented, so silence and a closed connection both end here.
+    """
+
+
+class TransportTimeoutError(TransportError, TimeoutError):
+    """Nothing came before the deadline. The link is unusable from here on."""
+
+
+class TransportClosedError(TransportError):
+    """The link was used after this side had closed it."""
+
+
+class TransportBrokenError(TransportError):
+    """The far side, or the cable, ended the link."""
+
+
+class ProtocolError(RobolinkError):
+    """Root of the two protocol errors; never raised as such."""
+
+
+class LocalProtocolError(ProtocolError):
+    """This side asked for something that the protocol forbids. Nothing was sent."""
+
+
+class RemoteProtocolError(ProtocolError):
+    """The far side sent something that makes no sense. The session is over."""
+
+
+class ControllerError(RobolinkError):
+    """The controller, or a check of its state, said no.
+
+    Attributes:
+        code: The controller's own number, 0 when there is none.
+    """
+
+    def __init__(
+        self,
+        what: str,
+        *,
+        code: int = 0,
+        remedy: str = "",
+        controller: str = "",
+        request: str = "",
+        raw: bytes = b"",
+    ) -> None:
+        super().__init__(what, remedy=remedy, controller=controller, request=request, raw=raw)
+        self.code = code
+
+
+class RejectedError(ControllerError):
+    """The controller answered with a refusal; it did not act."""
+
+
+class LoginRefusedError(RejectedError):
+    """The password is wrong or missing. One attempt was made, no more will be."""
+
+
+class NotReadyReason(StrEnum):
+    """Why a command was held back before it was sent."""
+
+    NOT_REMOTE = "not_remote"
+    TEACH = "teach"
+    TEST = "test"
+    RUNNING = "running"
+    PAUSED = "paused"
+    MOVING = "moving"
+    EMERGENCY_STOP = "emergency_stop"
+    GUARD_OPEN = "guard_open"
+    FAULT = "fault"
+    SERIOUS_FAULT = "serious_fault"
+    STARTING = "starting"
+    MOTORS_OFF = "motors_off"
+    HIGH_POWER = "high_power"
+    WRONG_TOOL = "wrong_tool"
+    NO_REMOTE_TIMEOUT = "no_remote_timeout"
+
+
+class NotReadyError(ControllerError):
+    """The controller's state would not allow the command, so it was not sent.
+
+    Attributes:
+        reason: The named state.
+    """
+
+    def __init__(
+        self,
+        what: str,
+        *,
+        reason: NotReadyReason,
+        code: int = 0,
+        remedy: str = "",
+        controller: str = "",
+        request: str = "",
+    ) -> None:
+        super().__init__(what, code=code, remedy=remedy, controller=controller, request=request)
+        self.reason = reason
+
+
+class ControllerFaultError(ControllerError):
+    """The controller went into, or is in, its error state."""
+
+
+class MotionTimeoutError(ControllerError):
+    """A movement did not end in time; it was aborted, and its end was seen."""
+
+
+class BusyError(ControllerError):
+    """Another operation of this process holds the controller. Nothing was sent."""
+
+
+class OutcomeUnknownError(RobolinkError):
+    """A command went out and no answer came: it may or may not have run.
+
+    Motion on that controller is blocked until ``resolve``; nothing is sent again.
+    """
+
+
+class ToolError(RobolinkError):
+    """Something about a tool."""
+
+
+class ToolIndexError(ToolError, ValueError):
+    """No such tool number."""
+
+
+class ReservedToolError(ToolError):
+    """Tool 0 is the flange itself and is never written."""
+
+
+class UndefinedToolError(ToolError):
+    """The tool has no definition."""
+
+
+class ToolChangedError(ToolError):
+    """The stored value is not the one that was expected. Nothing was written."""
+
+
+class ReadBackError(ToolError):
+    """The value read after the write is not the value written."""
+
+
+class CalibrationError(RobolinkError):
+    """The measurements do not support a result.
+
+    Attributes:
+        code: The named reason, for example ``insufficient_rotation``.
+    """
+
+    def __init__(self, code: str, what: str, *, remedy: str = "") -> None:
+        super().__init__(what, remedy=remedy)
+        self.code = code
+
+
+class VerifyError(RobolinkError):
+    """The tip drifts too far when the tool turns about it; the old value was put back."""
+
+
+class DeclinedError(RobolinkError):
+    """A person, or the absence of one, said no."""

@@ -1,0 +1,138 @@
+"""What a controller is to its user."""
+
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from enum import StrEnum
+from types import TracebackType
+from typing import Protocol, Self
+
+from robolink.model._motion import MotionGroup
+from robolink.model._outcomes import OutcomeLog
+from robolink.model._tools import ToolTable
+from robolink.timing import Clock
+
+
+class ControllerState(StrEnum):
+    """The one word for what a controller is doing, worst first."""
+
+    SERIOUS_FAULT = "serious fault"
+    EMERGENCY_STOP = "emergency stop"
+    FAULT = "fault"
+    GUARD_OPEN = "guard open"
+    TEACH = "teach"
+    TEST = "test"
+    NOT_REMOTE = "not in remote control"
+    PAUSED = "paused"
+    RUNNING = "running"
+    READY = "ready"
+    STARTING = "starting"
+
+
+@dataclass(frozen=True, slots=True)
+class ControllerStatus:
+    """The state flags of a controller at one moment.
+
+    ``code`` is the controller's own error or warning number, 0 when there is none.
+    """
+
+    remote: bool = False
+    ready: bool = False
+    running: bool = False
+    paused: bool = False
+    fault: bool = False
+    serious_fault: bool = False
+    emergency_stop: bool = False
+    guard_open: bool = False
+    warning: bool = False
+    teach: bool = False
+    test: bool = False
+    code: int = 0
+
+    @property
+    def state(self) -> ControllerState:
+        """The worst thing that is true."""
+        checks = (
+            (self.serious_fault, ControllerState.SERIOUS_FAULT),
+            (self.emergency_stop, ControllerState.EMERGENCY_STOP),
+            (self.fault, ControllerState.FAULT),
+            (self.guard_open, ControllerState.GUARD_OPEN),
+            (self.teach, ControllerState.TEACH),
+            (self.test, ControllerState.TEST),
+            (not self.remote, ControllerState.NOT_REMOTE),
+            (self.paused, ControllerState.PAUSED),
+            (self.running, ControllerState.RUNNING),
+            (self.ready, ControllerState.READY),
+        )
+        return next((state for true, state in checks if true), ControllerState.STARTING)
+
+
+@dataclass(frozen=True, slots=True)
+class Capabilities:
+    """What this kind of controller can be asked for."""
+
+    tool_write: bool = False
+    motion: bool = False
+    motors: bool = False
+
+
+class Controller(Protocol):
+    """A controller that someone is connected to.
+
+    Every call may raise a TransportError or RemoteProtocolError; after one the link is dead
+    and a new connection is needed.
+    """
+
+    @property
+    def identity(self) -> str:
+        """Which controller this is, without options or passwords."""
+
+    @property
+    def clock(self) -> Clock:
+        """The clock on which this controller's time passes."""
+
+    @property
+    def capabilities(self) -> Capabilities:
+        """What can be asked for."""
+
+    @property
+    def tools(self) -> ToolTable:
+        """The tool offsets."""
+
+    @property
+    def groups(self) -> Sequence[MotionGroup]:
+        """What moves."""
+
+    @property
+    def outcomes(self) -> OutcomeLog:
+        """The doubtful outcomes and the unfinished procedures of this controller."""
+
+    def status(self) -> ControllerStatus:
+        """Read the state flags."""
+
+    def stop(self) -> None:
+        """Stop everything; from any thread, at any time, more than once."""
+
+    def reset_fault(self) -> None:
+        """Clear an error because a person asked for it."""
+
+    def motors(self, on: bool) -> None:
+        """Switch the motors."""
+
+    def preserved(self, reason: str) -> AbstractContextManager[None]:
+        """Put back, at the end of the block, the tool, power and speed in force at its start.
+
+        A durable marker names the tool until that has been read back.
+        """
+
+    def close(self) -> None:
+        """Log out where that does no harm and close the link. Idempotent."""
+
+    def __enter__(self) -> Self: ...
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None: ...

@@ -1,0 +1,129 @@
+"""Tool offsets and the table that holds them: the centre of the product."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from enum import Enum
+from typing import Final, Literal, Protocol
+
+from robolink.errors import ConfigError
+from robolink.messages import tr
+from robolink.model._geometry import angle_difference_deg
+
+
+@dataclass(frozen=True, slots=True)
+class ToolOffset:
+    """Where the tip is, seen from the flange (Tool 0).
+
+    Lengths in mm, angles in degrees, ``R = Rz(U) Ry(V) Rx(W)`` as EPSON defines it.
+
+    Raises:
+        ConfigError: A component is not a finite number.
+    """
+
+    x_mm: float = 0.0
+    y_mm: float = 0.0
+    z_mm: float = 0.0
+    u_deg: float = 0.0
+    v_deg: float = 0.0
+    w_deg: float = 0.0
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if not isinstance(value, (int, float)) or not math.isfinite(value):
+                raise ConfigError(
+                    tr("{name} is not a number: {value!r}.", name=field.name, value=value),
+                    remedy=tr("Give a finite decimal number."),
+                )
+
+    def components(self) -> tuple[float, float, float, float, float, float]:
+        """Return x, y, z in mm and u, v, w in degrees."""
+        return (self.x_mm, self.y_mm, self.z_mm, self.u_deg, self.v_deg, self.w_deg)
+
+    def rounded(self, decimals: int) -> "ToolOffset":
+        """Return the value that a controller printing ``decimals`` places can hold."""
+        return ToolOffset(*(round(value, decimals) + 0.0 for value in self.components()))
+
+    def matches(self, other: "ToolOffset", tolerance: float) -> bool:
+        """Tell whether every component agrees within ``tolerance`` (mm, degrees).
+
+        Angles are compared modulo 360: a controller may store 270 as -90.
+        """
+        lengths = zip(self.components()[:3], other.components()[:3], strict=True)
+        angles = zip(self.components()[3:], other.components()[3:], strict=True)
+        slack = tolerance * (1 + 1e-9)
+        return all(abs(a - b) <= slack for a, b in lengths) and all(
+            abs(angle_difference_deg(a, b)) <= slack for a, b in angles
+        )
+
+
+class Expect(Enum):
+    """How a write may be made without naming the old value."""
+
+    ANY = "any"
+
+
+ANY: Final = Expect.ANY
+"""Pass as ``expected`` to write whatever is stored now. Recorded as unconditional."""
+
+Expected = ToolOffset | None | Literal[Expect.ANY]
+"""What the caller believes is stored: an offset, ``None`` for undefined, or :data:`ANY`."""
+
+
+@dataclass(frozen=True, slots=True)
+class ToolReceipt:
+    """What a write or clear did, as proved by reading back.
+
+    ``skipped`` means that the value was already there and nothing was written.
+    ``None`` stands for an undefined tool.
+    """
+
+    tool: int
+    before: ToolOffset | None
+    requested: ToolOffset | None
+    read_back: ToolOffset | None
+    skipped: bool = False
+    unconditional: bool = False
+
+
+class ToolTable(Protocol):
+    """The tool offsets stored in a controller."""
+
+    def indices(self) -> Sequence[int]:
+        """Return the tool numbers that can be written."""
+
+    def read_all(self) -> dict[int, ToolOffset | None]:
+        """Read every writable tool; an undefined one is ``None``."""
+
+    def read(self, tool: int) -> ToolOffset | None:
+        """Read one tool, ``None`` when it is undefined.
+
+        Raises:
+            ToolIndexError: There is no such tool.
+        """
+
+    def write(self, tool: int, offset: ToolOffset, *, expected: Expected) -> ToolReceipt:
+        """Write ``offset`` if the stored value is ``expected``, then read it back.
+
+        Raises:
+            ReservedToolError: Tool 0.
+            ToolIndexError: There is no such tool.
+            ToolChangedError: Something else is stored; nothing was written.
+            ReadBackError: Another value came back.
+            NotReadyError: The state would not allow a write; nothing was written.
+            OutcomeUnknownError: No answer came to the write.
+        """
+
+    def clear(self, tool: int, *, expected: Expected) -> ToolReceipt:
+        """Remove a definition; same conditions and errors as :meth:`write`."""
+
+    def selected(self) -> int:
+        """Return the number of the tool in force, 0 for the flange."""
+
+    def select(self, tool: int) -> None:
+        """Put a tool in force and read the selection back.
+
+        Raises:
+            UndefinedToolError: The tool has no definition.
+        """

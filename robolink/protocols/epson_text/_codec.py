@@ -1,0 +1,221 @@
+"""The two ends of a Remote Ethernet line, without the line.
+
+Theory of operation. Bytes go in through :meth:`~EpsonTextCodec.receive_data`, events come
+out of :meth:`~EpsonTextCodec.next_event`; events go in through
+:meth:`~EpsonTextCodec.send`, bytes come out. The codec frames and checks syntax. Whether a
+request is allowed now, and which reply answers which request, is for the layers above.
+
+A stream that makes no sense ends the codec for good: what follows a broken message cannot
+be told from the rest of it, and a reply taken for the wrong question moves a robot. So
+every later call raises the same error again.
+"""
+
+import codecs
+from typing import Final, Literal, Never
+
+from robolink.errors import ConfigError, LocalProtocolError, RemoteProtocolError
+from robolink.messages import tr
+from robolink.protocols._role import NEED_DATA, Need, Role
+from robolink.protocols.epson_text._events import (
+    EndOfStream,
+    Event,
+    Refusal,
+    Reply,
+    Request,
+)
+from robolink.protocols.epson_text._framing import MessageBuffer
+from robolink.protocols.epson_text._reading import read_answer, read_request
+from robolink.protocols.epson_text._writing import write_refusal, write_reply, write_request
+
+_TERMINATORS: Final = (b"\r\n", b"\r", b"\n")
+
+_ENCODINGS: Final = frozenset(
+    codecs.lookup(name).name
+    for name in ("latin-1", "cp1252", "utf-8", "shift_jis", "cp932", "gb18030", "big5")
+)
+"""Encodings in which no longer character holds the byte of a comma, a quote or a line end."""
+
+
+class EpsonTextCodec:
+    r"""One end of one connection.
+
+    Receiving accepts CR, LF and CRLF whatever ``terminator`` is, and any cut of the stream
+    into chunks gives the same events. As HOST, one empty line directly after an answer is
+    skipped: a controller set to LF CR, or one that puts Print's own line end behind the
+    closing quote, leaves such a line. Any other empty line is an error. As DEVICE, an empty
+    line is a request without ``$``.
+
+    A quoted text is handed out without one line end at its end, whether or not the
+    controller prints one before the closing quote (epson.md 1.5). A quote directly followed
+    by a line end ends the text, even if the controller meant it as part of it.
+
+    Args:
+        role: HOST sends requests, DEVICE answers them.
+        terminator: What ends the messages sent: CR, LF or CRLF.
+        max_line: Most bytes of one received message.
+        encoding: Of names and texts. Controllers print in the code page of their language
+            (cp1252, Shift-JIS, GB18030, Big5; epson.md 1.1); the default, latin-1, loses no
+            byte. A byte outside the encoding is shown as ``\xNN``.
+        segments: DEVICE only: :meth:`end_of_segment` may end a request that has no
+            terminator, as one controller was seen to do (epson.md 1.1).
+
+    Raises:
+        ConfigError: An argument is none of these.
+    """
+
+    __slots__ = (
+        "_blank_allowed",
+        "_buffer",
+        "_encoding",
+        "_ended",
+        "_failure",
+        "_role",
+        "_segments",
+        "_terminator",
+    )
+
+    def __init__(
+        self,
+        role: Role,
+        *,
+        terminator: bytes = b"\r\n",
+        max_line: int = 65536,
+        encoding: str = "latin-1",
+        segments: bool = False,
+    ) -> None:
+        if terminator not in _TERMINATORS:
+            _misconfigured(tr("{value!r} is not CR, LF or CRLF.", value=terminator))
+        if segments and role is Role.HOST:
+            _misconfigured(tr("Only a device can take segments for requests."))
+        self._role = role
+        self._terminator = terminator
+        self._encoding = _known_encoding(encoding)
+        self._segments = segments
+        self._buffer = MessageBuffer(max_line, quoted_replies=role is Role.HOST)
+        self._blank_allowed = False
+        self._ended = False
+        self._failure: RemoteProtocolError | None = None
+
+    def __repr__(self) -> str:
+        # What is held may be a login, so only its length is shown.
+        return f"<EpsonTextCodec {self._role.name} holding {len(self._buffer.held)} bytes>"
+
+    @property
+    def bytes_held(self) -> bytes:
+        """What has arrived and is part of no event yet, for messages about half a reply."""
+        return self._buffer.held
+
+    def send(self, event: Event) -> bytes:
+        """Return the bytes of one message.
+
+        Raises:
+            LocalProtocolError: The protocol, or this end's role, forbids it.
+            RemoteProtocolError: The codec is dead.
+        """
+        self._check_alive()
+        if self._role is Role.HOST and isinstance(event, Request):
+            return write_request(event) + self._terminator
+        if self._role is Role.DEVICE and isinstance(event, Reply):
+            return write_reply(event, self._encoding) + self._terminator
+        if self._role is Role.DEVICE and isinstance(event, Refusal):
+            return write_refusal(event, self._encoding) + self._terminator
+        raise LocalProtocolError(
+            tr(
+                "A {role} does not send {kind}.",
+                role=self._role.name.lower(),
+                kind=type(event).__name__,
+            ),
+            remedy=tr("A host sends requests; a device sends replies and refusals."),
+        )
+
+    def receive_data(self, data: bytes) -> None:
+        """Take what was received; ``b""`` means that the far side closed.
+
+        Raises:
+            LocalProtocolError: Bytes after the end of the stream.
+            RemoteProtocolError: The codec is dead.
+        """
+        self._check_alive()
+        if not data:
+            self._ended = True
+        elif self._ended:
+            raise LocalProtocolError(
+                tr("Bytes cannot follow the end of the stream."),
+                remedy=tr("Use a new codec for a new connection."),
+            )
+        else:
+            self._buffer.append(data)
+
+    def end_of_segment(self) -> None:
+        """Take what is held for a complete request; see ``segments``.
+
+        Raises:
+            LocalProtocolError: The codec was made without ``segments``.
+            RemoteProtocolError: The codec is dead.
+        """
+        self._check_alive()
+        if not self._segments:
+            raise LocalProtocolError(
+                tr("This codec does not end requests at segments."),
+                remedy=tr("Make it with segments=True."),
+            )
+        self._buffer.end_message()
+
+    def next_event(self) -> Event | Literal[Need.DATA]:
+        """Return the next event, or ``NEED_DATA``.
+
+        After the far side closed between two messages: ``EndOfStream``, each time.
+
+        Raises:
+            RemoteProtocolError: The stream makes no sense, or ended inside a message; the
+                codec is dead from here on.
+        """
+        self._check_alive()
+        try:
+            return self._next_event()
+        except RemoteProtocolError as error:
+            if self._role is Role.DEVICE:
+                error.raw = b""  # it may hold a password
+            self._failure = error
+            raise
+
+    def _next_event(self) -> Event | Literal[Need.DATA]:
+        while (line := self._buffer.take()) is not None:
+            if self._role is Role.DEVICE:
+                return read_request(line, self._encoding)
+            if line:
+                self._blank_allowed = True
+                return read_answer(line, self._encoding)
+            if not self._blank_allowed:
+                raise RemoteProtocolError(
+                    tr("An empty line came where an answer was expected."),
+                    remedy=tr("Set the terminator to CRLF in the controller's setup."),
+                )
+            self._blank_allowed = False
+        if not self._ended:
+            return NEED_DATA
+        if held := self._buffer.held:
+            raise RemoteProtocolError(
+                tr("The connection ended inside a message."),
+                remedy=tr("Check the cable and the controller's power, then connect again."),
+                raw=held,
+            )
+        return EndOfStream()
+
+    def _check_alive(self) -> None:
+        if (failure := self._failure) is not None:
+            raise RemoteProtocolError(failure.what, remedy=failure.remedy, raw=failure.raw)
+
+
+def _known_encoding(name: str) -> str:
+    try:
+        found = codecs.lookup(name).name
+    except LookupError:
+        found = ""
+    if found not in _ENCODINGS:
+        _misconfigured(tr("{name!r} is not an encoding of EPSON controllers.", name=name))
+    return found
+
+
+def _misconfigured(what: str) -> Never:
+    raise ConfigError(what, remedy=tr("Correct the codec's arguments."))

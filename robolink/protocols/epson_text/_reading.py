@@ -1,0 +1,75 @@
+"""From one message to one event.
+
+Messages are cut at the byte level before anything is decoded: in every encoding that the
+codec admits, the bytes of ``# ! $ , "`` and of line ends never occur inside a longer
+character.
+"""
+
+from typing import Final
+
+from robolink.errors import RemoteProtocolError
+from robolink.messages import tr
+from robolink.protocols.epson_text._codes import ErrorCode
+from robolink.protocols.epson_text._commands import find_command
+from robolink.protocols.epson_text._events import BadRequest, Refusal, Reply, Request
+from robolink.protocols.epson_text._parameters import split_parameters
+
+_UNDECODABLE: Final = "backslashreplace"
+"""A byte outside the encoding stays visible as ``\\xNN`` and ends no session."""
+
+_MAX_CODE_DIGITS: Final = 5
+
+
+def read_answer(line: bytes, encoding: str) -> Reply | Refusal:
+    """Read what a device sends.
+
+    Raises:
+        RemoteProtocolError: It is neither a reply nor a refusal.
+    """
+    mark = line[:1]
+    if mark == b"#":
+        name, comma, payload = line[1:].partition(b",")
+        if comma and name.isalnum():
+            if payload[:1] == b'"':
+                text = payload[1:-1].decode(encoding, _UNDECODABLE)
+                return Reply(name.decode("ascii"), (), _without_line_end(text))
+            fields = [field.decode(encoding, _UNDECODABLE) for field in payload.split(b",")]
+            return Reply(name.decode("ascii"), tuple(fields))
+    elif mark == b"!":
+        # The name may be an echo of anything, commas included (epson.md 1.6).
+        name, comma, code = line[1:].rpartition(b",")
+        if comma and code.isdigit() and len(code) <= _MAX_CODE_DIGITS:
+            return Refusal(name.decode(encoding, _UNDECODABLE), int(code))
+    raise RemoteProtocolError(
+        tr("{line!r} is no answer of Remote Ethernet.", line=line[:80]),
+        remedy=tr(
+            "Check the port and the control device in the controller's setup, then connect again."
+        ),
+        raw=line,
+    )
+
+
+def read_request(line: bytes, encoding: str) -> Request | BadRequest:
+    """Read what a host sends; what makes no sense becomes the refusal it deserves."""
+    text = line.decode(encoding, _UNDECODABLE)
+    if text[:1] != "$":
+        return BadRequest(_echo(text), ErrorCode.NO_DOLLAR)
+    name, comma, payload = text[1:].partition(",")
+    command = find_command(name)
+    if command is None:
+        return BadRequest(_echo(text[1:]), ErrorCode.UNKNOWN_COMMAND)
+    if not comma and command.min_parameters == 0:
+        return Request(name)
+    parameters = split_parameters(command, payload) if comma else None
+    if parameters is None:
+        return BadRequest(name, ErrorCode.MALFORMED)
+    return Request(name, parameters)
+
+
+def _echo(text: str) -> str:
+    name = text.partition(",")[0]
+    return name if name.isascii() and name.isalnum() else text
+
+
+def _without_line_end(text: str) -> str:
+    return text.removesuffix("\n").removesuffix("\r")

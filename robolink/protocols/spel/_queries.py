@@ -1,0 +1,91 @@
+"""Statements that only print (epson.md 3.1, 3.3; spel.md 5.3, 6.1, 7.2, 9).
+
+Those that take a number raise LocalProtocolError when it is out of range.
+"""
+
+from robolink.messages import tr
+from robolink.protocols.spel._statements import LAST_TOOL, Statement, check_range
+
+_LAST_SPEED = 3
+_LAST_JOINT = 6
+
+
+def print_selected_tool() -> Statement:
+    """The number of the tool in force."""
+    return Statement("Print Tool")
+
+
+def print_tool_defined(tool: int) -> Statement:
+    """Whether tool 1 to 15 has a definition, a Boolean; raises no error if it has none."""
+    return Statement(f"Print TLDef({_tool(tool)})")
+
+
+def print_tool(tool: int) -> Statement:
+    """The definition of tool 1 to 15, as a point."""
+    return Statement(f"Print TLSet({_tool(tool)})")
+
+
+def list_tools() -> Statement:
+    """All defined tools, a line each."""
+    return Statement("TLSet")
+
+
+def print_real_position() -> Statement:
+    """The measured position of the tool in force, as a point."""
+    return Statement("Print RealPos")
+
+
+def print_here() -> Statement:
+    """The commanded position of the tool in force, as a point."""
+    return Statement("Print Here")
+
+
+def print_robot() -> Statement:
+    """The number of the robot in force."""
+    return Statement("Print Robot")
+
+
+def print_robot_type() -> Statement:
+    """The kind of the robot in force: 3 SCARA, 5 six axes, 6 RS, 7 N (spel.md 9)."""
+    return Statement("Print RobotType")
+
+
+def print_motor() -> Statement:
+    """1 when the motors are on, else 0."""
+    return Statement("Print Motor")
+
+
+def print_power() -> Statement:
+    """1 in high power, 0 in low."""
+    return Statement("Print Power")
+
+
+def print_speed(index: int) -> Statement:
+    """Joint speed in percent: 1 travel, 2 departure, 3 approach."""
+    return Statement(f"Print Speed({_which(index)})")
+
+
+def print_speed_s(index: int) -> Statement:
+    """Straight-line speed in mm/s: 1 travel, 2 departure, 3 approach."""
+    return Statement(f"Print SpeedS({_which(index)})")
+
+
+def print_joint_angle(joint: int) -> Statement:
+    """The commanded angle of joint 1 to 6 in degrees, mm for a linear joint."""
+    check_range(tr("A joint"), joint, 1, _LAST_JOINT)
+    return Statement(f"Print Agl({joint})")
+
+
+def where() -> Statement:
+    """The commanded position in world, joint and pulse notation; command window only."""
+    return Statement("Where")
+
+
+def _tool(tool: int) -> int:
+    check_range(tr("A tool that can be defined"), tool, 1, LAST_TOOL)
+    return tool
+
+
+def _which(index: int) -> int:
+    check_range(tr("A speed's number"), index, 1, _LAST_SPEED)
+    return index

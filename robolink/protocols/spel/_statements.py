@@ -1,0 +1,193 @@
+"""Statements, built from typed values; nothing a person typed passes through unseen.
+
+A :data:`Statement` is made by a function of this package and nowhere else. All but
+:func:`raw` write strict ASCII numbers into a fixed form, so that no value can turn into
+another statement.
+"""
+
+from typing import Final, NewType, TypeVar
+
+from robolink.errors import LocalProtocolError
+from robolink.messages import tr
+from robolink.model import Hand, Pose, ToolOffset
+from robolink.protocols.spel._numbers import decimal
+
+Statement = NewType("Statement", str)
+"""One SPEL+ statement, fit for Execute."""
+
+MAX_STATEMENT: Final = 4060
+"""Most bytes of a statement (epson.md 1.5)."""
+
+_HANDS: Final = {Hand.RIGHT: " /R", Hand.LEFT: " /L"}
+LAST_TOOL: Final = 15
+_MIN_SPEED_MM_S: Final = 0.1
+_MAX_SPEED_MM_S: Final = 2000.0
+
+_Speed = TypeVar("_Speed", int, float)
+
+
+def set_tool(tool: int, offset: ToolOffset, *, six_axes: bool) -> Statement:
+    """``TLSet 1, XY(...)``: define a tool, mm and degrees (epson.md 3.1). Wears the flash.
+
+    Raises:
+        LocalProtocolError: No such tool, or V or W on a robot of four axes.
+    """
+    check_range(tr("A tool that can be set"), tool, 1, LAST_TOOL)
+    return Statement(f"TLSet {tool}, {_xy(offset.components(), six_axes=six_axes)}")
+
+
+def clear_tool(tool: int) -> Statement:
+    """``TLClr 1``: remove a tool's definition (epson.md 3.1). Wears the flash.
+
+    Raises:
+        LocalProtocolError: No such tool.
+    """
+    check_range(tr("A tool that can be cleared"), tool, 1, LAST_TOOL)
+    return Statement(f"TLClr {tool}")
+
+
+def select_tool(tool: int) -> Statement:
+    """``Tool 1``: put a tool in force; 0 is the flange (epson.md 3.1).
+
+    Raises:
+        LocalProtocolError: No such tool.
+    """
+    check_range(tr("A tool"), tool, 0, LAST_TOOL)
+    return Statement(f"Tool {tool}")
+
+
+def go(target: Pose, *, six_axes: bool) -> Statement:
+    """``Go XY(...)``: move point to point (spel.md 7.1).
+
+    Raises:
+        LocalProtocolError: V or W on a robot of four axes, or a local other than 0.
+    """
+    return Statement(f"Go {_point(target, six_axes=six_axes)}")
+
+
+def move(target: Pose, *, six_axes: bool) -> Statement:
+    """``Move XY(...)``: move along a straight line (spel.md 7.1).
+
+    Raises:
+        LocalProtocolError: V or W on a robot of four axes, or a local other than 0.
+    """
+    return Statement(f"Move {_point(target, six_axes=six_axes)}")
+
+
+def power_low() -> Statement:
+    """``Power Low``: the tip stays below 250 mm/s (epson.md 3.4)."""
+    return Statement("Power Low")
+
+
+def power_high() -> Statement:
+    """``Power High``: the speeds that were set take effect (spel.md 7.2)."""
+    return Statement("Power High")
+
+
+def speed(percent: int, depart: int | None = None, approach: int | None = None) -> Statement:
+    """``Speed 5``: joint speed in percent; Jump's departure and approach follow it if left out.
+
+    Raises:
+        LocalProtocolError: Not 1 to 100 (spel.md 7.2), or only one of the two given.
+    """
+    values = _three(percent, depart, approach)
+    for value in values:
+        check_range(tr("A speed in percent"), value, 1, 100)
+    return Statement("Speed " + ", ".join(str(value) for value in values))
+
+
+def speed_s(mm_s: float, depart: float | None = None, approach: float | None = None) -> Statement:
+    """``SpeedS 20.000``: straight-line speed in mm/s; the other two follow it if left out.
+
+    Raises:
+        LocalProtocolError: Not 0.1 to 2000 mm/s (spel.md 7.2), or only one of the two given.
+    """
+    values = _three(mm_s, depart, approach)
+    written = ", ".join(decimal(value) for value in values)
+    for value in values:
+        if not _MIN_SPEED_MM_S <= value <= _MAX_SPEED_MM_S:
+            raise LocalProtocolError(
+                tr("A straight-line speed of {value} mm/s cannot be set.", value=value),
+                remedy=tr("Use 0.1 to 2000 mm/s."),
+            )
+    return Statement(f"SpeedS {written}")
+
+
+def raw(text: str) -> Statement:
+    """Take free text for a statement: the single door through which a person's text passes.
+
+    Only the characters and the length are checked, not the meaning: whoever calls this has
+    the text shown to a person, and journals it.
+
+    Raises:
+        LocalProtocolError: Empty, longer than 4060 bytes, a quote, or a character that is
+            not printable ASCII (line ends included).
+    """
+    if not text.strip() or len(text) > MAX_STATEMENT:
+        why = tr("it must hold 1 to {limit} characters", limit=MAX_STATEMENT)
+    elif not (text.isascii() and text.isprintable()):
+        why = tr("it holds a character that is not printable ASCII")
+    elif '"' in text:
+        why = tr("Execute knows no way to write a quote; use Chr$(34)")
+    else:
+        return Statement(text)
+    raise LocalProtocolError(
+        tr("The statement cannot be sent: {why}.", why=why),
+        remedy=tr("Nothing was sent. Correct the statement."),
+    )
+
+
+def _point(target: Pose, *, six_axes: bool) -> str:
+    if target.local != 0:
+        raise LocalProtocolError(
+            tr("A target in local {local} cannot be moved to.", local=target.local),
+            remedy=tr("Give the target in local 0, the robot's base."),
+        )
+    hand = "" if target.hand is None else _HANDS[target.hand]
+    return f"{_xy(target.coordinates(), six_axes=six_axes)}{hand} /0"
+
+
+def _xy(values: tuple[float, ...], *, six_axes: bool) -> str:
+    written = [decimal(value) for value in values]
+    if not six_axes:
+        if any(value != decimal(0.0) for value in written[4:]):
+            raise LocalProtocolError(
+                tr(
+                    "A robot of four axes cannot take V = {v} and W = {w}.",
+                    v=values[4],
+                    w=values[5],
+                ),
+                remedy=tr("Leave V and W at 0."),
+            )
+        del written[4:]
+    return f"XY({', '.join(written)})"
+
+
+def _three(first: _Speed, depart: _Speed | None, approach: _Speed | None) -> tuple[_Speed, ...]:
+    if depart is None and approach is None:
+        return (first,)
+    if depart is None or approach is None:
+        raise LocalProtocolError(
+            tr("Departure and approach speed are set together."),
+            remedy=tr("Give both, or neither."),
+        )
+    return (first, depart, approach)
+
+
+def check_range(what: str, value: int, low: int, high: int) -> None:
+    """Refuse a number outside ``low`` to ``high``.
+
+    Raises:
+        LocalProtocolError: Says what the range is.
+    """
+    if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+        raise LocalProtocolError(
+            tr(
+                "{what} is {low} to {high}, not {value!r}.",
+                what=what,
+                low=low,
+                high=high,
+                value=value,
+            ),
+            remedy=tr("Nothing was sent. Correct the number."),
+        )

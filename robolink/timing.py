@@ -1,0 +1,56 @@
+"""Clocks and deadlines.
+
+Whoever waits does so on an injected :class:`Clock`, in integer nanoseconds of a
+monotonic time. Wall time appears in records only, as a label.
+"""
+
+import time
+from dataclasses import dataclass
+from typing import Protocol, Self
+
+NS_PER_S = 1_000_000_000
+
+
+class Clock(Protocol):
+    """A monotonic time that can be waited on."""
+
+    def now_ns(self) -> int:
+        """Return the time in nanoseconds since an arbitrary origin; never decreases."""
+
+    def sleep(self, seconds: float) -> None:
+        """Let ``seconds`` of this clock's time pass; zero or less returns at once."""
+
+
+class SystemClock:
+    """The machine's monotonic clock."""
+
+    def now_ns(self) -> int:
+        """Return the machine's monotonic time in nanoseconds."""
+        return time.monotonic_ns()
+
+    def sleep(self, seconds: float) -> None:
+        """Block the calling thread."""
+        if seconds > 0:
+            time.sleep(seconds)
+
+
+@dataclass(frozen=True, slots=True)
+class Deadline:
+    """One instant that a whole exchange must meet, however many reads it takes."""
+
+    clock: Clock
+    at_ns: int
+
+    @classmethod
+    def after(cls, clock: Clock, timeout_s: float) -> Self:
+        """Return the deadline ``timeout_s`` seconds from now."""
+        return cls(clock, clock.now_ns() + int(timeout_s * NS_PER_S))
+
+    def remaining_s(self) -> float:
+        """Return the seconds left, 0.0 when the deadline has passed."""
+        return max(0, self.at_ns - self.clock.now_ns()) / NS_PER_S
+
+    @property
+    def expired(self) -> bool:
+        """Whether the instant has been reached."""
+        return self.clock.now_ns() >= self.at_ns

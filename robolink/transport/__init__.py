@@ -1,0 +1,12 @@
+"""Moves bytes to and from a far end; knows no protocol."""
+
+from robolink.transport._base import Transport as Transport
+from robolink.transport._registry import TRANSPORTS_GROUP as TRANSPORTS_GROUP
+from robolink.transport._registry import TransportOpener as TransportOpener
+from robolink.transport._registry import open_transport as open_transport
+from robolink.transport._trace import SECRET_PLACEHOLDER as SECRET_PLACEHOLDER
+from robolink.transport._trace import Direction as Direction
+from robolink.transport._trace import TraceSink as TraceSink
+from robolink.transport._trace import TracingTransport as TracingTransport
+from robolink.transport._url import LinkUrl as LinkUrl
+from robolink.transport._url import parse_url as parse_url

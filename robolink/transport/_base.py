@@ -1,0 +1,63 @@
+"""The contract of a byte transport."""
+
+from typing import Protocol
+
+from robolink.timing import Clock, Deadline
+
+
+class Transport(Protocol):
+    """Ordered bytes to and from one far end. Knows no protocol.
+
+    Not thread-safe, but for :meth:`wait_readable` and :meth:`close`, which any thread may
+    call at any time. The owner serialises the rest.
+    """
+
+    @property
+    def url(self) -> str:
+        """Where it leads, as a person wrote it, with nothing secret in it."""
+
+    @property
+    def identity(self) -> str:
+        """Which far end this is: the URL without its options."""
+
+    @property
+    def durable(self) -> bool:
+        """Whether the far end outlives this process, so that markers about it must too."""
+
+    @property
+    def clock(self) -> Clock:
+        """The clock on which the far end's time passes; deadlines are made from it."""
+
+    def send(self, data: bytes, *, deadline: Deadline, secret: bool = False) -> None:
+        """Send all of ``data``. ``secret`` keeps it out of every trace.
+
+        Raises:
+            TransportBrokenError: The link is gone; an unknown prefix may be out.
+            TransportTimeoutError: The deadline passed; an unknown prefix may be out.
+            TransportClosedError: Used after :meth:`close`.
+        """
+
+    def receive(self, *, deadline: Deadline) -> bytes:
+        """Return 1 to 65536 bytes, or ``b""``, which means end of stream and nothing else.
+
+        Raises:
+            TransportTimeoutError: The deadline passed with nothing to return.
+            TransportBrokenError: The link is gone (reset, unreachable, unplugged).
+            TransportClosedError: Used after :meth:`close`.
+        """
+
+    def receive_waiting(self) -> bytes | None:
+        """Return what has arrived already, ``b""`` at end of stream, ``None`` for nothing.
+
+        Never waits. Raises as :meth:`receive`, but for the time-out.
+        """
+
+    def wait_readable(self, *, deadline: Deadline) -> bool:
+        """Wait, consuming nothing, until :meth:`receive` would not wait.
+
+        Returns:
+            False when the deadline passed first. True also for an ended or closed link.
+        """
+
+    def close(self) -> None:
+        """Close. Idempotent; a waiting call in another thread ends soon after."""

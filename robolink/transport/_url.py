@@ -1,0 +1,84 @@
+"""URLs that name a controller: ``KIND+MEDIUM://HOST:PORT/PATH?OPTION=VALUE``."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from urllib.parse import parse_qsl, urlsplit
+
+from robolink.errors import ConfigError
+from robolink.messages import tr
+
+
+@dataclass(frozen=True, slots=True)
+class LinkUrl:
+    """A parsed controller URL.
+
+    Attributes:
+        kind: Controller kind, for example ``epson``.
+        medium: How it is reached, for example ``tcp`` or ``sim``.
+        host: Host name, address, or the name of a simulator.
+        port: TCP port, ``None`` when not given.
+        path: Path part, for serial devices.
+        options: The query, every value as text.
+    """
+
+    kind: str
+    medium: str
+    host: str
+    port: int | None
+    path: str
+    options: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def scheme(self) -> str:
+        """``kind+medium``."""
+        return f"{self.kind}+{self.medium}"
+
+    @property
+    def identity(self) -> str:
+        """The URL without options: names the far end."""
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        port = "" if self.port is None else f":{self.port}"
+        return f"{self.scheme}://{host}{port}{self.path}"
+
+
+def parse_url(text: str) -> LinkUrl:
+    """Parse a controller URL.
+
+    Raises:
+        ConfigError: It is not one, or it carries a user name or password.
+    """
+    example = tr("Write for example epson+tcp://192.168.0.1:5000.")
+    try:
+        parts = urlsplit(text)
+        port = parts.port
+    except ValueError as error:
+        # The text is not repeated: it may hold a password.
+        raise ConfigError(tr("The controller URL cannot be read."), remedy=example) from error
+    if parts.username is not None or parts.password is not None:
+        raise ConfigError(
+            tr("A controller URL must not carry a user name or password."),
+            remedy=tr("Remove it and set ROBOLINK_PASSWORD or give --password-file."),
+        )
+    kind, plus, medium = parts.scheme.partition("+")
+    if not (kind and plus and medium):
+        raise ConfigError(tr("{text!r} is not a controller URL.", text=text), remedy=example)
+    try:
+        pairs = parse_qsl(parts.query, keep_blank_values=True, strict_parsing=bool(parts.query))
+    except ValueError as error:
+        raise ConfigError(
+            tr("The options of {text!r} cannot be read.", text=text),
+            remedy=tr("Options have the form ?name=value&name=value."),
+        ) from error
+    options = dict(pairs)
+    if len(options) != len(pairs):
+        raise ConfigError(
+            tr("An option stands twice in {text!r}.", text=text),
+            remedy=tr("Give each option once."),
+        )
+    for forbidden in ("password", "passwd", "pass"):
+        if forbidden in options:
+            raise ConfigError(
+                tr("A controller URL must not carry a password."),
+                remedy=tr("Remove it and set ROBOLINK_PASSWORD or give --password-file."),
+            )
+    return LinkUrl(kind, medium, parts.hostname or "", port, parts.path, options)

@@ -1,0 +1,181 @@
+"""The assist port: the hands, eyes and truth of a served simulator, as JSON lines.
+
+``{"do": "look"}`` is answered with ``{"ok": true, ...}``, anything that cannot be done with
+``{"ok": false, "error": sentence}``. A line that is no JSON object ends the connection, so
+that a web page which posts to the port gets nothing done.
+"""
+
+import json
+import socket
+from types import TracebackType
+from typing import Any, Final, Self
+from urllib.parse import urlsplit
+
+from robolink.errors import ConfigError, ConnectError, RobolinkError, TransportBrokenError
+from robolink.messages import tr
+from robolink_simulators.assist_acts import perform
+from robolink_simulators.clock import ScaledClock
+from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.epson.refusals import Refusal
+from robolink_simulators.hosting._tcp_host import TcpHost
+from robolink_simulators.world import Look
+
+_MAX_LINE: Final = 65536
+_SCHEME: Final = "assist+tcp"
+
+
+def serve_assist(simulator: EpsonSimulator, *, port: int = 0, clock: ScaledClock) -> TcpHost:
+    """Serve the assist port of a simulator, on loopback only.
+
+    Args:
+        simulator: Whose world.
+        port: Port, 0 for a free one.
+        clock: The clock on which the simulator is served.
+
+    Raises:
+        ConnectError: The port is taken.
+    """
+    return TcpHost(
+        _AssistDevice(simulator),
+        _SCHEME,
+        ("127.0.0.1", port),
+        clock=clock,
+        lock=simulator.lock,
+    )
+
+
+class _AssistDevice:
+    """Implements :class:`~robolink_simulators.wire.WireDevice`."""
+
+    def __init__(self, simulator: EpsonSimulator) -> None:
+        self._simulator = simulator
+
+    def connect(self, now_ns: int) -> "_AssistLink":  # noqa: ARG002 - time plays no part
+        return _AssistLink(self._simulator)
+
+    def advance(self, now_ns: int) -> None:
+        """Nothing happens here by itself."""
+
+    def next_change(self) -> int | None:
+        return None
+
+
+class _AssistLink:
+    """Implements :class:`~robolink_simulators.wire.DeviceLink`."""
+
+    def __init__(self, simulator: EpsonSimulator) -> None:
+        self._simulator = simulator
+        self._held = b""
+        self._out = b""
+        self.closed = False
+
+    def receive(self, data: bytes, now_ns: int) -> None:
+        self._held += data
+        if len(self._held) > _MAX_LINE:
+            self.closed = True
+        while not self.closed and b"\n" in self._held:
+            line, _, self._held = self._held.partition(b"\n")
+            self._simulator.advance(now_ns)
+            self._out += self._answered(line)
+
+    def outgoing(self) -> bytes:
+        out, self._out = self._out, b""
+        return out
+
+    def _answered(self, line: bytes) -> bytes:
+        try:
+            request = json.loads(line)
+        except (ValueError, RecursionError):
+            request = None
+        if not isinstance(request, dict):
+            self.closed = True
+            return b""
+        try:
+            answer = {"ok": True, **perform(self._simulator, request)}
+        except (RobolinkError, Refusal) as error:
+            answer = {"ok": False, "error": str(error)}
+        return json.dumps(answer).encode() + b"\n"
+
+
+class AssistClient:
+    """Talks to an assist port.
+
+    Args:
+        url: ``assist+tcp://127.0.0.1:PORT``.
+        timeout_s: Longest wait for an answer.
+
+    Raises:
+        ConfigError: It is not an assist URL.
+        ConnectError: Nobody listens there.
+    """
+
+    def __init__(self, url: str, *, timeout_s: float = 5.0) -> None:
+        parts = urlsplit(url)
+        if parts.scheme != _SCHEME or not parts.hostname or not parts.port:
+            raise ConfigError(
+                tr("{url!r} is not an assist URL.", url=url),
+                remedy=tr("Take the one that 'robolink sim' prints."),
+            )
+        self._url = url
+        try:
+            self._socket = socket.create_connection((parts.hostname, parts.port), timeout_s)
+        except OSError as error:
+            raise ConnectError(
+                tr("No simulator listens on {url}.", url=url),
+                remedy=tr("Start one with 'robolink sim epson'."),
+            ) from error
+        self._lines = self._socket.makefile("rb")
+
+    def do(self, act: str, **parameters: object) -> dict[str, Any]:
+        """Have something done and return what it gives.
+
+        Raises:
+            ConfigError: The simulator cannot do it, and says why.
+            TransportBrokenError: The simulator is gone.
+        """
+        try:
+            self._socket.sendall(json.dumps({"do": act, **parameters}).encode() + b"\n")
+            line = self._lines.readline()
+        except OSError as error:
+            raise self._broken() from error
+        if not line:
+            raise self._broken()
+        answer: dict[str, Any] = json.loads(line)
+        if not answer.pop("ok"):
+            raise ConfigError(str(answer["error"]))
+        return answer
+
+    def look(self, tool: int | None = None) -> Look:
+        """Return the vector, in base axes, that the operator sees from the tip to the pin."""
+        return Look(**(self.do("look") if tool is None else self.do("look", tool=tool)))
+
+    def jog_onto_pin(self) -> dict[str, float]:
+        """Jog the tip onto the pin on the pendant (Teach only); return the flange pose."""
+        flange: dict[str, float] = self.do("jog_onto_pin")["flange"]
+        return flange
+
+    def truth(self) -> dict[str, Any]:
+        """Return where the tips and the pin really are."""
+        return self.do("truth")
+
+    def close(self) -> None:
+        """Close the connection."""
+        self._lines.close()
+        self._socket.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def _broken(self) -> TransportBrokenError:
+        return TransportBrokenError(
+            tr("The simulator behind {url} is gone.", url=self._url),
+            remedy=tr("Start it again."),
+        )

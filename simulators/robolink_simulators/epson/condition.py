@@ -1,0 +1,123 @@
+"""What GetStatus shows: mode selector, emergency stop, guard, errors and the task."""
+
+from enum import Enum, StrEnum, auto
+
+from robolink.protocols.epson_text import StatusFlags
+
+
+class Mode(StrEnum):
+    """Position of the mode selector."""
+
+    AUTO = "auto"
+    TEACH = "teach"
+    TEST = "test"
+
+
+class Task(Enum):
+    """What the production program is doing."""
+
+    NONE = auto()
+    RUNNING = auto()
+    PAUSED = auto()
+
+
+class Condition:
+    """The state that decides what a controller serves (epson.md 1.4).
+
+    An emergency stop stays in force until it is released and then Reset (epson.md 1.7).
+    Ready means that start-up is over and no task executes; it stays on in an error, since
+    Reset needs it (inferred from the table of epson.md 1.2).
+
+    Attributes:
+        mode: Position of the mode selector.
+        monitoring_only: Another device controls the cell, so Auto stays off (inferred).
+        estop_pressed: Whether the button is in.
+        guard_open: Whether the safety door is open.
+        task: What the production program is doing.
+        code: Error or warning number, 0 for none.
+    """
+
+    def __init__(self, *, monitoring_only: bool) -> None:
+        self.mode = Mode.AUTO
+        self.monitoring_only = monitoring_only
+        self.estop_pressed = False
+        self.guard_open = False
+        self.task = Task.NONE
+        self.code = 0
+        self._estop_latched = False
+        self._error = False
+        self._serious = False
+        self._warning = False
+
+    @property
+    def error(self) -> bool:
+        """Whether the controller is in its error state."""
+        return self._error
+
+    @property
+    def serious(self) -> bool:
+        """Whether only a restart helps."""
+        return self._serious
+
+    def press_estop(self) -> None:
+        """Press the emergency stop; the production task ends."""
+        self.estop_pressed = self._estop_latched = True
+        self.task = Task.NONE
+
+    def release_estop(self) -> None:
+        """Release the button; the stop stays in force until Reset."""
+        self.estop_pressed = False
+
+    def open_guard(self) -> None:
+        """Open the safety door; a running task pauses."""
+        self.guard_open = True
+        if self.task is Task.RUNNING:
+            self.task = Task.PAUSED
+
+    def raise_error(self, number: int, *, serious: bool = False) -> None:
+        """Go into the error state; the production task ends (assumed)."""
+        self._error = True
+        self._serious = self._serious or serious
+        self._warning = False
+        self.code = number % 10_000
+        self.task = Task.NONE
+
+    def raise_warning(self, number: int) -> None:
+        """Show a warning; tasks go on. An error that stands is kept."""
+        if not self._error:
+            self._warning = True
+            self.code = number % 10_000
+
+    def reset(self) -> None:
+        """Clear error, warning and a released emergency stop.
+
+        What Reset does while the button is still pressed is not stated; assumed: nothing.
+        """
+        if self.estop_pressed:
+            return
+        self._estop_latched = self._error = self._warning = False
+        self.code = 0
+
+    def restart(self) -> None:
+        """Switch off and on: only what stands outside the controller stays as it is."""
+        self._estop_latched = self.estop_pressed
+        self._error = self._serious = self._warning = False
+        self.code = 0
+        self.task = Task.NONE
+
+    def flags(self, *, executing: bool = False) -> StatusFlags:
+        """Return the flags; ``executing`` makes an Execute show as a running task."""
+        idle = self.task is Task.NONE
+        return StatusFlags(
+            test=self.mode is Mode.TEST,
+            teach=self.mode is Mode.TEACH,
+            auto=self.mode is Mode.AUTO and not self.monitoring_only,
+            warning=self._warning,
+            serious_error=self._serious,
+            safeguard=self.guard_open,
+            emergency_stop=self._estop_latched,
+            error=self._error,
+            paused=self.task is Task.PAUSED,
+            running=self.task is Task.RUNNING or executing,
+            ready=idle and not executing,
+        )

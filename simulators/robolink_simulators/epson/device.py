@@ -1,0 +1,275 @@
+"""A simulated EPSON controller as a device: clients connect, bytes come, time passes.
+
+Theory of operation. The device is given every instant at which something can change, in
+order: the statement that runs, replies that leave late, time-outs, planned stops. It owns no
+thread and no clock; whoever hosts it holds :attr:`EpsonSimulator.lock`, hands it bytes and
+the time, and asks when to call again.
+"""
+
+import random
+from collections import deque
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import Final
+
+from robolink.model import Secret
+from robolink.protocols.epson_text import BadRequest, ErrorCode, Request
+from robolink.timing import NS_PER_S
+from robolink_simulators.epson.client_slot import ClientSlot
+from robolink_simulators.epson.condition import Condition, Mode
+from robolink_simulators.epson.desk import CommandDesk
+from robolink_simulators.epson.exchange import Exchange
+from robolink_simulators.epson.flash import Flash
+from robolink_simulators.epson.link import EpsonLink
+from robolink_simulators.epson.machine import Machine
+from robolink_simulators.epson.options import EpsonOptions
+from robolink_simulators.epson.panel import Panel
+from robolink_simulators.epson.points import LocalTable, PointTable
+from robolink_simulators.epson.queries import Alarms
+from robolink_simulators.epson.robots import find_robot
+from robolink_simulators.epson.service import Service
+from robolink_simulators.epson.spel import Interpreter
+from robolink_simulators.epson.variables import project_variables
+from robolink_simulators.epson.window import CommandWindow
+from robolink_simulators.epson.wire_text import shown_reply, shown_request
+from robolink_simulators.faults import Departure, Fault, FaultAction, FaultPlan
+from robolink_simulators.world import World
+
+_LOG_LINES: Final = 2000
+
+RequestHook = Callable[[int, str], None]
+"""Called with the running number of a request and a text, passwords hidden."""
+
+
+class EpsonSimulator(Panel):
+    """Implements :class:`~robolink_simulators.wire.WireDevice`.
+
+    Args:
+        robot: Name of a SCARA model.
+        seed: Decides the world and every scatter; the same seed gives the same run.
+        password: Of Remote Ethernet; none means an empty one.
+        options: The controller's habits.
+        state_path: File that keeps what the controller's flash keeps.
+        faults: What is planned to go wrong.
+
+    Attributes:
+        url: Where a host serves it, empty when none does.
+        variables: The Global Preserve variables.
+        world: The truth, and the person at the cell.
+        faults: What is planned to go wrong.
+        exchanges: Requests answered.
+        log: The last (now_ns, ">" or "<", text), with passwords hidden.
+        on_request: Called with a request before it is carried out. What it raises goes to
+            the host; the request is carried out all the same.
+        on_reply: Called with the answer before it leaves; it leaves all the same.
+
+    The attributes of :class:`Panel`, and all that it can do, belong to it as well. The
+    motors are on at first, as in a cell that stands ready; after a restart they are off.
+
+    Raises:
+        ConfigError: No such robot, or a state file that does not fit.
+    """
+
+    def __init__(
+        self,
+        robot: str = "T6-602S",
+        *,
+        seed: int = 1,
+        password: Secret | None = None,
+        options: EpsonOptions | None = None,
+        state_path: Path | None = None,
+        faults: Iterable[Fault] = (),
+    ) -> None:
+        super().__init__()
+        self.url = ""
+        self.seed = seed
+        self.options = options or EpsonOptions()
+        self.faults = FaultPlan(faults, seed)
+        self.exchanges = 0
+        self.log: deque[tuple[int, str, str]] = deque(maxlen=_LOG_LINES)
+        self.on_request: RequestHook | None = None
+        self.on_reply: RequestHook | None = None
+        self._password = password.reveal() if password else ""
+        self._requests = 0
+        self._links: list[EpsonLink] = []
+        self._planned: list[tuple[int, Callable[[], None]]] = []
+        self.machine = Machine(find_robot(robot))
+        self.machine.switch_motors(True)
+        self.world = World.seeded(
+            self.machine,
+            seed,
+            pendant_live=lambda: self.condition.mode is Mode.TEACH,
+            now_ns=lambda: self._now_ns,
+        )
+        self._flash = Flash(state_path, self.machine)
+        self._flash.restore()
+        self.durable = state_path is not None
+        self.variables = project_variables(str(self.options.true_value))
+        self.alarms = Alarms()
+        self.condition = Condition(monitoring_only=self.options.monitoring_only)
+        interpreter = Interpreter(self.machine, self.options, random.Random(f"arm {self.seed}"))
+        self._window = CommandWindow(interpreter, self.condition, self.options)
+        self._slot = ClientSlot(self.options.remote_timeout_s)
+        self._desk = CommandDesk(
+            self.machine, self.condition, self.variables, self.alarms, options=self.options
+        )
+        self._service = Service(
+            self._desk,
+            self._window,
+            self._slot,
+            self.condition,
+            options=self.options,
+            password=self._password,
+        )
+
+    def connect(self, now_ns: int) -> EpsonLink:
+        """Accept one client; see ``EpsonOptions.second_client``."""
+        self.advance(now_ns)
+        link = EpsonLink(self, now_ns)
+        self._links.append(link)
+        if self._slot.client is not None and self.options.second_client == "closed":
+            link.cut()
+        return link
+
+    def advance(self, now_ns: int) -> None:
+        """Let simulated time reach ``now_ns``, stopping wherever something changes."""
+        while (change := self.next_change()) is not None and self._now_ns < change < now_ns:
+            self._step(change)
+        self._step(max(now_ns, self._now_ns))
+
+    def next_change(self) -> int | None:
+        """Return when :meth:`advance` will next do something by itself, if ever."""
+        changes = [
+            self._window.next_change(),
+            self._slot.deadline(unfinished=self._service.unfinished),
+            *(at_ns for at_ns, _ in self._planned),
+            *(link.next_change() for link in self._links),
+        ]
+        return min((change for change in changes if change is not None), default=None)
+
+    def restart(self) -> None:
+        """Switch off and on: links are cut, all but the flash and the variables is forgotten."""
+        with self._act():
+            for link in self._links:
+                link.cut()
+            self._window.interrupt(self._now_ns)
+            self._slot.free()
+            self._planned.clear()
+            self.condition.restart()
+            self._forget_volatile()
+
+    def _forget_volatile(self) -> None:
+        machine = self.machine
+        machine.arm.halt(self._now_ns)
+        machine.switch_motors(False)
+        machine.reset_motion_parameters()
+        machine.outputs.clear()
+        machine.memory.clear()
+        machine.points, machine.locals = PointTable(), LocalTable()
+
+    def push(self, data: bytes) -> None:
+        """Send every client bytes that nobody asked for (F10)."""
+        with self._act():
+            for link in self._links:
+                link.push(data)
+
+    def take(self, link: EpsonLink, event: Request | BadRequest) -> None:
+        """Deal with a request of a client; while another is logged in, it is not heard."""
+        shown = shown_request(event)
+        self.log.append((self._now_ns, ">", shown))
+        if self._slot.client not in (None, link):
+            if self.options.second_client == "closed":
+                link.cut()
+            return
+        self._requests += 1
+        exchange = Exchange(self._requests, event.name, self.faults.take(shown), link)
+        if exchange.meets(FaultAction.DISCONNECT_BEFORE):
+            link.cut()
+            return
+        self._strike(exchange.faults)
+        try:
+            if self.on_request is not None:
+                self.on_request(exchange.number, shown)
+        finally:
+            self._service.carry_out(link, exchange, event, self._now_ns)
+            self._flash.save_changes()
+
+    def leaving(self, exchange: Exchange, reply: bytes) -> Sequence[Departure]:
+        """Count a reply and return what of it leaves, when."""
+        self._flash.save_changes()
+        self.exchanges += 1
+        self.log.append((self._now_ns, "<", shown_reply(reply)))
+        if not exchange.faults:
+            return ((0.0, reply),)
+        return self.faults.departures(reply, exchange.faults)
+
+    def announce(self, exchange: Exchange, reply: bytes) -> None:
+        """Tell the hook that a reply is about to leave."""
+        if self.on_reply is not None:
+            self.on_reply(exchange.number, shown_reply(reply))
+
+    def forget(self, link: EpsonLink) -> None:
+        """A connection is over; what runs goes on or not, as the option says."""
+        if self._slot.client is link:
+            # Production that another device started is not this client's to supervise.
+            own = self._service.unfinished and not self.condition.monitoring_only
+            self._slot.lost(unfinished=own)
+            if self.options.execute_on_disconnect == "stops":
+                self._window.interrupt(self._now_ns)
+
+    def _step(self, now_ns: int) -> None:
+        self._now_ns = now_ns
+        self._stepping = True
+        try:
+            self.machine.arm.advance(now_ns)
+            self._window.advance(now_ns)
+            if self._planned:
+                self._carry_out_plans(now_ns)
+            self._supervise(now_ns)
+            self._flash.save_changes()
+        finally:
+            self._stepping = False
+
+    def _carry_out_plans(self, now_ns: int) -> None:
+        due = [act for at_ns, act in self._planned if at_ns <= now_ns]
+        self._planned = [plan for plan in self._planned if plan[0] > now_ns]
+        for act in due:
+            act()
+
+    def _supervise(self, now_ns: int) -> None:
+        """Keep the time-outs of epson.md 1.1."""
+        unfinished = self._service.unfinished
+        self._slot.settle(unfinished=unfinished)
+        deadline = self._slot.deadline(unfinished=unfinished)
+        if deadline is not None and now_ns >= deadline:
+            client = self._slot.client
+            self._slot.free()
+            self._window.interrupt(now_ns)
+            self.condition.raise_error(ErrorCode.TIMED_OUT)
+            if client is not None:
+                client.cut()
+        for link in self._links:
+            link.supervise(now_ns)
+        self._links = [link for link in self._links if not link.drained]
+
+    def _strike(self, faults: Sequence[Fault]) -> None:
+        """Press, open or raise what is planned: at once, or some seconds from now."""
+        for fault in faults:
+            act = self._act_of(fault)
+            if act is None:
+                continue
+            if fault.seconds > 0:
+                self._planned.append((self._now_ns + round(fault.seconds * NS_PER_S), act))
+            else:
+                act()
+
+    def _act_of(self, fault: Fault) -> Callable[[], None] | None:
+        match fault.action:
+            case FaultAction.ESTOP:
+                return self.press_estop
+            case FaultAction.GUARD_OPEN:
+                return self.open_guard
+            case FaultAction.DEVICE_FAULT:
+                return lambda: self.raise_error(fault.code)
+            case _:
+                return None

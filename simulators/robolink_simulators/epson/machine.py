@@ -1,0 +1,151 @@
+"""What SPEL+ statements touch: one robot, its tools, points, bits and settings."""
+
+import random
+from collections.abc import Mapping, Sequence
+
+from robolink.errors import ConfigError
+from robolink.messages import tr
+from robolink.model import Pose, ToolOffset
+from robolink_simulators.epson.arm import REST, Arm
+from robolink_simulators.epson.bits import IO_BITS, MEMORY_BITS, BitBank
+from robolink_simulators.epson.kinematics import Joints, flange_of, inverse, tip_of
+from robolink_simulators.epson.parameters import MotionParameters
+from robolink_simulators.epson.points import LocalTable, Point, PointTable
+from robolink_simulators.epson.refusals import OutOfReach
+from robolink_simulators.epson.robots import ScaraModel
+from robolink_simulators.epson.tool_memory import ToolMemory
+
+REMOTE_ETHERNET = 26
+"""CtrlDev of a controller run over Remote Ethernet (spel.md 9)."""
+
+
+class Machine:
+    """A SCARA controller's memory and its arm. No wire, no clock of its own.
+
+    Args:
+        model: Which robot.
+        joints: Where the arm stands.
+        backlash_deg: See :class:`Arm`.
+        serial: What RobotSerial$ gives.
+
+    Attributes:
+        arm: The arm in simulated time.
+        tools: Tool definitions and the tool in force.
+        points: P0 to P999.
+        locals: Local coordinate systems.
+        inputs: Input bits; the world sets them.
+        outputs: Output bits.
+        memory: Memory bits.
+        parameters: Speeds, accelerations, LimZ.
+        motors_on: Whether the motors are on.
+        power_high: Whether power is high; low after anything that resets the parameters.
+        robot_number: The robot in force; this controller has one.
+        control_device: What CtrlDev gives.
+    """
+
+    def __init__(
+        self,
+        model: ScaraModel,
+        *,
+        joints: Joints = REST,
+        backlash_deg: float = 0.0,
+        serial: str = "SIM00001",
+    ) -> None:
+        self.model = model
+        self.serial = serial
+        self.arm = Arm(model, joints, backlash_deg=backlash_deg)
+        self.tools = ToolMemory()
+        self.points = PointTable()
+        self.locals = LocalTable()
+        self.inputs = BitBank(IO_BITS)
+        self.outputs = BitBank(IO_BITS)
+        self.memory = BitBank(MEMORY_BITS)
+        self.parameters = MotionParameters()
+        self.motors_on = False
+        self.power_high = False
+        self.robot_number = 1
+        self.control_device = REMOTE_ETHERNET
+
+    @property
+    def flash_writes(self) -> int:
+        """How often TLSet or TLClr wrote the flash."""
+        return self.tools.flash_writes
+
+    @property
+    def offset(self) -> ToolOffset | None:
+        """The definition of the tool in force, ``None`` for the flange."""
+        return self.tools.get(self.tools.selected)
+
+    def tip(self) -> Pose:
+        """Return the commanded pose of the selected tool's tip (Here, CurPos)."""
+        return self._tip_of(self.arm.flange())
+
+    def real_tip(self, rng: random.Random, noise_mm: float) -> Pose:
+        """Return the measured pose of the selected tool's tip (RealPos)."""
+        return self._tip_of(self.arm.real_position(rng, noise_mm))
+
+    def joints_for(self, target: Point) -> Joints:
+        """Return the joints that bring the selected tool's tip to a point.
+
+        Raises:
+            Refusal: Its local is not defined, or the arm cannot take it up.
+        """
+        base = self.locals.to_base(target)
+        x, y, z, u, _, _ = base.coordinates
+        flange = flange_of(Pose(x, y, z, u), self.offset)
+        return inverse(self.model, flange, base.hand)
+
+    def switch_motors(self, on: bool) -> None:
+        """Switch the motors; on also resets the motion parameters (spel.md 6.3)."""
+        self.motors_on = on
+        if on:
+            self.reset_motion_parameters()
+
+    def reset_motion_parameters(self) -> None:
+        """Set the defaults and low power: start-up, Motor On, Reset ... (spel.md 6.3)."""
+        self.parameters = MotionParameters()
+        self.power_high = False
+
+    def to_state(self) -> dict[str, object]:
+        """Return what survives power-off, ready for JSON.
+
+        Tools and their selection (documented, spel.md 6.1) and where the arm stands (assumed:
+        absolute encoders). Points set by a statement are lost unless saved to a file.
+        """
+        return {
+            "robot": self.model.name,
+            "joints": list(self.arm.joints.values()),
+            "tools": self.tools.to_state(),
+        }
+
+    @classmethod
+    def from_state(
+        cls,
+        model: ScaraModel,
+        state: Mapping[str, object],
+        *,
+        backlash_deg: float = 0.0,
+        serial: str = "SIM00001",
+    ) -> "Machine":
+        """Return the machine after a restart.
+
+        Raises:
+            ConfigError: The state is not one of this robot's.
+        """
+        try:
+            robot, joints, tools = state["robot"], state["joints"], state["tools"]
+            if robot != model.name:
+                raise ValueError(robot)
+            if not (isinstance(joints, Sequence) and isinstance(tools, Mapping)):
+                raise TypeError(joints)
+            machine = cls(model, joints=Joints(*joints), backlash_deg=backlash_deg, serial=serial)
+            machine.tools.restore(tools)
+        except (KeyError, TypeError, ValueError, OutOfReach) as error:
+            raise ConfigError(
+                tr("The saved state does not fit a simulated {robot}.", robot=model.name),
+                remedy=tr("Use another state file, or delete this one to start afresh."),
+            ) from error
+        return machine
+
+    def _tip_of(self, flange: Pose) -> Pose:
+        return tip_of(flange, self.offset, tool=self.tools.selected)

@@ -1,0 +1,99 @@
+"""What no document settles about EPSON controllers, as named options.
+
+Each default is the likeliest reading; the driver must work with every value (the contract
+tests run with each). Evidence marks: [D] document, [R] transcript of a real controller,
+[I] inferred, [U] unverified, [open] the references contradict each other.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+
+@dataclass(frozen=True, slots=True)
+class SpelNumbers:
+    """Error numbers that the language reference does not give [U]; any number would do."""
+
+    syntax: int = 2100
+    not_allowed_here: int = 2119
+    value_out_of_range: int = 4002
+    out_of_reach: int = 4001
+    motors_off: int = 4023
+    emergency_stop: int = 4025
+    guard_open: int = 4026
+    tool_undefined: int = 4015
+    tool_zero_fixed: int = 4016
+    local_undefined: int = 4010
+    point_undefined: int = 7007  # spel.md 10, sample handler
+    above_limz: int = 4005  # spel.md 10
+    subscript: int = 2231
+    type_mismatch: int = 2130
+    aborted: int = 2997
+    logged_out_in_task: int = 2996
+    home_undefined: int = 2228  # spel.md 10
+    serious: int = 9001
+
+
+@dataclass(frozen=True, slots=True)
+class EpsonOptions:
+    """One controller's habits.
+
+    Attributes:
+        terminator: Line end in force in the controller setup, both ways [D].
+        status_flags: GetStatus prints 11 flags (RC+ 7 on) or 10 (RC+ 5) [D].
+        print_crlf_inside_quotes: Print's own CRLF stands before the closing quote [R/I].
+        abort_reply_first: Abort is answered before the Execute it ends [U].
+        second_client: What a second connection meets while a client is logged in [U].
+        execute_on_disconnect: Whether a motion goes on when its client vanishes [I].
+        logout_while_running: Logout during a task: raises a controller error [D], or is
+            also refused.
+        execute_failure: How a failed statement is answered [I]: a refusal with
+            ``execute_failure_code``, or a quoted text.
+        flags_during_execute: What GetStatus shows while an Execute runs [U].
+        monitoring_only: Another device starts the cell; only queries are served [D].
+        monitoring_refusal: Code that a held-back command gets in that mode [U].
+        login_timeout_s: Without a login the connection is cut after this [D, RC+ 7].
+        remote_timeout_s: Idle time after which error 19 is raised and the link cut; 0 never [D].
+        point_coordinates: Stored points print six coordinates, or as many as given [open].
+        true_value: What ``Print`` of True shows [open].
+        comma_blank: What a comma in Print leaves between items [open].
+        tool_listing: Layout of the TLSet listing [I].
+        tlset_of_undefined: What the function TLSet(n) gives for an undefined tool [U].
+        where_width: Width of the value field of Where [open].
+        requests_end_with_segment: A request may lack its terminator; it ends with the piece of
+            stream in which it came [R, one controller].
+        reset_outputs_off: Preference "Reset turns off outputs" [D].
+        extended_queries: Firmware knows GetContVer and its kin; older answers 11 [R].
+        rc_plus: Command set: 5, 7 or 8.
+        real_pos_noise_mm: Standard deviation of RealPos against the commanded position [R:
+            2 um seen].
+        angle_wrap: Whether a stored tool angle is brought into -180..180 [U].
+        numbers: Error numbers in use.
+    """
+
+    terminator: Literal["crlf", "cr", "lf"] = "crlf"
+    status_flags: Literal[11, 10] = 11
+    print_crlf_inside_quotes: bool = True
+    abort_reply_first: bool = True
+    second_client: Literal["ignored", "closed"] = "ignored"
+    execute_on_disconnect: Literal["continues", "stops"] = "continues"
+    logout_while_running: Literal["error", "refused"] = "error"
+    execute_failure: Literal["refusal", "text"] = "refusal"
+    execute_failure_code: int = 99
+    flags_during_execute: Literal["running", "ready"] = "running"
+    monitoring_only: bool = False
+    monitoring_refusal: int = 20
+    login_timeout_s: float = 300.0
+    remote_timeout_s: float = 60.0
+    point_coordinates: Literal["six", "given"] = "six"
+    true_value: Literal[-1, 1] = -1
+    comma_blank: Literal["numeric", "always"] = "numeric"
+    tool_listing: Literal["plain", "padded", "four"] = "plain"
+    tlset_of_undefined: Literal["zeros", "error"] = "zeros"
+    where_width: Literal[9, 8] = 9
+    requests_end_with_segment: bool = False
+    reset_outputs_off: bool = True
+    extended_queries: bool = True
+    rc_plus: Literal[5, 7, 8] = 7
+    real_pos_noise_mm: float = 0.002
+    angle_wrap: bool = False
+    numbers: SpelNumbers = SpelNumbers()

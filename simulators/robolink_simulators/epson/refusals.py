@@ -1,0 +1,45 @@
+"""Why the simulated controller says no.
+
+The texts are the controller's own, as GetErrMsg would give them: they travel over the wire
+and are data there, so they are not translated.
+"""
+
+from enum import StrEnum
+
+
+class RefusalKind(StrEnum):
+    """What went wrong; each value names the field of ``SpelNumbers`` that numbers it."""
+
+    SYNTAX = "syntax"
+    NOT_ALLOWED_HERE = "not_allowed_here"
+    VALUE_OUT_OF_RANGE = "value_out_of_range"
+    OUT_OF_REACH = "out_of_reach"
+    MOTORS_OFF = "motors_off"
+    TOOL_UNDEFINED = "tool_undefined"
+    TOOL_ZERO_FIXED = "tool_zero_fixed"
+    LOCAL_UNDEFINED = "local_undefined"
+    POINT_UNDEFINED = "point_undefined"
+    ABOVE_LIMZ = "above_limz"
+    SUBSCRIPT = "subscript"
+    TYPE_MISMATCH = "type_mismatch"
+
+
+class Refusal(Exception):
+    """The controller will not do it; nothing was changed and nothing moves.
+
+    Attributes:
+        kind: What went wrong.
+        text: The controller's sentence.
+    """
+
+    def __init__(self, kind: RefusalKind, text: str) -> None:
+        super().__init__(text)
+        self.kind = kind
+        self.text = text
+
+
+class OutOfReach(Refusal):
+    """A target that the arm cannot take up."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(RefusalKind.OUT_OF_REACH, text)

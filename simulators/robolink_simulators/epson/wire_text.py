@@ -1,0 +1,22 @@
+"""Requests and replies as a log shows them: as on the wire, but for passwords."""
+
+from robolink.protocols.epson_text import BadRequest, Request
+
+
+def shown_request(event: Request | BadRequest) -> str:
+    """Return a request in one line."""
+    name = event.name
+    if isinstance(event, BadRequest):
+        return "***" if "login" in name.lower() else name
+    match name.lower():
+        case "login":
+            return f"${name},***"
+        case "execute":
+            return f'${name},"{event.parameters[0]}"'
+        case _:
+            return ",".join((f"${name}", *event.parameters))
+
+
+def shown_reply(reply: bytes) -> str:
+    """Return a reply without its terminator."""
+    return reply.decode("latin-1").rstrip("\r\n")

@@ -1,0 +1,76 @@
+"""Pytest fixtures that bring a simulated controller; tests connect by URL themselves.
+
+Importing this module costs next to nothing: every pytest run of an environment in which
+robolink is installed imports it.
+"""
+
+from collections.abc import Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import pytest
+
+if TYPE_CHECKING:
+    from robolink_simulators.epson.device import EpsonSimulator
+
+
+@dataclass(frozen=True, slots=True)
+class ServedEpson:
+    """A simulated EPSON controller on a loopback port.
+
+    Attributes:
+        url: ``epson+tcp://127.0.0.1:PORT``.
+        assist: ``assist+tcp://127.0.0.1:PORT``.
+        simulator: The device; hold its ``lock`` while touching it.
+    """
+
+    url: str
+    assist: str
+    simulator: "EpsonSimulator"
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add ``--robolink-seed``."""
+    group = parser.getgroup("robolink")
+    group.addoption(
+        "--robolink-seed",
+        type=int,
+        default=1,
+        metavar="N",
+        help="seed of the simulated controllers (default: 1)",
+    )
+
+
+def pytest_report_header(config: pytest.Config) -> str:
+    """Show the seed, so that a failure can be repeated."""
+    return f"robolink: simulated controllers, seed {config.getoption('--robolink-seed')}"
+
+
+@pytest.fixture
+def epson_sim(request: pytest.FixtureRequest) -> Iterator["EpsonSimulator"]:
+    """A simulated EPSON controller in this process; connect to its ``url``."""
+    from robolink_simulators.epson.device import EpsonSimulator
+    from robolink_simulators.hosting.in_process import register, unregister
+
+    simulator = EpsonSimulator(seed=request.config.getoption("--robolink-seed"))
+    name = f"pytest-{id(simulator):x}"
+    register(name, simulator)
+    yield simulator
+    unregister(name)
+
+
+@pytest.fixture
+def epson_tcp(request: pytest.FixtureRequest) -> Iterator[ServedEpson]:
+    """A simulated EPSON controller on a loopback TCP port, with its assist port."""
+    from robolink_simulators.assist import serve_assist
+    from robolink_simulators.clock import ScaledClock
+    from robolink_simulators.epson.device import EpsonSimulator
+    from robolink_simulators.hosting.tcp import serve_tcp
+
+    simulator = EpsonSimulator(seed=request.config.getoption("--robolink-seed"))
+    clock = ScaledClock()
+    with ExitStack() as stack:
+        tcp = stack.enter_context(serve_tcp(simulator, clock=clock))
+        assist = stack.enter_context(serve_assist(simulator, clock=clock))
+        yield ServedEpson(tcp.url, assist.url, simulator)

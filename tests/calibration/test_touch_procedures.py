@@ -1,0 +1,119 @@
+"""The procedures, fed with numbers by an arm that exists only in this file."""
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from robolink.calibration import (
+    Ask,
+    Move,
+    TouchPlan,
+    contact_pose,
+    two_pose,
+    verify_by_turning,
+)
+from robolink.model import Path, Pose, ToolOffset, rotate_xy
+
+PIN = (310.0, 95.0, -40.0)
+PLAN = TouchPlan(lift_mm=10, clearance_mm=2)
+
+
+class PerfectPerson:
+    """Puts the physical tip on the pin, whatever frame the poses are given in."""
+
+    def __init__(self, tip, believed=None):
+        self.tip, self.believed = tip, believed or ToolOffset()
+        self.pose = None
+        self.log = []
+
+    def answer(self, step):
+        self.log.append(step)
+        if isinstance(step, Move):
+            self.pose = step.target
+            return self.pose
+        u_flange = self.pose.u_deg - self.believed.u_deg
+        tip_x, tip_y = rotate_xy(self.tip.x_mm, self.tip.y_mm, u_flange)
+        own_x, own_y = rotate_xy(self.believed.x_mm, self.believed.y_mm, u_flange)
+        self.pose = replace(
+            self.pose,
+            x_mm=PIN[0] - tip_x + own_x,
+            y_mm=PIN[1] - tip_y + own_y,
+            z_mm=PIN[2] - self.tip.z_mm + self.believed.z_mm,
+        )
+        return self.pose
+
+
+def drive(procedure, person):
+    step = next(procedure)
+    while True:
+        try:
+            step = procedure.send(person.answer(step))
+        except StopIteration as finished:
+            return finished.value
+
+
+def measured(tip, stored, start_u_deg=0.0):
+    person = PerfectPerson(tip)
+    person.pose = Pose(300, 100, 0, start_u_deg, tool=0)
+    return drive(two_pose(PLAN, stored=stored), person), person
+
+
+@pytest.mark.parametrize("start_u_deg", [0.0, 15.0, -120.0, 180.0])
+def test_the_true_tip_is_found_from_any_start_angle(start_u_deg):
+    tip = ToolOffset(12.3, -3.9, -20)
+    result, _ = measured(tip, ToolOffset(12, -3.5, -20), start_u_deg)
+    assert (result.offset.x_mm, result.offset.y_mm) == pytest.approx((12.3, -3.9), abs=1e-9)
+    assert result.reference_point_mm == pytest.approx(PIN[:2], abs=1e-9)
+
+
+def test_nothing_ever_turns_in_contact():
+    _, person = measured(ToolOffset(12.3, -3.9, -20), ToolOffset(12, -3.5, -20))
+    touch_z = PIN[2] + 20
+    turned = [s for s in person.log if isinstance(s, Move) and s.path is Path.JOINT]
+    assert turned
+    assert all(step.target.z_mm >= touch_z + PLAN.lift_mm - 1e-9 for step in turned)
+    lowered = [s for s in person.log if isinstance(s, Move) and s.path is Path.STRAIGHT]
+    assert all(step.target.z_mm >= touch_z + PLAN.clearance_mm - 1e-9 for step in lowered)
+    for before, after in zip(person.log, person.log[1:], strict=False):
+        if isinstance(before, Ask):
+            assert isinstance(after, Move)
+            assert after.path is Path.STRAIGHT
+
+
+def test_the_stored_offset_brings_the_tip_down_near_the_pin():
+    _, person = measured(ToolOffset(30.2, 0, -20), ToolOffset(30, 0, -20))
+    down = [s for s in person.log if isinstance(s, Move)][2].target
+    tip_x, tip_y = rotate_xy(30.2, 0, down.u_deg)
+    assert math.dist((down.x_mm + tip_x, down.y_mm + tip_y), PIN[:2]) < 0.41
+
+
+def verified(tip, believed, **plan):
+    result, _ = measured(believed, believed)
+    person = PerfectPerson(tip, believed)
+    contact = contact_pose(result, tool=3)
+    procedure = verify_by_turning(
+        PLAN, contact=contact, angles_deg=(90.0, 0.0), **{"tolerance_mm": 0.2, **plan}
+    )
+    return drive(procedure, person), person
+
+
+def test_a_right_offset_shows_no_drift():
+    outcome, person = verified(ToolOffset(12.3, -3.9, -20), ToolOffset(12.3, -3.9, -20))
+    assert outcome.max_drift_mm < 1e-9
+    assert outcome.passed
+    assert {step.target.tool for step in person.log if isinstance(step, Move)} == {3}
+
+
+def test_an_offset_error_shows_as_drift_and_fails():
+    outcome, _ = verified(ToolOffset(12.6, -3.9, -20), ToolOffset(12.3, -3.9, -20))
+    assert [drift.distance_mm for drift in outcome.drifts] == pytest.approx([0.3, 0.3])
+    assert not outcome.passed
+
+
+def test_a_tool_angle_is_kept_and_seen_through():
+    stored = ToolOffset(12, -3.5, -20, 30)
+    result, _ = measured(ToolOffset(12.3, -3.9, -20), stored)
+    contact = contact_pose(result, tool=1)
+    assert contact.u_deg == result.inputs[-1].u_deg + 30
+    assert contact.z_mm == pytest.approx(PIN[2])

@@ -1,0 +1,205 @@
+"""The frame of the command line: what it loads, and how it merges options."""
+
+import os
+import subprocess
+import sys
+from typing import Any
+
+import click
+import pytest
+from robolink_cli import main
+from robolink_cli._context import marker_notice, open_controller
+
+import robolink
+from robolink.model import Marker, MarkerKind
+
+URL = "epson+tcp://192.0.2.1:5000"
+OTHER = "epson+tcp://192.0.2.2:5000"
+
+
+HEAVY = {
+    "numpy",
+    "pymodbus",
+    "can",
+    "canopen",
+    "sqlalchemy",
+    "pydantic",
+    "rich",
+    "lark",
+    "platformdirs",
+    "keyring",
+    "importlib.metadata",
+    "robolink.controllers",
+    "robolink_simulators",
+}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "environment"),
+    [
+        (["--help"], {}),
+        (["--version"], {}),
+        ([], {"_ROBOLINK_COMPLETE": "bash_complete", "COMP_WORDS": "robolink ", "COMP_CWORD": "1"}),
+    ],
+    ids=["help", "version", "tab"],
+)
+def test_looking_at_the_commands_loads_none_of_the_heavy_packages(arguments, environment):
+    program = (
+        "import sys, atexit\n"
+        f"atexit.register(lambda: print('loaded:', sorted({HEAVY!r} & set(sys.modules))))\n"
+        "from robolink_cli.main import main\n"
+        "main()\n"
+    )
+    # The parent's import path reaches the child whichever way the project is installed.
+    paths = os.pathsep.join(path for path in sys.path if path)
+    done = subprocess.run(
+        [sys.executable, "-S", "-c", program, *arguments],
+        env={**os.environ, **environment, "PYTHONPATH": paths},
+        capture_output=True,
+        text=True,
+        timeout=30,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines()[-1] == "loaded: []"
+    expected = "0.1.0" if arguments == ["--version"] else "calibrate"
+    assert expected in done.stdout
+
+
+def test_every_command_of_the_table_exists_and_is_listed_with_its_line():
+    listing = main.cli.get_help(click.Context(main.cli, info_name="robolink"))
+    for name, (target, summary) in main.COMMANDS.items():
+        assert f"  {name} " in listing
+        assert summary[:30] in listing
+        assert target.startswith("robolink_cli.")
+
+
+def test_commands_are_listed_in_the_order_of_the_table():
+    assert main.cli.list_commands(click.Context(main.cli)) == list(main.COMMANDS)
+
+
+def test_a_command_that_does_not_exist_is_a_usage_error(capsys):
+    assert main.run(["no-such-command"]) == 2
+    assert "no-such-command" in capsys.readouterr().err
+
+
+def test_the_version_is_the_package_s(capsys):
+    assert main.run(["--version"]) == 0
+    assert capsys.readouterr().out == f"robolink {robolink.__version__}\n"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "environment", "expected"),
+    [
+        (["-c", URL, "status"], None, URL),
+        (["status", "-c", URL], None, URL),
+        (["--controller", OTHER, "status", "--controller", URL], None, URL),
+        (["status"], URL, URL),
+        (["-c", URL, "status"], OTHER, URL),
+        (["status", "-c", URL], OTHER, URL),
+        (["status"], None, None),
+    ],
+)
+def test_the_controller_is_named_before_or_after_the_command(
+    command, monkeypatch, arguments, environment, expected
+):
+    if environment:
+        monkeypatch.setenv("ROBOLINK_CONTROLLER", environment)
+    seen = command()
+    assert main.run(arguments) == 0
+    assert seen[0].url == expected
+
+
+def test_times_and_the_password_file_reach_the_command(command, tmp_path):
+    seen = command()
+    arguments = ["--timeout", "1.5", "status", "--remote-timeout", "0"]
+    assert main.run([*arguments, "--password-file", str(tmp_path / "secret")]) == 0
+    (context,) = seen
+    assert (context.timeout_s, context.remote_timeout_s) == (1.5, 0)
+    assert context.password_file == tmp_path / "secret"
+
+
+def test_without_options_the_defaults_are_in_force(command):
+    seen = command()
+    assert main.run(["status"]) == 0
+    assert (seen[0].timeout_s, seen[0].remote_timeout_s, seen[0].json) == (3.0, 60.0, False)
+
+
+def test_no_option_takes_a_password():
+    names = {
+        name
+        for parameter in main.cli.params
+        for name in parameter.opts
+        if "password" in name or name == "-p"
+    }
+    assert names == {"--password-file"}
+
+
+def test_a_missing_controller_is_told_with_an_example(command, capsys):
+    command(lambda context: context.require_url())
+    assert main.run(["status"]) == 2
+    assert "-c epson+tcp://" in capsys.readouterr().err
+
+
+class UnfinishedController:
+    """A controller on which two things were left open."""
+
+    def __init__(self):
+        self.outcomes = self
+        self.closed = False
+
+    def open_markers(self):
+        when = "2025-01-01T00:00:00+00:00"
+        return (
+            Marker("a", MarkerKind.SELECTION, "calibrate tool 3", when, {"tool": 3, "now": 0}),
+            Marker("b", MarkerKind.SET, "TLSet 3, XY(1,2,3,0)", when),
+        )
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *error):
+        self.closed = True
+
+
+def test_what_was_left_unfinished_is_said_on_connecting(command, capsys, monkeypatch):
+    connected: dict[str, Any] = {}
+    controller = UnfinishedController()
+
+    def connect(url, **options):
+        connected.update(options, url=url)
+        return controller
+
+    def act(context):
+        with open_controller(context):
+            pass
+
+    monkeypatch.setattr(robolink, "connect", connect, raising=False)
+    monkeypatch.setenv("ROBOLINK_PASSWORD", "hunter2")
+    command(act)
+    assert main.run(["-c", URL, "status", "--timeout", "2"]) == 0
+    assert controller.closed
+    assert connected.pop("password").reveal() == "hunter2"
+    assert connected == {"url": URL, "timeout_s": 2.0, "remote_timeout_s": 60.0}
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    for text in ("Tool 0 is selected now", "puts tool 3 back", f"robolink -c {URL} resolve"):
+        assert text in shown.err
+    assert "TLSet 3, XY(1,2,3,0)" in shown.err
+    assert "motion is blocked" in shown.err
+
+
+def test_resolve_is_not_told_to_resolve(command, capsys, monkeypatch):
+    def act(context):
+        with open_controller(context, quiet=True):
+            pass
+
+    monkeypatch.setattr(robolink, "connect", lambda *a, **k: UnfinishedController(), raising=False)
+    command(act)
+    assert main.run(["-c", URL, "status"]) == 0
+    assert capsys.readouterr().err == ""
+
+
+def test_a_selection_marker_without_details_is_still_told():
+    marker = Marker("a", MarkerKind.SELECTION, "calibrate", "2025-01-01T00:00:00+00:00")
+    assert "Tool ? is selected" in marker_notice(marker, URL)

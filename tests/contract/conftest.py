@@ -1,0 +1,82 @@
+"""The backend matrix: the same checks on the in-process simulator, on a socket, on hardware."""
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from itertools import count
+
+import pytest
+from robolink_simulators.clock import ScaledClock
+from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.epson.options import EpsonOptions
+from robolink_simulators.hosting.in_process import register, unregister
+from robolink_simulators.hosting.tcp import serve_tcp
+
+import robolink
+
+SPEED = 40.0
+"""Simulated seconds per real second on the socket."""
+
+_names = count()
+
+
+@dataclass
+class Cell:
+    """A controller to test against; ``simulator`` is None on hardware."""
+
+    url: str
+    simulator: EpsonSimulator | None
+
+    def connect(self, **options):
+        return robolink.connect(self.url, **options)
+
+
+@contextmanager
+def served(backend: str, simulator: EpsonSimulator) -> Iterator[Cell]:
+    """Offer ``simulator`` on ``backend``."""
+    if backend == "sim":
+        name = f"contract-{next(_names)}"
+        register(name, simulator)
+        try:
+            yield Cell(f"epson+sim://{name}", simulator)
+        finally:
+            unregister(name)
+    else:
+        with serve_tcp(simulator, clock=ScaledClock(SPEED)) as host:
+            yield Cell(host.url, simulator)
+
+
+@pytest.fixture(autouse=True)
+def _own_state_folder(tmp_path, monkeypatch):
+    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
+
+
+@pytest.fixture(params=["sim", "tcp", "hardware"])
+def cell(request) -> Iterator[Cell]:
+    """A controller with the default habits: simulated, served, or real."""
+    if request.param == "hardware":
+        url = os.environ.get("ROBOLINK_EPSON_URL")
+        if not url:
+            pytest.skip("no hardware: set ROBOLINK_EPSON_URL to a real controller")
+        moves = request.node.get_closest_marker("moves")
+        if moves and os.environ.get("ROBOLINK_ALLOW_MOTION") != "1":
+            pytest.skip("no motion on hardware: set ROBOLINK_ALLOW_MOTION=1")
+        if request.node.get_closest_marker("simulator_only"):
+            pytest.skip("needs the simulator's controls")
+        yield Cell(url, None)
+        return
+    with served(request.param, EpsonSimulator(seed=7)) as cell:
+        yield cell
+
+
+@pytest.fixture(params=["sim", "tcp"])
+def serve(request):
+    """A maker of cells around a simulator of the test's own."""
+    return lambda simulator: served(request.param, simulator)
+
+
+@pytest.fixture
+def options():
+    """The class of habits, for tests that vary them."""
+    return EpsonOptions

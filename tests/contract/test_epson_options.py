@@ -1,0 +1,112 @@
+"""Whatever habit a controller has where the documents are unsure, the driver works."""
+
+from dataclasses import fields, replace
+
+import pytest
+from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.epson.options import EpsonOptions
+
+from robolink import ANY, ToolOffset
+from robolink.errors import ControllerFaultError, RejectedError, UndefinedToolError
+from robolink.model import MotionOutcome, MotionProfile, Path, WorkBox
+from robolink.protocols import spel
+
+HABITS = [
+    {},
+    {"terminator": "cr"},
+    {"terminator": "lf"},
+    {"status_flags": 10},
+    {"print_crlf_inside_quotes": False},
+    {"abort_reply_first": False},
+    {"second_client": "closed"},
+    {"execute_on_disconnect": "stops"},
+    {"logout_while_running": "refused"},
+    {"execute_failure": "text"},
+    {"execute_failure_code": 20},
+    {"flags_during_execute": "ready"},
+    {"monitoring_refusal": 11},
+    {"point_coordinates": "given"},
+    {"true_value": 1},
+    {"comma_blank": "always"},
+    {"tool_listing": "padded"},
+    {"tool_listing": "four"},
+    {"tlset_of_undefined": "error"},
+    {"where_width": 8},
+    {"reset_outputs_off": False},
+    {"extended_queries": False},
+    {"rc_plus": 5},
+    {"rc_plus": 8},
+    {"real_pos_noise_mm": 0.0},
+    {"angle_wrap": True},
+]
+
+
+def name_of(habit):
+    return ",".join(f"{key}={value}" for key, value in habit.items()) or "defaults"
+
+
+def test_every_option_with_named_values_is_varied_here():
+    varied = {key for habit in HABITS for key in habit}
+    settled_elsewhere = {"monitoring_only", "login_timeout_s", "remote_timeout_s", "numbers"}
+    assert {field.name for field in fields(EpsonOptions)} == varied | settled_elsewhere
+
+
+@pytest.fixture(params=HABITS, ids=name_of)
+def habit(request):
+    return request.param
+
+
+@pytest.mark.moves
+def test_tools_and_motion_work_with_every_habit(serve, habit):
+    simulator = EpsonSimulator(seed=11, options=EpsonOptions(**habit))
+    with serve(simulator) as cell, cell.connect() as controller:
+        controller.motors(True)
+        tools, group = controller.tools, controller.groups[0]
+        assert controller.status().ready
+        listed = tools.read_all()
+        assert listed[1].matches(tools.read(1), 0.0005)
+        assert tools.read(2) is None
+        value = ToolOffset(10.5, -2.25, -19.125, 12.5)
+        assert tools.write(2, value, expected=None).read_back.matches(value, 0.0005)
+        assert tools.clear(2, expected=value).read_back is None
+        with pytest.raises(UndefinedToolError):
+            tools.select(2)
+        with controller.preserved("a test"):
+            tools.select(0)
+            here = group.pose()
+            target = replace(here, z_mm=here.z_mm + 3)
+            profile = MotionProfile(Path.STRAIGHT, 5, 20.0)
+            motion = group.move_to(target, profile, box=WorkBox())
+            assert motion.wait(timeout_s=60) is MotionOutcome.ARRIVED
+            assert group.pose().z_mm == pytest.approx(target.z_mm, abs=0.05)
+        assert tools.selected() == 1
+        assert len(group.joints().world) == 6
+
+
+@pytest.mark.moves
+def test_an_abort_and_a_failed_statement_are_understood_with_every_habit(serve, habit):
+    simulator = EpsonSimulator(seed=11, options=EpsonOptions(**habit))
+    with serve(simulator) as cell, cell.connect() as controller:
+        controller.motors(True)
+        group = controller.groups[0]
+        here = group.pose()
+        target = replace(here, z_mm=here.z_mm + 30)
+        motion = group.move_to(
+            target, MotionProfile(Path.STRAIGHT, 1, 1.0), box=WorkBox()
+        )
+        controller.stop()
+        assert motion.wait(timeout_s=60) is MotionOutcome.STOPPED
+        beyond = replace(group.pose(), x_mm=5000.0)
+        with pytest.raises((ControllerFaultError, RejectedError)) as caught:
+            group.move_to(beyond, MotionProfile(), box=WorkBox()).wait(timeout_s=60)
+        assert "Go XY(5000.000" in str(caught.value)
+        assert controller.outcomes.open_markers() == ()
+        if controller.status().fault:
+            controller.reset_fault()
+        assert controller.tools.write(1, ToolOffset(12), expected=ANY).read_back
+
+
+def test_the_listing_with_four_columns_means_no_v_and_no_w():
+    assert spel.parse_tool_listing("Tool 1: 1.000, 2.000, 3.000, 4.000\r\n") == {
+        1: ToolOffset(1, 2, 3, 4)
+    }

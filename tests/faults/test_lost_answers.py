@@ -1,0 +1,168 @@
+"""What a lost, late, doubled or mangled answer may cost: never a second move, never a lie."""
+
+from dataclasses import replace
+
+import pytest
+from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.faults import Fault, FaultAction
+
+import robolink
+from robolink import ToolOffset
+from robolink.controllers.epson import Verdict
+from robolink.errors import (
+    OutcomeUnknownError,
+    ReadBackError,
+    RemoteProtocolError,
+    RobolinkError,
+    TransportClosedError,
+    TransportError,
+)
+from robolink.model import MotionProfile, Path, WorkBox
+
+NEW = ToolOffset(12.75, -3.25, -20)
+WRITE = "TLSet 1, XY"
+MOVE = "Move XY"
+
+LOST = {
+    "dropped": FaultAction.DROP_REPLY,
+    "truncated": FaultAction.TRUNCATE_REPLY,
+    "cut off after it was carried out": FaultAction.DISCONNECT,
+    "cut off before it was carried out": FaultAction.DISCONNECT_BEFORE,
+}
+
+
+def simulator_with(action, match):
+    return EpsonSimulator(seed=5, faults=[Fault(action, on_exchange=0, match=match)])
+
+
+def lift(controller, dz_mm=5.0):
+    if controller.outcomes.open_markers() == ():
+        controller.motors(True)
+    group = controller.groups[0]
+    here = group.pose()
+    return group.move_to(
+        replace(here, z_mm=here.z_mm + dz_mm),
+        MotionProfile(Path.STRAIGHT, 5, 20.0),
+        box=WorkBox(),
+    )
+
+
+def write(controller):
+    before = controller.tools.read(1)
+    return controller.tools.write(1, NEW, expected=before)
+
+
+@pytest.mark.parametrize("how", LOST)
+def test_a_lost_answer_to_a_write_is_unknown_blocks_motion_and_is_settled_by_reading(serve, how):
+    simulator = simulator_with(LOST[how], WRITE)
+    applied = LOST[how] is not FaultAction.DISCONNECT_BEFORE
+    with serve(simulator) as url:
+        with robolink.connect(url, timeout_s=0.3) as controller:
+            with pytest.raises(OutcomeUnknownError, match="may or may not have run"):
+                write(controller)
+            with pytest.raises(TransportClosedError):
+                controller.status()
+        with robolink.connect(url) as controller:
+            with pytest.raises(OutcomeUnknownError, match="not settled"):
+                lift(controller)
+            (marker,) = controller.outcomes.open_markers()
+            finding = controller.resolver.examine(marker)
+            assert finding.verdict is (Verdict.DONE if applied else Verdict.NOT_APPLIED)
+            controller.resolver.settle(finding)
+            lift(controller).wait(timeout_s=60)
+    writes = [text for _, direction, text in simulator.log if WRITE in text]
+    assert len(writes) == 1
+
+
+@pytest.mark.parametrize("how", LOST)
+def test_a_lost_answer_to_a_move_is_unknown_and_the_move_is_never_sent_twice(serve, how):
+    simulator = simulator_with(LOST[how], MOVE)
+    with serve(simulator) as url:
+        with robolink.connect(url, timeout_s=0.3) as controller:
+            started = simulator.machine.arm.moves_started
+            with pytest.raises(OutcomeUnknownError):
+                lift(controller).wait(timeout_s=20)
+        with robolink.connect(url) as controller:
+            with pytest.raises(OutcomeUnknownError, match="resolve"):
+                lift(controller)
+            with pytest.raises(OutcomeUnknownError), controller.preserved("a procedure"):
+                pass
+            assert simulator.machine.arm.moves_started <= started + 1
+            (marker,) = controller.outcomes.open_markers()
+            finding = controller.resolver.examine(marker)
+            assert finding.verdict is Verdict.LOOK
+            controller.resolver.settle(finding)
+            lift(controller).wait(timeout_s=60)
+
+
+def test_a_value_that_was_changed_meanwhile_is_a_conflict(serve):
+    simulator = simulator_with(FaultAction.DROP_REPLY, WRITE)
+    with serve(simulator) as url:
+        with robolink.connect(url, timeout_s=0.3) as controller:
+            with pytest.raises(OutcomeUnknownError):
+                write(controller)
+        simulator.machine.tools.set(1, ToolOffset(1, 1, 1))
+        with robolink.connect(url) as controller:
+            (marker,) = controller.outcomes.open_markers()
+            finding = controller.resolver.examine(marker)
+            assert finding.verdict is Verdict.CONFLICT
+            assert "neither" in finding.sentence
+
+
+def test_a_write_that_is_acknowledged_but_not_applied_is_found_by_reading_back(serve):
+    simulator = simulator_with(FaultAction.IGNORE_WRITE, WRITE)
+    with serve(simulator) as url, robolink.connect(url) as controller:
+        with pytest.raises(ReadBackError, match=r"reads back as X 12\.000"):
+            write(controller)
+
+
+@pytest.mark.parametrize("match", ["GetStatus", "Print TLDef(1)", "Print TLSet(1)"])
+@pytest.mark.parametrize(
+    "action", [FaultAction.DROP_REPLY, FaultAction.TRUNCATE_REPLY, FaultAction.GARBLE_REPLY]
+)
+def test_a_read_that_fails_ends_the_session_and_lies_about_nothing(serve, match, action):
+    simulator = simulator_with(action, match)
+    truth = simulator.machine.tools.get(1)
+    with serve(simulator) as url:
+        with robolink.connect(url, timeout_s=0.3) as controller:
+            try:
+                value = controller.tools.read(1)
+            except RobolinkError:
+                pass
+            else:
+                assert value == truth
+        with robolink.connect(url) as controller:
+            assert controller.tools.read(1) == truth
+
+
+def test_a_doubled_answer_is_never_taken_for_the_next_one(serve):
+    simulator = simulator_with(FaultAction.DUPLICATE_REPLY, "Print TLSet(1)")
+    with serve(simulator) as url, robolink.connect(url) as controller:
+        with pytest.raises((RemoteProtocolError, TransportError)):
+            for _ in range(5):
+                assert controller.tools.read(1) == simulator.machine.tools.get(1)
+                assert controller.tools.selected() == 1
+
+
+def test_a_late_answer_dies_with_its_connection(serve):
+    simulator = EpsonSimulator(
+        seed=5,
+        faults=[Fault(FaultAction.DELAY, on_exchange=0, match="Print Tool", seconds=30.0)],
+    )
+    with serve(simulator) as url:
+        with robolink.connect(url, timeout_s=0.3) as controller:
+            with pytest.raises(TransportError):
+                controller.tools.selected()
+        with robolink.connect(url) as controller:
+            assert controller.tools.selected() == 1
+            assert controller.tools.read(1) == simulator.machine.tools.get(1)
+
+
+def test_an_answer_in_pieces_is_the_same_answer(serve):
+    simulator = EpsonSimulator(
+        seed=5,
+        faults=[Fault(FaultAction.SPLIT_REPLY, on_exchange=n, match="TLSet") for n in (0, 1, 2)],
+    )
+    with serve(simulator) as url, robolink.connect(url) as controller:
+        assert controller.tools.read_all()[1] == simulator.machine.tools.get(1)
+        assert controller.tools.read(1) == simulator.machine.tools.get(1)

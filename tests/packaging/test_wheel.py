@@ -1,0 +1,105 @@
+"""What is installed is what was meant to be, and nothing else."""
+
+import configparser
+import os
+import subprocess
+import sys
+import tomllib
+import zipfile
+from pathlib import Path
+
+import pytest
+from robolink_cli import main
+
+import robolink
+
+ROOT = Path(__file__).parents[2]
+PACKAGES = {
+    "robolink": ROOT / "robolink",
+    "robolink_cli": ROOT / "cli" / "robolink_cli",
+    "robolink_simulators": ROOT / "simulators" / "robolink_simulators",
+}
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("wheel")
+    done = subprocess.run(
+        [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder)],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=50,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    (path,) = folder.iterdir()
+    with zipfile.ZipFile(path) as archive:
+        yield archive
+
+
+@pytest.fixture(scope="module")
+def names(wheel):
+    return set(wheel.namelist())
+
+
+def test_the_wheel_brings_three_packages_and_nothing_else(names):
+    tops = {name.partition("/")[0] for name in names}
+    assert tops == {*PACKAGES, f"robolink-{robolink.__version__}.dist-info"}
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_every_source_and_data_file_is_in_the_wheel(names, package):
+    folder = PACKAGES[package]
+    files = {
+        f"{package}/{path.relative_to(folder).as_posix()}"
+        for path in folder.rglob("*")
+        if path.is_file() and "__pycache__" not in path.parts
+    }
+    assert f"{package}/py.typed" in files
+    assert files - names == set()
+
+
+def test_the_wheel_brings_grammar_and_catalogue(names):
+    assert any(name.endswith("/grammar.lark") for name in names)
+    assert "robolink/locale/robolink.pot" in names
+
+
+def test_the_wheel_installs_the_command_and_the_simulator(wheel, names):
+    (path,) = (name for name in names if name.endswith(".dist-info/entry_points.txt"))
+    entries = configparser.ConfigParser(delimiters=("=",))
+    entries.read_string(wheel.read(path).decode())
+    assert dict(entries["console_scripts"]) == {"robolink": "robolink_cli.main:main"}
+    assert "epson+sim" in entries["robolink.transports"]
+    assert callable(main.main)
+
+
+def test_licence_and_notice_travel_along(names):
+    (licence,) = (name for name in names if name.endswith("licenses/LICENSE"))
+    assert licence.replace("LICENSE", "NOTICE") in names
+
+
+def test_the_notice_names_every_run_time_dependency():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    notice = (ROOT / "NOTICE").read_text().lower()
+    wanted = [*project["dependencies"], *project["optional-dependencies"]["keyring"]]
+    for requirement in wanted:
+        name = requirement.partition(">")[0]
+        assert f"\n{name} " in notice, f"{name} is missing in NOTICE"
+
+
+def test_versions_agree():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    assert project["version"] == robolink.__version__
+    assert f"## [{robolink.__version__}]" in (ROOT / "CHANGELOG.md").read_text()
+
+
+@pytest.mark.parametrize("folder", ["cli", "simulators"])
+def test_no_second_name_leads_to_the_same_code(folder):
+    assert not (ROOT / folder / "__init__.py").exists()
+
+
+def test_ci_runs_what_a_person_runs():
+    script = ROOT / ".ci" / "run"
+    assert os.access(script, os.X_OK)
+    assert script.read_text().rstrip().endswith("exec make test")

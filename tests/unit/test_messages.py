@@ -1,0 +1,64 @@
+"""Every sentence goes through one door, in a form that can be collected and filled."""
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+from robolink import messages
+from robolink.messages import tr
+
+ROOT = Path(__file__).parents[2]
+PACKAGES = ("robolink", "cli/robolink_cli", "simulators/robolink_simulators")
+
+
+def sources():
+    return sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
+
+
+def sentences(path):
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "tr":
+            yield node
+
+
+def placeholders(sentence):
+    """Names between braces; braces around anything else are text."""
+    return set(re.findall(r"(?<!{){([a-z_]\w*)[^{}]*}", sentence))
+
+
+@pytest.fixture
+def shouted():
+    messages.install(str.upper)
+    yield
+    messages.install(None)
+
+
+def test_a_sentence_is_shown_as_it_stands_without_a_translation():
+    assert tr("The tip moved {distance_mm:.3f} mm.", distance_mm=0.25) == "The tip moved 0.250 mm."
+
+
+def test_braces_without_values_are_left_alone():
+    assert tr('Write {"a": 1}.') == 'Write {"a": 1}.'
+
+
+def test_a_translation_is_asked_for_the_sentence_before_it_is_filled(shouted):
+    assert tr("Connect again.") == "CONNECT AGAIN."
+
+
+def test_sentences_are_looked_for_where_they_are():
+    assert sum(1 for path in sources() for _ in sentences(path)) > 50
+
+
+@pytest.mark.parametrize("path", sources(), ids=lambda path: str(path.relative_to(ROOT)))
+def test_every_sentence_is_a_literal_that_gets_exactly_its_values(path):
+    for call in sentences(path):
+        place = f"{path.name}:{call.lineno}"
+        (sentence,) = call.args
+        assert isinstance(sentence, ast.Constant), f"{place}: not a literal, cannot be collected"
+        given = {keyword.arg for keyword in call.keywords}
+        if None in given:
+            continue  # **values, which cannot be counted here
+        wanted = placeholders(str(sentence.value))
+        assert wanted == given, f"{place}: the sentence wants {wanted}, gets {given}"

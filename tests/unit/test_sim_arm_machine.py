@@ -1,0 +1,153 @@
+import json
+import random
+
+import pytest
+from robolink_simulators.epson.bits import BitBank
+from robolink_simulators.epson.kinematics import Joints
+from robolink_simulators.epson.machine import Machine
+from robolink_simulators.epson.parameters import MotionParameters
+from robolink_simulators.epson.points import Local, Point
+from robolink_simulators.epson.refusals import Refusal, RefusalKind
+from robolink_simulators.epson.robots import find_robot
+
+from robolink.errors import ConfigError
+from robolink.model import ToolOffset
+
+T6 = find_robot("T6-602S")
+NOZZLE = ToolOffset(12.0, -3.0, -20.0, 30.0)
+
+
+@pytest.fixture
+def machine():
+    return Machine(T6)
+
+
+def test_the_selected_tool_moves_the_reported_tip_but_not_the_arm(machine):
+    flange = machine.tip()
+    machine.tools.set(2, NOZZLE)
+    machine.tools.select(2)
+    tip = machine.tip()
+    # The arm rests with U = 0, so the offset adds up axis by axis.
+    added = [a - b for a, b in zip(tip.coordinates(), flange.coordinates(), strict=True)]
+    assert added == pytest.approx(NOZZLE.components())
+    assert tip.tool == 2
+    assert machine.arm.moves_started == 0
+
+
+def test_the_joints_for_a_point_bring_the_selected_tip_there(machine):
+    machine.tools.set(2, NOZZLE)
+    machine.tools.select(2)
+    machine.locals.define(1, Local(10.0, 20.0, -5.0, 30.0))
+    target = machine.locals.convert(Point((200.0, 380.0, -60.0, 25.0, 0.0, 0.0)), 1)
+    machine.arm.place(machine.joints_for(target), 0)
+    assert machine.tip().coordinates() == pytest.approx((200.0, 380.0, -60.0, 25.0, 0.0, 0.0))
+
+
+def test_an_undefined_tool_cannot_be_selected(machine):
+    with pytest.raises(Refusal) as refused:
+        machine.tools.select(5)
+    assert refused.value.kind is RefusalKind.TOOL_UNDEFINED
+    assert machine.tools.selected == 0
+
+
+@pytest.mark.parametrize(
+    ("tool", "kind"),
+    [
+        (0, RefusalKind.TOOL_ZERO_FIXED),
+        (16, RefusalKind.VALUE_OUT_OF_RANGE),
+        (-1, RefusalKind.VALUE_OUT_OF_RANGE),
+    ],
+)
+def test_only_tools_1_to_15_can_be_written(machine, tool, kind):
+    for write in (lambda: machine.tools.set(tool, NOZZLE), lambda: machine.tools.clear(tool)):
+        with pytest.raises(Refusal) as refused:
+            write()
+        assert refused.value.kind is kind
+    assert machine.flash_writes == 0
+
+
+def test_every_write_and_clear_wears_the_flash(machine):
+    machine.tools.set(1, NOZZLE)
+    machine.tools.set(1, NOZZLE)
+    machine.tools.clear(1)
+    machine.tools.select(0)
+    assert machine.flash_writes == 3
+
+
+def test_clearing_the_tool_in_force_selects_the_flange(machine):
+    machine.tools.set(1, NOZZLE)
+    machine.tools.select(1)
+    machine.tools.clear(1)
+    assert machine.tools.selected == 0
+
+
+def test_tools_selection_and_arm_survive_a_restart_but_settings_do_not(machine):
+    machine.tools.set(15, NOZZLE)
+    machine.tools.select(15)
+    machine.arm.place(Joints(10.0, -20.0, -30.0, 40.0), 0)
+    machine.switch_motors(True)
+    machine.points.store(1, Point((0.0,) * 6))
+    state = json.loads(json.dumps(machine.to_state()))
+    again = Machine.from_state(T6, state)
+    assert again.tools.defined() == {15: NOZZLE}
+    assert again.tools.selected == 15
+    assert again.flash_writes == 1
+    assert again.arm.joints == machine.arm.joints
+    assert not again.motors_on
+    assert not again.points.defined(1)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"robot": "T3-401S"},
+        {"joints": [0.0, 0.0, 99.0, 0.0]},
+        {"joints": None},
+        {"tools": {}},
+        {"tools": {"offsets": {}, "selected": 3, "flash_writes": 0}},
+        {"tools": {"offsets": {"16": [0.0]}, "selected": 0, "flash_writes": 0}},
+        {"tools": {"offsets": {"1": ["x"]}, "selected": 0, "flash_writes": 0}},
+    ],
+)
+def test_a_state_that_does_not_fit_is_refused(machine, change):
+    with pytest.raises(ConfigError, match="does not fit"):
+        Machine.from_state(T6, machine.to_state() | change)
+
+
+def test_motor_on_resets_the_motion_parameters_and_power(machine):
+    machine.parameters = MotionParameters(speed=(50, 50, 50), limz_mm=-20.0)
+    machine.power_high = True
+    machine.switch_motors(True)
+    assert machine.motors_on
+    assert not machine.power_high
+    assert machine.parameters == MotionParameters()
+
+
+def test_the_measured_tip_is_that_of_the_selected_tool(machine):
+    machine.tools.set(1, NOZZLE)
+    machine.tools.select(1)
+    assert machine.real_tip(random.Random(1), 0.0) == machine.tip()
+
+
+def test_a_byte_is_eight_bits_with_the_lowest_first():
+    bank = BitBank(16)
+    bank.set_byte(1, 0b101)
+    assert [bank.get(n) for n in range(8, 12)] == [True, False, True, False]
+    bank.set(15, True)
+    assert bank.get_byte(1) == 0b1000_0101
+    bank.clear()
+    assert bank.get_byte(1) == 0
+
+
+@pytest.mark.parametrize(
+    "use",
+    [
+        lambda bank: bank.get(16),
+        lambda bank: bank.set(-1, True),
+        lambda bank: bank.get_byte(2),
+        lambda bank: bank.set_byte(0, 256),
+    ],
+)
+def test_a_bit_or_a_value_that_does_not_exist_is_refused(use):
+    with pytest.raises(Refusal):
+        use(BitBank(16))

@@ -1,0 +1,72 @@
+"""Finding the transport that a URL names."""
+
+from importlib import metadata
+from importlib.metadata import EntryPoint, EntryPoints
+
+import pytest
+
+from robolink.errors import ConfigError
+from robolink.transport import TRANSPORTS_GROUP, open_transport, parse_url
+
+
+def opener(url, *, timeout_s, clock):
+    return ("opened", url, timeout_s, clock)
+
+
+class DeskEntryPoint(EntryPoint):
+    """One whose package is this module, which cannot be imported by name."""
+
+    def load(self):
+        return opener
+
+
+@pytest.fixture
+def entry_points(monkeypatch):
+    found = EntryPoints(
+        [
+            DeskEntryPoint("epson+desk", "desk:opener", TRANSPORTS_GROUP),
+            EntryPoint("epson+gone", "no_such_module_of_ours:opener", TRANSPORTS_GROUP),
+            EntryPoint("epson+odd", "robolink.errors:no_such_name", TRANSPORTS_GROUP),
+        ]
+    )
+    monkeypatch.setattr(metadata, "entry_points", lambda **by: found.select(**by))
+
+
+def test_another_package_is_found_by_the_name_of_its_full_scheme(entry_points):
+    link = parse_url("epson+desk://cell-a?seed=1")
+    opened: object = open_transport(link, timeout_s=1.5)
+    assert opened == ("opened", link, 1.5, None)
+
+
+def test_a_url_may_be_given_as_text(entry_points):
+    link = parse_url("epson+desk://cell-a")
+    opened: object = open_transport("epson+desk://cell-a")
+    assert opened == ("opened", link, 3.0, None)
+
+
+def test_an_unknown_scheme_is_refused_with_a_list_of_what_there_is(entry_points):
+    with pytest.raises(ConfigError, match=r"'epson\+pigeon'") as caught:
+        open_transport("epson+pigeon://loft")
+    for known in ("epson+tcp", "epson+desk"):
+        assert known in caught.value.remedy
+
+
+@pytest.mark.parametrize("scheme", ["epson+gone", "epson+odd"])
+def test_an_entry_point_that_cannot_be_loaded_is_an_error_of_ours(entry_points, scheme):
+    with pytest.raises(ConfigError, match="cannot be loaded") as caught:
+        open_transport(f"{scheme}://x")
+    assert isinstance(caught.value.__cause__, (ImportError, AttributeError))
+
+
+@pytest.mark.parametrize(
+    "url",
+    [
+        "epson+tcp://192.168.0.1",
+        "epson+tcp://:5000",
+        "epson+tcp://192.168.0.1:5000/",
+        "epson+tcp://192.168.0.1:5000?seed=1",
+    ],
+)
+def test_a_tcp_url_is_host_and_port_and_nothing_else(url):
+    with pytest.raises(ConfigError):
+        open_transport(url)

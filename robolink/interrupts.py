@@ -1,40 +1,68 @@
 """Ctrl-C between exchanges, never inside one.
 
 A KeyboardInterrupt between a request and its answer would leave the answer in the pipe, to
-be taken for the answer to the next question. So it is held back for the length of one
-exchange, which a deadline bounds, and raised right after.
+be taken for the answer to the next question. So while a session is open, SIGINT goes through
+a handler that raises KeyboardInterrupt as usual, except inside an exchange: there it is held
+back until the exchange, which a deadline bounds, has ended.
+
+The handler is swapped once per session and not once per exchange, because two calls of
+``signal.signal`` would cost more than everything else that the driver does in one.
 """
 
 import signal
 import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
-from types import FrameType
+from types import FrameType, TracebackType
 
 
-@contextmanager
-def deferred_interrupt() -> Iterator[None]:
-    """Hold back a SIGINT that arrives inside the block; raise KeyboardInterrupt at its end.
+class InterruptGate:
+    """Holds back SIGINT while the main thread is inside the gate; a context manager.
 
-    Does nothing outside the main thread, where Python delivers no signals, and where the
-    program has installed a handler of its own.
+    It stands aside where it is not needed: outside the main thread, where Python delivers no
+    signals, and where the program has a SIGINT handler of its own.
     """
-    if (
-        threading.current_thread() is not threading.main_thread()
-        or signal.getsignal(signal.SIGINT) is not signal.default_int_handler
-    ):
-        yield
-        return
-    held = False
 
-    def hold(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - signal's form
-        nonlocal held
-        held = True
+    def __init__(self) -> None:
+        self._open = False
+        self._inside = False
+        self._held = False
 
-    signal.signal(signal.SIGINT, hold)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-        if held:
-            raise KeyboardInterrupt
+    def open(self) -> None:
+        """Start to watch SIGINT, if this is the main thread and nobody else does."""
+        if (
+            threading.current_thread() is threading.main_thread()
+            and signal.getsignal(signal.SIGINT) is signal.default_int_handler
+        ):
+            signal.signal(signal.SIGINT, self._interrupted)
+            self._open = True
+
+    def close(self) -> None:
+        """Give SIGINT back. Idempotent; from another thread the handler just stays harmless."""
+        if self._open and threading.current_thread() is threading.main_thread():
+            if signal.getsignal(signal.SIGINT) == self._interrupted:
+                signal.signal(signal.SIGINT, signal.default_int_handler)
+            self._open = False
+
+    def __enter__(self) -> None:
+        if self._open and threading.get_ident() == _MAIN:
+            self._inside = True
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if self._inside and threading.get_ident() == _MAIN:
+            self._inside = False
+            if self._held:
+                self._held = False
+                raise KeyboardInterrupt
+
+    def _interrupted(self, number: int, frame: FrameType | None) -> None:
+        if self._inside:
+            self._held = True
+        else:
+            signal.default_int_handler(number, frame)
+
+
+_MAIN = threading.main_thread().ident

@@ -55,6 +55,14 @@ class MemoryOutcomeLog:
         return tuple(self._markers.values())
 
 
+_in_memory: dict[str, MemoryOutcomeLog] = {}
+
+
+def memory_log(identity: str) -> MemoryOutcomeLog:
+    """Return the log that all connections of this process to one far end share."""
+    return _in_memory.setdefault(identity, MemoryOutcomeLog())
+
+
 class FileOutcomeLog:
     """Markers of one controller in one file.
 

@@ -127,7 +127,7 @@ class Bench:
     def _operator(self) -> Operator:
         if self._assist_url is None:
             return TerminalOperator(note)
-        from robolink_simulators.hosting.assist import AssistClient
+        from robolink_simulators.assist import AssistClient
 
         client = AssistClient(self._assist_url)
 

@@ -21,6 +21,19 @@ def colour_wanted() -> bool | None:
     return False if os.environ.get("NO_COLOR") else None
 
 
+def help_width() -> int:
+    """Return the width of help pages: the terminal's, between 50 and 78 columns.
+
+    The rule is click's own; click would import ``shutil``, and with it the compression
+    modules, to find out.
+    """
+    try:
+        columns = int(os.environ.get("COLUMNS") or os.get_terminal_size().columns)
+    except (OSError, ValueError):
+        columns = 80
+    return max(min(columns, 80) - 2, 50)
+
+
 def leave_pipe() -> None:
     """Send what is still to be flushed nowhere, because the reader of the pipe has left."""
     nowhere = os.open(os.devnull, os.O_WRONLY)

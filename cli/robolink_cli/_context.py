@@ -2,10 +2,8 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import wraps
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import click
 from click.core import ParameterSource
@@ -24,8 +22,7 @@ CommandT = TypeVar("CommandT", bound=Callable[..., Any])
 _GIVEN = "robolink.given"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CliContext:
+class CliContext(NamedTuple):
     """What a command was told from both sides of its name, and how it answers.
 
     Attributes:
@@ -36,7 +33,7 @@ class CliContext:
     """
 
     url: str | None = None
-    password_file: Path | None = None
+    password_file: str | None = None
     timeout_s: float = 3.0
     remote_timeout_s: float = 60.0
 
@@ -172,7 +169,7 @@ def _link_options(command: CommandT) -> CommandT:
         ),
         click.option(
             "--password-file",
-            type=click.Path(dir_okay=False, path_type=Path),
+            type=click.Path(dir_okay=False),
             expose_value=False,
             callback=_keep,
             help=tr("File whose first line is the controller's password; readable by you only."),

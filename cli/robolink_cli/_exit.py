@@ -20,7 +20,6 @@ code  meaning
 """
 
 import os
-import traceback
 from typing import Final
 
 import click
@@ -65,6 +64,8 @@ def report(error: BaseException, *, as_json: bool) -> int:
     """Tell a person, or a machine, about ``error``; return the exit code."""
     code = exit_code(error)
     if os.environ.get("ROBOLINK_DEBUG"):
+        import traceback  # here, because --help needs none
+
         traceback.print_exception(error)
     if as_json:
         click.echo(error_document(error))

@@ -10,7 +10,7 @@ from robolink.model import Secret
 KEYRING_SERVICE = "robolink"
 
 
-def find_password(identity: str, *, password_file: Path | None = None) -> Secret | None:
+def find_password(identity: str, *, password_file: str | None = None) -> Secret | None:
     """Return the password for a controller, None when there is none.
 
     The first that has one wins: the system's keyring (service ``robolink``, user
@@ -23,10 +23,9 @@ def find_password(identity: str, *, password_file: Path | None = None) -> Secret
     stored = _from_keyring(identity)
     if stored is not None:
         return stored
-    named = os.environ.get("ROBOLINK_PASSWORD_FILE")
-    path = password_file or (Path(named) if named else None)
-    if path is not None:
-        return _from_file(path)
+    path = password_file or os.environ.get("ROBOLINK_PASSWORD_FILE")
+    if path:
+        return _from_file(Path(path))
     value = os.environ.get("ROBOLINK_PASSWORD")
     return None if value is None else Secret(value)
 

@@ -6,7 +6,6 @@ it over, and it is printed once, when the command has ended well; an error print
 document instead.
 """
 
-import json
 from collections.abc import Iterable, Mapping, Sequence
 
 import click
@@ -74,4 +73,6 @@ def print_document(context: click.Context) -> None:
 
 def dumps(schema: str, payload: Mapping[str, object]) -> str:
     """Return one JSON document in ASCII, so that no console can spoil it."""
+    import json  # here, because --help needs none
+
     return json.dumps({"schema": schema, **payload}, indent=2, allow_nan=False)

@@ -9,7 +9,7 @@ import click
 
 from robolink import __version__
 from robolink.messages import tr
-from robolink_cli._console import colour_wanted, leave_pipe, tolerate_any_console
+from robolink_cli._console import colour_wanted, help_width, leave_pipe, tolerate_any_console
 from robolink_cli._context import shared_options
 from robolink_cli._exit import READER_LEFT, report
 from robolink_cli._lazy import LazyGroup
@@ -88,7 +88,10 @@ def _answer(arguments: Sequence[str]) -> int:
 
 def _invoke(arguments: Sequence[str]) -> int:
     colour = colour_wanted()
-    with cli.make_context("robolink", list(arguments), color=colour) as context:
+    width = help_width()
+    with cli.make_context(
+        "robolink", list(arguments), color=colour, terminal_width=width
+    ) as context:
         code = cli.invoke(context)
         print_document(context)
     return code if isinstance(code, int) else 0

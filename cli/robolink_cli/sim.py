@@ -3,10 +3,8 @@
 import json
 import signal
 import threading
-from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
-from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -112,15 +110,12 @@ def epson(
         stopped.wait()
 
 
-_Handler = Callable[[int, FrameType | None], Any] | int | None
-
-
 class _Termination:
     """Makes SIGTERM an orderly end; Ctrl-C stays what it is."""
 
     def __init__(self) -> None:
         self._stopped = threading.Event()
-        self._before: _Handler = None
+        self._before: Any = None
 
     def wait(self) -> None:
         """Block until SIGTERM."""
@@ -146,7 +141,7 @@ def _announce(url: str, assist_url: str, robot: str, seed: int) -> None:
             "seed": seed,
             "simulated": True,
         }
-        # One line and at once: whoever started us waits for it.
+        # One line; click flushes it, because whoever started us waits for it.
         lines = [json.dumps(document)]
     else:
         lines = [
@@ -157,7 +152,6 @@ def _announce(url: str, assist_url: str, robot: str, seed: int) -> None:
             tr("Ctrl-C ends it."),
         ]
     click.echo("\n".join(lines))
-    click.get_text_stream("stdout").flush()
 
 
 def _host_and_port(address: str) -> tuple[str, int]:

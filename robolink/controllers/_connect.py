@@ -2,7 +2,7 @@
 
 from robolink.controllers.epson import EpsonController, open_epson
 from robolink.errors import ConfigError
-from robolink.markers import FileOutcomeLog, MemoryOutcomeLog
+from robolink.markers import FileOutcomeLog, memory_log
 from robolink.messages import tr
 from robolink.model import OutcomeLog, Secret
 from robolink.timing import Clock
@@ -47,8 +47,8 @@ def connect(
     transport = open_transport(link, timeout_s=timeout_s, clock=clock)
     try:
         if outcomes is None:
-            durable = transport.durable
-            outcomes = FileOutcomeLog(transport.identity) if durable else MemoryOutcomeLog()
+            keep = FileOutcomeLog if transport.durable else memory_log
+            outcomes = keep(transport.identity)
         if trace is not None:
             transport = TracingTransport(transport, trace)
     except BaseException:

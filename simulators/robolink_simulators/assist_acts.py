@@ -49,6 +49,11 @@ def _set_input(simulator: EpsonSimulator, request: Parameters) -> Answer:
     return {}
 
 
+def _restart(simulator: EpsonSimulator, _request: Parameters) -> Answer:
+    simulator.restart()
+    return {}
+
+
 def _counters(simulator: EpsonSimulator, _request: Parameters) -> Answer:
     return {
         "exchanges": simulator.exchanges,
@@ -59,7 +64,7 @@ def _counters(simulator: EpsonSimulator, _request: Parameters) -> Answer:
 
 def _plain(name: str) -> Act:
     def act(simulator: EpsonSimulator, _request: Parameters) -> Answer:
-        getattr(simulator, name)()
+        getattr(simulator.panel, name)()
         return {}
 
     return act
@@ -67,7 +72,7 @@ def _plain(name: str) -> Act:
 
 def _numbered(name: str) -> Act:
     def act(simulator: EpsonSimulator, request: Parameters) -> Answer:
-        getattr(simulator, name)(_whole(request, "number"))
+        getattr(simulator.panel, name)(_whole(request, "number"))
         return {}
 
     return act
@@ -93,7 +98,7 @@ ACTS: Final[Mapping[str, Act]] = {
     "start_production": _plain("start_production"),
     "stop_production": _plain("stop_production"),
     "cut_link": _plain("cut_link"),
-    "restart": _plain("restart"),
+    "restart": _restart,
 }
 """Every act by name."""
 

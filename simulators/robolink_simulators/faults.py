@@ -40,11 +40,11 @@ class FaultAction(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """One planned fault. It fires once, or on every match.
+    """One planned fault. It fires once.
 
     Attributes:
         action: What goes wrong.
-        on_exchange: Which of the requests that ``match``, counted from 1; 0 for every one.
+        on_exchange: Which of the requests that ``match``, counted from 0.
         match: Text that a request must contain to be counted; empty counts all.
         seconds: A delay in simulated time, where the action has one. With 0 a stop or error
             comes before the request is carried out.
@@ -54,7 +54,7 @@ class Fault:
     """
 
     action: FaultAction
-    on_exchange: int = 1
+    on_exchange: int = 0
     match: str = ""
     seconds: float = 0.0
     code: int = 0
@@ -99,11 +99,12 @@ class FaultPlan:
         due: list[Fault] = []
         waiting: list[tuple[Fault, int]] = []
         for fault, left in self._waiting:
-            counted = fault.match in request
-            if counted and left <= 1:
+            if fault.match not in request:
+                waiting.append((fault, left))
+            elif left == 0:
                 due.append(fault)
-            if not counted or left != 1:
-                waiting.append((fault, left - 1 if counted and left else left))
+            else:
+                waiting.append((fault, left - 1))
         self._waiting = waiting
         self.fired += due
         return tuple(due)

@@ -22,9 +22,9 @@ PLAN = TouchPlan(lift_mm=10, clearance_mm=2)
 class PerfectPerson:
     """Puts the physical tip on the pin, whatever frame the poses are given in."""
 
-    def __init__(self, tip, believed=None):
+    def __init__(self, tip, believed=None, *, start=Pose(300, 100, 0, 0, tool=0)):
         self.tip, self.believed = tip, believed or ToolOffset()
-        self.pose = None
+        self.pose = start
         self.log = []
 
     def answer(self, step):
@@ -54,8 +54,7 @@ def drive(procedure, person):
 
 
 def measured(tip, stored, start_u_deg=0.0):
-    person = PerfectPerson(tip)
-    person.pose = Pose(300, 100, 0, start_u_deg, tool=0)
+    person = PerfectPerson(tip, start=Pose(300, 100, 0, start_u_deg, tool=0))
     return drive(two_pose(PLAN, stored=stored), person), person
 
 

@@ -116,7 +116,7 @@ def test_times_and_the_password_file_reach_the_command(command, tmp_path):
     assert main.run([*arguments, "--password-file", str(tmp_path / "secret")]) == 0
     (context,) = seen
     assert (context.timeout_s, context.remote_timeout_s) == (1.5, 0)
-    assert context.password_file == tmp_path / "secret"
+    assert context.password_file == str(tmp_path / "secret")
 
 
 def test_without_options_the_defaults_are_in_force(command):

@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 
+import click
 import pytest
 from robolink_cli import _render, main
 
@@ -122,3 +123,12 @@ def test_a_reader_that_leaves_early_causes_no_noise():
         child.stdout.close()
         assert child.stderr.read() == b""
         assert child.wait(timeout=30) == 141
+
+
+@pytest.mark.parametrize(("value", "expected"), [("1", False), ("", None)])
+def test_no_color_is_honoured(command, monkeypatch, value, expected):
+    monkeypatch.setenv("NO_COLOR", value)
+    seen = []
+    command(lambda context: seen.append(click.get_current_context().color))
+    assert main.run(["status"]) == 0
+    assert seen == [expected]

@@ -1,6 +1,7 @@
 """Whatever habit a controller has where the documents are unsure, the driver works."""
 
 from dataclasses import fields, replace
+from typing import Any
 
 import pytest
 from robolink_simulators.epson.device import EpsonSimulator
@@ -11,7 +12,7 @@ from robolink.errors import ControllerFaultError, RejectedError, UndefinedToolEr
 from robolink.model import MotionOutcome, MotionProfile, Path, WorkBox
 from robolink.protocols import spel
 
-HABITS = [
+HABITS: list[dict[str, Any]] = [
     {},
     {"terminator": "cr"},
     {"terminator": "lf"},
@@ -38,6 +39,7 @@ HABITS = [
     {"rc_plus": 8},
     {"real_pos_noise_mm": 0.0},
     {"angle_wrap": True},
+    {"requests_end_with_segment": True},
 ]
 
 
@@ -91,9 +93,7 @@ def test_an_abort_and_a_failed_statement_are_understood_with_every_habit(serve, 
         group = controller.groups[0]
         here = group.pose()
         target = replace(here, z_mm=here.z_mm + 30)
-        motion = group.move_to(
-            target, MotionProfile(Path.STRAIGHT, 1, 1.0), box=WorkBox()
-        )
+        motion = group.move_to(target, MotionProfile(Path.STRAIGHT, 1, 1.0), box=WorkBox())
         controller.stop()
         assert motion.wait(timeout_s=60) is MotionOutcome.STOPPED
         beyond = replace(group.pose(), x_mm=5000.0)

@@ -115,14 +115,22 @@ class EpsonController:
         """Send Reset because a person asked for it; it may switch outputs off.
 
         Raises:
-            NotReadyError: A reset cannot help now (emergency stop pressed, serious error,
-                a program is running).
-            ControllerFaultError: The error is still there afterwards.
+            NotReadyError: A reset cannot help now (serious error, guard open, a program is
+                running, no remote control).
+            ControllerFaultError: The error or the emergency stop is still there afterwards.
         """
         with self._lock.held("Reset"):
             self._require_resettable(self.status())
             self._session.exchange("Reset")
             status = self.status()
+            if status.emergency_stop:
+                raise ControllerFaultError(
+                    tr("The emergency stop is still in force after the reset."),
+                    code=status.code,
+                    remedy=tr("Release the button, then reset again."),
+                    controller=self.identity,
+                    request="Reset",
+                )
             if status.fault or status.serious_fault:
                 raise ControllerFaultError(
                     tr("The reset did not clear error {code:04d}.", code=status.code),
@@ -205,7 +213,9 @@ class EpsonController:
         self.close()
 
     def _require_resettable(self, status: ControllerStatus) -> None:
-        if status.serious_fault or status.emergency_stop or status.running or not status.remote:
+        # The flag of an emergency stop stays on after its release until the reset
+        # (epson.md 1.7), so it cannot hold the reset back.
+        if status.serious_fault or status.running or not status.remote:
             require_ready(status, controller=self.identity, request="Reset")
         if status.guard_open:
             raise NotReadyError(

@@ -28,7 +28,7 @@ from robolink.errors import (
     TransportError,
     TransportTimeoutError,
 )
-from robolink.interrupts import deferred_interrupt
+from robolink.interrupts import InterruptGate
 from robolink.messages import tr
 from robolink.model import Secret
 from robolink.protocols.epson_text import (
@@ -69,6 +69,8 @@ class EpsonSession:
         self._transport = transport
         self._codec = EpsonTextCodec(Role.HOST)
         self._wire = threading.Lock()
+        self._gate = InterruptGate()
+        self._gate.open()
         self._pending: PendingExecute | None = None
         self._ended_by: RobolinkError | None = None
         self.timeout_s = timeout_s
@@ -150,7 +152,7 @@ class EpsonSession:
     def start_execute(self, statement: Statement) -> PendingExecute:
         """Send a statement that takes its time; its answer is collected by name later."""
         request = Request("Execute", (statement,))
-        with deferred_interrupt(), self._wire:
+        with self._gate, self._wire:
             self._check_usable(request)
             pending = PendingExecute(statement)
             try:
@@ -170,7 +172,7 @@ class EpsonSession:
     def await_pending(self, *, wait_s: float) -> None:
         """Wait up to ``wait_s`` for bytes, without the lock, then read what is there."""
         self._transport.wait_readable(deadline=Deadline.after(self.clock, wait_s))
-        with deferred_interrupt(), self._wire:
+        with self._gate, self._wire:
             if self._ended_by is None:
                 try:
                     self._expect_silence()
@@ -187,9 +189,10 @@ class EpsonSession:
                 controller=self.identity,
             )
         self._transport.close()
+        self._gate.close()
 
     def _ask(self, request: Request, *, secret: bool = False) -> Reply | Refusal:
-        with deferred_interrupt(), self._wire:
+        with self._gate, self._wire:
             self._check_usable(request)
             try:
                 self._expect_silence()

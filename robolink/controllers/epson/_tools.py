@@ -2,11 +2,13 @@
 
 from collections.abc import Sequence
 
+from robolink.controllers.epson._answers import NOT_EXECUTED
 from robolink.controllers.epson._guarded import MarkerDesk, ProcedureLock
 from robolink.controllers.epson._robot import RobotFacts
 from robolink.controllers.epson._window import CommandWindow
 from robolink.errors import (
     ReadBackError,
+    RejectedError,
     ReservedToolError,
     ToolChangedError,
     ToolError,
@@ -14,7 +16,7 @@ from robolink.errors import (
     UndefinedToolError,
 )
 from robolink.messages import tr
-from robolink.model import ANY, Expected, MarkerKind, ToolOffset, ToolReceipt
+from robolink.model import ANY, Expected, Marker, MarkerKind, ToolOffset, ToolReceipt
 from robolink.protocols import spel
 
 DECIMALS = 3
@@ -115,7 +117,7 @@ class EpsonToolTable:
             marker = self._desk.begin(MarkerKind.SET, statement, {"select": tool, "before": before})
             self._desk.note_selection(tool)
             with self._desk.doubt(statement):
-                self._window.command(statement)
+                self._run(statement, marker)
                 found = self._selected()
             self._desk.clear(marker)
             if found != tool:
@@ -159,7 +161,7 @@ class EpsonToolTable:
             {"tool": tool, "before": _plain(before), "requested": _plain(requested)},
         )
         with self._desk.doubt(statement):
-            self._window.command(statement)
+            self._run(statement, marker)
             found = self._read(tool)
         self._desk.clear(marker)
         if not _same(found, requested):
@@ -177,6 +179,18 @@ class EpsonToolTable:
                 request=statement,
             )
         return ToolReceipt(tool, before, requested, found, unconditional=unconditional)
+
+    def _run(self, statement: spel.Statement, marker: Marker) -> None:
+        """Run ``statement``; a plain refusal settles its marker, a fault does not.
+
+        A controller in error refuses to print the value that would prove what happened.
+        """
+        try:
+            self._window.command(statement)
+        except RejectedError as error:
+            if error.code in NOT_EXECUTED:
+                self._desk.clear(marker)
+            raise
 
     def _read(self, tool: int) -> ToolOffset | None:
         if tool == 0:

@@ -14,6 +14,9 @@ from robolink.protocols.epson_text import Refusal, Reply, parse_status
 from robolink.protocols.spel import Statement
 
 
+_NOT_READY = 20
+
+
 class CommandWindow:
     """Runs typed SPEL+ statements that do not move the robot, and explains failures.
 
@@ -79,14 +82,18 @@ class CommandWindow:
     ) -> RejectedError | ControllerFaultError:
         """Find out why ``statement`` did not run."""
         controller = self._session.identity
-        if isinstance(answer, Refusal) and answer.code in NOT_EXECUTED:
+        code = answer.code if isinstance(answer, Refusal) else 0
+        # 20 says that a condition is missing; the flags say which (epson.md 1.6).
+        if code in NOT_EXECUTED and code != _NOT_READY and isinstance(answer, Refusal):
             return rejected(answer, controller=controller, request=statement)
         status = self.status()
         if status.fault or status.emergency_stop or status.guard_open or status.serious_fault:
             return self.fault(status, statement)
+        if code in NOT_EXECUTED and isinstance(answer, Refusal):
+            return rejected(answer, controller=controller, request=statement)
         return RejectedError(
             tr("The controller did not run {statement!r}.", statement=statement),
-            code=answer.code if isinstance(answer, Refusal) else status.code,
+            code=code or status.code,
             remedy=tr("It answered: {answer}.", answer=_shown(answer)),
             controller=controller,
             request=statement,

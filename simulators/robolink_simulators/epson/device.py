@@ -7,24 +7,25 @@ the time, and asks when to call again.
 """
 
 import random
+import threading
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
 
 from robolink.model import Secret
-from robolink.protocols.epson_text import BadRequest, ErrorCode, Request
-from robolink.timing import NS_PER_S
+from robolink.protocols.epson_text import BadRequest, ErrorCode, Request, StatusFlags
 from robolink_simulators.epson.client_slot import ClientSlot
 from robolink_simulators.epson.condition import Condition, Mode
 from robolink_simulators.epson.desk import CommandDesk
 from robolink_simulators.epson.exchange import Exchange
-from robolink_simulators.epson.flash import Flash
+from robolink_simulators.epson.flash import Flash, forget_volatile
 from robolink_simulators.epson.link import EpsonLink
 from robolink_simulators.epson.machine import Machine
+from robolink_simulators.epson.mishaps import Mishaps
 from robolink_simulators.epson.options import EpsonOptions
 from robolink_simulators.epson.panel import Panel
-from robolink_simulators.epson.points import LocalTable, PointTable
 from robolink_simulators.epson.queries import Alarms
 from robolink_simulators.epson.robots import find_robot
 from robolink_simulators.epson.service import Service
@@ -41,7 +42,7 @@ RequestHook = Callable[[int, str], None]
 """Called with the running number of a request and a text, passwords hidden."""
 
 
-class EpsonSimulator(Panel):
+class EpsonSimulator:
     """Implements :class:`~robolink_simulators.wire.WireDevice`.
 
     Args:
@@ -52,8 +53,16 @@ class EpsonSimulator(Panel):
         state_path: File that keeps what the controller's flash keeps.
         faults: What is planned to go wrong.
 
+    The motors are on at first, as in a cell that stands ready; after a restart they are off.
+
     Attributes:
+        lock: Held by whoever touches the simulator while a host serves it.
         url: Where a host serves it, empty when none does.
+        options: The controller's habits.
+        machine: The robot and its memory.
+        condition: What GetStatus shows.
+        panel: What a person, or the rest of the cell, can do to the controller.
+        alarms: The alarms that stand.
         variables: The Global Preserve variables.
         world: The truth, and the person at the cell.
         faults: What is planned to go wrong.
@@ -62,9 +71,9 @@ class EpsonSimulator(Panel):
         on_request: Called with a request before it is carried out. What it raises goes to
             the host; the request is carried out all the same.
         on_reply: Called with the answer before it leaves; it leaves all the same.
-
-    The attributes of :class:`Panel`, and all that it can do, belong to it as well. The
-    motors are on at first, as in a cell that stands ready; after a restart they are off.
+        watchers: Called after each act at the panel, so that a host looks for what leaves now.
+        present_ns: Tells the present time to such acts; a host sets it. Without one, they
+            happen at the instant that the simulator was given last.
 
     Raises:
         ConfigError: No such robot, or a state file that does not fit.
@@ -80,7 +89,11 @@ class EpsonSimulator(Panel):
         state_path: Path | None = None,
         faults: Iterable[Fault] = (),
     ) -> None:
-        super().__init__()
+        self.lock = threading.RLock()
+        self.watchers: list[Callable[[], None]] = []
+        self.present_ns: Callable[[], int] | None = None
+        self._now_ns = 0
+        self._stepping = False
         self.url = ""
         self.seed = seed
         self.options = options or EpsonOptions()
@@ -89,10 +102,8 @@ class EpsonSimulator(Panel):
         self.log: deque[tuple[int, str, str]] = deque(maxlen=_LOG_LINES)
         self.on_request: RequestHook | None = None
         self.on_reply: RequestHook | None = None
-        self._password = password.reveal() if password else ""
         self._requests = 0
         self._links: list[EpsonLink] = []
-        self._planned: list[tuple[int, Callable[[], None]]] = []
         self.machine = Machine(find_robot(robot))
         self.machine.switch_motors(True)
         self.world = World.seeded(
@@ -119,8 +130,38 @@ class EpsonSimulator(Panel):
             self._slot,
             self.condition,
             options=self.options,
-            password=self._password,
+            password=password.reveal() if password else "",
         )
+        self.panel = Panel(
+            self.machine,
+            self.condition,
+            self._window,
+            self._slot,
+            self.alarms,
+            options=self.options,
+            acting=self.acting,
+        )
+        self._mishaps = Mishaps(self.panel)
+
+    @property
+    def now_ns(self) -> int:
+        """The instant last given."""
+        return self._now_ns
+
+    def status_flags(self) -> StatusFlags:
+        """Return the flags as they are, whatever the client may be shown."""
+        return self.condition.flags(executing=self._window.busy)
+
+    @contextmanager
+    def acting(self) -> Iterator[int]:
+        """Surround an act that comes past the wire; gives the present time."""
+        with self.lock:
+            # A planned act happens at its own instant, in the middle of an advance.
+            if self.present_ns is not None and not self._stepping:
+                self.advance(self.present_ns())
+            yield self._now_ns
+        for watcher in tuple(self.watchers):
+            watcher()
 
     def connect(self, now_ns: int) -> EpsonLink:
         """Accept one client; see ``EpsonOptions.second_client``."""
@@ -142,34 +183,25 @@ class EpsonSimulator(Panel):
         changes = [
             self._window.next_change(),
             self._slot.deadline(unfinished=self._service.unfinished),
-            *(at_ns for at_ns, _ in self._planned),
+            self._mishaps.next_change(),
             *(link.next_change() for link in self._links),
         ]
         return min((change for change in changes if change is not None), default=None)
 
     def restart(self) -> None:
         """Switch off and on: links are cut, all but the flash and the variables is forgotten."""
-        with self._act():
+        with self.acting():
             for link in self._links:
                 link.cut()
             self._window.interrupt(self._now_ns)
             self._slot.free()
-            self._planned.clear()
+            self._mishaps.forget()
             self.condition.restart()
-            self._forget_volatile()
-
-    def _forget_volatile(self) -> None:
-        machine = self.machine
-        machine.arm.halt(self._now_ns)
-        machine.switch_motors(False)
-        machine.reset_motion_parameters()
-        machine.outputs.clear()
-        machine.memory.clear()
-        machine.points, machine.locals = PointTable(), LocalTable()
+            forget_volatile(self.machine, self._now_ns)
 
     def push(self, data: bytes) -> None:
         """Send every client bytes that nobody asked for (F10)."""
-        with self._act():
+        with self.acting():
             for link in self._links:
                 link.push(data)
 
@@ -186,7 +218,7 @@ class EpsonSimulator(Panel):
         if exchange.meets(FaultAction.DISCONNECT_BEFORE):
             link.cut()
             return
-        self._strike(exchange.faults)
+        self._mishaps.strike(exchange.faults, self._now_ns)
         try:
             if self.on_request is not None:
                 self.on_request(exchange.number, shown)
@@ -223,18 +255,11 @@ class EpsonSimulator(Panel):
         try:
             self.machine.arm.advance(now_ns)
             self._window.advance(now_ns)
-            if self._planned:
-                self._carry_out_plans(now_ns)
+            self._mishaps.carry_out(now_ns)
             self._supervise(now_ns)
             self._flash.save_changes()
         finally:
             self._stepping = False
-
-    def _carry_out_plans(self, now_ns: int) -> None:
-        due = [act for at_ns, act in self._planned if at_ns <= now_ns]
-        self._planned = [plan for plan in self._planned if plan[0] > now_ns]
-        for act in due:
-            act()
 
     def _supervise(self, now_ns: int) -> None:
         """Keep the time-outs of epson.md 1.1."""
@@ -251,25 +276,3 @@ class EpsonSimulator(Panel):
         for link in self._links:
             link.supervise(now_ns)
         self._links = [link for link in self._links if not link.drained]
-
-    def _strike(self, faults: Sequence[Fault]) -> None:
-        """Press, open or raise what is planned: at once, or some seconds from now."""
-        for fault in faults:
-            act = self._act_of(fault)
-            if act is None:
-                continue
-            if fault.seconds > 0:
-                self._planned.append((self._now_ns + round(fault.seconds * NS_PER_S), act))
-            else:
-                act()
-
-    def _act_of(self, fault: Fault) -> Callable[[], None] | None:
-        match fault.action:
-            case FaultAction.ESTOP:
-                return self.press_estop
-            case FaultAction.GUARD_OPEN:
-                return self.open_guard
-            case FaultAction.DEVICE_FAULT:
-                return lambda: self.raise_error(fault.code)
-            case _:
-                return None

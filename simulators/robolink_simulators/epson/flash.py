@@ -11,6 +11,7 @@ from typing import Final
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_simulators.epson.machine import Machine
+from robolink_simulators.epson.points import LocalTable, PointTable
 
 SCHEMA: Final = "robolink/sim-state/1"
 
@@ -82,6 +83,16 @@ class Flash:
 
     def _mark(self) -> tuple[int, int]:
         return (self._machine.tools.flash_writes, self._machine.tools.selected)
+
+
+def forget_volatile(machine: Machine, now_ns: int) -> None:
+    """Let a machine forget what a power cycle takes: all but its tools and its place."""
+    machine.arm.halt(now_ns)
+    machine.switch_motors(False)
+    machine.reset_motion_parameters()
+    machine.outputs.clear()
+    machine.memory.clear()
+    machine.points, machine.locals = PointTable(), LocalTable()
 
 
 def _replace_durably(path: Path, document: Mapping[str, object]) -> None:

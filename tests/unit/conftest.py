@@ -1,0 +1,60 @@
+"""A client without a socket, for tests of the simulated EPSON controller."""
+
+from collections.abc import Callable
+
+import pytest
+from robolink_simulators.epson import EpsonSimulator
+
+S = 1_000_000_000
+
+
+class Client:
+    """One link to a simulator, and the time it is given."""
+
+    def __init__(self, simulator: EpsonSimulator, now_ns: int = 0) -> None:
+        self.simulator = simulator
+        self.link = simulator.connect(max(now_ns, simulator.now_ns))
+
+    def send(self, request: str) -> None:
+        """Send a request at the present time, without taking an answer."""
+        self.link.receive(f"{request}\r\n".encode(), self.simulator.now_ns)
+
+    def ask(self, request: str) -> str:
+        """Send a request and return what came back at once, without its terminator."""
+        self.send(request)
+        return self.heard()
+
+    def heard(self) -> str:
+        """Return what is ready, without the last terminator."""
+        return self.link.outgoing().decode().removesuffix("\r\n")
+
+    def wait(self, seconds: float) -> str:
+        """Let time pass, then return what is ready."""
+        self.simulator.advance(self.simulator.now_ns + round(seconds * S))
+        return self.heard()
+
+    def flags(self) -> str:
+        """Return the flags of GetStatus."""
+        return self.ask("$GetStatus").split(",")[1]
+
+    def code(self) -> int:
+        """Return the error number of GetStatus."""
+        return int(self.ask("$GetStatus").split(",")[2])
+
+
+@pytest.fixture
+def connect() -> Callable[[EpsonSimulator], Client]:
+    """Connect to a simulator without logging in."""
+    return Client
+
+
+@pytest.fixture
+def login() -> Callable[..., Client]:
+    """Connect to a simulator and log in."""
+
+    def logged_in(simulator: EpsonSimulator, password: str = "") -> Client:
+        client = Client(simulator)
+        assert client.ask(f"$Login,{password}") == "#Login,0"
+        return client
+
+    return logged_in

@@ -1,0 +1,70 @@
+"""Ctrl-C is held back inside the gate, raised at its end, and unchanged elsewhere."""
+
+import signal
+import threading
+
+import pytest
+
+from robolink.interrupts import InterruptGate
+
+
+@pytest.fixture
+def gate():
+    gate = InterruptGate()
+    gate.open()
+    yield gate
+    gate.close()
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_an_interrupt_inside_the_gate_is_raised_at_its_end(gate):
+    reached = []
+    with pytest.raises(KeyboardInterrupt), gate:
+        signal.raise_signal(signal.SIGINT)
+        reached.append("end of the exchange")
+    assert reached
+
+
+def test_an_interrupt_outside_the_gate_is_raised_at_once(gate):
+    with gate:
+        pass
+    with pytest.raises(KeyboardInterrupt):
+        signal.raise_signal(signal.SIGINT)
+
+
+def test_one_interrupt_is_raised_once(gate):
+    with pytest.raises(KeyboardInterrupt), gate:
+        signal.raise_signal(signal.SIGINT)
+    with gate:
+        pass
+
+
+def test_an_exchange_of_another_thread_holds_nothing_back(gate):
+    entered, leave = threading.Event(), threading.Event()
+
+    def exchange():
+        with gate:
+            entered.set()
+            leave.wait(10)
+
+    thread = threading.Thread(target=exchange)
+    thread.start()
+    entered.wait(10)
+    with pytest.raises(KeyboardInterrupt):
+        signal.raise_signal(signal.SIGINT)
+    leave.set()
+    thread.join()
+
+
+def test_a_handler_of_the_program_is_left_alone():
+    seen = []
+    before = signal.signal(signal.SIGINT, lambda *_: seen.append("theirs"))
+    try:
+        gate = InterruptGate()
+        gate.open()
+        with gate:
+            signal.raise_signal(signal.SIGINT)
+        gate.close()
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert seen == ["theirs"]

@@ -125,10 +125,16 @@ def open_controller(context: CliContext, *, quiet: bool = False) -> "Iterator[Ep
         timeout_s=context.timeout_s,
         remote_timeout_s=context.remote_timeout_s,
     ) as controller:
+        found = controller.outcomes.open_markers()
         if not quiet:
-            for marker in controller.outcomes.open_markers():
+            for marker in found:
                 note(marker_notice(marker, url))
-        yield controller
+        try:
+            yield controller
+        finally:
+            for marker in controller.outcomes.open_markers():
+                if marker not in found:
+                    note(marker_notice(marker, url))
 
 
 def marker_notice(marker: "Marker", url: str) -> str:

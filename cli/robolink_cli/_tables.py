@@ -14,18 +14,24 @@ def show_status(payload: Mapping[str, object]) -> None:
     say(f"{payload['controller']}: {payload['state']}")
     if payload["code"]:
         say(tr("  code {code:04d} {text}", code=payload["code"], text=payload["text"]).rstrip())
-    on = [key for key, value in payload.items() if value is True]
+    on = [key for key, value in payload.items() if value is True and key != "motors_on"]
     say(tr("  flags: {flags}", flags=", ".join(on).replace("_", " ") or tr("none")))
-    tool = payload["selected_tool"]
-    if tool is not None:
-        say(tr("  tool in force: {tool}", tool=tool))
+    if payload["selected_tool"] is not None:
+        say(
+            tr(
+                "  tool in force: {tool}; motors {motors}, power {power}",
+                tool=payload["selected_tool"],
+                motors=tr("on") if payload["motors_on"] else tr("off"),
+                power=payload["power"],
+            )
+        )
 
 
 def show_pose(payload: Mapping[str, object]) -> None:
     """Print a pose and the joints."""
     title = tr("tool {tool} in local {local}, hand {hand}", **payload)
     table(title, AXES, [offset_cells(payload)])
-    joints = payload["joints"]
+    joints = payload.get("joints")
     if isinstance(joints, Sequence):
         say(tr("  joints: {joints}", joints="  ".join(number(j) for j in joints)))
 
@@ -37,7 +43,8 @@ def show_tools(tools: Mapping[str, Mapping[str, object] | None], selected: int) 
         if offset is not None:
             mark = "*" if int(tool) == selected else " "
             rows.append([f"{mark}{tool}", *offset_cells(offset)])
-    table(tr("tools (* in force)"), (tr("tool"), *AXES), rows)
+    if rows:
+        table(tr("tools (* in force)"), (tr("tool"), *AXES), rows)
     missing = [tool for tool, offset in tools.items() if offset is None]
     if missing:
         say(tr("  undefined: {tools}", tools=", ".join(missing)))

@@ -1,6 +1,7 @@
 """What commands show: plain payloads, and the tables made from them."""
 
 from collections.abc import Mapping
+from contextlib import suppress
 
 from robolink.calibration import VerifyResult
 from robolink.controllers.epson import EpsonController, Finding
@@ -110,15 +111,17 @@ def status_payload(controller: EpsonController) -> dict[str, object]:
         "code": status.code,
         "text": "",
         "selected_tool": None,
+        "motors_on": None,
+        "power": None,
     }
     if status.code:
         payload["text"] = controller.error_text(status.code)
     if status.remote and status.ready and not (status.fault or status.guard_open):
-        try:
+        # A controller that serves monitoring only may not show it in its flags.
+        with suppress(RejectedError):
             payload["selected_tool"] = controller.tools.selected()
-        except RejectedError:
-            # A controller that serves monitoring only shows nothing in its flags.
-            payload["selected_tool"] = None
+            payload["motors_on"] = controller.groups[0].motors_on()
+            payload["power"] = "high" if controller.groups[0].settings.power_high() else "low"
     return payload
 
 

@@ -74,7 +74,7 @@ def reset(context: CliContext, dry_run: bool, yes: bool) -> None:
     context.emit(
         "reset",
         payload,
-        lambda: say(tr("The error is cleared; the controller is: {state}.", state=state)),
+        lambda: say(tr("The reset was carried out; the controller is: {state}.", state=state)),
     )
 
 

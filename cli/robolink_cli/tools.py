@@ -78,6 +78,7 @@ def set_tool(
     # Checks the numbers before a connection is made.
     ToolOffset(**changes)
     with open_controller(context) as controller:
+        controller.tools.require_writable(number)
         before = controller.tools.read(number)
         wanted = replace(before or ToolOffset(), **changes)
         kept = [name for name in units.values() if name not in changes]

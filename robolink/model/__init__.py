@@ -4,6 +4,7 @@ from robolink.model._controller import Capabilities as Capabilities
 from robolink.model._controller import Controller as Controller
 from robolink.model._controller import ControllerState as ControllerState
 from robolink.model._controller import ControllerStatus as ControllerStatus
+from robolink.model._facts import ControllerFacts as ControllerFacts
 from robolink.model._geometry import Hand as Hand
 from robolink.model._geometry import Pose as Pose
 from robolink.model._geometry import angle_difference_deg as angle_difference_deg

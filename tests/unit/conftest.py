@@ -26,7 +26,7 @@ class Client:
 
     def heard(self) -> str:
         """Return what is ready, without the last terminator."""
-        return self.link.outgoing().decode().removesuffix("\r\n")
+        return self.link.outgoing().decode().removesuffix("\n").removesuffix("\r")
 
     def wait(self, seconds: float) -> str:
         """Let time pass, then return what is ready."""

@@ -164,7 +164,7 @@ class EpsonController:
             self._session.exchange(name, str(self.robot_number()))
             if on:
                 self._group.settings.slow_down(MotionProfile())
-            if (spel.parse_integer(self._window.printed(spel.print_motor())) != 0) is not on:
+            if self._group.motors_on() is not on:
                 raise ReadBackError(
                     tr("The motors are not {wanted}.", wanted=tr("on") if on else tr("off")),
                     remedy=tr("Look at the controller; nothing was repeated."),

@@ -19,7 +19,7 @@ import threading
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 
-from robolink.controllers.epson._session import EpsonSession, outcome_unknown
+from robolink.controllers.epson._session import EpsonSession
 from robolink.errors import (
     BusyError,
     OutcomeUnknownError,
@@ -120,12 +120,17 @@ class MarkerDesk:
         try:
             yield
         except (TransportError, RemoteProtocolError) as error:
-            raise outcome_unknown(
-                error,
-                controller=self._session.identity,
-                request=statement,
-                marker_note=tr(
+            raise OutcomeUnknownError(
+                tr(
+                    "No answer came to {request!r}: it may or may not have run ({cause})",
+                    request=statement,
+                    cause=error.what,
+                ),
+                remedy=tr(
                     "It was not sent again. Look at the robot, connect again and run "
                     "'robolink resolve'; motion is blocked until then."
                 ),
+                controller=self._session.identity,
+                request=statement,
+                raw=error.raw,
             ) from error

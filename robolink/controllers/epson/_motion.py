@@ -191,6 +191,10 @@ class EpsonGroup:
             x_mm, y_mm, z_mm, u_deg, v_deg, w_deg, hand=point.hand, local=point.local, tool=tool
         )
 
+    def motors_on(self) -> bool:
+        """Read whether the motors are on."""
+        return spel.parse_integer(self._parts.window.printed(spel.print_motor())) != 0
+
     def joints(self) -> spel.PrintedWhere:
         """Read the commanded position in all three notations (Where)."""
         self._parts.window.require_ready("Where")
@@ -247,7 +251,7 @@ class EpsonGroup:
             )
 
     def _require_motors(self, statement: str) -> None:
-        if spel.parse_integer(self._parts.window.printed(spel.print_motor())) == 0:
+        if not self.motors_on():
             raise NotReadyError(
                 tr("The motors are off."),
                 reason=NotReadyReason.MOTORS_OFF,

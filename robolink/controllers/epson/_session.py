@@ -20,7 +20,6 @@ from robolink.errors import (
     BusyError,
     LoginRefusedError,
     LoginUnansweredError,
-    OutcomeUnknownError,
     RemoteProtocolError,
     RobolinkError,
     TransportBrokenError,
@@ -291,20 +290,3 @@ class EpsonSession:
             if self._ended_by is None:
                 self._ended_by = error
             self._transport.close()
-
-
-def outcome_unknown(
-    error: RobolinkError, *, controller: str, request: str, marker_note: str
-) -> OutcomeUnknownError:
-    """Return what a lost answer to a SET or MOVE means to a person."""
-    return OutcomeUnknownError(
-        tr(
-            "No answer came to {request!r}: it may or may not have run ({cause})",
-            request=request,
-            cause=error.what,
-        ),
-        remedy=marker_note,
-        controller=controller,
-        request=request,
-        raw=error.raw,
-    )

@@ -36,7 +36,7 @@ class Settings:
             spel.parse_number(self._window.printed(spel.print_speed_s(i))) for i in (1, 2, 3)
         ]
         return PowerAndSpeed(
-            self._power_high(),
+            self.power_high(),
             (speed[0], speed[1], speed[2]),
             (speed_s[0], speed_s[1], speed_s[2]),
         )
@@ -93,5 +93,6 @@ class Settings:
                 controller=self._identity,
             )
 
-    def _power_high(self) -> bool:
+    def power_high(self) -> bool:
+        """Read the power mode."""
         return spel.parse_integer(self._window.printed(spel.print_power())) != 0

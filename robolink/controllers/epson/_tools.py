@@ -59,7 +59,7 @@ class EpsonToolTable:
 
     def write(self, tool: int, offset: ToolOffset, *, expected: Expected) -> ToolReceipt:
         """Write and read back; see :class:`robolink.model.ToolTable`."""
-        self._check_writable(tool)
+        self.require_writable(tool)
         requested = offset.rounded(DECIMALS)
         with self._lock.held(f"TLSet {tool}"):
             self._window.require_ready(f"TLSet {tool}")
@@ -73,7 +73,7 @@ class EpsonToolTable:
 
         Empty when the value is stored already.
         """
-        self._check_writable(tool)
+        self.require_writable(tool)
         self._window.require_ready(f"TLSet {tool}")
         requested = offset.rounded(DECIMALS)
         six_axes = self._robot.read().six_axes
@@ -84,7 +84,7 @@ class EpsonToolTable:
 
     def preview_clear(self, tool: int) -> tuple[spel.Statement, ...]:
         """Return what :meth:`clear` would send besides its reads."""
-        self._check_writable(tool)
+        self.require_writable(tool)
         return () if self.read(tool) is None else (spel.clear_tool(tool),)
 
     def preview_select(self, tool: int) -> tuple[spel.Statement, ...]:
@@ -94,7 +94,7 @@ class EpsonToolTable:
 
     def clear(self, tool: int, *, expected: Expected) -> ToolReceipt:
         """Clear and read back; see :class:`robolink.model.ToolTable`."""
-        self._check_writable(tool)
+        self.require_writable(tool)
         with self._lock.held(f"TLClr {tool}"):
             self._window.require_ready(f"TLClr {tool}")
             return self._change(tool, None, expected, spel.clear_tool(tool))
@@ -220,7 +220,12 @@ class EpsonToolTable:
                 remedy=tr("EPSON controllers have tools {lowest} to 15.", lowest=lowest),
             )
 
-    def _check_writable(self, tool: int) -> None:
+    def require_writable(self, tool: int) -> None:
+        """Refuse a tool number that cannot be written; sends nothing.
+
+        Raises:
+            ReservedToolError, ToolIndexError: As :meth:`write` would.
+        """
         if tool == 0:
             raise ReservedToolError(
                 tr("Tool 0 is the flange itself and is never written."),

@@ -13,7 +13,6 @@ from robolink.model import ControllerStatus
 from robolink.protocols.epson_text import Refusal, Reply, parse_status
 from robolink.protocols.spel import Statement
 
-
 _NOT_READY = 20
 
 

@@ -15,8 +15,11 @@ from robolink.protocols.spel._queries import print_here as print_here
 from robolink.protocols.spel._queries import print_joint_angle as print_joint_angle
 from robolink.protocols.spel._queries import print_motor as print_motor
 from robolink.protocols.spel._queries import print_power as print_power
+from robolink.protocols.spel._queries import print_output as print_output
 from robolink.protocols.spel._queries import print_real_position as print_real_position
 from robolink.protocols.spel._queries import print_robot as print_robot
+from robolink.protocols.spel._queries import print_robot_model as print_robot_model
+from robolink.protocols.spel._queries import print_robot_serial as print_robot_serial
 from robolink.protocols.spel._queries import print_robot_type as print_robot_type
 from robolink.protocols.spel._queries import print_selected_tool as print_selected_tool
 from robolink.protocols.spel._queries import print_speed as print_speed

@@ -6,6 +6,9 @@ Those that take a number raise LocalProtocolError when it is out of range.
 from robolink.messages import tr
 from robolink.protocols.spel._statements import LAST_TOOL, Statement, check_range
 
+LAST_IO_BIT = 511
+"""Inputs and outputs are numbered 0 to this (spel.md 8)."""
+
 _LAST_SPEED = 3
 _LAST_JOINT = 6
 
@@ -48,6 +51,26 @@ def print_robot() -> Statement:
 def print_robot_type() -> Statement:
     """The kind of the robot in force: 3 SCARA, 5 six axes, 6 RS, 7 N (spel.md 9)."""
     return Statement("Print RobotType")
+
+
+def print_robot_model() -> Statement:
+    """The model of the robot in force, a text (spel.md 9)."""
+    return Statement("Print RobotModel$")
+
+
+def print_robot_serial() -> Statement:
+    """The serial number of the robot in force, a text (spel.md 9)."""
+    return Statement("Print RobotSerial$")
+
+
+def print_output(bit: int) -> Statement:
+    """1 when an output is on, else 0 (spel.md 8). Remote Ethernet has no request for it.
+
+    Raises:
+        LocalProtocolError: ``bit`` is not 0 to 511.
+    """
+    check_range(tr("An output"), bit, 0, LAST_IO_BIT)
+    return Statement(f"Print Oport({bit})")
 
 
 def print_motor() -> Statement:

@@ -5,8 +5,7 @@ monotonic time. Wall time appears in records only, as a label.
 """
 
 import time
-from dataclasses import dataclass
-from typing import Protocol, Self
+from typing import NamedTuple, Protocol, Self
 
 NS_PER_S = 1_000_000_000
 
@@ -34,8 +33,7 @@ class SystemClock:
             time.sleep(seconds)
 
 
-@dataclass(frozen=True, slots=True)
-class Deadline:
+class Deadline(NamedTuple):
     """One instant that a whole exchange must meet, however many reads it takes."""
 
     clock: Clock

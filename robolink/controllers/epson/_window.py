@@ -1,5 +1,7 @@
 """Statements run through Execute, as if typed in the controller's command window."""
 
+from functools import lru_cache
+
 from robolink.controllers.epson._answers import (
     NOT_EXECUTED,
     rejected,
@@ -29,8 +31,7 @@ class CommandWindow:
 
     def status(self) -> ControllerStatus:
         """Read the flags; legal at any time after the login."""
-        flags, code = parse_status(self._session.exchange("GetStatus"))
-        return status_from_flags(flags, code)
+        return _status(self._session.exchange("GetStatus"))
 
     def require_ready(self, request: str) -> ControllerStatus:
         """Read the flags and hold ``request`` back if Execute would be refused.
@@ -133,6 +134,12 @@ class CommandWindow:
         except RejectedError:
             return ""
         return ",".join(reply.fields).strip()
+
+
+@lru_cache(maxsize=256)
+def _status(reply: Reply) -> ControllerStatus:
+    """Read a status; a poll sees the same few over and over."""
+    return status_from_flags(*parse_status(reply))
 
 
 def _shown(answer: Reply | Refusal) -> str:

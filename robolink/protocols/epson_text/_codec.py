@@ -171,6 +171,8 @@ class EpsonTextCodec:
                 codec is dead from here on.
         """
         self._check_alive()
+        if not self._buffer and not self._ended:
+            return NEED_DATA  # asked twice in every exchange, and mostly true
         try:
             return self._next_event()
         except RemoteProtocolError as error:

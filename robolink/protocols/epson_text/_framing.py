@@ -47,6 +47,9 @@ class MessageBuffer:
         """The bytes that no message has used yet."""
         return bytes(self._data)
 
+    def __bool__(self) -> bool:
+        return bool(self._data)
+
     def append(self, data: bytes) -> None:
         """Add what was received."""
         if self._skip_lf and data:

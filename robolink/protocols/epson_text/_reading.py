@@ -5,6 +5,7 @@ codec admits, the bytes of ``# ! $ , "`` and of line ends never occur inside a l
 character.
 """
 
+from functools import lru_cache
 from typing import Final
 
 from robolink.errors import RemoteProtocolError
@@ -20,8 +21,9 @@ _UNDECODABLE: Final = "backslashreplace"
 _MAX_CODE_DIGITS: Final = 5
 
 
+@lru_cache(maxsize=256)
 def read_answer(line: bytes, encoding: str) -> Reply | Refusal:
-    """Read what a device sends.
+    """Read what a device sends; a poll sees the same few answers over and over.
 
     Raises:
         RemoteProtocolError: It is neither a reply nor a refusal.

@@ -3,7 +3,7 @@
 import random
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
-from typing import Final
+from typing import Any, Final
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
@@ -94,7 +94,7 @@ class World:
         self.tips[tool] = _exchanged(self.tips.get(tool, STORED), self._random)
         return self.tips[tool]
 
-    def truth(self) -> dict[str, object]:
+    def truth(self) -> dict[str, Any]:
         """Return all of it, ready for JSON."""
         stored = self.machine.tools.defined()
         return {

@@ -26,10 +26,12 @@ def test_a_manual_clock_never_goes_back():
 
 def test_no_tick_is_lost_when_threads_advance_a_manual_clock():
     clock = ManualClock()
-    threads = [
-        threading.Thread(target=lambda: [clock.advance(1e-9) for _ in range(2000)])
-        for _ in range(4)
-    ]
+
+    def tick():
+        for _ in range(2000):
+            clock.advance(1e-9)
+
+    threads = [threading.Thread(target=tick) for _ in range(4)]
     for thread in threads:
         thread.start()
     for thread in threads:

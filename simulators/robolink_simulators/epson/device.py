@@ -58,6 +58,8 @@ class EpsonSimulator:
     Attributes:
         lock: Held by whoever touches the simulator while a host serves it.
         url: Where a host serves it, empty when none does.
+        seed: What decides the world and every scatter.
+        durable: Whether its tools outlive the process.
         options: The controller's habits.
         machine: The robot and its memory.
         condition: What GetStatus shows.

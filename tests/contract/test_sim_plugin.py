@@ -1,0 +1,53 @@
+"""The pytest plugin in the run of somebody else's tests."""
+
+import subprocess
+import sys
+
+THEIRS = """
+import socket
+
+def test_the_served_one_answers(epson_tcp):
+    host, port = epson_tcp.url.removeprefix("epson+tcp://").split(":")
+    with socket.create_connection((host, int(port)), timeout=5) as client:
+        client.sendall(b"$Login,\\r\\n")
+        assert client.recv(100) == b"#Login,0\\r\\n"
+    assert epson_tcp.simulator.seed == 7
+    assert epson_tcp.assist.startswith("assist+tcp://127.0.0.1:")
+
+def test_the_one_in_process_has_a_url(epson_sim):
+    from robolink.transport import open_transport
+    open_transport(epson_sim.url).close()
+    assert epson_sim.seed == 7
+"""
+
+
+def run(folder, *arguments):
+    return subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *arguments],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=50,
+        check=False,
+    )
+
+
+def test_its_fixtures_serve_simulators_with_the_seed_of_the_command_line(tmp_path):
+    (tmp_path / "test_theirs.py").write_text(THEIRS)
+    done = run(tmp_path, "-W", "error", "--robolink-seed", "7")
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "2 passed" in done.stdout
+
+
+def test_the_header_names_the_seed(tmp_path):
+    (tmp_path / "test_theirs.py").write_text("def test_nothing(): pass\n")
+    done = run(tmp_path, "-v")
+    assert "robolink: simulated controllers, seed 1" in done.stdout
+
+
+def test_the_plugin_itself_loads_no_simulator(tmp_path):
+    (tmp_path / "test_theirs.py").write_text(
+        "import sys\n"
+        "def test_light(): assert 'robolink_simulators.epson.device' not in sys.modules\n"
+    )
+    assert run(tmp_path).returncode == 0

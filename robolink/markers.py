@@ -8,13 +8,12 @@ matters, so it is neither ignored nor written over.
 """
 
 import json
-import os
-import re
 import threading
 from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
 
+from robolink.durable_files import file_name, make_folder, state_folder, sync_folder, write_whole
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import Marker, MarkerKind
@@ -77,9 +76,9 @@ class FileOutcomeLog:
 
     def __init__(self, identity: str, directory: Path | None = None) -> None:
         self._identity = identity
-        self._directory = _state_directory() if directory is None else directory
+        self._directory = state_folder("outcomes") if directory is None else directory
         self._lock = threading.Lock()
-        self.path = self._directory / _file_name(identity)
+        self.path = self._directory / file_name(identity)
 
     def begin(self, marker: Marker) -> None:
         """Store ``marker``, in place of an earlier one of the same operation.
@@ -145,11 +144,11 @@ class FileOutcomeLog:
         text = json.dumps(document, indent=1, allow_nan=False)
         try:
             if entries:
-                _make_directory(self._directory)
-                _write_atomically(self.path, text.encode())
+                make_folder(self._directory)
+                write_whole(self.path, text.encode())
             else:
                 self.path.unlink()
-            _sync_directory(self._directory)
+            sync_folder(self._directory)
         except OSError as error:
             raise ConfigError(
                 tr(
@@ -187,51 +186,3 @@ def _marker(entry: dict[str, object]) -> Marker:
     return Marker(
         str(operation), MarkerKind(str(entry["kind"])), str(request), str(begun_at), details
     )
-
-
-def _file_name(identity: str) -> str:
-    from hashlib import sha256
-
-    readable = re.sub(r"[^A-Za-z0-9.]+", "-", identity).strip("-.")[:60]
-    return f"{readable or 'controller'}-{sha256(identity.encode()).hexdigest()[:16]}.json"
-
-
-def _state_directory() -> Path:
-    base = os.environ.get("ROBOLINK_STATE_DIR")
-    if base:
-        return Path(base) / "outcomes"
-    from platformdirs import user_state_path
-
-    return user_state_path("robolink", appauthor=False) / "outcomes"
-
-
-def _write_atomically(path: Path, data: bytes) -> None:
-    """Put ``data`` in place of the file, whole and durable, or leave the file as it was."""
-    draft = path.with_name(f".{new_operation()}.new")
-    try:
-        descriptor = os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-        with open(descriptor, "wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(descriptor)
-        os.replace(draft, path)
-    except BaseException:
-        draft.unlink(missing_ok=True)
-        raise
-
-
-def _make_directory(directory: Path) -> None:
-    if not directory.is_dir():
-        directory.mkdir(mode=0o700, parents=True, exist_ok=True)
-        _sync_directory(directory.parent)
-
-
-def _sync_directory(directory: Path) -> None:
-    """Make a rename in ``directory`` durable; Windows cannot open folders and needs not."""
-    if not hasattr(os, "O_DIRECTORY"):
-        return
-    descriptor = os.open(directory, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)

@@ -1,16 +1,20 @@
 """A calibration on a terminal: who is asked, what is shown, what is reported."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
 
-from robolink.calibration import TouchPlan
+from robolink.calibration import Impact, TouchPlan
 from robolink.controllers.epson import EpsonController
 from robolink.errors import ConfigError, ReservedToolError, ToolIndexError
 from robolink.messages import tr
+from robolink.model import Pose
 from robolink.nozzle_change import ChangePlan, ChangeReport, NozzleChange, Proposal, preview
 from robolink.runner import Operator
-from robolink_cli._operator import AssistedOperator, TerminalOperator
+from robolink_cli._impacting import ImpactRequest, impact_payload, judge, show_impact
+from robolink_cli._operator import AssistedOperator, terminal
 from robolink_cli._render import note, say
+from robolink_cli._safekeeping import back_up_first
 from robolink_cli._tables import show_change
 from robolink_cli._views import (
     offset_payload,
@@ -69,22 +73,32 @@ class Bench:
     """One calibration of one tool, as a command runs it."""
 
     def __init__(
-        self, controller: EpsonController, plan: ChangePlan, *, assist_url: str | None = None
+        self,
+        controller: EpsonController,
+        plan: ChangePlan,
+        *,
+        assist_url: str | None = None,
+        impact: ImpactRequest | None = None,
     ) -> None:
         self._controller = controller
         self._plan = plan
         self._assist_url = assist_url
+        self._impact_request = impact
+        self._points: dict[int, Pose | None] | None = None
+        self._impact: Impact | None = None
         self._report: ChangeReport | None = None
 
     def require_writable(self) -> None:
-        """Refuse before anything moves what would be refused at the write.
+        """Refuse before anything moves what would be refused at the write; back up first.
 
         Raises:
+            ConfigError: The backup before the first write cannot be stored.
             OutcomeUnknownError: Something earlier is unsettled.
             NotReadyError: The state forbids it.
         """
         self._controller.require_settled(tr("calibrate tool {tool}", tool=self._plan.tool))
         self._controller.tools.read(self._plan.tool)
+        back_up_first(self._controller)
 
     def dry_run(self) -> dict[str, object]:
         """Return the foreseen steps with their requests and limit checks; reads only."""
@@ -110,35 +124,47 @@ class Bench:
 
     def run(self, *, ask_before_write: bool) -> dict[str, object]:
         """Measure, propose, write, verify; return the document of the whole."""
-        change = NozzleChange(
-            self._controller,
-            replace(self._plan, ask_before_write=ask_before_write),
-            operator=self._operator(),
-            show=self._show_proposal,
-        )
-        self._report = change.run()
-        return report_payload(self._report)
+        if self._impact_request is not None:
+            self._points = self._impact_request.read(self._controller)
+        with self._operator() as operator:
+            change = NozzleChange(
+                self._controller,
+                replace(self._plan, ask_before_write=ask_before_write),
+                operator=operator,
+                show=self._show_proposal,
+            )
+            self._report = change.run()
+        return {
+            **report_payload(self._report),
+            "source": {"kind": "live"},
+            "impact": impact_payload(self._impact) if self._impact else None,
+        }
 
     def show_end(self) -> None:
         """Say how it ended."""
         if self._report is not None:
             show_report(self._report)
 
-    def _operator(self) -> Operator:
+    @contextmanager
+    def _operator(self) -> Iterator[Operator]:
         if self._assist_url is None:
-            return TerminalOperator(note)
+            yield terminal()
+            return
         from robolink_simulators.assist import AssistClient
 
-        client = AssistClient(self._assist_url)
+        with AssistClient(self._assist_url) as client:
 
-        def look() -> tuple[float, float, float]:
-            seen = client.look(self._plan.tool)
-            return seen.dx_mm, seen.dy_mm, seen.dz_mm
+            def look() -> tuple[float, float, float]:
+                seen = client.look(self._plan.tool)
+                return seen.dx_mm, seen.dy_mm, seen.dz_mm
 
-        return AssistedOperator(look, note)
+            yield AssistedOperator(look, note)
 
     def _show_proposal(self, proposal: Proposal) -> None:
         show_proposal(proposal)
+        self._impact = judge(self._points, old=proposal.before, new=proposal.result.offset)
+        if self._impact is not None:
+            show_impact(proposal.tool, self._impact)
 
 
 def show_proposal(proposal: Proposal) -> None:

@@ -8,6 +8,7 @@ import click
 
 from robolink.errors import DeclinedError
 from robolink.messages import tr
+from robolink_cli._context import WATCHED
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -26,6 +27,15 @@ def yes_option(function: F) -> F:
     return click.option("--yes", is_flag=True, help="Answer yes to the question asked.")(function)
 
 
+def published_option(function: F) -> F:
+    """Add ``--published``."""
+    return click.option(
+        "--published",
+        is_flag=True,
+        help="The tools as the companion program published them; works while production runs.",
+    )(function)
+
+
 def on_terminal() -> bool:
     """Tell whether a person can be asked."""
     return sys.stdin.isatty() and sys.stderr.isatty()
@@ -37,8 +47,8 @@ def agree(question: str, *, yes: bool) -> None:
     Raises:
         DeclinedError: The answer was no.
     """
-    if not yes and on_terminal() and not click.confirm(question, err=True):
-        raise DeclinedError(tr("You said no."), remedy=tr("Nothing was sent."))
+    if not yes and on_terminal():
+        _require_yes(question)
 
 
 def agree_to_motion(question: str, *, yes: bool) -> None:
@@ -54,5 +64,23 @@ def agree_to_motion(question: str, *, yes: bool) -> None:
             tr("The robot would move, and nobody can be asked here."),
             remedy=tr("Run it on a terminal, or give --yes when the cell is clear."),
         )
-    if not click.confirm(question, err=True):
+    _require_yes(question)
+
+
+def _require_yes(question: str) -> None:
+    """Ask with a prompt that can be polled, and read the status between polls.
+
+    An idle client is cut off after the remote time-out (epson.md 1.1), and a person may take
+    longer than that to look into the cell.
+    """
+    from robolink.runner import POLL_S, Question
+    from robolink_cli._operator import terminal
+
+    controller = click.get_current_context().meta.get(WATCHED)
+    operator = terminal()
+    operator.ask(question, Question.YES_NO)
+    while (line := operator.poll(POLL_S)) is None:
+        if controller is not None:
+            controller.status()
+    if line.strip().lower() not in ("y", "yes"):
         raise DeclinedError(tr("You said no."), remedy=tr("Nothing was sent."))

@@ -1,4 +1,4 @@
-"""Output that never fails for want of a character."""
+"""Output and input that never fail for want of a character."""
 
 import io
 import os
@@ -9,9 +9,9 @@ def tolerate_any_console() -> None:
     """Show what the console's encoding lacks as an escape instead of raising.
 
     A technician's console may be cp1252, cp936 or plain ASCII, and a degree sign must not
-    end a calibration.
+    end a calibration; nor must a slip of the fingers that the encoding does not know.
     """
-    for stream in (sys.stdout, sys.stderr):
+    for stream in (sys.stdin, sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
 

@@ -20,6 +20,7 @@ code  meaning
 """
 
 import os
+import sys
 from typing import Final
 
 import click
@@ -70,12 +71,12 @@ def report(error: BaseException, *, as_json: bool) -> int:
     if as_json:
         click.echo(error_document(error))
     elif isinstance(error, click.ClickException):
-        error.show()
+        error.show(file=sys.stderr)
     else:
         what, remedy = _sentences(error)
-        click.echo(f"robolink: {what}", err=True)
+        click.echo(f"robolink: {what}", file=sys.stderr)
         if remedy:
-            click.echo(f"  {remedy}", err=True)
+            click.echo(f"  {remedy}", file=sys.stderr)
     return code
 
 

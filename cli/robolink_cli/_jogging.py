@@ -1,12 +1,13 @@
 """Jogging through the runner, so that its limits and its watch hold."""
 
-from collections.abc import Callable
-
 from robolink.controllers.epson import EpsonController
 from robolink.messages import tr
 from robolink.model import MotionProfile, Pose, WorkBox
 from robolink.runner import Operator, Runner, RunSettings, ask_for_pose, jog_target
-from robolink_cli._operator import TerminalOperator
+from robolink_cli._key_jog import KeyOperator
+from robolink_cli._keyboard import Keyboard
+from robolink_cli._operator import TerminalOperator, terminal
+from robolink_cli._render import say
 
 
 def jog_by_steps(controller: EpsonController, steps: str, speed_mm_s: float, box_mm: float) -> Pose:
@@ -14,12 +15,20 @@ def jog_by_steps(controller: EpsonController, steps: str, speed_mm_s: float, box
     return _runner(controller, TerminalOperator(_silent), speed_mm_s, box_mm).jog(steps)
 
 
-def jog_on_terminal(
-    controller: EpsonController, speed_mm_s: float, box_mm: float, show: Callable[[str], None]
-) -> Pose:
+def jog_on_terminal(controller: EpsonController, speed_mm_s: float, box_mm: float) -> Pose:
     """Let a person jog until an empty line, and return where the tool is then."""
-    runner = _runner(controller, TerminalOperator(show), speed_mm_s, box_mm)
+    runner = _runner(controller, terminal(), speed_mm_s, box_mm)
     return runner.run(ask_for_pose(tr("Jog the tool.")))
+
+
+def jog_by_keys(
+    controller: EpsonController, keys: Keyboard, speed_mm_s: float, box_mm: float
+) -> Pose:
+    """Let a person jog by keys until q or ENTER, and return where the tool is then."""
+    group = controller.groups[0]
+    settings = _settings(group.pose(), speed_mm_s, box_mm)
+    operator = KeyOperator(keys, group.pose, settings.box, say)
+    return Runner(controller, group, operator, settings).run(ask_for_pose(tr("Jog the tool.")))
 
 
 def plan_jog(

@@ -4,10 +4,12 @@ import queue
 import sys
 import threading
 from collections.abc import Callable
+from functools import cache
 
 from robolink.errors import DeclinedError
 from robolink.messages import tr
 from robolink.runner import Question
+from robolink_cli._render import note
 
 
 class TerminalOperator:
@@ -55,9 +57,17 @@ class TerminalOperator:
         return line
 
     def _read(self) -> None:
-        for line in sys.stdin:
-            self._lines.put(line)
-        self._lines.put(None)
+        try:
+            for line in sys.stdin:
+                self._lines.put(line)
+        finally:
+            self._lines.put(None)
+
+
+@cache
+def terminal() -> TerminalOperator:
+    """Return the one operator of this process's terminal: two would share the input badly."""
+    return TerminalOperator(note)
 
 
 class AssistedOperator:

@@ -10,12 +10,24 @@ from robolink.model import Secret
 KEYRING_SERVICE = "robolink"
 
 
-def find_password(identity: str, *, password_file: str | None = None) -> Secret | None:
+def find_password(
+    identity: str,
+    *,
+    password_file: str | None = None,
+    cell_file: str | None = None,
+    cell_variable: str | None = None,
+) -> Secret | None:
     """Return the password for a controller, None when there is none.
 
     The first that has one wins: the system's keyring (service ``robolink``, user
-    ``identity``); ``password_file`` or the file that ROBOLINK_PASSWORD_FILE names;
-    ROBOLINK_PASSWORD.
+    ``identity``); a file; the environment.
+
+    Args:
+        identity: The controller's URL without options.
+        password_file: File given on the command line. ROBOLINK_PASSWORD_FILE comes after it.
+        cell_file: File that the cell file names; it comes last of the files.
+        cell_variable: Variable that the cell file names, in place of ROBOLINK_PASSWORD: what
+            stands there may be another cell's password.
 
     Raises:
         ConfigError: The file cannot be read, or others than its owner may read it.
@@ -23,10 +35,10 @@ def find_password(identity: str, *, password_file: str | None = None) -> Secret 
     stored = _from_keyring(identity)
     if stored is not None:
         return stored
-    path = password_file or os.environ.get("ROBOLINK_PASSWORD_FILE")
+    path = password_file or os.environ.get("ROBOLINK_PASSWORD_FILE") or cell_file
     if path:
         return _from_file(Path(path))
-    value = os.environ.get("ROBOLINK_PASSWORD")
+    value = os.environ.get(cell_variable or "ROBOLINK_PASSWORD")
     return None if value is None else Secret(value)
 
 

@@ -6,6 +6,7 @@ it over, and it is printed once, when the command has ended well; an error print
 document instead.
 """
 
+import sys
 from collections.abc import Iterable, Mapping, Sequence
 
 import click
@@ -27,12 +28,14 @@ def switch_json_on(context: click.Context) -> None:
 
 def say(text: str = "") -> None:
     """Show a person a line: on stdout, or on stderr when stdout is for machines."""
-    click.echo(text, err=json_is_on())
+    # The stream is named, because click takes an ASCII console for a misunderstanding and
+    # would send it UTF-8.
+    click.echo(text, file=sys.stderr if json_is_on() else sys.stdout)
 
 
 def note(text: str) -> None:
     """Show a person a remark beside the result; always on stderr."""
-    click.echo(text, err=True)
+    click.echo(text, file=sys.stderr)
 
 
 def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
@@ -48,8 +51,9 @@ def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[object]]) 
     for row in rows:
         shown.add_row(*(Text(str(cell)) for cell in row))
     console = Console(stderr=json_is_on(), highlight=False)
-    # Off a terminal nothing may be cut to an assumed width of 80.
-    console.print(shown, width=None if console.is_terminal else 1000, crop=False)
+    if not console.is_terminal:
+        console.width = 1000  # nothing may be cut to an assumed width of 80
+    console.print(shown, crop=False)
 
 
 def emit_json(schema: str, payload: Mapping[str, object]) -> None:

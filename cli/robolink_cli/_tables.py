@@ -16,6 +16,9 @@ def show_status(payload: Mapping[str, object]) -> None:
         say(tr("  code {code:04d} {text}", code=payload["code"], text=payload["text"]).rstrip())
     on = [key for key, value in payload.items() if value is True and key != "motors_on"]
     say(tr("  flags: {flags}", flags=", ".join(on).replace("_", " ") or tr("none")))
+    alarms = payload["alarms"]
+    if isinstance(alarms, Sequence) and alarms:
+        say(tr("  alarms: {numbers}", numbers=", ".join(str(number) for number in alarms)))
     if payload["selected_tool"] is not None:
         say(
             tr(
@@ -25,6 +28,8 @@ def show_status(payload: Mapping[str, object]) -> None:
                 power=payload["power"],
             )
         )
+    elif payload["published_selected_tool"] is not None:
+        say(tr("  tool in force, as published: {tool}", tool=payload["published_selected_tool"]))
 
 
 def show_pose(payload: Mapping[str, object]) -> None:

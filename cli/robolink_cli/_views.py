@@ -5,7 +5,7 @@ from contextlib import suppress
 
 from robolink.calibration import VerifyResult
 from robolink.controllers.epson import EpsonController, Finding
-from robolink.errors import RejectedError
+from robolink.errors import RejectedError, ToolError
 from robolink.model import Pose, ToolOffset, ToolReceipt
 from robolink.nozzle_change import Proposal
 
@@ -91,7 +91,7 @@ def finding_payload(finding: Finding) -> dict[str, object]:
 def status_payload(controller: EpsonController) -> dict[str, object]:
     """Return the state; what needs Execute is left out where Execute is not available.
 
-    While production runs only the flags are read (epson.md 1.3).
+    While production runs only the flags and the alarms are read (epson.md 1.2, 1.3).
     """
     status = controller.status()
     payload: dict[str, object] = {
@@ -110,18 +110,27 @@ def status_payload(controller: EpsonController) -> dict[str, object]:
         "test": status.test,
         "code": status.code,
         "text": "",
+        "alarms": None,
         "selected_tool": None,
+        "published_selected_tool": None,
         "motors_on": None,
         "power": None,
     }
     if status.code:
         payload["text"] = controller.error_text(status.code)
+    with suppress(RejectedError):  # older firmware has no alarms
+        payload["alarms"] = list(controller.alarms.list())
     if status.remote and status.ready and not (status.fault or status.guard_open):
         # A controller that serves monitoring only may not show it in its flags.
         with suppress(RejectedError):
             payload["selected_tool"] = controller.tools.selected()
             payload["motors_on"] = controller.groups[0].motors_on()
             payload["power"] = "high" if controller.groups[0].settings.power_high() else "low"
+    if payload["selected_tool"] is None:
+        # A table that is being changed just now must not hide the state.
+        with suppress(RejectedError, ToolError):
+            published = controller.published_tools()
+            payload["published_selected_tool"] = published.selected if published else None
     return payload
 
 

@@ -1,12 +1,42 @@
 """calibrate METHOD: measure a tool offset, propose it, write it, prove it."""
 
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink_cli._cell import with_cell_limits
 from robolink_cli._consent import agree_to_motion, dry_run_option, yes_option
 from robolink_cli._context import CliContext, controller_options, open_controller
+from robolink_cli._impacting import ImpactRequest, impact_options, impact_request
+from robolink_cli._pose_source import pose_source, pose_source_options, refuse_motion_options
+
+if TYPE_CHECKING:
+    from robolink.nozzle_change import ChangePlan
+
+_MOTION: Final = (
+    "turn_deg",
+    "lift_mm",
+    "clearance_mm",
+    "speed_mm_s",
+    "box_mm",
+    "tolerance_mm",
+    "no_verify",
+    "assist",
+)
+"""Options that mean nothing when the poses exist already."""
+
+_CELL_KEYS: Final = {
+    "lift_mm": "lift_mm",
+    "clearance_mm": "clearance_mm",
+    "speed_mm_s": "speed_mm_s",
+    "box_mm": "box_mm",
+    "max_change_mm": "max_change_mm",
+    "tolerance_mm": "drift_tolerance_mm",
+}
+"""Option to key in the cell file."""
 
 
 @click.group()
@@ -57,6 +87,8 @@ def calibrate() -> None:
     metavar="URL",
     help="A simulator's assist URL: its operator brings the tip onto the pin.",
 )
+@pose_source_options
+@impact_options
 @controller_options
 @dry_run_option
 @yes_option
@@ -65,20 +97,58 @@ def two_pose(
     *,
     tool: int,
     assist: str | None,
+    impact: str | None,
+    impact_pts: Path | None,
     dry_run: bool,
     yes: bool,
+    points: str | None,
+    typed: tuple[str, ...],
+    path: Path | None,
+    taught_tool: int | None,
     **limits: Any,  # noqa: ANN401 - click passes the options by name
 ) -> None:
     """Touch one pin at two angles of U, half a turn apart.
 
     Put the tip some millimetres above a fixed pin first. The robot moves in Power Low only:
     it lifts before it turns and comes down to a clearance; you do the rest by typing steps.
-    """
-    from robolink_cli._calibrating import Bench, plan_from, show_plan
 
-    plan = plan_from(tool, **limits)
+    With --points, --pose or --poses the two poses exist already: nothing moves, no tool is
+    selected, and nothing is proved by turning about the new tip.
+    """
+    from robolink.nozzle_change import PosesPlan
+    from robolink_cli._calibrating import plan_from
+    from robolink_cli._calibrating_poses import calibrate_from_poses
+
+    plan = plan_from(tool, **with_cell_limits(context.cell, limits, _CELL_KEYS))
+    judged = impact_request(impact, impact_pts, names=("--impact", "--impact-pts"))
+    source = pose_source(points=points, typed=typed, path=path, taught_tool=taught_tool)
+    if source is None:
+        _measure(context, plan, assist=assist, impact=judged, dry_run=dry_run, yes=yes)
+    else:
+        refuse_motion_options(click.get_current_context(), _MOTION)
+        known = PosesPlan(tool, taught_tool or 0, plan.max_change_mm)
+        calibrate_from_poses(context, known, source, impact=judged, dry_run=dry_run, yes=yes)
+
+
+def _measure(
+    context: CliContext,
+    plan: "ChangePlan",
+    *,
+    assist: str | None,
+    impact: ImpactRequest | None,
+    dry_run: bool,
+    yes: bool,
+) -> None:
+    """Let the robot and a person take the poses, then propose, write and verify."""
+    from robolink_cli._calibrating import Bench, show_plan
+
+    if dry_run and impact is not None:
+        raise ConfigError(
+            tr("A dry run measures nothing, so there is no impact to show."),
+            remedy=tr("Leave --impact out, or use 'robolink impact' with an offset."),
+        )
     with open_controller(context) as controller:
-        bench = Bench(controller, plan, assist_url=assist)
+        bench = Bench(controller, plan, assist_url=assist, impact=impact)
         if dry_run:
             payload = bench.dry_run()
             context.emit("dry-run", payload, lambda: show_plan(payload))
@@ -91,9 +161,11 @@ def two_pose(
                 robot=controller.robot_number(),
                 speed=plan.speed_mm_s,
                 box=plan.box_mm,
-                tool=tool,
+                tool=plan.tool,
             ),
             yes=yes,
         )
         payload = bench.run(ask_before_write=not yes)
-    context.emit("calibration", payload, bench.show_end)
+        # Now, because Ctrl-C may come before the logout is answered.
+        bench.show_end()
+    context.emit("calibration", payload, lambda: None)

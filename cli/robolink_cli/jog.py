@@ -1,11 +1,21 @@
 """jog: small steps, in low power, inside a box."""
 
+from contextlib import AbstractContextManager, nullcontext
+from typing import TYPE_CHECKING, Final
+
 import click
 
+from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink_cli._cell import with_cell_limits
 from robolink_cli._consent import agree_to_motion, dry_run_option, yes_option
 from robolink_cli._context import CliContext, controller_options, open_controller
-from robolink_cli._render import say
+
+if TYPE_CHECKING:
+    from robolink_cli._keyboard import Keyboard
+
+_CELL_KEYS: Final = {"speed_mm_s": "speed_mm_s", "box_mm": "jog_box_mm"}
+"""Option to key in the cell file: a box for calibrating is too wide for jogging."""
 
 
 @click.command()
@@ -19,6 +29,7 @@ from robolink_cli._render import say
     metavar="MM",
     help="How far from the start the tool may be jogged, in every direction.",
 )
+@click.option("--keys", is_flag=True, help="Jog with the arrow keys; on a terminal only.")
 @controller_options
 @dry_run_option
 @yes_option
@@ -27,6 +38,7 @@ def jog(
     steps: tuple[str, ...],
     speed_mm_s: float,
     box_mm: float,
+    keys: bool,
     dry_run: bool,
     yes: bool,
 ) -> None:
@@ -34,31 +46,64 @@ def jog(
 
     Each step is one move in Power Low of at most 5 mm or 5 degrees. Negative numbers need no
     quoting: write x-0.1.
+
+    With --keys each key press is one step: arrows X and Y, PageUp and PageDown Z, < and > U,
+    + and - the step size (0.01, 0.1, 1, 5), q or ENTER ends. Keys pressed while the robot
+    moves are dropped. A step that has begun goes on when the key is released; Ctrl-C aborts
+    it, and only the emergency stop is an emergency stop.
     """
-    from robolink_cli._jogging import jog_by_steps, jog_on_terminal, plan_jog
+    from robolink_cli._jogging import jog_by_keys, jog_by_steps, jog_on_terminal, plan_jog
+    from robolink_cli._key_jog import agree_by_key
     from robolink_cli._tables import show_pose
     from robolink_cli._views import pose_payload
 
-    with open_controller(context) as controller:
+    typed = {"speed_mm_s": speed_mm_s, "box_mm": box_mm}
+    speed_mm_s, box_mm = with_cell_limits(context.cell, typed, _CELL_KEYS).values()
+    with (
+        _keyboard_for(keys, steps, dry_run=dry_run) as board,
+        open_controller(context) as controller,
+    ):
         if dry_run:
             context.show_requests(plan_jog(controller, " ".join(steps), speed_mm_s, box_mm))
             return
-        tool = controller.tools.selected()
-        agree_to_motion(
-            tr(
-                "Robot {robot} will move in Power Low, at most {speed:g} mm/s, with tool {tool}, "
-                "within {box:g} mm. Is the cell clear?",
-                robot=controller.robot_number(),
-                speed=speed_mm_s,
-                tool=tool,
-                box=box_mm,
-            ),
-            yes=yes,
+        question = tr(
+            "Robot {robot} will move in Power Low, at most {speed:g} mm/s, with tool {tool}, "
+            "within {box:g} mm. Is the cell clear?",
+            robot=controller.robot_number(),
+            speed=speed_mm_s,
+            tool=controller.tools.selected(),
+            box=box_mm,
         )
+        if board is None:
+            agree_to_motion(question, yes=yes)
+        elif not yes:
+            agree_by_key(question, board, watch=controller.status)
         with controller.preserved(tr("jog")):
-            if steps:
+            if board is not None:
+                pose = jog_by_keys(controller, board, speed_mm_s, box_mm)
+            elif steps:
                 pose = jog_by_steps(controller, " ".join(steps), speed_mm_s, box_mm)
             else:
-                pose = jog_on_terminal(controller, speed_mm_s, box_mm, say)
+                pose = jog_on_terminal(controller, speed_mm_s, box_mm)
     payload = pose_payload(pose)
     context.emit("jog", payload, lambda: show_pose(payload))
+
+
+def _keyboard_for(
+    keys: bool, steps: tuple[str, ...], *, dry_run: bool
+) -> "AbstractContextManager[Keyboard | None]":
+    """Return the terminal's keys when they are wanted.
+
+    Raises:
+        ConfigError: Steps or a dry run were asked for besides.
+    """
+    if not keys:
+        return nullcontext()
+    if steps or dry_run:
+        raise ConfigError(
+            tr("With --keys the steps are known only when they are pressed."),
+            remedy=tr("Leave --keys out to give steps, or to see their requests."),
+        )
+    from robolink_cli._keyboard import keyboard
+
+    return keyboard()

@@ -31,10 +31,32 @@ COMMANDS: Final = {
         tr("Settle what was begun and not proved finished."),
     ),
     "tool": ("robolink_cli.tools:tool", tr("Read, write, clear and select tool offsets.")),
+    "backup": ("robolink_cli.backup:backup", tr("Save all tools to a file.")),
+    "restore": ("robolink_cli.backup:restore", tr("Put the tools of a backup back.")),
+    "compare": (
+        "robolink_cli.backup:compare",
+        tr("What differs from a backup; exit code 1 when something does."),
+    ),
+    "io": ("robolink_cli.io:io", tr("Read inputs, switch outputs and memory bits.")),
+    "var": ("robolink_cli.var:var", tr("Read and set the project's variables.")),
+    "verify-controller": (
+        "robolink_cli.verify_controller:verify_controller",
+        tr("Find out, reading only, what this controller really does."),
+    ),
     "jog": ("robolink_cli.jog:jog", tr("Move a small step, in Power Low.")),
     "calibrate": (
         "robolink_cli.calibrate:calibrate",
         tr("Measure a tool offset, propose it, write it and prove it."),
+    ),
+    "doctor": ("robolink_cli.doctor:doctor", tr("What could get in the way on this computer.")),
+    "ports": ("robolink_cli.ports:ports", tr("List the serial ports.")),
+    "scan": ("robolink_cli.scan:scan", tr("Try which of a few addresses answer.")),
+    "config": ("robolink_cli.config:config", tr("Look at the cell files.")),
+    "completion": ("robolink_cli.completion:completion", tr("Make TAB complete commands.")),
+    "spel": ("robolink_cli.spel:spel", tr("The companion program for the controller's project.")),
+    "impact": (
+        "robolink_cli.impact:impact",
+        tr("How far a tool change moves the tip at taught points."),
     ),
 }
 """Name, where it is, one-line help; in the order of the help page."""

@@ -2,6 +2,7 @@
 
 import click
 
+from robolink.errors import ConnectError
 from robolink.messages import tr
 from robolink_cli._consent import agree, dry_run_option, yes_option
 from robolink_cli._context import CliContext, controller_options, open_controller
@@ -40,12 +41,17 @@ def where(context: CliContext) -> None:
 @dry_run_option
 def stop(context: CliContext, dry_run: bool) -> None:
     """Stop the controller's tasks. Not an emergency stop, and no substitute for one."""
-    with open_controller(context) as controller:
-        if dry_run:
-            context.show_requests([controller.wire("Stop")])
-            return
-        controller.stop()
-        state = controller.status().state
+    try:
+        # Whatever robot it is: a stop does not wait for a look at the model.
+        with open_controller(context, any_robot=True) as controller:
+            if dry_run:
+                context.show_requests([controller.wire("Stop")])
+                return
+            controller.stop()
+            state = controller.status().state
+    except ConnectError as error:
+        error.remedy = f"{tr('To stop the robot now, press the emergency stop.')} {error.remedy}"
+        raise
     payload: dict[str, object] = {"stopped": True, "state": state}
     context.emit(
         "stop",

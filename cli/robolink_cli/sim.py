@@ -13,9 +13,10 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_cli._context import json_option
 from robolink_cli._render import json_is_on
+from robolink_cli._replaying import serve_recording
 
 if TYPE_CHECKING:
-    from robolink_simulators.epson import EpsonOptions
+    from robolink_simulators.epson import EpsonOptions, EpsonSimulator
 
     from robolink.model import Secret
 
@@ -68,6 +69,16 @@ def sim() -> None:
     metavar="NAME=VALUE",
     help="A habit of the controller; a wrong name lists them all. May be repeated.",
 )
+@click.option(
+    "--profile",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    help="Cell profile written by verify-controller; --option overrules it.",
+)
+@click.option(
+    "--replay",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    help="Serve a dialogue that --record has written, in place of a simulator.",
+)
 @click.option("--allow-remote", is_flag=True, help="Listen where other machines can reach it, too.")
 @json_option
 def epson(
@@ -79,6 +90,8 @@ def epson(
     state: Path | None,
     speed: float,
     options: tuple[str, ...],
+    profile: Path | None,
+    replay: Path | None,
     allow_remote: bool,
 ) -> None:
     """Serve a simulated EPSON controller with Remote Ethernet until Ctrl-C.
@@ -86,27 +99,38 @@ def epson(
     A second port, assist, stands in for the person at the cell: it looks at the tip, knows
     the truth, and presses the emergency stop.
     """
-    from robolink_simulators.assist import serve_assist
-    from robolink_simulators.clock import ScaledClock
     from robolink_simulators.epson import EpsonSimulator
-    from robolink_simulators.hosting.tcp import serve_tcp
 
-    host, port = _host_and_port(address)
+    listen = _host_and_port(address)
+    if replay is not None:
+        with _Termination() as stopped:
+            serve_recording(replay, listen, allow_remote=allow_remote, wait=stopped.wait)
+        return
     simulator = EpsonSimulator(
         robot,
         seed=seed,
         password=_password(password_env),
-        options=_habits(options),
+        options=_habits(options, profile),
         state_path=state,
     )
+    _serve(simulator, listen, speed=speed, allow_remote=allow_remote)
+
+
+def _serve(
+    simulator: "EpsonSimulator", address: tuple[str, int], *, speed: float, allow_remote: bool
+) -> None:
+    from robolink_simulators.assist import serve_assist
+    from robolink_simulators.clock import ScaledClock
+    from robolink_simulators.hosting.tcp import serve_tcp
+
     clock = ScaledClock(speed)
     with ExitStack() as stack:
         stopped = stack.enter_context(_Termination())
         tcp = stack.enter_context(
-            serve_tcp(simulator, host, port, clock=clock, allow_remote=allow_remote)
+            serve_tcp(simulator, *address, clock=clock, allow_remote=allow_remote)
         )
         assist = stack.enter_context(serve_assist(simulator, clock=clock))
-        _announce(tcp.url, assist.url, simulator.machine.model.name, seed)
+        _announce(tcp.url, assist.url, simulator.machine.model.name, simulator.seed)
         stopped.wait()
 
 
@@ -181,8 +205,9 @@ def _password(variable: str | None) -> "Secret | None":
     return Secret(value)
 
 
-def _habits(options: tuple[str, ...]) -> "EpsonOptions":
+def _habits(options: tuple[str, ...], profile: Path | None) -> "EpsonOptions":
     from robolink_simulators.epson.option_text import options_from_text
+    from robolink_simulators.epson.profile import read_profile
 
     pairs: dict[str, str] = {}
     for option in options:
@@ -193,4 +218,5 @@ def _habits(options: tuple[str, ...]) -> "EpsonOptions":
                 remedy=tr("Write for example --option terminator=cr."),
             )
         pairs[name] = value
-    return options_from_text(pairs)
+    settled = {} if profile is None else read_profile(profile)
+    return options_from_text({**settled, **pairs})

@@ -5,7 +5,7 @@ from dataclasses import replace
 import click
 
 from robolink.messages import tr
-from robolink_cli._consent import agree, dry_run_option, yes_option
+from robolink_cli._consent import agree, dry_run_option, published_option, yes_option
 from robolink_cli._context import CliContext, controller_options, open_controller
 from robolink_cli._render import say
 
@@ -16,17 +16,20 @@ def tool() -> None:
 
 
 @tool.command("list")
+@published_option
 @controller_options
-def list_tools(context: CliContext) -> None:
+def list_tools(context: CliContext, published: bool) -> None:
     """Show all tools and which one is in force."""
     from robolink_cli._tables import show_tools
+    from robolink_cli._tool_source import find_tools
     from robolink_cli._views import offset_payload
 
     with open_controller(context) as controller:
-        stored, selected = controller.tools.read_all(), controller.tools.selected()
-    tools = {str(number): offset_payload(offset) for number, offset in stored.items()}
-    payload: dict[str, object] = {"selected_tool": selected, "tools": tools}
-    context.emit("tools", payload, lambda: show_tools(tools, selected))
+        found = find_tools(controller, published=published)
+    tools = {str(number): offset_payload(offset) for number, offset in found.tools.items()}
+    payload: dict[str, object] = {"selected_tool": found.selected, "tools": tools}
+    payload["source"] = "published" if published else "controller"
+    context.emit("tools", payload, lambda: show_tools(tools, found.selected))
 
 
 @tool.command("get")
@@ -66,6 +69,7 @@ def set_tool(
     """Write a tool offset; components that are not given are kept."""
     from robolink.errors import ConfigError
     from robolink.model import ToolOffset
+    from robolink_cli._safekeeping import back_up_first
     from robolink_cli._tables import show_change
     from robolink_cli._views import offset_payload, receipt_payload
 
@@ -90,6 +94,7 @@ def set_tool(
         if not context.json:
             show_change(number, *shown, after_name=tr("new"))
             agree(tr("Write this to tool {number}?", number=number), yes=yes)
+        back_up_first(controller)
         receipt = controller.tools.write(number, wanted, expected=before)
     payload = receipt_payload(receipt) | {"kept": kept}
     done = (
@@ -109,6 +114,7 @@ def set_tool(
 @yes_option
 def clear(context: CliContext, number: int, dry_run: bool, yes: bool) -> None:
     """Remove a tool's definition."""
+    from robolink_cli._safekeeping import back_up_first
     from robolink_cli._views import receipt_payload
 
     with open_controller(context) as controller:
@@ -119,6 +125,7 @@ def clear(context: CliContext, number: int, dry_run: bool, yes: bool) -> None:
             return
         if not context.json:
             agree(tr("Clear tool {number}?", number=number), yes=yes)
+        back_up_first(controller)
         receipt = controller.tools.clear(number, expected=before)
     done = tr("was undefined already") if receipt.skipped else tr("cleared, read back")
     context.emit(

@@ -1,5 +1,18 @@
-"""Where the tool tip is: pure procedures and solvers. No I/O."""
+"""Where the tool tip is: pure procedures and solvers. No I/O.
 
+Solvers that need numpy are loaded when they are first used, because a command that only looks
+at the controller should not wait for it.
+"""
+
+from typing import TYPE_CHECKING
+
+from robolink.calibration._impact import Impact as Impact
+from robolink.calibration._impact import PointImpact as PointImpact
+from robolink.calibration._impact import impact_on as impact_on
+from robolink.calibration._poses import ToolFit as ToolFit
+from robolink.calibration._poses import better_fit as better_fit
+from robolink.calibration._poses import tool_fits as tool_fits
+from robolink.calibration._poses import two_of as two_of
 from robolink.calibration._result import CalibrationResult as CalibrationResult
 from robolink.calibration._result import Drift as Drift
 from robolink.calibration._result import VerifyResult as VerifyResult
@@ -7,9 +20,72 @@ from robolink.calibration._steps import Ask as Ask
 from robolink.calibration._steps import Move as Move
 from robolink.calibration._steps import Procedure as Procedure
 from robolink.calibration._steps import Step as Step
+from robolink.calibration._tolerance import PLANAR_TOLERANCE as PLANAR_TOLERANCE
+from robolink.calibration._tolerance import TOUCH_TOLERANCE as TOUCH_TOLERANCE
+from robolink.calibration._tolerance import Tolerance as Tolerance
 from robolink.calibration._touch import TouchPlan as TouchPlan
 from robolink.calibration._touch import contact_pose as contact_pose
 from robolink.calibration._touch import raised as raised
 from robolink.calibration._touch import two_pose as two_pose
 from robolink.calibration._touch import verify_by_turning as verify_by_turning
 from robolink.calibration._two_pose import solve_two_pose as solve_two_pose
+
+if TYPE_CHECKING:
+    from robolink.calibration._board import solve_board as solve_board
+    from robolink.calibration._board_fit import solve_board_fit as solve_board_fit
+    from robolink.calibration._camera import Sighting as Sighting
+    from robolink.calibration._camera import solve_up_camera as solve_up_camera
+    from robolink.calibration._n_angle import solve_n_angle as solve_n_angle
+    from robolink.calibration._needle_change import NeedleChain as NeedleChain
+    from robolink.calibration._needle_change import NeedleChangeResult as NeedleChangeResult
+    from robolink.calibration._needle_change import NeedleLimits as NeedleLimits
+    from robolink.calibration._needle_change import solve_needle_change as solve_needle_change
+    from robolink.calibration._one_touch import Pin as Pin
+    from robolink.calibration._one_touch import pin_touched as pin_touched
+    from robolink.calibration._one_touch import solve_one_touch as solve_one_touch
+    from robolink.calibration._robust import Robust as Robust
+    from robolink.calibration._rotations import quaternion_rotations as quaternion_rotations
+    from robolink.calibration._rotations import rotation_of as rotation_of
+    from robolink.calibration._rotations import uvw_deg as uvw_deg
+    from robolink.calibration._rotations import zyz_deg as zyz_deg
+    from robolink.calibration._update_guard import NEEDLE_LIMIT_MM as NEEDLE_LIMIT_MM
+    from robolink.calibration._update_guard import Correction as Correction
+    from robolink.calibration._update_guard import update_guard as update_guard
+    from robolink.calibration._verify import PLACING_TOLERANCE_MM as PLACING_TOLERANCE_MM
+    from robolink.calibration._verify import verify_drift as verify_drift
+
+_LOADED_LATER = {
+    "solve_board": "_board",
+    "solve_board_fit": "_board_fit",
+    "Sighting": "_camera",
+    "solve_up_camera": "_camera",
+    "solve_n_angle": "_n_angle",
+    "NeedleChain": "_needle_change",
+    "NeedleChangeResult": "_needle_change",
+    "NeedleLimits": "_needle_change",
+    "solve_needle_change": "_needle_change",
+    "Pin": "_one_touch",
+    "pin_touched": "_one_touch",
+    "solve_one_touch": "_one_touch",
+    "Robust": "_robust",
+    "quaternion_rotations": "_rotations",
+    "rotation_of": "_rotations",
+    "uvw_deg": "_rotations",
+    "zyz_deg": "_rotations",
+    "Correction": "_update_guard",
+    "NEEDLE_LIMIT_MM": "_update_guard",
+    "update_guard": "_update_guard",
+    "PLACING_TOLERANCE_MM": "_verify",
+    "verify_drift": "_verify",
+}
+
+
+def __getattr__(name: str) -> object:
+    """Load a solver from its module (PEP 562)."""
+    if name not in _LOADED_LATER:
+        raise AttributeError(f"module 'robolink.calibration' has no attribute {name!r}")
+    from importlib import import_module
+
+    value = getattr(import_module(f"robolink.calibration.{_LOADED_LATER[name]}"), name)
+    globals()[name] = value
+    return value

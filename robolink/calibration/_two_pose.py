@@ -18,6 +18,7 @@ import math
 
 from robolink.calibration._checks import check_poses, keep_unmeasured
 from robolink.calibration._result import CalibrationResult
+from robolink.calibration._scatter import Scatter
 from robolink.errors import CalibrationError
 from robolink.messages import tr
 from robolink.model import Pose, ToolOffset, angle_difference_deg, rotate_xy
@@ -37,6 +38,7 @@ def solve_two_pose(
     stored: ToolOffset | None = None,
     min_rotation_deg: float = MIN_ROTATION_DEG,
     allow_mixed_hand: bool = False,
+    sigma_mm: float | None = None,
 ) -> CalibrationResult:
     """Return the offset of a tip that touched one point in both flange poses.
 
@@ -46,11 +48,14 @@ def solve_two_pose(
         stored: The offset stored now; Z, U, V and W are kept from it, or 0 without one.
         min_rotation_deg: Smallest difference of U, modulo 360, that is accepted.
         allow_mixed_hand: Warn instead of refusing when the arm was configured differently.
+        sigma_mm: Standard deviation of one coordinate of one placement. Without it the result
+            has no interval, because two poses leave no residual.
 
     Raises:
         CalibrationError: ``degenerate_angles``, ``insufficient_rotation``, ``non_finite``,
             ``suspect_units``, ``mixed_hand``, ``mixed_local``, ``mixed_tool`` or
             ``implausible_offset``.
+        ConfigError: ``sigma_mm`` is not positive.
     """
     warnings = check_poses((first, second), allow_mixed_hand=allow_mixed_hand)
     rotation_deg = abs(angle_difference_deg(second.u_deg, first.u_deg))
@@ -64,15 +69,26 @@ def solve_two_pose(
     scale = 2 * math.sin(half)
     t_x, t_y = -m_y / scale, m_x / scale
     at_x, at_y = rotate_xy(t_x, t_y, first.u_deg)
+    gain = 1 / (math.sqrt(2) * abs(math.sin(half)))
+    scatter = Scatter.of(0.0, 0, sigma_mm)
+    variance = (scatter.sigma_mm * gain) ** 2 if scatter else 0.0
+    covariance = ((variance, 0.0), (0.0, variance)) if scatter else ()
     return CalibrationResult(
         method="two_pose",
         offset=keep_unmeasured(stored, x_mm=t_x, y_mm=t_y),
         measured=MEASURED,
         kept=("z_mm", "u_deg", "v_deg", "w_deg"),
         reference_point_mm=(first.x_mm + at_x, first.y_mm + at_y),
-        sigma_gain=1 / (math.sqrt(2) * abs(math.sin(half))),
+        sigma_gain=gain,
         warnings=warnings,
         inputs=(first, second),
+        covariance=covariance,
+        half_width95=scatter.half_widths(covariance) if scatter else (),
+        sigma_mm=sigma_mm,
+        sigma_stated=scatter is not None,
+        rank=4,
+        dof=0,
+        unobservable=("z_mm", "u_deg", "v_deg", "w_deg"),
     )
 
 

@@ -8,7 +8,7 @@ once. Whatever happens, the tool, power mode and speed of before are put back at
 from collections.abc import Callable
 
 from robolink.calibration import VerifyResult, contact_pose, two_pose, verify_by_turning
-from robolink.errors import CalibrationError, DeclinedError, RobolinkError, VerifyError
+from robolink.errors import DeclinedError, RobolinkError, VerifyError
 from robolink.messages import tr
 from robolink.model import Controller, Pose, ToolOffset, ToolReceipt
 from robolink.nozzle_change._plan import ChangePlan, ChangeReport, Proposal
@@ -42,7 +42,7 @@ class NozzleChange:
         self._on_step = on_step
 
     def run(self) -> ChangeReport:
-        """Do it all.
+        """Do it all. Ctrl-C before the verification has passed leaves the old value.
 
         Raises:
             CalibrationError: The measurement is not trusted; nothing was written.
@@ -50,24 +50,50 @@ class NozzleChange:
             VerifyError: The tip drifts too far; the old value was put back.
             RobolinkError: Anything else that ended it, with the state it left.
         """
+        controller, tool = self._controller, self._plan.tool
+        before = controller.tools.read(tool)
+        report: ChangeReport | None = None
+        try:
+            with controller.preserved(tr("calibrate tool {tool}", tool=tool)):
+                report = self._carry_out(before)
+        except KeyboardInterrupt:
+            if report is not None:
+                self._operator.tell(tr("Tool {tool} keeps the new value.", tool=tool))
+            raise
+        return report
+
+    def _carry_out(self, before: ToolOffset | None) -> ChangeReport:
         controller, plan = self._controller, self._plan
-        before = controller.tools.read(plan.tool)
-        with controller.preserved(tr("calibrate tool {tool}", tool=plan.tool)):
-            controller.tools.select(0)
-            start = controller.groups[0].pose()
-            runner = self._runner(start, None)
-            result = runner.run(two_pose(plan.touch, stored=before))
-            proposal = Proposal(plan.tool, before, result)
-            self._show(proposal)
-            self._check_change(proposal)
-            question = tr("Write this to tool {tool}?", tool=plan.tool)
-            if plan.ask_before_write and not runner.confirm(question):
-                raise DeclinedError(
-                    tr("The proposal was not accepted."), remedy=tr("Nothing was written.")
-                )
-            receipt = controller.tools.write(plan.tool, result.offset, expected=before)
-            verification = self._verify(start, proposal, receipt) if plan.verify else None
+        controller.tools.select(0)
+        start = controller.groups[0].pose()
+        runner = self._runner(start, None)
+        result = runner.run(two_pose(plan.touch, stored=before))
+        proposal = Proposal(plan.tool, before, result)
+        self._show(proposal)
+        proposal.require_plausible(
+            plan.max_change_mm,
+            remedy=tr(
+                "Check that both poses touched the same point. If the change is real, allow it "
+                "with --max-change."
+            ),
+        )
+        question = tr("Write this to tool {tool}?", tool=plan.tool)
+        if plan.ask_before_write and not runner.confirm(question):
+            raise DeclinedError(
+                tr("The proposal was not accepted."), remedy=tr("Nothing was written.")
+            )
+        receipt = self._write(proposal)
+        verification = self._verify(start, proposal, receipt) if plan.verify else None
         return ChangeReport(proposal, receipt, verification)
+
+    def _write(self, proposal: Proposal) -> ToolReceipt:
+        tool, before, offset = proposal.tool, proposal.before, proposal.result.offset
+        try:
+            return self._controller.tools.write(tool, offset, expected=before)
+        except KeyboardInterrupt as error:
+            # It was written and read back by now, or not begun; it was not verified.
+            self._roll_back(ToolReceipt(tool, before, offset, offset), error)
+            raise
 
     def _verify(self, start: Pose, proposal: Proposal, receipt: ToolReceipt) -> VerifyResult:
         plan, result = self._plan, proposal.result
@@ -104,12 +130,17 @@ class NozzleChange:
     def _roll_back(self, receipt: ToolReceipt, cause: BaseException) -> None:
         """Write the old value back, once; let ``cause`` say whether that was done."""
         tools, tool = self._controller.tools, receipt.tool
+        if receipt.skipped:
+            return
         try:
             if receipt.before is None:
-                tools.clear(tool, expected=receipt.read_back)
+                undone = tools.clear(tool, expected=receipt.read_back)
             else:
-                tools.write(tool, receipt.before, expected=receipt.read_back)
-            note = tr("The old value of tool {tool} was written back.", tool=tool)
+                undone = tools.write(tool, receipt.before, expected=receipt.read_back)
+            if undone.skipped:
+                note = tr("Tool {tool} holds its old value.", tool=tool)
+            else:
+                note = tr("The old value of tool {tool} was written back.", tool=tool)
         except RobolinkError as error:
             note = tr(
                 "The old value of tool {tool} could NOT be written back: {error}",
@@ -119,23 +150,6 @@ class NozzleChange:
         if isinstance(cause, RobolinkError):
             cause.remedy = f"{cause.remedy} {note}".strip()
         self._operator.tell(note)
-
-    def _check_change(self, proposal: Proposal) -> None:
-        change = proposal.change_mm
-        if change is not None and change > self._plan.max_change_mm:
-            raise CalibrationError(
-                "implausible_change",
-                tr(
-                    "The tip would move by {change:.3f} mm against the stored tool; "
-                    "{limit:.3f} mm are plausible.",
-                    change=change,
-                    limit=self._plan.max_change_mm,
-                ),
-                remedy=tr(
-                    "Check that both poses touched the same point. If the change is real, "
-                    "allow it with --max-change."
-                ),
-            )
 
     def _runner(self, start: Pose, offset: ToolOffset | None) -> Runner:
         return Runner(

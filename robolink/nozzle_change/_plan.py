@@ -4,6 +4,8 @@ import math
 from dataclasses import dataclass, field
 
 from robolink.calibration import CalibrationResult, TouchPlan, VerifyResult
+from robolink.errors import CalibrationError
+from robolink.messages import tr
 from robolink.model import Pose, ToolOffset, ToolReceipt, WorkBox
 from robolink.runner import RunSettings
 
@@ -73,6 +75,30 @@ class Proposal:
             return None
         after = self.result.offset
         return math.hypot(after.x_mm - self.before.x_mm, after.y_mm - self.before.y_mm)
+
+
+    def require_plausible(self, limit_mm: float, *, remedy: str) -> None:
+        """Refuse a change that no nozzle change explains.
+
+        Args:
+            limit_mm: Largest plausible change.
+            remedy: What to do about a larger one.
+
+        Raises:
+            CalibrationError: ``implausible_change``.
+        """
+        change = self.change_mm
+        if change is not None and change > limit_mm:
+            raise CalibrationError(
+                "implausible_change",
+                tr(
+                    "The tip would move by {change:.3f} mm against the stored tool; {limit:.3f} "
+                    "mm are plausible.",
+                    change=change,
+                    limit=limit_mm,
+                ),
+                remedy=remedy,
+            )
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,13 @@
 """Moves bytes to and from a far end; knows no protocol."""
 
 from robolink.transport._base import Transport as Transport
+from robolink.transport._dialogue import Dialogue as Dialogue
+from robolink.transport._dialogue import DialogueLog as DialogueLog
+from robolink.transport._dialogue import Passage as Passage
+from robolink.transport._dialogue import format_dialogue as format_dialogue
+from robolink.transport._dialogue import opening_line as opening_line
+from robolink.transport._dialogue import parse_dialogues as parse_dialogues
+from robolink.transport._dialogue import passage_line as passage_line
 from robolink.transport._registry import TRANSPORTS_GROUP as TRANSPORTS_GROUP
 from robolink.transport._registry import TransportOpener as TransportOpener
 from robolink.transport._registry import open_transport as open_transport

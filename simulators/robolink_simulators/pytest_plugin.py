@@ -4,9 +4,10 @@ Importing this module costs next to nothing: every pytest run of an environment 
 robolink is installed imports it.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
@@ -74,3 +75,30 @@ def epson_tcp(request: pytest.FixtureRequest) -> Iterator[ServedEpson]:
         tcp = stack.enter_context(serve_tcp(simulator, clock=clock))
         assist = stack.enter_context(serve_assist(simulator, clock=clock))
         yield ServedEpson(tcp.url, assist.url, simulator)
+
+
+@pytest.fixture
+def epson_replay() -> Iterator[Callable[[Path], str]]:
+    """A maker of replays: give it a recording, connect to the URL that it returns.
+
+    The test fails when a client asked otherwise than recorded, or did not connect as often.
+    """
+    from robolink_simulators.replay import ReplayDevice, read_recording, serve_replay
+
+    devices: list[ReplayDevice] = []
+    with ExitStack() as stack:
+
+        def serve(recording: Path) -> str:
+            device = ReplayDevice(read_recording(recording))
+            devices.append(device)
+            return stack.enter_context(serve_replay(device)).url
+
+        yield serve
+    differences = [what for device in devices for what in device.differences]
+    differences += [
+        f"{device.unplayed} recorded connections were not made"
+        for device in devices
+        if device.unplayed
+    ]
+    if differences:
+        pytest.fail("\n".join(differences), pytrace=False)

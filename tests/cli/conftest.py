@@ -2,11 +2,16 @@
 
 import os
 import sys
+from itertools import count
 
 import click
 import pytest
-from robolink_cli import _lazy, _render
+from robolink_cli import _lazy, _render, main
 from robolink_cli._context import controller_options, json_option
+from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.hosting.in_process import register, unregister
+
+_numbers = count()
 
 
 @pytest.fixture(autouse=True)
@@ -40,3 +45,40 @@ def command(monkeypatch):
         return seen
 
     return install
+
+
+@pytest.fixture
+def state_folder(tmp_path, monkeypatch):
+    """A state folder and a working folder of the test's own; returns the first."""
+    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
+    monkeypatch.chdir(tmp_path)
+    return tmp_path / "state"
+
+
+@pytest.fixture
+def simulator(tmp_path, state_folder):
+    """A simulated controller that keeps its tools in a file, as a real one does."""
+    simulator = EpsonSimulator(seed=4, state_path=tmp_path / "flash.json")
+    name = f"cli-{next(_numbers)}"
+    register(name, simulator)
+    yield simulator
+    unregister(name)
+
+
+@pytest.fixture
+def run(simulator, capsys):
+    """Run a command on the simulator; return the exit code and what was shown."""
+
+    def ran(*arguments):
+        code = main.run(["-c", simulator.url, *arguments])
+        shown = capsys.readouterr()
+        return code, shown.out, shown.err
+
+    return ran
+
+
+@pytest.fixture
+def golden(run):
+    """The name of a backup of the controller as it is at first."""
+    assert run("backup", "golden.json")[0] == 0
+    return "golden.json"

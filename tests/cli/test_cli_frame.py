@@ -180,7 +180,12 @@ def test_what_was_left_unfinished_is_said_on_connecting(command, capsys, monkeyp
     assert main.run(["-c", URL, "status", "--timeout", "2"]) == 0
     assert controller.closed
     assert connected.pop("password").reveal() == "hunter2"
-    assert connected == {"url": URL, "timeout_s": 2.0, "remote_timeout_s": 60.0}
+    assert connected == {
+        "url": URL,
+        "timeout_s": 2.0,
+        "remote_timeout_s": 60.0,
+        "trace": None,
+    }
     shown = capsys.readouterr()
     assert shown.out == ""
     for text in ("Tool 0 is selected now", "puts tool 3 back", f"robolink -c {URL} resolve"):

@@ -71,6 +71,15 @@ def test_a_second_document_is_a_defect(command, capsys):
     assert "RuntimeError" in json.loads(capsys.readouterr().out)["error"]["kind"]
 
 
+def test_a_wide_table_is_not_cut_off_a_terminal(command, capsys):
+    wide = "x" * 200
+    command(lambda context: _render.table("wide", ["a", "b"], [[wide, "end"]]))
+    assert main.run(["status"]) == 0
+    shown = capsys.readouterr().out
+    assert wide in shown
+    assert "end" in shown
+
+
 def test_brackets_in_a_table_are_text(command, capsys):
     command(lambda context: _render.table("[bold]", ["[a]"], [["[red]x"]]))
     assert main.run(["status"]) == 0

@@ -49,7 +49,14 @@ def name_of(habit):
 
 def test_every_option_with_named_values_is_varied_here():
     varied = {key for habit in HABITS for key in habit}
-    settled_elsewhere = {"monitoring_only", "login_timeout_s", "remote_timeout_s", "numbers"}
+    settled_elsewhere = {
+        "monitoring_only",
+        "monitoring_timeout",
+        "companion",
+        "login_timeout_s",
+        "remote_timeout_s",
+        "numbers",
+    }
     assert {field.name for field in fields(EpsonOptions)} == varied | settled_elsewhere
 
 

@@ -65,6 +65,15 @@ def test_the_wheel_brings_grammar_and_catalogue(names):
     assert "robolink/locale/robolink.pot" in names
 
 
+def test_the_wheel_brings_the_programs_for_controllers_and_their_licence(wheel, names):
+    folder = ROOT / "companions"
+    for path in folder.rglob("*"):
+        if path.is_file():
+            name = f"robolink_cli/companions/{path.relative_to(folder).as_posix()}"
+            assert wheel.read(name) == path.read_bytes()
+    assert "robolink_cli/companions/LICENSE" in names
+
+
 def test_the_wheel_installs_the_command_and_the_simulator(wheel, names):
     (path,) = (name for name in names if name.endswith(".dist-info/entry_points.txt"))
     entries = configparser.ConfigParser(delimiters=("=",))

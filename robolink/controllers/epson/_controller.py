@@ -5,13 +5,22 @@ from contextlib import AbstractContextManager
 from types import TracebackType
 from typing import Self
 
+from robolink.controllers.epson._alarms import EpsonAlarms
 from robolink.controllers.epson._answers import require_ready
+from robolink.controllers.epson._facts import FactReader
 from robolink.controllers.epson._guarded import MarkerDesk, ProcedureLock
-from robolink.controllers.epson._motion import EpsonGroup, request_abort
+from robolink.controllers.epson._io import EpsonIo
+from robolink.controllers.epson._motion import EpsonGroup
+from robolink.controllers.epson._movement import request_abort
+from robolink.controllers.epson._points import EpsonPoints
 from robolink.controllers.epson._preserve import Preserver
+from robolink.controllers.epson._published import PublishedReader, PublishedTools
 from robolink.controllers.epson._resolve import Resolver
 from robolink.controllers.epson._session import EpsonSession
+from robolink.controllers.epson._setter import ValueSetter
 from robolink.controllers.epson._tools import EpsonToolTable
+from robolink.controllers.epson._value_doubts import ValueDoubts
+from robolink.controllers.epson._variables import EpsonVariables
 from robolink.controllers.epson._window import CommandWindow
 from robolink.errors import (
     ControllerFaultError,
@@ -23,6 +32,7 @@ from robolink.errors import (
 from robolink.messages import tr
 from robolink.model import (
     Capabilities,
+    ControllerFacts,
     ControllerStatus,
     MotionProfile,
     OutcomeLog,
@@ -34,6 +44,12 @@ from robolink.timing import Clock
 
 class EpsonController:
     """A logged-in EPSON controller. Use it as a context manager.
+
+    Attributes:
+        io: Inputs, outputs and memory bits.
+        variables: The project's Global Preserve variables.
+        alarms: The alarms that stand.
+        resolver: Settles what was begun and not proved finished.
 
     Args:
         session: A session that has logged in.
@@ -57,8 +73,16 @@ class EpsonController:
         self._preserver = Preserver(
             session, self._window, self._desk, self._lock, tools=self._tools, group=self._group
         )
+        setter = ValueSetter(session, self._window, self._desk, self._lock)
+        self.io = EpsonIo(session, self._window, setter)
+        self.variables = EpsonVariables(session, setter)
+        self.alarms = EpsonAlarms(session, self._window, self._lock)
         self.resolver = Resolver(
-            self._desk, tools=self._tools, group=self._group, preserver=self._preserver
+            self._desk,
+            tools=self._tools,
+            group=self._group,
+            preserver=self._preserver,
+            values=ValueDoubts(self.io, self.variables),
         )
 
     @property
@@ -87,6 +111,22 @@ class EpsonController:
         return (self._group,)
 
     @property
+    def points(self) -> EpsonPoints:
+        """The taught points of the robot in force; read only."""
+        return EpsonPoints(self._window)
+
+    def published_tools(self) -> PublishedTools | None:
+        """Read the tools as the companion program published them; legal while production runs.
+
+        Returns:
+            ``None`` where the project publishes none.
+
+        Raises:
+            ToolError: The table was being changed, or is of another version.
+        """
+        return PublishedReader(self.variables).read()
+
+    @property
     def outcomes(self) -> OutcomeLog:
         """Open markers of this controller."""
         return self._outcomes
@@ -100,6 +140,10 @@ class EpsonController:
         """Read the state flags."""
         return self._window.status()
 
+    def facts(self) -> ControllerFacts:
+        """Read which controller and robots these are; legal while production runs."""
+        return FactReader(self._session, self._window).read()
+
     def error_text(self, code: int) -> str:
         """Return the controller's own text for an error number, empty where it has none."""
         return self._window.error_text(code)
@@ -108,8 +152,17 @@ class EpsonController:
         """Stop: abort our own movement, else stop the controller's tasks.
 
         May be called from any thread while another waits on a motion.
+
+        Raises:
+            RobolinkError: It was not confirmed; the message says to use the emergency stop.
         """
-        request_abort(self._session)
+        try:
+            request_abort(self._session)
+        except RobolinkError as error:
+            error.remedy = " ".join(
+                (tr("The stop is not confirmed: press the emergency stop."), error.remedy)
+            )
+            raise
 
     def reset_fault(self) -> None:
         """Send Reset because a person asked for it; it may switch outputs off.
@@ -188,13 +241,14 @@ class EpsonController:
         """Abort what nobody waited on, log out where that does no harm, close. Idempotent.
 
         Logging out while a task runs raises an error on the controller (epson.md 1.1), so
-        the connection is just closed then.
+        the connection is just closed then. So it is when another device starts the cell: a
+        task could begin between the look and the logout.
         """
         try:
             if self._session.alive:
                 self._group.abort_unfinished()
                 status = self.status()
-                if not (status.running or status.paused):
+                if status.remote and not (status.running or status.paused):
                     self._session.exchange("Logout")
         except RobolinkError:
             pass  # the link is going away in any case; markers keep what is in doubt

@@ -6,7 +6,7 @@ The command classes of design part 4 (faults_and_speed.md A3):
 class  here                                        when no answer comes
 =====  ==========================================  =======================================
 READ   GetStatus, Print ..., TLSet, Where          ask again on a new link
-SET    TLSet n, TLClr n, Tool n                    OutcomeUnknownError; read back, resolve
+SET    TLSet n, TLClr n, Tool n, SetIO ...         OutcomeUnknownError; read back, resolve
 MOVE   Go, Move                                    OutcomeUnknownError; never sent again
 STOP   Abort, Stop                                 may be repeated
 =====  ==========================================  =======================================
@@ -29,7 +29,6 @@ from robolink.errors import (
 from robolink.markers import new_operation, wall_label
 from robolink.messages import tr
 from robolink.model import Marker, MarkerKind, OutcomeLog
-from robolink.protocols.spel import Statement
 
 
 class ProcedureLock:
@@ -115,7 +114,7 @@ class MarkerDesk:
             )
 
     @contextmanager
-    def doubt(self, statement: Statement) -> Iterator[None]:
+    def doubt(self, request: str) -> Iterator[None]:
         """Turn a lost answer inside the block into OutcomeUnknownError."""
         try:
             yield
@@ -123,7 +122,7 @@ class MarkerDesk:
             raise OutcomeUnknownError(
                 tr(
                     "No answer came to {request!r}: it may or may not have run ({cause})",
-                    request=statement,
+                    request=request,
                     cause=error.what,
                 ),
                 remedy=tr(
@@ -131,6 +130,6 @@ class MarkerDesk:
                     "'robolink resolve'; motion is blocked until then."
                 ),
                 controller=self._session.identity,
-                request=statement,
+                request=request,
                 raw=error.raw,
             ) from error

@@ -1,148 +1,15 @@
-"""The robot arm of an EPSON controller: one pending Execute, watched by GetStatus."""
+"""The robot arm of an EPSON controller: where it is, and how it is told to go elsewhere."""
 
 from robolink.controllers.epson._guarded import MarkerDesk, ProcedureLock
+from robolink.controllers.epson._movement import EpsonMotion, MovementParts, request_abort
 from robolink.controllers.epson._robot import RobotFacts
-from robolink.controllers.epson._session import EpsonSession, PendingExecute
+from robolink.controllers.epson._session import EpsonSession
 from robolink.controllers.epson._settings import Settings
 from robolink.controllers.epson._window import CommandWindow
-from robolink.errors import (
-    ControllerFaultError,
-    MotionTimeoutError,
-    NotReadyError,
-    NotReadyReason,
-    RejectedError,
-    TransportTimeoutError,
-)
+from robolink.errors import NotReadyError, NotReadyReason
 from robolink.messages import tr
-from robolink.model import (
-    Marker,
-    MarkerKind,
-    MotionOutcome,
-    MotionProfile,
-    Path,
-    Pose,
-    WorkBox,
-)
+from robolink.model import MarkerKind, MotionProfile, Path, Pose, WorkBox
 from robolink.protocols import spel
-from robolink.timing import Deadline
-
-POLL_S = 0.1
-"""How often the status is read while the robot moves."""
-
-
-class EpsonMotion:
-    """A movement under way. Wait on it."""
-
-    def __init__(
-        self,
-        target: Pose,
-        pending: PendingExecute,
-        marker: Marker,
-        *,
-        parts: "_Parts",
-    ) -> None:
-        self._target = target
-        self._pending = pending
-        self._marker = marker
-        self._parts = parts
-
-    @property
-    def target(self) -> Pose:
-        """Where it goes."""
-        return self._target
-
-    @property
-    def settled(self) -> bool:
-        """Whether its end was seen and taken."""
-        return self._parts.session.pending is not self._pending
-
-    def wait(self, *, timeout_s: float) -> MotionOutcome:
-        """Wait for the end; see :class:`robolink.model.Motion`."""
-        try:
-            with self._parts.desk.doubt(self._pending.statement):
-                arrived = self._watch(Deadline.after(self._parts.session.clock, timeout_s))
-        except KeyboardInterrupt:
-            self.abort()
-            raise
-        if not arrived:
-            self.abort()
-            raise MotionTimeoutError(
-                tr(
-                    "{statement!r} did not end within {timeout_s:.0f} s and was aborted.",
-                    statement=self._pending.statement,
-                    timeout_s=timeout_s,
-                ),
-                remedy=tr("Read where the robot is ('robolink where') before you go on."),
-                controller=self._parts.session.identity,
-                request=self._pending.statement,
-            )
-        return self._settle()
-
-    def abort(self) -> None:
-        """Send Abort once and await the end of the movement.
-
-        Raises:
-            OutcomeUnknownError: No end was seen; the marker stays.
-        """
-        session = self._parts.session
-        with self._parts.desk.doubt(self._pending.statement):
-            if self._pending.answer is None:
-                request_abort(session)
-                self._end_within(session.timeout_s)
-        self._take_answer()
-
-    def _watch(self, deadline: Deadline) -> bool:
-        """Poll until the statement answers; False when the deadline passes first."""
-        session = self._parts.session
-        while self._pending.answer is None:
-            if deadline.expired:
-                return False
-            status = self._parts.window.status()
-            if status.emergency_stop or status.guard_open or status.fault:
-                # The controller ends the statement by itself; its answer must follow soon.
-                self._end_within(session.timeout_s)
-                break
-            session.await_pending(wait_s=min(POLL_S, deadline.remaining_s()))
-        return True
-
-    def _end_within(self, timeout_s: float) -> None:
-        session = self._parts.session
-        deadline = Deadline.after(session.clock, timeout_s)
-        while self._pending.answer is None:
-            if deadline.expired:
-                session.close()
-                raise TransportTimeoutError(
-                    tr("The controller did not announce the end of the statement."),
-                    controller=session.identity,
-                    request=self._pending.statement,
-                )
-            session.await_pending(wait_s=min(POLL_S, deadline.remaining_s()))
-
-    def _take_answer(self) -> None:
-        self._parts.session.finish(self._pending)
-        self._parts.desk.clear(self._marker)
-
-    def _settle(self) -> MotionOutcome:
-        answer, statement = self._pending.answer, self._pending.statement
-        assert answer is not None  # noqa: S101 - _watch returned True
-        self._take_answer()
-        window = self._parts.window
-        try:
-            window.check(statement, answer)
-        except (RejectedError, ControllerFaultError) as error:
-            if self._pending.abort_requested and isinstance(error, RejectedError):
-                return MotionOutcome.STOPPED
-            raise
-        return MotionOutcome.STOPPED if self._pending.abort_requested else MotionOutcome.ARRIVED
-
-
-class _Parts:
-    """What a motion needs of its controller."""
-
-    def __init__(self, session: EpsonSession, window: CommandWindow, desk: MarkerDesk) -> None:
-        self.session = session
-        self.window = window
-        self.desk = desk
 
 
 class EpsonGroup:
@@ -157,7 +24,7 @@ class EpsonGroup:
         *,
         remote_timeout_s: float,
     ) -> None:
-        self._parts = _Parts(session, window, desk)
+        self._parts = MovementParts(session, window, desk)
         self._lock = lock
         self._robot = RobotFacts(window)
         self._settings = Settings(window, identity=session.identity)
@@ -212,10 +79,13 @@ class EpsonGroup:
             self._require_motors(statement)
             self._require_tool(target, statement)
             self._settings.slow_down(profile)
-            marker = desk.begin(MarkerKind.MOVE, statement, {"target": list(target.coordinates())})
-            with desk.doubt(statement):
-                pending = session.start_execute(statement)
-            self._current = EpsonMotion(target, pending, marker, parts=self._parts)
+            try:
+                with session.uninterrupted():
+                    self._current = self._started(target, statement)
+            except KeyboardInterrupt:
+                # Nobody will be given this motion to wait on.
+                self.abort_unfinished()
+                raise
             return self._current
 
     def statements_for(self, target: Pose, profile: MotionProfile) -> tuple[spel.Statement, ...]:
@@ -230,6 +100,14 @@ class EpsonGroup:
         """Abort the last movement if nobody has seen its end."""
         if self._current is not None and not self._current.settled:
             self._current.abort()
+
+    def _started(self, target: Pose, statement: spel.Statement) -> EpsonMotion:
+        session, desk = self._parts.session, self._parts.desk
+        details = {"target": list(target.coordinates())}
+        marker = desk.begin(MarkerKind.MOVE, statement, details)
+        with desk.doubt(statement):
+            pending = session.start_execute(statement)
+        return EpsonMotion(target, pending, marker, parts=self._parts)
 
     def _statement_for(self, target: Pose, profile: MotionProfile) -> spel.Statement:
         build = spel.move if profile.path is Path.STRAIGHT else spel.go
@@ -275,16 +153,3 @@ class EpsonGroup:
                 controller=self._parts.session.identity,
                 request=statement,
             )
-
-
-def request_abort(session: EpsonSession) -> None:
-    """Stop: Abort our own running statement, or Stop the controller's tasks.
-
-    Abort ends what Execute runs; Stop ends tasks (epson.md 1.2). Both may be repeated.
-    """
-    pending = session.pending
-    if pending is not None and pending.answer is None:
-        pending.abort_requested = True
-        session.exchange("Abort")
-    else:
-        session.exchange("Stop")

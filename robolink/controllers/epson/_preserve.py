@@ -90,20 +90,24 @@ class Preserver:
             self._desk.require_settled(reason)
             self._window.require_ready(reason)
             before = InForce(self._tools.selected(), self._group.settings.read())
-            marker = self._desk.begin(MarkerKind.SELECTION, reason, before.to_details())
+            marker: Marker | None = None
             try:
+                with self._session.uninterrupted():
+                    marker = self._desk.begin(MarkerKind.SELECTION, reason, before.to_details())
                 yield
             except BaseException as error:
-                self._restore_after(error, before, marker)
+                if marker is not None:
+                    self._restore_after(error, before, marker)
                 raise
             self.restore(before, marker)
 
     def restore(self, before: InForce, marker: Marker) -> None:
-        """Put ``before`` back, read it back, and forget ``marker``."""
-        self._group.abort_unfinished()
-        self._tools.select(before.tool)
-        self._group.settings.restore(before.settings)
-        self._desk.clear(marker)
+        """Put ``before`` back, read it back, and forget ``marker``; Ctrl-C waits for the end."""
+        with self._session.uninterrupted():
+            self._group.abort_unfinished()
+            self._tools.select(before.tool)
+            self._group.settings.restore(before.settings)
+            self._desk.clear(marker)
 
     def _restore_after(self, error: BaseException, before: InForce, marker: Marker) -> None:
         """Restore while ``error`` is on its way; if impossible, let it say what is left."""

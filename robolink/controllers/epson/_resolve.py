@@ -4,55 +4,34 @@ Nothing is sent again. A value that was being written is read; a robot that was 
 is looked at; the cell's own tool is selected again when a person says so.
 """
 
-from dataclasses import dataclass
-from enum import StrEnum
-
+from robolink.controllers.epson._findings import Finding, Verdict
 from robolink.controllers.epson._guarded import MarkerDesk
 from robolink.controllers.epson._motion import EpsonGroup
 from robolink.controllers.epson._preserve import InForce, Preserver
 from robolink.controllers.epson._tools import TOLERANCE, EpsonToolTable, describe
+from robolink.controllers.epson._value_doubts import ValueDoubts
 from robolink.messages import tr
 from robolink.model import Marker, MarkerKind, ToolOffset
 from robolink.protocols import spel
-
-
-class Verdict(StrEnum):
-    """What reading the controller says about an open marker."""
-
-    DONE = "done"
-    NOT_APPLIED = "not applied"
-    CONFLICT = "conflict"
-    LOOK = "look"
-    NOT_RESTORED = "not restored"
-
-
-@dataclass(frozen=True, slots=True)
-class Finding:
-    """An open marker and what is true now.
-
-    Attributes:
-        marker: What was begun.
-        verdict: What became of it.
-        sentence: The same for a person.
-        action: What settling it will do beyond forgetting it, empty for nothing.
-    """
-
-    marker: Marker
-    verdict: Verdict
-    sentence: str
-    action: str = ""
 
 
 class Resolver:
     """Examines and settles open markers."""
 
     def __init__(
-        self, desk: MarkerDesk, *, tools: EpsonToolTable, group: EpsonGroup, preserver: Preserver
+        self,
+        desk: MarkerDesk,
+        *,
+        tools: EpsonToolTable,
+        group: EpsonGroup,
+        preserver: Preserver,
+        values: ValueDoubts,
     ) -> None:
         self._desk = desk
         self._tools = tools
         self._group = group
         self._preserver = preserver
+        self._values = values
 
     def examine(self, marker: Marker) -> Finding:
         """Read what is needed to judge ``marker``; changes nothing."""
@@ -62,6 +41,8 @@ class Resolver:
             return self._examine_selection(marker)
         if "select" in marker.details:
             return self._examine_select(marker)
+        if "item" in marker.details:
+            return self._values.examine(marker)
         return self._examine_write(marker)
 
     def settle(self, finding: Finding) -> None:

@@ -13,9 +13,11 @@ bytes die with the connection and can never be taken for the answer to a later q
 """
 
 import threading
-from dataclasses import dataclass
+from contextlib import AbstractContextManager
 
 from robolink.controllers.epson._answers import rejected
+from robolink.controllers.epson._operation_gate import OperationGate
+from robolink.controllers.epson._pending import PendingExecute
 from robolink.errors import (
     BusyError,
     LoginRefusedError,
@@ -27,7 +29,6 @@ from robolink.errors import (
     TransportError,
     TransportTimeoutError,
 )
-from robolink.interrupts import InterruptGate
 from robolink.messages import tr
 from robolink.model import Secret
 from robolink.protocols.epson_text import (
@@ -47,15 +48,6 @@ from robolink.transport import Transport
 _LOGIN_REFUSED = (13, 98)
 
 
-@dataclass(slots=True)
-class PendingExecute:
-    """An Execute that was sent; ``answer`` is set by whoever reads it."""
-
-    statement: Statement
-    answer: Reply | Refusal | None = None
-    abort_requested: bool = False
-
-
 class EpsonSession:
     """Requests and answers on one connection.
 
@@ -68,7 +60,7 @@ class EpsonSession:
         self._transport = transport
         self._codec = EpsonTextCodec(Role.HOST)
         self._wire = threading.Lock()
-        self._gate = InterruptGate()
+        self._gate = OperationGate()
         self._gate.open()
         self._pending: PendingExecute | None = None
         self._ended_by: RobolinkError | None = None
@@ -163,6 +155,10 @@ class EpsonSession:
                 raise
         return pending
 
+    def uninterrupted(self) -> AbstractContextManager[None]:
+        """Hold Ctrl-C back over exchanges that belong together; it is raised at their end."""
+        return self._gate
+
     def finish(self, pending: PendingExecute) -> None:
         """Forget an Execute whose answer was taken."""
         if self._pending is pending:
@@ -170,14 +166,11 @@ class EpsonSession:
 
     def await_pending(self, *, wait_s: float) -> None:
         """Wait up to ``wait_s`` for bytes, without the lock, then read what is there."""
-        self._transport.wait_readable(deadline=Deadline.after(self.clock, wait_s))
-        with self._gate, self._wire:
-            if self._ended_by is None:
-                try:
-                    self._expect_silence()
-                except RobolinkError as error:
-                    self._end(error)
-                    raise
+        # The answer may have come in one piece with that of the last request.
+        self._collect()
+        if self._pending is None or self._pending.answer is None:
+            self._transport.wait_readable(deadline=Deadline.after(self.clock, wait_s))
+            self._collect()
 
     def close(self) -> None:
         """Close the connection. Idempotent."""
@@ -189,6 +182,15 @@ class EpsonSession:
             )
         self._transport.close()
         self._gate.close()
+
+    def _collect(self) -> None:
+        with self._gate, self._wire:
+            if self._ended_by is None:
+                try:
+                    self._expect_silence()
+                except RobolinkError as error:
+                    self._end(error)
+                    raise
 
     def _ask(self, request: Request, *, secret: bool = False) -> Reply | Refusal:
         with self._gate, self._wire:

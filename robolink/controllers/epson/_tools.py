@@ -1,6 +1,7 @@
 """The tool table of an EPSON controller: TLSet, TLClr, Tool (epson.md 3.1)."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import TypeVar
 
 from robolink.controllers.epson._answers import NOT_EXECUTED
 from robolink.controllers.epson._guarded import MarkerDesk, ProcedureLock
@@ -18,6 +19,8 @@ from robolink.errors import (
 from robolink.messages import tr
 from robolink.model import ANY, Expected, Marker, MarkerKind, ToolOffset, ToolReceipt
 from robolink.protocols import spel
+
+T = TypeVar("T")
 
 DECIMALS = 3
 """Places that a printed point shows (epson.md 3.3, from a real capture)."""
@@ -46,9 +49,10 @@ class EpsonToolTable:
         return range(1, 16)
 
     def read_all(self) -> dict[int, ToolOffset | None]:
-        """Read all fifteen from one TLSet listing."""
+        """Read all fifteen from one TLSet listing; it is empty when none is defined."""
         self._window.require_ready("TLSet")
-        listed = spel.parse_tool_listing(self._window.printed(spel.list_tools()))
+        listing = self._window.printed(spel.list_tools(), may_be_nothing=True)
+        listed = spel.parse_tool_listing(listing)
         return {tool: listed.get(tool) for tool in self.indices()}
 
     def read(self, tool: int) -> ToolOffset | None:
@@ -114,12 +118,9 @@ class EpsonToolTable:
             if before == tool:
                 return
             self._require_defined(tool)
-            marker = self._desk.begin(MarkerKind.SET, statement, {"select": tool, "before": before})
             self._desk.note_selection(tool)
-            with self._desk.doubt(statement):
-                self._run(statement, marker)
-                found = self._selected()
-            self._desk.clear(marker)
+            details = {"select": tool, "before": before}
+            found = self._carry_out(statement, details, self._selected)
             if found != tool:
                 raise ReadBackError(
                     tr(
@@ -155,15 +156,8 @@ class EpsonToolTable:
                 ),
                 request=statement,
             )
-        marker = self._desk.begin(
-            MarkerKind.SET,
-            statement,
-            {"tool": tool, "before": _plain(before), "requested": _plain(requested)},
-        )
-        with self._desk.doubt(statement):
-            self._run(statement, marker)
-            found = self._read(tool)
-        self._desk.clear(marker)
+        details = {"tool": tool, "before": _plain(before), "requested": _plain(requested)}
+        found = self._carry_out(statement, details, lambda: self._read(tool))
         if not _same(found, requested):
             raise ReadBackError(
                 tr(
@@ -179,6 +173,18 @@ class EpsonToolTable:
                 request=statement,
             )
         return ToolReceipt(tool, before, requested, found, unconditional=unconditional)
+
+    def _carry_out(
+        self, statement: spel.Statement, details: Mapping[str, object], read: Callable[[], T]
+    ) -> T:
+        """Run a marked statement and return what ``read`` finds then; Ctrl-C waits for that."""
+        with self._window.uninterrupted():
+            marker = self._desk.begin(MarkerKind.SET, statement, details)
+            with self._desk.doubt(statement):
+                self._run(statement, marker)
+                found = read()
+            self._desk.clear(marker)
+        return found
 
     def _run(self, statement: spel.Statement, marker: Marker) -> None:
         """Run ``statement``; a plain refusal settles its marker, a fault does not.

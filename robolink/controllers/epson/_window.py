@@ -1,5 +1,6 @@
 """Statements run through Execute, as if typed in the controller's command window."""
 
+from contextlib import AbstractContextManager
 from functools import lru_cache
 
 from robolink.controllers.epson._answers import (
@@ -29,6 +30,10 @@ class CommandWindow:
     def __init__(self, session: EpsonSession) -> None:
         self._session = session
 
+    def uninterrupted(self) -> AbstractContextManager[None]:
+        """Hold Ctrl-C back over statements that belong together; it is raised at their end."""
+        return self._session.uninterrupted()
+
     def status(self) -> ControllerStatus:
         """Read the flags; legal at any time after the login."""
         return _status(self._session.exchange("GetStatus"))
@@ -52,8 +57,12 @@ class CommandWindow:
         """
         self.check(statement, self._session.execute(statement))
 
-    def printed(self, query: Statement) -> str:
+    def printed(self, query: Statement, *, may_be_nothing: bool = False) -> str:
         """Run a statement that prints, and return what it printed.
+
+        Args:
+            query: The statement.
+            may_be_nothing: Whether printing nothing is an answer, as for an empty list.
 
         Raises:
             RejectedError, ControllerFaultError: As for :meth:`command`.
@@ -64,6 +73,8 @@ class CommandWindow:
             if not answer.text.lstrip().startswith("!"):
                 return answer.text
         elif isinstance(answer, Reply) and answer.fields == ("0",):
+            if may_be_nothing:
+                return ""
             raise RemoteProtocolError(
                 tr("{query} printed nothing.", query=query),
                 remedy=tr("This controller's SPEL+ differs from the documented one; report it."),

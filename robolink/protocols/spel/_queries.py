@@ -6,11 +6,12 @@ Those that take a number raise LocalProtocolError when it is out of range.
 from robolink.messages import tr
 from robolink.protocols.spel._statements import LAST_TOOL, Statement, check_range
 
-LAST_IO_BIT = 511
-"""Inputs and outputs are numbered 0 to this (spel.md 8)."""
+_LAST_OUTPUT = 0xFFFF
+"""Two bytes carry a bit number (epson.md 2.2); which exist depends on the hardware."""
 
 _LAST_SPEED = 3
 _LAST_JOINT = 6
+_LAST_POINT = 999
 
 
 def print_selected_tool() -> Statement:
@@ -43,6 +44,16 @@ def print_here() -> Statement:
     return Statement("Print Here")
 
 
+def print_point_defined(number: int) -> Statement:
+    """Whether point P0 to P999 is taught, a Boolean (spel.md 5.1)."""
+    return Statement(f"Print PDef(P{_point(number)})")
+
+
+def print_point(number: int) -> Statement:
+    """A taught point, P0 to P999; one that is not taught is error 7007 (spel.md 5.1)."""
+    return Statement(f"Print P{_point(number)}")
+
+
 def print_robot() -> Statement:
     """The number of the robot in force."""
     return Statement("Print Robot")
@@ -67,9 +78,9 @@ def print_output(bit: int) -> Statement:
     """1 when an output is on, else 0 (spel.md 8). Remote Ethernet has no request for it.
 
     Raises:
-        LocalProtocolError: ``bit`` is not 0 to 511.
+        LocalProtocolError: ``bit`` is not 0 to 65535.
     """
-    check_range(tr("An output"), bit, 0, LAST_IO_BIT)
+    check_range(tr("An output"), bit, 0, _LAST_OUTPUT)
     return Statement(f"Print Oport({bit})")
 
 
@@ -107,6 +118,11 @@ def where() -> Statement:
 def _tool(tool: int) -> int:
     check_range(tr("A tool that can be defined"), tool, 1, LAST_TOOL)
     return tool
+
+
+def _point(number: int) -> int:
+    check_range(tr("A point"), number, 0, _LAST_POINT)
+    return number
 
 
 def _which(index: int) -> int:

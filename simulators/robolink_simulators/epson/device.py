@@ -17,7 +17,8 @@ from typing import Final
 from robolink.model import Secret
 from robolink.protocols.epson_text import BadRequest, ErrorCode, Request, StatusFlags
 from robolink_simulators.epson.client_slot import ClientSlot
-from robolink_simulators.epson.condition import Condition, Mode
+from robolink_simulators.epson.companion import Companion
+from robolink_simulators.epson.condition import Condition, Mode, Task
 from robolink_simulators.epson.desk import CommandDesk
 from robolink_simulators.epson.exchange import Exchange
 from robolink_simulators.epson.flash import Flash, forget_volatile
@@ -118,6 +119,9 @@ class EpsonSimulator:
         self._flash.restore()
         self.durable = state_path is not None
         self.variables = project_variables(str(self.options.true_value))
+        self._companion = (
+            Companion(self.machine, self.variables) if self.options.companion else None
+        )
         self.alarms = Alarms()
         self.condition = Condition(monitoring_only=self.options.monitoring_only)
         interpreter = Interpreter(self.machine, self.options, random.Random(f"arm {self.seed}"))
@@ -258,6 +262,8 @@ class EpsonSimulator:
             self.machine.arm.advance(now_ns)
             self._window.advance(now_ns)
             self._mishaps.carry_out(now_ns)
+            if self._companion is not None and self.condition.task is Task.RUNNING:
+                self._companion.publish_changes()
             self._supervise(now_ns)
             self._flash.save_changes()
         finally:
@@ -271,8 +277,10 @@ class EpsonSimulator:
         if deadline is not None and now_ns >= deadline:
             client = self._slot.client
             self._slot.free()
-            self._window.interrupt(now_ns)
-            self.condition.raise_error(ErrorCode.TIMED_OUT)
+            watches_only = self.condition.monitoring_only
+            if not watches_only or self.options.monitoring_timeout == "error":
+                self._window.interrupt(now_ns)
+                self.condition.raise_error(ErrorCode.TIMED_OUT)
             if client is not None:
                 client.cut()
         for link in self._links:

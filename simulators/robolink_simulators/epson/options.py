@@ -51,6 +51,8 @@ class EpsonOptions:
         flags_during_execute: What GetStatus shows while an Execute runs [U].
         monitoring_only: Another device starts the cell; only queries are served [D].
         monitoring_refusal: Code that a held-back command gets in that mode [U].
+        monitoring_timeout: What the remote time-out does in that mode: it cuts the link only,
+            since another device supervises the cell, or it raises error 19 too [U].
         login_timeout_s: Without a login the connection is cut after this [D, RC+ 7].
         remote_timeout_s: Idle time after which error 19 is raised and the link cut; 0 never [D].
         point_coordinates: Stored points print six coordinates, or as many as given [open].
@@ -62,6 +64,7 @@ class EpsonOptions:
         requests_end_with_segment: A request may lack its terminator; it ends with the piece of
             stream in which it came [R, one controller].
         reset_outputs_off: Preference "Reset turns off outputs" [D].
+        companion: The project holds robolink_tools.prg and its production task calls it [ours].
         extended_queries: Firmware knows GetContVer and its kin; older answers 11 [R].
         rc_plus: Command set: 5, 7 or 8.
         real_pos_noise_mm: Standard deviation of RealPos against the commanded position [R:
@@ -82,6 +85,7 @@ class EpsonOptions:
     flags_during_execute: Literal["running", "ready"] = "running"
     monitoring_only: bool = False
     monitoring_refusal: int = 20
+    monitoring_timeout: Literal["cut", "error"] = "cut"
     login_timeout_s: float = 300.0
     remote_timeout_s: float = 60.0
     point_coordinates: Literal["six", "given"] = "six"
@@ -92,6 +96,7 @@ class EpsonOptions:
     where_width: Literal[9, 8] = 9
     requests_end_with_segment: bool = False
     reset_outputs_off: bool = True
+    companion: bool = True
     extended_queries: bool = True
     rc_plus: Literal[5, 7, 8] = 7
     real_pos_noise_mm: float = 0.002

@@ -154,7 +154,7 @@ class Variables:
         if kind is VariableType.BOOLEAN:
             return self._true_text if value else "0"
         if kind in _DIGITS:
-            return f"{value:.{_DIGITS[kind]}g}"
+            return f"{value:.{_DIGITS[kind]}g}".upper()
         return str(value)
 
 

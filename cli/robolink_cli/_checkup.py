@@ -1,0 +1,173 @@
+"""The checks of ``doctor``: this computer, never a controller."""
+
+import json
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+from robolink.config import cell_names, check_file, config_files
+from robolink.errors import ConfigError
+from robolink.markers import FileOutcomeLog
+from robolink.messages import tr
+from robolink_cli._remark import Level, Remark
+from robolink_cli._requirements import check_name, check_versions
+from robolink_cli._serial_ports import serial_ports
+
+
+def check_up() -> list[Remark]:
+    """Return everything that was looked at."""
+    return [
+        *check_versions(),
+        *check_name(),
+        *check_state_folder(),
+        *check_cell_files(),
+        check_keyring(),
+        *check_serial_ports(),
+        *check_markers(),
+    ]
+
+
+def check_state_folder() -> Iterator[Remark]:
+    """See whether the safety record can be kept; without it nothing is ever sent."""
+    folder = _outcomes_folder()
+    existing = next(path for path in (folder, *folder.parents) if path.exists())
+    if not (existing.is_dir() and os.access(existing, os.W_OK | os.X_OK)):
+        yield Remark(
+            "state",
+            Level.BAD,
+            tr("the safety record cannot be kept in {folder}.", folder=folder),
+            tr("Make {path} writable, or name another folder: ROBOLINK_STATE_DIR.", path=existing),
+        )
+    elif folder.exists() and _others_may(folder, 0o022):
+        yield Remark(
+            "state",
+            Level.WARN,
+            tr("others may change the safety record in {folder}.", folder=folder),
+            tr("Run: chmod go-w {folder}", folder=folder),
+        )
+    else:
+        yield Remark("state", Level.OK, str(folder))
+
+
+def check_cell_files() -> Iterator[Remark]:
+    """Check each cell file, and who may change the addresses in it."""
+    files = [file.path for file in config_files() if file.present]
+    for path in files:
+        try:
+            problems = check_file(path)
+        except ConfigError as error:
+            yield Remark("cells", Level.BAD, error.what, error.remedy)
+            continue
+        if problems:
+            yield Remark(
+                "cells",
+                Level.BAD,
+                tr("{path} has {count} errors.", path=path, count=len(problems)),
+                tr("Run: robolink config check"),
+            )
+        elif _others_may(path, 0o002):
+            yield Remark(
+                "cells",
+                Level.WARN,
+                tr("anybody may change {path}, and with it where commands go.", path=path),
+                tr("Run: chmod o-w {path}", path=path),
+            )
+        else:
+            yield Remark("cells", Level.OK, str(path))
+    if files:
+        yield Remark("cells", Level.OK, tr("cells: {names}.", names=", ".join(cell_names())))
+    else:
+        yield Remark("cells", Level.OK, tr("there is no cell file; -c takes a URL."))
+
+
+def check_keyring() -> Remark:
+    """See whether passwords can be kept in the system's keyring."""
+    other = tr("A password can come from --password-file or ROBOLINK_PASSWORD.")
+    try:
+        import keyring
+        from keyring.backends import fail
+    except ImportError:
+        return Remark("keyring", Level.OK, tr("not installed; it is optional."), other)
+    found = keyring.get_keyring()
+    if isinstance(found, fail.Keyring):
+        return Remark("keyring", Level.WARN, tr("this computer has no keyring service."), other)
+    return Remark("keyring", Level.OK, type(found).__module__)
+
+
+def check_serial_ports() -> Iterator[Remark]:
+    """See whether the serial ports may be used."""
+    ports = serial_ports()
+    for port in ports:
+        if port.usable:
+            yield Remark("serial", Level.OK, f"{port.device} {port.description}".rstrip())
+        else:
+            yield Remark(
+                "serial",
+                Level.WARN,
+                tr("you may not use {device}.", device=port.device),
+                tr(
+                    "Run: sudo usermod -aG {group} $USER, then log in again.",
+                    group=port.group or "dialout",
+                ),
+            )
+    if not ports:
+        yield Remark("serial", Level.OK, tr("there is no serial port."))
+
+
+def check_markers() -> Iterator[Remark]:
+    """List what was begun on any controller and is not proved finished."""
+    folder = _outcomes_folder()
+    records = sorted(folder.glob("*.json")) if folder.is_dir() else []
+    for path in records:
+        try:
+            yield from _unsettled(path)
+        except ConfigError as error:
+            yield Remark("unsettled", Level.BAD, error.what, error.remedy)
+    if not records:
+        yield Remark("unsettled", Level.OK, tr("nothing was left unfinished."))
+
+
+def _unsettled(path: Path) -> Iterator[Remark]:
+    identity = _identity_in(path)
+    for marker in FileOutcomeLog(identity, path.parent).open_markers():
+        yield Remark(
+            "unsettled",
+            Level.WARN,
+            tr(
+                "{identity}, since {when}: {request}",
+                identity=identity,
+                when=marker.begun_at,
+                request=marker.request,
+            ),
+            tr("Run: robolink -c {identity} resolve", identity=identity),
+        )
+
+
+def _identity_in(path: Path) -> str:
+    """Return the controller that a record is about.
+
+    Raises:
+        ConfigError: It says none, or its name is another controller's.
+    """
+    try:
+        identity = json.loads(path.read_text(encoding="utf-8"))["controller"]
+        if FileOutcomeLog(identity, path.parent).path == path:
+            return str(identity)
+    except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
+        pass
+    raise ConfigError(
+        tr("The safety record {path} cannot be understood.", path=path),
+        remedy=tr(
+            "It may say what was left unfinished on a controller. Check the selected tool and "
+            "the tool offsets of your robots by hand, then move this file away."
+        ),
+    )
+
+
+def _outcomes_folder() -> Path:
+    return FileOutcomeLog("").path.parent
+
+
+def _others_may(path: Path, bits: int) -> bool:
+    # Windows keeps access in lists, not in these bits.
+    return os.name == "posix" and bool(path.stat().st_mode & bits)

@@ -1,0 +1,184 @@
+"""Where poses come from when nothing moves, and the options that say so."""
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar
+
+import click
+from click.core import ParameterSource
+
+from robolink.errors import ConfigError
+from robolink.messages import tr
+
+if TYPE_CHECKING:
+    from robolink.controllers.epson import EpsonController
+    from robolink.model import Pose
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+_RANGE: Final = re.compile(r"([0-9]{1,3})(?:-([0-9]{1,3}))?", re.ASCII)
+
+
+@dataclass(frozen=True, slots=True)
+class PoseSource:
+    """What was given in place of a measurement: exactly one of the three.
+
+    Attributes:
+        kind: Which one.
+        points: Numbers of taught points.
+        typed: X and Y in mm and U in degrees, each.
+        path: A file of poses.
+    """
+
+    kind: Literal["points", "typed", "file"]
+    points: tuple[int, ...] = ()
+    typed: tuple[tuple[float, float, float], ...] = ()
+    path: Path | None = None
+
+    def payload(self, taught_tool: int) -> dict[str, object]:
+        """Return what the document of a calibration says about it."""
+        body: dict[str, object] = {"kind": self.kind, "taught_tool": taught_tool}
+        if self.kind == "points":
+            body["points"] = list(self.points)
+        elif self.path is not None:
+            body["path"] = str(self.path)
+        return body
+
+    def poses(self, controller: "EpsonController") -> "tuple[Pose, ...]":
+        """Return the poses; taught points are read from the controller.
+
+        Raises:
+            CalibrationError: ``undefined_point``, or ``non_finite`` in a file.
+            ConfigError: The file cannot be used.
+        """
+        from robolink.model import Pose
+        from robolink.pose_files import read_poses
+
+        if self.kind == "points":
+            return _taught(controller, self.points)
+        if self.path is not None:
+            return read_poses(self.path)
+        return tuple(Pose(x_mm, y_mm, 0.0, u_deg) for x_mm, y_mm, u_deg in self.typed)
+
+
+def pose_source_options(function: F) -> F:
+    """Add ``--points``, ``--pose``, ``--poses`` and ``--taught-tool``."""
+    options = (
+        click.option(
+            "--points",
+            metavar="N,N",
+            help=tr("Two points taught on the pendant, for example 901,902. Nothing moves."),
+        ),
+        click.option(
+            "--pose",
+            "typed",
+            metavar="X,Y,U",
+            multiple=True,
+            help=tr("A pose in mm and degrees, for example 287.5,103.25,180; give it twice."),
+        ),
+        click.option(
+            "--poses",
+            "path",
+            type=click.Path(dir_okay=False, path_type=Path),
+            help=tr("A .json or .csv file with the two poses."),
+        ),
+        click.option(
+            "--taught-tool",
+            type=click.IntRange(0, 15),
+            metavar="N",
+            help=tr("The tool that was selected when the poses were taught (0, the flange)."),
+        ),
+    )
+    for option in reversed(options):
+        function = option(function)
+    return function
+
+
+def pose_source(
+    *, points: str | None, typed: tuple[str, ...], path: Path | None, taught_tool: int | None
+) -> PoseSource | None:
+    """Return what the options name, ``None`` when the robot is to measure.
+
+    Raises:
+        ConfigError: More than one source, or none to which ``--taught-tool`` belongs.
+    """
+    given = {"--points": points, "--pose": typed, "--poses": path}
+    named = [name for name, value in given.items() if value]
+    if len(named) > 1:
+        raise ConfigError(
+            tr("{names} exclude each other.", names=", ".join(named)),
+            remedy=tr("Give the poses in one way only."),
+        )
+    if points:
+        return PoseSource("points", points=point_numbers(points))
+    if typed:
+        return PoseSource("typed", typed=tuple(_typed_pose(text) for text in typed))
+    if path is not None:
+        return PoseSource("file", path=path)
+    if taught_tool is not None:
+        raise ConfigError(
+            tr("--taught-tool belongs to poses that exist already."),
+            remedy=tr("Give them with --points, --pose or --poses."),
+        )
+    return None
+
+
+def refuse_motion_options(context: click.Context, names: tuple[str, ...]) -> None:
+    """Refuse options that say how to move when nothing moves.
+
+    Raises:
+        ConfigError: Names the first that was given.
+    """
+    for parameter in context.command.params:
+        name = str(parameter.name)
+        if name in names and context.get_parameter_source(name) is ParameterSource.COMMANDLINE:
+            raise ConfigError(
+                tr("{option} says how to move, and nothing moves here.", option=parameter.opts[0]),
+                remedy=tr("Leave it out, or measure without --points, --pose and --poses."),
+            )
+
+
+def point_numbers(text: str) -> tuple[int, ...]:
+    """Read numbers of taught points, 0 to 999: ``901,902`` or ``1-50,60``; each once.
+
+    Raises:
+        ConfigError: It is anything else.
+    """
+    numbers: dict[int, None] = {}
+    for part in text.split(","):
+        match = _RANGE.fullmatch(part.strip())
+        first, last = (int(match[1]), int(match[2] or match[1])) if match else (1, 0)
+        if first > last:
+            raise ConfigError(
+                tr("{part!r} is not a point or a range of points.", part=part),
+                remedy=tr("Write for example 901,902 or 1-50,60; points are 0 to 999."),
+            )
+        numbers |= dict.fromkeys(range(first, last + 1))
+    return tuple(numbers)
+
+
+def _typed_pose(text: str) -> tuple[float, float, float]:
+    try:
+        x_mm, y_mm, u_deg = (float(part) for part in text.split(","))
+    except ValueError as error:
+        raise ConfigError(
+            tr("{text!r} is not a pose.", text=text),
+            remedy=tr("Write X,Y,U in mm and degrees, for example 287.5,103.25,180."),
+        ) from error
+    return x_mm, y_mm, u_deg
+
+
+def _taught(controller: "EpsonController", numbers: tuple[int, ...]) -> "tuple[Pose, ...]":
+    from robolink.errors import CalibrationError
+
+    found = controller.points.read_all(numbers)
+    missing = [f"P{number}" for number, pose in found.items() if pose is None]
+    if missing:
+        raise CalibrationError(
+            "undefined_point",
+            tr("Not taught on this controller: {points}.", points=", ".join(missing)),
+            remedy=tr("Teach them on the pendant, on the robot that is in force."),
+        )
+    return tuple(pose for pose in found.values() if pose is not None)

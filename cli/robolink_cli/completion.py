@@ -1,0 +1,30 @@
+"""completion SHELL: the script that makes TAB work."""
+
+import click
+
+from robolink.messages import tr
+
+
+@click.command()
+@click.argument("shell", type=click.Choice(["bash", "zsh", "fish", "powershell"]))
+def completion(shell: str) -> None:
+    r"""Print the script that makes TAB complete commands, options and cells.
+
+    \b
+    bash        echo 'eval "$(robolink completion bash)"' >> ~/.bashrc
+    zsh         echo 'eval "$(robolink completion zsh)"' >> ~/.zshrc
+    fish        robolink completion fish > ~/.config/fish/completions/robolink.fish
+    powershell  robolink completion powershell | Out-String | Invoke-Expression
+    """
+    from click.shell_completion import get_completion_class
+
+    from robolink.errors import ConfigError
+
+    made = get_completion_class(shell)
+    if made is None:
+        raise ConfigError(
+            tr("The click installed here has no completion for {shell}.", shell=shell),
+            remedy=tr("Install click 8.5 or later."),
+        )
+    root = click.get_current_context().find_root().command
+    click.echo(made(root, {}, "robolink", "_ROBOLINK_COMPLETE").source())

@@ -1,0 +1,152 @@
+"""What differs between the tools that a file holds and those of a controller."""
+
+from dataclasses import dataclass
+
+from robolink.backup._values import COMPONENTS, TOOLS, ToolState
+from robolink.errors import ConfigError
+from robolink.messages import tr
+from robolink.model import ToolOffset, angle_difference_deg
+
+_LENGTHS = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Tolerance:
+    """The largest difference that counts as none.
+
+    By default half the last digit that a controller prints (design part 4): values that it
+    prints alike are equal.
+
+    Raises:
+        ConfigError: One is negative or no number.
+    """
+
+    length_mm: float = 0.0005
+    angle_deg: float = 0.0005
+
+    def __post_init__(self) -> None:
+        if not (0 <= self.length_mm < float("inf") and 0 <= self.angle_deg < float("inf")):
+            raise ConfigError(
+                tr("A tolerance must be a number from 0 up."),
+                remedy=tr("For example --tolerance 0.05."),
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class ComponentComparison:
+    """One component of one tool: a length in mm or an angle in degrees.
+
+    Attributes:
+        name: Such as ``x_mm``.
+        expected: What the file holds.
+        found: What the controller holds.
+        delta: Found less expected; an angle modulo 360, from -180 up.
+        tolerance: What is allowed.
+    """
+
+    name: str
+    expected: float
+    found: float
+    delta: float
+    tolerance: float
+
+    @property
+    def equal(self) -> bool:
+        """Whether the difference is allowed."""
+        # A bound that is not a binary fraction must still include itself.
+        return abs(self.delta) <= self.tolerance * (1 + 1e-9)
+
+
+@dataclass(frozen=True, slots=True)
+class ToolComparison:
+    """One tool.
+
+    Attributes:
+        tool: Its number.
+        expected: What the file holds, ``None`` for undefined.
+        found: What the controller holds.
+        components: One each where both are defined, else none.
+    """
+
+    tool: int
+    expected: ToolOffset | None
+    found: ToolOffset | None
+    components: tuple[ComponentComparison, ...] = ()
+
+    @property
+    def equal(self) -> bool:
+        """Whether both are undefined, or both defined and alike."""
+        if self.expected is None or self.found is None:
+            return self.expected is self.found
+        return all(component.equal for component in self.components)
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """All tools, and the one in force.
+
+    Attributes:
+        tools: One each, in order.
+        expected_selected: The tool in force in the file.
+        found_selected: The tool in force on the controller.
+        selection_counts: Whether another tool in force is a difference.
+    """
+
+    tools: tuple[ToolComparison, ...]
+    expected_selected: int
+    found_selected: int
+    selection_counts: bool = True
+
+    @property
+    def differing(self) -> tuple[ToolComparison, ...]:
+        """The tools that are not alike."""
+        return tuple(tool for tool in self.tools if not tool.equal)
+
+    @property
+    def same_selection(self) -> bool:
+        """Whether the same tool is in force."""
+        return self.expected_selected == self.found_selected
+
+    @property
+    def equal(self) -> bool:
+        """Whether nothing differs that counts."""
+        return not self.differing and (self.same_selection or not self.selection_counts)
+
+
+def compare(
+    expected: ToolState,
+    found: ToolState,
+    tolerance: Tolerance | None = None,
+    *,
+    selection_counts: bool = True,
+) -> Comparison:
+    """Compare what a file holds with what a controller holds.
+
+    Args:
+        expected: From the file.
+        found: From the controller.
+        tolerance: What counts as alike.
+        selection_counts: Whether another tool in force is a difference. While a program runs
+            it selects tools by itself.
+    """
+    limits = tolerance or Tolerance()
+    return Comparison(
+        tuple(_tool(tool, expected, found, limits) for tool in TOOLS),
+        expected.selected,
+        found.selected,
+        selection_counts,
+    )
+
+
+def _tool(tool: int, expected: ToolState, found: ToolState, limits: Tolerance) -> ToolComparison:
+    wanted, stored = expected.tools[tool], found.tools[tool]
+    if wanted is None or stored is None:
+        return ToolComparison(tool, wanted, stored)
+    values = zip(COMPONENTS, wanted.components(), stored.components(), strict=True)
+    components = tuple(
+        ComponentComparison(name, a, b, b - a, limits.length_mm)
+        if place < _LENGTHS
+        else ComponentComparison(name, a, b, angle_difference_deg(b, a), limits.angle_deg)
+        for place, (name, a, b) in enumerate(values)
+    )
+    return ToolComparison(tool, wanted, stored, components)

@@ -1,0 +1,52 @@
+"""The backup that is made by itself, before the first write to a controller."""
+
+from pathlib import Path
+
+from robolink.backup._file import save
+from robolink.backup._values import ToolHolder, take_backup
+from robolink.durable_files import file_name, make_folder, state_folder
+from robolink.errors import ConfigError
+from robolink.markers import MemoryOutcomeLog
+from robolink.messages import tr
+
+
+def first_backup_path(identity: str) -> Path:
+    """Return where the first backup of a controller stands, in the user's state folder."""
+    return state_folder("backups") / file_name(identity)
+
+
+def keep_first_backup(controller: ToolHolder) -> Path | None:
+    """Save the tools of a controller that has no backup in the user's state folder yet.
+
+    To be called before a tool is written. A simulator that dies with this process needs none.
+
+    Returns:
+        Where it was saved, ``None`` when that was done before.
+
+    Raises:
+        ConfigError: It cannot be stored. Nothing may be written then.
+        NotReadyError: The tools cannot be read now.
+    """
+    if isinstance(controller.outcomes, MemoryOutcomeLog):
+        return None
+    path = first_backup_path(controller.identity)
+    if path.exists():
+        return None
+    backup = take_backup(controller)
+    try:
+        make_folder(path.parent)
+        save(backup, path)
+    except (OSError, ConfigError) as error:
+        raise ConfigError(
+            tr(
+                "The tools as they are now cannot be saved in {path}: {cause}",
+                path=path,
+                cause=error,
+            ),
+            remedy=tr(
+                "Make that folder writable or name another one with ROBOLINK_STATE_DIR. Without "
+                "a backup the first write to a controller is not made."
+            ),
+            controller=controller.identity,
+        ) from error
+    return path

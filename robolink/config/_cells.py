@@ -1,0 +1,153 @@
+"""From the cell files to one cell, and where each of its values came from."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from robolink.config._files import config_files, read_document
+from robolink.config._problems import Problem, dotted, problems_of, refusal
+from robolink.errors import ConfigError
+from robolink.messages import tr
+
+if TYPE_CHECKING:
+    from robolink.config._settings import CellSettings
+
+_CELL_NAME = re.compile(r"[^\s+:/\\]+")
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """One cell, as all files together describe it.
+
+    Attributes:
+        name: What ``-c`` calls it.
+        url: The controller's URL.
+        settings: Everything that is said about it.
+        origins: For each key that is said, the file that said it.
+    """
+
+    name: str
+    url: str
+    settings: "CellSettings"
+    origins: Mapping[str, Path]
+
+
+def find_cell(name: str) -> Cell:
+    """Return the cell that a person calls ``name``.
+
+    Raises:
+        ConfigError: There is none, or a file is wrong.
+    """
+    cells = load_cells()
+    if name in cells:
+        return cells[name]
+    if cells:
+        remedy = tr("These are known: {names}.", names=", ".join(cells))
+    else:
+        remedy = tr(
+            "No cell file was found; 'robolink config path' shows where one may be. A URL such "
+            "as epson+tcp://192.168.0.1:5000 works without."
+        )
+    raise ConfigError(tr("There is no cell {name!r}.", name=name), remedy=remedy)
+
+
+def load_cells() -> dict[str, Cell]:
+    """Return all cells of all files, those of the file that wins first.
+
+    A file adds to what farther ones say about a cell, and wins where both say something. One
+    that gives a URL starts the cell anew: limits and confirmations were given for the robot
+    at the other address.
+
+    Raises:
+        ConfigError: A file is wrong, or a cell has no URL in any of them.
+    """
+    said: dict[str, dict[str, tuple[Path, object]]] = {}
+    for file in config_files():
+        if file.present:
+            for name, values in _checked(file.path).items():
+                nearer = said.setdefault(name, {})
+                if "url" not in nearer:
+                    said[name] = {key: (file.path, value) for key, value in values.items()} | nearer
+    return {name: _cell(name, values) for name, values in said.items()}
+
+
+def check_file(path: Path) -> tuple[Problem, ...]:
+    """Return everything that is wrong in one cell file; nothing when it is right.
+
+    Raises:
+        ConfigError: It cannot be read, or is no TOML.
+    """
+    from pydantic import ValidationError
+
+    from robolink.config._settings import CellFile, CellSettings
+
+    document = read_document(path)
+    cells = document.get("cells")
+    names = [
+        Problem(
+            dotted(["cells", name]),
+            tr("cannot be the name of a cell: it must be free of blanks and of + : / \\"),
+        )
+        for name in (cells if isinstance(cells, dict) else ())
+        if not _CELL_NAME.fullmatch(name)
+    ]
+    try:
+        CellFile.model_validate(document)
+    except ValidationError as error:
+        known = {1: ["cells"], 3: list(CellSettings.model_fields)}
+        return (*names, *problems_of(error, known))
+    return tuple(names)
+
+
+def cell_names() -> list[str]:
+    """Return the names of all cells; for TAB, so files that are wrong are passed over."""
+    names: dict[str, None] = {}
+    for file in config_files():
+        if file.present:
+            try:
+                cells = read_document(file.path).get("cells")
+            except ConfigError:
+                continue
+            names |= dict.fromkeys(cells if isinstance(cells, dict) else ())
+    return list(names)
+
+
+def _checked(path: Path) -> dict[str, dict[str, object]]:
+    """Return what each cell of a file that is right says, paths made absolute."""
+    from robolink.config._settings import CellFile
+
+    problems = check_file(path)
+    if problems:
+        raise refusal(path, problems)
+    tables = {}
+    for name, settings in CellFile.model_validate(read_document(path)).cells.items():
+        values = settings.model_dump(exclude_unset=True)
+        if "password_file" in values:
+            hinted = Path(values["password_file"]).expanduser()
+            values["password_file"] = str(path.parent / hinted)
+        tables[name] = values
+    return tables
+
+
+def _cell(name: str, said: Mapping[str, tuple[Path, object]]) -> Cell:
+    from pydantic import ValidationError
+
+    from robolink.config._settings import CellSettings
+
+    values = {key: value for key, (_, value) in said.items()}
+    origins = {key: path for key, (path, _) in said.items()}
+    try:
+        settings = CellSettings.model_validate(values)
+    except ValidationError as error:
+        # Each file was right alone, so what is wrong is how they go together.
+        cell = dotted(["cells", name])
+        problems = [
+            Problem(f"{cell}.{problem.where}", problem.what) for problem in problems_of(error, {})
+        ]
+        raise refusal(next(iter(origins.values())), problems) from error
+    if settings.url is None:
+        missing = Problem(dotted(["cells", name, "url"]), tr("is missing, in every file"))
+        raise refusal(next(iter(origins.values())), [missing])
+    return Cell(name, settings.url, settings, origins)

@@ -1,0 +1,76 @@
+"""Which files say what the cells are, and how one is read."""
+
+import os
+import tomllib
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+
+from robolink.errors import ConfigError
+from robolink.messages import tr
+
+_NAME = "robolink.toml"
+
+
+class Source(StrEnum):
+    """Why a file is looked at; in the order of precedence."""
+
+    NAMED = "named"
+    FOLDER = "folder"
+    USER = "user"
+    SITE = "site"
+
+
+@dataclass(frozen=True, slots=True)
+class ConfigFile:
+    """A place where a cell file may be."""
+
+    source: Source
+    path: Path
+
+    @property
+    def present(self) -> bool:
+        """Whether it has to be read: it exists, or a person named it."""
+        return self.source is Source.NAMED or self.path.is_file()
+
+
+def config_files() -> tuple[ConfigFile, ...]:
+    """Return the places looked at, the one that wins first.
+
+    The file that ROBOLINK_CONFIG names, ``robolink.toml`` in the working folder, the user's,
+    the site's (ecosystem.md 5).
+    """
+    from platformdirs import site_config_path, user_config_path
+
+    files = [
+        ConfigFile(Source.FOLDER, Path.cwd() / _NAME),
+        ConfigFile(Source.USER, user_config_path("robolink", appauthor=False) / _NAME),
+        ConfigFile(Source.SITE, site_config_path("robolink", appauthor=False) / _NAME),
+    ]
+    named = os.environ.get("ROBOLINK_CONFIG")
+    if named:
+        files.insert(0, ConfigFile(Source.NAMED, Path(named).expanduser().absolute()))
+    return tuple(files)
+
+
+def read_document(path: Path) -> dict[str, object]:
+    """Return what a TOML file says.
+
+    Raises:
+        ConfigError: It cannot be read, or is no TOML.
+    """
+    try:
+        # Editors on Windows put a byte order mark in front, which TOML does not know.
+        return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+    except OSError as error:
+        cause = error.strerror or str(error)
+    except UnicodeError:
+        cause = tr("it is not UTF-8 text")
+    except RecursionError:
+        cause = tr("it is nested too deeply")
+    except tomllib.TOMLDecodeError as error:
+        cause = str(error)
+    raise ConfigError(
+        tr("The cell file {path} cannot be read: {cause}.", path=path, cause=cause),
+        remedy=tr("'robolink config path' shows which files are looked at."),
+    )

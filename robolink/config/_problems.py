@@ -1,0 +1,114 @@
+"""What is wrong in a cell file, said by the path of the key: ``cells.line3.timeout_s``."""
+
+import json
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from robolink.errors import ConfigError
+from robolink.messages import tr
+
+if TYPE_CHECKING:
+    from pydantic import ValidationError
+
+_BARE_KEY = re.compile("[A-Za-z0-9_-]+")
+_SECRET = re.compile("pass|pwd|secret|token|credential|^pin$", re.IGNORECASE)
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """One thing that is wrong.
+
+    Attributes:
+        where: Path of the key inside the file; empty for the file as a whole.
+        what: What is wrong with it. Never the value: it might be a password.
+    """
+
+    where: str
+    what: str
+
+    def __str__(self) -> str:
+        return f"{self.where}: {self.what}" if self.where else self.what
+
+
+def dotted(keys: Iterable[object]) -> str:
+    """Return the path of a key as TOML writes it."""
+    texts = (str(key) for key in keys)
+    return ".".join(
+        text if _BARE_KEY.fullmatch(text) else json.dumps(text, ensure_ascii=False)
+        for text in texts
+    )
+
+
+def problems_of(error: "ValidationError", known: Mapping[int, Sequence[str]]) -> list[Problem]:
+    """Return everything that pydantic objects to.
+
+    Args:
+        error: What it raised.
+        known: The keys that are known at each depth, for a better guess at what was meant.
+    """
+    details = error.errors(include_url=False, include_input=False)
+    return [
+        Problem(dotted(detail["loc"]), _sentence(detail, known.get(len(detail["loc"]), ())))
+        for detail in details
+    ]
+
+
+def refusal(path: Path, problems: Sequence[Problem]) -> ConfigError:
+    """Return the error that tells all problems of one file at once."""
+    lines = "\n".join(f"    {problem}" for problem in problems)
+    return ConfigError(
+        tr(
+            "The cell file {path} is wrong in {count} places:\n{lines}",
+            path=path,
+            count=len(problems),
+            lines=lines,
+        )
+        if len(problems) > 1
+        else tr("The cell file {path} is wrong:\n{lines}", path=path, lines=lines),
+        remedy=tr("Correct it; 'robolink config check' looks again. Nothing was sent."),
+    )
+
+
+def _sentence(detail: Any, known: Sequence[str]) -> str:  # noqa: ANN401 - pydantic's own form
+    limits = detail.get("ctx", {})
+    match detail["type"]:
+        case "extra_forbidden":
+            return _unknown(str(detail["loc"][-1]), known)
+        case "float_type" | "int_type":
+            return tr("must be a number")
+        case "string_type":
+            return tr("must be a text in quotes")
+        case "model_type" | "dict_type":
+            return tr("must be a table")
+        case "greater_than":
+            return tr("must be more than {limit:g}", limit=limits["gt"])
+        case "greater_than_equal":
+            return tr("must be at least {limit:g}", limit=limits["ge"])
+        case "less_than_equal":
+            return tr("must be at most {limit:g}", limit=limits["le"])
+        case "finite_number":
+            return tr("must be a finite number")
+        case "string_too_short":
+            return tr("must not be empty")
+        case "string_pattern_mismatch":
+            return tr("must be the name of a variable that begins with ROBOLINK_PASSWORD")
+        case "value_error":
+            return str(limits["error"])
+        case _:
+            return str(detail["msg"])
+
+
+def _unknown(key: str, known: Sequence[str]) -> str:
+    if _SECRET.search(key):
+        return tr(
+            "looks like a password, which never stands in a cell file; name a password_file that "
+            "only you can read, or a password_env"
+        )
+    close = get_close_matches(key, known, n=1)
+    if close:
+        return tr("is not known; is {name} meant?", name=close[0])
+    return tr("is not known; these are: {names}", names=", ".join(known))

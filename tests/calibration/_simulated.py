@@ -1,0 +1,78 @@
+"""Poses of a tip whose place is known, with and without noise."""
+
+import math
+from contextlib import contextmanager
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from robolink.calibration import CalibrationResult
+from robolink.errors import CalibrationError
+from robolink.model import Pose, rotate_xy
+
+PIN = (310.0, 95.0, -40.0)
+TRIALS = 2000
+LEAST, MOST = 0.93, 0.97
+"""What a 95 % interval may hold in 2,000 trials (the standard deviation is 0.5 %)."""
+
+
+def touching(tip, u_deg, *, pin=PIN, hand=None):
+    """Return the flange pose of a four-axis robot that puts ``tip`` on ``pin``."""
+    dx, dy = rotate_xy(tip[0], tip[1], u_deg)
+    return Pose(pin[0] - dx, pin[1] - dy, pin[2], u_deg, hand=hand, tool=0)
+
+
+def rotation(u_deg, v_deg, w_deg):
+    """Return Rz(U) Ry(V) Rx(W), written out the long way."""
+    u, v, w = (math.radians(angle) for angle in (u_deg, v_deg, w_deg))
+    turn = np.array([[math.cos(u), -math.sin(u), 0], [math.sin(u), math.cos(u), 0], [0, 0, 1]])
+    lean = np.array([[math.cos(v), 0, math.sin(v)], [0, 1, 0], [-math.sin(v), 0, math.cos(v)]])
+    roll = np.array([[1, 0, 0], [0, math.cos(w), -math.sin(w)], [0, math.sin(w), math.cos(w)]])
+    return turn @ lean @ roll
+
+
+def pivoting(tip, angles_deg, *, pin=PIN):
+    """Return the flange pose of a six-axis robot that puts ``tip`` on ``pin``."""
+    position = np.array(pin) - rotation(*angles_deg) @ np.array(tip)
+    return Pose(*position.tolist(), *angles_deg, tool=0)
+
+
+def shaken(poses, random, sigma_mm, *, axes=2):
+    """Return the poses with Gaussian noise on the first ``axes`` coordinates."""
+    noise = np.zeros((len(poses), 3))
+    noise[:, :axes] = random.normal(0, sigma_mm, (len(poses), axes))
+    return [
+        replace(pose, x_mm=pose.x_mm + dx, y_mm=pose.y_mm + dy, z_mm=pose.z_mm + dz)
+        for pose, (dx, dy, dz) in zip(poses, noise.tolist(), strict=True)
+    ]
+
+
+def coverage(measure, truth, *, trials=TRIALS, seed=7):
+    """Return how often each measured component's interval held the truth.
+
+    Args:
+        measure: Called with a random generator; returns a result.
+        truth: The true value of each measured component, in their order.
+    """
+    random = np.random.default_rng(seed)
+    hits = np.zeros(len(truth))
+    for _ in range(trials):
+        result: CalibrationResult = measure(random)
+        found = [getattr(result.offset, name) for name in result.measured]
+        hits += np.abs(np.array(found) - truth) <= np.array(result.half_width95)
+    return hits / trials
+
+
+def assert_honest(shares):
+    """Every component's interval holds the truth in 93 to 97 %."""
+    assert all(LEAST <= share <= MOST for share in shares), shares
+
+
+@contextmanager
+def refused(code):
+    """The block is refused with ``code``, and the refusal says what to do."""
+    with pytest.raises(CalibrationError) as caught:
+        yield caught
+    assert caught.value.code == code
+    assert caught.value.remedy

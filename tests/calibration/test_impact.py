@@ -1,0 +1,95 @@
+"""What a change of an offset does at taught points, against two simulated arms."""
+
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robolink.calibration import impact_on
+from robolink.model import Pose, ToolOffset, rotate_xy
+
+LENGTH = st.floats(-300, 300)
+ANGLE = st.floats(-360, 360)
+OFFSETS = st.builds(ToolOffset, LENGTH, LENGTH, LENGTH, ANGLE)
+POINTS = st.builds(Pose, LENGTH, LENGTH, LENGTH, ANGLE)
+
+
+def driven(point, believed, real):
+    """Return where a ``real`` tip is when a controller drives the ``believed`` one to ``point``."""
+    flange_u = point.u_deg - believed.u_deg
+    tip_x, tip_y = rotate_xy(real.x_mm - believed.x_mm, real.y_mm - believed.y_mm, flange_u)
+    return (
+        point.x_mm + tip_x,
+        point.y_mm + tip_y,
+        point.z_mm + real.z_mm - believed.z_mm,
+    )
+
+
+def at(point, old, new):
+    (entry,) = impact_on({1: point}, old=old, new=new).entries
+    return entry
+
+
+@given(POINTS, OFFSETS, OFFSETS)
+@settings(max_examples=60, deadline=None)
+def test_it_is_where_the_new_tip_goes_with_the_new_value_against_with_the_old(point, old, new):
+    entry = at(point, old, new)
+    before, after = driven(point, old, new), driven(point, new, new)
+    expected = [a - b for a, b in zip(after, before, strict=True)]
+    assert (entry.dx_mm, entry.dy_mm, entry.dz_mm) == pytest.approx(expected, abs=1e-9)
+
+
+@given(POINTS, OFFSETS, st.floats(-5, 5), st.floats(-5, 5))
+@settings(max_examples=60, deadline=None)
+def test_an_unchanged_nozzle_leaves_the_taught_place_by_as_much(point, old, dx, dy):
+    new = ToolOffset(old.x_mm + dx, old.y_mm + dy, old.z_mm, old.u_deg)
+    entry = at(point, old, new)
+    before, after = driven(point, old, old), driven(point, new, old)
+    assert before[:2] == pytest.approx((point.x_mm, point.y_mm))
+    assert (entry.dx_mm, entry.dy_mm) == pytest.approx(
+        (after[0] - before[0], after[1] - before[1]), abs=1e-9
+    )
+
+
+@given(st.lists(POINTS, min_size=1, max_size=6), OFFSETS, OFFSETS)
+@settings(max_examples=40, deadline=None)
+def test_on_four_axes_the_distance_is_the_same_at_every_point(points, old, new):
+    impact = impact_on(dict(enumerate(points)), old=old, new=new)
+    length = math.dist(old.components()[:3], new.components()[:3])
+    assert [entry.distance_mm for entry in impact.entries] == pytest.approx(
+        [length] * len(points), abs=1e-9
+    )
+    assert impact.largest is impact.entries[0]
+
+
+def test_a_hand_calculated_case():
+    entry = at(Pose(250, 200, -30, 90), ToolOffset(12, 0, -20), ToolOffset(12.5, 0, -21))
+    assert (entry.dx_mm, entry.dy_mm, entry.dz_mm) == pytest.approx((0, -0.5, 1))
+
+
+def test_a_new_tool_angle_turns_the_nozzle_the_other_way():
+    entry = at(Pose(250, 200, -30, 90), ToolOffset(u_deg=350), ToolOffset(u_deg=10))
+    assert entry.turn_deg == pytest.approx(-20)
+    assert entry.distance_mm == 0
+
+
+def test_points_that_cannot_be_judged_are_named_and_left_out():
+    points = {
+        1: Pose(250, 200, 0, 0),
+        2: None,
+        3: Pose(10, 20, 0, 0, local=2),
+        4: Pose(250, 200, 0, 0, w_deg=180),
+    }
+    impact = impact_on(points, old=ToolOffset(1), new=ToolOffset(2))
+    assert [entry.number for entry in impact.entries] == [1]
+    assert impact.undefined == (2,)
+    assert impact.other_local == {3: 2}
+    assert impact.tilted == (4,)
+
+
+def test_a_tilted_tool_judges_nothing():
+    impact = impact_on({1: Pose(250, 200, 0, 0)}, old=ToolOffset(v_deg=1), new=ToolOffset())
+    assert impact.entries == ()
+    assert impact.tilted == (1,)
+    assert impact.largest is None

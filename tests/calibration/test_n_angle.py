@@ -1,0 +1,180 @@
+"""One tip on one point at several angles of a four-axis robot."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+from scipy.stats import t as student
+
+from robolink.calibration import Robust, Tolerance, solve_n_angle, solve_two_pose
+from robolink.calibration._student import student_t95
+from robolink.errors import ConfigError
+from robolink.model import ToolOffset
+from tests.calibration._simulated import PIN, refused, shaken, touching
+
+TIP = (12.3, -3.9)
+ALL_ROUND = (-180.0, -90.0, 0.0, 90.0)
+
+
+def around(angles=ALL_ROUND, tip=TIP):
+    return [touching(tip, angle) for angle in angles]
+
+
+def noisy(angles=ALL_ROUND, sigma_mm=0.05, seed=1):
+    return shaken(around(angles), np.random.default_rng(seed), sigma_mm)
+
+
+def xy(result):
+    return (result.offset.x_mm, result.offset.y_mm)
+
+
+@pytest.mark.parametrize("angles", [ALL_ROUND, (0, 120, 240), (350, 10, 40), (-170, 170, 60, 5)])
+def test_exact_poses_give_the_exact_tip_on_any_arc(angles):
+    result = solve_n_angle(around(angles))
+    assert xy(result) == pytest.approx(TIP, abs=1e-10)
+    assert result.reference_point_mm == pytest.approx(PIN[:2], abs=1e-10)
+    assert result.rms_mm == pytest.approx(0, abs=1e-10)
+
+
+def test_two_poses_agree_with_the_closed_form_and_have_no_residual():
+    poses = noisy((10.0, 150.0))
+    result, closed = solve_n_angle(poses), solve_two_pose(*poses)
+    assert xy(result) == pytest.approx(xy(closed), abs=1e-12)
+    assert result.sigma_gain == pytest.approx(closed.sigma_gain)
+    assert (result.dof, result.rms_mm, result.half_width95) == (0, None, ())
+    assert "few_poses" in result.warnings
+
+
+def test_the_fit_is_the_least_squares_that_scipy_finds():
+    poses = noisy((0, 30, 80, 100, 200))
+
+    def misses(x):
+        tips = [
+            (*touching((-x[0], -x[1]), p.u_deg, pin=(p.x_mm, p.y_mm, 0)).coordinates(),)
+            for p in poses
+        ]
+        return np.ravel([(a[0] - x[2], a[1] - x[3]) for a in tips])
+
+    oracle = least_squares(misses, [0, 0, 300, 100], method="lm", xtol=1e-15, ftol=1e-15)
+    result = solve_n_angle(poses)
+    assert xy(result) == pytest.approx(oracle.x[:2], abs=1e-6)
+    assert result.reference_point_mm == pytest.approx(oracle.x[2:], abs=1e-6)
+    variance = 2 * oracle.cost / result.dof
+    expected = variance * np.linalg.inv(oracle.jac.T @ oracle.jac)[:2, :2]
+    assert np.array(result.covariance) == pytest.approx(expected, rel=1e-6, abs=1e-9)
+    assert result.rms_mm == pytest.approx(math.sqrt(2 * oracle.cost / 5), rel=1e-6)
+    assert result.condition_number == pytest.approx(np.linalg.cond(oracle.jac), rel=1e-6)
+    assert (result.rank, result.dof) == (4, 6)
+
+
+@pytest.mark.parametrize("count", [2, 3, 4, 6, 8, 12])
+def test_balanced_angles_gain_the_square_root_of_their_number(count):
+    result = solve_n_angle(around([360 * k / count for k in range(count)]))
+    assert result.sigma_gain == pytest.approx(1 / math.sqrt(count))
+    assert result.condition_number == pytest.approx(1.0)
+
+
+def test_the_interval_is_student_s_and_shrinks_when_sigma_is_stated():
+    poses = noisy()
+    free = solve_n_angle(poses)
+    assert free.sigma_mm
+    spread = free.sigma_mm * free.sigma_gain
+    assert free.half_width95 == pytest.approx([student.ppf(0.975, 4) * spread] * 2)
+    stated = solve_n_angle(poses, sigma_mm=0.05)
+    assert stated.half_width95 == pytest.approx([1.95996 * 0.05 * 0.5] * 2, rel=1e-5)
+    assert (stated.sigma_stated, free.sigma_stated) == (True, False)
+    low, high = stated.interval95["x_mm"]
+    assert (high - low) / 2 == pytest.approx(stated.half_width95[0])
+
+
+@pytest.mark.parametrize("dof", [1, 2, 3, 7, 30, 199, 201, 994, 29994])
+def test_the_quantile_is_student_s(dof):
+    assert student_t95(dof) == pytest.approx(student.ppf(0.975, dof), abs=1e-8)
+
+
+def test_a_quantile_needs_a_degree_of_freedom():
+    with pytest.raises(ValueError, match="0 degrees"):
+        student_t95(0)
+
+
+def with_outlier(index=2, shift_mm=2.0, count=8):
+    poses = noisy([45.0 * k for k in range(count)], sigma_mm=0.01)
+    poses[index] = replace(poses[index], x_mm=poses[index].x_mm + shift_mm)
+    return poses
+
+
+@pytest.mark.parametrize("options", [{"threshold_mm": 0.05}, {}])
+def test_a_robust_fit_leaves_the_outlier_out_and_names_it(options):
+    poses = with_outlier()
+    result = solve_n_angle(poses, robust=Robust(**options))
+    good = solve_n_angle([pose for index, pose in enumerate(poses) if index != 2])
+    assert result.rejected == (2,)
+    assert xy(result) == pytest.approx(xy(good), abs=1e-12)
+    assert result.dof == good.dof
+    assert result.rms_mm == pytest.approx(good.rms_mm)
+    assert len(result.residuals_mm) == 8
+    assert result.residual_distances_mm[2] == pytest.approx(2.0, abs=0.1)
+    assert "large_residual" in solve_n_angle(poses).warnings
+
+
+def test_a_stated_sigma_sets_the_threshold():
+    assert solve_n_angle(with_outlier(), robust=Robust(), sigma_mm=0.01).rejected == (2,)
+    assert solve_n_angle(with_outlier(), robust=Robust(), sigma_mm=2.0).rejected == ()
+
+
+def test_the_same_seed_gives_the_same_result_on_many_poses():
+    poses = noisy([3.0 * k for k in range(100)])
+    first = solve_n_angle(poses, robust=Robust(seed=4))
+    assert solve_n_angle(poses, robust=Robust(seed=4)) == first
+
+
+def test_exact_poses_are_not_rejected_by_each_other():
+    assert solve_n_angle(around((0, 60, 120, 180, 240)), robust=Robust()).rejected == ()
+
+
+def test_more_than_a_third_of_outliers_is_refused():
+    poses = noisy([45.0 * k for k in range(8)], sigma_mm=0.01)
+    for index, shift in ((1, 3.0), (4, -4.0), (6, 5.0)):
+        poses[index] = replace(poses[index], y_mm=poses[index].y_mm + shift)
+    with refused("too_many_outliers"):
+        solve_n_angle(poses, robust=Robust(threshold_mm=0.1))
+
+
+def test_two_poses_cannot_outvote_a_third():
+    with refused("too_few_poses"):
+        solve_n_angle(around((0, 120, 240)), robust=Robust())
+
+
+def test_what_was_not_measured_is_kept():
+    result = solve_n_angle(around(), stored=ToolOffset(1, 2, -20, 30))
+    assert (result.offset.z_mm, result.offset.u_deg) == (-20, 30)
+    assert result.kept == result.unobservable == ("z_mm", "u_deg", "v_deg", "w_deg")
+
+
+def test_a_sigma_that_the_residuals_contradict_is_doubted():
+    poses = noisy([30.0 * k for k in range(12)])
+    assert "sigma_too_small" in solve_n_angle(poses, sigma_mm=0.005).warnings
+    assert "sigma_too_small" not in solve_n_angle(poses, sigma_mm=0.05).warnings
+
+
+@pytest.mark.parametrize("sigma", [0.0, -1.0, math.nan])
+def test_a_sigma_has_to_be_positive(sigma):
+    with pytest.raises(ConfigError, match="sigma_mm"):
+        solve_n_angle(around(), sigma_mm=sigma)
+
+
+def test_the_limits_of_the_residuals_can_be_set():
+    poses = noisy(sigma_mm=0.1)
+    assert "large_rms" in solve_n_angle(poses).warnings
+    assert solve_n_angle(poses, tolerance=Tolerance(1.0, 2.0)).warnings == ()
+
+
+def test_a_stated_sigma_gives_two_poses_an_interval():
+    poses = around((0, 180))
+    assert solve_two_pose(*poses).half_width95 == ()
+    result = solve_two_pose(*poses, sigma_mm=0.02)
+    assert result.half_width95 == pytest.approx([1.95996 * 0.02 / math.sqrt(2)] * 2, rel=1e-5)
+    assert result.covariance[0] == pytest.approx((0.0002, 0.0))
+    assert result.sigma_stated

@@ -1,0 +1,232 @@
+"""backup, restore and compare on the command line, and the backup made by itself."""
+
+import json
+from itertools import count
+
+import pytest
+from robolink_cli import _consent, main
+from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.hosting.in_process import register, unregister
+
+from robolink.backup import load
+from robolink.errors import DeclinedError
+from robolink.model import ToolOffset
+
+_numbers = count()
+
+
+def test_a_backup_says_what_it_saved_and_of_which_robot(run, tmp_path):
+    code, out, _ = run("backup", "cell.json")
+    assert code == 0
+    assert "robot T6-602S, serial SIM00001" in out
+    assert "1 defined tools, 14 undefined, tool 1 in force" in out
+    assert load(tmp_path / "cell.json").state.selected == 1
+
+
+def test_a_backup_as_a_document(run):
+    code, out, _ = run("backup", "cell.json", "--json")
+    document = json.loads(out)
+    assert (code, document["schema"]) == (0, "robolink/backup-saved/1")
+    assert document["facts"]["robot_serials"] == ["SIM00001"]
+    assert document["tools"]["2"] is None
+
+
+def test_a_file_is_written_over_only_with_force(run, simulator, golden, tmp_path):
+    simulator.machine.tools.set(2, ToolOffset(5))
+    sent = simulator.exchanges
+    code, _, err = run("backup", golden)
+    assert (code, simulator.exchanges) == (2, sent)
+    assert "exists already" in err
+    assert run("backup", golden, "--force")[0] == 0
+    assert load(tmp_path / golden).state.tools[2] == ToolOffset(5)
+
+
+def test_compare_answers_0_when_equal_and_1_when_not(run, simulator, golden):
+    code, out, _ = run("compare", golden)
+    assert (code, out.startswith("Equal")) == (0, True)
+    simulator.machine.tools.set(1, ToolOffset(12.1, -3.5, -20))
+    simulator.machine.tools.set(9, ToolOffset(1))
+    code, out, _ = run("compare", golden)
+    assert code == 1
+    assert [line.split() for line in out.splitlines() if "X mm" in line] == [
+        ["1", "X", "mm", "12.000", "12.100", "+0.100", "0.0005", "<"]
+    ]
+    assert "undefined" in out
+    assert "Different: tools 1, 9." in out
+
+
+def test_a_tolerance_lets_small_differences_pass(run, simulator, golden):
+    simulator.machine.tools.set(1, ToolOffset(12.1, -3.5, -20, 0.3))
+    assert run("compare", golden, "--tolerance", "0.2")[0] == 1
+    assert run("compare", golden, "--tolerance", "0.2", "--tolerance-deg", "0.5")[0] == 0
+
+
+def test_compare_as_a_document(run, simulator, golden):
+    simulator.machine.tools.set(1, ToolOffset(12.1, -3.5, -20))
+    simulator.machine.tools.select(0)
+    code, out, _ = run("compare", golden, "--json")
+    document = json.loads(out)
+    assert (code, document["schema"], document["equal"]) == (1, "robolink/compare/1", False)
+    (tool,) = document["differing"]
+    assert (tool["tool"], tool["found"]["x_mm"]) == (1, 12.1)
+    assert [part["name"] for part in tool["components"] if not part["equal"]] == ["x_mm"]
+    assert document["selected_tool"] == {
+        "expected": 1,
+        "found": 0,
+        "equal": False,
+        "counts": True,
+    }
+
+
+def test_another_tool_in_force_is_shown_and_may_be_ignored(run, simulator, golden):
+    simulator.machine.tools.select(0)
+    code, out, _ = run("compare", golden)
+    assert code == 1
+    assert "tool in force: 1 in the file, 0 on the controller" in out
+    code, out, _ = run("compare", golden, "--ignore-selected")
+    assert code == 0
+    assert "tool in force: 1 in the file, 0 on the controller" in out
+
+
+def test_one_golden_file_is_compared_with_many_cells(golden, capsys):
+    codes = []
+    for seed in (1, 2):
+        other = EpsonSimulator(seed=seed)
+        name = f"backup-{next(_numbers)}"
+        url = register(name, other)
+        if seed == 2:
+            other.machine.tools.clear(1)
+        codes.append(main.run(["compare", golden, "-c", url]))
+        unregister(name)
+    assert codes == [0, 1]
+
+
+def test_a_file_that_is_wrong_is_refused_before_anything_is_sent(run, simulator, golden, tmp_path):
+    (tmp_path / golden).write_text((tmp_path / golden).read_text().replace('"7"', '"77"'))
+    sent = simulator.exchanges
+    for command in ("compare", "restore"):
+        code, _, err = run(command, golden)
+        assert (code, simulator.exchanges) == (2, sent)
+        assert "tools.77" in err
+
+
+def test_a_restore_writes_what_differs_and_backs_up_first(run, simulator, golden, state_folder):
+    simulator.machine.tools.set(1, ToolOffset(99))
+    simulator.machine.tools.set(3, ToolOffset(5))
+    code, out, err = run("restore", golden)
+    assert code == 0
+    assert "Restored and read back: tools 1, 3." in out
+    (saved,) = (state_folder / "backups").iterdir()
+    assert str(saved) in err
+    assert load(saved).state.tools[1] == ToolOffset(99)
+    assert run("compare", golden)[0] == 0
+    written = simulator.machine.flash_writes
+    code, out, err = run("restore", golden)
+    assert (code, "already" in out, "saved in" in err) == (0, True, False)
+    assert simulator.machine.flash_writes == written
+
+
+def test_a_dry_run_shows_the_requests_and_writes_nothing(run, simulator, golden, state_folder):
+    simulator.machine.tools.set(1, ToolOffset(99))
+    simulator.machine.tools.set(3, ToolOffset(5))
+    simulator.machine.tools.select(0)
+    written = simulator.machine.flash_writes
+    code, out, _ = run("restore", golden, "--selected", "--dry-run")
+    assert code == 0
+    assert out.splitlines() == [
+        '$Execute,"TLSet 1, XY(12.000, -3.500, -20.000, 0.000)"',
+        '$Execute,"Tool 1"',
+        '$Execute,"TLClr 3"',
+    ]
+    assert simulator.machine.flash_writes == written
+    assert not (state_folder / "backups").exists()
+
+
+def test_only_named_tools_and_the_selection_are_restored_when_asked(run, simulator, golden):
+    simulator.machine.tools.set(1, ToolOffset(99))
+    simulator.machine.tools.set(3, ToolOffset(5))
+    simulator.machine.tools.select(3)
+    code, out, _ = run("restore", golden, "--tool", "1", "--json")
+    document = json.loads(out)
+    assert (code, document["schema"], document["selected_tool"]) == (0, "robolink/restore/1", 3)
+    assert [receipt["tool"] for receipt in document["restored"]] == [1]
+    code, _, err = run("restore", golden)
+    assert code == 5
+    assert "Tool 3 is in force" in err
+    assert run("restore", golden, "--selected")[0] == 0
+    assert simulator.machine.tools.selected == 1
+    assert simulator.machine.tools.get(3) is None
+
+
+@pytest.mark.parametrize("tool", ["0", "16"])
+def test_a_tool_that_cannot_be_restored_is_a_mistake_in_the_command(run, golden, tool):
+    assert run("restore", golden, "--tool", tool)[0] == 2
+
+
+def test_another_controller_is_refused_unless_told(run, simulator, golden):
+    simulator.machine.serial = "SIM00002"
+    simulator.machine.tools.set(1, ToolOffset(99))
+    code, _, err = run("restore", golden)
+    assert code == 2
+    assert "SIM00001 in the backup, SIM00002 here" in err
+    assert simulator.machine.tools.get(1) == ToolOffset(99)
+    assert run("restore", golden, "--other-controller")[0] == 0
+    assert simulator.machine.tools.get(1).x_mm == 12
+
+
+@pytest.mark.parametrize(
+    "command",
+    [["tool", "set", "2", "--x", "1"], ["tool", "clear", "1"], ["restore", "golden.json"]],
+)
+def test_no_write_is_made_when_the_first_backup_cannot_be_stored(
+    run, simulator, golden, tmp_path, monkeypatch, command
+):
+    simulator.machine.tools.set(3, ToolOffset(5))
+    simulator.machine.tools.select(0)
+    (tmp_path / "state").mkdir()
+    (tmp_path / "state" / "backups").write_text("in the way")
+    written = simulator.machine.flash_writes
+    code, _, err = run(*command)
+    assert code == 2
+    assert "cannot be saved" in err
+    assert simulator.machine.flash_writes == written
+
+
+CALIBRATIONS = {
+    # Nobody can be asked here, so the first ends before anything moves.
+    9: ["calibrate", "two-pose", "--tool", "1"],
+    0: [
+        *("calibrate", "two-pose", "--tool", "1", "--yes"),
+        *("--pose", "288.1,103.5,0", "--pose", "311.9,96.5,180"),
+    ],
+}
+
+
+@pytest.mark.parametrize("code", CALIBRATIONS)
+def test_a_calibration_saves_the_tools_before_it_goes_on(run, simulator, state_folder, code):
+    before = simulator.machine.tools.get(1)
+    assert run(*CALIBRATIONS[code])[0] == code
+    (saved,) = (state_folder / "backups").iterdir()
+    assert load(saved).state.tools[1] == before
+    assert (simulator.machine.tools.get(1) == before) is (code != 0)
+
+
+def test_a_person_who_says_no_leaves_everything_as_it_was(run, simulator, golden, monkeypatch):
+    def say_no(question):
+        raise DeclinedError(question)
+
+    monkeypatch.setattr(_consent, "on_terminal", lambda: True)
+    monkeypatch.setattr(_consent, "_require_yes", say_no)
+    simulator.machine.tools.set(1, ToolOffset(99))
+    code, out, err = run("restore", golden)
+    assert (code, "99.000" in out, "Write this" in err) == (9, True, True)
+    assert simulator.machine.tools.get(1) == ToolOffset(99)
+
+
+def test_the_first_write_says_where_the_tools_were_saved(run, simulator, state_folder):
+    code, _, err = run("tool", "set", "2", "--x", "1")
+    (saved,) = (state_folder / "backups").iterdir()
+    assert (code, str(saved) in err) == (0, True)
+    assert load(saved).state.tools[2] is None
+    code, _, err = run("tool", "clear", "2")
+    assert (code, "saved in" in err) == (0, False)

@@ -1,0 +1,262 @@
+"""Bad input: each a clear sentence, the right exit code, and nothing sent that was not asked."""
+
+import json
+import socket
+
+import pytest
+from robolink_cli import main
+
+from tests.faults._nozzle_cell import OLD_TIP, served_cell
+from tests.faults._requests import changes
+
+CANARY = "k4nar1envogel"
+WRONG = "n1chtd4spasswort"
+
+SET = ["tool", "set", "1", "--x", "13", "--yes"]
+CLEAR = ["tool", "clear", "1", "--yes"]
+SELECT = ["tool", "select", "0", "--yes"]
+JOG = ["jog", "z+1", "--yes"]
+CALIBRATE = ["calibrate", "two-pose", "--tool", "1", "--yes"]
+MOTORS = ["motors", "on", "--yes"]
+
+
+@pytest.fixture(autouse=True)
+def _own_state_folder(tmp_path, monkeypatch):
+    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
+
+
+@pytest.fixture
+def cell(tmp_path, monkeypatch):
+    with served_cell(tmp_path / "cell", monkeypatch) as cell:
+        yield cell
+
+
+def check_refused(shown, code, words):
+    """A sentence that says what happened, and one that says what to do."""
+    assert shown.code == code, shown.err
+    assert shown.out == ""
+    what, remedy = shown.err.partition("robolink: ")[2].splitlines()[:2]
+    assert words in f"{what} {remedy}"
+    assert what.endswith((".", ")"))
+    assert len(remedy.strip()) > 10
+
+
+def check_refused_as_document(shown, exit_code, /, **expected):
+    assert shown.code == exit_code
+    document = json.loads(shown.out)
+    assert document["schema"] == "robolink/error/1"
+    assert document["exit_code"] == exit_code
+    assert document["error"]["what"]
+    assert document["error"]["remedy"]
+    assert {key: document["error"][key] for key in expected} == expected
+
+
+def check_nothing_was_changed(cell):
+    assert changes(cell.requests) == []
+    assert cell.tool_1 == OLD_TIP
+    assert cell.simulator.machine.arm.moves_started == 0
+    cell.check_settings_are_those_of_before()
+    assert cell.open_markers() == ()
+
+
+STATES = {
+    "controller in Teach": ("teach", "teach", "Teach mode"),
+    "e-stop pressed": ("press_estop", "emergency_stop", "emergency stop is pressed"),
+    "guard open": ("open_guard", "guard_open", "guard is open"),
+    "running": ("start_production", "running", "program is running"),
+    "serious error": ("raise_serious_error", "serious_fault", "off and on"),
+    "monitoring only": ("", "not_remote", "Set Control Device = Remote Ethernet"),
+}
+
+
+@pytest.mark.parametrize("command", [SET, CLEAR, SELECT, JOG, CALIBRATE, MOTORS], ids=" ".join)
+@pytest.mark.parametrize("state", STATES)
+def test_a_state_that_forbids_it_is_named_and_nothing_is_sent(cell, state, command):
+    act, reason, words = STATES[state]
+    panel = cell.simulator.panel
+    if act:
+        getattr(panel, act)()
+    else:
+        panel.set_monitoring_only(True)
+    check_refused(cell.run(*command), 5, words)
+    document = cell.run(*command, "--json")
+    check_refused_as_document(document, 5, kind="NotReadyError", reason=reason)
+    check_nothing_was_changed(cell)
+
+
+def test_a_status_is_shown_in_teach_mode_with_the_guard_open_and_while_production_runs(cell):
+    panel = cell.simulator.panel
+    for act, undo, flag in (
+        ("teach", "auto", "teach"),
+        ("open_guard", "close_guard", "guard_open"),
+        ("start_production", "stop_production", "running"),
+    ):
+        getattr(panel, act)()
+        shown = cell.run("status", "--json")
+        assert shown.code == 0, shown.err
+        assert json.loads(shown.out)[flag] is True
+        getattr(panel, undo)()
+    assert changes(cell.requests) == []
+
+
+def test_motors_that_are_off_are_named_and_nothing_moves(cell):
+    assert cell.run("motors", "off").code == 0
+    shown = cell.run(*JOG, "--json")
+    check_refused_as_document(shown, 5, reason="motors_off")
+    assert cell.simulator.machine.arm.moves_started == 0
+    assert cell.selected_tool == 1
+    assert cell.open_markers() == ()
+
+
+NUMBERS = {
+    "tool 16": (["tool", "set", "16", "--x", "1"], "There is no tool 16"),
+    "tool 16, read": (["tool", "get", "16"], "There is no tool 16"),
+    "tool 16, cleared": (["tool", "clear", "16"], "There is no tool 16"),
+    "tool 16, selected": (["tool", "select", "16"], "There is no tool 16"),
+    "tool 16, calibrated": (["calibrate", "two-pose", "--tool", "16"], "There is no tool 16"),
+    "tool 0": (["tool", "set", "0", "--x", "1"], "never written"),
+    "tool 0, cleared": (["tool", "clear", "0"], "never written"),
+    "tool 0, calibrated": (["calibrate", "two-pose", "--tool", "0"], "never written"),
+    "NaN": (["tool", "set", "1", "--x", "nan"], "x_mm is not a number"),
+    "infinity": (["tool", "set", "1", "--u", "inf"], "u_deg is not a number"),
+    "no component": (["tool", "set", "1"], "No component was given"),
+    "no jog step": (["jog", "--yes", "x0.1"], "is not a jog step"),
+    "jog NaN": (["jog", "--yes", "x+nan"], "is not a jog step"),
+    "too large a step": (["jog", "--yes", "x+50"], "too large for one step"),
+    "clearance above the lift": (
+        ["calibrate", "two-pose", "--tool", "1", "--clearance", "20"],
+        "smaller than the lift",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", NUMBERS)
+def test_a_wrong_number_is_a_mistake_in_the_command_and_nothing_is_sent(cell, name):
+    arguments, words = NUMBERS[name]
+    check_refused(cell.run(*arguments), 2, words)
+    check_refused_as_document(cell.run(*arguments, "--json"), 2)
+    check_nothing_was_changed(cell)
+
+
+@pytest.mark.parametrize("value", ["abc", "1,5", ""])
+def test_text_where_a_number_belongs_is_a_usage_error(cell, value):
+    shown = cell.run("tool", "set", "1", "--x", value)
+    assert shown.code == 2
+    assert f"'--x': '{value}' is not a valid" in shown.err
+    check_refused_as_document(cell.run("tool", "set", "1", "--x", value, "--json"), 2)
+    assert cell.requests == []
+
+
+def test_an_undefined_tool_is_not_selected(cell):
+    check_refused(cell.run("tool", "select", "7"), 5, "Tool 7 is not defined")
+    check_nothing_was_changed(cell)
+
+
+def test_a_wrong_password_is_tried_once_and_shown_nowhere(tmp_path, monkeypatch):
+    secret = tmp_path / "secret"
+    secret.write_text(f"{WRONG}\n")
+    secret.chmod(0o600)
+    with served_cell(tmp_path / "cell", monkeypatch, password=CANARY) as cell:
+        shown = cell.run("status", "--password-file", str(secret))
+        check_refused(shown, 5, "refused the login (code 13)")
+        assert [request for request in cell.requests if "ogin" in request] == ["$Login,***"]
+        monkeypatch.setenv("ROBOLINK_PASSWORD", WRONG)
+        as_document = cell.run(*SET, "--json")
+        check_refused_as_document(as_document, 5, kind="LoginRefusedError", code=13)
+        monkeypatch.setenv("ROBOLINK_PASSWORD", CANARY)
+        right = cell.run(*SET, "--json")
+        assert right.code == 0
+        seen = [repr((shown, as_document, right)), repr(list(cell.simulator.log))]
+    seen += [path.read_text() for path in (tmp_path / "cell").rglob("*") if path.is_file()]
+    assert not [text for text in seen if CANARY in text or WRONG in text]
+
+
+def test_a_password_file_that_others_may_read_is_refused_before_anything_is_sent(cell, tmp_path):
+    secret = tmp_path / "secret"
+    secret.write_text(WRONG)
+    secret.chmod(0o644)
+    shown = cell.run("status", "--password-file", str(secret))
+    check_refused(shown, 2, f"chmod 600 {secret}")
+    assert WRONG not in shown.err
+    assert cell.requests == []
+
+
+def run(capsys, *arguments):
+    code = main.run(arguments)
+    out, err = capsys.readouterr()
+    return code, out, err
+
+
+def closed_port():
+    with socket.socket() as listener:
+        listener.bind(("127.0.0.1", 0))
+        return listener.getsockname()[1]
+
+
+def test_a_closed_port_is_not_reached(capsys):
+    url = f"epson+tcp://127.0.0.1:{closed_port()}"
+    code, out, err = run(capsys, "-c", url, "status")
+    assert (code, out) == (3, "")
+    assert url.partition("//")[2].partition(":")[0] in err
+    code, out, _ = run(capsys, "-c", url, "--json", *SET)
+    document = json.loads(out)
+    assert (code, document["exit_code"], document["error"]["kind"]) == (3, 3, "ConnectError")
+    assert document["error"]["remedy"]
+
+
+URLS = {
+    "no controller named": ([], "No controller is named"),
+    "a password in the URL": (["-c", f"epson+tcp://user:{CANARY}@127.0.0.1:5000"], "password"),
+    "a password as an option": (["-c", f"epson+tcp://127.0.0.1?password={CANARY}"], "password"),
+    "a password and a bad port": (["-c", f"epson+tcp://u:{CANARY}@127.0.0.1:x"], "cannot be read"),
+    "an unknown medium": (["-c", "epson+smoke://hill"], "epson+smoke"),
+    "an unknown kind": (["-c", "toaster+tcp://127.0.0.1:5000"], "toaster"),
+    "a web address": (["-c", "http://127.0.0.1:5000"], "http"),
+}
+
+
+@pytest.mark.parametrize("name", URLS)
+def test_a_wrong_url_is_a_mistake_in_the_command_and_a_password_is_not_echoed(capsys, name):
+    arguments, words = URLS[name]
+    code, out, err = run(capsys, *arguments, "status")
+    assert (code, out) == (2, "")
+    what, remedy = err.removeprefix("robolink: ").splitlines()[:2]
+    assert words in what
+    assert remedy.strip()
+    as_json = run(capsys, *arguments, "status", "--json")
+    document = json.loads(as_json[1])
+    assert document["exit_code"] == as_json[0] == 2
+    assert CANARY not in out + err + as_json[1] + as_json[2]
+
+
+@pytest.mark.parametrize("command", [CALIBRATE, JOG], ids=" ".join)
+def test_nobody_to_ask_and_no_yes_means_no(cell, command):
+    without_yes = [word for word in command if word != "--yes"]
+    check_refused(cell.run(*without_yes), 9, "--yes")
+    check_refused_as_document(cell.run(*without_yes, "--json"), 9, kind="DeclinedError")
+    check_nothing_was_changed(cell)
+
+
+def test_an_implausible_change_is_refused_and_not_written(cell):
+    refused = cell.run(*cell.calibration, "--max-change", "0.01")
+    assert refused.code == 7
+    assert "0.010 mm are plausible" in refused.err
+    assert "--max-change" in refused.err
+    as_json = cell.run(*cell.calibration, "--max-change", "0.01", "--json")
+    check_refused_as_document(as_json, 7, kind="CalibrationError", code="implausible_change")
+    assert cell.simulator.machine.flash_writes == 0
+    cell.check_nothing_else_was_written()
+    cell.check_settings_are_those_of_before()
+    assert cell.open_markers() == ()
+
+
+def test_a_drift_beyond_the_tolerance_puts_the_old_value_back(cell):
+    refused = cell.run(*cell.calibration, "--tolerance", "0.0001", "--json")
+    check_refused_as_document(refused, 8, kind="VerifyError")
+    remedy = json.loads(refused.out)["error"]["remedy"]
+    assert "The old value of tool 1 was written back." in remedy
+    assert cell.tool_1 == OLD_TIP
+    assert cell.simulator.machine.flash_writes == 2
+    cell.check_nothing_else_was_written()
+    cell.check_settings_are_those_of_before()
+    assert cell.open_markers() == ()

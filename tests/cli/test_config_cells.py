@@ -1,0 +1,205 @@
+"""-c CELL: what a command takes from the cell file, and what wins over it."""
+
+import json
+
+import pytest
+from robolink_cli import calibrate, jog, main
+from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.hosting.in_process import register, unregister
+
+from robolink.config._settings import CellSettings
+from robolink.markers import memory_log
+from robolink.model import Marker, MarkerKind, Secret
+
+URL = "epson+sim://config-cell"
+
+
+@pytest.fixture(autouse=True)
+def own_files(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for place in ("user", "site"):
+        folder = tmp_path / place
+        monkeypatch.setattr(
+            f"platformdirs.{place}_config_path", lambda *a, folder=folder, **k: folder
+        )
+
+
+@pytest.fixture
+def cell(tmp_path):
+    """Write the cell ``a``."""
+
+    def write(lines="", url=URL):
+        (tmp_path / "robolink.toml").write_text(f'[cells.a]\nurl = "{url}"\n{lines}\n')
+
+    return write
+
+
+@pytest.fixture
+def simulator():
+    simulator = EpsonSimulator(seed=3)
+    register("config-cell", simulator)
+    yield simulator
+    unregister("config-cell")
+
+
+CONFIRMED = "remote_timeout_s = 30\nremote_timeout_confirmed_by = 'me'\n"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "environment"),
+    [(["-c", "a", "status"], None), (["status", "-c", "a"], None), (["status"], "a")],
+)
+def test_a_cell_is_named_wherever_a_url_is(command, cell, monkeypatch, arguments, environment):
+    cell("timeout_s = 1.5\n" + CONFIRMED)
+    if environment:
+        monkeypatch.setenv("ROBOLINK_CONTROLLER", environment)
+    seen = command()
+    assert main.run(arguments) == 0
+    (context,) = seen
+    assert (context.url, context.timeout_s, context.remote_timeout_s) == (URL, 1.5, 30)
+
+
+def test_the_command_line_wins_over_the_cell(command, cell):
+    cell("timeout_s = 1.5\n" + CONFIRMED)
+    seen = command()
+    assert main.run(["-c", "a", "--timeout", "2", "status", "--remote-timeout", "10"]) == 0
+    assert (seen[0].timeout_s, seen[0].remote_timeout_s) == (2, 10)
+
+
+def test_a_url_reads_no_cell_file(command, tmp_path):
+    (tmp_path / "robolink.toml").write_text("wrong")
+    seen = command()
+    assert main.run(["-c", "epson+tcp://192.0.2.1:5000", "status"]) == 0
+    assert seen[0].cell is None
+
+
+def test_a_cell_file_that_is_wrong_stops_the_command_before_anything_is_sent(command, cell, capsys):
+    cell("timeout_s = 0")
+    seen = command()
+    assert main.run(["-c", "a", "status"]) == 2
+    assert seen == []
+    assert "cells.a.timeout_s: must be more than 0" in capsys.readouterr().err
+
+
+def test_nothing_moves_in_a_cell_without_a_confirmed_remote_timeout(cell, simulator, capsys):
+    cell()
+    assert main.run(["-c", "a", "motors", "on", "--yes"]) == 0
+    assert main.run(["-c", "a", "jog", "z+0.1", "--yes", "--json"]) == 5
+    assert json.loads(capsys.readouterr().out.partition("\n")[2])["error"]["reason"] == (
+        "no_remote_timeout"
+    )
+    assert main.run(["-c", "a", "jog", "z+0.1", "--yes", "--remote-timeout", "60"]) == 0
+    cell(CONFIRMED)
+    assert main.run(["-c", "a", "jog", "z+0.1", "--yes"]) == 0
+
+
+@pytest.mark.parametrize("robot", ["T6-602S", "t6-602s"])
+def test_the_expected_robot_is_let_through(cell, simulator, robot):
+    cell(f"robot = '{robot}'")
+    assert main.run(["-c", "a", "tool", "list"]) == 0
+
+
+def test_another_robot_than_the_cell_file_says_is_refused(cell, simulator, capsys):
+    cell("robot = 'LS10-B'")
+    assert main.run(["-c", "a", "tool", "set", "3", "--x", "1"]) == 2
+    shown = capsys.readouterr().err
+    assert "has a robot LS10-B, but at epson+sim://config-cell there is: T6-602S." in shown
+    assert "robolink.toml" in shown
+    assert simulator.machine.tools.get(3) is None
+
+
+def test_a_stop_asks_for_no_model(cell, simulator):
+    cell("robot = 'LS10-B'")
+    assert main.run(["-c", "a", "stop"]) == 0
+
+
+def test_a_password_comes_from_the_variable_that_the_cell_names(cell, monkeypatch, capsys):
+    register("config-cell", EpsonSimulator(seed=3, password=Secret("hunter2")))
+    try:
+        cell("password_env = 'ROBOLINK_PASSWORD_A'")
+        monkeypatch.setenv("ROBOLINK_PASSWORD", "another cell's")
+        assert main.run(["-c", "a", "status"]) == 5
+        monkeypatch.setenv("ROBOLINK_PASSWORD_A", "hunter2")
+        assert main.run(["-c", "a", "status"]) == 0
+    finally:
+        unregister("config-cell")
+
+
+def test_a_password_comes_from_the_file_that_the_cell_names(cell, tmp_path, monkeypatch):
+    register("config-cell", EpsonSimulator(seed=3, password=Secret("hunter2")))
+    try:
+        (tmp_path / "secret").write_text("hunter2\n")
+        (tmp_path / "secret").chmod(0o600)
+        cell("password_file = 'secret'")
+        assert main.run(["-c", "a", "status"]) == 0
+        (tmp_path / "secret").chmod(0o644)
+        assert main.run(["-c", "a", "status"]) == 2
+    finally:
+        unregister("config-cell")
+
+
+LIMITS = (
+    "speed_mm_s = 11\nbox_mm = 77\njog_box_mm = 9\nlift_mm = 12\nclearance_mm = 3\n"
+    "max_change_mm = 1.5\ndrift_tolerance_mm = 0.1\n"
+)
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        ([], (11, 77, 12, 3, 1.5, 0.1)),
+        (["--speed", "20", "--lift", "10"], (20, 77, 10, 3, 1.5, 0.1)),
+    ],
+    ids=["the cell's", "typed ones win, though they are the defaults"],
+)
+def test_calibrate_takes_its_limits_from_the_cell(cell, simulator, monkeypatch, options, expected):
+    cell(LIMITS)
+    plans = []
+
+    def remember(controller, plan, **_kwargs):
+        plans.append(plan)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("robolink_cli._calibrating.Bench", remember)
+    assert main.run(["-c", "a", "calibrate", "two-pose", "--tool", "1", *options]) == 130
+    (plan,) = plans
+    assert (
+        plan.speed_mm_s,
+        plan.box_mm,
+        plan.touch.lift_mm,
+        plan.touch.clearance_mm,
+        plan.max_change_mm,
+        plan.drift_tolerance_mm,
+    ) == expected
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"), [([], (11, 9)), (["--speed", "20", "--box", "50"], (20, 50))]
+)
+def test_jog_takes_its_limits_from_the_cell(cell, simulator, monkeypatch, options, expected):
+    cell(LIMITS)
+    seen = []
+
+    def remember(_controller, _steps, speed_mm_s, box_mm):
+        seen.append((speed_mm_s, box_mm))
+        return []
+
+    monkeypatch.setattr("robolink_cli._jogging.plan_jog", remember)
+    assert main.run(["-c", "a", "jog", "x+1", "--dry-run", *options]) == 0
+    assert seen == [expected]
+
+
+def test_what_was_left_unfinished_is_resolved_by_the_cell_s_name(cell, simulator, capsys):
+    cell()
+    log = memory_log(URL)
+    log.begin(Marker("a", MarkerKind.SET, "TLSet 3, XY(1,2,3,0)", "2026-01-01T00:00:00+00:00"))
+    try:
+        assert main.run(["-c", "a", "status"]) == 0
+        assert "robolink -c a resolve" in capsys.readouterr().err
+    finally:
+        log.clear("a")
+
+
+@pytest.mark.parametrize("module", [calibrate, jog])
+def test_each_limit_of_a_command_is_a_key_of_the_cell_file(module):
+    assert set(module._CELL_KEYS.values()) <= set(CellSettings.model_fields)

@@ -1,0 +1,314 @@
+"""``calibrate`` and ``impact`` on poses that exist already: nothing moves, ever."""
+
+import json
+import os
+import sys
+
+import pytest
+from robolink_cli import _calibrating_poses, main
+from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.epson.points import Point
+
+import robolink
+from robolink.model import Hand, Pose, ToolOffset, rotate_xy
+
+REAL = ToolOffset(12.3, -3.9, -20.4)
+STORED = ToolOffset(12.0, -3.5, -20.0)
+"""What a simulator stores for tool 1 at first."""
+
+PIN = (300.0, 100.0, -60.0)
+
+
+def touching(u_deg, believed=None, **more):
+    """Return the point taught on the pin with a tool that is believed to be there."""
+    own = believed or ToolOffset()
+    x, y = rotate_xy(REAL.x_mm - own.x_mm, REAL.y_mm - own.y_mm, u_deg)
+    return Pose(PIN[0] - x, PIN[1] - y, PIN[2] - REAL.z_mm + own.z_mm, u_deg, **more)
+
+
+@pytest.fixture(autouse=True)
+def plain_environment(monkeypatch):
+    for name in [name for name in os.environ if name.startswith("ROBOLINK")]:
+        if name != "ROBOLINK_STATE_DIR":
+            monkeypatch.delenv(name)
+    monkeypatch.setitem(sys.modules, "keyring", None)
+
+
+@pytest.fixture
+def simulator():
+    simulator = EpsonSimulator(seed=7)
+    store = simulator.machine.points.store
+    store(901, Point.at(touching(10)))
+    store(902, Point.at(touching(-170)))
+    store(911, Point.at(touching(10, STORED)))
+    store(912, Point.at(touching(-170, STORED)))
+    store(921, Point.at(touching(-170, hand=Hand.LEFT)))
+    store(931, Point(touching(-170).coordinates(), local=2))
+    store(941, Point((300.0, 100.0, 0.0, 0.0, 0.0, 180.0)))
+    store(951, Point.at(touching(30)))
+    store(1, Point.at(Pose(250, 200, -30, 0)))
+    store(3, Point.at(Pose(250, 210, -30, 90)))
+    store(4, Point((1.0, 2.0, 3.0, 4.0, 0.0, 0.0), local=5))
+    return simulator
+
+
+@pytest.fixture
+def command(serve, simulator, capsys):
+    """Run a command line on the cell; return its exit code, stdout and stderr."""
+    with serve(simulator) as cell:
+        capsys.readouterr()
+
+        def run(*words):
+            code = main.run(["-c", cell.url, *words])
+            shown = capsys.readouterr()
+            return code, shown.out, shown.err
+
+        yield run
+    arm = simulator.machine.arm
+    assert arm.moves_started == 0
+    assert simulator.machine.tools.selected == 1
+
+
+def stored(simulator):
+    return simulator.machine.tools.defined()[1]
+
+
+def calibrate(*more):
+    return ("calibrate", "two-pose", "--tool", "1", *more)
+
+
+def test_taught_points_give_the_tip_and_what_was_not_measured_is_kept(command, simulator):
+    code, out, _ = command(*calibrate("--points", "901,902", "--yes"))
+    assert code == 0
+    assert stored(simulator) == ToolOffset(12.3, -3.9, -20.0)
+    assert "Z kept at -20.000: not measured" in out
+    assert "Tool 1 was written and read back." in out
+    assert "not proved by turning" in out
+
+
+@pytest.mark.parametrize("layout", ["json", "csv"])
+def test_a_file_of_poses_gives_the_same(command, simulator, tmp_path, layout):
+    poses = [touching(10), touching(-170)]
+    path = tmp_path / f"poses.{layout}"
+    rows = [{"x_mm": p.x_mm, "y_mm": p.y_mm, "u_deg": p.u_deg} for p in poses]
+    text = "\n".join(",".join(map(str, row.values())) for row in rows)
+    path.write_text(json.dumps(rows) if layout == "json" else f"x_mm,y_mm,u_deg\n{text}\n")
+    assert command(*calibrate("--poses", str(path), "--yes"))[0] == 0
+    assert stored(simulator) == ToolOffset(12.3, -3.9, -20.0)
+
+
+def test_typed_poses_may_be_negative(command, simulator):
+    first, second = touching(10), touching(-170)
+    shift = 600.0
+    words = [f"{p.x_mm - shift:.3f},{p.y_mm:.3f},{p.u_deg}" for p in (first, second)]
+    assert words[0].startswith("-")
+    code, _, _ = command(*calibrate("--pose", words[0], "--pose", words[1], "--yes"))
+    assert code == 0
+    assert stored(simulator).matches(ToolOffset(12.3, -3.9, -20.0), 0.002)
+
+
+def test_the_document_has_the_shape_of_a_live_one_and_names_its_source(command):
+    code, out, err = command(*calibrate("--points", "901,902", "--yes", "--json"))
+    document = json.loads(out)
+    assert code == 0
+    assert document["schema"] == "robolink/calibration/1"
+    assert document["source"] == {"kind": "points", "taught_tool": 0, "points": [901, 902]}
+    assert document["proposed"]["x_mm"] == pytest.approx(12.3, abs=1e-3)
+    assert document["kept"] == ["z_mm", "u_deg", "v_deg", "w_deg"]
+    assert document["write"]["read_back"]["y_mm"] == -3.9
+    assert document["verification"] is None
+    assert document["impact"] is None
+    assert document["better_tool"] is None
+    assert "measured" in err
+
+
+def test_off_a_terminal_nothing_is_written_without_yes(command, simulator):
+    code, out, err = command(*calibrate("--points", "901,902"))
+    assert code == 9
+    assert "12.300" in out
+    assert "--yes" in err
+    assert stored(simulator) == STORED
+
+
+def test_on_a_terminal_a_no_writes_nothing(command, simulator, monkeypatch):
+    asked = []
+
+    def decline(question, *, yes):
+        asked.append(question)
+        raise robolink.errors.DeclinedError("You said no.")
+
+    monkeypatch.setattr(_calibrating_poses, "on_terminal", lambda: True)
+    monkeypatch.setattr(_calibrating_poses, "agree", decline)
+    assert command(*calibrate("--points", "901,902"))[0] == 9
+    assert asked == ["Write this to tool 1?"]
+    assert stored(simulator) == STORED
+
+
+def test_a_dry_run_shows_the_request_and_writes_nothing(command, simulator):
+    code, out, _ = command(*calibrate("--points", "901,902", "--dry-run"))
+    assert code == 0
+    assert '$Execute,"TLSet 1, XY(12.300, -3.900, -20.000, 0.000)"' in out
+    assert stored(simulator) == STORED
+    code, out, _ = command(*calibrate("--points", "901,902", "--dry-run", "--json"))
+    assert code == 0
+    assert json.loads(out)["requests"] == ['$Execute,"TLSet 1, XY(12.300, -3.900, -20.000, 0.000)"']
+
+
+def test_points_taught_with_a_tool_are_seen_through_its_stored_value(command, simulator):
+    code, _, err = command(*calibrate("--points", "911,912", "--taught-tool", "1", "--yes"))
+    assert code == 0
+    assert "Warning" not in err
+    assert stored(simulator) == ToolOffset(12.3, -3.9, -20.0)
+
+
+@pytest.mark.parametrize(
+    ("points", "said", "meant"), [("911,912", "0", "1"), ("901,902", "1", "0")]
+)
+def test_the_wrong_tool_is_warned_of_and_its_change_refused(
+    command, simulator, points, said, meant
+):
+    words = calibrate("--points", points, "--taught-tool", said, "--yes")
+    code, _, err = command(*words)
+    assert code == 7
+    assert f"fit tool {meant} much better than tool {said}" in err
+    assert f"--taught-tool {meant}" in err
+    assert stored(simulator) == STORED
+    code, out, _ = command(*words, "--max-change", "50", "--json")
+    assert code == 0
+    assert json.loads(out)["better_tool"] == int(meant)
+    assert json.loads(out)["warnings"] == ["other_tool_fits"]
+    assert json.loads(out)["tool_fits"][0]["tool"] == int(meant)
+
+
+REFUSED = {
+    "too_few_poses": ("--points", "901"),
+    "undefined_point": ("--points", "901,990"),
+    "mixed_hand": ("--points", "901,921"),
+    "mixed_local": ("--points", "901,931"),
+    "tilted_pose": ("--points", "901,941"),
+    "insufficient_rotation": ("--points", "901,951"),
+    "degenerate_angles": ("--pose", "300,100,0", "--pose", "310,100,360"),
+    "non_finite": ("--pose", "nan,100,0", "--pose", "310,100,180"),
+    "suspect_units": ("--pose", "0.3,0.1,0", "--pose", "0.31,0.1,180"),
+    "implausible_change": ("--pose", "300,100,0", "--pose", "310,100,180"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_bad_poses_end_with_their_named_code(command, simulator, name):
+    code, out, _ = command(*calibrate(*REFUSED[name], "--yes", "--json"))
+    assert code == 7
+    assert json.loads(out)["error"]["code"] == name
+    assert json.loads(out)["error"]["remedy"]
+    assert stored(simulator) == STORED
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("--points", "901,902", "--pose", "1,2,3"),
+        ("--points", "901,902", "--poses", "x.json"),
+        ("--points", "901,902,921"),
+        ("--points", "902-901"),
+        ("--points", "901,9020"),
+        ("--pose", "300,100"),
+        ("--pose", "300,100,abc"),
+        ("--poses", "missing.json"),
+        ("--points", "901,902", "--lift", "12"),
+        ("--points", "901,902", "--no-verify"),
+        ("--points", "901,902", "--assist", "assist+tcp://127.0.0.1:1"),
+        ("--taught-tool", "1"),
+        ("--points", "901,902", "--impact", "1-5", "--impact-pts", "robot1.pts"),
+        ("--dry-run", "--impact", "1-5"),
+    ],
+)
+def test_what_makes_no_sense_together_is_a_mistake_in_the_command(command, simulator, words):
+    code, _, err = command(*calibrate(*words, "--yes"))
+    assert code == 2
+    assert "Traceback" not in err
+    assert stored(simulator) == STORED
+
+
+def test_an_undefined_taught_tool_is_refused(command):
+    code, _, err = command(*calibrate("--points", "901,902", "--taught-tool", "9", "--yes"))
+    assert code == 5
+    assert "Tool 9 is not defined" in err
+
+
+def test_a_tool_changed_meanwhile_is_not_overwritten(command, simulator, monkeypatch):
+    def change(tool, *, yes):
+        simulator.machine.tools.set(1, ToolOffset(1, 2, 3))
+
+    monkeypatch.setattr(_calibrating_poses, "_agree_to_write", change)
+    code, _, err = command(*calibrate("--points", "901,902", "--yes"))
+    assert code == 5
+    assert "nothing was written" in err
+    assert stored(simulator) == ToolOffset(1, 2, 3)
+
+
+def test_the_impact_is_shown_before_the_question(command):
+    code, out, _ = command(*calibrate("--points", "901,902", "--impact", "1-5"))
+    assert code == 9
+    assert "largest: 0.500 mm at P1" in out
+    assert "not taught, skipped: 2" in out
+    assert "P4 (local 5)" in out
+
+
+def test_an_undefined_tool_has_no_impact(command):
+    words = ("calibrate", "two-pose", "--tool", "6", "--points", "901,902", "--impact", "1-5")
+    code, out, _ = command(*words, "--yes", "--json")
+    assert code == 0
+    assert json.loads(out)["impact"] is None
+    assert json.loads(out)["before"] is None
+
+
+def test_the_impact_of_a_typed_offset_is_shown_and_nothing_written(command, simulator):
+    words = ("impact", "--tool", "1", "--x", "12.3", "--y", "-3.9", "--points", "1-5")
+    code, out, _ = command(*words, "--json")
+    document = json.loads(out)
+    assert code == 0
+    assert document["schema"] == "robolink/impact/1"
+    first, third = document["points"]
+    assert (first["dx_mm"], first["dy_mm"]) == pytest.approx((-0.3, 0.4))
+    assert (third["dx_mm"], third["dy_mm"]) == pytest.approx((-0.4, -0.3))
+    assert document["largest_mm"] == pytest.approx(0.5)
+    assert document["undefined_count"] == 2
+    assert document["other_local"] == [{"point": 4, "local": 5}]
+    code, out, _ = command(*words)
+    assert code == 0
+    assert "Nothing was written." in out
+    assert stored(simulator) == STORED
+
+
+def test_a_point_file_stands_in_for_the_controllers_points(command, tmp_path):
+    path = tmp_path / "robot1.pts"
+    fields = "\n".join(
+        f"\tr{axis}={value}" for axis, value in zip("XYZUVW", (9, 8, 7, 90, 0, 0), strict=True)
+    )
+    path.write_text(
+        f"nNumberOfPoints=1\nPoint1 {{\n\tnNumber=12\n\tnUndefined=448\n{fields}\n"
+        "\tnLocal=0\n\tnHand=1\n}\n"
+    )
+    code, out, _ = command("impact", "--tool", "1", "--x", "13", "--pts", str(path), "--json")
+    assert code == 0
+    (entry,) = json.loads(out)["points"]
+    assert entry["point"] == 12
+    assert (entry["dx_mm"], entry["dy_mm"]) == pytest.approx((0, -1))
+
+
+@pytest.mark.parametrize(
+    ("words", "code"),
+    [
+        (("--tool", "1", "--x", "12"), 2),
+        (("--tool", "1", "--points", "1-5"), 2),
+        (("--tool", "1", "--x", "nan", "--points", "1-5"), 2),
+        (("--tool", "1", "--x", "12", "--points", "1-5", "--pts", "a.pts"), 2),
+        (("--tool", "1", "--x", "12", "--pts", "missing.pts"), 2),
+        (("--tool", "16", "--x", "12", "--points", "1"), 2),
+        (("--tool", "7", "--x", "12", "--points", "1"), 5),
+    ],
+)
+def test_an_impact_that_cannot_be_shown_says_why(command, words, code):
+    found, _, err = command("impact", *words)
+    assert found == code
+    assert "Traceback" not in err

@@ -1,0 +1,217 @@
+"""verify-controller names the habits that are in force, and leaves no trace."""
+
+import json
+
+import pytest
+from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.epson.option_text import option_names, options_from_text
+from robolink_simulators.epson.options import EpsonOptions
+from robolink_simulators.epson.profile import read_profile
+from robolink_simulators.epson.spel._machine_functions import MACHINE_FUNCTIONS
+from robolink_simulators.faults import Fault, FaultAction
+from robolink_simulators.hosting.in_process import register, unregister
+from robolink_simulators.hosting.tcp import serve_tcp
+
+from robolink.controllers.epson.verify import redacted, verify_epson
+from robolink.errors import LoginRefusedError
+from robolink.model import Secret, ToolOffset
+from robolink.transport import format_dialogue
+
+HABITS = [
+    {},
+    {"terminator": "cr"},
+    {"terminator": "lf"},
+    {"status_flags": 10},
+    {"print_crlf_inside_quotes": False},
+    {"flags_during_execute": "ready"},
+    {"point_coordinates": "given"},
+    {"true_value": 1},
+    {"comma_blank": "always"},
+    {"tool_listing": "padded"},
+    {"tool_listing": "four"},
+    {"where_width": 8},
+    {"extended_queries": False},
+    {"rc_plus": 5},
+    {"rc_plus": 8},
+    {"requests_end_with_segment": True},
+    {"requests_end_with_segment": True, "terminator": "cr", "print_crlf_inside_quotes": False},
+    {"abort_reply_first": False},
+    {"second_client": "closed"},
+    {"execute_on_disconnect": "stops"},
+    {"logout_while_running": "refused"},
+    {"execute_failure": "text"},
+    {"execute_failure_code": 20},
+    {"monitoring_refusal": 11},
+    {"tlset_of_undefined": "error"},
+    {"reset_outputs_off": False},
+    {"real_pos_noise_mm": 0.0},
+    {"angle_wrap": True},
+]
+
+ALWAYS_SETTLED = {
+    "comma_blank",
+    "extended_queries",
+    "flags_during_execute",
+    "monitoring_only",
+    "point_coordinates",
+    "print_crlf_inside_quotes",
+    "requests_end_with_segment",
+    "status_flags",
+    "terminator",
+    "tool_listing",
+    "true_value",
+    "where_width",
+}
+
+
+@pytest.fixture
+def cell():
+    """A maker of simulators in this process."""
+    names = []
+
+    def serve(simulator):
+        names.append(f"verify-{id(simulator):x}")
+        return register(names[-1], simulator)
+
+    yield serve
+    for name in names:
+        unregister(name)
+
+
+@pytest.mark.parametrize("habit", HABITS, ids=lambda habit: ",".join(map(str, habit)) or "defaults")
+def test_the_profile_names_exactly_the_option_values_in_force(cell, habit):
+    options = EpsonOptions(**habit)
+    found = verify_epson(cell(EpsonSimulator(seed=3, options=options))).options
+    in_force = {name: getattr(options, name) for name in found}
+    if options.rc_plus == 5:
+        in_force["extended_queries"] = False  # RC+ 5 has none, whatever the option says
+    assert found == in_force
+    assert set(found) >= ALWAYS_SETTLED
+    assert ("rc_plus" in found) is options.extended_queries
+
+
+def test_a_profile_makes_a_simulator_with_the_same_habits(cell, tmp_path):
+    options = EpsonOptions(terminator="lf", tool_listing="padded", where_width=8, true_value=1)
+    found = verify_epson(cell(EpsonSimulator(options=options)))
+    profile = tmp_path / "cell.json"
+    profile.write_text(json.dumps(found.profile()))
+    assert options_from_text(read_profile(profile)) == options
+
+
+def test_every_fact_has_a_finding_and_names_an_option_that_exists(cell):
+    found = verify_epson(cell(EpsonSimulator()))
+    assert all(fact.finding for fact in found.facts)
+    named = [fact.option for fact in found.facts if fact.option]
+    assert len(named) == len(set(named))
+    assert set(named) <= set(option_names())
+    ours = {"companion"}
+    assert {name for name in option_names() if "." not in name} - set(named) == ours
+
+
+def test_nothing_is_written_and_nothing_moves(cell):
+    simulator = EpsonSimulator()
+    before = simulator.machine.to_state()
+    verify_epson(cell(simulator))
+    assert simulator.machine.to_state() == before
+    assert simulator.machine.flash_writes == 0
+    assert simulator.condition.code == 0
+    asked = [text for _, direction, text in simulator.log if direction == ">"]
+    assert asked[-1] == "$Logout"
+    changing = ("$Set", "$Reset", "$Start", "$Stop", "$Abort", '$Execute,"TLSet ')
+    assert not any(text.startswith(changing) for text in asked)
+
+
+@pytest.mark.parametrize(
+    ("monitoring_only", "running"), [(True, True), (True, False), (False, True)]
+)
+def test_where_production_may_run_only_queries_are_sent(cell, monitoring_only, running):
+    simulator = EpsonSimulator(options=EpsonOptions(monitoring_only=monitoring_only))
+    url = cell(simulator)
+    if running:
+        simulator.panel.start_production()
+    found = verify_epson(url)
+    assert simulator.status_flags().running is running
+    assert simulator.condition.code == 0
+    asked = [text for _, direction, text in simulator.log if direction == ">"]
+    assert not any("Execute" in text or "Logout" in text for text in asked)
+    assert set(found.options) == {"status_flags", "extended_queries", "rc_plus", "terminator"}
+    why = {fact.option: fact.finding for fact in found.facts}
+    assert "program" in why["requests_end_with_segment"]
+
+
+def test_without_a_tool_what_tools_show_is_not_settled(cell):
+    simulator = EpsonSimulator()
+    for tool in simulator.machine.tools.defined():
+        simulator.machine.tools.select(0)
+        simulator.machine.tools.clear(tool)
+    found = verify_epson(cell(simulator))
+    assert {"tool_listing", "true_value"}.isdisjoint(found.options)
+    assert "where_width" in found.options
+
+
+def test_a_tool_turned_beyond_180_degrees_shows_that_angles_are_kept(cell):
+    simulator = EpsonSimulator()
+    simulator.machine.tools.set(5, ToolOffset(1, 2, 3, 200))
+    assert verify_epson(cell(simulator)).options["angle_wrap"] is False
+
+
+@pytest.mark.parametrize("failure", ["refusal", "text"])
+def test_a_fault_ends_the_statements_and_is_named(cell, failure):
+    fault = Fault(FaultAction.DEVICE_FAULT, match="Where", code=4711)
+    simulator = EpsonSimulator(options=EpsonOptions(execute_failure=failure), faults=[fault])
+    found = verify_epson(cell(simulator))
+    assert "point_coordinates" in found.options
+    assert "comma_blank" not in found.options
+    (why,) = [fact.finding for fact in found.facts if fact.option == "comma_blank"]
+    assert "4711" in why
+    statements = [text for _, _, text in simulator.log if text.startswith("$Execute")]
+    assert statements[-1] == '$Execute,"Where"'
+
+
+def test_a_text_that_nobody_knows_is_reported_and_not_guessed(cell, monkeypatch):
+    simulator = EpsonSimulator()
+    monkeypatch.setitem(MACHINE_FUNCTIONS, "tldef", (range(1, 2), lambda *_: "Yes"))
+    found = verify_epson(cell(simulator))
+    (fact,) = [fact for fact in found.facts if fact.option == "true_value"]
+    assert not fact.settled
+    assert "Yes" in fact.finding
+
+
+def test_the_login_is_in_no_transcript_and_one_attempt_is_made(cell):
+    simulator = EpsonSimulator(password=Secret("hush-4711"))
+    url = cell(simulator)
+    found = verify_epson(url, password=Secret("hush-4711"))
+    assert "hush" not in format_dialogue(found.dialogue)
+    with pytest.raises(LoginRefusedError):
+        verify_epson(url, password=Secret("wrong"))
+    logins = [text for _, _, text in simulator.log if text.startswith("$Login")]
+    assert len(logins) == 2
+
+
+@pytest.mark.parametrize("extended", [True, False])
+def test_a_redacted_transcript_names_no_serial_number_and_no_address(cell, extended):
+    simulator = EpsonSimulator(options=EpsonOptions(extended_queries=extended))
+    found = verify_epson(cell(simulator))
+    assert simulator.machine.serial in format_dialogue(found.dialogue)
+    shown = format_dialogue(redacted(found.dialogue)) + json.dumps(found.profile(redact=True))
+    for hidden in (simulator.machine.serial, "SIMULATED", simulator.url):
+        assert hidden not in shown
+
+
+def test_a_controller_on_a_socket_is_verified_as_well():
+    options = EpsonOptions(terminator="cr", requests_end_with_segment=True)
+    with serve_tcp(EpsonSimulator(options=options)) as host:
+        found = verify_epson(host.url).options
+    assert found["terminator"] == "cr"
+    assert found["requests_end_with_segment"] is True
+    assert found["flags_during_execute"] == "running"
+
+
+def test_a_redacted_transcript_can_be_replayed(cell, tmp_path, epson_replay):
+    options = EpsonOptions(true_value=1, tool_listing="padded")
+    found = verify_epson(cell(EpsonSimulator(options=options)))
+    said = tmp_path / "said.jsonl"
+    said.write_text(format_dialogue(redacted(found.dialogue)))
+    again = verify_epson(epson_replay(said))
+    assert again.options == found.options
+    assert again.about.robot_serials == ("***",)

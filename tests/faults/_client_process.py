@@ -1,0 +1,95 @@
+"""The real command line in a process of its own, to be killed or interrupted.
+
+Each process is forked from one small single-threaded server that has the command line loaded
+already: a new interpreter for every kill point would cost more than all the rest.
+"""
+
+import multiprocessing
+import os
+import signal
+import sys
+from collections.abc import Mapping, Sequence
+from multiprocessing.connection import wait
+from pathlib import Path
+
+_FORKS = multiprocessing.get_context("forkserver")
+_FORKS.set_forkserver_preload(
+    [
+        "__main__",
+        "robolink_cli.main",
+        "robolink_cli.calibrate",
+        "robolink_cli._calibrating",
+        "robolink_cli._password",
+        "robolink.transport._tcp",
+        "robolink_simulators.assist",
+        "rich.console",
+        "rich.table",
+        "platformdirs",
+        "json",
+        "uuid",
+    ]
+)
+
+_PATIENCE_S = 30.0
+
+
+class ClientProcess:
+    """``robolink ARGUMENTS`` as a process; what it printed stands in two files.
+
+    Args:
+        arguments: The command line.
+        environment: Added to this process's environment.
+        folder: Where its output goes.
+    """
+
+    def __init__(
+        self, arguments: Sequence[str], *, environment: Mapping[str, str], folder: Path
+    ) -> None:
+        self._out, self._err = folder / "client-stdout", folder / "client-stderr"
+        self._process = _FORKS.Process(
+            target=_robolink,
+            args=(list(arguments), dict(environment), str(self._out), str(self._err)),
+        )
+        self._process.start()
+
+    def signal(self, number: signal.Signals) -> None:
+        """Send it a signal."""
+        assert self._process.pid is not None
+        os.kill(self._process.pid, number)
+
+    def kill(self) -> None:
+        """Send SIGKILL and return when the process, and with it its socket, is gone."""
+        self.signal(signal.SIGKILL)
+        assert wait([self._process.sentinel], _PATIENCE_S), "it outlived SIGKILL"
+
+    def exit_code(self) -> int:
+        """Wait for its end and return the exit code, negative for a signal."""
+        assert wait([self._process.sentinel], _PATIENCE_S), f"it hangs; {self.err}"
+        self._process.join()
+        code = self._process.exitcode
+        self._process.close()
+        assert code is not None
+        return code
+
+    @property
+    def out(self) -> str:
+        """What it wrote to stdout."""
+        return self._out.read_text()
+
+    @property
+    def err(self) -> str:
+        """What it wrote to stderr."""
+        return self._err.read_text()
+
+
+def _robolink(
+    arguments: list[str], environment: Mapping[str, str], out_path: str, err_path: str
+) -> None:
+    os.environ.update(environment)
+    for number, path in ((1, out_path), (2, err_path)):
+        os.dup2(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600), number)
+    # A shell that starts a test run in the background has SIGINT ignored.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    from robolink_cli.main import run
+
+    sys.exit(run(arguments))

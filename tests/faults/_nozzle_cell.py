@@ -1,0 +1,162 @@
+"""A served cell whose nozzle was changed, and what may be found in it after a mishap."""
+
+import contextlib
+import io
+import re
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from robolink_cli import main
+from robolink_simulators.assist import serve_assist
+from robolink_simulators.clock import ScaledClock
+from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.epson.options import EpsonOptions
+from robolink_simulators.hosting.tcp import serve_tcp
+from robolink_simulators.world import STORED
+
+from robolink.markers import FileOutcomeLog
+from robolink.model import Marker, Secret, ToolOffset
+from tests.faults._client_process import ClientProcess
+from tests.faults._requests import changes
+
+SPEED = 200.0
+"""Simulated seconds per real second. The remote time-out is off: it would be 0.3 s."""
+
+FAST = (30, 40, 50)
+"""Speed of the cell's own program, which a calibration must leave as it found it."""
+
+OLD_TIP = STORED
+"""What tool 1 holds before the nozzle change."""
+
+MOVE = re.compile(r'\$Execute,"(Move|Go) ')
+_EXPECTED = re.compile(
+    r'\$Execute,"(Tool [01]|TLSet 1, XY\(.*\)|Power (Low|High)|SpeedS? [\d., ]+'
+    r'|(Move|Go) XY\(.*\).*)"|\$Abort'
+)
+"""All that a calibration of tool 1 may ask of a controller besides reading."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a command ended and what it showed."""
+
+    code: int
+    out: str
+    err: str
+
+
+class NozzleCell:
+    """A controller that holds the old tip in tool 1, with fast and high-power settings."""
+
+    def __init__(self, simulator: EpsonSimulator, url: str, assist_url: str, folder: Path) -> None:
+        self.simulator = simulator
+        self.url = url
+        self.assist_url = assist_url
+        self.folder = folder
+        self.state_folder = folder / "state"
+        machine = simulator.machine
+        machine.power_high, machine.parameters.speed = True, FAST
+        self._settings = self._settings_now()
+        self._others = self._all_but_tool_1()
+
+    @property
+    def calibration(self) -> list[str]:
+        """The command of the whole nozzle change."""
+        assist = ["--assist", self.assist_url]
+        return ["calibrate", "two-pose", "--tool", "1", "--yes", *assist]
+
+    def calibrate(self) -> ClientProcess:
+        """Start the whole nozzle change in a process of its own."""
+        return ClientProcess(
+            ["-c", self.url, *self.calibration, "--json"],
+            environment={"ROBOLINK_STATE_DIR": str(self.state_folder)},
+            folder=self.folder,
+        )
+
+    def run(self, *arguments: str) -> Outcome:
+        """Run another command, in this process."""
+        out, err = io.StringIO(), io.StringIO()
+        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+            code = main.run(["-c", self.url, *arguments])
+        return Outcome(code, out.getvalue(), err.getvalue())
+
+    def wait_at_rest(self) -> None:
+        """Wait until a movement that goes on without its client has ended."""
+        while self.simulator.status_flags().running:
+            time.sleep(0.002)
+
+    @property
+    def selected_tool(self) -> int:
+        """The tool in force, past the wire."""
+        return self.simulator.machine.tools.selected
+
+    @property
+    def tool_1(self) -> ToolOffset | None:
+        """What is stored, past the wire."""
+        return self.simulator.machine.tools.get(1)
+
+    @property
+    def requests(self) -> list[str]:
+        """What came in so far."""
+        return [text for _, direction, text in self.simulator.log if direction == ">"]
+
+    @property
+    def moves_requested(self) -> int:
+        """How many moves were asked for so far."""
+        return sum(MOVE.match(text) is not None for text in self.requests)
+
+    def open_markers(self) -> tuple[Marker, ...]:
+        """Return what the command line holds for unsettled."""
+        return FileOutcomeLog(self.url, self.state_folder / "outcomes").open_markers()
+
+    def check_nothing_else_was_written(self) -> None:
+        """Tool 1 holds the old or the measured value, written once at most; the rest stands."""
+        machine = self.simulator.machine
+        asked = changes(self.requests)
+        strange = [text for text in asked if not _EXPECTED.fullmatch(text)]
+        assert not strange, strange
+        written = [ToolOffset(*_numbers(text)) for text in asked if "TLSet" in text]
+        assert machine.flash_writes == len(written) <= 2
+        assert self.tool_1 == (written[-1] if written else OLD_TIP)
+        assert self._all_but_tool_1() == self._others
+        assert machine.arm.moves_started <= self.moves_requested
+
+    def check_settings_are_those_of_before(self) -> None:
+        """Tool, power and speed are as the cell's own program left them."""
+        assert self.selected_tool == 1
+        assert self._settings_now() == self._settings
+
+    def _settings_now(self) -> object:
+        machine = self.simulator.machine
+        return machine.power_high, machine.parameters.speed, machine.parameters.speed_s
+
+    def _all_but_tool_1(self) -> object:
+        machine = self.simulator.machine
+        others = {tool: value for tool, value in machine.tools.defined().items() if tool != 1}
+        return others, machine.outputs.get_byte(0), machine.memory.get_byte(0)
+
+
+@contextmanager
+def served_cell(
+    folder: Path, monkeypatch, *, speed: float = SPEED, password: str = "", **habits: Any
+) -> Iterator[NozzleCell]:
+    """Serve a cell; commands of this process share its state folder."""
+    folder.mkdir(parents=True)
+    options = EpsonOptions(**{"remote_timeout_s": 0, "login_timeout_s": 0, **habits})
+    simulator = EpsonSimulator(seed=1, password=Secret(password), options=options)
+    clock = ScaledClock(speed)
+    with ExitStack() as stack:
+        tcp = stack.enter_context(serve_tcp(simulator, clock=clock))
+        assist = stack.enter_context(serve_assist(simulator, clock=clock))
+        cell = NozzleCell(simulator, tcp.url, assist.url, folder)
+        monkeypatch.setenv("ROBOLINK_STATE_DIR", str(cell.state_folder))
+        yield cell
+
+
+def _numbers(statement: str) -> list[float]:
+    inside = statement.partition("(")[2].partition(")")[0]
+    return [float(number) for number in inside.split(",")]

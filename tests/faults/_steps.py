@@ -1,0 +1,75 @@
+"""Which exchanges of a nozzle change are disturbed, and when."""
+
+import os
+import re
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from queue import SimpleQueue
+from typing import Final, Literal
+
+from tests.faults._client_process import ClientProcess
+from tests.faults._nozzle_cell import NozzleCell
+
+Moment = Literal["before it is carried out", "before its answer leaves"]
+MOMENTS: Final[tuple[Moment, Moment]] = (
+    "before it is carried out",
+    "before its answer leaves",
+)
+
+SHARES: Final = 8
+"""Into so many tests the steps are dealt, so that several workers can share them."""
+
+_EVERY = 24
+"""Of all other exchanges, every 24th makes the sample."""
+
+_MATTERS = re.compile(r'\$(Log|Execute,"(Tool \d|TLSet \d|Move |Go ))')
+"""Logs in or out, selects, writes or moves."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """One instant of a nozzle change: an exchange by its running number, and a moment of it."""
+
+    number: int
+    moment: Moment
+    request: str
+
+    def __str__(self) -> str:
+        return f"exchange {self.number}, {self.moment}: {self.request}"
+
+
+def steps_of(requests: list[str], share: int) -> list[Step]:
+    """Return the steps to disturb: all of them, or without the switch a fixed sample."""
+    all_of_them = os.environ.get("ROBOLINK_ALL_KILL_POINTS") == "1"
+    chosen = [
+        Step(number, moment, request)
+        for number, request in enumerate(requests, start=1)
+        for moment in MOMENTS
+        if all_of_them or number % _EVERY == 1 or _MATTERS.match(request)
+    ]
+    return chosen[share::SHARES]
+
+
+def disturbed(cell: NozzleCell, step: Step, act: Callable[[ClientProcess], None]) -> ClientProcess:
+    """Start a nozzle change and hold the wire at ``step`` while ``act`` is done to its process."""
+    started: SimpleQueue[ClientProcess] = SimpleQueue()
+    reached = threading.Event()
+
+    def hold(number: int, _text: str) -> None:
+        if number == step.number and not reached.is_set():
+            act(started.get(timeout=30))
+            reached.set()
+
+    simulator = cell.simulator
+    with simulator.lock:
+        if step.moment == MOMENTS[0]:
+            simulator.on_request = hold
+        else:
+            simulator.on_reply = hold
+    client = cell.calibrate()
+    started.put(client)
+    assert reached.wait(30), "the step was not reached"
+    with simulator.lock:
+        simulator.on_request = simulator.on_reply = None
+    return client

@@ -1,0 +1,146 @@
+"""Ctrl-C at each step of a nozzle change: the tool, power and speed of before are put back.
+
+Until the verification has passed, an interrupted change ends with the old value in tool 1: it
+was not written, or it is written back, and that is said. From then on the new value is kept.
+Steps are taken as in the test of kill points; ``ROBOLINK_ALL_KILL_POINTS=1`` takes all.
+"""
+
+import math
+import signal
+from dataclasses import dataclass, field
+
+import pytest
+from robolink_cli._operator import AssistedOperator
+from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.hosting.in_process import register, unregister
+
+import robolink
+from robolink.controllers.epson._operation_gate import OperationGate
+from robolink.markers import MemoryOutcomeLog
+from robolink.nozzle_change import ChangePlan, NozzleChange
+from tests.faults._nozzle_cell import OLD_TIP, NozzleCell, served_cell
+from tests.faults._steps import SHARES, Step, disturbed, steps_of
+
+pytestmark = pytest.mark.timeout(600)
+
+POSE = '$Execute,"Print RealPos"'
+
+
+@pytest.fixture(scope="module")
+def requests(tmp_path_factory):
+    """What a nozzle change asks of the controller when nothing disturbs it."""
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        with served_cell(tmp_path_factory.mktemp("whole") / "cell", monkeypatch) as cell:
+            client = cell.calibrate()
+            assert client.exit_code() == 0, client.err
+            return cell.requests
+
+
+def check(cell: NozzleCell, step: Step, *, verified: bool) -> None:
+    client = disturbed(cell, step, lambda client: client.signal(signal.SIGINT))
+    code = client.exit_code()
+    assert code == 130, client.err
+    assert not cell.simulator.status_flags().running, "the robot still moves"
+    assert cell.requests.count("$Abort") <= 1
+    cell.check_nothing_else_was_written()
+    cell.check_settings_are_those_of_before()
+    assert cell.open_markers() == (), client.err
+    if verified:
+        assert cell.tool_1 != OLD_TIP
+        kept = ("Tool 1 keeps the new value", "Tool 1 was written and read back")
+        assert any(sentence in client.err for sentence in kept), client.err
+    else:
+        assert cell.tool_1 == OLD_TIP, client.err
+    if cell.simulator.machine.flash_writes == 2:
+        assert "The old value of tool 1 was written back" in client.err
+
+
+@pytest.mark.parametrize("share", range(SHARES))
+def test_ctrl_c_at_each_step_leaves_no_tool_selected_that_is_not_the_cell_s_own(
+    tmp_path, monkeypatch, requests, share
+):
+    poses = [number for number, text in enumerate(requests, start=1) if text == POSE]
+    steps = steps_of(requests, share)
+    for step in steps:
+        folder = tmp_path / f"{step.number}-{step.moment[:10]}"
+        with served_cell(folder, monkeypatch) as cell:
+            try:
+                check(cell, step, verified=step.number > poses[-1])
+            except AssertionError as error:
+                error.add_note(f"interrupted at {step}")
+                raise
+    print(f"{len(steps)} steps of {2 * len(requests)}")  # noqa: T201 - for pytest -s
+
+
+class InterruptingLog(MemoryOutcomeLog):
+    """Presses Ctrl-C just after the marker number ``at`` was written or cleared."""
+
+    def __init__(self, at: float) -> None:
+        super().__init__()
+        self.changes = 0
+        self._at = at
+
+    def begin(self, marker):
+        super().begin(marker)
+        self._changed()
+
+    def clear(self, operation):
+        super().clear(operation)
+        self._changed()
+
+    def _changed(self) -> None:
+        self.changes += 1
+        if self.changes == self._at:
+            signal.raise_signal(signal.SIGINT)
+
+
+@dataclass
+class Change:
+    """A nozzle change in this process, and what was said during it."""
+
+    simulator: EpsonSimulator = field(default_factory=lambda: EpsonSimulator(seed=1))
+    said: list[str] = field(default_factory=list)
+
+    def run(self, outcomes: InterruptingLog) -> None:
+        def look():
+            seen = self.simulator.world.operator.look(1)
+            return seen.dx_mm, seen.dy_mm, seen.dz_mm
+
+        with robolink.connect(register("interrupted", self.simulator), outcomes=outcomes) as robot:
+            operator = AssistedOperator(look, self.said.append)
+            plan = ChangePlan(1, ask_before_write=False)
+            NozzleChange(robot, plan, operator=operator, show=lambda proposal: None).run()
+
+
+def test_ctrl_c_while_a_marker_is_written_or_cleared_leaves_none_open():
+    undisturbed = InterruptingLog(math.inf)
+    try:
+        Change().run(undisturbed)
+    finally:
+        unregister("interrupted")
+    for at in range(1, undisturbed.changes + 1):
+        change, outcomes = Change(), InterruptingLog(at)
+        with pytest.raises(KeyboardInterrupt):
+            try:
+                change.run(outcomes)
+            finally:
+                unregister("interrupted")
+        machine = change.simulator.machine
+        assert outcomes.open_markers() == (), at
+        assert machine.tools.selected == 1, at
+        assert not change.simulator.status_flags().running, at
+        kept = "Tool 1 keeps the new value." in change.said
+        assert (machine.tools.get(1) == OLD_TIP) is not kept, at
+
+
+def test_ctrl_c_waits_for_the_outermost_of_two_operations():
+    gate, reached = OperationGate(), []
+    gate.open()
+    try:
+        with pytest.raises(KeyboardInterrupt), gate:
+            with gate:
+                signal.raise_signal(signal.SIGINT)
+            reached.append("end of the operation")
+    finally:
+        gate.close()
+    assert reached

@@ -9,6 +9,7 @@ SHELL := /bin/bash
 PYTHON ?= $(firstword $(foreach name,python3.11 python3.12 python3.13 python3,$(shell command -v $(name))) python3)
 VENV := .venv
 BIN := $(VENV)/bin
+WHEELHOUSE := wheelhouse
 POT := robolink/locale/robolink.pot
 
 .PHONY: help
@@ -44,9 +45,21 @@ messages: $(VENV)/.installed-dev ## Collect every sentence shown to a person.
 build: $(VENV)/.installed-dev ## Build the wheel and the source archive into dist/.
 	$(BIN)/python -m hatchling build -t sdist -t wheel
 
+# Of every run-time dependency a wheel is taken, none is built: the offline PC has no compiler.
+GATHER = $(BIN)/python -m pip download --quiet --only-binary=:all: --python-version=3.11 \
+	--implementation=cp $(WHEELHOUSE)/robolink-*.whl
+
+.PHONY: wheelhouse
+wheelhouse: $(VENV)/.installed-dev ## Gather all wheels for a PC without network: linux, win_amd64.
+	rm -rf $(WHEELHOUSE)
+	$(BIN)/python -m hatchling build -t wheel -d $(WHEELHOUSE)
+	$(GATHER) --platform=manylinux2014_x86_64 --dest=$(WHEELHOUSE)/linux
+	$(GATHER) --platform=win_amd64 --dest=$(WHEELHOUSE)/win_amd64
+	rm $(WHEELHOUSE)/robolink-*.whl
+
 .PHONY: clean
 clean: ## Remove everything that was made.
-	rm -rf $(VENV) dist build .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) $(WHEELHOUSE) dist build .pytest_cache .mypy_cache .ruff_cache .hypothesis
 
 # A stamp is written last, so that a set-up that was interrupted is made again.
 $(VENV)/.installed-dev: $(VENV)/.installed

@@ -17,13 +17,17 @@ from types import FrameType, TracebackType
 class InterruptGate:
     """Holds back SIGINT while the main thread is inside the gate; a context manager.
 
+    It may be entered inside itself, because some operations are several exchanges: a write
+    is not done before it has been read back, and a movement is not under way before whoever
+    could abort it knows of it. The outermost end lets Ctrl-C out.
+
     It stands aside where it is not needed: outside the main thread, where Python delivers no
     signals, and where the program has a SIGINT handler of its own.
     """
 
     def __init__(self) -> None:
         self._open = False
-        self._inside = False
+        self._depth = 0
         self._held = False
 
     def open(self) -> None:
@@ -44,7 +48,7 @@ class InterruptGate:
 
     def __enter__(self) -> None:
         if self._open and threading.get_ident() == _MAIN:
-            self._inside = True
+            self._depth += 1
 
     def __exit__(
         self,
@@ -52,14 +56,14 @@ class InterruptGate:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        if self._inside and threading.get_ident() == _MAIN:
-            self._inside = False
-            if self._held:
+        if self._depth and threading.get_ident() == _MAIN:
+            self._depth -= 1
+            if self._held and not self._depth:
                 self._held = False
                 raise KeyboardInterrupt
 
     def _interrupted(self, number: int, frame: FrameType | None) -> None:
-        if self._inside:
+        if self._depth:
             self._held = True
         else:
             signal.default_int_handler(number, frame)

@@ -37,11 +37,10 @@ def show_backup(backup: Backup, file: Path) -> None:
     )
     say(
         tr(
-            "Saved in {file}: {defined} defined tools, {undefined} undefined, tool {selected} in "
-            "force.",
+            "Saved in {file}: {defined} of {count} tools are defined, tool {selected} is in force.",
             file=file,
             defined=sum(offset is not None for offset in tools.values()),
-            undefined=sum(offset is None for offset in tools.values()),
+            count=len(tools),
             selected=backup.state.selected,
         )
     )
@@ -96,7 +95,7 @@ def show_comparison(comparison: Comparison, tolerance: Tolerance, identity: str)
         )
     elif rows:
         numbers = ", ".join(str(tool.tool) for tool in comparison.differing)
-        say(tr("Different: tools {numbers}.", numbers=numbers))
+        say(tr("Different tools: {numbers}.", numbers=numbers))
 
 
 def _tool_payload(tool: ToolComparison) -> dict[str, object]:

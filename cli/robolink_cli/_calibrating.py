@@ -150,12 +150,12 @@ class Bench:
         if self._assist_url is None:
             yield terminal()
             return
-        from robolink_simulators.assist import AssistClient
+        from robolink_simulators.assist import open_eyes
 
-        with AssistClient(self._assist_url) as client:
+        with open_eyes(self._assist_url) as eyes:
 
             def look() -> tuple[float, float, float]:
-                seen = client.look(self._plan.tool)
+                seen = eyes.look(self._plan.tool)
                 return seen.dx_mm, seen.dy_mm, seen.dz_mm
 
             yield AssistedOperator(look, note)

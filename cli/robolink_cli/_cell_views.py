@@ -53,7 +53,7 @@ def show_check(payload: Mapping[str, Any]) -> None:
         state = tr("wrong") if entry["problems"] else tr("right")
         say(f"{entry['path']}: {state}")
         for problem in entry["problems"]:
-            say(f"    {problem['where']}: {problem['what']}".replace("    : ", "    "))
+            say("    " + ": ".join(filter(None, (problem["where"], problem["what"]))))
     if payload["disagreement"]:
         say(payload["disagreement"])
     if not payload["files"]:

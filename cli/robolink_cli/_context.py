@@ -17,13 +17,14 @@ from robolink_cli._cell import (
     link_options,
     require_expected_robot,
 )
+from robolink_cli._notices import marker_notice
 from robolink_cli._recording import recording
 from robolink_cli._render import emit_json, json_is_on, note, say, switch_json_on
 
 if TYPE_CHECKING:
     from robolink.config import Cell
     from robolink.controllers.epson import EpsonController
-    from robolink.model import Marker, Secret
+    from robolink.model import Secret
 
 CommandT = TypeVar("CommandT", bound=Callable[..., Any])
 
@@ -191,29 +192,6 @@ def origin_of(option: str) -> str | None:
     """Return the option or variable by which a person gave ``option``, None when nobody did."""
     origins: dict[str, str] = click.get_current_context().meta.get(_ORIGINS, {})
     return origins.get(option)
-
-
-def marker_notice(marker: "Marker", url: str) -> str:
-    """Return what a person must know about an unsettled marker, and what settles it."""
-    from robolink.model import MarkerKind
-
-    if marker.kind is MarkerKind.SELECTION:
-        return tr(
-            "Not finished since {when}: {request}. Tool {now} is selected now; it was tool "
-            "{tool} before.\n  'robolink -c {url} resolve' puts tool {tool} back.",
-            when=marker.begun_at,
-            request=marker.request,
-            now=marker.details.get("now", "?"),
-            tool=marker.details.get("tool", "?"),
-            url=url,
-        )
-    return tr(
-        "Sent {when} and never answered: {request}. It may or may not have run, so motion is "
-        "blocked.\n  'robolink -c {url} resolve' settles it.",
-        when=marker.begun_at,
-        request=marker.request,
-        url=url,
-    )
 
 
 def _link_options(command: CommandT) -> CommandT:

@@ -39,21 +39,31 @@ def note(text: str) -> None:
 
 
 def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    """Show a person a table of numbers, aligned to the right."""
+    """Show a person a table: numbers to the right and whole, words to the left and folded."""
     from rich import box
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
 
+    cells = [[str(cell) for cell in row] for row in rows]
     shown = Table(title=Text(title), title_justify="left", box=box.SIMPLE_HEAD)
-    for column in columns:
-        shown.add_column(Text(column), justify="right", no_wrap=True)
-    for row in rows:
-        shown.add_row(*(Text(str(cell)) for cell in row))
+    for number, column in enumerate(columns):
+        if all(_is_figure(row[number]) for row in cells):
+            shown.add_column(Text(column), justify="right", no_wrap=True)
+        else:
+            shown.add_column(Text(column), overflow="fold")
+    for row in cells:
+        shown.add_row(*(Text(cell) for cell in row))
     console = Console(stderr=json_is_on(), highlight=False)
     if not console.is_terminal:
-        console.width = 1000  # nothing may be cut to an assumed width of 80
+        console.width = 1000  # nothing may be folded to an assumed width of 80
     console.print(shown, crop=False)
+
+
+def _is_figure(cell: str) -> bool:
+    """Tell whether a cell holds a number, a number with a mark, or nothing."""
+    digits = cell.strip().lstrip("*+-").replace(".", "", 1)
+    return digits.isdigit() or not digits
 
 
 def emit_json(schema: str, payload: Mapping[str, object]) -> None:

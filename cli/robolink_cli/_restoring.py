@@ -66,4 +66,4 @@ class Restoration:
             say(tr("The controller holds this already; nothing was written."))
         elif self._plan.changes:
             numbers = ", ".join(str(change.tool) for change in self._plan.changes)
-            say(tr("Restored and read back: tools {numbers}.", numbers=numbers))
+            say(tr("Tools restored and read back: {numbers}.", numbers=numbers))

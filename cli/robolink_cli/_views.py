@@ -6,7 +6,7 @@ from contextlib import suppress
 from robolink.calibration import VerifyResult
 from robolink.controllers.epson import EpsonController, Finding
 from robolink.errors import RejectedError, ToolError
-from robolink.model import Pose, ToolOffset, ToolReceipt
+from robolink.model import ControllerState, Pose, ToolOffset, ToolReceipt
 from robolink.nozzle_change import Proposal
 
 COMPONENTS = ("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
@@ -120,7 +120,7 @@ def status_payload(controller: EpsonController) -> dict[str, object]:
         payload["text"] = controller.error_text(status.code)
     with suppress(RejectedError):  # older firmware has no alarms
         payload["alarms"] = list(controller.alarms.list())
-    if status.remote and status.ready and not (status.fault or status.guard_open):
+    if status.state is ControllerState.READY:
         # A controller that serves monitoring only may not show it in its flags.
         with suppress(RejectedError):
             payload["selected_tool"] = controller.tools.selected()

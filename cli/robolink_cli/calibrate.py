@@ -85,7 +85,7 @@ def calibrate() -> None:
 @click.option(
     "--assist",
     metavar="URL",
-    help="A simulator's assist URL: its operator brings the tip onto the pin.",
+    help="A simulator's assist or sim URL: its operator brings the tip onto the pin.",
 )
 @pose_source_options
 @impact_options

@@ -9,7 +9,7 @@ from robolink_cli._context import json_option
 @click.option("--seed", type=int, default=1, show_default=True, help="Another cell, another tip.")
 @click.option(
     "--speed",
-    type=click.FloatRange(1, 1000),
+    type=click.FloatRange(1, 100),
     default=20.0,
     show_default=True,
     help="How many times faster than real the simulated time passes.",

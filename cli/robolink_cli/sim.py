@@ -116,6 +116,23 @@ def epson(
     _serve(simulator, listen, speed=speed, allow_remote=allow_remote)
 
 
+@sim.command()
+@click.argument("url")
+@click.argument("act")
+@click.argument("values", nargs=-1, metavar="[NAME=NUMBER]...")
+@json_option
+def assist(url: str, act: str, values: tuple[str, ...]) -> None:
+    """Be the person at a simulated cell: press its buttons, teach its points, see its truth.
+
+    URL is the assist URL that 'robolink sim epson' prints. Acts are for example press_estop,
+    release_estop, open_guard, teach, auto, teach_point number=901 u_deg=180, truth; an unknown
+    one lists them all.
+    """
+    from robolink_cli._assisting import do_act
+
+    do_act(url, act, values)
+
+
 def _serve(
     simulator: "EpsonSimulator", address: tuple[str, int], *, speed: float, allow_remote: bool
 ) -> None:

@@ -31,10 +31,21 @@ from robolink.calibration._touch import verify_by_turning as verify_by_turning
 from robolink.calibration._two_pose import solve_two_pose as solve_two_pose
 
 if TYPE_CHECKING:
+    from robolink.calibration._beams import Beam as Beam
+    from robolink.calibration._beams import Crossing as Crossing
+    from robolink.calibration._beams import find_beams as find_beams
     from robolink.calibration._board import solve_board as solve_board
     from robolink.calibration._board_fit import solve_board_fit as solve_board_fit
     from robolink.calibration._camera import Sighting as Sighting
     from robolink.calibration._camera import solve_up_camera as solve_up_camera
+    from robolink.calibration._camera_affine import CameraCalibration as CameraCalibration
+    from robolink.calibration._camera_affine import PixelSighting as PixelSighting
+    from robolink.calibration._camera_affine import solve_camera_affine as solve_camera_affine
+    from robolink.calibration._camera_model import CameraLimits as CameraLimits
+    from robolink.calibration._camera_model import CameraModel as CameraModel
+    from robolink.calibration._camera_model import require_same_camera as require_same_camera
+    from robolink.calibration._crossed_beams import BeamsResult as BeamsResult
+    from robolink.calibration._crossed_beams import solve_crossed_beams as solve_crossed_beams
     from robolink.calibration._n_angle import solve_n_angle as solve_n_angle
     from robolink.calibration._needle_change import NeedleChain as NeedleChain
     from robolink.calibration._needle_change import NeedleChangeResult as NeedleChangeResult
@@ -43,22 +54,48 @@ if TYPE_CHECKING:
     from robolink.calibration._one_touch import Pin as Pin
     from robolink.calibration._one_touch import pin_touched as pin_touched
     from robolink.calibration._one_touch import solve_one_touch as solve_one_touch
+    from robolink.calibration._pivot import solve_pivot as solve_pivot
+    from robolink.calibration._pivot_fit import PivotDesign as PivotDesign
+    from robolink.calibration._pivot_fit import PivotFit as PivotFit
+    from robolink.calibration._pivot_fit import fit_pivot as fit_pivot
+    from robolink.calibration._pivot_fit import fit_pivot_robust as fit_pivot_robust
+    from robolink.calibration._pivot_fit import pivot_design as pivot_design
     from robolink.calibration._robust import Robust as Robust
     from robolink.calibration._rotations import quaternion_rotations as quaternion_rotations
     from robolink.calibration._rotations import rotation_of as rotation_of
     from robolink.calibration._rotations import uvw_deg as uvw_deg
     from robolink.calibration._rotations import zyz_deg as zyz_deg
+    from robolink.calibration._runout import RunoutReport as RunoutReport
+    from robolink.calibration._runout import runout_report as runout_report
+    from robolink.calibration._six_point import SixPointResult as SixPointResult
+    from robolink.calibration._six_point import ToolAxis as ToolAxis
+    from robolink.calibration._six_point import solve_six_point as solve_six_point
+    from robolink.calibration._six_point import solve_tool_axis as solve_tool_axis
     from robolink.calibration._update_guard import NEEDLE_LIMIT_MM as NEEDLE_LIMIT_MM
     from robolink.calibration._update_guard import Correction as Correction
     from robolink.calibration._update_guard import update_guard as update_guard
     from robolink.calibration._verify import PLACING_TOLERANCE_MM as PLACING_TOLERANCE_MM
     from robolink.calibration._verify import verify_drift as verify_drift
+    from robolink.calibration._z_touch import Touch as Touch
+    from robolink.calibration._z_touch import ZTouchResult as ZTouchResult
+    from robolink.calibration._z_touch import solve_z_touch as solve_z_touch
 
 _LOADED_LATER = {
+    "Beam": "_beams",
+    "Crossing": "_beams",
+    "find_beams": "_beams",
     "solve_board": "_board",
     "solve_board_fit": "_board_fit",
     "Sighting": "_camera",
     "solve_up_camera": "_camera",
+    "CameraCalibration": "_camera_affine",
+    "PixelSighting": "_camera_affine",
+    "solve_camera_affine": "_camera_affine",
+    "CameraLimits": "_camera_model",
+    "CameraModel": "_camera_model",
+    "require_same_camera": "_camera_model",
+    "BeamsResult": "_crossed_beams",
+    "solve_crossed_beams": "_crossed_beams",
     "solve_n_angle": "_n_angle",
     "NeedleChain": "_needle_change",
     "NeedleChangeResult": "_needle_change",
@@ -67,16 +104,31 @@ _LOADED_LATER = {
     "Pin": "_one_touch",
     "pin_touched": "_one_touch",
     "solve_one_touch": "_one_touch",
+    "solve_pivot": "_pivot",
+    "PivotDesign": "_pivot_fit",
+    "PivotFit": "_pivot_fit",
+    "fit_pivot": "_pivot_fit",
+    "fit_pivot_robust": "_pivot_fit",
+    "pivot_design": "_pivot_fit",
     "Robust": "_robust",
     "quaternion_rotations": "_rotations",
     "rotation_of": "_rotations",
     "uvw_deg": "_rotations",
     "zyz_deg": "_rotations",
+    "RunoutReport": "_runout",
+    "runout_report": "_runout",
+    "SixPointResult": "_six_point",
+    "ToolAxis": "_six_point",
+    "solve_six_point": "_six_point",
+    "solve_tool_axis": "_six_point",
     "Correction": "_update_guard",
     "NEEDLE_LIMIT_MM": "_update_guard",
     "update_guard": "_update_guard",
     "PLACING_TOLERANCE_MM": "_verify",
     "verify_drift": "_verify",
+    "Touch": "_z_touch",
+    "ZTouchResult": "_z_touch",
+    "solve_z_touch": "_z_touch",
 }
 
 

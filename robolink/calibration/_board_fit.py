@@ -13,17 +13,19 @@ from robolink.calibration._board import SPACING_TOLERANCE, check_spacing
 from robolink.calibration._camera import Sighting, check_sightings
 from robolink.calibration._checks import keep_unmeasured
 from robolink.calibration._finite import require_finite
+from robolink.calibration._judging import judged
 from robolink.calibration._planar import Complexes
 from robolink.calibration._planar_checks import require_poses
 from robolink.calibration._result import CalibrationResult
 from robolink.calibration._robust import Floats
-from robolink.calibration._scatter import Scatter
 from robolink.calibration._tolerance import PLANAR_TOLERANCE, Tolerance
 from robolink.errors import CalibrationError
 from robolink.messages import tr
 from robolink.model import ToolOffset, rotate_xy
 
 UNKNOWNS = 3
+
+_KEPT = ("z_mm", "v_deg", "w_deg")
 
 
 def solve_board_fit(
@@ -63,13 +65,7 @@ def solve_board_fit(
     origin = complex(seen.mean() - turn * drawing.mean())
     residuals = seen - origin - turn * drawing
     unit = _unit_covariance(turn, drawing)
-    total, dof = float((np.abs(residuals) ** 2).sum()), 2 * len(seen) - UNKNOWNS
-    scatter = Scatter.of(total, dof, sigma_mm)
-    rms, worst = math.sqrt(total / len(seen)), float(np.abs(residuals).max())
-    covariance = scale_covariance(unit, scatter)
-    if scatter and scatter.contradicted_by(total, dof):
-        warnings = (*warnings, "sigma_too_small")
-    return CalibrationResult(
+    result = CalibrationResult(
         method="board_fit",
         offset=keep_unmeasured(
             stored,
@@ -78,29 +74,23 @@ def solve_board_fit(
             u_deg=math.degrees(math.atan2(turn.imag, turn.real)),
         ),
         measured=("x_mm", "y_mm", "u_deg"),
-        kept=("z_mm", "v_deg", "w_deg"),
+        kept=_KEPT,
         reference_point_mm=(),
         sigma_gain=float(np.sqrt(max(unit[0, 0], unit[1, 1]))),
-        warnings=(*warnings, *tolerance.doubts(rms, worst)),
+        warnings=warnings,
         inputs=tuple(sighting.flange for sighting in sightings),
-        covariance=covariance,
-        half_width95=scatter.half_widths(covariance) if scatter else (),
-        sigma_mm=scatter.sigma_mm if scatter else None,
-        sigma_stated=sigma_mm is not None,
-        rms_mm=rms,
-        max_residual_mm=worst,
         residuals_mm=_in_base(residuals, sightings),
         rank=UNKNOWNS,
-        dof=dof,
-        unobservable=("z_mm", "v_deg", "w_deg"),
+        unobservable=_KEPT,
     )
-
-
-def scale_covariance(unit: Floats, scatter: Scatter | None) -> tuple[tuple[float, ...], ...]:
-    """Return a covariance for sigma = 1 as nested tuples for the sigma that is known."""
-    if scatter is None:
-        return ()
-    return tuple(map(tuple, (unit * scatter.sigma_mm**2).tolist()))
+    return judged(
+        result,
+        residuals.view(float).reshape(-1, 2),
+        unit,
+        unknowns=UNKNOWNS,
+        sigma_mm=sigma_mm,
+        tolerance=tolerance,
+    )
 
 
 def _turn(seen: Complexes, drawing: Complexes) -> complex:

@@ -5,17 +5,16 @@ from collections.abc import Sequence
 import numpy as np
 
 from robolink.calibration._checks import keep_unmeasured
+from robolink.calibration._judging import judged
 from robolink.calibration._planar import (
     UNKNOWNS,
     Complexes,
-    PlanarFit,
     fit_planar,
     fit_planar_robust,
 )
 from robolink.calibration._planar_checks import MIN_ROTATION_DEG, check_planar
 from robolink.calibration._result import CalibrationResult
 from robolink.calibration._robust import Mask, Robust
-from robolink.calibration._scatter import Scatter
 from robolink.calibration._tolerance import PLANAR_TOLERANCE, Tolerance
 from robolink.model import Pose, ToolOffset
 
@@ -23,6 +22,8 @@ RECOMMENDED_POSES = 4
 
 # Two poses always agree with each other: more have to confirm them before any is an outlier.
 _ROBUST_POSES = 4
+
+_KEPT = ("z_mm", "u_deg", "v_deg", "w_deg")
 
 
 def solve_n_angle(
@@ -76,54 +77,32 @@ def solve_n_angle(
             min_rotation_deg=min_rotation_deg,
             allow_mixed_hand=allow_mixed_hand,
         )
-    return _result(poses, fit, kept, warnings, stored=stored, sigma_mm=sigma_mm, limits=tolerance)
+    result = CalibrationResult(
+        method="n_angle",
+        offset=keep_unmeasured(stored, x_mm=fit.tip.real, y_mm=fit.tip.imag),
+        measured=("x_mm", "y_mm"),
+        kept=_KEPT,
+        reference_point_mm=(fit.point.real, fit.point.imag),
+        sigma_gain=fit.sigma_gain,
+        warnings=warnings,
+        inputs=tuple(poses),
+        residuals_mm=tuple((e.real, e.imag) for e in fit.residuals.tolist()),
+        rejected=tuple(np.flatnonzero(~kept).tolist()),
+        condition_number=fit.condition_number,
+        rank=UNKNOWNS,
+        unobservable=_KEPT,
+    )
+    return judged(
+        result,
+        fit.residuals[kept].view(float).reshape(-1, 2),
+        np.eye(2) * fit.sigma_gain**2,
+        unknowns=UNKNOWNS,
+        sigma_mm=sigma_mm,
+        tolerance=tolerance,
+    )
 
 
 def planar_arrays(poses: Sequence[Pose]) -> tuple[Complexes, Complexes]:
     """Return flange positions x + iy in mm and orientations exp(iU)."""
     table = np.array([(pose.x_mm, pose.y_mm, pose.u_deg) for pose in poses])
     return table[:, 0] + 1j * table[:, 1], np.exp(1j * np.radians(table[:, 2]))
-
-
-def _result(
-    poses: Sequence[Pose],
-    fit: PlanarFit,
-    kept: Mask,
-    warnings: tuple[str, ...],
-    *,
-    stored: ToolOffset | None,
-    sigma_mm: float | None,
-    limits: Tolerance,
-) -> CalibrationResult:
-    squares = np.abs(fit.residuals[kept]) ** 2
-    total, count = float(squares.sum()), int(np.count_nonzero(kept))
-    dof = 2 * count - UNKNOWNS
-    scatter = Scatter.of(total, dof, sigma_mm)
-    rms = float(np.sqrt(total / count)) if dof else None
-    worst = float(np.sqrt(squares.max())) if dof else None
-    if scatter and scatter.contradicted_by(total, dof):
-        warnings = (*warnings, "sigma_too_small")
-    variance = (scatter.sigma_mm * fit.sigma_gain) ** 2 if scatter else 0.0
-    covariance = ((variance, 0.0), (0.0, variance)) if scatter else ()
-    return CalibrationResult(
-        method="n_angle",
-        offset=keep_unmeasured(stored, x_mm=fit.tip.real, y_mm=fit.tip.imag),
-        measured=("x_mm", "y_mm"),
-        kept=("z_mm", "u_deg", "v_deg", "w_deg"),
-        reference_point_mm=(fit.point.real, fit.point.imag),
-        sigma_gain=fit.sigma_gain,
-        warnings=(*warnings, *limits.doubts(rms, worst)),
-        inputs=tuple(poses),
-        covariance=covariance,
-        half_width95=scatter.half_widths(covariance) if scatter else (),
-        sigma_mm=scatter.sigma_mm if scatter else None,
-        sigma_stated=sigma_mm is not None,
-        rms_mm=rms,
-        max_residual_mm=worst,
-        residuals_mm=tuple((e.real, e.imag) for e in fit.residuals.tolist()),
-        rejected=tuple(np.flatnonzero(~kept).tolist()),
-        condition_number=fit.condition_number,
-        rank=UNKNOWNS,
-        dof=dof,
-        unobservable=("z_mm", "u_deg", "v_deg", "w_deg"),
-    )

@@ -7,6 +7,8 @@ that a web page which posts to the port gets nothing done.
 
 import json
 import socket
+from collections.abc import Iterator
+from contextlib import contextmanager
 from types import TracebackType
 from typing import Any, Final, Self
 from urllib.parse import urlsplit
@@ -18,10 +20,12 @@ from robolink_simulators.clock import ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.refusals import Refusal
 from robolink_simulators.hosting._tcp_host import TcpHost
+from robolink_simulators.hosting.in_process import simulator_named
 from robolink_simulators.world import Look
 
 _MAX_LINE: Final = 65536
 _SCHEME: Final = "assist+tcp"
+_IN_PROCESS: Final = "epson+sim://"
 
 
 def serve_assist(simulator: EpsonSimulator, *, port: int = 0, clock: ScaledClock) -> TcpHost:
@@ -179,3 +183,34 @@ class AssistClient:
             tr("The simulator behind {url} is gone.", url=self._url),
             remedy=tr("Start it again."),
         )
+
+
+class InProcessEyes:
+    """Looks at a simulator of this process, as :class:`AssistClient` does at a served one."""
+
+    def __init__(self, simulator: EpsonSimulator) -> None:
+        self._simulator = simulator
+
+    def look(self, tool: int | None = None) -> Look:
+        """Return the vector, in base axes, that the operator sees from the tip to the pin."""
+        with self._simulator.lock:
+            return self._simulator.world.operator.look(tool)
+
+
+@contextmanager
+def open_eyes(url: str) -> Iterator[AssistClient | InProcessEyes]:
+    """Open the operator's eyes on a simulator.
+
+    Args:
+        url: An assist URL, or ``epson+sim://NAME`` for a simulator of this process.
+
+    Raises:
+        ConfigError: It is neither, or no simulator has that name.
+        ConnectError: Nobody listens there.
+    """
+    if url.startswith(_IN_PROCESS):
+        name = urlsplit(url).hostname or ""
+        yield InProcessEyes(simulator_named(name))
+    else:
+        with AssistClient(url) as client:
+            yield client

@@ -6,6 +6,7 @@ from typing import Any, Final
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink.model import Pose
 from robolink_simulators.epson.device import EpsonSimulator
 
 Answer = dict[str, object]
@@ -33,9 +34,23 @@ def _look(simulator: EpsonSimulator, request: Parameters) -> Answer:
 
 
 def _jog_onto_pin(simulator: EpsonSimulator, request: Parameters) -> Answer:
-    flange = simulator.world.operator.jog_onto_pin(_tool(request))
+    return {"flange": _shown(simulator.world.operator.jog_onto_pin(_tool(request)))}
+
+
+def _shown(flange: Pose) -> dict[str, float]:
     x_mm, y_mm, z_mm, u_deg, _, _ = flange.coordinates()
-    return {"flange": {"x_mm": x_mm, "y_mm": y_mm, "z_mm": z_mm, "u_deg": u_deg}}
+    return {"x_mm": x_mm, "y_mm": y_mm, "z_mm": z_mm, "u_deg": u_deg}
+
+
+def _teach_point(simulator: EpsonSimulator, request: Parameters) -> Answer:
+    u_deg = request.get("u_deg")
+    if not isinstance(u_deg, (int, float)) or not -360 <= u_deg <= 360:
+        raise ConfigError(
+            tr("{act} needs {name}, an angle.", act="teach_point", name="u_deg"),
+            remedy=tr("Give it as {example}.", example='"u_deg": 180'),
+        )
+    flange = simulator.world.operator.teach_point(_whole(request, "number"), float(u_deg))
+    return {"flange": _shown(flange)}
 
 
 def _change_nozzle(simulator: EpsonSimulator, request: Parameters) -> Answer:
@@ -81,6 +96,7 @@ def _numbered(name: str) -> Act:
 ACTS: Final[Mapping[str, Act]] = {
     "look": _look,
     "jog_onto_pin": _jog_onto_pin,
+    "teach_point": _teach_point,
     "truth": lambda simulator, _request: simulator.world.truth(),
     "counters": _counters,
     "change_nozzle": _change_nozzle,

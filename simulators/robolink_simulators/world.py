@@ -10,6 +10,7 @@ from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
 from robolink_simulators.epson.kinematics import Joints, inverse, tip_of
 from robolink_simulators.epson.machine import Machine
+from robolink_simulators.epson.points import Point
 
 STORED: Final = ToolOffset(12.0, -3.5, -20.0)
 """What the controller holds for tool 1 at first: the nozzle that was there before."""
@@ -163,11 +164,7 @@ class Operator:
             ConfigError: The controller is not in Teach mode, so the pendant moves nothing.
             OutOfReach: The arm cannot get there.
         """
-        if not self._pendant_live():
-            raise ConfigError(
-                tr("The pendant moves the arm in Teach mode only."),
-                remedy=tr("Turn the mode selector to Teach first."),
-            )
+        self._require_pendant()
         tool = MOUNTED_TOOL if tool is None else tool
         arm = self._world.machine.arm
         self._error = self._drawn_error()
@@ -183,6 +180,30 @@ class Operator:
         arm.place(inverse(arm.model, target, arm.hand), self._now_ns())
         self._placement = (arm.joints, tool)
         return arm.flange()
+
+    def teach_point(self, number: int, u_deg: float) -> Pose:
+        """Turn the tool to ``u_deg``, jog its tip onto the pin, teach the flange pose there.
+
+        As with Tool 0 selected on the pendant. Returns that pose.
+
+        Raises:
+            ConfigError: As :meth:`jog_onto_pin`.
+            OutOfReach: The arm cannot get there.
+        """
+        self._require_pendant()
+        arm = self._world.machine.arm
+        turned = replace(arm.flange(), u_deg=u_deg)
+        arm.place(inverse(arm.model, turned, arm.hand), self._now_ns())
+        flange = self.jog_onto_pin()
+        self._world.machine.points.store(number, Point.at(flange))
+        return flange
+
+    def _require_pendant(self) -> None:
+        if not self._pendant_live():
+            raise ConfigError(
+                tr("The pendant moves the arm in Teach mode only."),
+                remedy=tr("Turn the mode selector to Teach first."),
+            )
 
     def _take_up_position(self, tool: int) -> None:
         placement = (self._world.machine.arm.joints, tool)

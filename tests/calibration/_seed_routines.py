@@ -8,8 +8,9 @@ def atan2_x_first(x, y):
     return math.atan2(y, x)
 
 
-def in_tool_0(x, y, flange):
+def in_tool_0(seen, flange):
     """The polar steps that both routines share."""
+    x, y = seen
     x0, y0, u0 = flange
     dx, dy = x - x0, y - y0
     theta = atan2_x_first(dx, dy) - math.radians(u0)
@@ -19,12 +20,12 @@ def in_tool_0(x, y, flange):
 
 def calc_tool(tip, flange):
     """CalcTool: one look of an up-looking camera."""
-    return in_tool_0(*tip, flange)
+    return in_tool_0(tip, flange)
 
 
 def calc_board_tool(fiducial_1, flange_1, fiducial_2, flange_2):
     """CalcBoardTool: x, y and U of a board with two fiducials."""
-    x1, y1 = in_tool_0(*fiducial_1, flange_1)
-    x2, y2 = in_tool_0(*fiducial_2, flange_2)
+    x1, y1 = in_tool_0(fiducial_1, flange_1)
+    x2, y2 = in_tool_0(fiducial_2, flange_2)
     tool_u = math.degrees(atan2_x_first(x1 - x2, y1 - y2))
     return (x1 + x2) / 2, (y1 + y2) / 2, tool_u

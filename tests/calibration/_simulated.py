@@ -35,7 +35,9 @@ def rotation(u_deg, v_deg, w_deg):
 def pivoting(tip, angles_deg, *, pin=PIN):
     """Return the flange pose of a six-axis robot that puts ``tip`` on ``pin``."""
     position = np.array(pin) - rotation(*angles_deg) @ np.array(tip)
-    return Pose(*position.tolist(), *angles_deg, tool=0)
+    x, y, z = position.tolist()
+    u, v, w = angles_deg
+    return Pose(x, y, z, u, v, w, tool=0)
 
 
 def shaken(poses, random, sigma_mm, *, axes=2):

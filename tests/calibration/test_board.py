@@ -19,7 +19,7 @@ BOARD = (3.0, -2.0, 21.8)
 
 def seen_at(place, pose, noise=(0.0, 0.0), hand=None):
     """Return the sighting of what is at ``place`` in the flange's axes."""
-    dx, dy = rotate_xy(*place, pose[2])
+    dx, dy = rotate_xy(place[0], place[1], pose[2])
     flange = Pose(pose[0], pose[1], 0, pose[2], hand=hand, tool=0)
     return Sighting(flange, pose[0] + dx + noise[0], pose[1] + dy + noise[1])
 

@@ -13,6 +13,7 @@ FLANGE = Pose(300, 90, -10, 130, tool=0)
 OLD = ToolOffset(12, -3, -20, 30)
 SIGMA = 0.01
 FRESH = NeedleChain(0.01)
+USUAL = NeedleLimits()
 
 
 def seen(tip, noise=(0.0, 0.0, 0.0), bias=(0.0, 0.0, 0.0)):
@@ -21,7 +22,7 @@ def seen(tip, noise=(0.0, 0.0, 0.0), bias=(0.0, 0.0, 0.0)):
     return tuple(a + b + c for a, b, c in zip(place, noise, bias, strict=True))
 
 
-def change(new, *, dimensions=3, chain=FRESH, limits=NeedleLimits(), **shake):
+def change(new, *, dimensions=3, chain=FRESH, limits=USUAL, **shake):
     before = seen(OLD, **{k: v for k, v in shake.items() if k == "bias"})
     return solve_needle_change(
         FLANGE,

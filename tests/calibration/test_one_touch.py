@@ -44,7 +44,8 @@ def test_the_interval_holds_the_truth_with_the_pin_s_own_error_in_it():
 
     def measure(rng):
         (touched,) = shaken([flange], rng, 0.03, axes=3)
-        pin = Pin(*(rng.normal(0, 0.04, 3) + PIN).tolist(), sigma_mm=0.04)
+        x, y, z = (rng.normal(0, 0.04, 3) + PIN).tolist()
+        pin = Pin(x, y, z, 0.04)
         return solve_one_touch(touched, pin, sigma_mm=0.03)
 
     assert_honest(coverage(measure, TIP))

@@ -19,7 +19,7 @@ def test_a_backup_says_what_it_saved_and_of_which_robot(run, tmp_path):
     code, out, _ = run("backup", "cell.json")
     assert code == 0
     assert "robot T6-602S, serial SIM00001" in out
-    assert "1 defined tools, 14 undefined, tool 1 in force" in out
+    assert "1 of 15 tools are defined, tool 1 is in force" in out
     assert load(tmp_path / "cell.json").state.selected == 1
 
 
@@ -52,7 +52,7 @@ def test_compare_answers_0_when_equal_and_1_when_not(run, simulator, golden):
         ["1", "X", "mm", "12.000", "12.100", "+0.100", "0.0005", "<"]
     ]
     assert "undefined" in out
-    assert "Different: tools 1, 9." in out
+    assert "Different tools: 1, 9." in out
 
 
 def test_a_tolerance_lets_small_differences_pass(run, simulator, golden):
@@ -115,7 +115,7 @@ def test_a_restore_writes_what_differs_and_backs_up_first(run, simulator, golden
     simulator.machine.tools.set(3, ToolOffset(5))
     code, out, err = run("restore", golden)
     assert code == 0
-    assert "Restored and read back: tools 1, 3." in out
+    assert "Tools restored and read back: 1, 3." in out
     (saved,) = (state_folder / "backups").iterdir()
     assert str(saved) in err
     assert load(saved).state.tools[1] == ToolOffset(99)

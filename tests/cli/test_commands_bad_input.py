@@ -260,3 +260,10 @@ def test_a_drift_beyond_the_tolerance_puts_the_old_value_back(cell):
     cell.check_nothing_else_was_written()
     cell.check_settings_are_those_of_before()
     assert cell.open_markers() == ()
+
+
+def test_a_status_is_shown_with_the_e_stop_pressed(cell):
+    cell.simulator.panel.press_estop()
+    shown = cell.run("status")
+    assert shown.code == 0
+    assert "emergency stop" in shown.out

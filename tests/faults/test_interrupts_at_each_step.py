@@ -15,7 +15,7 @@ from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.in_process import register, unregister
 
 import robolink
-from robolink.controllers.epson._operation_gate import OperationGate
+from robolink.interrupts import InterruptGate
 from robolink.markers import MemoryOutcomeLog
 from robolink.nozzle_change import ChangePlan, NozzleChange
 from tests.faults._nozzle_cell import OLD_TIP, NozzleCell, served_cell
@@ -134,7 +134,7 @@ def test_ctrl_c_while_a_marker_is_written_or_cleared_leaves_none_open():
 
 
 def test_ctrl_c_waits_for_the_outermost_of_two_operations():
-    gate, reached = OperationGate(), []
+    gate, reached = InterruptGate(), []
     gate.open()
     try:
         with pytest.raises(KeyboardInterrupt), gate:

@@ -76,9 +76,28 @@ class MarkerDesk:
 
     def note_selection(self, tool: int) -> None:
         """Record, in the marker of the procedure under way, which tool is in force now."""
+        self._note({"now": tool})
+
+    def note_written(self, tool: int, before: object, now: object) -> None:
+        """Record, likewise, that ``tool`` was written, until it holds its first value again.
+
+        Args:
+            tool: Number of the tool.
+            before: Plain value that it held.
+            now: Plain value that it holds.
+        """
+        if self._selection is not None:
+            known = self._selection.details.get("written")
+            written = dict(known) if isinstance(known, dict) else {}
+            first = written.setdefault(str(tool), before)
+            if first == now:
+                del written[str(tool)]
+            self._note({"written": written})
+
+    def _note(self, more: Mapping[str, object]) -> None:
         marker = self._selection
         if marker is not None:
-            details = {**marker.details, "now": tool}
+            details = {**marker.details, **more}
             self._selection = Marker(
                 marker.operation, marker.kind, marker.request, marker.begun_at, details
             )

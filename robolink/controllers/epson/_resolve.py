@@ -104,23 +104,37 @@ class Resolver:
 
     def _examine_selection(self, marker: Marker) -> Finding:
         before, now = InForce.from_marker(marker), self._tools.selected()
+        unverified = _written_in(marker)
         if now == before.tool and self._group.settings.read() == before.settings:
-            return Finding(
-                marker,
-                Verdict.DONE,
-                tr("Tool {tool} is selected, as it was before.", tool=now),
-            )
+            sentence = tr("Tool {tool} is selected, as it was before.", tool=now)
+            return Finding(marker, Verdict.DONE, f"{sentence} {unverified}".rstrip())
+        sentence = tr(
+            "Tool {now} is selected; before {reason!r} it was tool {before}.",
+            now=now,
+            reason=marker.request,
+            before=before.tool,
+        )
         return Finding(
             marker,
             Verdict.NOT_RESTORED,
-            tr(
-                "Tool {now} is selected; before {reason!r} it was tool {before}.",
-                now=now,
-                reason=marker.request,
-                before=before.tool,
-            ),
+            f"{sentence} {unverified}".rstrip(),
             tr("select tool {tool} again, with the power mode and speed of then", tool=before.tool),
         )
+
+
+def _written_in(marker: Marker) -> str:
+    """Say which tools were written in a procedure that nobody saw end well."""
+    written = marker.details.get("written")
+    if not isinstance(written, dict):
+        return ""
+    return " ".join(
+        tr(
+            "Tool {tool} was written meanwhile and not verified; before it held {before}.",
+            tool=tool,
+            before=describe(_offset(before)),
+        )
+        for tool, before in written.items()
+    )
 
 
 def _offset(value: object) -> ToolOffset | None:

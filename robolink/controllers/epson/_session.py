@@ -16,7 +16,6 @@ import threading
 from contextlib import AbstractContextManager
 
 from robolink.controllers.epson._answers import rejected
-from robolink.controllers.epson._operation_gate import OperationGate
 from robolink.controllers.epson._pending import PendingExecute
 from robolink.errors import (
     BusyError,
@@ -29,6 +28,7 @@ from robolink.errors import (
     TransportError,
     TransportTimeoutError,
 )
+from robolink.interrupts import InterruptGate
 from robolink.messages import tr
 from robolink.model import Secret
 from robolink.protocols.epson_text import (
@@ -60,7 +60,7 @@ class EpsonSession:
         self._transport = transport
         self._codec = EpsonTextCodec(Role.HOST)
         self._wire = threading.Lock()
-        self._gate = OperationGate()
+        self._gate = InterruptGate()
         self._gate.open()
         self._pending: PendingExecute | None = None
         self._ended_by: RobolinkError | None = None

@@ -172,6 +172,7 @@ class EpsonToolTable:
                 ),
                 request=statement,
             )
+        self._desk.note_written(tool, _plain(before), _plain(found))
         return ToolReceipt(tool, before, requested, found, unconditional=unconditional)
 
     def _carry_out(

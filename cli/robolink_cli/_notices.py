@@ -1,0 +1,49 @@
+"""What a person must know about something that was begun and not proved finished."""
+
+from typing import TYPE_CHECKING
+
+from robolink.messages import tr
+
+if TYPE_CHECKING:
+    from robolink.model import Marker
+
+
+def marker_notice(marker: "Marker", url: str) -> str:
+    """Return the sentences about an unsettled marker, and the command that settles it."""
+    from robolink.model import MarkerKind
+
+    if marker.kind is MarkerKind.SELECTION:
+        return _unfinished(marker, url)
+    return tr(
+        "Sent {when} and never answered: {request}. It may or may not have run, so motion is "
+        "blocked.\n  'robolink -c {url} resolve' settles it.",
+        when=marker.begun_at,
+        request=marker.request,
+        url=url,
+    )
+
+
+def _unfinished(marker: "Marker", url: str) -> str:
+    now, before = marker.details.get("now", "?"), marker.details.get("tool", "?")
+    parts = [
+        tr("Not finished since {when}: {request}.", when=marker.begun_at, request=marker.request)
+    ]
+    if now == before:
+        parts.append(tr("Tool {tool} is selected, as before.", tool=now))
+    else:
+        parts.append(
+            tr(
+                "Tool {now} is selected now; it was tool {tool} before.",
+                now=now,
+                tool=before,
+            )
+        )
+    written = marker.details.get("written")
+    if isinstance(written, dict) and written:
+        parts.append(tr("Written and not verified: tool {tools}.", tools=", ".join(written)))
+    remedy = tr(
+        "'robolink -c {url} resolve' puts tool {tool} back, with the power mode and speed of then.",
+        url=url,
+        tool=before,
+    )
+    return f"{' '.join(parts)}\n  {remedy}"

@@ -1,0 +1,124 @@
+"""What a fixed camera does to the plane of the tips: a linear map from pixels to the base."""
+
+import math
+from dataclasses import dataclass
+
+from robolink.errors import CalibrationError
+from robolink.messages import tr
+from robolink.model import angle_difference_deg
+
+Matrix2 = tuple[tuple[float, float], tuple[float, float]]
+
+
+@dataclass(frozen=True, slots=True)
+class CameraModel:
+    """Base coordinates of a pixel: ``matrix (px, py) + origin``.
+
+    Attributes:
+        mm_per_px: The 2 x 2 matrix: scale, turn, shear and mirror.
+        origin_mm: Base point that is seen at pixel (0, 0).
+    """
+
+    mm_per_px: Matrix2
+    origin_mm: tuple[float, float]
+
+    def base_mm(self, px: float, py: float) -> tuple[float, float]:
+        """Return where in the base a pixel looks."""
+        (a, b), (c, d) = self.mm_per_px
+        return (a * px + b * py + self.origin_mm[0], c * px + d * py + self.origin_mm[1])
+
+    @property
+    def determinant(self) -> float:
+        """Area of a pixel in mm^2, negative when the image is mirrored."""
+        (a, b), (c, d) = self.mm_per_px
+        return a * d - b * c
+
+    @property
+    def mirrored(self) -> bool:
+        """Whether the image is mirrored against the base seen from above."""
+        return self.determinant < 0
+
+    @property
+    def scale_mm_per_px(self) -> tuple[float, float]:
+        """Length of a pixel along the image's two axes."""
+        (a, b), (c, d) = self.mm_per_px
+        return math.hypot(a, c), math.hypot(b, d)
+
+    @property
+    def turn_deg(self) -> float:
+        """Direction of the image's first axis in the base."""
+        (a, _), (c, _) = self.mm_per_px
+        return math.degrees(math.atan2(c, a))
+
+    @property
+    def shear_deg(self) -> float:
+        """By how much the image's axes are off a right angle."""
+        sx, sy = self.scale_mm_per_px
+        return math.degrees(math.acos(min(abs(self.determinant) / (sx * sy), 1.0)))
+
+
+@dataclass(frozen=True, slots=True)
+class CameraLimits:
+    """What is still the same camera, and what is still a good one.
+
+    Attributes:
+        unequal_scale: Largest |scale_x / scale_y - 1| without a warning.
+        shear_deg: Largest shear without a warning; a tilted camera shows as shear.
+        rms_px: Largest residual without a warning.
+        scale_change: Largest relative change of a scale since the last calibration.
+        turn_change_deg: Largest change of turn or shear since then.
+    """
+
+    unequal_scale: float = 0.05
+    shear_deg: float = 10.0
+    rms_px: float = 0.5
+    scale_change: float = 0.02
+    turn_change_deg: float = 1.0
+
+    def doubts(self, camera: CameraModel, rms_px: float | None) -> tuple[str, ...]:
+        """Return the names of what is doubtful about a camera."""
+        sx, sy = camera.scale_mm_per_px
+        found = []
+        if abs(sx / sy - 1) > self.unequal_scale:
+            found.append("unequal_scale")
+        if camera.shear_deg > self.shear_deg:
+            found.append("large_shear")
+        if rms_px is not None and rms_px > self.rms_px:
+            found.append("large_pixel_residual")
+        return tuple(found)
+
+
+USUAL_CAMERA = CameraLimits()
+
+
+def require_same_camera(
+    now: CameraModel, before: CameraModel, limits: CameraLimits = USUAL_CAMERA
+) -> None:
+    """Refuse a camera that is not as it was; where it looks may have moved.
+
+    Raises:
+        CalibrationError: ``camera_changed``.
+    """
+    changes = [
+        abs(a / b - 1) for a, b in zip(now.scale_mm_per_px, before.scale_mm_per_px, strict=True)
+    ]
+    if now.mirrored != before.mirrored:
+        what = tr("The image is mirrored against the last calibration.")
+    elif max(changes) > limits.scale_change:
+        what = tr("The scale of the image changed by {change:.1f} %.", change=100 * max(changes))
+    elif abs(angle_difference_deg(now.turn_deg, before.turn_deg)) > limits.turn_change_deg:
+        what = tr(
+            "The camera turned by {turn:.2f} degrees.",
+            turn=angle_difference_deg(now.turn_deg, before.turn_deg),
+        )
+    elif abs(now.shear_deg - before.shear_deg) > limits.turn_change_deg:
+        what = tr(
+            "The camera tilted: the shear changed from {before:.2f} to {now:.2f} degrees.",
+            before=before.shear_deg,
+            now=now.shear_deg,
+        )
+    else:
+        return
+    raise CalibrationError(
+        "camera_changed", what, remedy=tr("Check camera, lens and mount, then calibrate it again.")
+    )

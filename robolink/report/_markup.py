@@ -1,0 +1,58 @@
+"""Elements of a page. All text goes through here, so all text is escaped."""
+
+import unicodedata
+from typing import Final, TypeAlias
+from xml.etree.ElementTree import Element, tostring
+
+Content: TypeAlias = Element | str | None
+
+_INVISIBLE: Final = ("Cc", "Cf", "Cs")
+"""Control characters, marks that change the direction of writing, halves of pairs."""
+
+
+def element(tag: str, *content: Content, **attributes: object) -> Element:
+    """Return an element.
+
+    Args:
+        tag: Its name.
+        content: Text and elements in their order; ``None`` is left out.
+        attributes: ``_`` stands for ``-``, and a trailing one is dropped (``class_``);
+            ``None`` leaves the attribute out.
+    """
+    made = Element(tag)
+    for name, value in attributes.items():
+        if value is not None:
+            made.set(name.rstrip("_").replace("_", "-"), plain(str(value)))
+    for part in content:
+        if isinstance(part, str):
+            _append_text(made, plain(part))
+        elif part is not None:
+            made.append(part)
+    return made
+
+
+def figure(value: float, digits: int = 3) -> Element:
+    """Return a number: rounded to the eye, whole for a program that reads the page."""
+    # Adding zero takes the sign off what rounds to zero.
+    return element("data", f"{round(value, digits) + 0.0:.{digits}f}", value=repr(float(value)))
+
+
+def plain(text: str) -> str:
+    """Return ``text`` with every invisible character replaced.
+
+    Names come from files and controllers; no file name may turn the line around, and
+    half a surrogate pair could not be written at all.
+    """
+    return "".join("\ufffd" if unicodedata.category(c) in _INVISIBLE else c for c in text)
+
+
+def document(root: Element) -> str:
+    """Return the text of a whole page."""
+    return "<!DOCTYPE html>\n" + tostring(root, encoding="unicode", method="html") + "\n"
+
+
+def _append_text(parent: Element, text: str) -> None:
+    if len(parent):
+        parent[-1].tail = (parent[-1].tail or "") + text
+    else:
+        parent.text = (parent.text or "") + text

@@ -24,7 +24,15 @@ def do_act(url: str, act: str, values: Sequence[str]) -> None:
         return
     say(tr("{act}: done", act=act))
     for name, value in answer.items():
-        say(f"  {name}: {value}")
+        say(f"  {name}: {_shown(value)}")
+
+
+def _shown(value: object) -> str:
+    if isinstance(value, dict):
+        return ", ".join(f"{name} {_shown(part)}" for name, part in value.items())
+    if isinstance(value, list):
+        return " ".join(_shown(part) for part in value)
+    return f"{value:.3f}" if isinstance(value, float) else str(value)
 
 
 def _parsed(text: str) -> tuple[str, float | int]:

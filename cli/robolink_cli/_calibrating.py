@@ -14,6 +14,7 @@ from robolink.runner import Operator
 from robolink_cli._impacting import ImpactRequest, impact_payload, judge, show_impact
 from robolink_cli._operator import AssistedOperator, terminal
 from robolink_cli._render import note, say
+from robolink_cli._reporting import Draft
 from robolink_cli._safekeeping import back_up_first
 from robolink_cli._tables import show_change
 from robolink_cli._views import (
@@ -76,12 +77,14 @@ class Bench:
         self,
         controller: EpsonController,
         plan: ChangePlan,
+        draft: Draft,
         *,
         assist_url: str | None = None,
         impact: ImpactRequest | None = None,
     ) -> None:
         self._controller = controller
         self._plan = plan
+        self._draft = draft
         self._assist_url = assist_url
         self._impact_request = impact
         self._points: dict[int, Pose | None] | None = None
@@ -132,6 +135,7 @@ class Bench:
                 replace(self._plan, ask_before_write=ask_before_write),
                 operator=operator,
                 show=self._show_proposal,
+                on_result=self._draft.note_result,
             )
             self._report = change.run()
         return {
@@ -165,6 +169,12 @@ class Bench:
         self._impact = judge(self._points, old=proposal.before, new=proposal.result.offset)
         if self._impact is not None:
             show_impact(proposal.tool, self._impact)
+        self._draft.propose(
+            proposal,
+            source=tr("measured on the robot: one pin touched at two angles of U"),
+            warnings=doubts(proposal),
+            impact=self._impact,
+        )
 
 
 def show_proposal(proposal: Proposal) -> None:
@@ -182,6 +192,13 @@ def show_proposal(proposal: Proposal) -> None:
             gain=proposal.result.sigma_gain,
         )
     )
+
+
+def doubts(proposal: Proposal) -> tuple[str, ...]:
+    """Return what a proposal leaves in doubt, as sentences for a report."""
+    if "small_rotation" in proposal.result.warnings:
+        return (tr("The poses differ little in U; half a turn would be best."),)
+    return ()
 
 
 def show_report(report: ChangeReport) -> None:

@@ -12,12 +12,13 @@ from robolink.nozzle_change import (
     require_plausible,
     write_proposal,
 )
-from robolink_cli._calibrating import report_payload, show_proposal
+from robolink_cli._calibrating import doubts, report_payload, show_proposal
 from robolink_cli._consent import agree, on_terminal
 from robolink_cli._context import CliContext, open_controller
 from robolink_cli._impacting import ImpactRequest, impact_payload, judge, show_impact
 from robolink_cli._pose_source import PoseSource
 from robolink_cli._render import note, say
+from robolink_cli._reporting import ReportRequest, reporting
 from robolink_cli._safekeeping import back_up_first
 from robolink_cli._views import proposal_payload
 
@@ -28,6 +29,7 @@ def calibrate_from_poses(
     source: PoseSource,
     *,
     impact: ImpactRequest | None,
+    report: ReportRequest | None,
     dry_run: bool,
     yes: bool,
 ) -> None:
@@ -38,19 +40,24 @@ def calibrate_from_poses(
         DeclinedError: A person said no, or nobody could be asked.
         ToolChangedError: The tool was changed meanwhile; nothing was written.
     """
-    with open_controller(context) as controller:
+    with open_controller(context) as controller, reporting(report, controller) as draft:
         if not dry_run:
             controller.require_settled(tr("calibrate tool {tool}", tool=plan.tool))
         proposed = propose_from_poses(controller, plan, source.poses(controller))
         points = impact.read(controller) if impact else None
         judged = judge(points, old=proposed.proposal.before, new=proposed.proposal.result.offset)
         extra = _extra(proposed, source, judged)
+        draft.propose(
+            proposed.proposal,
+            source=source.sentence(plan.taught_tool),
+            warnings=_doubts(proposed),
+            impact=judged,
+        )
         if not (dry_run and context.json):
             _show(proposed, judged)
         require_plausible(proposed)
         if dry_run:
-            _dry_run(context, controller, proposed, extra)
-            return
+            payload = _dry_run(context, controller, proposed, extra)
         _agree_to_write(plan.tool, yes=yes)
         back_up_first(controller)
         report = write_proposal(controller, proposed.proposal)

@@ -12,6 +12,7 @@ from robolink_cli._consent import agree_to_motion, dry_run_option, yes_option
 from robolink_cli._context import CliContext, controller_options, open_controller
 from robolink_cli._impacting import ImpactRequest, impact_options, impact_request
 from robolink_cli._pose_source import pose_source, pose_source_options, refuse_motion_options
+from robolink_cli._reporting import ReportRequest, report_options, report_request, reporting
 
 if TYPE_CHECKING:
     from robolink.nozzle_change import ChangePlan
@@ -89,6 +90,7 @@ def calibrate() -> None:
 )
 @pose_source_options
 @impact_options
+@report_options
 @controller_options
 @dry_run_option
 @yes_option
@@ -99,6 +101,8 @@ def two_pose(
     assist: str | None,
     impact: str | None,
     impact_pts: Path | None,
+    report_path: Path | None,
+    force: bool,
     dry_run: bool,
     yes: bool,
     points: str | None,
@@ -121,13 +125,34 @@ def two_pose(
 
     plan = plan_from(tool, **with_cell_limits(context.cell, limits, _CELL_KEYS))
     judged = impact_request(impact, impact_pts, names=("--impact", "--impact-pts"))
+    page = report_request(report_path, force=force)
     source = pose_source(points=points, typed=typed, path=path, taught_tool=taught_tool)
     if source is None:
-        _measure(context, plan, assist=assist, impact=judged, dry_run=dry_run, yes=yes)
+        if dry_run:
+            _refuse_to_show_nothing(judged, page)
+        _measure(
+            context, plan, assist=assist, impact=judged, report=page, dry_run=dry_run, yes=yes
+        )
     else:
         refuse_motion_options(click.get_current_context(), _MOTION)
         known = PosesPlan(tool, taught_tool or 0, plan.max_change_mm)
-        calibrate_from_poses(context, known, source, impact=judged, dry_run=dry_run, yes=yes)
+        calibrate_from_poses(
+            context, known, source, impact=judged, report=page, dry_run=dry_run, yes=yes
+        )
+
+
+def _refuse_to_show_nothing(impact: ImpactRequest | None, report: ReportRequest | None) -> None:
+    """Refuse to show in a dry run what only a measurement can give."""
+    if impact is not None:
+        raise ConfigError(
+            tr("A dry run measures nothing, so there is no impact to show."),
+            remedy=tr("Leave --impact out, or use 'robolink impact' with an offset."),
+        )
+    if report is not None:
+        raise ConfigError(
+            tr("A dry run measures nothing, so there is nothing to report."),
+            remedy=tr("Leave --report out, or use 'robolink impact' with an offset."),
+        )
 
 
 def _measure(
@@ -136,19 +161,15 @@ def _measure(
     *,
     assist: str | None,
     impact: ImpactRequest | None,
+    report: ReportRequest | None,
     dry_run: bool,
     yes: bool,
 ) -> None:
     """Let the robot and a person take the poses, then propose, write and verify."""
     from robolink_cli._calibrating import Bench, show_plan
 
-    if dry_run and impact is not None:
-        raise ConfigError(
-            tr("A dry run measures nothing, so there is no impact to show."),
-            remedy=tr("Leave --impact out, or use 'robolink impact' with an offset."),
-        )
-    with open_controller(context) as controller:
-        bench = Bench(controller, plan, assist_url=assist, impact=impact)
+    with open_controller(context) as controller, reporting(report, controller) as draft:
+        bench = Bench(controller, plan, draft, assist_url=assist, impact=impact)
         if dry_run:
             payload = bench.dry_run()
             context.emit("dry-run", payload, lambda: show_plan(payload))
@@ -168,4 +189,4 @@ def _measure(
         payload = bench.run(ask_before_write=not yes)
         # Now, because Ctrl-C may come before the logout is answered.
         bench.show_end()
-    context.emit("calibration", payload, lambda: None)
+    context.emit("calibration", {**payload, "report": draft.saved}, lambda: None)

@@ -10,6 +10,7 @@ from robolink.messages import tr
 from robolink_cli._context import CliContext, controller_options, open_controller
 from robolink_cli._impacting import impact_payload, impact_request, show_impact
 from robolink_cli._render import say
+from robolink_cli._reporting import report_options, report_request, reporting
 
 
 @click.command()
@@ -25,12 +26,16 @@ from robolink_cli._render import say
     type=click.Path(dir_okay=False, path_type=Path),
     help="A .pts file of EPSON RC+ in place of the controller's points.",
 )
+@report_options
 @controller_options
 def impact(
     context: CliContext,
+    *,
     tool: int,
     points: str | None,
     path: Path | None,
+    report_path: Path | None,
+    force: bool,
     **given: float | None,
 ) -> None:
     """Show how far the tip will move at taught points when a tool's offset is changed.
@@ -49,7 +54,8 @@ def impact(
             tr("No points were named."), remedy=tr("Give --points 1-50 or --pts robot1.pts.")
         )
     changes = _changes(given)
-    with open_controller(context) as controller:
+    wanted = report_request(report_path, force=force)
+    with open_controller(context) as controller, reporting(wanted, controller) as draft:
         before = controller.tools.read(tool)
         if before is None:
             raise UndefinedToolError(
@@ -59,8 +65,10 @@ def impact(
             )
         after = replace(before, **changes)
         found = impact_on(request.read(controller), old=before, new=after)
+        draft.offer(tool, before=before, after=after, given=tuple(changes), impact=found)
     shown = offset_payload(before), offset_payload(after)
     payload = {"tool": tool, "before": shown[0], "after": shown[1], **impact_payload(found)}
+    payload["report"] = draft.saved
 
     def show() -> None:
         show_change(tool, *shown, after_name=tr("new"))

@@ -11,7 +11,7 @@ from robolink.calibration._result import CalibrationResult, Drift, VerifyResult
 from robolink.calibration._steps import Ask, Move, Procedure
 from robolink.calibration._two_pose import solve_two_pose
 from robolink.messages import tr
-from robolink.model import Path, Pose, ToolOffset, angle_difference_deg, rotate_xy
+from robolink.model import Path, Pose, ToolOffset, rotate_xy
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,8 +104,9 @@ def raised(pose: Pose, by_mm: float) -> Pose:
 
 def _second_pose(first: Pose, plan: TouchPlan, guess: ToolOffset) -> Pose:
     """Return the flange pose that brings the tip, by ``guess``, back to the same point."""
-    # Turn toward zero: U starts anywhere inside the joint's range, and stays there.
-    sign = -1.0 if angle_difference_deg(first.u_deg, 0.0) > 0 else 1.0
+    # Toward zero, by the angle as it is counted and not modulo 360: U starts inside the
+    # joint's range, and so it stays there.
+    sign = -1.0 if first.u_deg > 0 else 1.0
     u_deg = first.u_deg + sign * plan.turn_deg
     before_x, before_y = rotate_xy(guess.x_mm, guess.y_mm, first.u_deg)
     after_x, after_y = rotate_xy(guess.x_mm, guess.y_mm, u_deg)

@@ -24,6 +24,7 @@ class NozzleChange:
         plan: What to do, within which limits.
         show: Given the proposal to put before a person, before anything is written.
         on_step: Told of every step taken.
+        on_result: Told of the write and of the verification as they end, whatever comes next.
     """
 
     def __init__(
@@ -34,12 +35,14 @@ class NozzleChange:
         operator: Operator,
         show: Callable[[Proposal], None],
         on_step: Callable[[StepDone], None] | None = None,
+        on_result: Callable[[ToolReceipt | VerifyResult], None] = lambda _result: None,
     ) -> None:
         self._controller = controller
         self._plan = plan
         self._operator = operator
         self._show = show
         self._on_step = on_step
+        self._on_result = on_result
 
     def run(self) -> ChangeReport:
         """Do it all. Ctrl-C before the verification has passed leaves the old value.
@@ -89,11 +92,13 @@ class NozzleChange:
     def _write(self, proposal: Proposal) -> ToolReceipt:
         tool, before, offset = proposal.tool, proposal.before, proposal.result.offset
         try:
-            return self._controller.tools.write(tool, offset, expected=before)
+            receipt = self._controller.tools.write(tool, offset, expected=before)
+            self._on_result(receipt)
         except KeyboardInterrupt as error:
             # It was written and read back by now, or not begun; it was not verified.
             self._roll_back(ToolReceipt(tool, before, offset, offset), error)
             raise
+        return receipt
 
     def _verify(self, start: Pose, proposal: Proposal, receipt: ToolReceipt) -> VerifyResult:
         plan, result = self._plan, proposal.result
@@ -109,6 +114,7 @@ class NozzleChange:
                     tolerance_mm=plan.drift_tolerance_mm,
                 )
             )
+            self._on_result(outcome)
         except BaseException as error:
             self._roll_back(receipt, error)
             raise

@@ -35,9 +35,9 @@ def render(report: Report) -> str:
         facts(report),
         *doubts(report),
         *offsets(report),
-        *points(report),
-        *verification(report),
         *poses(report),
+        *verification(report),
+        *points(report),
         _foot(report),
     )
     return document(element("html", head, body, lang="en"))

@@ -13,7 +13,8 @@ _HIGHEST: Final = 430.0
 _MARGIN: Final = 60.0
 """Room around the outermost points, for their arrows and names."""
 
-_SMALLEST_SPAN_MM: Final = 40.0
+_NARROWEST_MM: Final = 40.0
+_LOWEST_MM: Final = 10.0
 _STEPS: Final = (1.0, 2.0, 5.0)
 _FINE_STEPS: Final = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
 
@@ -54,7 +55,8 @@ class Plane:
 def plane_around(places: Sequence[tuple[float, float]]) -> Plane:
     """Return the plane that shows all ``places``, mm."""
     xs, ys = [x for x, _ in places], [y for _, y in places]
-    span_x, span_y = (max(max(v) - min(v), _SMALLEST_SPAN_MM) for v in (xs, ys))
+    span_x = max(max(xs) - min(xs), _NARROWEST_MM)
+    span_y = max(max(ys) - min(ys), _LOWEST_MM)
     inner = WIDTH - 2 * _MARGIN
     height = min(max(span_y * inner / span_x + 2 * _MARGIN, _LOWEST), _HIGHEST)
     per_mm = min(inner / span_x, (height - 2 * _MARGIN) / span_y)

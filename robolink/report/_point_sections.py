@@ -43,13 +43,15 @@ def _summary(impact: Impact, largest: PointImpact, tool: int) -> Element:
     if distance_mm < _SAME_MM:
         return element("p", tr("The tip stays where it is at every point shown."))
     least_mm = min(entry.distance_mm for entry in impact.entries)
-    alike = len(impact.entries) > 1 and distance_mm - least_mm < _SAME_MM
+    aside = abs(largest.dx_mm) > _SAME_MM or abs(largest.dy_mm) > _SAME_MM
+    alike = aside and len(impact.entries) > 1 and distance_mm - least_mm < _SAME_MM
     return element(
         "p",
         element("strong", tr("Largest: "), figure(distance_mm), f" mm, P{largest.number}."),
         " ",
         tr("It is equal at every point; only its direction turns with U. ") if alike else None,
         tr("It concerns only points that a program drives with tool {tool}.", tool=tool),
+        class_="lead",
     )
 
 

@@ -17,12 +17,13 @@ from robolink.model import Path, Pose, ToolOffset, rotate_xy
 
 PIN = (310.0, 95.0, -40.0)
 PLAN = TouchPlan(lift_mm=10, clearance_mm=2)
+START = Pose(300, 100, 0, 0, tool=0)
 
 
 class PerfectPerson:
     """Puts the physical tip on the pin, whatever frame the poses are given in."""
 
-    def __init__(self, tip, believed=None, *, start=Pose(300, 100, 0, 0, tool=0)):
+    def __init__(self, tip, believed=None, *, start=START):
         self.tip, self.believed = tip, believed or ToolOffset()
         self.pose = start
         self.log = []
@@ -78,6 +79,14 @@ def test_nothing_ever_turns_in_contact():
         if isinstance(before, Ask):
             assert isinstance(after, Move)
             assert after.path is Path.STRAIGHT
+
+
+@pytest.mark.parametrize(
+    ("start_u_deg", "second_u_deg"), [(0, 180), (180, 0), (-180, 0), (350, 170), (-90, 90)]
+)
+def test_u_turns_toward_zero_and_so_stays_inside_the_joint_s_range(start_u_deg, second_u_deg):
+    result, _ = measured(ToolOffset(12, -3.5, -20), None, start_u_deg)
+    assert result.inputs[1].u_deg == second_u_deg
 
 
 def test_the_stored_offset_brings_the_tip_down_near_the_pin():

@@ -216,3 +216,18 @@ def test_a_tool_written_while_it_is_selected_moves_nothing(cell):
         before = controller.tools.read(tool)
         controller.tools.write(tool, ToolOffset(13, -3, -20), expected=before)
         assert cell.simulator.machine.arm.moves_started == moved
+
+
+@pytest.mark.simulator_only
+def test_a_tool_written_in_an_unfinished_procedure_is_named_until_it_holds_its_first_value(cell):
+    with cell.connect() as controller:
+        before = controller.tools.read(1)
+        with controller.preserved("a test"):
+            controller.tools.write(1, ToolOffset(13, -3, -20), expected=before)
+            (marker,) = controller.outcomes.open_markers()
+            finding = controller.resolver.examine(marker)
+            assert "Tool 1 was written meanwhile and not verified" in finding.sentence
+            assert "before it held X 12.000 Y -3.500" in finding.sentence
+            controller.tools.write(1, before, expected=ToolOffset(13, -3, -20))
+            (marker,) = controller.outcomes.open_markers()
+            assert "written" not in controller.resolver.examine(marker).sentence

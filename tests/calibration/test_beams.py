@@ -1,0 +1,149 @@
+"""Two crossed beams: found with a pin, then used for a needle."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from robolink.calibration import Beam, Crossing, find_beams, solve_crossed_beams
+from robolink.model import Pose, angle_difference_deg, rotate_xy
+from tests.calibration._simulated import assert_honest, coverage, refused
+
+TRUE = (Beam(300.0, 80.0, 3.0), Beam(300.0, 80.0, 88.0))
+TIP = (12.0, -3.5)
+PIN = (0.4, -0.2)
+
+
+def crossing(beam, tip, *, u_deg=0.0, way=1, along_mm=0.0, lag_mm=0.0, noise=(0, 0), beams=TRUE):
+    """Drive ``tip`` straight through a beam; edges come late by ``lag_mm``."""
+    line = beams[beam]
+    nx, ny = line.normal
+    tx, ty = rotate_xy(tip[0], tip[1], u_deg)
+    ends = []
+    for half_mm, shake in ((-0.6, noise[0]), (0.6, noise[1])):
+        across = way * (half_mm + lag_mm) + shake
+        x = line.x_mm + ny * along_mm + nx * across - tx
+        y = line.y_mm - nx * along_mm + ny * across - ty
+        ends.append(Pose(x, y, -20, u_deg, tool=0))
+    return Crossing(beam, ends[0], ends[1])
+
+
+def travels(tip, *, angles=(0.0,), repeats=1, rng=None, sigma_mm=0.0, lag_mm=0.02, beams=TRUE):
+    """Cross both beams in both directions at every angle."""
+    found = []
+    for _ in range(repeats):
+        for u_deg in angles:
+            for beam in (0, 1):
+                for way in (1, -1):
+                    noise = rng.normal(0, sigma_mm, 2) if rng else (0, 0)
+                    found.append(
+                        crossing(
+                            beam, tip, u_deg=u_deg, way=way, lag_mm=lag_mm, noise=noise, beams=beams
+                        )
+                    )
+    return found
+
+
+def xy(result):
+    return (result.offset.x_mm, result.offset.y_mm)
+
+
+@pytest.mark.parametrize("u_deg", [0.0, 130.0])
+def test_entry_and_exit_in_both_directions_cancel_width_and_latency(u_deg):
+    result = solve_crossed_beams(travels(TIP, angles=(u_deg,)), TRUE)
+    assert xy(result) == pytest.approx(TIP, abs=1e-10)
+    assert result.lag_mm == pytest.approx((0.02, 0.02))
+    assert result.reference_point_mm == pytest.approx((300, 80))
+    assert result.warnings == ()
+
+
+def test_one_direction_alone_carries_the_latency_and_says_so():
+    one_way = [c for c in travels(TIP) if c.direction_over(TRUE[c.beam]) > 0]
+    result = solve_crossed_beams(one_way, TRUE)
+    assert math.dist(xy(result), TIP) > 0.02
+    assert result.warnings == ("one_direction",)
+    assert result.lag_mm == (None, None)
+
+
+def test_uneven_numbers_of_directions_do_not_let_the_latency_in():
+    uneven = [*travels(TIP), crossing(0, TIP, lag_mm=0.02), crossing(1, TIP, way=-1, lag_mm=0.02)]
+    assert xy(solve_crossed_beams(uneven, TRUE)) == pytest.approx(TIP, abs=1e-10)
+
+
+def test_a_moved_beam_is_told_from_a_moved_tip_by_turning():
+    moved = (replace(TRUE[0], y_mm=80.7), replace(TRUE[1], x_mm=299.6))
+    seen = travels(TIP, angles=(0.0, 180.0), beams=moved)
+    assert math.dist(xy(solve_crossed_beams(seen, TRUE)), TIP) < 1e-9
+    assert solve_crossed_beams(seen, TRUE).max_residual_mm > 0.3
+    freed = solve_crossed_beams(seen, TRUE, beams_may_have_moved=True)
+    assert xy(freed) == pytest.approx(TIP, abs=1e-10)
+    assert freed.max_residual_mm < 1e-9
+    with refused("insufficient_rotation"):
+        solve_crossed_beams(travels(TIP, beams=moved), TRUE, beams_may_have_moved=True)
+
+
+def pin_travels(rng=None, sigma_mm=0.0):
+    found = []
+    for beam in (0, 1):
+        for along in (-15, -5, 5, 15):
+            for way in (1, -1):
+                noise = rng.normal(0, sigma_mm, 2) if rng else (0, 0)
+                found.append(
+                    crossing(beam, PIN, way=way, along_mm=along, lag_mm=0.03, noise=noise, u_deg=20)
+                )
+    return found
+
+
+def distance_from(beam, true):
+    nx, ny = true.normal
+    return abs(nx * (beam.x_mm - true.x_mm) + ny * (beam.y_mm - true.y_mm))
+
+
+def test_the_beams_are_found_with_a_pin_whose_tip_is_known():
+    for beam, true in zip(find_beams(pin_travels(), PIN), TRUE, strict=True):
+        turn = abs(angle_difference_deg(beam.direction_deg, true.direction_deg))
+        assert min(turn, 180 - turn) == pytest.approx(0, abs=1e-9)
+        assert distance_from(beam, true) == pytest.approx(0, abs=1e-9)
+
+
+def test_beams_found_with_noise_serve_for_a_needle():
+    beams = find_beams(pin_travels(np.random.default_rng(1), 0.01), PIN)
+    assert all(distance_from(b, t) < 0.02 for b, t in zip(beams, TRUE, strict=True))
+    assert math.dist(xy(solve_crossed_beams(travels(TIP), beams)), TIP) < 0.03
+
+
+def test_a_pin_seen_in_one_direction_only_still_shows_the_direction():
+    one_way = [c for c in pin_travels() if c.direction_over(TRUE[c.beam]) > 0]
+    beams = find_beams(one_way, PIN)
+    assert beams[0].direction_deg % 180 == pytest.approx(3.0)
+    assert distance_from(beams[0], TRUE[0]) == pytest.approx(0.03)
+
+
+def test_what_cannot_be_used_is_named():
+    with refused("too_few_poses"):
+        solve_crossed_beams([c for c in travels(TIP) if c.beam == 0], TRUE)
+    with refused("parallel_beams"):
+        solve_crossed_beams(travels(TIP), (TRUE[0], replace(TRUE[0], direction_deg=185.0)))
+    along = Crossing(0, Pose(290, 80, 0, 0), Pose(310, 81.0, 0, 0))
+    with refused("no_crossing"):
+        solve_crossed_beams([*travels(TIP), along], TRUE)
+    turned = replace(travels(TIP)[0], exit=replace(travels(TIP)[0].exit, u_deg=5.0))
+    with refused("turned_in_crossing"):
+        solve_crossed_beams([*travels(TIP), turned], TRUE)
+    with refused("short_beam"):
+        find_beams([c for c in travels(PIN, repeats=2) for _ in (0, 1)], PIN)
+    with refused("too_few_poses"):
+        find_beams(travels(PIN), PIN)
+
+
+@pytest.mark.parametrize("stated", [None, 0.02 / math.sqrt(2)])
+@pytest.mark.parametrize("angles", [(0.0,), (0.0, 180.0)])
+def test_the_interval_holds_the_truth(angles, stated):
+    moved = len(angles) > 1
+
+    def measure(rng):
+        seen = travels(TIP, angles=angles, repeats=2, rng=rng, sigma_mm=0.02)
+        return solve_crossed_beams(seen, TRUE, sigma_mm=stated, beams_may_have_moved=moved)
+
+    assert_honest(coverage(measure, TIP))

@@ -1,4 +1,4 @@
-"""scan RANGE: which of a few addresses answer on a port."""
+"""scan RANGE: where a controller might be: addresses that answer, and serial ports."""
 
 import click
 
@@ -25,18 +25,27 @@ def scan(addresses: str, port: int, timeout_s: float) -> None:
 
     RANGE is 192.168.0.7, 192.168.0.1-20 or 192.168.0.0/28. Each connection is closed at once
     and nothing is sent. A controller serves one client at a time and its maker does not say
-    what a second connection does to the first: scan while nobody is connected.
+    what a second connection does to the first: scan while nobody is connected. The serial
+    ports of this computer are listed beside; none is opened.
     """
     from robolink_cli._scanning import State, parse_range, probe_all
+    from robolink_cli._serial_ports import serial_ports
 
     wanted = parse_range(addresses)
     probes = probe_all(wanted, port, timeout_s)
     answering = [f"epson+tcp://{p.address}:{port}" for p in probes if p.state is State.OPEN]
+    serial = [found.device for found in serial_ports()]
     if json_is_on():
         entries = [
             {"address": p.address, "state": p.state, "elapsed_ms": p.elapsed_ms} for p in probes
         ]
-        document = {"port": port, "timeout_s": timeout_s, "urls": answering, "probes": entries}
+        document = {
+            "port": port,
+            "timeout_s": timeout_s,
+            "urls": answering,
+            "probes": entries,
+            "serial_ports": serial,
+        }
         emit_json("robolink/scan/1", document)
         return
     for url in answering:
@@ -57,3 +66,4 @@ def scan(addresses: str, port: int, timeout_s: float) -> None:
     )
     if answering:
         say(tr("An open port is no proof of a controller: 'robolink -c URL status' asks it."))
+    say(tr("serial ports of this computer: {ports}", ports=", ".join(serial) or tr("none")))

@@ -1,5 +1,7 @@
 """A movement under way: one pending Execute, watched by GetStatus, ended by Abort."""
 
+from contextlib import suppress
+
 from robolink.controllers.epson._guarded import MarkerDesk
 from robolink.controllers.epson._pending import PendingExecute
 from robolink.controllers.epson._session import EpsonSession
@@ -86,7 +88,9 @@ class EpsonMotion:
         with session.uninterrupted():
             with self._parts.desk.doubt(self._pending.statement):
                 if self._pending.answer is None:
-                    request_abort(session)
+                    # A refusal may mean that it has just ended by itself; its end is awaited.
+                    with suppress(RejectedError):
+                        request_abort(session)
                     self._end_within(session.timeout_s)
             self._take_answer()
 

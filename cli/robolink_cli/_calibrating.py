@@ -77,8 +77,8 @@ class Bench:
         self,
         controller: EpsonController,
         plan: ChangePlan,
-        draft: Draft,
         *,
+        draft: Draft,
         assist_url: str | None = None,
         impact: ImpactRequest | None = None,
     ) -> None:

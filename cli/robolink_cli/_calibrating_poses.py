@@ -8,6 +8,7 @@ from robolink.nozzle_change import (
     ChangeReport,
     PosesPlan,
     PosesProposal,
+    Proposal,
     propose_from_poses,
     require_plausible,
     write_proposal,
@@ -57,13 +58,15 @@ def calibrate_from_poses(
             _show(proposed, judged)
         require_plausible(proposed)
         if dry_run:
-            payload = _dry_run(context, controller, proposed, extra)
-        _agree_to_write(plan.tool, yes=yes)
-        back_up_first(controller)
-        report = write_proposal(controller, proposed.proposal)
-        # Now, because Ctrl-C may come before the logout is answered.
-        _show_end(report)
-    context.emit("calibration", {**report_payload(report), **extra}, lambda: None)
+            requests = _requests(controller, proposed.proposal)
+        else:
+            done = _write(controller, proposed.proposal, yes=yes)
+            draft.note_result(done.receipt)
+    extra["report"] = draft.saved
+    if dry_run:
+        _show_dry_run(context, requests, {**proposal_payload(proposed.proposal), **extra})
+    else:
+        context.emit("calibration", {**report_payload(done), **extra}, lambda: None)
 
 
 def _extra(proposed: PosesProposal, source: PoseSource, judged: Impact | None) -> dict[str, object]:
@@ -104,16 +107,24 @@ def _warn_of_other_tool(proposed: PosesProposal) -> None:
     )
 
 
-def _dry_run(
-    context: CliContext,
-    controller: EpsonController,
-    proposed: PosesProposal,
-    extra: dict[str, object],
-) -> None:
-    proposal = proposed.proposal
-    statements = controller.tools.preview_write(proposal.tool, proposal.result.offset)
-    requests = [controller.wire("Execute", statement) for statement in statements]
+def _doubts(proposed: PosesProposal) -> tuple[str, ...]:
+    known = doubts(proposed.proposal)
+    if proposed.better is None:
+        return known
+    other = tr(
+        "These poses fit tool {better} much better than tool {taught}.",
+        better=proposed.better.tool,
+        taught=proposed.plan.taught_tool,
+    )
+    return (*known, other)
 
+
+def _requests(controller: EpsonController, proposal: Proposal) -> list[str]:
+    statements = controller.tools.preview_write(proposal.tool, proposal.result.offset)
+    return [controller.wire("Execute", statement) for statement in statements]
+
+
+def _show_dry_run(context: CliContext, requests: list[str], payload: dict[str, object]) -> None:
     def show() -> None:
         if requests:
             say(tr("Dry run; this would be sent:"))
@@ -121,8 +132,16 @@ def _dry_run(
         else:
             say(tr("Dry run; the value is stored already, nothing would be sent."))
 
-    payload = {"dry_run": True, "requests": requests, **proposal_payload(proposal), **extra}
-    context.emit("dry-run", payload, show)
+    context.emit("dry-run", {"dry_run": True, "requests": requests, **payload}, show)
+
+
+def _write(controller: EpsonController, proposal: Proposal, *, yes: bool) -> ChangeReport:
+    _agree_to_write(proposal.tool, yes=yes)
+    back_up_first(controller)
+    done = write_proposal(controller, proposal)
+    # Now, because Ctrl-C may come before the logout is answered.
+    _show_end(done)
+    return done
 
 
 def _agree_to_write(tool: int, *, yes: bool) -> None:

@@ -46,6 +46,17 @@ class PoseSource:
             body["path"] = str(self.path)
         return body
 
+    def sentence(self, taught_tool: int) -> str:
+        """Return what a report says about it."""
+        if self.kind == "points":
+            points = ", ".join(f"P{number}" for number in self.points)
+            named = tr("points taught on the pendant, {points}", points=points)
+        elif self.path is not None:
+            named = tr("poses of the file {path}", path=self.path)
+        else:
+            named = tr("typed poses")
+        return tr("{poses}; taught with tool {tool}", poses=named, tool=taught_tool)
+
     def poses(self, controller: "EpsonController") -> "tuple[Pose, ...]":
         """Return the poses; taught points are read from the controller.
 

@@ -53,7 +53,7 @@ def report_request(path: Path | None, *, force: bool) -> ReportRequest | None:
     Raises:
         ConfigError: The file cannot be written, or ``--force`` stands alone.
     """
-    from robolink.report import require_free
+    from robolink.named_files import require_free
 
     if path is None:
         if force:
@@ -157,26 +157,24 @@ class Draft:
         from robolink.report import Outcome
 
         receipt = self._receipt
-        if error is None and receipt is None:
-            return Outcome.PROPOSED
-        if error is None:
-            if self._verification is not None:
-                return Outcome.VERIFIED
-            return Outcome.SKIPPED if receipt and receipt.skipped else Outcome.WRITTEN
         if isinstance(error, VerifyError):
             return Outcome.VERIFY_FAILED
-        # After the write these two words would claim that nothing was written.
+        # After a write these two words would claim that nothing was written.
         if receipt is None and isinstance(error, DeclinedError):
             return Outcome.DECLINED
         if receipt is None and isinstance(error, CalibrationError):
             return Outcome.REFUSED
-        return Outcome.UNFINISHED
+        if error is not None:
+            return Outcome.UNFINISHED
+        if receipt is None:
+            return Outcome.PROPOSED
+        if receipt.skipped:
+            return Outcome.SKIPPED
+        return Outcome.WRITTEN if self._verification is None else Outcome.VERIFIED
 
 
 @contextmanager
-def reporting(
-    request: ReportRequest | None, controller: "EpsonController"
-) -> "Iterator[Draft]":
+def reporting(request: ReportRequest | None, controller: "EpsonController") -> "Iterator[Draft]":
     """Collect what a command finds out, and write it at the end, whatever the end is.
 
     A report that cannot be written changes nothing about how the command ends: it is said.

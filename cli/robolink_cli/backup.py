@@ -17,11 +17,11 @@ _FILE = click.Path(dir_okay=False, path_type=Path)
 @controller_options
 def backup(context: CliContext, file: Path, force: bool) -> None:
     """Save all fifteen tools, the one in force, and which controller it is. Reads only."""
-    from robolink.backup import require_free, save, take_backup
+    from robolink.backup import save, take_backup
+    from robolink.named_files import require_free
     from robolink_cli._backup_views import backup_payload, show_backup
 
-    if not force:
-        require_free(file)
+    require_free(file, replace=force)
     with open_controller(context) as controller:
         taken = take_backup(controller)
     save(taken, file, replace=force)

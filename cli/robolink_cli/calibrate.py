@@ -130,9 +130,7 @@ def two_pose(
     if source is None:
         if dry_run:
             _refuse_to_show_nothing(judged, page)
-        _measure(
-            context, plan, assist=assist, impact=judged, report=page, dry_run=dry_run, yes=yes
-        )
+        _measure(context, plan, assist=assist, impact=judged, report=page, dry_run=dry_run, yes=yes)
     else:
         refuse_motion_options(click.get_current_context(), _MOTION)
         known = PosesPlan(tool, taught_tool or 0, plan.max_change_mm)
@@ -169,7 +167,7 @@ def _measure(
     from robolink_cli._calibrating import Bench, show_plan
 
     with open_controller(context) as controller, reporting(report, controller) as draft:
-        bench = Bench(controller, plan, draft, assist_url=assist, impact=impact)
+        bench = Bench(controller, plan, draft=draft, assist_url=assist, impact=impact)
         if dry_run:
             payload = bench.dry_run()
             context.emit("dry-run", payload, lambda: show_plan(payload))

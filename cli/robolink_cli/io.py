@@ -36,7 +36,8 @@ def get(
     """Show an input. Legal while production runs, except with --output."""
     if sum(at is not None for at in (bit, byte, word)) != 1:
         raise ConfigError(
-            tr("What is to be read?"), remedy=tr("Give one of BIT, --byte PORT and --word PORT.")
+            tr("Exactly one place can be read at a time."),
+            remedy=tr("Give one of BIT, --byte PORT and --word PORT."),
         )
     if output and (memory or bit is None):
         raise ConfigError(

@@ -9,7 +9,6 @@ from robolink.backup._file import SCHEMA as SCHEMA
 from robolink.backup._file import backup_from_text as backup_from_text
 from robolink.backup._file import backup_to_text as backup_to_text
 from robolink.backup._file import load as load
-from robolink.backup._file import require_free as require_free
 from robolink.backup._file import save as save
 from robolink.backup._first import first_backup_path as first_backup_path
 from robolink.backup._first import keep_first_backup as keep_first_backup

@@ -13,26 +13,15 @@ from typing import Final
 
 from robolink.backup._reading import JsonReader
 from robolink.backup._values import COMPONENTS, TOOLS, Backup, ToolState
-from robolink.durable_files import sync_folder, write_whole
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import ControllerFacts, ToolOffset
+from robolink.named_files import save_named
 
 SCHEMA: Final = "robolink/backup/1"
 
 _LONGEST: Final = 1_000_000
 _FAMILY: Final = "robolink/backup/"
-_ANYONE: Final = 0o666
-
-
-def require_free(path: Path) -> None:
-    """Refuse a name that is taken, before the controller is asked for anything.
-
-    Raises:
-        ConfigError: A file is there already.
-    """
-    if path.exists():
-        raise _taken(path)
 
 
 def save(backup: Backup, path: Path, *, replace: bool = False) -> None:
@@ -42,21 +31,7 @@ def save(backup: Backup, path: Path, *, replace: bool = False) -> None:
         ConfigError: A file is there already and ``replace`` is not set, or it cannot be
             written. What was there is unchanged.
     """
-    data = backup_to_text(backup).encode("ascii")
-    try:
-        write_whole(path, data, replace=replace, mode=_ANYONE)
-        sync_folder(path.parent)
-    except FileExistsError as error:
-        raise _taken(path) from error
-    except OSError as error:
-        raise ConfigError(
-            tr(
-                "The backup {path} cannot be written: {cause}.",
-                path=path,
-                cause=error.strerror or error,
-            ),
-            remedy=tr("Give a file in a folder that exists and can be written."),
-        ) from error
+    save_named(path, backup_to_text(backup).encode("ascii"), replace=replace)
 
 
 def load(path: Path) -> Backup:
@@ -118,13 +93,6 @@ def backup_from_text(text: str, *, source: str) -> Backup:
             {int(tool): _offset(read, value, f"tools.{tool}") for tool, value in tools.items()},
             read.whole(members["selected_tool"], "selected_tool", 0, TOOLS[-1]),
         ),
-    )
-
-
-def _taken(path: Path) -> ConfigError:
-    return ConfigError(
-        tr("{path} exists already; it was not written over.", path=path),
-        remedy=tr("Give another name, or --force if that backup may go."),
     )
 
 

@@ -76,7 +76,6 @@ class Proposal:
         after = self.result.offset
         return math.hypot(after.x_mm - self.before.x_mm, after.y_mm - self.before.y_mm)
 
-
     def require_plausible(self, limit_mm: float, *, remedy: str) -> None:
         """Refuse a change that no nozzle change explains.
 

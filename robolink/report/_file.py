@@ -1,29 +1,10 @@
 """A report as a file."""
 
-import os
 from pathlib import Path
-from typing import Final
 
-from robolink.durable_files import sync_folder, write_whole
-from robolink.errors import ConfigError
-from robolink.messages import tr
+from robolink.named_files import save_named
 from robolink.report._page import render
 from robolink.report._values import Report
-
-_ANYONE: Final = 0o666
-
-
-def require_free(path: Path, *, replace: bool = False) -> None:
-    """Refuse a name that cannot be used, before the controller is asked for anything.
-
-    Raises:
-        ConfigError: A file is there already and ``replace`` is not set, or its folder is
-            missing or may not be written.
-    """
-    if path.is_dir() or (path.exists() and not replace):
-        raise _taken(path)
-    if not path.parent.is_dir() or not os.access(path.parent, os.W_OK):
-        raise _unwritable(path, tr("there is no such folder, or it may not be written"))
 
 
 def save(report: Report, path: Path, *, replace: bool = False) -> None:
@@ -33,25 +14,4 @@ def save(report: Report, path: Path, *, replace: bool = False) -> None:
         ConfigError: A file is there already and ``replace`` is not set, or it cannot be
             written. What was there is unchanged.
     """
-    data = render(report).encode("utf-8")
-    try:
-        write_whole(path, data, replace=replace, mode=_ANYONE)
-        sync_folder(path.parent)
-    except FileExistsError as error:
-        raise _taken(path) from error
-    except OSError as error:
-        raise _unwritable(path, str(error.strerror or error)) from error
-
-
-def _taken(path: Path) -> ConfigError:
-    return ConfigError(
-        tr("{path} exists already; it was not written over.", path=path),
-        remedy=tr("Give another name, or --force to replace it."),
-    )
-
-
-def _unwritable(path: Path, cause: str) -> ConfigError:
-    return ConfigError(
-        tr("The report {path} cannot be written: {cause}.", path=path, cause=cause),
-        remedy=tr("Give a file in a folder that exists and can be written."),
-    )
+    save_named(path, render(report).encode("utf-8"), replace=replace)

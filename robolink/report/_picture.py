@@ -136,7 +136,9 @@ def _scales(plane: Plane, factor: float | None, longest_mm: float) -> Element:
     if factor is not None:
         shown_mm = step_down(longest_mm)
         start, length = WIDTH / 2, shown_mm * factor * plane.per_mm
-        said = tr("arrows: {length:g} mm, drawn {factor:g} times as long", length=shown_mm, factor=factor)
+        said = tr(
+            "arrows: {length:g} mm, drawn {factor:g} times as long", length=shown_mm, factor=factor
+        )
         arrow = _arrow((start, y), (start + length, y))
         parts.append(element("g", *arrow, class_="point"))
         parts.append(_text(said, start + length + 8, y + 4, class_="scale"))

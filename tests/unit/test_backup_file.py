@@ -15,11 +15,11 @@ from robolink.backup import (
     backup_from_text,
     backup_to_text,
     load,
-    require_free,
     save,
 )
 from robolink.errors import ConfigError
 from robolink.model import ControllerFacts, ToolOffset
+from robolink.named_files import require_free
 
 TIP = ToolOffset(12.345, -3.25, -20.002, 90.0)
 AXES = ("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")

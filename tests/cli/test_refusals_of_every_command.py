@@ -1,0 +1,220 @@
+"""Every command times the ways it is refused: an exit code, what happened, what to do.
+
+Leaves of the command table are looked up, so a new command without a row fails here. The
+controller is in process; what only a socket shows stands in ``test_commands_bad_input``,
+from which the checks and the states come.
+"""
+
+import json
+from types import SimpleNamespace
+
+import click
+import pytest
+from robolink_cli import main
+from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.hosting.in_process import register, unregister
+
+from robolink.model import Secret
+from tests.cli.test_commands_bad_input import (
+    STATES,
+    check_refused,
+    check_refused_as_document,
+    closed_port,
+)
+from tests.faults._requests import changes
+
+POSES = ["--pose", "287.7,103.9,0", "--pose", "312.3,96.1,180"]
+
+NEEDS_A_CONTROLLER = {
+    "status": [],
+    "where": [],
+    "stop": [],
+    "reset": ["--yes"],
+    "motors": ["on", "--yes"],
+    "resolve": ["--yes"],
+    "tool list": [],
+    "tool get": ["1"],
+    "tool set": ["1", "--x", "13", "--yes"],
+    "tool clear": ["1", "--yes"],
+    "tool select": ["0", "--yes"],
+    "backup": ["new.json"],
+    "restore": ["golden.json", "--yes"],
+    "compare": ["golden.json"],
+    "io get": ["1"],
+    "io set": ["1", "on", "--yes"],
+    "var get": ["g_Long"],
+    "var set": ["g_Long", "1", "--type", "Long", "--yes"],
+    "verify-controller": [],
+    "jog": ["z+1", "--yes"],
+    "calibrate two-pose": ["--tool", "1", *POSES, "--yes"],
+    "impact": ["--tool", "1", "--x", "13", "--points", "1-5"],
+}
+"""Command and arguments with which it succeeds on a controller that is ready."""
+
+ANY_STATE = {"status", "resolve", "verify-controller", "io get", "var get"}
+"""What only reads, and by queries that are legal at any time."""
+
+STOPPABLE = set(STATES) - {"controller in Teach", "monitoring only"}
+"""States in which a stop gets through: a stop must not wait for a good state."""
+
+BAD = {
+    "tool get": (["16"], "There is no tool 16"),
+    "tool set": (["0", "--x", "1"], "never written"),
+    "tool clear": (["16"], "There is no tool 16"),
+    "tool select": (["-1"], "No such option"),
+    "motors": (["up"], "is not one of"),
+    "backup": (["golden.json"], "exists already"),
+    "restore": (["golden.json", "--tool", "16"], "16"),
+    "compare": (["missing.json"], "cannot be read"),
+    "io get": ([], "Exactly one place"),
+    "io set": (["70000", "on"], "70000"),
+    "var get": (["g_Long", "--index", "0"], "need --type"),
+    "var set": (["g_Long", "x", "--type", "Long"], "x"),
+    "verify-controller": (["--timeout", "0"], "0"),
+    "jog": (["--yes", "x0.1"], "is not a jog step"),
+    "calibrate two-pose": (["--tool", "1", "--taught-tool", "0"], "--taught-tool"),
+    "impact": (["--tool", "1", "--x", "nan", "--points", "1"], "not a number"),
+    "status": (["--timeout", "-1"], "-1"),
+    "where": (["here"], "unexpected extra argument"),
+    "stop": (["now"], "unexpected extra argument"),
+    "reset": (["--force"], "No such option"),
+    "resolve": (["all"], "unexpected extra argument"),
+    "tool list": (["--timeout", "soon"], "soon"),
+    "demo": (["--speed", "0"], "0"),
+    "sim epson": (["--tcp", "nowhere"], "no address to listen on"),
+    "sim assist": (["http://127.0.0.1:1", "look"], ""),
+    "solve": (["missing.json"], "missing.json"),
+    "doctor": (["--fix"], "No such option"),
+    "ports": (["COM1"], "unexpected extra argument"),
+    "scan": (["localhost"], "no range of addresses"),
+    "config path": (["here"], "unexpected extra argument"),
+    "config check": (["--fix"], "No such option"),
+    "config show": (["nowhere"], "nowhere"),
+    "completion": (["tcsh"], "is not one of"),
+    "spel export": (["golden.json"], "is a file"),
+}
+"""What is a mistake in the command: exit code 2, and at most reads are sent."""
+
+
+def leaves(command, path=()):
+    """Yield the full names of ``command``'s commands."""
+    if not isinstance(command, click.Group):
+        yield " ".join(path)
+        return
+    context = click.Context(command)
+    for name in command.list_commands(context):
+        inner = command.get_command(context, name)
+        assert inner is not None
+        yield from leaves(inner, (*path, name))
+
+
+@pytest.fixture
+def shown(capsys):
+    """Run a command line; return it in the form that the shared checks read."""
+
+    def run(*arguments):
+        capsys.readouterr()
+        code = main.run(arguments)
+        out, err = capsys.readouterr()
+        return SimpleNamespace(code=code, out=out, err=err)
+
+    return run
+
+
+def check_usage(shown, words):
+    """A mistake in the command: click's sentence, or one of ours with its remedy."""
+    if shown.err.startswith("robolink: "):
+        check_refused(shown, 2, words)
+    else:
+        assert (shown.code, shown.out) == (2, "")
+        assert words in shown.err
+        assert "--help" in shown.err
+
+
+def test_every_command_has_a_row():
+    assert set(leaves(main.cli)) == set(BAD)
+    assert set(NEEDS_A_CONTROLLER) < set(BAD)
+
+
+@pytest.mark.parametrize("name", NEEDS_A_CONTROLLER)
+def test_on_a_controller_that_is_ready_the_row_is_no_refusal(run, simulator, golden, name):
+    simulator.variables.set("g_Long", "1", "Long")
+    code, _, err = run(*name.split(), *NEEDS_A_CONTROLLER[name])
+    assert code == 0, err
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_bad_values_are_a_mistake_in_the_command(run, simulator, golden, shown, name):
+    arguments, words = BAD[name]
+    given = ["-c", simulator.url, *name.split(), *arguments]
+    check_usage(shown(*given), words)
+    check_refused_as_document(shown("--json", *given), 2)
+    requests = [text for _, direction, text in simulator.log if direction == ">"]
+    assert changes(requests) == []
+
+
+@pytest.mark.parametrize("name", NEEDS_A_CONTROLLER)
+def test_no_controller_named(golden, shown, name):
+    given = [*name.split(), *NEEDS_A_CONTROLLER[name]]
+    check_refused(shown(*given), 2, "Give -c CELL")
+    check_refused_as_document(shown(*given, "--json"), 2, kind="ConfigError")
+
+
+@pytest.mark.parametrize("name", NEEDS_A_CONTROLLER)
+def test_a_closed_port(golden, shown, name):
+    given = ["-c", f"epson+tcp://127.0.0.1:{closed_port()}", *name.split()]
+    given += NEEDS_A_CONTROLLER[name]
+    check_refused(shown(*given), 3, "emergency stop" if name == "stop" else "127.0.0.1")
+    check_refused_as_document(shown(*given, "--json"), 3, kind="ConnectError")
+
+
+@pytest.mark.parametrize("name", NEEDS_A_CONTROLLER)
+def test_a_wrong_password(golden, shown, name, monkeypatch):
+    monkeypatch.setenv("ROBOLINK_PASSWORD", "wrong-one")
+    url = register("locked", EpsonSimulator(seed=4, password=Secret("right-one")))
+    try:
+        given = ["-c", url, *name.split(), *NEEDS_A_CONTROLLER[name]]
+        refused, document = shown(*given), shown(*given, "--json")
+    finally:
+        unregister("locked")
+    check_refused(refused, 5, "refused the login (code 13)")
+    check_refused_as_document(document, 5, kind="LoginRefusedError", code=13)
+    assert "wrong-one" not in repr((refused, document))
+
+
+@pytest.mark.parametrize("state", STATES)
+@pytest.mark.parametrize("name", sorted({*NEEDS_A_CONTROLLER} - ANY_STATE))
+def test_a_state_that_forbids_it(simulator, golden, shown, name, state):
+    act, reason, words = STATES[state]
+    put_into(simulator, act)
+    tools = simulator.machine.tools.defined()
+    given = ["-c", simulator.url, *name.split(), *NEEDS_A_CONTROLLER[name]]
+    if name == "stop" and state in STOPPABLE:
+        assert shown(*given).code == 0
+        return
+    refused, document = shown(*given), shown(*given, "--json")
+    assert refused.code == document.code == 5
+    check_refused(refused, 5, "")
+    check_refused_as_document(document, 5)
+    if name not in ("stop", "reset"):
+        check_refused(refused, 5, words)
+        assert json.loads(document.out)["error"]["reason"] == reason
+    assert simulator.machine.tools.defined() == tools
+    assert simulator.machine.flash_writes == 0
+    assert simulator.machine.arm.moves_started == 0
+
+
+@pytest.mark.parametrize("state", STATES)
+@pytest.mark.parametrize("name", sorted(ANY_STATE))
+def test_a_state_that_does_not_matter(simulator, golden, shown, name, state):
+    simulator.variables.set("g_Long", "1", "Long")
+    put_into(simulator, STATES[state][0])
+    done = shown("-c", simulator.url, *name.split(), *NEEDS_A_CONTROLLER[name])
+    assert done.code == 0, done.err
+
+
+def put_into(simulator, act):
+    if act:
+        getattr(simulator.panel, act)()
+    else:
+        simulator.panel.set_monitoring_only(True)

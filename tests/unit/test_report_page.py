@@ -1,0 +1,262 @@
+"""The report as a page: well formed, escaped, whole by itself, and equal to its numbers."""
+
+import re
+from html.parser import HTMLParser
+
+import pytest
+
+from robolink.calibration import Drift, VerifyResult, impact_on
+from robolink.errors import ConfigError
+from robolink.model import ControllerFacts, Hand, Pose, ToolOffset
+from robolink.named_files import require_free
+from robolink.report import Outcome, Report, render, save
+
+OLD = ToolOffset(12.0, -3.5, -20.0)
+NEW = ToolOffset(12.3, -3.9, -20.0)
+NASTY = "<script>alert('1')</script>&\"\u202egnp.\x00\ud800 " + "x" * 200
+
+POINTS: dict[int, Pose | None] = {
+    number: Pose(200.0 + 22 * (number % 10), 30.0 * (number // 10), -30, 37 * number)
+    for number in range(1, 51)
+}
+
+VOID = {"meta"}
+
+
+def report(points=None, *, new=NEW, **more):
+    impact = None if points is None else impact_on(points, old=OLD, new=new)
+    known = {
+        "made_at": "2026-03-04T10:11:12+00:00",
+        "robolink_version": "1.2.3",
+        "controller": "epson+tcp://192.168.0.1:5000",
+        "facts": ControllerFacts(robot_models=("T6-602S",), robot_serials=("S1",)),
+        "tool": 1,
+        "before": OLD,
+        "after": new,
+        "outcome": Outcome.VERIFIED,
+        "source": "measured",
+        "method": "two_pose",
+        "determined": ("x_mm", "y_mm"),
+        "poses": (Pose(287.5, 103.25, 0, 0, hand=Hand.RIGHT), Pose(312.5, 96.75, 0, 180)),
+        "impact": impact,
+    }
+    return Report(**{**known, **more})
+
+
+class Page(HTMLParser):
+    """Reads a page strictly: every element is closed, in its turn."""
+
+    def __init__(self, text):
+        super().__init__(convert_charrefs=True)
+        self.open: list[str] = []
+        self.tags: list[str] = []
+        self.attributes: list[tuple[str, str, str | None]] = []
+        self.texts: list[str] = []
+        self.values: list[float] = []
+        self.feed(text)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append(tag)
+        self.attributes += [(tag, *pair) for pair in attrs]
+        if tag == "data":
+            self.values.append(float(dict(attrs)["value"]))
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        if self.open and self.open[-1] != "style":
+            self.texts.append(data)
+
+    @property
+    def text(self):
+        return " ".join(" ".join(self.texts).split())
+
+    def under(self, tag, class_):
+        return [a for a in self.attributes if a[0] == tag and a[1:] == ("class", class_)]
+
+
+EVERY = {
+    "50 points": report(POINTS),
+    "one point": report({3: Pose(250, 200, -30, 90)}),
+    "no shift": report(POINTS, new=OLD),
+    "upwards only": report(POINTS, new=ToolOffset(12.0, -3.5, -19.0)),
+    "a huge shift": report(POINTS, new=ToolOffset(900.0)),
+    "all on one spot": report({number: Pose(1, 2, 3, 0) for number in range(1, 60)}),
+    "none taught": report({1: None, 2: Pose(1, 2, 3, 4, local=5), 3: Pose(1, 2, 3, 4, v_deg=9)}),
+    "no points named": report(),
+    "undefined before": report(before=None, outcome=Outcome.DECLINED),
+    "hostile names": report(
+        POINTS,
+        controller=NASTY,
+        facts=ControllerFacts(NASTY, NASTY, NASTY, NASTY, NASTY, 1, (NASTY,), (NASTY,)),
+        source=NASTY,
+        ending=NASTY,
+        warnings=(NASTY,),
+        outcome=Outcome.REFUSED,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", EVERY)
+def test_a_page_is_well_formed_and_needs_nothing_beside_itself(name):
+    text = render(EVERY[name])
+    page = Page(text)
+    assert text.startswith("<!DOCTYPE html>\n<html")
+    assert page.tags.count("h1") == page.tags.count("body") == 1
+    assert not {"script", "link", "img", "iframe", "object", "use", "image", "a"} & {*page.tags}
+    loading = {"src", "href", "xlink:href", "style", "srcset", "action", "data"}
+    assert [a for a in page.attributes if a[1] in loading or a[1].startswith("on")] == []
+    assert not re.search(r"url\(|@import", text)
+    assert "nan" not in {v for _, key, v in page.attributes if key != "content"}
+    text.encode("utf-8")
+
+
+def test_names_from_outside_are_text_and_their_invisible_characters_are_shown():
+    text = render(EVERY["hostile names"])
+    assert "<script" not in text
+    assert not {"\u202e", "\x00", "\ud800"} & {*text}
+    assert "<script>alert('1')</script>&\"\ufffdgnp.\ufffd\ufffd" in Page(text).text
+
+
+def test_the_numbers_of_the_points_are_whole_and_shown_with_three_digits():
+    made = EVERY["50 points"]
+    page = Page(render(made))
+    for entry in made.impact.entries:
+        row = [*entry.pose.coordinates()[:4], entry.dx_mm, entry.dy_mm, entry.dz_mm]
+        row += [entry.turn_deg, entry.distance_mm]
+        at = next(i for i in range(len(page.values)) if page.values[i : i + len(row)] == row)
+        assert at > 0
+    assert "-0.000" not in page.text
+    assert "before 12.000 -3.500 -20.000 0.000 0.000 0.000" in page.text
+    assert "change 0.300 -0.400 0.000 0.000 0.000 0.000" in page.text
+    assert "where from measured measured kept kept kept kept" in page.text
+
+
+def test_the_largest_is_marked_once_in_the_table_and_once_in_the_picture():
+    page = Page(render(EVERY["50 points"]))
+    assert len(page.under("tr", "largest")) == len(page.under("g", "largest")) == 1
+    assert page.text.count("P1, largest") == 1
+    assert "P1: 0.500 mm" in page.text
+    assert "Largest: 0.500 mm, P1." in page.text
+    assert "It is equal at every point" in page.text
+
+
+@pytest.mark.parametrize("name", ["50 points", "one point", "a huge shift"])
+def test_arrows_are_as_long_as_the_stated_factor_says_and_stay_on_the_paper(name):
+    made = EVERY[name]
+    text = render(made)
+    (factor,) = re.findall(r"drawn ([0-9.e+-]+) times as long as it is", text)
+    ((width, height),) = re.findall(r'<rect width="(\d+)" height="([\d.]+)"', text)
+    per_mm = scale_of(text)
+    shafts = re.findall(r'class="(?:point|largest)"><title>P(\d+).*?<polygon points="(.*?)"', text)
+    dots = dict(re.findall(r'<title>P(\d+):.*?<circle cx="([^"]+" cy="[^"]+)" r="2.6"', text))
+    assert len(shafts) == len(made.impact.entries)
+    for number, corners in shafts:
+        (entry,) = (e for e in made.impact.entries if e.number == int(number))
+        tip_x, tip_y = map(float, corners.split()[0].split(","))
+        x, y = map(float, dots[number].split('" cy="'))
+        assert 0 <= tip_x <= float(width)
+        assert 0 <= tip_y <= float(height)
+        assert tip_x - x == pytest.approx(float(factor) * entry.dx_mm * per_mm, abs=0.02)
+        assert y - tip_y == pytest.approx(float(factor) * entry.dy_mm * per_mm, abs=0.02)
+
+
+def scale_of(text):
+    """Return paper per mm, as the ruler of the picture says."""
+    length = re.findall(r'class="bar" x1="0.00" y1="[^"]*" x2="([^"]*)"', text)[0]
+    (millimetres,) = re.findall(r"points: ([\d.]+) mm", text)
+    return float(length) / float(millimetres)
+
+
+def test_every_point_of_an_ordinary_picture_has_its_number_and_no_two_overlap():
+    boxes = [
+        (float(x) - 2.6 * len(number), float(y) - 7, float(x) + 2.6 * len(number), float(y))
+        for number, x, y in names_of(render(EVERY["50 points"]))
+    ]
+    assert len(boxes) == 49
+    for i, a in enumerate(boxes):
+        for b in boxes[:i]:
+            assert a[2] <= b[0] or b[2] <= a[0] or a[3] <= b[1] or b[3] <= a[1]
+
+
+def names_of(text):
+    found = re.findall(r'<text x="([^"]+)" y="([^"]+)" class="name"[^>]*>(\d+)<', text)
+    return [(number, x, y) for x, y, number in found]
+
+
+def test_numbers_without_room_are_left_out_and_counted():
+    text = render(EVERY["all on one spot"])
+    (count,) = re.findall(r"(\d+) numbers have no room", text)
+    assert len(names_of(text)) + int(count) == 58
+    assert "P1: 0.500 mm" in text
+
+
+def test_without_a_shift_there_is_no_arrow_and_it_is_said():
+    page = Page(render(EVERY["no shift"]))
+    assert "polygon" not in page.tags
+    assert "The tip stays where it is" in page.text
+    upwards = Page(render(EVERY["upwards only"]))
+    assert "polygon" not in upwards.tags
+    assert "Largest: 1.000 mm" in upwards.text
+    assert "only its direction turns" not in upwards.text
+    assert "Nothing moves sideways" in upwards.text
+
+
+def test_points_that_cannot_be_judged_are_counted_and_named():
+    page = Page(render(EVERY["none taught"]))
+    assert "No point could be judged." in page.text
+    for words in ("Not taught, skipped: 1.", "P2 (local 5)", "Tilted (V or W not 0), left out: P3"):
+        assert words in page.text
+    assert "svg" not in page.tags
+
+
+OUTCOMES = {
+    Outcome.VERIFIED: "Written, read back and verified",
+    Outcome.WRITTEN: "Written and read back, not verified",
+    Outcome.SKIPPED: "Stored already, nothing was written",
+    Outcome.PROPOSED: "A proposal, nothing was written",
+    Outcome.DECLINED: "Declined, nothing was written",
+    Outcome.REFUSED: "Refused, nothing was written",
+    Outcome.VERIFY_FAILED: "The verification failed",
+    Outcome.UNFINISHED: "Not finished",
+}
+
+
+@pytest.mark.parametrize("outcome", Outcome)
+def test_how_it_ended_stands_at_the_top(outcome):
+    text = Page(render(report(outcome=outcome, ending="Because."))).text
+    assert text.index(OUTCOMES[outcome]) < text.index("Because.") < text.index("controller epson")
+
+
+def test_the_drifts_are_shown_with_what_is_allowed():
+    drifts = (Drift(90, 0.3, -0.4), Drift(0, 0.01, 0.0))
+    page = Page(render(report(verification=VerifyResult(drifts, 0.2))))
+    assert "failed : the largest drift is 0.500 mm; 0.200 mm are allowed." in page.text
+    assert "90.000 0.300 -0.400 0.500" in page.text
+
+
+def test_a_file_is_written_over_only_when_told(tmp_path):
+    path = tmp_path / "page.html"
+    require_free(path)
+    save(report(), path)
+    first = path.read_bytes()
+    with pytest.raises(ConfigError, match="exists already"):
+        require_free(path)
+    with pytest.raises(ConfigError, match="exists already"):
+        save(report(POINTS), path)
+    assert path.read_bytes() == first
+    require_free(path, replace=True)
+    save(report(POINTS), path, replace=True)
+    assert path.read_bytes() != first
+
+
+def test_a_folder_that_is_missing_is_found_before_anything_is_asked(tmp_path):
+    with pytest.raises(ConfigError, match="cannot be written"):
+        require_free(tmp_path / "missing" / "page.html")
+    with pytest.raises(ConfigError, match="cannot be written"):
+        save(report(), tmp_path / "missing" / "page.html")

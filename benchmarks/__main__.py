@@ -2,13 +2,16 @@
 
 from benchmarks.exchange import measure_exchange
 from benchmarks.nozzle_change import measure_nozzle_change
+from benchmarks.solvers import measure_solvers
 from benchmarks.start_up import measure_start_up
 from benchmarks.table import print_table
 
 
 def main() -> None:
     """Run every measurement."""
-    print_table([*measure_exchange(), *measure_nozzle_change(), *measure_start_up()])
+    print_table(
+        [*measure_exchange(), *measure_nozzle_change(), *measure_start_up(), *measure_solvers()]
+    )
 
 
 if __name__ == "__main__":

@@ -48,6 +48,7 @@ COMMANDS: Final = {
         "robolink_cli.calibrate:calibrate",
         tr("Measure a tool offset, propose it, write it and prove it."),
     ),
+    "solve": ("robolink_cli.solve:solve", tr("Calculate a tool offset from a file, offline.")),
     "doctor": ("robolink_cli.doctor:doctor", tr("What could get in the way on this computer.")),
     "ports": ("robolink_cli.ports:ports", tr("List the serial ports.")),
     "scan": ("robolink_cli.scan:scan", tr("Try which of a few addresses answer.")),

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 from robolink.calibration._impact import Impact as Impact
 from robolink.calibration._impact import PointImpact as PointImpact
 from robolink.calibration._impact import impact_on as impact_on
+from robolink.calibration._planar_checks import MIN_ROTATION_DEG as MIN_ROTATION_DEG
+from robolink.calibration._planar_checks import planar_sigma_gain as planar_sigma_gain
 from robolink.calibration._poses import ToolFit as ToolFit
 from robolink.calibration._poses import better_fit as better_fit
 from robolink.calibration._poses import tool_fits as tool_fits
@@ -46,6 +48,10 @@ if TYPE_CHECKING:
     from robolink.calibration._camera_model import require_same_camera as require_same_camera
     from robolink.calibration._crossed_beams import BeamsResult as BeamsResult
     from robolink.calibration._crossed_beams import solve_crossed_beams as solve_crossed_beams
+    from robolink.calibration._joint import JointResult as JointResult
+    from robolink.calibration._joint import JointTouch as JointTouch
+    from robolink.calibration._joint import ToolDifference as ToolDifference
+    from robolink.calibration._joint import solve_joint as solve_joint
     from robolink.calibration._n_angle import solve_n_angle as solve_n_angle
     from robolink.calibration._needle_change import NeedleChain as NeedleChain
     from robolink.calibration._needle_change import NeedleChangeResult as NeedleChangeResult
@@ -71,6 +77,10 @@ if TYPE_CHECKING:
     from robolink.calibration._six_point import ToolAxis as ToolAxis
     from robolink.calibration._six_point import solve_six_point as solve_six_point
     from robolink.calibration._six_point import solve_tool_axis as solve_tool_axis
+    from robolink.calibration._suggest import PoseLimits as PoseLimits
+    from robolink.calibration._suggest import PosePlan as PosePlan
+    from robolink.calibration._suggest import precise_enough as precise_enough
+    from robolink.calibration._suggest import suggest_poses as suggest_poses
     from robolink.calibration._update_guard import NEEDLE_LIMIT_MM as NEEDLE_LIMIT_MM
     from robolink.calibration._update_guard import Correction as Correction
     from robolink.calibration._update_guard import update_guard as update_guard
@@ -96,6 +106,10 @@ _LOADED_LATER = {
     "require_same_camera": "_camera_model",
     "BeamsResult": "_crossed_beams",
     "solve_crossed_beams": "_crossed_beams",
+    "JointResult": "_joint",
+    "JointTouch": "_joint",
+    "ToolDifference": "_joint",
+    "solve_joint": "_joint",
     "solve_n_angle": "_n_angle",
     "NeedleChain": "_needle_change",
     "NeedleChangeResult": "_needle_change",
@@ -121,6 +135,10 @@ _LOADED_LATER = {
     "ToolAxis": "_six_point",
     "solve_six_point": "_six_point",
     "solve_tool_axis": "_six_point",
+    "PoseLimits": "_suggest",
+    "PosePlan": "_suggest",
+    "precise_enough": "_suggest",
+    "suggest_poses": "_suggest",
     "Correction": "_update_guard",
     "NEEDLE_LIMIT_MM": "_update_guard",
     "update_guard": "_update_guard",

@@ -67,12 +67,7 @@ def solve_crossed_beams(
     if not all(two_ways):
         warnings = (*warnings, "one_direction")
     a, b = _system(crossings, beams, two_ways, beams_may_have_moved)
-    if len(a) < a.shape[1]:
-        raise CalibrationError(
-            "too_few_poses",
-            tr("{count} crossings are too few.", count=len(crossings)),
-            remedy=tr("Cross each beam in both directions, at each angle of U."),
-        )
+    _require_enough(a)
     fit = linear_fit(a, b)
     lags = fit.x[2 : 2 + sum(two_ways)].tolist()
     result = BeamsResult(
@@ -150,6 +145,15 @@ def _where_they_cross(beams: tuple[Beam, Beam]) -> tuple[float, float]:
     normals = np.array([beam.normal for beam in beams])
     x, y = np.linalg.solve(normals, [beam.distance_mm for beam in beams]).tolist()
     return x, y
+
+
+def _require_enough(a: Floats) -> None:
+    if len(a) < a.shape[1]:
+        raise CalibrationError(
+            "too_few_poses",
+            tr("{count} crossings are too few.", count=len(a)),
+            remedy=tr("Cross each beam in both directions, at each angle of U."),
+        )
 
 
 def _require_turned(crossings: Sequence[Crossing]) -> None:

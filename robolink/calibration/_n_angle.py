@@ -70,13 +70,7 @@ def solve_n_angle(
         fit = fit_planar(p, z)
     else:
         fit, kept = fit_planar_robust(p, z, robust, sigma_mm=sigma_mm)
-        chosen = [pose for pose, keep in zip(poses, kept, strict=True) if keep]
-        check_planar(
-            chosen,
-            minimum=2,
-            min_rotation_deg=min_rotation_deg,
-            allow_mixed_hand=allow_mixed_hand,
-        )
+        _require_spread_of_kept(poses, kept, min_rotation_deg)
     result = CalibrationResult(
         method="n_angle",
         offset=keep_unmeasured(stored, x_mm=fit.tip.real, y_mm=fit.tip.imag),
@@ -100,6 +94,11 @@ def solve_n_angle(
         sigma_mm=sigma_mm,
         tolerance=tolerance,
     )
+
+
+def _require_spread_of_kept(poses: Sequence[Pose], kept: Mask, min_rotation_deg: float) -> None:
+    chosen = [pose for pose, keep in zip(poses, kept, strict=True) if keep]
+    check_planar(chosen, minimum=2, min_rotation_deg=min_rotation_deg, allow_mixed_hand=True)
 
 
 def planar_arrays(poses: Sequence[Pose]) -> tuple[Complexes, Complexes]:

@@ -98,12 +98,7 @@ def solve_needle_change(
         ConfigError: A standard deviation or limit is not positive.
         ValueError: The two places do not have two or three coordinates each.
     """
-    if len(before_mm) != len(after_mm) or len(before_mm) not in (2, 3):
-        raise ValueError("both places need two coordinates, or both three")
-    for name, value in zip("xyz", before_mm, strict=False):
-        require_finite(**{f"{name} before": value})
-    for name, value in zip("xyz", after_mm, strict=False):
-        require_finite(**{f"{name} after": value})
+    _check_places(before_mm, after_mm)
     require_positive(limits.tolerance_mm, "tolerance_mm")
     check_poses((flange,), allow_mixed_hand=False)
     shift = tuple(b - a for a, b in zip(before_mm, after_mm, strict=True))
@@ -142,6 +137,13 @@ def solve_needle_change(
         chain=now,
         full_calibration_due=due,
     )
+
+
+def _check_places(before_mm: Point, after_mm: Point) -> None:
+    if len(before_mm) != len(after_mm) or len(before_mm) not in (2, 3):
+        raise ValueError("both places need two coordinates, or both three")
+    for name, before, after in zip("xyz", before_mm, after_mm, strict=False):
+        require_finite(**{f"{name} before": before, f"{name} after": after})
 
 
 def _require_plausible(shift_mm: float, limit_mm: float) -> None:

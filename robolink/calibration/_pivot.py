@@ -84,10 +84,6 @@ def solve_pivot(
         _require_observable(
             [poses[i] for i in np.flatnonzero(kept).tolist()], design, max_condition
         )
-    if design.condition_number > WARN_CONDITION:
-        warnings = (*warnings, "small_rotation")
-    if len(poses) < RECOMMENDED_POSES:
-        warnings = (*warnings, "few_poses")
     result = CalibrationResult(
         method="pivot",
         offset=keep_unmeasured(stored, **dict(zip(_MEASURED, fit.tip.tolist(), strict=True))),
@@ -95,7 +91,7 @@ def solve_pivot(
         kept=_KEPT,
         reference_point_mm=tuple(fit.point.tolist()),
         sigma_gain=math.sqrt(float(design.unit_covariance.diagonal().max())),
-        warnings=warnings,
+        warnings=(*warnings, *_doubts(design, len(poses))),
         inputs=tuple(poses),
         residuals_mm=tuple(map(tuple, fit.residuals.tolist())),
         rejected=tuple(np.flatnonzero(~kept).tolist()),
@@ -111,6 +107,11 @@ def solve_pivot(
         sigma_mm=sigma_mm,
         tolerance=tolerance,
     )
+
+
+def _doubts(design: PivotDesign, count: int) -> tuple[str, ...]:
+    weak = ("small_rotation",) if design.condition_number > WARN_CONDITION else ()
+    return (*weak, "few_poses") if count < RECOMMENDED_POSES else weak
 
 
 def _require_observable(poses: Sequence[Pose], design: PivotDesign, max_condition: float) -> None:

@@ -30,6 +30,8 @@ MINIMAL = 3
 
 QR_ABOVE_CONDITION = 50.0
 
+_ONE = np.eye(3)
+
 _RANK_BELOW = 1e-9
 """1 - s below this is a direction that the rotations leave alone."""
 
@@ -65,16 +67,19 @@ class PivotFit:
 def pivot_design(rotations: Floats) -> PivotDesign:
     """Return what N x 3 x 3 rotations can tell about a tip."""
     count = len(rotations)
-    _, s, axes = np.linalg.svd(rotations.mean(axis=0))
-    gaps = np.maximum(1 - s, 0.0)
-    lost = gaps < _RANK_BELOW
-    with np.errstate(divide="ignore"):
-        inverse = np.where(lost, np.inf, 1 / (gaps * (1 + s) * count))
-        condition = math.sqrt((1 + s[0]) / gaps[0]) if gaps[0] > 0 else math.inf
-    covariance = np.full((3, 3), np.inf) if lost.any() else (axes.T * inverse) @ axes
+    # Plain sums and floats: at a few poses, the calls cost more than the arithmetic.
+    _, s, axes = np.linalg.svd(rotations.sum(axis=0) / count)
+    largest, *_ = singular = s.tolist()
+    gaps = [max(1 - value, 0.0) for value in singular]
+    lost = sum(gap < _RANK_BELOW for gap in gaps)
+    if lost:
+        covariance = np.full((3, 3), np.inf)
+    else:
+        told = [count * gap * (1 + value) for gap, value in zip(gaps, singular, strict=True)]
+        covariance = (axes.T / told) @ axes
     return PivotDesign(
-        condition_number=condition,
-        rank=UNKNOWNS - int(np.count_nonzero(lost)),
+        condition_number=math.sqrt((1 + largest) / gaps[0]) if gaps[0] > 0 else math.inf,
+        rank=UNKNOWNS - lost,
         smallest_singular_value=math.sqrt(count * gaps[0]),
         weakest_axis=axes[0],
         unit_covariance=covariance,
@@ -126,10 +131,10 @@ def fit_pivot_robust(
 
 
 def _by_normal_equations(p: Floats, r: Floats) -> tuple[Floats, Floats]:
-    rm, pm = r.mean(axis=0), p.mean(axis=0)
+    rm, pm = r.sum(axis=0) / len(p), p.sum(axis=0) / len(p)
     # Far from the origin p would swamp the differences that matter.
     right = (r.reshape(-1, 3).T @ (p - pm).reshape(-1)) / len(p)
-    tip = np.linalg.solve(np.eye(3) - rm.T @ rm, -right)
+    tip = np.linalg.solve(_ONE - rm.T @ rm, -right)
     return tip, rm @ tip + pm
 
 

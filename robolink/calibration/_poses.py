@@ -41,10 +41,10 @@ class ToolFit:
 
 
 def two_of(poses: Sequence[Pose]) -> tuple[Pose, Pose]:
-    """Return the two poses, upright as the planar solver needs them.
+    """Return the two poses that the method takes.
 
     Raises:
-        CalibrationError: ``too_few_poses``, or ``tilted_pose`` when V or W is not 0.
+        CalibrationError: ``too_few_poses``.
         ConfigError: There are more than two.
     """
     if len(poses) < 2:
@@ -58,19 +58,6 @@ def two_of(poses: Sequence[Pose]) -> tuple[Pose, Pose]:
             tr("{count} poses were given; the method takes two.", count=len(poses)),
             remedy=tr("Choose the two that differ most in U."),
         )
-    for number, pose in enumerate(poses, start=1):
-        if pose.v_deg or pose.w_deg:
-            raise CalibrationError(
-                "tilted_pose",
-                tr(
-                    "Pose {number} has V = {v} and W = {w}; two poses give an offset only when "
-                    "both are 0.",
-                    number=number,
-                    v=pose.v_deg,
-                    w=pose.w_deg,
-                ),
-                remedy=tr("On a robot of six axes, use the controller's own wizard."),
-            )
     first, second = poses
     return first, second
 

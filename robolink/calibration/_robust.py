@@ -82,19 +82,24 @@ def refit_until_settled(
 ) -> tuple[FitT, Mask]:
     """Fit again with the poses inside the threshold until the same ones stay.
 
+    Two thirds of the poses always take part: a lucky first draw that few poses share must not
+    talk itself into an ever smaller circle.
+
     Raises:
-        CalibrationError: ``too_many_outliers`` when more than a third would be rejected.
+        CalibrationError: ``too_many_outliers`` when more than a third is rejected at the end.
     """
-    kept = None
+    used = None
     for _ in range(MOST_REFITS):
         lengths = distances(residuals)
         inside = lengths <= threshold(lengths)
-        rejected = int(np.count_nonzero(~inside))
-        if 3 * rejected > inside.size:
-            raise _too_many(rejected, inside.size)
-        if kept is not None and np.array_equal(inside, kept):
+        least = -(-2 * lengths.size // 3)
+        taking_part = inside | (lengths <= np.partition(lengths, least - 1)[least - 1])
+        if used is not None and np.array_equal(taking_part, used):
             break
-        residuals, kept = refit(inside), inside
+        residuals, used = refit(taking_part), taking_part
+    rejected = int(np.count_nonzero(~inside))
+    if 3 * rejected > inside.size:
+        raise _too_many(rejected, inside.size)
     return finish(inside), inside
 
 

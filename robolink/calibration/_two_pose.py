@@ -16,19 +16,17 @@ error. Each length has the standard deviation of one placement times 1 / (sqrt2 
 
 import math
 
-from robolink.calibration._checks import check_poses, keep_unmeasured
+from robolink.calibration._checks import keep_unmeasured
+from robolink.calibration._planar_checks import (
+    MIN_ROTATION_DEG,
+    check_planar,
+    planar_sigma_gain,
+)
 from robolink.calibration._result import CalibrationResult
 from robolink.calibration._scatter import Scatter
-from robolink.errors import CalibrationError
-from robolink.messages import tr
 from robolink.model import Pose, ToolOffset, angle_difference_deg, rotate_xy
 
 MEASURED = ("x_mm", "y_mm")
-
-MIN_ROTATION_DEG = 30.0
-"""Refuse below this difference of U (calibration.md 2)."""
-
-WARN_ROTATION_DEG = 90.0
 
 
 def solve_two_pose(
@@ -54,22 +52,23 @@ def solve_two_pose(
     Raises:
         CalibrationError: ``degenerate_angles``, ``insufficient_rotation``, ``non_finite``,
             ``suspect_units``, ``mixed_hand``, ``mixed_local``, ``mixed_tool`` or
-            ``implausible_offset``.
+            ``implausible_offset``, or ``tilted_pose``.
         ConfigError: ``sigma_mm`` is not positive.
     """
-    warnings = check_poses((first, second), allow_mixed_hand=allow_mixed_hand)
-    rotation_deg = abs(angle_difference_deg(second.u_deg, first.u_deg))
+    warnings = check_planar(
+        (first, second),
+        minimum=2,
+        min_rotation_deg=min_rotation_deg,
+        allow_mixed_hand=allow_mixed_hand,
+    )
     half = math.radians(angle_difference_deg(second.u_deg, first.u_deg) / 2)
-    _require_rotation(rotation_deg, half, min_rotation_deg)
-    if rotation_deg < WARN_ROTATION_DEG:
-        warnings = (*warnings, "small_rotation")
     d_x, d_y = second.x_mm - first.x_mm, second.y_mm - first.y_mm
     mean_deg = first.u_deg + math.degrees(half)
     m_x, m_y = rotate_xy(d_x, d_y, -mean_deg)
     scale = 2 * math.sin(half)
     t_x, t_y = -m_y / scale, m_x / scale
     at_x, at_y = rotate_xy(t_x, t_y, first.u_deg)
-    gain = 1 / (math.sqrt(2) * abs(math.sin(half)))
+    gain = planar_sigma_gain((first, second))
     scatter = Scatter.of(0.0, 0, sigma_mm)
     variance = (scatter.sigma_mm * gain) ** 2 if scatter else 0.0
     covariance = ((variance, 0.0), (0.0, variance)) if scatter else ()
@@ -90,24 +89,3 @@ def solve_two_pose(
         dof=0,
         unobservable=("z_mm", "u_deg", "v_deg", "w_deg"),
     )
-
-
-def _require_rotation(rotation_deg: float, half: float, minimum_deg: float) -> None:
-    if rotation_deg < 1e-9:
-        raise CalibrationError(
-            "degenerate_angles",
-            tr("Both poses have the same U; the offset cannot be found from them."),
-            remedy=tr("Turn the tool, best by 180 degrees, and touch the point again."),
-        )
-    if rotation_deg < minimum_deg:
-        gain = 1 / (math.sqrt(2) * abs(math.sin(half)))
-        raise CalibrationError(
-            "insufficient_rotation",
-            tr(
-                "The poses differ by {rotation:.2f} degrees in U only; every placement error "
-                "would count {gain:.1f} times.",
-                rotation=rotation_deg,
-                gain=gain,
-            ),
-            remedy=tr("Turn by at least {minimum:.0f} degrees, best by 180.", minimum=minimum_deg),
-        )

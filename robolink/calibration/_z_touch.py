@@ -83,11 +83,7 @@ def solve_z_touch(
     """
     require_poses(len(touches), 1 if latency_s is not None else 2)
     require_finite(surface_z_mm=surface_z_mm)
-    for number, touch in enumerate(touches, start=1):
-        require_finite(
-            **{f"z_mm of touch {number}": touch.z_mm},
-            **{f"speed_mm_s of touch {number}": touch.speed_mm_s},
-        )
+    _check_touches(touches)
     z = np.array([touch.z_mm for touch in touches], dtype=float)
     speeds = np.array([touch.speed_mm_s for touch in touches], dtype=float)
     columns = [np.ones(len(z))]
@@ -122,6 +118,14 @@ def solve_z_touch(
         sigma_mm=sigma_mm,
         tolerance=tolerance,
     )
+
+
+def _check_touches(touches: Sequence[Touch]) -> None:
+    for number, touch in enumerate(touches, start=1):
+        require_finite(
+            **{f"z_mm of touch {number}": touch.z_mm},
+            **{f"speed_mm_s of touch {number}": touch.speed_mm_s},
+        )
 
 
 def _require_two_speeds(touches: Sequence[Touch]) -> None:

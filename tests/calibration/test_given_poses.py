@@ -109,5 +109,5 @@ def test_three_poses_are_a_mistake_in_the_command():
 
 def test_a_tilted_pose_is_refused_by_name():
     with pytest.raises(CalibrationError) as caught:
-        two_of([Pose(300, 100, 0, 0), Pose(300, 100, 0, 180, w_deg=180)])
+        solve_two_pose(Pose(300, 100, 0, 0), Pose(300, 100, 0, 180, w_deg=180))
     assert caught.value.code == "tilted_pose"

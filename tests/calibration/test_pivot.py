@@ -1,6 +1,7 @@
 """One tip on one point in many orientations of a six-axis robot."""
 
 import math
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +14,7 @@ from robolink.calibration._pivot_fit import QR_ABOVE_CONDITION, _by_normal_equat
 from robolink.calibration._rotations import pose_arrays
 from robolink.model import ToolOffset
 from tests.calibration._simulated import (
+    MOST,
     PIN,
     assert_honest,
     coverage,
@@ -182,3 +184,12 @@ def test_the_interval_holds_the_truth(count, stated):
     assert_honest(
         coverage(lambda rng: solve_pivot(shaken(exact, rng, 0.1, axes=3), sigma_mm=stated), TIP)
     )
+
+
+def test_a_robust_fit_is_less_honest_refuses_nothing_good_and_that_is_known():
+    exact = poses_on(8)
+    shares = coverage(
+        lambda rng: solve_pivot(shaken(exact, rng, 0.1, axes=3), robust=Robust()), TIP, trials=1000
+    )
+    sys.stdout.write(f"robust pivot, 8 poses, no outlier: {shares}\n")
+    assert all(0.90 <= share <= MOST for share in shares)

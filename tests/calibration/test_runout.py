@@ -43,6 +43,7 @@ def test_harmonics_are_kept_apart_from_the_offset():
     assert report.second_mm == pytest.approx(0.03, abs=0.003)
     assert report.harmonics_matter
     assert report.warnings == ("wobble",)
+    assert report.rms_after_mm is not None
     assert report.rms_after_mm < 0.004 < report.rms_mm
     assert report.peak_mm > 0.08
 

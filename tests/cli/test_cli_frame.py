@@ -8,7 +8,8 @@ from typing import Any
 import click
 import pytest
 from robolink_cli import main
-from robolink_cli._context import marker_notice, open_controller
+from robolink_cli._context import open_controller
+from robolink_cli._notices import marker_notice
 
 import robolink
 from robolink.model import Marker, MarkerKind

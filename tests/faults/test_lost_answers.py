@@ -81,7 +81,7 @@ def test_a_lost_answer_to_a_move_is_unknown_and_the_move_is_never_sent_twice(ser
         with robolink.connect(url, timeout_s=0.3) as controller:
             started = simulator.machine.arm.moves_started
             with pytest.raises(OutcomeUnknownError):
-                lift(controller).wait(timeout_s=20)
+                lift(controller).wait(timeout_s=2)
         with robolink.connect(url) as controller:
             with pytest.raises(OutcomeUnknownError, match="resolve"):
                 lift(controller)

@@ -1,0 +1,145 @@
+"""A pivot with covariance and residuals, against what others offer, on the same arrays.
+
+scipy's least_squares is what a person reaches for first; numpy's lstsq on the 3N x 6 system is
+the floor of a careful one. scikit-surgerycalibration is the field's own package; it brings
+some ninety others, so it is compared only where somebody has installed it.
+"""
+
+from collections.abc import Callable, Iterator
+from importlib.util import find_spec
+from statistics import median
+from time import perf_counter_ns
+from typing import Literal
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from benchmarks.table import Figure
+from robolink.calibration import (
+    Robust,
+    fit_pivot,
+    fit_pivot_robust,
+    pivot_design,
+    quaternion_rotations,
+    solve_pivot,
+    uvw_deg,
+)
+from robolink.calibration._robust import Floats
+from robolink.model import Pose
+
+SIZES = (10, 20, 100, 1_000, 10_000)
+PEER = "scikit-surgerycalibration"
+THRESHOLD_MM = 0.5
+TIP = np.array([4.2, -7.9, 131.6])
+
+_AT_LEAST_S = 0.15
+
+
+def measure_solvers() -> Iterator[Figure]:
+    """Yield the figures of the pivot solvers."""
+    for count in SIZES:
+        yield from _plain(count)
+    peer = find_spec("sksurgerycalibration") is not None
+    for count in SIZES:
+        if count != 20:
+            yield from _robust(count, peer)
+    if not peer:
+        yield Figure(f"robust pivot, {PEER}", "not installed")
+
+
+def _plain(count: int) -> Iterator[Figure]:
+    positions, turned = _data(count, outliers=0.0)
+    poses = [_pose(*row) for row in zip(positions.tolist(), turned, strict=True)]
+    ours = _median_us(lambda: pivot(positions, turned))
+    whole = _median_us(lambda: solve_pivot(poses))
+    scipy = _median_us(lambda: by_scipy(positions, turned, "trf"))
+    quick = _median_us(lambda: by_scipy(positions, turned, "lm"))
+    floor = _median_us(lambda: by_lstsq(positions, turned))
+    name = f"pivot of {count} poses,"
+    yield Figure(f"{name} robolink, with covariance and residuals", f"{ours:.0f} us")
+    goal = 1 / 20 if count == 20 else None
+    yield Figure(f"{name} robolink over scipy least_squares", f"{scipy:.0f} us", ours / scipy, goal)
+    yield Figure(f"{name} robolink over scipy with method lm", f"{quick:.0f} us", ours / quick)
+    yield Figure(f"{name} robolink over numpy lstsq alone", f"{floor:.0f} us", ours / floor)
+    yield Figure(f"{name} robolink from poses, with every check", f"{whole:.0f} us", whole / scipy)
+
+
+def _robust(count: int, peer: bool) -> Iterator[Figure]:
+    positions, turned = _data(count, outliers=0.2)
+    robust = Robust(threshold_mm=THRESHOLD_MM)
+    fit, kept = fit_pivot_robust(positions, turned, robust, sigma_mm=None)
+    wrong = float(np.linalg.norm(fit.tip - TIP))
+    ours = _median_us(lambda: fit_pivot_robust(positions, turned, robust, sigma_mm=None))
+    name = f"robust pivot of {count} poses, 20 % outliers,"
+    yield Figure(f"{name} robolink ({wrong:.3f} mm off, {int(kept.sum())} kept)", f"{ours:.0f} us")
+    if not peer:
+        return
+    from sksurgerycalibration.algorithms.pivot import pivot_calibration_with_ransac
+
+    matrices = np.tile(np.eye(4), (count, 1, 1))
+    matrices[:, :3, :3], matrices[:, :3, 3] = turned, positions
+
+    def theirs() -> Floats:
+        tip: Floats = pivot_calibration_with_ransac(matrices, 100, THRESHOLD_MM, 0.25)[0]
+        return tip
+
+    off = float(np.linalg.norm(theirs().ravel() - fit.tip))
+    them = _median_us(theirs)
+    goal = 1 / 50 if count == 100 else None
+    yield Figure(
+        f"{name} robolink over {PEER} ({off:.3f} mm apart)", f"{them:.0f} us", ours / them, goal
+    )
+
+
+def pivot(positions: Floats, turned: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return tip, covariance and residuals by the product's own functions."""
+    design = pivot_design(turned)
+    fit = fit_pivot(positions, turned, condition_number=design.condition_number)
+    flat = fit.residuals.ravel()
+    variance = float(flat @ flat) / (flat.size - 6)
+    return fit.tip, design.unit_covariance * variance, fit.residuals
+
+
+def by_scipy(
+    positions: Floats, turned: Floats, method: Literal["trf", "lm"]
+) -> tuple[Floats, Floats, Floats]:
+    """Return the same from scipy's least_squares; trf is what it takes unasked."""
+    found = least_squares(
+        lambda x: (positions + turned @ x[:3] - x[3:]).ravel(), np.zeros(6), method=method
+    )
+    variance = 2 * found.cost / (3 * len(positions) - 6)
+    covariance = variance * np.linalg.inv(found.jac.T @ found.jac)
+    return found.x[:3], covariance[:3, :3], found.fun
+
+
+def by_lstsq(positions: Floats, turned: Floats) -> Floats:
+    """Return tip and point by lstsq of the whole system, without any uncertainty."""
+    whole = np.hstack((turned.reshape(-1, 3), np.tile(-np.eye(3), (len(positions), 1))))
+    return np.linalg.lstsq(whole, -positions.ravel(), rcond=None)[0].astype(float)
+
+
+def _data(count: int, *, outliers: float) -> tuple[Floats, Floats]:
+    """Return flange positions and rotations with 0.1 mm of noise and outliers of 30 mm."""
+    random = np.random.default_rng(5)
+    turned = quaternion_rotations(random.normal(size=(count, 4)) * (0.3, 0.3, 1.0, 1.0))
+    positions = np.array([350.0, -120.0, 85.0]) - turned @ TIP
+    positions += random.normal(0, 0.1, positions.shape)
+    spoilt = random.permutation(count)[: int(outliers * count)]
+    positions[spoilt] += random.normal(0, 30.0, (len(spoilt), 3))
+    return positions, turned
+
+
+def _pose(place: list[float], turned: Floats) -> Pose:
+    x, y, z = place
+    u, v, w = uvw_deg(turned)
+    return Pose(x, y, z, u, v, w)
+
+
+def _median_us(act: Callable[[], object]) -> float:
+    act()
+    times: list[int] = []
+    while sum(times) < _AT_LEAST_S * 1e9 or len(times) < 5:
+        start = perf_counter_ns()
+        act()
+        times.append(perf_counter_ns() - start)
+    return median(times) / 1000

@@ -154,7 +154,6 @@ class NotReadyReason(StrEnum):
     TEST = "test"
     RUNNING = "running"
     PAUSED = "paused"
-    MOVING = "moving"
     EMERGENCY_STOP = "emergency_stop"
     GUARD_OPEN = "guard_open"
     FAULT = "fault"

@@ -110,10 +110,11 @@ def test_every_fact_has_a_finding_and_names_an_option_that_exists(cell):
 
 def test_nothing_is_written_and_nothing_moves(cell):
     simulator = EpsonSimulator()
-    before = simulator.machine.to_state()
+    before = simulator.machine.tools.to_state()
     verify_epson(cell(simulator))
-    assert simulator.machine.to_state() == before
+    assert simulator.machine.tools.to_state() == before
     assert simulator.machine.flash_writes == 0
+    assert simulator.machine.arm.moves_started == 0
     assert simulator.condition.code == 0
     asked = [text for _, direction, text in simulator.log if direction == ">"]
     assert asked[-1] == "$Logout"

@@ -1,16 +1,13 @@
-import json
 import random
 
 import pytest
 from robolink_simulators.epson.bits import BitBank
-from robolink_simulators.epson.kinematics import Joints
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.parameters import MotionParameters
 from robolink_simulators.epson.points import Local, Point
 from robolink_simulators.epson.refusals import Refusal, RefusalKind
 from robolink_simulators.epson.robots import find_robot
 
-from robolink.errors import ConfigError
 from robolink.model import ToolOffset
 
 T6 = find_robot("T6-602S")
@@ -79,39 +76,6 @@ def test_clearing_the_tool_in_force_selects_the_flange(machine):
     machine.tools.select(1)
     machine.tools.clear(1)
     assert machine.tools.selected == 0
-
-
-def test_tools_selection_and_arm_survive_a_restart_but_settings_do_not(machine):
-    machine.tools.set(15, NOZZLE)
-    machine.tools.select(15)
-    machine.arm.place(Joints(10.0, -20.0, -30.0, 40.0), 0)
-    machine.switch_motors(True)
-    machine.points.store(1, Point((0.0,) * 6))
-    state = json.loads(json.dumps(machine.to_state()))
-    again = Machine.from_state(T6, state)
-    assert again.tools.defined() == {15: NOZZLE}
-    assert again.tools.selected == 15
-    assert again.flash_writes == 1
-    assert again.arm.joints == machine.arm.joints
-    assert not again.motors_on
-    assert not again.points.defined(1)
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        {"robot": "T3-401S"},
-        {"joints": [0.0, 0.0, 99.0, 0.0]},
-        {"joints": None},
-        {"tools": {}},
-        {"tools": {"offsets": {}, "selected": 3, "flash_writes": 0}},
-        {"tools": {"offsets": {"16": [0.0]}, "selected": 0, "flash_writes": 0}},
-        {"tools": {"offsets": {"1": ["x"]}, "selected": 0, "flash_writes": 0}},
-    ],
-)
-def test_a_state_that_does_not_fit_is_refused(machine, change):
-    with pytest.raises(ConfigError, match="does not fit"):
-        Machine.from_state(T6, machine.to_state() | change)
 
 
 def test_motor_on_resets_the_motion_parameters_and_power(machine):

@@ -40,7 +40,6 @@ from robolink.protocols.spel._statements import go as go
 from robolink.protocols.spel._statements import move as move
 from robolink.protocols.spel._statements import power_high as power_high
 from robolink.protocols.spel._statements import power_low as power_low
-from robolink.protocols.spel._statements import raw as raw
 from robolink.protocols.spel._statements import select_tool as select_tool
 from robolink.protocols.spel._statements import set_tool as set_tool
 from robolink.protocols.spel._statements import speed as speed

@@ -113,30 +113,6 @@ def speed_s(mm_s: float, depart: float | None = None, approach: float | None = N
     return Statement(f"SpeedS {written}")
 
 
-def raw(text: str) -> Statement:
-    """Take free text for a statement: the single door through which a person's text passes.
-
-    Only the characters and the length are checked, not the meaning: whoever calls this has
-    the text shown to a person, and journals it.
-
-    Raises:
-        LocalProtocolError: Empty, longer than 4060 bytes, a quote, or a character that is
-            not printable ASCII (line ends included).
-    """
-    if not text.strip() or len(text) > MAX_STATEMENT:
-        why = tr("it must hold 1 to {limit} characters", limit=MAX_STATEMENT)
-    elif not (text.isascii() and text.isprintable()):
-        why = tr("it holds a character that is not printable ASCII")
-    elif '"' in text:
-        why = tr("Execute knows no way to write a quote; use Chr$(34)")
-    else:
-        return Statement(text)
-    raise LocalProtocolError(
-        tr("The statement cannot be sent: {why}.", why=why),
-        remedy=tr("Nothing was sent. Correct the statement."),
-    )
-
-
 def _point(target: Pose, *, six_axes: bool) -> str:
     if target.local != 0:
         raise LocalProtocolError(

@@ -1,17 +1,13 @@
 """What SPEL+ statements touch: one robot, its tools, points, bits and settings."""
 
 import random
-from collections.abc import Mapping, Sequence
 
-from robolink.errors import ConfigError
-from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
 from robolink_simulators.epson.arm import REST, Arm
 from robolink_simulators.epson.bits import IO_BITS, MEMORY_BITS, BitBank
 from robolink_simulators.epson.kinematics import Joints, flange_of, inverse, tip_of
 from robolink_simulators.epson.parameters import MotionParameters
 from robolink_simulators.epson.points import LocalTable, Point, PointTable
-from robolink_simulators.epson.refusals import OutOfReach
 from robolink_simulators.epson.robots import ScaraModel
 from robolink_simulators.epson.tool_memory import ToolMemory
 
@@ -105,47 +101,6 @@ class Machine:
         """Set the defaults and low power: start-up, Motor On, Reset ... (spel.md 6.3)."""
         self.parameters = MotionParameters()
         self.power_high = False
-
-    def to_state(self) -> dict[str, object]:
-        """Return what survives power-off, ready for JSON.
-
-        Tools and their selection (documented, spel.md 6.1) and where the arm stands (assumed:
-        absolute encoders). Points set by a statement are lost unless saved to a file.
-        """
-        return {
-            "robot": self.model.name,
-            "joints": list(self.arm.joints.values()),
-            "tools": self.tools.to_state(),
-        }
-
-    @classmethod
-    def from_state(
-        cls,
-        model: ScaraModel,
-        state: Mapping[str, object],
-        *,
-        backlash_deg: float = 0.0,
-        serial: str = "SIM00001",
-    ) -> "Machine":
-        """Return the machine after a restart.
-
-        Raises:
-            ConfigError: The state is not one of this robot's.
-        """
-        try:
-            robot, joints, tools = state["robot"], state["joints"], state["tools"]
-            if robot != model.name:
-                raise ValueError(robot)
-            if not (isinstance(joints, Sequence) and isinstance(tools, Mapping)):
-                raise TypeError(joints)
-            machine = cls(model, joints=Joints(*joints), backlash_deg=backlash_deg, serial=serial)
-            machine.tools.restore(tools)
-        except (KeyError, TypeError, ValueError, OutOfReach) as error:
-            raise ConfigError(
-                tr("The saved state does not fit a simulated {robot}.", robot=model.name),
-                remedy=tr("Use another state file, or delete this one to start afresh."),
-            ) from error
-        return machine
 
     def _tip_of(self, flange: Pose) -> Pose:
         return tip_of(flange, self.offset, tool=self.tools.selected)

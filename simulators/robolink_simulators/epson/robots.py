@@ -57,11 +57,6 @@ class ScaraModel:
         """The mark of the whole row."""
         return Evidence.PARTLY_ASSUMED if self.assumed else Evidence.DOCUMENTED
 
-    @property
-    def reach_mm(self) -> float:
-        """Distance from joint 1 to joint 4 with the arm stretched."""
-        return self.a1_mm + self.a2_mm
-
 
 _TURN = 360.0
 

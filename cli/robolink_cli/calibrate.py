@@ -176,11 +176,13 @@ def _measure(
         agree_to_motion(
             tr(
                 "Robot {robot} will move in Power Low, at most {speed:g} mm/s, within {box:g} mm, "
-                "to measure tool {tool}. Is the cell clear?",
+                "to measure tool {tool}. The remote time-out set in the controller is taken to "
+                "be {timeout:g} s. Is the cell clear?",
                 robot=controller.robot_number(),
                 speed=plan.speed_mm_s,
                 box=plan.box_mm,
                 tool=plan.tool,
+                timeout=context.remote_timeout_s,
             ),
             yes=yes,
         )

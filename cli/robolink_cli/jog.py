@@ -68,11 +68,13 @@ def jog(
             return
         question = tr(
             "Robot {robot} will move in Power Low, at most {speed:g} mm/s, with tool {tool}, "
-            "within {box:g} mm. Is the cell clear?",
+            "within {box:g} mm. The remote time-out set in the controller is taken to be "
+            "{timeout:g} s. Is the cell clear?",
             robot=controller.robot_number(),
             speed=speed_mm_s,
             tool=controller.tools.selected(),
             box=box_mm,
+            timeout=context.remote_timeout_s,
         )
         if board is None:
             agree_to_motion(question, yes=yes)

@@ -142,6 +142,7 @@ def test_a_step_out_of_the_box_is_refused_and_jogging_goes_on(jog, simulator):
     terminal.wait_for(POSITION)
     terminal.press(RIGHT)
     terminal.wait_for("outside the work box")
+    terminal.wait_for(POSITION)  # until then, keys are dropped
     terminal.press(b"-")
     terminal.wait_for(r"step 0\.01\s")
     terminal.press(RIGHT)

@@ -67,7 +67,7 @@ def agree_to_motion(question: str, *, yes: bool) -> None:
     _require_yes(question)
 
 
-def _require_yes(question: str) -> None:
+def asked(question: str) -> bool:
     """Ask with a prompt that can be polled, and read the status between polls.
 
     An idle client is cut off after the remote time-out (epson.md 1.1), and a person may take
@@ -82,5 +82,9 @@ def _require_yes(question: str) -> None:
     while (line := operator.poll(POLL_S)) is None:
         if controller is not None:
             controller.status()
-    if line.strip().lower() not in ("y", "yes"):
+    return line.strip().lower() in ("y", "yes")
+
+
+def _require_yes(question: str) -> None:
+    if not asked(question):
         raise DeclinedError(tr("You said no."), remedy=tr("Nothing was sent."))

@@ -134,7 +134,8 @@ def open_controller(
     Args:
         context: What the command was told.
         quiet: Whether the command itself deals with what was left unfinished.
-        any_robot: Whether it goes on without a look at the model that the cell file names.
+        any_robot: Whether it goes on at once, without a look at the model that the cell file
+            names and without a question.
 
     Raises:
         ConfigError: No controller is named, the URL or password file is wrong, or the robot is
@@ -162,6 +163,10 @@ def open_controller(
                 note(marker_notice(marker, named))
         if context.cell and not any_robot:
             require_expected_robot(controller, context.cell)
+        if found and not quiet and not any_robot:
+            from robolink_cli._offering import offer_to_restore
+
+            offer_to_restore(controller, found)
         try:
             yield controller
         finally:

@@ -1,0 +1,89 @@
+"""The next command says that Tool 0 is still selected, and offers the old one."""
+
+import pytest
+from robolink_cli import _consent, _offering, _operator, main
+from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.hosting.in_process import register, unregister
+
+import robolink
+from robolink.markers import memory_log
+
+
+class Person:
+    """Answers every question alike."""
+
+    def __init__(self, answer):
+        self.answer, self.questions = answer, []
+
+    def ask(self, question, kind):
+        self.questions.append(question)
+
+    def poll(self, wait_s):
+        return self.answer
+
+
+@pytest.fixture
+def cell():
+    """A simulator on which a calibration died with Tool 0 selected."""
+    simulator = EpsonSimulator(seed=3)
+    url = register("offer-to-restore", simulator)
+    with robolink.connect(url) as controller:
+        died = controller.preserved("calibrate tool 1")
+        died.__enter__()
+        controller.tools.select(0)
+        controller._session.close()
+    yield simulator, url
+    unregister("offer-to-restore")
+    for marker in open_markers(url):
+        memory_log(url).clear(marker.operation)
+
+
+def open_markers(url):
+    return memory_log(url).open_markers()
+
+
+@pytest.fixture
+def person(monkeypatch, request):
+    person = Person(request.param)
+    monkeypatch.setattr(_offering, "on_terminal", lambda: True)
+    monkeypatch.setattr(_consent, "on_terminal", lambda: True)
+    monkeypatch.setattr(_operator, "terminal", lambda: person)
+    return person
+
+
+@pytest.mark.parametrize("person", ["y"], indirect=True)
+def test_a_yes_selects_the_cells_own_tool_again(cell, person, capsys):
+    simulator, url = cell
+    assert main.run(["-c", url, "status"]) == 0
+    assert simulator.machine.tools.selected == 1
+    assert open_markers(url) == ()
+    shown = capsys.readouterr()
+    assert "Tool 0 is selected now; it was tool 1 before" in shown.err
+    assert "tool in force: 1" in shown.out
+    assert "select tool 1 again" in person.questions[0]
+
+
+@pytest.mark.parametrize("person", ["n"], indirect=True)
+def test_a_no_changes_nothing_and_the_command_goes_on(cell, person, capsys):
+    simulator, url = cell
+    assert main.run(["-c", url, "status"]) == 0
+    assert simulator.machine.tools.selected == 0
+    assert len(open_markers(url)) == 1
+    assert "tool in force: 0" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("person", ["y"], indirect=True)
+@pytest.mark.parametrize("words", [("stop",), ("status", "--json")])
+def test_a_stop_and_a_script_are_asked_nothing(cell, person, words):
+    simulator, url = cell
+    assert main.run(["-c", url, *words]) == 0
+    assert person.questions == []
+    assert simulator.machine.tools.selected == 0
+
+
+@pytest.mark.parametrize("person", ["y"], indirect=True)
+def test_nothing_is_asked_of_a_controller_that_can_be_told_nothing(cell, person):
+    simulator, url = cell
+    simulator.panel.press_estop()
+    assert main.run(["-c", url, "status"]) == 0
+    assert person.questions == []

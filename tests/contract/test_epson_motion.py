@@ -51,9 +51,8 @@ def test_a_joint_move_turns_the_tool(controller):
     assert group.pose().u_deg == pytest.approx(target.u_deg, abs=0.05)
 
 
+@pytest.mark.simulator_only
 def test_power_is_low_and_the_speed_is_set_before_a_move(cell):
-    if cell.simulator is None:
-        pytest.skip("sets high power, which a test never does on hardware")
     with cell.connect() as controller:
         controller.motors(True)
         cell.simulator.machine.power_high = True

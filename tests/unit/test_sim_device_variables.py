@@ -2,9 +2,9 @@
 
 import pytest
 from robolink_simulators.epson import EpsonSimulator
-from robolink_simulators.epson.variables import VariableType
 
 from robolink.errors import ConfigError
+from robolink.protocols.epson_text import VariableType
 
 
 @pytest.fixture

@@ -9,11 +9,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from robolink.controllers.epson._variables import EpsonVariables, VariableType
+from robolink.controllers.epson._variables import EpsonVariables
 from robolink.errors import RejectedError, ToolError
 from robolink.messages import tr
 from robolink.model import ToolOffset
-from robolink.protocols.epson_text import ErrorCode
+from robolink.protocols.epson_text import ErrorCode, VariableType
 
 LAYOUT: Final = 1
 """Number of the arrangement below; the program writes it into its state."""

@@ -8,7 +8,7 @@ from robolink.controllers.epson._findings import Finding, Verdict
 from robolink.controllers.epson._guarded import MarkerDesk
 from robolink.controllers.epson._motion import EpsonGroup
 from robolink.controllers.epson._preserve import InForce, Preserver
-from robolink.controllers.epson._tools import TOLERANCE, EpsonToolTable, describe
+from robolink.controllers.epson._tools import EpsonToolTable, describe, same_tool
 from robolink.controllers.epson._value_doubts import ValueDoubts
 from robolink.messages import tr
 from robolink.model import Marker, MarkerKind, ToolOffset
@@ -61,10 +61,10 @@ class Resolver:
         now = self._tools.read(tool)
         requested = _offset(marker.details.get("requested"))
         before = _offset(marker.details.get("before"))
-        if _same(now, requested):
+        if same_tool(now, requested):
             verdict = Verdict.DONE
             sentence = tr("Tool {tool} holds the new value {now}.", tool=tool, now=describe(now))
-        elif _same(now, before):
+        elif same_tool(now, before):
             verdict = Verdict.NOT_APPLIED
             sentence = tr(
                 "Tool {tool} still holds the old value {now}; the write did not take.",
@@ -139,7 +139,3 @@ def _written_in(marker: Marker) -> str:
 
 def _offset(value: object) -> ToolOffset | None:
     return ToolOffset(*value) if isinstance(value, list) else None
-
-
-def _same(a: ToolOffset | None, b: ToolOffset | None) -> bool:
-    return a is b if a is None or b is None else a.matches(b, TOLERANCE)

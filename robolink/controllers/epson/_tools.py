@@ -82,7 +82,7 @@ class EpsonToolTable:
         requested = offset.rounded(DECIMALS)
         six_axes = self._robot.read().six_axes
         self._check_axes(requested, six_axes=six_axes)
-        if _same(self._read(tool), requested):
+        if same_tool(self._read(tool), requested):
             return ()
         return (spel.set_tool(tool, requested, six_axes=six_axes),)
 
@@ -138,11 +138,11 @@ class EpsonToolTable:
     ) -> ToolReceipt:
         before = self._read(tool)
         unconditional = expected is ANY
-        if _same(before, requested):
+        if same_tool(before, requested):
             return ToolReceipt(
                 tool, before, requested, before, skipped=True, unconditional=unconditional
             )
-        if expected is not ANY and not _same(before, expected):
+        if expected is not ANY and not same_tool(before, expected):
             raise ToolChangedError(
                 tr(
                     "Tool {tool} holds {found}, not the expected {expected}; nothing was written.",
@@ -158,7 +158,7 @@ class EpsonToolTable:
             )
         details = {"tool": tool, "before": _plain(before), "requested": _plain(requested)}
         found = self._carry_out(statement, details, lambda: self._read(tool))
-        if not _same(found, requested):
+        if not same_tool(found, requested):
             raise ReadBackError(
                 tr(
                     "Tool {tool} was written as {requested}, but reads back as {found}.",
@@ -258,7 +258,8 @@ def describe(offset: ToolOffset | None) -> str:
     return " ".join(f"{name} {spel.decimal(value, DECIMALS)}" for name, value in shown)
 
 
-def _same(a: ToolOffset | None, b: ToolOffset | None) -> bool:
+def same_tool(a: ToolOffset | None, b: ToolOffset | None) -> bool:
+    """Tell whether this controller prints both alike; undefined equals undefined only."""
     if a is None or b is None:
         return a is b
     return a.matches(b, TOLERANCE)

@@ -4,7 +4,6 @@ import math
 import re
 from collections.abc import Sequence
 from decimal import Decimal
-from enum import StrEnum
 from typing import Final
 
 from robolink.controllers.epson._session import EpsonSession
@@ -12,20 +11,7 @@ from robolink.controllers.epson._setter import Change, Value, ValueReceipt, Valu
 from robolink.errors import ConfigError, RemoteProtocolError
 from robolink.messages import tr
 from robolink.protocols import spel
-from robolink.protocols.epson_text import Request
-
-
-class VariableType(StrEnum):
-    """The types that Remote Ethernet knows, as they are written on the wire."""
-
-    BOOLEAN = "Boolean"
-    BYTE = "Byte"
-    DOUBLE = "Double"
-    INTEGER = "Integer"
-    LONG = "Long"
-    REAL = "Real"
-    STRING = "String"
-
+from robolink.protocols.epson_text import Request, VariableType
 
 MOST_ELEMENTS: Final = 100
 """Elements of an array that one request may ask for (epson.md 1.2 note 4)."""

@@ -18,3 +18,4 @@ from robolink.protocols.epson_text._events import Request as Request
 from robolink.protocols.epson_text._status import StatusFlags as StatusFlags
 from robolink.protocols.epson_text._status import parse_status as parse_status
 from robolink.protocols.epson_text._status import status_fields as status_fields
+from robolink.protocols.epson_text._variable_types import VariableType as VariableType

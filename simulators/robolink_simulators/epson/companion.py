@@ -7,9 +7,10 @@ start and after each change of a tool is what the companion's documentation asks
 from collections.abc import Sequence
 from typing import Final
 
+from robolink.protocols.epson_text import VariableType
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.tool_memory import HIGHEST_TOOL
-from robolink_simulators.epson.variables import Variables, VariableType
+from robolink_simulators.epson.variables import Variables
 
 LAYOUT: Final = 1
 LAST_COUNT: Final = 1_000_000_000

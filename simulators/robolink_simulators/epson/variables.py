@@ -3,27 +3,14 @@
 import math
 import re
 from collections.abc import Sequence
-from enum import StrEnum
 from typing import Final
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink.protocols.epson_text import ErrorCode
+from robolink.protocols.epson_text import ErrorCode, VariableType
 from robolink_simulators.epson.refused import Refused, malformed
 
 Value = bool | int | float | str
-
-
-class VariableType(StrEnum):
-    """The types that Remote Ethernet knows."""
-
-    BOOLEAN = "Boolean"
-    BYTE = "Byte"
-    DOUBLE = "Double"
-    INTEGER = "Integer"
-    LONG = "Long"
-    REAL = "Real"
-    STRING = "String"
 
 
 _RANGES: Final = {

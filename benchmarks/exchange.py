@@ -23,7 +23,7 @@ from urllib.parse import urlsplit
 
 import robolink
 from benchmarks.table import Figure
-from robolink.markers import MemoryOutcomeLog
+from robolink.journal import memory_journal
 
 ROUNDS = 15
 EXCHANGES = 1_000
@@ -47,7 +47,7 @@ def measure_exchange() -> Iterator[Figure]:
 def _compare(
     placed: str, *, goal: float | None, simulator_cpu: int | None = None
 ) -> Iterator[Figure]:
-    with _simulator(simulator_cpu) as url:
+    with served_simulator(simulator_cpu) as url:
         rounds = [(_raw_round(url), _driver_round(url)) for _ in range(ROUNDS)]
     raw, driver = (median(column) for column in zip(*rounds, strict=True))
     yield Figure(f"status exchange, raw blocking socket ({placed})", f"{raw:.1f} us")
@@ -60,7 +60,8 @@ def _compare(
 
 
 @contextlib.contextmanager
-def _simulator(cpu: int | None) -> Iterator[str]:
+def served_simulator(cpu: int | None) -> Iterator[str]:
+    """Serve a simulator in a process of its own, on the CPU ``cpu``; gives its URL."""
     command = [sys.executable, "-m", "robolink_cli", "sim", "epson", "--tcp", "127.0.0.1:0"]
     process = subprocess.Popen([*command, "--json"], stdout=subprocess.PIPE, text=True)
     try:
@@ -94,7 +95,7 @@ def _raw_round(url: str) -> float:
 
 
 def _driver_round(url: str) -> float:
-    with robolink.connect(url, outcomes=MemoryOutcomeLog()) as controller:
+    with robolink.connect(url, outcomes=memory_journal(url).log(url)) as controller:
         for _ in range(WARM_UP):
             controller.status()
         start = perf_counter_ns()

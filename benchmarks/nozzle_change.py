@@ -9,7 +9,7 @@ from robolink_simulators.hosting.in_process import simulator_named, unregister
 
 import robolink
 from benchmarks.table import Figure
-from robolink.nozzle_change import ChangePlan, NozzleChange
+from robolink.nozzle_change import ChangePlan, NozzleChange, ToolPlan
 
 ROUNDS = 9
 
@@ -38,9 +38,8 @@ def _change(seed: int) -> tuple[float, float]:
         start = perf_counter_ns()
         NozzleChange(
             controller,
-            ChangePlan(1, ask_before_write=False),
+            ChangePlan((ToolPlan(1),), ask_before_write=False),
             operator=AssistedOperator(look, lambda _: None),
-            show=lambda _: None,
         ).run()
         wall_ns = perf_counter_ns() - start
         simulated_ns = controller.clock.now_ns() - simulated_ns

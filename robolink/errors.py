@@ -4,7 +4,8 @@
 
     RobolinkError
     ├── ConfigError (ValueError)           a URL, an option or a file is wrong; nothing was sent
-    │   └── LimitError                     a target or a change lies outside the stated limits
+    │   ├── LimitError                     a target or a change lies outside the stated limits
+    │   └── JournalError                   the record cannot be kept or read
     ├── TransportError                     the wire
     │   ├── ConnectError (ConnectionError) no link
     │   │   └── LoginUnansweredError       a link, but nobody answers the login
@@ -20,7 +21,9 @@
     │   ├── NotReadyError                  refused here: the state would not allow it (.reason)
     │   ├── ControllerFaultError           the controller is in error
     │   ├── MotionTimeoutError             a movement took too long and was aborted
-    │   └── BusyError                      another operation of this process is under way
+    │   └── BusyError                      another operation is under way
+    │       ├── LeaseHeldError             another program or person is changing the controller
+    │       └── LeaseLostError             another did so meanwhile
     ├── OutcomeUnknownError                sent, not answered: the machine may or may not have acted
     ├── ToolError
     │   ├── ToolIndexError · ReservedToolError · UndefinedToolError
@@ -29,6 +32,7 @@
     ├── CalibrationError                   the data do not give a trustworthy result (.code)
     ├── VerifyError                        the drift about the new tip is too large
     └── DeclinedError                      a person said no
+        └── NotAllowedError                it takes an engineer
 
 Each error says what happened (:attr:`~RobolinkError.what`) and what to do next
 (:attr:`~RobolinkError.remedy`); ``str(error)`` is both. Foreign exceptions are converted
@@ -75,6 +79,10 @@ class ConfigError(RobolinkError, ValueError):
 
 class LimitError(ConfigError):
     """A target, a step or a change lies outside the limits in force. Nothing was sent."""
+
+
+class JournalError(ConfigError):
+    """The journal cannot be opened, read or added to."""
 
 
 class TransportError(RobolinkError):
@@ -195,7 +203,15 @@ class MotionTimeoutError(ControllerError):
 
 
 class BusyError(ControllerError):
-    """Another operation of this process holds the controller. Nothing was sent."""
+    """Another operation holds the controller. Nothing was sent."""
+
+
+class LeaseHeldError(BusyError):
+    """Another program or person is changing the controller. Nothing was sent."""
+
+
+class LeaseLostError(BusyError):
+    """Another took the controller over, or changed it since it was looked at. Nothing was sent."""
 
 
 class OutcomeUnknownError(RobolinkError):
@@ -247,3 +263,7 @@ class VerifyError(RobolinkError):
 
 class DeclinedError(RobolinkError):
     """A person, or the absence of one, said no."""
+
+
+class NotAllowedError(DeclinedError):
+    """The person's role in the cell file does not cover it. Nothing was sent."""

@@ -39,6 +39,8 @@ T = TypeVar("T")
 
 _STEP = re.compile(r"([xyzu])([+-][0-9]{1,4}(?:\.[0-9]{1,3})?)", re.ASCII)
 
+_DECIMAL = re.compile(r"[+-]?[0-9]{1,5}(?:\.[0-9]{1,6})?", re.ASCII)
+
 
 class Question(Enum):
     """What kind of answer is wanted."""
@@ -47,6 +49,9 @@ class Question(Enum):
     """Jog steps until the tip is on the reference point, then an empty line."""
 
     YES_NO = "yes/no"
+
+    TEXT = "text"
+    """A line of text that is not empty; ``q`` alone ends."""
 
 
 class Operator(Protocol):
@@ -193,13 +198,33 @@ class Runner:
         self._operator.ask(question, Question.YES_NO)
         return self._answer() in ("y", "yes")
 
+    def ask_text(self, question: str) -> str:
+        """Ask for a line of text under the same watch, until there is one.
+
+        Raises:
+            DeclinedError: The person ended it with ``q``.
+        """
+        while True:
+            self._operator.ask(question, Question.TEXT)
+            text = self._line().strip()
+            if text == "q":
+                raise DeclinedError(
+                    tr("The procedure was ended by the operator."),
+                    remedy=tr("Nothing was written."),
+                )
+            if text:
+                return text
+
     def _answer(self) -> str:
+        return self._line().strip().lower()
+
+    def _line(self) -> str:
         """Return the next line typed, reading the status at least once a second meanwhile."""
         while True:
             line = self._operator.poll(POLL_S)
             self._watch()
             if line is not None:
-                return line.strip().lower()
+                return line
 
     def _watch(self) -> None:
         obstacle = _ended_by(self._controller.status())
@@ -240,6 +265,20 @@ def jog_target(here: Pose, steps: str, settings: RunSettings) -> tuple[Pose, Pat
     )
     # A straight move that only turns is an error in SPEL+ without ROT (spel.md 7.1).
     return target, Path.JOINT if "u" in deltas else Path.STRAIGHT
+
+
+def parse_decimal(text: str) -> float:
+    """Read a decimal number that a person typed: ``-120.35``.
+
+    Raises:
+        ConfigError: It is anything else.
+    """
+    if not _DECIMAL.fullmatch(text.strip()):
+        raise ConfigError(
+            tr("{text!r} is not a decimal number.", text=text),
+            remedy=tr("Type for example -120.35."),
+        )
+    return float(text)
 
 
 def parse_steps(text: str) -> dict[str, float]:

@@ -52,3 +52,10 @@ class Deadline(NamedTuple):
     def expired(self) -> bool:
         """Whether the instant has been reached."""
         return self.clock.now_ns() >= self.at_ns
+
+
+def wall_label() -> str:
+    """Return the wall-clock time, ISO 8601 UTC, as a label for people."""
+    from datetime import UTC, datetime  # here, because most users of clocks need no calendar
+
+    return datetime.now(UTC).isoformat(timespec="seconds")

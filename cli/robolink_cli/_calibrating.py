@@ -1,16 +1,29 @@
 """A calibration on a terminal: who is asked, what is shown, what is reported."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 
-from robolink.calibration import Impact, TouchPlan
+from robolink.calibration import CalibrationResult, Impact, TouchPlan, VerifyResult
 from robolink.controllers.epson import EpsonController
 from robolink.errors import ConfigError, ReservedToolError, ToolIndexError
 from robolink.messages import tr
-from robolink.model import Pose
-from robolink.nozzle_change import ChangePlan, ChangeReport, NozzleChange, Proposal, preview
+from robolink.model import Pose, ToolReceipt
+from robolink.nozzle_change import (
+    ChangePlan,
+    Gate,
+    Limits,
+    Listener,
+    NozzleChange,
+    PinAndPerson,
+    Proposal,
+    ToolPlan,
+    ToolReport,
+    preview,
+)
 from robolink.runner import Operator
+from robolink.transaction import earlier_corrections
 from robolink_cli._impacting import ImpactRequest, impact_payload, judge, show_impact
 from robolink_cli._operator import AssistedOperator, terminal
 from robolink_cli._render import note, say
@@ -37,8 +50,11 @@ def plan_from(
     max_change_mm: float,
     tolerance_mm: float,
     no_verify: bool,
+    jump_limit_mm: float,
 ) -> ChangePlan:
     """Return the plan that the options of the command describe.
+
+    A larger ``max_change_mm`` than ``jump_limit_mm``, the cell's own, takes an engineer.
 
     Raises:
         ReservedToolError, ToolIndexError: There is no such tool to calibrate.
@@ -59,19 +75,62 @@ def plan_from(
             tr("The clearance must be smaller than the lift."),
             remedy=tr("For example --lift 10 --clearance 2."),
         )
-    return ChangePlan(
-        tool,
-        touch=TouchPlan(lift_mm=lift_mm, clearance_mm=clearance_mm, turn_deg=turn_deg),
-        max_change_mm=max_change_mm,
+    source = PinAndPerson(TouchPlan(lift_mm=lift_mm, clearance_mm=clearance_mm, turn_deg=turn_deg))
+    gate = Gate(
+        max_change_mm=min(max_change_mm, jump_limit_mm),
+        accepted_change_mm=max_change_mm,
         drift_tolerance_mm=tolerance_mm,
-        verify=not no_verify,
-        box_mm=box_mm,
-        speed_mm_s=speed_mm_s,
+    )
+    return ChangePlan(
+        (ToolPlan(tool, source, gate, verify=not no_verify),),
+        limits=Limits(box_mm=box_mm, speed_mm_s=speed_mm_s),
     )
 
 
-class Bench:
-    """One calibration of one tool, as a command runs it."""
+class CalibrationListener(Listener):
+    """Shows a calibration as it goes, and collects it for a report.
+
+    Attributes:
+        impact: What the change means for taught points, once it was proposed.
+    """
+
+    def __init__(self, draft: Draft, impact: ImpactRequest | None) -> None:
+        self._draft = draft
+        self._request = impact
+        self._points: dict[int, Pose | None] | None = None
+        self.impact: Impact | None = None
+
+    def read_points(self, controller: EpsonController) -> None:
+        """Read the taught points on which the change is to be judged."""
+        if self._request is not None:
+            self._points = self._request.read(controller)
+
+    def wrote(self, receipt: ToolReceipt) -> None:
+        """Note it for the report."""
+        self._draft.note_result(receipt)
+
+    def verified(self, tool: int, result: VerifyResult) -> None:  # noqa: ARG002 - one tool only
+        """Note it for the report."""
+        self._draft.note_result(result)
+
+    def propose(self, proposal: Proposal, *, source: str, warnings: tuple[str, ...]) -> None:
+        """Show the proposal and what it means for taught points."""
+        self.impact = judge(self._points, old=proposal.before, new=proposal.offset)
+        self._draft.propose(proposal, source=source, warnings=warnings, impact=self.impact)
+        show_proposal(proposal)
+
+
+class _LiveListener(CalibrationListener):
+    def proposed(self, proposals: Sequence[Proposal]) -> None:
+        (proposal,) = proposals
+        source = tr("measured on the robot: one pin touched at two angles of U")
+        self.propose(proposal, source=source, warnings=doubts(proposal))
+        if self.impact is not None:
+            show_impact(proposal.tool, self.impact)
+
+
+class LiveCalibration:
+    """One calibration of one tool by a person at a pin, as a command runs it."""
 
     def __init__(
         self,
@@ -84,12 +143,14 @@ class Bench:
     ) -> None:
         self._controller = controller
         self._plan = plan
-        self._draft = draft
         self._assist_url = assist_url
-        self._impact_request = impact
-        self._points: dict[int, Pose | None] | None = None
-        self._impact: Impact | None = None
-        self._report: ChangeReport | None = None
+        self._listener = _LiveListener(draft, impact)
+        self._report: ToolReport | None = None
+
+    @property
+    def tool(self) -> int:
+        """Number of the tool."""
+        return self._plan.tools[0].tool
 
     def require_writable(self) -> None:
         """Refuse before anything moves what would be refused at the write; back up first.
@@ -99,49 +160,32 @@ class Bench:
             OutcomeUnknownError: Something earlier is unsettled.
             NotReadyError: The state forbids it.
         """
-        self._controller.require_settled(tr("calibrate tool {tool}", tool=self._plan.tool))
-        self._controller.tools.read(self._plan.tool)
+        self._controller.require_settled(tr("calibrate tool {tool}", tool=self.tool))
+        self._controller.tools.read(self.tool)
         back_up_first(self._controller)
 
     def dry_run(self) -> dict[str, object]:
         """Return the foreseen steps with their requests and limit checks; reads only."""
-        group = self._controller.groups[0]
-        steps: list[dict[str, object]] = []
-        for step in preview(self._controller, self._plan):
-            requests: list[str] = []
-            if step.target is not None and step.profile is not None:
-                requests = [
-                    self._controller.wire("Execute", statement)
-                    for statement in group.statements_for(step.target, step.profile)
-                ]
-            target = pose_payload(step.target) if step.target else None
-            steps.append(
-                {
-                    "text": step.text,
-                    "target": target,
-                    "requests": requests,
-                    "refusal": step.refusal,
-                }
-            )
-        return {"dry_run": True, "tool": self._plan.tool, "steps": steps}
+        steps = planned_steps(self._controller, self._plan)
+        return {"dry_run": True, "tool": self.tool, "steps": steps}
 
     def run(self, *, ask_before_write: bool) -> dict[str, object]:
         """Measure, propose, write, verify; return the document of the whole."""
-        if self._impact_request is not None:
-            self._points = self._impact_request.read(self._controller)
-        with self._operator() as operator:
+        self._listener.read_points(self._controller)
+        with operator_at(self._assist_url, lambda: self.tool) as operator:
             change = NozzleChange(
                 self._controller,
                 replace(self._plan, ask_before_write=ask_before_write),
                 operator=operator,
-                show=self._show_proposal,
-                on_result=self._draft.note_result,
+                listener=self._listener,
+                earlier=partial(earlier_corrections, self._controller),
             )
-            self._report = change.run()
+            (self._report,) = change.run().tools
+        impact = self._listener.impact
         return {
             **report_payload(self._report),
             "source": {"kind": "live"},
-            "impact": impact_payload(self._impact) if self._impact else None,
+            "impact": impact_payload(impact) if impact else None,
         }
 
     def show_end(self) -> None:
@@ -149,32 +193,45 @@ class Bench:
         if self._report is not None:
             show_report(self._report)
 
-    @contextmanager
-    def _operator(self) -> Iterator[Operator]:
-        if self._assist_url is None:
-            yield terminal()
-            return
-        from robolink_simulators.assist import open_eyes
 
-        with open_eyes(self._assist_url) as eyes:
-
-            def look() -> tuple[float, float, float]:
-                seen = eyes.look(self._plan.tool)
-                return seen.dx_mm, seen.dy_mm, seen.dz_mm
-
-            yield AssistedOperator(look, note)
-
-    def _show_proposal(self, proposal: Proposal) -> None:
-        show_proposal(proposal)
-        self._impact = judge(self._points, old=proposal.before, new=proposal.result.offset)
-        if self._impact is not None:
-            show_impact(proposal.tool, self._impact)
-        self._draft.propose(
-            proposal,
-            source=tr("measured on the robot: one pin touched at two angles of U"),
-            warnings=doubts(proposal),
-            impact=self._impact,
+def planned_steps(controller: EpsonController, plan: ChangePlan) -> list[dict[str, object]]:
+    """Return the foreseen steps of a plan with their requests and limit checks; reads only."""
+    group = controller.groups[0]
+    steps: list[dict[str, object]] = []
+    for step in preview(controller, plan):
+        requests: list[str] = []
+        if step.target is not None and step.profile is not None:
+            requests = [
+                controller.wire("Execute", statement)
+                for statement in group.statements_for(step.target, step.profile)
+            ]
+        target = pose_payload(step.target) if step.target else None
+        steps.append(
+            {"text": step.text, "target": target, "requests": requests, "refusal": step.refusal}
         )
+    return steps
+
+
+@contextmanager
+def operator_at(assist_url: str | None, tool: Callable[[], int]) -> Iterator[Operator]:
+    """Yield the person at the terminal, or a simulator's stand-in for one.
+
+    Args:
+        assist_url: The simulator's assist URL, ``None`` for a real person.
+        tool: Tells which tip the stand-in is to look at.
+    """
+    if assist_url is None:
+        yield terminal()
+        return
+    from robolink_simulators.assist import open_eyes
+
+    with open_eyes(assist_url) as eyes:
+
+        def look() -> tuple[float, float, float]:
+            seen = eyes.look(tool())
+            return seen.dx_mm, seen.dy_mm, seen.dz_mm
+
+        yield AssistedOperator(look, note)
 
 
 def show_proposal(proposal: Proposal) -> None:
@@ -182,15 +239,26 @@ def show_proposal(proposal: Proposal) -> None:
     show_change(
         proposal.tool,
         offset_payload(proposal.before),
-        offset_payload(proposal.result.offset),
-        after_name=tr("measured"),
-        unmeasured=proposal.result.kept,
+        offset_payload(proposal.offset),
+        after_name=tr("measured") if proposal.measured is None else tr("proposed"),
+        unmeasured=proposal.kept,
     )
-    say(
-        tr(
-            "  two poses leave no residual: each placement error counts {gain:.2f} times",
-            gain=proposal.result.sigma_gain,
+    for remark in (*proposal.notes, fit_sentence(proposal.result)):
+        say(f"  {remark}")
+
+
+def fit_sentence(result: CalibrationResult) -> str:
+    """Return how far the measurement can be trusted, in one sentence."""
+    if result.rms_mm is None:
+        return tr(
+            "two poses leave no residual: each placement error counts {gain:.2f} times",
+            gain=result.sigma_gain,
         )
+    return tr(
+        "{count} poses agree within {rms:.3f} mm rms, {largest:.3f} mm at most",
+        count=len(result.inputs),
+        rms=result.rms_mm,
+        largest=result.max_residual_mm,
     )
 
 
@@ -201,10 +269,12 @@ def doubts(proposal: Proposal) -> tuple[str, ...]:
     return ()
 
 
-def show_report(report: ChangeReport) -> None:
+def show_report(report: ToolReport) -> None:
     """Say what was written and how the verification ended."""
-    tool = report.receipt.tool
-    if report.receipt.skipped:
+    tool, receipt = report.proposal.tool, report.receipt
+    if receipt is None:
+        return
+    if receipt.skipped:
         say(tr("Tool {tool} held this value already; nothing was written.", tool=tool))
     else:
         say(tr("Tool {tool} was written and read back.", tool=tool))
@@ -228,20 +298,24 @@ def show_report(report: ChangeReport) -> None:
     )
 
 
-def report_payload(report: ChangeReport) -> dict[str, object]:
+def report_payload(report: ToolReport) -> dict[str, object]:
     """Return the document of a finished calibration."""
     return {
         **proposal_payload(report.proposal),
-        "write": receipt_payload(report.receipt),
+        "write": receipt_payload(report.receipt) if report.receipt else None,
         "verification": verification_payload(report.verification),
     }
 
 
 def show_plan(payload: Mapping[str, object]) -> None:
     """Show a dry run."""
-    steps = payload["steps"]
-    assert isinstance(steps, list)  # noqa: S101 - made by Bench.dry_run
     say(tr("Dry run; nothing is sent. The measurement of tool {tool}:", tool=payload["tool"]))
+    show_steps(payload["steps"])
+
+
+def show_steps(steps: object) -> None:
+    """Show the steps of :func:`planned_steps`."""
+    assert isinstance(steps, list)  # noqa: S101 - made by planned_steps
     for number, step in enumerate(steps, start=1):
         say(f"{number:3}. {step['text']}")
         for request in step["requests"]:

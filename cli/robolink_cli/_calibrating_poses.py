@@ -1,27 +1,105 @@
 """A calibration from poses that exist already: nothing moves, no tool is selected."""
 
-from robolink.calibration import Impact
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+
+from robolink.calibration import ToolFit
 from robolink.controllers.epson import EpsonController
 from robolink.errors import DeclinedError
 from robolink.messages import tr
 from robolink.nozzle_change import (
-    ChangeReport,
-    PosesPlan,
-    PosesProposal,
+    Bench,
+    ChangePlan,
+    Gate,
+    GivenPoses,
+    Listener,
+    Moment,
+    NozzleChange,
     Proposal,
-    propose_from_poses,
-    require_plausible,
-    write_proposal,
+    ToolPlan,
+    ToolReport,
 )
-from robolink_cli._calibrating import doubts, report_payload, show_proposal
+from robolink.transaction import earlier_corrections
+from robolink_cli._calibrating import CalibrationListener, doubts, report_payload
 from robolink_cli._consent import agree, on_terminal
 from robolink_cli._context import CliContext, open_controller
-from robolink_cli._impacting import ImpactRequest, impact_payload, judge, show_impact
+from robolink_cli._impacting import ImpactRequest, impact_payload, show_impact
+from robolink_cli._operator import terminal
 from robolink_cli._pose_source import PoseSource
 from robolink_cli._render import note, say
-from robolink_cli._reporting import ReportRequest, reporting
+from robolink_cli._reporting import Draft, ReportRequest, reporting
 from robolink_cli._safekeeping import back_up_first
 from robolink_cli._views import proposal_payload
+
+
+@dataclass(frozen=True, slots=True)
+class PosesPlan:
+    """What to find out from poses that exist.
+
+    Attributes:
+        tool: Number of the tool whose nozzle was changed.
+        taught_tool: The tool whose tip the poses describe; 0 when they are flange poses.
+        gate: What is believed.
+    """
+
+    tool: int
+    taught_tool: int
+    gate: Gate
+
+
+class _PosesListener(CalibrationListener):
+    """Shows what the poses say, warns of another tool, and asks before the write."""
+
+    def __init__(
+        self,
+        draft: Draft,
+        plan: PosesPlan,
+        given: GivenPoses,
+        *,
+        impact: ImpactRequest | None,
+        yes: bool,
+    ) -> None:
+        super().__init__(draft, impact)
+        self._plan = plan
+        self._given = given
+        self._yes = yes
+
+    @property
+    def better(self) -> ToolFit | None:
+        """A tool that fits the poses much better than the one named."""
+        return self._given.found.better if self._given.found else None
+
+    @property
+    def fits(self) -> tuple[ToolFit, ...]:
+        """Which tools the poses may have been taught with, the likeliest first."""
+        return self._given.found.fits if self._given.found else ()
+
+    def proposed(self, proposals: Sequence[Proposal]) -> None:
+        (proposal,) = proposals
+        self.propose(proposal, source=self._given.sentence, warnings=self._doubts(proposal))
+        if "small_rotation" in proposal.result.warnings:
+            say(tr("  the poses differ little in U; half a turn would be best"))
+        if self.better is not None:
+            _warn_of_other_tool(self._plan, self.better, proposal.change_mm)
+        if self.impact is not None:
+            show_impact(self._plan.tool, self.impact)
+
+    def moment(self, moment: Moment, bench: Bench, tool: int | None = None) -> None:  # noqa: ARG002 - one tool only
+        if moment is Moment.BEFORE_WRITE:
+            _agree_to_write(self._plan.tool, yes=self._yes)
+            back_up_first(bench.controller)
+
+    def _doubts(self, proposal: Proposal) -> tuple[str, ...]:
+        known = doubts(proposal)
+        if self.better is None:
+            return known
+        other = tr(
+            "These poses fit tool {better} much better than tool {taught}.",
+            better=self.better.tool,
+            taught=self._plan.taught_tool,
+        )
+        return (*known, other)
 
 
 def calibrate_from_poses(
@@ -41,56 +119,78 @@ def calibrate_from_poses(
         DeclinedError: A person said no, or nobody could be asked.
         ToolChangedError: The tool was changed meanwhile; nothing was written.
     """
-    with open_controller(context) as controller, reporting(report, controller) as draft:
-        if not dry_run:
-            controller.require_settled(tr("calibrate tool {tool}", tool=plan.tool))
-        proposed = propose_from_poses(controller, plan, source.poses(controller))
-        points = impact.read(controller) if impact else None
-        judged = judge(points, old=proposed.proposal.before, new=proposed.proposal.result.offset)
-        extra = _extra(proposed, source, judged)
-        draft.propose(
-            proposed.proposal,
-            source=source.sentence(plan.taught_tool),
-            warnings=_doubts(proposed),
-            impact=judged,
+    with (
+        open_controller(context, changes=not dry_run) as controller,
+        reporting(report, controller) as draft,
+    ):
+        given = GivenPoses(
+            lambda: source.poses(controller),
+            taught_tool=plan.taught_tool,
+            plausible_mm=plan.gate.limit_mm,
+            sentence=source.sentence(plan.taught_tool),
         )
-        if not (dry_run and context.json):
-            _show(proposed, judged)
-        require_plausible(proposed)
+        listener = _PosesListener(draft, plan, given, impact=impact, yes=yes)
+        listener.read_points(controller)
         if dry_run:
-            requests = _requests(controller, proposed.proposal)
+            payload = _dry_run(controller, plan, given, listener, quiet=context.json)
         else:
-            done = _write(controller, proposed.proposal, yes=yes)
-            draft.note_result(done.receipt)
-    extra["report"] = draft.saved
+            done = _carry_out(controller, plan, given, listener)
+            payload = report_payload(done)
+            # Now, because Ctrl-C may come before the logout is answered.
+            _show_end(done)
+    extra = _extra(plan, source, listener) | {"report": draft.saved}
     if dry_run:
-        _show_dry_run(context, requests, {**proposal_payload(proposed.proposal), **extra})
+        _show_dry_run(context, {**payload, **extra})
     else:
-        context.emit("calibration", {**report_payload(done), **extra}, lambda: None)
+        context.emit("calibration", {**payload, **extra}, lambda: None)
 
 
-def _extra(proposed: PosesProposal, source: PoseSource, judged: Impact | None) -> dict[str, object]:
-    better = proposed.better
+def _carry_out(
+    controller: EpsonController, plan: PosesPlan, given: GivenPoses, listener: Listener
+) -> ToolReport:
+    one = ToolPlan(plan.tool, given, plan.gate, verify=False)
+    change = NozzleChange(
+        controller,
+        ChangePlan((one,), ask_before_write=False),
+        operator=terminal(),
+        listener=listener,
+        earlier=partial(earlier_corrections, controller),
+    )
+    (report,) = change.run().tools
+    return report
+
+
+def _dry_run(
+    controller: EpsonController,
+    plan: PosesPlan,
+    given: GivenPoses,
+    listener: Listener,
+    *,
+    quiet: bool,
+) -> dict[str, object]:
+    """Propose and judge; return the document with what would be sent."""
+    before = controller.tools.read(plan.tool)
+    given.found = given.find(controller, plan.tool, before)
+    proposal = Proposal(plan.tool, before, given.found.result)
+    if not quiet:
+        listener.proposed([proposal])
+    plan.gate.judge_change(proposal, remedy=given.remedy)
+    statements = controller.tools.preview_write(plan.tool, proposal.offset)
+    requests = [controller.wire("Execute", statement) for statement in statements]
+    return {"dry_run": True, "requests": requests, **proposal_payload(proposal)}
+
+
+def _extra(plan: PosesPlan, source: PoseSource, listener: _PosesListener) -> dict[str, object]:
+    better, impact = listener.better, listener.impact
     return {
-        "source": source.payload(proposed.plan.taught_tool),
-        "tool_fits": [{"tool": fit.tool, "change_mm": fit.change_mm} for fit in proposed.fits],
+        "source": source.payload(plan.taught_tool),
+        "tool_fits": [{"tool": fit.tool, "change_mm": fit.change_mm} for fit in listener.fits],
         "better_tool": None if better is None else better.tool,
-        "impact": impact_payload(judged) if judged else None,
+        "impact": impact_payload(impact) if impact else None,
     }
 
 
-def _show(proposed: PosesProposal, judged: Impact | None) -> None:
-    show_proposal(proposed.proposal)
-    if "small_rotation" in proposed.proposal.result.warnings:
-        say(tr("  the poses differ little in U; half a turn would be best"))
-    if proposed.better is not None:
-        _warn_of_other_tool(proposed)
-    if judged is not None:
-        show_impact(proposed.plan.tool, judged)
-
-
-def _warn_of_other_tool(proposed: PosesProposal) -> None:
-    assert proposed.better is not None  # noqa: S101 - asked by the caller
+def _warn_of_other_tool(plan: PosesPlan, better: ToolFit, change_mm: float | None) -> None:
     note(
         tr(
             "Warning: these poses fit tool {better} much better than tool {taught}.\n"
@@ -98,33 +198,19 @@ def _warn_of_other_tool(proposed: PosesProposal) -> None:
             "taught with tool {taught}, by {large:.3f} mm.\n"
             "  If tool {better} was selected on the pendant, write nothing and give "
             "--taught-tool {better}.",
-            better=proposed.better.tool,
-            taught=proposed.plan.taught_tool,
-            tool=proposed.plan.tool,
-            small=proposed.better.change_mm,
-            large=proposed.proposal.change_mm,
+            better=better.tool,
+            taught=plan.taught_tool,
+            tool=plan.tool,
+            small=better.change_mm,
+            large=change_mm,
         )
     )
 
 
-def _doubts(proposed: PosesProposal) -> tuple[str, ...]:
-    known = doubts(proposed.proposal)
-    if proposed.better is None:
-        return known
-    other = tr(
-        "These poses fit tool {better} much better than tool {taught}.",
-        better=proposed.better.tool,
-        taught=proposed.plan.taught_tool,
-    )
-    return (*known, other)
+def _show_dry_run(context: CliContext, payload: dict[str, object]) -> None:
+    requests = payload["requests"]
+    assert isinstance(requests, list)  # noqa: S101 - made by _dry_run
 
-
-def _requests(controller: EpsonController, proposal: Proposal) -> list[str]:
-    statements = controller.tools.preview_write(proposal.tool, proposal.result.offset)
-    return [controller.wire("Execute", statement) for statement in statements]
-
-
-def _show_dry_run(context: CliContext, requests: list[str], payload: dict[str, object]) -> None:
     def show() -> None:
         if requests:
             say(tr("Dry run; this would be sent:"))
@@ -132,16 +218,7 @@ def _show_dry_run(context: CliContext, requests: list[str], payload: dict[str, o
         else:
             say(tr("Dry run; the value is stored already, nothing would be sent."))
 
-    context.emit("dry-run", {"dry_run": True, "requests": requests, **payload}, show)
-
-
-def _write(controller: EpsonController, proposal: Proposal, *, yes: bool) -> ChangeReport:
-    _agree_to_write(proposal.tool, yes=yes)
-    back_up_first(controller)
-    done = write_proposal(controller, proposal)
-    # Now, because Ctrl-C may come before the logout is answered.
-    _show_end(done)
-    return done
+    context.emit("dry-run", payload, show)
 
 
 def _agree_to_write(tool: int, *, yes: bool) -> None:
@@ -159,9 +236,9 @@ def _agree_to_write(tool: int, *, yes: bool) -> None:
     agree(tr("Write this to tool {tool}?", tool=tool), yes=False)
 
 
-def _show_end(report: ChangeReport) -> None:
-    tool = report.receipt.tool
-    if report.receipt.skipped:
+def _show_end(report: ToolReport) -> None:
+    tool = report.proposal.tool
+    if report.receipt is not None and report.receipt.skipped:
         say(tr("Tool {tool} held this value already; nothing was written.", tool=tool))
     else:
         say(tr("Tool {tool} was written and read back.", tool=tool))

@@ -1,13 +1,12 @@
 """The checks of ``doctor``: this computer, never a controller."""
 
-import json
 import os
 from collections.abc import Iterator
 from pathlib import Path
 
 from robolink.config import cell_names, check_file, config_files
+from robolink.durable_files import state_folder
 from robolink.errors import ConfigError
-from robolink.markers import FileOutcomeLog
 from robolink.messages import tr
 from robolink_cli._remark import Level, Remark
 from robolink_cli._requirements import check_name, check_versions
@@ -23,26 +22,26 @@ def check_up() -> list[Remark]:
         *check_cell_files(),
         check_keyring(),
         *check_serial_ports(),
-        *check_markers(),
+        *check_journal(),
     ]
 
 
 def check_state_folder() -> Iterator[Remark]:
-    """See whether the safety record can be kept; without it nothing is ever sent."""
-    folder = _outcomes_folder()
+    """See whether backups can be kept; without one nothing is ever written."""
+    folder = state_folder("backups")
     existing = next(path for path in (folder, *folder.parents) if path.exists())
     if not (existing.is_dir() and os.access(existing, os.W_OK | os.X_OK)):
         yield Remark(
             "state",
             Level.BAD,
-            tr("the safety record cannot be kept in {folder}.", folder=folder),
+            tr("backups cannot be kept in {folder}.", folder=folder),
             tr("Make {path} writable, or name another folder: ROBOLINK_STATE_DIR.", path=existing),
         )
     elif folder.exists() and _others_may(folder, 0o022):
         yield Remark(
             "state",
             Level.WARN,
-            tr("others may change the safety record in {folder}.", folder=folder),
+            tr("others may change the backups in {folder}.", folder=folder),
             tr("Run: chmod go-w {folder}", folder=folder),
         )
     else:
@@ -114,22 +113,21 @@ def check_serial_ports() -> Iterator[Remark]:
         yield Remark("serial", Level.OK, tr("there is no serial port."))
 
 
-def check_markers() -> Iterator[Remark]:
+def check_journal() -> Iterator[Remark]:
     """List what was begun on any controller and is not proved finished."""
-    folder = _outcomes_folder()
-    records = sorted(folder.glob("*.json")) if folder.is_dir() else []
-    for path in records:
-        try:
-            yield from _unsettled(path)
-        except ConfigError as error:
-            yield Remark("unsettled", Level.BAD, error.what, error.remedy)
-    if not records:
-        yield Remark("unsettled", Level.OK, tr("nothing was left unfinished."))
+    from robolink.journal import default_location, may_exist, open_journal
 
-
-def _unsettled(path: Path) -> Iterator[Remark]:
-    identity = _identity_in(path)
-    for marker in FileOutcomeLog(identity, path.parent).open_markers():
+    if not may_exist(default_location()):
+        yield Remark("journal", Level.OK, tr("nothing was recorded yet."))
+        return
+    try:
+        journal = open_journal(read_only=True)
+        unsettled = journal.open_markers()
+    except ConfigError as error:
+        yield Remark("journal", Level.BAD, error.what, error.remedy)
+        return
+    yield Remark("journal", Level.OK, journal.location)
+    for identity, marker in unsettled:
         yield Remark(
             "unsettled",
             Level.WARN,
@@ -139,33 +137,10 @@ def _unsettled(path: Path) -> Iterator[Remark]:
                 when=marker.begun_at,
                 request=marker.request,
             ),
-            tr("Run: robolink -c {identity} resolve", identity=identity),
+            tr("Run: robolink -c {identity} recover", identity=identity),
         )
-
-
-def _identity_in(path: Path) -> str:
-    """Return the controller that a record is about.
-
-    Raises:
-        ConfigError: It says none, or its name is another controller's.
-    """
-    try:
-        identity = json.loads(path.read_text(encoding="utf-8"))["controller"]
-        if FileOutcomeLog(identity, path.parent).path == path:
-            return str(identity)
-    except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
-        pass
-    raise ConfigError(
-        tr("The safety record {path} cannot be understood.", path=path),
-        remedy=tr(
-            "It may say what was left unfinished on a controller. Check the selected tool and "
-            "the tool offsets of your robots by hand, then move this file away."
-        ),
-    )
-
-
-def _outcomes_folder() -> Path:
-    return FileOutcomeLog("").path.parent
+    if not unsettled:
+        yield Remark("unsettled", Level.OK, tr("nothing was left unfinished."))
 
 
 def _others_may(path: Path, bits: int) -> bool:

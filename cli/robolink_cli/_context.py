@@ -3,36 +3,33 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import wraps
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
-from click.core import ParameterSource
 
 import robolink
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_cli._cell import (
-    complete_cell,
     is_cell_name,
     link_options,
     require_expected_robot,
 )
 from robolink_cli._notices import marker_notice
+from robolink_cli._people import signature_of
 from robolink_cli._recording import recording
-from robolink_cli._render import emit_json, json_is_on, note, say, switch_json_on
+from robolink_cli._render import emit_json, json_is_on, note, say
+from robolink_cli._shared_options import GIVEN, shared_options
+from robolink_cli._shared_options import json_option as json_option
+from robolink_cli._shared_options import origin_of as origin_of
 
 if TYPE_CHECKING:
     from robolink.config import Cell
     from robolink.controllers.epson import EpsonController
-    from robolink.model import Secret
-
-CommandT = TypeVar("CommandT", bound=Callable[..., Any])
-
-_GIVEN = "robolink.given"
+    from robolink.model import OutcomeLog, Secret
 
 WATCHED = "robolink.watched"
 """Where a prompt finds the controller whose status it must read while a person thinks."""
-_ORIGINS = "robolink.origins"
 
 
 class CliContext(NamedTuple):
@@ -45,6 +42,7 @@ class CliContext(NamedTuple):
         remote_timeout_s: The remote time-out that is set in the controller; 0 for none.
         cell: What the cell files say, when a cell was named instead of a URL.
         record: File to which the dialogue with the controller is appended.
+        operator: Badge or name of the person.
     """
 
     url: str | None = None
@@ -53,6 +51,7 @@ class CliContext(NamedTuple):
     remote_timeout_s: float = 60.0
     cell: "Cell | None" = None
     record: str | None = None
+    operator: str | None = None
 
     @property
     def json(self) -> bool:
@@ -91,14 +90,6 @@ class CliContext(NamedTuple):
         self.emit("dry-run", {"requests": list(requests)}, lambda: say("\n".join(requests)))
 
 
-def shared_options(command: CommandT) -> CommandT:
-    """Add the options that are accepted before and after a command's name.
-
-    For groups. What is given later, nearer to the command, wins.
-    """
-    return json_option(_link_options(command))
-
-
 def controller_options(command: Callable[..., int | None]) -> Callable[..., int | None]:
     """Add the same options to a command, and pass it a :class:`CliContext` first.
 
@@ -107,27 +98,19 @@ def controller_options(command: Callable[..., int | None]) -> Callable[..., int 
 
     @wraps(command)
     def with_context(*args: object, **kwargs: object) -> int | None:
-        given = click.get_current_context().meta.get(_GIVEN, {})
+        given = click.get_current_context().meta.get(GIVEN, {})
         return command(_context_from(given), *args, **kwargs)
 
     return shared_options(with_context)
 
 
-def json_option(command: CommandT) -> CommandT:
-    """Add ``--json`` alone, for a command that needs no controller."""
-    return click.option(
-        "--json",
-        "json_",
-        is_flag=True,
-        expose_value=False,
-        callback=_note_json,
-        help=tr("Print one JSON document on stdout; text goes to stderr."),
-    )(command)
-
-
 @contextmanager
 def open_controller(
-    context: CliContext, *, quiet: bool = False, any_robot: bool = False
+    context: CliContext,
+    *,
+    quiet: bool = False,
+    any_robot: bool = False,
+    changes: bool = False,
 ) -> "Iterator[EpsonController]":
     """Connect to the controller and, unless ``quiet``, say what was left unfinished there.
 
@@ -135,7 +118,9 @@ def open_controller(
         context: What the command was told.
         quiet: Whether the command itself deals with what was left unfinished.
         any_robot: Whether it goes on at once, without a look at the model that the cell file
-            names and without a question.
+            names, without a question, and without a journal if it must.
+        changes: Whether it may change something, so that a badge is asked for where the cell
+            names people.
 
     Raises:
         ConfigError: No controller is named, the URL or password file is wrong, or the robot is
@@ -146,6 +131,7 @@ def open_controller(
     url = context.require_url()
     named = context.cell.name if context.cell else url
     password = password_of(context)
+    signature = signature_of(context.operator, context.cell, changes=changes)
     with (
         recording(context.record, url.partition("?")[0]) as trace,
         robolink.connect(
@@ -154,6 +140,8 @@ def open_controller(
             timeout_s=context.timeout_s,
             remote_timeout_s=context.remote_timeout_s,
             trace=trace,
+            signature=signature,
+            outcomes=_journal_or_memory(url) if any_robot else None,
         ) as controller,
     ):
         click.get_current_context().meta[WATCHED] = controller
@@ -193,67 +181,6 @@ def password_of(context: CliContext) -> "Secret | None":
     )
 
 
-def origin_of(option: str) -> str | None:
-    """Return the option or variable by which a person gave ``option``, None when nobody did."""
-    origins: dict[str, str] = click.get_current_context().meta.get(_ORIGINS, {})
-    return origins.get(option)
-
-
-def _link_options(command: CommandT) -> CommandT:
-    options = (
-        click.option(
-            "-c",
-            "--controller",
-            "url",
-            metavar="CELL|URL",
-            envvar="ROBOLINK_CONTROLLER",
-            show_envvar=True,
-            expose_value=False,
-            callback=_keep,
-            shell_complete=complete_cell,
-            help=tr("A cell of the cell files, or a URL like epson+tcp://192.168.0.1:5000."),
-        ),
-        click.option(
-            "--password-file",
-            type=click.Path(dir_okay=False),
-            expose_value=False,
-            callback=_keep,
-            help=tr("File whose first line is the controller's password; readable by you only."),
-        ),
-        click.option(
-            "--timeout",
-            "timeout_s",
-            metavar="S",
-            type=click.FloatRange(min=0, min_open=True),
-            expose_value=False,
-            callback=_keep,
-            help=tr("Longest wait for one answer, in seconds (3)."),
-        ),
-        click.option(
-            "--remote-timeout",
-            "remote_timeout_s",
-            metavar="S",
-            type=click.FloatRange(min=0),
-            expose_value=False,
-            callback=_keep,
-            help=tr(
-                "The remote time-out set in the controller, in seconds (60); 0 forbids motion."
-            ),
-        ),
-        click.option(
-            "--record",
-            metavar="FILE",
-            type=click.Path(dir_okay=False),
-            expose_value=False,
-            callback=_keep,
-            help=tr("Append the dialogue with the controller to FILE, without the password."),
-        ),
-    )
-    for option in reversed(options):
-        command = option(command)
-    return command
-
-
 def _context_from(given: Mapping[str, Any]) -> CliContext:
     name = given.get("url")
     if name is None or not is_cell_name(name):
@@ -264,18 +191,15 @@ def _context_from(given: Mapping[str, Any]) -> CliContext:
     return CliContext(**{**link_options(cell), **given, "url": cell.url, "cell": cell})
 
 
-def _keep(context: click.Context, parameter: click.Parameter, value: object) -> None:
-    given: dict[str, object] = context.meta.setdefault(_GIVEN, {})
-    name = str(parameter.name)
-    # The environment speaks at each level of the command line, and must not overrule what
-    # was written at an earlier one.
-    typed = context.get_parameter_source(name) is ParameterSource.COMMANDLINE
-    if value is not None and (typed or name not in given):
-        given[name] = value
-        origin = parameter.opts[-1] if typed else str(parameter.envvar)
-        context.meta.setdefault(_ORIGINS, {})[name] = origin
+def _journal_or_memory(url: str) -> "OutcomeLog | None":
+    """Return ``None`` for the journal, or a log in memory where the journal is out of order."""
+    from robolink.errors import JournalError
+    from robolink.journal import default_location, may_exist, memory_journal, open_journal
 
-
-def _note_json(context: click.Context, parameter: click.Parameter, value: bool) -> None:  # noqa: ARG001 - click's form
-    if value:
-        switch_json_on(context)
+    try:
+        if may_exist(default_location()):
+            open_journal()
+    except JournalError as error:
+        note(str(error))
+        return memory_journal(url).log(url)
+    return None

@@ -1,19 +1,26 @@
 """The demonstration: serve a simulator, connect to it, change a nozzle, compare with truth."""
 
 import math
+from collections.abc import Sequence
 
 from robolink_simulators.clock import ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.tcp import serve_tcp
 
 import robolink
-from robolink.calibration import TouchPlan
 from robolink.controllers.epson import EpsonController
 from robolink.errors import VerifyError
-from robolink.markers import MemoryOutcomeLog
+from robolink.journal import memory_journal
 from robolink.messages import tr
 from robolink.model import ToolOffset
-from robolink.nozzle_change import ChangePlan, ChangeReport, NozzleChange
+from robolink.nozzle_change import (
+    ChangePlan,
+    Listener,
+    NozzleChange,
+    Proposal,
+    ToolPlan,
+    ToolReport,
+)
 from robolink_cli._calibrating import report_payload, show_proposal, show_report
 from robolink_cli._operator import AssistedOperator
 from robolink_cli._render import emit_json, json_is_on, say
@@ -59,12 +66,14 @@ def demonstrate(*, seed: int, speed: float) -> None:
         say(tr("SIMULATED EPSON T6-602S, served at {url}", url=host.url))
         say(tr("The nozzle was changed; tool {tool} still holds the old tip.", tool=TOOL))
         say()
-        with robolink.connect(host.url, outcomes=MemoryOutcomeLog(), trace=wire) as controller:
+        journal = memory_journal(host.url)
+        outcomes = journal.log(host.url)
+        with robolink.connect(host.url, outcomes=outcomes, trace=wire) as controller:
             controller.motors(True)
             report = _change(controller, simulator)
             exchanges = controller.exchanges
     truth = simulator.world.tips[TOOL]
-    error_mm = math.dist(report.proposal.result.offset.components()[:2], truth.components()[:2])
+    error_mm = math.dist(report.proposal.offset.components()[:2], truth.components()[:2])
     if json_is_on():
         emit_json("robolink/demo/1", _document(report, truth, error_mm, exchanges))
         return
@@ -87,29 +96,36 @@ def demonstrate(*, seed: int, speed: float) -> None:
     )
 
 
-def _change(controller: EpsonController, simulator: EpsonSimulator) -> ChangeReport:
+def _change(controller: EpsonController, simulator: EpsonSimulator) -> ToolReport:
     def look() -> tuple[float, float, float]:
         seen = simulator.world.operator.look(TOOL)
         return seen.dx_mm, seen.dy_mm, seen.dz_mm
 
     change = NozzleChange(
         controller,
-        ChangePlan(TOOL, touch=TouchPlan(), ask_before_write=False),
+        ChangePlan((ToolPlan(TOOL),), ask_before_write=False),
         operator=AssistedOperator(look, lambda text: say(f"  {text}")),
-        show=show_proposal,
+        listener=_Shown(),
     )
-    return change.run()
+    (report,) = change.run().tools
+    return report
+
+
+class _Shown(Listener):
+    def proposed(self, proposals: Sequence[Proposal]) -> None:
+        for proposal in proposals:
+            show_proposal(proposal)
 
 
 def _document(
-    report: ChangeReport, truth: ToolOffset, error_mm: float, exchanges: int
+    report: ToolReport, truth: ToolOffset, error_mm: float, exchanges: int
 ) -> dict[str, object]:
     verification = report.verification
     if verification is None:
         raise VerifyError(tr("The demonstration was not verified."))
     return {
         "simulated": True,
-        "recovered": offset_payload(report.proposal.result.offset),
+        "recovered": offset_payload(report.proposal.offset),
         "truth": offset_payload(truth),
         "error_mm": error_mm,
         "drift_mm": verification.max_drift_mm,

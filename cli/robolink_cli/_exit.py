@@ -82,16 +82,20 @@ def report(error: BaseException, *, as_json: bool) -> int:
 
 def error_document(error: BaseException) -> str:
     """Return the JSON document that stands for ``error``."""
+    return dumps("robolink/error/1", {"error": error_body(error), "exit_code": exit_code(error)})
+
+
+def error_body(error: BaseException) -> dict[str, object]:
+    """Return what is known about ``error``, as plain JSON."""
     what, remedy = _sentences(error)
     ours = isinstance(error, errors.RobolinkError)
-    body = {
+    return {
         "kind": type(error).__name__,
         "what": what,
         "remedy": remedy,
         "reason": getattr(error, "reason", None) if ours else None,
         "code": (getattr(error, "code", None) or None) if ours else None,
     }
-    return dumps("robolink/error/1", {"error": body, "exit_code": exit_code(error)})
 
 
 def _sentences(error: BaseException) -> tuple[str, str]:

@@ -14,9 +14,16 @@ def marker_notice(marker: "Marker", url: str) -> str:
 
     if marker.kind is MarkerKind.SELECTION:
         return _unfinished(marker, url)
+    if marker.kind is MarkerKind.CHANGE:
+        return tr(
+            "Not finished since {when}: {request}.\n  'robolink -c {url} recover' settles it.",
+            when=marker.begun_at,
+            request=marker.request,
+            url=url,
+        )
     return tr(
         "Sent {when} and never answered: {request}. It may or may not have run, so motion is "
-        "blocked.\n  'robolink -c {url} resolve' settles it.",
+        "blocked.\n  'robolink -c {url} recover' settles what reading can, 'resolve' the rest.",
         when=marker.begun_at,
         request=marker.request,
         url=url,
@@ -38,11 +45,8 @@ def _unfinished(marker: "Marker", url: str) -> str:
                 tool=before,
             )
         )
-    written = marker.details.get("written")
-    if isinstance(written, dict) and written:
-        parts.append(tr("Written and not verified: tool {tools}.", tools=", ".join(written)))
     remedy = tr(
-        "'robolink -c {url} resolve' puts tool {tool} back, with the power mode and speed of then.",
+        "'robolink -c {url} recover' puts tool {tool} back, with the power mode and speed of then.",
         url=url,
         tool=before,
     )

@@ -32,6 +32,8 @@ class TerminalOperator:
         """Show what is wanted and how to answer."""
         if kind is Question.PLACE:
             how = tr("steps like x+0.1 z-0.5; ENTER when it is on the pin; q ends")
+        elif kind is Question.TEXT:
+            how = tr("type it, then ENTER; q ends")
         else:
             how = tr("y or n")
         self._show(f"{question} [{how}]")
@@ -109,6 +111,8 @@ class AssistedOperator:
         """Answer: the jog steps still needed, or done."""
         if self._kind is Question.YES_NO:
             return "y"
+        if self._kind is Question.TEXT:
+            return tr("simulated")
         # Sideways first, down last, as one does with a needle.
         dx_mm, dy_mm, dz_mm = self._look()
         aside = {"x": dx_mm, "y": dy_mm}

@@ -65,10 +65,11 @@ class PoseSource:
             ConfigError: The file cannot be used.
         """
         from robolink.model import Pose
+        from robolink.nozzle_change import taught_poses
         from robolink.pose_files import read_poses
 
         if self.kind == "points":
-            return _taught(controller, self.points)
+            return taught_poses(controller.points, self.points)
         if self.path is not None:
             return read_poses(self.path)
         return tuple(Pose(x_mm, y_mm, 0.0, u_deg) for x_mm, y_mm, u_deg in self.typed)
@@ -179,17 +180,3 @@ def _typed_pose(text: str) -> tuple[float, float, float]:
             remedy=tr("Write X,Y,U in mm and degrees, for example 287.5,103.25,180."),
         ) from error
     return x_mm, y_mm, u_deg
-
-
-def _taught(controller: "EpsonController", numbers: tuple[int, ...]) -> "tuple[Pose, ...]":
-    from robolink.errors import CalibrationError
-
-    found = controller.points.read_all(numbers)
-    missing = [f"P{number}" for number, pose in found.items() if pose is None]
-    if missing:
-        raise CalibrationError(
-            "undefined_point",
-            tr("Not taught on this controller: {points}.", points=", ".join(missing)),
-            remedy=tr("Teach them on the pendant, on the robot that is in force."),
-        )
-    return tuple(pose for pose in found.values() if pose is not None)

@@ -1,9 +1,10 @@
 """Going through the open markers of a controller, one by one."""
 
-from robolink.controllers.epson import EpsonController, Finding
+from robolink.controllers.epson import EpsonController
 from robolink.errors import OutcomeUnknownError, RobolinkError
 from robolink.messages import tr
-from robolink.model import MarkerKind
+from robolink.model import Finding, MarkerKind
+from robolink.transaction import Settler
 from robolink_cli._consent import agree
 from robolink_cli._render import note
 from robolink_cli._views import finding_payload
@@ -24,19 +25,20 @@ def resolve_all(
     )
     if not markers:
         note(tr("Nothing is unsettled on this controller."))
+    settler = Settler(controller)
     if forget:
         agree(tr("Forget {count} open entries without looking?", count=len(markers)), yes=yes)
         if not dry_run:
             for marker in markers:
-                controller.resolver.forget(marker)
+                settler.forget(marker)
         return {"findings": [], "forgotten": len(markers), "settled": not dry_run}
     findings = []
     for marker in markers:
-        finding = controller.resolver.examine(marker)
+        finding = settler.examine(marker)
         findings.append(finding)
         note(f"{marker.begun_at}  {marker.request}\n  {finding.sentence}")
         if not dry_run:
-            _settle(controller, finding, yes=yes)
+            _settle(settler, finding, yes=yes)
     return {
         "findings": [finding_payload(finding) for finding in findings],
         "forgotten": 0,
@@ -44,14 +46,14 @@ def resolve_all(
     }
 
 
-def _settle(controller: EpsonController, finding: Finding, *, yes: bool) -> None:
+def _settle(settler: Settler, finding: Finding, *, yes: bool) -> None:
     if finding.action:
         question = tr("Do it: {action}?", action=finding.action)
     else:
         question = tr("Is that as it should be, and may work go on?")
     agree(question, yes=yes)
     try:
-        controller.resolver.settle(finding)
+        settler.settle(finding)
     except RobolinkError as error:
         if isinstance(error, OutcomeUnknownError):
             raise

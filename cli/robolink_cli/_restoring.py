@@ -4,7 +4,7 @@ from robolink.backup import RestorePlan
 from robolink.backup import restore as restore_tools
 from robolink.controllers.epson import EpsonController
 from robolink.messages import tr
-from robolink.model import ToolReceipt
+from robolink.model import ToolReceipt, require_engineer
 from robolink.protocols import spel
 from robolink_cli._render import note, say
 from robolink_cli._safekeeping import back_up_first
@@ -53,6 +53,7 @@ class Restoration:
         """Carry it out and return the document; nothing is sent when nothing differs."""
         receipts: tuple[ToolReceipt, ...] = ()
         if not self._plan.empty:
+            require_engineer(self._controller.outcomes, tr("restore tools from a backup"))
             back_up_first(self._controller)
             receipts = restore_tools(self._controller.tools, self._plan, tell=note)
         return {

@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from contextlib import suppress
 
 from robolink.calibration import VerifyResult
-from robolink.controllers.epson import EpsonController, Finding
+from robolink.controllers.epson import EpsonController
 from robolink.errors import RejectedError, ToolError
-from robolink.model import ControllerState, Pose, ToolOffset, ToolReceipt
+from robolink.model import ControllerState, Finding, Pose, ToolOffset, ToolReceipt
 from robolink.nozzle_change import Proposal
 
 COMPONENTS = ("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
@@ -45,8 +45,10 @@ def proposal_payload(proposal: Proposal) -> dict[str, object]:
         "method": result.method,
         "before": offset_payload(proposal.before),
         "proposed": offset_payload(result.offset),
+        "tip": offset_payload(proposal.tip),
+        "notes": list(proposal.notes),
         "measured": list(result.measured),
-        "kept": list(result.kept),
+        "kept": list(proposal.kept),
         "change_mm": proposal.change_mm,
         "reference_point_mm": list(result.reference_point_mm),
         "sigma_gain": result.sigma_gain,

@@ -120,7 +120,7 @@ def restore(
     from robolink_cli._restoring import Restoration
 
     wanted = load(file)
-    with open_controller(context) as controller:
+    with open_controller(context, changes=not dry_run) as controller:
         if not other_controller:
             require_same_controller(wanted, controller.identity, controller.facts())
         plan = plan_restore(wanted, read_tools(controller), tools=tools, selected=selected)

@@ -15,6 +15,7 @@ from robolink_cli._pose_source import pose_source, pose_source_options, refuse_m
 from robolink_cli._reporting import ReportRequest, report_options, report_request, reporting
 
 if TYPE_CHECKING:
+    from robolink.config import Cell
     from robolink.nozzle_change import ChangePlan
 
 _MOTION: Final = (
@@ -28,6 +29,8 @@ _MOTION: Final = (
     "assist",
 )
 """Options that mean nothing when the poses exist already."""
+
+_USUAL_CHANGE_MM: Final = 2.0
 
 _CELL_KEYS: Final = {
     "lift_mm": "lift_mm",
@@ -70,9 +73,10 @@ def calibrate() -> None:
     "--max-change",
     "max_change_mm",
     type=click.FloatRange(min=0, min_open=True),
-    default=2.0,
+    default=_USUAL_CHANGE_MM,
     show_default=True,
-    help="Largest plausible change against the stored offset.",
+    help="Largest plausible change against the stored offset; more than the cell allows takes "
+    "an engineer.",
 )
 @click.option(
     "--tolerance",
@@ -119,11 +123,14 @@ def two_pose(
     With --points, --pose or --poses the two poses exist already: nothing moves, no tool is
     selected, and nothing is proved by turning about the new tip.
     """
-    from robolink.nozzle_change import PosesPlan
     from robolink_cli._calibrating import plan_from
-    from robolink_cli._calibrating_poses import calibrate_from_poses
+    from robolink_cli._calibrating_poses import PosesPlan, calibrate_from_poses
 
-    plan = plan_from(tool, **with_cell_limits(context.cell, limits, _CELL_KEYS))
+    plan = plan_from(
+        tool,
+        **with_cell_limits(context.cell, limits, _CELL_KEYS),
+        jump_limit_mm=jump_limit_mm(context.cell),
+    )
     judged = impact_request(impact, impact_pts, names=("--impact", "--impact-pts"))
     page = report_request(report_path, force=force)
     source = pose_source(points=points, typed=typed, path=path, taught_tool=taught_tool)
@@ -133,10 +140,16 @@ def two_pose(
         _measure(context, plan, assist=assist, impact=judged, report=page, dry_run=dry_run, yes=yes)
     else:
         refuse_motion_options(click.get_current_context(), _MOTION)
-        known = PosesPlan(tool, taught_tool or 0, plan.max_change_mm)
+        known = PosesPlan(tool, taught_tool or 0, plan.tools[0].gate)
         calibrate_from_poses(
             context, known, source, impact=judged, report=page, dry_run=dry_run, yes=yes
         )
+
+
+def jump_limit_mm(cell: "Cell | None") -> float:
+    """Return the largest change that takes no engineer: the cell's, or the usual one."""
+    limit = cell.settings.max_change_mm if cell else None
+    return _USUAL_CHANGE_MM if limit is None else limit
 
 
 def _refuse_to_show_nothing(impact: ImpactRequest | None, report: ReportRequest | None) -> None:
@@ -164,29 +177,32 @@ def _measure(
     yes: bool,
 ) -> None:
     """Let the robot and a person take the poses, then propose, write and verify."""
-    from robolink_cli._calibrating import Bench, show_plan
+    from robolink_cli._calibrating import LiveCalibration, show_plan
 
-    with open_controller(context) as controller, reporting(report, controller) as draft:
-        bench = Bench(controller, plan, draft=draft, assist_url=assist, impact=impact)
+    with (
+        open_controller(context, changes=not dry_run) as controller,
+        reporting(report, controller) as draft,
+    ):
+        live = LiveCalibration(controller, plan, draft=draft, assist_url=assist, impact=impact)
         if dry_run:
-            payload = bench.dry_run()
+            payload = live.dry_run()
             context.emit("dry-run", payload, lambda: show_plan(payload))
             return
-        bench.require_writable()
+        live.require_writable()
         agree_to_motion(
             tr(
                 "Robot {robot} will move in Power Low, at most {speed:g} mm/s, within {box:g} mm, "
                 "to measure tool {tool}. The remote time-out set in the controller is taken to "
                 "be {timeout:g} s. Is the cell clear?",
                 robot=controller.robot_number(),
-                speed=plan.speed_mm_s,
-                box=plan.box_mm,
-                tool=plan.tool,
+                speed=plan.limits.speed_mm_s,
+                box=plan.limits.box_mm,
+                tool=live.tool,
                 timeout=context.remote_timeout_s,
             ),
             yes=yes,
         )
-        payload = bench.run(ask_before_write=not yes)
+        payload = live.run(ask_before_write=not yes)
         # Now, because Ctrl-C may come before the logout is answered.
-        bench.show_end()
+        live.show_end()
     context.emit("calibration", {**payload, "report": draft.saved}, lambda: None)

@@ -10,10 +10,10 @@ import click
 from robolink import __version__
 from robolink.messages import tr
 from robolink_cli._console import colour_wanted, help_width, leave_pipe, tolerate_any_console
-from robolink_cli._context import shared_options
 from robolink_cli._exit import READER_LEFT, report
 from robolink_cli._lazy import LazyGroup
 from robolink_cli._render import print_document
+from robolink_cli._shared_options import shared_options
 
 COMMANDS: Final = {
     "demo": (
@@ -26,11 +26,24 @@ COMMANDS: Final = {
     "stop": ("robolink_cli.operate:stop", tr("Stop every motion.")),
     "reset": ("robolink_cli.operate:reset", tr("Clear an error of the controller.")),
     "motors": ("robolink_cli.operate:motors", tr("Switch the motors on or off.")),
+    "recover": (
+        "robolink_cli.operate:recover",
+        tr("Settle what a crash left: finish or take back each tool change."),
+    ),
     "resolve": (
         "robolink_cli.operate:resolve",
         tr("Settle what was begun and not proved finished."),
     ),
     "tool": ("robolink_cli.tools:tool", tr("Read, write, clear and select tool offsets.")),
+    "undo": ("robolink_cli.undo:undo", tr("Put back what tools held before a change.")),
+    "journal": (
+        "robolink_cli.journal:journal",
+        tr("What is on record: values, proofs, people. Reads only."),
+    ),
+    "report": (
+        "robolink_cli.report:report",
+        tr("One page about one tool change, from the journal, to keep or print."),
+    ),
     "backup": ("robolink_cli.backup:backup", tr("Save all tools to a file.")),
     "restore": ("robolink_cli.backup:restore", tr("Put the tools of a backup back.")),
     "compare": (
@@ -48,13 +61,22 @@ COMMANDS: Final = {
         "robolink_cli.calibrate:calibrate",
         tr("Measure a tool offset, propose it, write it and prove it."),
     ),
+    "recalibrate": (
+        "robolink_cli.recalibrate:recalibrate",
+        tr("The scripted nozzle change: run a recipe."),
+    ),
     "solve": ("robolink_cli.solve:solve", tr("Calculate a tool offset from a file, offline.")),
     "doctor": ("robolink_cli.doctor:doctor", tr("What could get in the way on this computer.")),
     "ports": ("robolink_cli.ports:ports", tr("List the serial ports.")),
     "scan": ("robolink_cli.scan:scan", tr("Try which of a few addresses answer.")),
     "config": ("robolink_cli.config:config", tr("Look at the cell files.")),
     "completion": ("robolink_cli.completion:completion", tr("Make TAB complete commands.")),
+    "execute-raw": (
+        "robolink_cli.operate:execute_raw",
+        tr("Run one SPEL+ statement as typed; for engineers."),
+    ),
     "spel": ("robolink_cli.spel:spel", tr("The companion program for the controller's project.")),
+    "plc": ("robolink_cli.plc:plc", tr("The register map and data types of a PLC's mailbox.")),
     "impact": (
         "robolink_cli.impact:impact",
         tr("How far a tool change moves the tip at taught points."),

@@ -4,7 +4,7 @@ import click
 
 from robolink.errors import ConnectError
 from robolink.messages import tr
-from robolink_cli._consent import agree, dry_run_option, yes_option
+from robolink_cli._consent import agree, agree_to_motion, dry_run_option, yes_option
 from robolink_cli._context import CliContext, controller_options, open_controller
 from robolink_cli._render import say
 
@@ -105,6 +105,53 @@ def motors(context: CliContext, switch: str, dry_run: bool, yes: bool) -> None:
     context.emit("motors", payload, lambda: say(tr("The motors are {switch}.", switch=switch)))
 
 
+@click.command("recover")
+@controller_options
+@dry_run_option
+@click.option(
+    "--keep",
+    is_flag=True,
+    help="Keep new values that nobody verified; without it the old ones are written back.",
+)
+@click.option(
+    "--take-over",
+    metavar="REASON",
+    help="End the lease of another who has this controller, and record why.",
+)
+def recover(context: CliContext, dry_run: bool, keep: bool, take_over: str | None) -> int:
+    """Settle what a crash left: read the controller, finish or take back each tool change.
+
+    Each tool is written once at most, and nothing moves. What only a person can judge is left
+    for 'robolink resolve', with exit code 6. It may be run again at any time.
+    """
+    from robolink_cli._recovering import recover_all, show_end
+
+    with open_controller(context, quiet=True, changes=not dry_run) as controller:
+        payload = recover_all(controller, keep=keep, take_over=take_over, dry_run=dry_run)
+    context.emit("recover", payload, lambda: show_end(payload))
+    return 6 if payload["left"] else 0
+
+
+@click.command("execute-raw")
+@click.argument("statement")
+@controller_options
+@yes_option
+def execute_raw(context: CliContext, statement: str, yes: bool) -> None:
+    """Run one SPEL+ statement as typed; it takes an engineer, and goes on record.
+
+    It is sent once, as it stands, and must be answered within --timeout: it is not for
+    movements, which may end in a doubtful outcome.
+    """
+    with open_controller(context, changes=True) as controller:
+        agree_to_motion(
+            tr("Send {statement!r} as it stands? It may do anything.", statement=statement),
+            yes=yes,
+        )
+        printed = controller.execute_raw(statement)
+    payload: dict[str, object] = {"statement": statement, "printed": printed}
+    context.emit("execute-raw", payload, lambda: say(printed or tr("carried out")))
+
+
 @click.command()
 @controller_options
 @dry_run_option
@@ -121,6 +168,6 @@ def resolve(context: CliContext, dry_run: bool, yes: bool, forget: bool) -> None
     """
     from robolink_cli._resolve import resolve_all
 
-    with open_controller(context, quiet=True) as controller:
+    with open_controller(context, quiet=True, changes=not dry_run) as controller:
         payload = resolve_all(controller, dry_run=dry_run, yes=yes, forget=forget)
     context.emit("resolve", payload, lambda: None)

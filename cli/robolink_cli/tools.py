@@ -7,7 +7,7 @@ import click
 from robolink.messages import tr
 from robolink_cli._consent import agree, dry_run_option, published_option, yes_option
 from robolink_cli._context import CliContext, controller_options, open_controller
-from robolink_cli._render import say
+from robolink_cli._render import note, say
 
 
 @click.group()
@@ -69,6 +69,7 @@ def set_tool(
     """Write a tool offset; components that are not given are kept."""
     from robolink.errors import ConfigError
     from robolink.model import ToolOffset
+    from robolink.transaction import Wanted, change_tools
     from robolink_cli._safekeeping import back_up_first
     from robolink_cli._tables import show_change
     from robolink_cli._views import offset_payload, receipt_payload
@@ -81,7 +82,7 @@ def set_tool(
         )
     # Checks the numbers before a connection is made.
     ToolOffset(**changes)
-    with open_controller(context) as controller:
+    with open_controller(context, changes=not dry_run) as controller:
         controller.tools.require_writable(number)
         before = controller.tools.read(number)
         wanted = replace(before or ToolOffset(), **changes)
@@ -95,7 +96,7 @@ def set_tool(
             show_change(number, *shown, after_name=tr("new"))
             agree(tr("Write this to tool {number}?", number=number), yes=yes)
         back_up_first(controller)
-        receipt = controller.tools.write(number, wanted, expected=before)
+        (receipt,) = change_tools(controller, [Wanted(number, wanted, before)], tell=note)
     payload = receipt_payload(receipt) | {"kept": kept}
     done = (
         tr("already stored, nothing was written") if receipt.skipped else tr("written, read back")
@@ -114,10 +115,11 @@ def set_tool(
 @yes_option
 def clear(context: CliContext, number: int, dry_run: bool, yes: bool) -> None:
     """Remove a tool's definition."""
+    from robolink.transaction import Wanted, change_tools
     from robolink_cli._safekeeping import back_up_first
     from robolink_cli._views import receipt_payload
 
-    with open_controller(context) as controller:
+    with open_controller(context, changes=not dry_run) as controller:
         before = controller.tools.read(number)
         if dry_run:
             statements = controller.tools.preview_clear(number)
@@ -126,7 +128,7 @@ def clear(context: CliContext, number: int, dry_run: bool, yes: bool) -> None:
         if not context.json:
             agree(tr("Clear tool {number}?", number=number), yes=yes)
         back_up_first(controller)
-        receipt = controller.tools.clear(number, expected=before)
+        (receipt,) = change_tools(controller, [Wanted(number, None, before)], tell=note)
     done = tr("was undefined already") if receipt.skipped else tr("cleared, read back")
     context.emit(
         "tool-clear",
@@ -142,7 +144,7 @@ def clear(context: CliContext, number: int, dry_run: bool, yes: bool) -> None:
 @yes_option
 def select(context: CliContext, number: int, dry_run: bool, yes: bool) -> None:
     """Put a tool in force; the choice survives power-off. 0 is the flange."""
-    with open_controller(context) as controller:
+    with open_controller(context, changes=not dry_run) as controller:
         before = controller.tools.selected()
         if dry_run:
             statements = controller.tools.preview_select(number)

@@ -6,7 +6,6 @@ from robolink.backup._file import save
 from robolink.backup._values import ToolHolder, take_backup
 from robolink.durable_files import file_name, make_folder, state_folder
 from robolink.errors import ConfigError
-from robolink.markers import MemoryOutcomeLog
 from robolink.messages import tr
 
 
@@ -27,7 +26,7 @@ def keep_first_backup(controller: ToolHolder) -> Path | None:
         ConfigError: It cannot be stored. Nothing may be written then.
         NotReadyError: The tools cannot be read now.
     """
-    if isinstance(controller.outcomes, MemoryOutcomeLog):
+    if not controller.outcomes.durable:
         return None
     path = first_backup_path(controller.identity)
     if path.exists():

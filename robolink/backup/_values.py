@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import Final, Protocol
 
 import robolink
-from robolink.markers import wall_label
 from robolink.model import ControllerFacts, OutcomeLog, ToolOffset, ToolTable
+from robolink.timing import wall_label
 
 TOOLS: Final = range(1, 16)
 """The tools that a controller can define (epson.md 3.1); a backup names every one."""

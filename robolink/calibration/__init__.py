@@ -27,7 +27,9 @@ from robolink.calibration._tolerance import TOUCH_TOLERANCE as TOUCH_TOLERANCE
 from robolink.calibration._tolerance import Tolerance as Tolerance
 from robolink.calibration._touch import TouchPlan as TouchPlan
 from robolink.calibration._touch import contact_pose as contact_pose
+from robolink.calibration._touch import n_angle as n_angle
 from robolink.calibration._touch import raised as raised
+from robolink.calibration._touch import travel as travel
 from robolink.calibration._touch import two_pose as two_pose
 from robolink.calibration._touch import verify_by_turning as verify_by_turning
 from robolink.calibration._two_pose import solve_two_pose as solve_two_pose
@@ -83,6 +85,7 @@ if TYPE_CHECKING:
     from robolink.calibration._suggest import suggest_poses as suggest_poses
     from robolink.calibration._update_guard import NEEDLE_LIMIT_MM as NEEDLE_LIMIT_MM
     from robolink.calibration._update_guard import Correction as Correction
+    from robolink.calibration._update_guard import require_shrinking as require_shrinking
     from robolink.calibration._update_guard import update_guard as update_guard
     from robolink.calibration._verify import PLACING_TOLERANCE_MM as PLACING_TOLERANCE_MM
     from robolink.calibration._verify import verify_drift as verify_drift
@@ -140,6 +143,7 @@ _LOADED_LATER = {
     "precise_enough": "_suggest",
     "suggest_poses": "_suggest",
     "Correction": "_update_guard",
+    "require_shrinking": "_update_guard",
     "NEEDLE_LIMIT_MM": "_update_guard",
     "update_guard": "_update_guard",
     "PLACING_TOLERANCE_MM": "_verify",

@@ -6,12 +6,15 @@ clearance above the pin, and the last bit is done by the person, who sees it.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Final
 
 from robolink.calibration._result import CalibrationResult, Drift, VerifyResult
 from robolink.calibration._steps import Ask, Move, Procedure
 from robolink.calibration._two_pose import solve_two_pose
 from robolink.messages import tr
-from robolink.model import Path, Pose, ToolOffset, rotate_xy
+from robolink.model import Path, Pose, ToolOffset, angle_difference_deg, rotate_xy
+
+NO_OFFSET: Final = ToolOffset()
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +32,9 @@ class TouchPlan:
     turn_deg: float = 180.0
 
 
-def two_pose(plan: TouchPlan, *, stored: ToolOffset | None) -> Procedure[CalibrationResult]:
+def two_pose(
+    plan: TouchPlan, *, stored: ToolOffset | None, sigma_mm: float | None = None
+) -> Procedure[CalibrationResult]:
     """Measure a tip on a pin at two angles. Runs in Tool 0.
 
     The second approach uses ``stored`` so that the tip comes down near the pin. It ends with
@@ -39,22 +44,68 @@ def two_pose(plan: TouchPlan, *, stored: ToolOffset | None) -> Procedure[Calibra
         CalibrationError: As :func:`solve_two_pose`.
     """
     first = yield Ask(tr("Bring the tip onto the pin."))
-    lifted = yield Move(raised(first, plan.lift_mm), Path.STRAIGHT, tr("lift off the pin"))
-    beyond = _second_pose(first, plan, stored or ToolOffset())
-    above = replace(beyond, z_mm=lifted.z_mm)
-    yield Move(above, Path.JOINT, tr("turn in the air"))
-    yield Move(
-        replace(above, z_mm=first.z_mm + plan.clearance_mm),
-        Path.STRAIGHT,
-        tr("come down to the clearance"),
-    )
-    second = yield Ask(tr("Bring the tip onto the pin again, with the tool turned."))
-    yield Move(raised(second, plan.lift_mm), Path.STRAIGHT, tr("lift off the pin"))
-    return solve_two_pose(first, second, stored=stored)
+    # Toward zero, by the angle as it is counted and not modulo 360: U starts inside the
+    # joint's range, and so it stays there.
+    turn_deg = -plan.turn_deg if first.u_deg > 0 else plan.turn_deg
+    second = yield from _touch_again(plan, first, first.u_deg + turn_deg, stored or ToolOffset())
+    return solve_two_pose(first, second, stored=stored, sigma_mm=sigma_mm)
+
+
+def n_angle(
+    plan: TouchPlan,
+    *,
+    turns_deg: Sequence[float],
+    stored: ToolOffset | None,
+    sigma_mm: float | None = None,
+) -> Procedure[CalibrationResult]:
+    """Measure a tip on a pin at several angles. Runs in Tool 0.
+
+    Args:
+        plan: Lift and clearance.
+        turns_deg: Angles of the further touches, counted from the first one.
+        stored: The offset stored now; the approaches use it.
+        sigma_mm: Standard deviation of one coordinate of one touch, where it is known.
+
+    Raises:
+        CalibrationError: As :func:`solve_n_angle`.
+    """
+    from robolink.calibration._n_angle import solve_n_angle  # numpy, not for --help
+
+    first = yield Ask(tr("Bring the tip onto the pin."))
+    touches = [first]
+    for turn_deg in turns_deg:
+        # Within half a turn of zero: adding up from touch to touch leaves the joint's range.
+        u_deg = angle_difference_deg(first.u_deg + turn_deg, 0.0)
+        touches.append((yield from _touch_again(plan, touches[-1], u_deg, stored or ToolOffset())))
+    return solve_n_angle(touches, stored=stored, sigma_mm=sigma_mm)
+
+
+def travel(target: Pose, *, here: Pose, purpose: str) -> Procedure[None]:
+    """Go somewhere without dragging the tip along: up first, over, then down.
+
+    Args:
+        target: Where to.
+        here: Where the frame is now.
+        purpose: What for, for a person.
+    """
+    top_mm = max(here.z_mm, target.z_mm)
+    above = replace(target, z_mm=top_mm)
+    if here.z_mm < top_mm:
+        yield Move(replace(here, z_mm=top_mm), Path.STRAIGHT, purpose)
+    if above.coordinates()[:2] != here.coordinates()[:2] or above.u_deg != here.u_deg:
+        yield Move(above, Path.JOINT, purpose)
+    if target.z_mm < top_mm:
+        yield Move(target, Path.STRAIGHT, purpose)
 
 
 def verify_by_turning(
-    plan: TouchPlan, *, contact: Pose, angles_deg: Sequence[float], tolerance_mm: float
+    plan: TouchPlan,
+    *,
+    contact: Pose,
+    angles_deg: Sequence[float],
+    tolerance_mm: float,
+    written: ToolOffset = NO_OFFSET,
+    tip: ToolOffset = NO_OFFSET,
 ) -> Procedure[VerifyResult]:
     """Turn about the new tip and let a person show where it went. Runs in the new tool.
 
@@ -63,19 +114,27 @@ def verify_by_turning(
         contact: Pose of the new tool's tip on the pin, as the calibration implies it.
         angles_deg: Tool angles U at which the tip is brought back onto the pin.
         tolerance_mm: Largest drift that passes.
+        written: The offset in force.
+        tip: Where the tip was found. It differs from ``written`` where a difference was
+            written, and then the frame in force does not turn about the tip.
 
     The tip starts lifted. The distance that the person jogs it, from where it should have
     been to the pin, is the drift. It ends lifted.
     """
     drifts = []
     for angle in angles_deg:
-        place = replace(contact, u_deg=angle)
+        aside_x, aside_y = rotate_xy(
+            written.x_mm - tip.x_mm, written.y_mm - tip.y_mm, angle - written.u_deg
+        )
+        place = replace(
+            contact, x_mm=contact.x_mm + aside_x, y_mm=contact.y_mm + aside_y, u_deg=angle
+        )
         yield Move(raised(place, plan.lift_mm), Path.JOINT, tr("turn about the new tip"))
         yield Move(
             raised(place, plan.clearance_mm), Path.STRAIGHT, tr("come down to the clearance")
         )
         found = yield Ask(tr("Bring the tip back onto the pin; what you jog is the drift."))
-        drifts.append(Drift(angle, found.x_mm - contact.x_mm, found.y_mm - contact.y_mm))
+        drifts.append(Drift(angle, found.x_mm - place.x_mm, found.y_mm - place.y_mm))
         yield Move(raised(found, plan.lift_mm), Path.STRAIGHT, tr("lift off the pin"))
     return VerifyResult(tuple(drifts), tolerance_mm)
 
@@ -83,7 +142,7 @@ def verify_by_turning(
 def contact_pose(result: CalibrationResult, *, tool: int) -> Pose:
     """Return the pose of the proposed tool's tip on the reference point.
 
-    Height and angle are those of the second pose, seen through the proposed offset.
+    Height and angle are those of the last pose, seen through the proposed offset.
     """
     last = result.inputs[-1]
     x_mm, y_mm = result.reference_point_mm
@@ -102,17 +161,30 @@ def raised(pose: Pose, by_mm: float) -> Pose:
     return replace(pose, z_mm=pose.z_mm + by_mm)
 
 
-def _second_pose(first: Pose, plan: TouchPlan, guess: ToolOffset) -> Pose:
-    """Return the flange pose that brings the tip, by ``guess``, back to the same point."""
-    # Toward zero, by the angle as it is counted and not modulo 360: U starts inside the
-    # joint's range, and so it stays there.
-    sign = -1.0 if first.u_deg > 0 else 1.0
-    u_deg = first.u_deg + sign * plan.turn_deg
-    before_x, before_y = rotate_xy(guess.x_mm, guess.y_mm, first.u_deg)
+def _touch_again(
+    plan: TouchPlan, contact: Pose, u_deg: float, guess: ToolOffset
+) -> Procedure[Pose]:
+    """Lift off, turn to ``u_deg``, come down beside the pin, and let the person touch it."""
+    lifted = yield Move(raised(contact, plan.lift_mm), Path.STRAIGHT, tr("lift off the pin"))
+    above = replace(_turned(contact, u_deg, guess), z_mm=lifted.z_mm)
+    yield Move(above, Path.JOINT, tr("turn in the air"))
+    yield Move(
+        replace(above, z_mm=contact.z_mm + plan.clearance_mm),
+        Path.STRAIGHT,
+        tr("come down to the clearance"),
+    )
+    touch = yield Ask(tr("Bring the tip onto the pin again, with the tool turned."))
+    yield Move(raised(touch, plan.lift_mm), Path.STRAIGHT, tr("lift off the pin"))
+    return touch
+
+
+def _turned(contact: Pose, u_deg: float, guess: ToolOffset) -> Pose:
+    """Return the flange pose at ``u_deg`` that brings the tip, by ``guess``, to the same point."""
+    before_x, before_y = rotate_xy(guess.x_mm, guess.y_mm, contact.u_deg)
     after_x, after_y = rotate_xy(guess.x_mm, guess.y_mm, u_deg)
     return replace(
-        first,
-        x_mm=first.x_mm + before_x - after_x,
-        y_mm=first.y_mm + before_y - after_y,
+        contact,
+        x_mm=contact.x_mm + before_x - after_x,
+        y_mm=contact.y_mm + before_y - after_y,
         u_deg=u_deg,
     )

@@ -58,22 +58,9 @@ def update_guard(
         CalibrationError: ``implausible_change`` or ``diverging``.
     """
     changes = (new.x_mm - stored.x_mm, new.y_mm - stored.y_mm, new.z_mm - stored.z_mm)
-    before = earlier_mm[-1] if earlier_mm else None
     length = math.hypot(*changes)
     # Divergence first: at the end of it the change is implausible as well.
-    if before is not None and length > max(before, noise_mm):
-        raise CalibrationError(
-            "diverging",
-            tr(
-                "The correction is {now:.3f} mm after one of {before:.3f} mm: they grow.",
-                now=length,
-                before=before,
-            ),
-            remedy=tr(
-                "Do not write it. A growing correction has the wrong sign, axis or angle; "
-                "check how the camera or the sensor is turned."
-            ),
-        )
+    require_shrinking(length, earlier_mm, noise_mm=noise_mm)
     if length > max_change_mm:
         raise CalibrationError(
             "implausible_change",
@@ -84,4 +71,34 @@ def update_guard(
             ),
             remedy=tr("Look at how the tip is seated, and measure again."),
         )
+    before = earlier_mm[-1] if earlier_mm else None
     return Correction(*changes, ratio=length / before if before else None)
+
+
+def require_shrinking(
+    now_mm: float, earlier_mm: Sequence[float], *, noise_mm: float = NOISE_MM
+) -> None:
+    """Refuse a correction that is larger than the one before it on the same nozzle.
+
+    Args:
+        now_mm: Length of the correction that is proposed.
+        earlier_mm: Lengths of those made since the nozzle was mounted, oldest first.
+        noise_mm: Corrections up to this may grow: they only repeat the noise.
+
+    Raises:
+        CalibrationError: ``diverging``.
+    """
+    if not earlier_mm or now_mm <= max(earlier_mm[-1], noise_mm):
+        return
+    raise CalibrationError(
+        "diverging",
+        tr(
+            "The correction is {now:.3f} mm after one of {before:.3f} mm: they grow.",
+            now=now_mm,
+            before=earlier_mm[-1],
+        ),
+        remedy=tr(
+            "Do not write it. A growing correction has the wrong sign, axis or angle; check how "
+            "the camera or the sensor is turned."
+        ),
+    )

@@ -5,6 +5,7 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
 
 from robolink.messages import tr
+from robolink.model import Role
 from robolink.transport import parse_url
 
 Text = Annotated[str, Field(min_length=1)]
@@ -36,6 +37,7 @@ class CellSettings(BaseModel):
             the pin it stops.
         max_change_mm: Largest plausible change against the stored offset.
         drift_tolerance_mm: Largest drift about the new tip that passes.
+        people: Who works at the cell: badge or name, and ``operator`` or ``engineer``.
         notes: For people.
     """
 
@@ -55,7 +57,15 @@ class CellSettings(BaseModel):
     clearance_mm: Annotated[float, Field(ge=0.5, le=50)] | None = None
     max_change_mm: Positive | None = None
     drift_tolerance_mm: Positive | None = None
+    people: dict[Text, Role] | None = None
     notes: str | None = None
+
+    @field_validator("people", mode="before")
+    @classmethod
+    def _roles_are_roles(cls, people: object) -> object:
+        if not isinstance(people, dict):
+            return people
+        return {name: _role(name, role) for name, role in people.items()}
 
     @field_validator("url")
     @classmethod
@@ -89,6 +99,15 @@ class CellSettings(BaseModel):
         if lift_mm is not None and clearance_mm is not None and clearance_mm >= lift_mm:
             raise ValueError(tr("must be smaller than lift_mm"))
         return clearance_mm
+
+
+def _role(name: str, role: object) -> Role:
+    try:
+        return Role(str(role))
+    except ValueError:
+        raise ValueError(
+            tr("{name} is {role!r}: it must be operator or engineer", name=name, role=role)
+        ) from None
 
 
 class CellFile(BaseModel):

@@ -1,10 +1,11 @@
 """From a URL to a controller."""
 
+from robolink import __version__
 from robolink.controllers.epson import EpsonController, open_epson
-from robolink.errors import ConfigError
-from robolink.markers import FileOutcomeLog, memory_log
+from robolink.errors import ConfigError, LoginUnansweredError
+from robolink.journal import memory_journal, open_journal, signature_here
 from robolink.messages import tr
-from robolink.model import OutcomeLog, Secret
+from robolink.model import OutcomeLog, Secret, Signature
 from robolink.timing import Clock
 from robolink.transport import TraceSink, TracingTransport, open_transport, parse_url
 
@@ -18,6 +19,7 @@ def connect(
     clock: Clock | None = None,
     trace: TraceSink | None = None,
     outcomes: OutcomeLog | None = None,
+    signature: Signature | None = None,
 ) -> EpsonController:
     """Connect to a controller and log in.
 
@@ -30,13 +32,15 @@ def connect(
         clock: Replaces the machine's clock; a simulator brings its own.
         trace: Called with (time in ns, "sent" or "received", bytes) for all traffic but the
             login frame.
-        outcomes: Where doubtful outcomes are kept; by default one file per controller in the
-            user's state folder, or memory for a simulator that dies with this process.
+        outcomes: Where outcomes are recorded; by default the journal of this user, or memory
+            for a simulator that dies with this process.
+        signature: Who works here, and with what; by default the user of this computer.
 
     Raises:
         ConfigError: The URL or an option is wrong.
         ConnectError: Nobody is reached, or nobody answers the login.
         LoginRefusedError: Wrong or missing password.
+        LeaseHeldError: Nobody answers the login, and somebody else has the controller.
     """
     link = parse_url(url)
     if link.kind != "epson":
@@ -47,17 +51,23 @@ def connect(
     transport = open_transport(link, timeout_s=timeout_s, clock=clock)
     try:
         if outcomes is None:
-            keep = FileOutcomeLog if transport.durable else memory_log
-            outcomes = keep(transport.identity)
+            identity = transport.identity
+            journal = open_journal() if transport.durable else memory_journal(identity)
+            outcomes = journal.log(identity, signature=signature or signature_here(__version__))
         if trace is not None:
             transport = TracingTransport(transport, trace)
     except BaseException:
         transport.close()
         raise
-    return open_epson(
-        transport,
-        outcomes=outcomes,
-        password=Secret(password) if isinstance(password, str) else password,
-        timeout_s=timeout_s,
-        remote_timeout_s=remote_timeout_s,
-    )
+    try:
+        return open_epson(
+            transport,
+            outcomes=outcomes,
+            password=Secret(password) if isinstance(password, str) else password,
+            timeout_s=timeout_s,
+            remote_timeout_s=remote_timeout_s,
+        )
+    except LoginUnansweredError:
+        # One client at a time is served (epson.md 1.1). The lease may say who that is.
+        outcomes.look()
+        raise

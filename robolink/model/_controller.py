@@ -1,14 +1,17 @@
 """What a controller is to its user."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from enum import StrEnum
 from types import TracebackType
 from typing import Protocol, Self
 
+from robolink.model._facts import ControllerFacts
+from robolink.model._findings import Resolver
+from robolink.model._journal_entries import NewEntry
 from robolink.model._motion import MotionGroup
-from robolink.model._outcomes import OutcomeLog
+from robolink.model._outcomes import Marker, MarkerKind, OutcomeLog
 from robolink.model._tools import ToolTable
 from robolink.timing import Clock
 
@@ -107,8 +110,15 @@ class Controller(Protocol):
     def outcomes(self) -> OutcomeLog:
         """The doubtful outcomes and the unfinished procedures of this controller."""
 
+    @property
+    def resolver(self) -> Resolver:
+        """Settles what was begun here and not proved finished."""
+
     def status(self) -> ControllerStatus:
         """Read the state flags."""
+
+    def facts(self) -> ControllerFacts:
+        """Read which controller and robots these are."""
 
     def stop(self) -> None:
         """Stop everything; from any thread, at any time, more than once."""
@@ -118,6 +128,27 @@ class Controller(Protocol):
 
     def motors(self, on: bool) -> None:
         """Switch the motors."""
+
+    def require_settled(self, request: str) -> None:
+        """Refuse ``request`` while something earlier is unsettled.
+
+        Raises:
+            OutcomeUnknownError: Names it.
+        """
+
+    def begin(self, kind: MarkerKind, request: str, details: Mapping[str, object]) -> Marker:
+        """Store the durable marker of a procedure of several steps.
+
+        Raises:
+            ConfigError: That is impossible; nothing may be sent.
+            BusyError: Another process has the controller.
+        """
+
+    def finish(self, marker: Marker, *entries: NewEntry) -> None:
+        """Forget the marker of a procedure, and journal how it ended."""
+
+    def uninterrupted(self) -> AbstractContextManager[None]:
+        """Hold Ctrl-C back for a block that must be seen through."""
 
     def preserved(self, reason: str) -> AbstractContextManager[None]:
         """Put back, at the end of the block, the tool, power and speed in force at its start.

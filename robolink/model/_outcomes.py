@@ -1,9 +1,12 @@
 """Durable markers of what was begun and not proved finished."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Protocol
+
+from robolink.model._journal_entries import EntryKind, NewEntry, Recorded, Signature
 
 
 class MarkerKind(StrEnum):
@@ -12,6 +15,14 @@ class MarkerKind(StrEnum):
     SET = "set"
     MOVE = "move"
     SELECTION = "selection"
+    CHANGE = "change"
+
+
+def new_operation() -> str:
+    """Return a unique id for a command or a tool change."""
+    from uuid import uuid4  # here, because --help needs none
+
+    return uuid4().hex
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,7 +32,8 @@ class Marker:
     Attributes:
         operation: Unique id of the command.
         kind: ``SET`` a value is being written, ``MOVE`` the robot was told to move,
-            ``SELECTION`` another tool than the cell's own is in force meanwhile.
+            ``SELECTION`` another tool than the cell's own is in force meanwhile, ``CHANGE`` a
+            tool change is not finished: written and not verified, or not every tool of it.
         request: What was sent or begun, as a person may read it.
         begun_at: Wall-clock label, ISO 8601 UTC.
         details: Plain JSON values needed to settle it.
@@ -35,7 +47,19 @@ class Marker:
 
 
 class OutcomeLog(Protocol):
-    """Keeps the markers of one controller, beyond the life of the process where it can."""
+    """Keeps the markers of one controller, beyond the life of the process where it can.
+
+    Attributes:
+        signature: Who works here, and with what.
+        change: Id of the tool change under way, empty for none; it goes with every entry.
+    """
+
+    signature: Signature
+    change: str
+
+    @property
+    def durable(self) -> bool:
+        """Whether what is recorded outlives this process."""
 
     def begin(self, marker: Marker) -> None:
         """Store ``marker``; it is durable when this returns.
@@ -44,8 +68,60 @@ class OutcomeLog(Protocol):
             ConfigError: It cannot be stored. The command must not be sent then.
         """
 
-    def clear(self, operation: str) -> None:
-        """Forget the marker; unknown ids are ignored."""
+    def clear(self, operation: str, *entries: NewEntry) -> None:
+        """Forget the marker and record how it ended; unknown ids are ignored.
+
+        Raises:
+            ConfigError: It cannot be recorded; the marker stays.
+        """
+
+    def append(self, *entries: NewEntry) -> None:
+        """Put something on record; it is durable when this returns.
+
+        Raises:
+            ConfigError: It cannot be recorded.
+        """
 
     def open_markers(self) -> tuple[Marker, ...]:
         """Return what is unsettled, oldest first."""
+
+    def look(self) -> None:
+        """Note the state of the lease; a later :meth:`begin` fails if it changed meanwhile.
+
+        Raises:
+            BusyError: Another process has the controller.
+        """
+
+    def hold(self, purpose: str) -> AbstractContextManager[None]:
+        """Keep the lease for the whole of a block, markers or not.
+
+        Raises:
+            BusyError: Another process has the controller.
+        """
+
+    def take_over(self, reason: str) -> None:
+        """End the lease of whoever has it, because a person insists; this is recorded.
+
+        Raises:
+            ConfigError: It cannot be recorded.
+        """
+
+    def beat(self) -> None:
+        """Let others see that this process is alive; cheap, and raises nothing."""
+
+    def recorded(
+        self, *, tool: int | None = None, change: str = "", kinds: Collection[EntryKind] = ()
+    ) -> Iterator[Recorded]:
+        """Return what is on record about this controller, newest first.
+
+        Args:
+            tool: Only entries about this tool.
+            change: Only entries of this tool change.
+            kinds: Only entries of these kinds.
+
+        Raises:
+            ConfigError: The record cannot be read.
+        """
+
+    def close(self) -> None:
+        """Give the lease up; open markers stay, and block until they are settled."""

@@ -58,6 +58,38 @@ class ToolOffset:
         )
 
 
+def describe_offset(offset: ToolOffset | None) -> str:
+    """Return an offset as a person reads it; V and W only where they are not 0."""
+    if offset is None:
+        return tr("undefined")
+    names = ("X", "Y", "Z", "U", "V", "W")
+    pairs = zip(names, offset.components(), strict=True)
+    # Adding 0.0 takes the sign off a negative zero.
+    shown = [(name, round(value, 3) + 0.0) for name, value in pairs]
+    return " ".join(f"{name} {value:.3f}" for name, value in shown if name not in "VW" or value)
+
+
+def plain_offset(offset: ToolOffset | None) -> list[float] | None:
+    """Return an offset as plain JSON, ``None`` for an undefined tool."""
+    return None if offset is None else list(offset.components())
+
+
+def read_offset(value: object) -> ToolOffset | None:
+    """Return what :func:`plain_offset` was given.
+
+    Raises:
+        ConfigError: It is no such value.
+    """
+    if value is None:
+        return None
+    if isinstance(value, list) and len(value) == 6:
+        return ToolOffset(*value)
+    raise ConfigError(
+        tr("A recorded tool offset cannot be understood: {value!r}.", value=value),
+        remedy=tr("Read the tool from the controller and compare it by hand."),
+    )
+
+
 class Expect(Enum):
     """How a write may be made without naming the old value."""
 
@@ -92,6 +124,16 @@ class ToolTable(Protocol):
 
     def indices(self) -> Sequence[int]:
         """Return the tool numbers that can be written."""
+
+    def same(self, a: ToolOffset | None, b: ToolOffset | None) -> bool:
+        """Tell whether this controller would store both alike; undefined equals undefined only."""
+
+    def require_writable(self, tool: int) -> None:
+        """Refuse a tool number that cannot be written; sends nothing.
+
+        Raises:
+            ReservedToolError, ToolIndexError: As :meth:`write` would.
+        """
 
     def read_all(self) -> dict[int, ToolOffset | None]:
         """Read every writable tool; an undefined one is ``None``."""

@@ -1,14 +1,23 @@
-"""The nozzle change: measure the new tip, write its offset, prove it, or undo it."""
+"""The nozzle change: measure the new tips, write their offsets, prove them, or undo it."""
 
+from robolink.nozzle_change._change import Earlier as Earlier
 from robolink.nozzle_change._change import NozzleChange as NozzleChange
-from robolink.nozzle_change._from_poses import PosesPlan as PosesPlan
-from robolink.nozzle_change._from_poses import PosesProposal as PosesProposal
-from robolink.nozzle_change._from_poses import propose_from_poses as propose_from_poses
-from robolink.nozzle_change._from_poses import require_plausible as require_plausible
-from robolink.nozzle_change._from_poses import write_proposal as write_proposal
+from robolink.nozzle_change._flange import flange_pose as flange_pose
+from robolink.nozzle_change._gate import Gate as Gate
+from robolink.nozzle_change._given_poses import GivenPoses as GivenPoses
+from robolink.nozzle_change._given_poses import PosesFound as PosesFound
+from robolink.nozzle_change._given_poses import taught_poses as taught_poses
+from robolink.nozzle_change._listener import Listener as Listener
+from robolink.nozzle_change._listener import Moment as Moment
 from robolink.nozzle_change._plan import ChangePlan as ChangePlan
-from robolink.nozzle_change._plan import ChangeReport as ChangeReport
-from robolink.nozzle_change._plan import Proposal as Proposal
+from robolink.nozzle_change._plan import Limits as Limits
+from robolink.nozzle_change._plan import ToolPlan as ToolPlan
 from robolink.nozzle_change._preview import PlannedStep as PlannedStep
-from robolink.nozzle_change._preview import flange_pose as flange_pose
 from robolink.nozzle_change._preview import preview as preview
+from robolink.nozzle_change._proposal import ChangeReport as ChangeReport
+from robolink.nozzle_change._proposal import Proposal as Proposal
+from robolink.nozzle_change._proposal import ToolReport as ToolReport
+from robolink.nozzle_change._source import Bench as Bench
+from robolink.nozzle_change._source import MovingSource as MovingSource
+from robolink.nozzle_change._source import TipSource as TipSource
+from robolink.nozzle_change._touching import PinAndPerson as PinAndPerson

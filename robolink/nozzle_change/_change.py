@@ -1,30 +1,42 @@
-"""The nozzle change: measure the new tip, write its offset, prove it, or put the old one back.
+"""The nozzle change: measure the new tips, write their offsets, prove them, or take all back.
 
-Order (design parts 4 and 8): read the old value; measure in Tool 0; propose; on a yes write
-with compare-and-set and read back; turn about the new tip; keep, or write the old value back
-once. Whatever happens, the tool, power mode and speed of before are put back at the end.
+Order (design parts 4 and 8): read the old values; measure, in Tool 0 where the robot moves;
+judge; propose; on a yes write with compare-and-set and read back; turn about the new tips;
+keep, or write the old values back once. Several tools are all measured before the first is
+written. Whatever happens, the tool, power mode and speed of before are put back at the end.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 
-from robolink.calibration import VerifyResult, contact_pose, two_pose, verify_by_turning
-from robolink.errors import DeclinedError, RobolinkError, VerifyError
+from robolink.calibration import VerifyResult
+from robolink.errors import DeclinedError, VerifyError
 from robolink.messages import tr
-from robolink.model import Controller, Pose, ToolOffset, ToolReceipt
-from robolink.nozzle_change._plan import ChangePlan, ChangeReport, Proposal
-from robolink.runner import Operator, Runner, StepDone
+from robolink.model import Controller, ToolReceipt, new_operation, require_engineer
+from robolink.nozzle_change._listener import Listener, Moment
+from robolink.nozzle_change._measuring import Measuring
+from robolink.nozzle_change._plan import ChangePlan, ToolPlan
+from robolink.nozzle_change._proposal import ChangeReport, Proposal, ToolReport
+from robolink.nozzle_change._records import decision_entry, refusal_entry, verification_entry
+from robolink.nozzle_change._source import Bench
+from robolink.runner import Operator
+from robolink.transaction import ToolChange, Wanted
+
+Earlier = Callable[[int], Sequence[float]]
+"""Returns the lengths of a tool's corrections since its nozzle was mounted, oldest first."""
+
+Proposals = Sequence[tuple[ToolPlan, Proposal]]
 
 
 class NozzleChange:
-    """One nozzle change on one controller.
+    """One nozzle change on one controller, of one tool or of several on one head.
 
     Args:
         controller: A connected controller.
-        operator: Who brings the tip onto the pin.
         plan: What to do, within which limits.
-        show: Given the proposal to put before a person, before anything is written.
-        on_step: Told of every step taken.
-        on_result: Told of the write and of the verification as they end, whatever comes next.
+        operator: Who is asked, and brings the tip onto the pin.
+        listener: Told of everything that happens.
+        earlier: Where the corrections of before are found, for the refusal of growing ones.
     """
 
     def __init__(
@@ -33,135 +45,151 @@ class NozzleChange:
         plan: ChangePlan,
         *,
         operator: Operator,
-        show: Callable[[Proposal], None],
-        on_step: Callable[[StepDone], None] | None = None,
-        on_result: Callable[[ToolReceipt | VerifyResult], None] = lambda _result: None,
+        listener: Listener | None = None,
+        earlier: Earlier = lambda _tool: (),
     ) -> None:
         self._controller = controller
         self._plan = plan
         self._operator = operator
-        self._show = show
-        self._on_step = on_step
-        self._on_result = on_result
+        self._listener = Listener() if listener is None else listener
+        self._earlier = earlier
+        self._written: ToolChange | None = None
 
-    def run(self) -> ChangeReport:
-        """Do it all. Ctrl-C before the verification has passed leaves the old value.
+    def run(self, *, write: bool = True) -> ChangeReport:
+        """Do it all. Ctrl-C before the last verification has passed leaves the old values.
+
+        Args:
+            write: Whether the proposals are written; a reference for later is not.
 
         Raises:
-            CalibrationError: The measurement is not trusted; nothing was written.
+            CalibrationError: A measurement is not trusted; nothing was written.
             DeclinedError: The person said no; nothing was written.
-            VerifyError: The tip drifts too far; the old value was put back.
+            VerifyError: A tip drifts too far; the old values were put back.
             RobolinkError: Anything else that ended it, with the state it left.
         """
-        controller, tool = self._controller, self._plan.tool
-        before = controller.tools.read(tool)
-        report: ChangeReport | None = None
+        numbers = ", ".join(str(plan.tool) for plan in self._plan.tools)
+        reason = tr("calibrate tool {tool}", tool=numbers)
+        controller = self._controller
+        controller.outcomes.change = new_operation()
         try:
-            with controller.preserved(tr("calibrate tool {tool}", tool=tool)):
-                report = self._carry_out(before)
+            controller.require_settled(reason)
+            with controller.preserved(reason) if self._plan.moves else nullcontext():
+                return self._carry_out(write=write)
         except KeyboardInterrupt:
-            if report is not None:
-                self._operator.tell(tr("Tool {tool} keeps the new value.", tool=tool))
+            if self._written is not None and self._written.kept:
+                self._tell(tr("Tool {tool} keeps the new value.", tool=numbers))
             raise
-        return report
+        finally:
+            controller.outcomes.change = ""
 
-    def _carry_out(self, before: ToolOffset | None) -> ChangeReport:
-        controller, plan = self._controller, self._plan
-        controller.tools.select(0)
-        start = controller.groups[0].pose()
-        runner = self._runner(start, None)
-        result = runner.run(two_pose(plan.touch, stored=before))
-        proposal = Proposal(plan.tool, before, result)
-        self._show(proposal)
-        proposal.require_plausible(
-            plan.max_change_mm,
-            remedy=tr(
-                "Check that both poses touched the same point. If the change is real, allow it "
-                "with --max-change."
-            ),
-        )
-        question = tr("Write this to tool {tool}?", tool=plan.tool)
-        if plan.ask_before_write and not runner.confirm(question):
+    def _carry_out(self, *, write: bool) -> ChangeReport:
+        plan, listener, bench = self._plan, self._listener, self._bench()
+        measuring = Measuring(bench, listener)
+        measuring.go_to(plan.safe, tr("go to the safe pose"))
+        listener.moment(Moment.START, bench)
+        proposals = [(one, measuring.propose(one)) for one in plan.tools]
+        listener.proposed([proposal for _, proposal in proposals])
+        self._judge(proposals)
+        if write:
+            listener.moment(Moment.BEFORE_WRITE, bench)
+            self._ask(bench)
+            reports = self._write(bench, proposals)
+        else:
+            reports = tuple(ToolReport(proposal, None, None) for _, proposal in proposals)
+        measuring.go_to(plan.safe, tr("go to the safe pose"))
+        listener.moment(Moment.END, bench)
+        return ChangeReport(self._controller.outcomes.change, reports)
+
+    def _bench(self) -> Bench:
+        start = None
+        if self._plan.moves:
+            self._controller.tools.select(0)
+            start = self._controller.groups[0].pose()
+        settings = self._plan.limits.settings
+        return Bench(self._controller, self._operator, start=start, settings=settings)
+
+    def _judge(self, proposals: Proposals) -> None:
+        for plan, proposal in proposals:
+            try:
+                plan.gate.judge_change(
+                    proposal, earlier_mm=self._earlier(plan.tool), remedy=plan.source.remedy
+                )
+            except BaseException as error:
+                self._controller.outcomes.append(refusal_entry(plan.tool, plan.gate, error))
+                raise
+            if plan.gate.jumps(proposal):
+                require_engineer(
+                    self._controller.outcomes,
+                    tr(
+                        "let tool {tool} jump by {change:.3f} mm",
+                        tool=plan.tool,
+                        change=proposal.change_mm,
+                    ),
+                )
+
+    def _ask(self, bench: Bench) -> None:
+        outcomes = self._controller.outcomes
+        if not self._plan.ask_before_write:
+            outcomes.append(decision_entry(tr("accepted beforehand"), accepted=True))
+            return
+        numbers = ", ".join(str(plan.tool) for plan in self._plan.tools)
+        accepted = bench.runner().confirm(tr("Write this to tool {tool}?", tool=numbers))
+        verdict = tr("accepted") if accepted else tr("declined")
+        outcomes.append(decision_entry(verdict, accepted=accepted))
+        if not accepted:
             raise DeclinedError(
                 tr("The proposal was not accepted."), remedy=tr("Nothing was written.")
             )
-        receipt = self._write(proposal)
-        verification = self._verify(start, proposal, receipt) if plan.verify else None
-        return ChangeReport(proposal, receipt, verification)
 
-    def _write(self, proposal: Proposal) -> ToolReceipt:
-        tool, before, offset = proposal.tool, proposal.before, proposal.result.offset
-        try:
-            receipt = self._controller.tools.write(tool, offset, expected=before)
-            self._on_result(receipt)
-        except KeyboardInterrupt as error:
-            # It was written and read back by now, or not begun; it was not verified.
-            self._roll_back(ToolReceipt(tool, before, offset, offset), error)
-            raise
-        return receipt
-
-    def _verify(self, start: Pose, proposal: Proposal, receipt: ToolReceipt) -> VerifyResult:
-        plan, result = self._plan, proposal.result
-        contact = contact_pose(result, tool=plan.tool)
-        first, second = (pose.u_deg + result.offset.u_deg for pose in result.inputs)
-        try:
-            self._controller.tools.select(plan.tool)
-            outcome = self._runner(start, result.offset).run(
-                verify_by_turning(
-                    plan.touch,
-                    contact=contact,
-                    angles_deg=((first + second) / 2, first),
-                    tolerance_mm=plan.drift_tolerance_mm,
-                )
+    def _write(self, bench: Bench, proposals: Proposals) -> tuple[ToolReport, ...]:
+        """Write all, verify each, keep all; an error on the way takes all back."""
+        verify = any(plan.verify and plan.moving for plan, _ in proposals)
+        wanted = [
+            Wanted(proposal.tool, proposal.offset, proposal.before, plan.details(proposal))
+            for plan, proposal in proposals
+        ]
+        self._written = ToolChange(self._controller, wanted, verify=verify, tell=self._tell)
+        with self._written as change:
+            receipts = change.write()
+            for receipt in receipts:
+                self._listener.wrote(receipt)
+            reports = tuple(
+                ToolReport(proposal, receipt, self._verify(bench, plan, proposal, receipt))
+                for (plan, proposal), receipt in zip(proposals, receipts, strict=True)
             )
-            self._on_result(outcome)
-        except BaseException as error:
-            self._roll_back(receipt, error)
-            raise
-        if not outcome.passed:
-            failure = VerifyError(
+            change.keep(tr("verified") if verify else tr("not verified"))
+        return reports
+
+    def _verify(
+        self, bench: Bench, plan: ToolPlan, proposal: Proposal, receipt: ToolReceipt
+    ) -> VerifyResult | None:
+        source = plan.moving
+        if source is None or not plan.verify:
+            return None
+        tool, gate = receipt.tool, plan.gate
+        with bench.telling(lambda done: self._listener.step(tool, done)):
+            result = source.verify(
+                bench,
+                tool,
+                proposal.result,
+                tip=proposal.tip,
+                tolerance_mm=gate.drift_tolerance_mm,
+            )
+        self._controller.outcomes.append(verification_entry(tool, result))
+        self._listener.verified(tool, result)
+        if not result.passed:
+            raise VerifyError(
                 tr(
                     "The tip drifts {drift:.3f} mm when the tool turns; {limit:.3f} mm are "
                     "allowed.",
-                    drift=outcome.max_drift_mm,
-                    limit=plan.drift_tolerance_mm,
+                    drift=result.max_drift_mm,
+                    limit=gate.drift_tolerance_mm,
                 ),
                 remedy=tr("Check that the nozzle sits firmly and measure again."),
                 controller=self._controller.identity,
             )
-            self._roll_back(receipt, failure)
-            raise failure
-        return outcome
+        return result
 
-    def _roll_back(self, receipt: ToolReceipt, cause: BaseException) -> None:
-        """Write the old value back, once; let ``cause`` say whether that was done."""
-        tools, tool = self._controller.tools, receipt.tool
-        if receipt.skipped:
-            return
-        try:
-            if receipt.before is None:
-                undone = tools.clear(tool, expected=receipt.read_back)
-            else:
-                undone = tools.write(tool, receipt.before, expected=receipt.read_back)
-            if undone.skipped:
-                note = tr("Tool {tool} holds its old value.", tool=tool)
-            else:
-                note = tr("The old value of tool {tool} was written back.", tool=tool)
-        except RobolinkError as error:
-            note = tr(
-                "The old value of tool {tool} could NOT be written back: {error}",
-                tool=tool,
-                error=error,
-            )
-        if isinstance(cause, RobolinkError):
-            cause.remedy = f"{cause.remedy} {note}".strip()
-        self._operator.tell(note)
-
-    def _runner(self, start: Pose, offset: ToolOffset | None) -> Runner:
-        return Runner(
-            self._controller,
-            self._controller.groups[0],
-            self._operator,
-            self._plan.settings(start, offset),
-            on_step=self._on_step,
-        )
+    def _tell(self, sentence: str) -> None:
+        self._operator.tell(sentence)
+        self._listener.told(sentence)

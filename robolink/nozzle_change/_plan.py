@@ -1,38 +1,27 @@
-"""What a nozzle change is to do, what it measured, and what it did."""
+"""What a nozzle change is to do, and within which limits."""
 
 import math
 from dataclasses import dataclass, field
 
-from robolink.calibration import CalibrationResult, TouchPlan, VerifyResult
-from robolink.errors import CalibrationError
-from robolink.messages import tr
-from robolink.model import Pose, ToolOffset, ToolReceipt, WorkBox
+from robolink.model import Pose, ToolOffset, WorkBox, plain_offset
+from robolink.nozzle_change._gate import Gate
+from robolink.nozzle_change._proposal import Proposal
+from robolink.nozzle_change._source import MovingSource, TipSource
+from robolink.nozzle_change._touching import PinAndPerson
 from robolink.runner import RunSettings
 
 
 @dataclass(frozen=True, slots=True)
-class ChangePlan:
-    """What to do and within which limits.
+class Limits:
+    """Where and how fast the robot may go.
 
     Attributes:
-        tool: Number of the tool whose nozzle was changed.
-        touch: Lift, clearance and angle of the measurement.
-        max_change_mm: Largest plausible change against the stored value, in the plane.
-        drift_tolerance_mm: Largest drift that passes the verification.
-        verify: Whether to turn about the new tip after the write.
-        ask_before_write: Whether a person accepts the proposal before it is written.
         box_mm: How far targets may lie, sideways, from where the flange is at the start.
         box_down_mm: How far below the start they may lie.
         box_up_mm: How far above.
         speed_percent, speed_mm_s: Speeds, in low power.
     """
 
-    tool: int
-    touch: TouchPlan = field(default_factory=TouchPlan)
-    max_change_mm: float = 2.0
-    drift_tolerance_mm: float = 0.2
-    verify: bool = True
-    ask_before_write: bool = True
     box_mm: float = 150.0
     box_down_mm: float = 30.0
     box_up_mm: float = 50.0
@@ -44,8 +33,7 @@ class ChangePlan:
 
         Args:
             start: Flange pose at the start; the box lies about it.
-            offset: The tool in force while moving, ``None`` for the flange. Seen from a tip,
-                the box lies lower by the tool's length and is wider by its reach.
+            offset: The tip that moves, ``None`` for the flange.
         """
         shift_z = offset.z_mm if offset else 0.0
         reach = self.box_mm + (math.hypot(offset.x_mm, offset.y_mm) if offset else 0.0)
@@ -61,49 +49,55 @@ class ChangePlan:
 
 
 @dataclass(frozen=True, slots=True)
-class Proposal:
-    """What was measured, next to what is stored."""
+class ToolPlan:
+    """What is to be done about one tool.
+
+    Attributes:
+        tool: Number of the tool whose nozzle was changed.
+        source: Where its measurement comes from.
+        gate: What a measurement must be like to be believed.
+        verify: Whether to turn about the new tip after the write, where the source can.
+        attempts: How often it is measured before a refusal ends the change.
+        approach: Flange pose from which it is measured, ``None`` for wherever the robot is.
+        retreat: Flange pose to which the robot goes afterwards.
+    """
 
     tool: int
-    before: ToolOffset | None
-    result: CalibrationResult
+    source: TipSource = field(default_factory=PinAndPerson)
+    gate: Gate = field(default_factory=Gate)
+    verify: bool = True
+    attempts: int = 1
+    approach: Pose | None = None
+    retreat: Pose | None = None
+
+    def details(self, proposal: Proposal) -> dict[str, object]:
+        """Return what the journal keeps about the value beside it, plain JSON."""
+        own = {"tip": plain_offset(proposal.tip), "method": proposal.result.method}
+        return {**own, **proposal.kept_record}
 
     @property
-    def change_mm(self) -> float | None:
-        """Length of the change in the plane, ``None`` when the tool was undefined."""
-        if self.before is None:
-            return None
-        after = self.result.offset
-        return math.hypot(after.x_mm - self.before.x_mm, after.y_mm - self.before.y_mm)
-
-    def require_plausible(self, limit_mm: float, *, remedy: str) -> None:
-        """Refuse a change that no nozzle change explains.
-
-        Args:
-            limit_mm: Largest plausible change.
-            remedy: What to do about a larger one.
-
-        Raises:
-            CalibrationError: ``implausible_change``.
-        """
-        change = self.change_mm
-        if change is not None and change > limit_mm:
-            raise CalibrationError(
-                "implausible_change",
-                tr(
-                    "The tip would move by {change:.3f} mm against the stored tool; {limit:.3f} "
-                    "mm are plausible.",
-                    change=change,
-                    limit=limit_mm,
-                ),
-                remedy=remedy,
-            )
+    def moving(self) -> MovingSource | None:
+        """The source, where it moves the robot."""
+        return self.source if isinstance(self.source, MovingSource) else None
 
 
 @dataclass(frozen=True, slots=True)
-class ChangeReport:
-    """What a nozzle change did."""
+class ChangePlan:
+    """What to do with one tool, or with several on one head: all of them or none.
 
-    proposal: Proposal
-    receipt: ToolReceipt
-    verification: VerifyResult | None
+    Attributes:
+        tools: The tools, in the order in which they are measured.
+        limits: Where and how fast the robot may go.
+        ask_before_write: Whether a person accepts the proposals before anything is written.
+        safe: Flange pose to which the robot goes first and last.
+    """
+
+    tools: tuple[ToolPlan, ...]
+    limits: Limits = field(default_factory=Limits)
+    ask_before_write: bool = True
+    safe: Pose | None = None
+
+    @property
+    def moves(self) -> bool:
+        """Whether the robot moves."""
+        return any(plan.moving for plan in self.tools)

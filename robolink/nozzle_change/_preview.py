@@ -1,12 +1,17 @@
 """The nozzle change on paper: every step with its target, before anything moves."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Generator, Iterator
+from dataclasses import dataclass
+from functools import partial
 
-from robolink.calibration import Ask, Move, two_pose
-from robolink.errors import LimitError
-from robolink.model import Controller, MotionProfile, Pose, ToolOffset, rotate_xy
+from robolink.calibration import Ask, Move, Procedure, travel
+from robolink.errors import CalibrationError, LimitError
+from robolink.messages import tr
+from robolink.model import Controller, MotionProfile, Pose, ToolOffset
+from robolink.nozzle_change._flange import flange_pose
 from robolink.nozzle_change._plan import ChangePlan
+from robolink.nozzle_change._source import MovingSource
+from robolink.runner import RunSettings
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,52 +32,75 @@ class PlannedStep:
 
 
 def preview(controller: Controller, plan: ChangePlan) -> tuple[PlannedStep, ...]:
-    """Return the steps of the measurement from where the robot stands now.
+    """Return the steps of the measurements from where the robot stands now.
 
     Reads only. The person's part is foreseen as no movement at all.
     """
-    stored = controller.tools.read(plan.tool)
+    if not plan.moves:
+        return ()
     here = controller.groups[0].pose()
     selected = controller.tools.read(here.tool) if here.tool else None
-    flange = flange_pose(here, selected or ToolOffset())
-    return tuple(_foresee(plan, flange, stored))
+    start = flange_pose(here, selected or ToolOffset())
+    return tuple(_foresee(controller, plan, start))
 
 
-def flange_pose(tip: Pose, offset: ToolOffset) -> Pose:
-    """Return where the flange is when a four-axis robot's tool tip is at ``tip``.
-
-    ``tip = flange + Rz(U) t`` and the tip's U is the flange's U plus the tool's
-    (epson.md 3.1).
-    """
-    u_deg = tip.u_deg - offset.u_deg
-    dx, dy = rotate_xy(offset.x_mm, offset.y_mm, u_deg)
-    return replace(
-        tip,
-        x_mm=tip.x_mm - dx,
-        y_mm=tip.y_mm - dy,
-        z_mm=tip.z_mm - offset.z_mm,
-        u_deg=u_deg,
-        tool=0,
-    )
+def _foresee(controller: Controller, plan: ChangePlan, start: Pose) -> Iterator[PlannedStep]:
+    settings = plan.limits.settings(start, None)
+    here = start
+    for procedure in _procedures(controller, plan):
+        here = yield from _follow(procedure(here), here, settings)
 
 
-def _foresee(plan: ChangePlan, start: Pose, stored: ToolOffset | None) -> Iterator[PlannedStep]:
-    settings = plan.settings(start, None)
-    procedure = two_pose(plan.touch, stored=stored)
-    pose, step = start, next(procedure)
-    while True:
-        if isinstance(step, Ask):
-            yield PlannedStep(step.instruction)
-        elif isinstance(step, Move):
-            pose = step.target
-            profile = MotionProfile(step.path, settings.speed_percent, settings.speed_mm_s)
-            try:
-                settings.box.check(pose)
-                refusal = ""
-            except LimitError as error:
-                refusal = str(error)
-            yield PlannedStep(step.purpose, pose, profile, refusal)
-        try:
-            step = procedure.send(pose)
-        except StopIteration:
-            return
+def _procedures(
+    controller: Controller, plan: ChangePlan
+) -> Iterator[Callable[[Pose], Procedure[object]]]:
+    """Yield what runs before the write, each to be made from where the one before ended."""
+    yield partial(_journey, plan.safe, tr("go to the safe pose"))
+    for one in plan.tools:
+        tool, source = one.tool, one.moving
+        if source is None:
+            continue
+        stored = controller.tools.read(tool)
+        yield partial(_journey, one.approach, tr("go to where tool {tool} is measured", tool=tool))
+        yield partial(_measurement, source, stored)
+        away = tr("go away from where tool {tool} is measured", tool=tool)
+        yield partial(_journey, one.retreat, away)
+
+
+def _journey(target: Pose | None, purpose: str, here: Pose) -> Procedure[object]:
+    if target is not None:
+        goal = Pose(*target.coordinates(), hand=here.hand, local=here.local, tool=0)
+        yield from travel(goal, here=here, purpose=purpose)
+    return None
+
+
+def _measurement(source: MovingSource, stored: ToolOffset | None, _here: Pose) -> Procedure[object]:
+    return (yield from source.procedure(stored))
+
+
+def _follow(
+    procedure: Procedure[object], here: Pose, settings: RunSettings
+) -> Generator[PlannedStep, None, Pose]:
+    """Yield the steps of a procedure, and return where they lead."""
+    try:
+        step = next(procedure)
+        while True:
+            if isinstance(step, Ask):
+                yield PlannedStep(step.instruction)
+            elif isinstance(step, Move):
+                here = step.target
+                yield _planned(step, settings)
+            step = procedure.send(here)
+    except (StopIteration, CalibrationError):
+        # The poses are foreseen, so what they would give means nothing.
+        return here
+
+
+def _planned(step: Move, settings: RunSettings) -> PlannedStep:
+    profile = MotionProfile(step.path, settings.speed_percent, settings.speed_mm_s)
+    try:
+        settings.box.check(step.target)
+        refusal = ""
+    except LimitError as error:
+        refusal = str(error)
+    return PlannedStep(step.purpose, step.target, profile, refusal)

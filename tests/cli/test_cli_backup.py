@@ -183,7 +183,7 @@ def test_no_write_is_made_when_the_first_backup_cannot_be_stored(
 ):
     simulator.machine.tools.set(3, ToolOffset(5))
     simulator.machine.tools.select(0)
-    (tmp_path / "state").mkdir()
+    (tmp_path / "state").mkdir(exist_ok=True)
     (tmp_path / "state" / "backups").write_text("in the way")
     written = simulator.machine.flash_writes
     code, _, err = run(*command)

@@ -37,6 +37,7 @@ def an_error(kind):
 CODES = {
     "ConfigError": 2,
     "LimitError": 2,
+    "JournalError": 2,
     "TransportError": 3,
     "ConnectError": 3,
     "LoginUnansweredError": 3,
@@ -52,6 +53,8 @@ CODES = {
     "NotReadyError": 5,
     "ControllerFaultError": 5,
     "BusyError": 5,
+    "LeaseHeldError": 5,
+    "LeaseLostError": 5,
     "MotionTimeoutError": 5,
     "OutcomeUnknownError": 6,
     "ToolError": 5,
@@ -63,6 +66,7 @@ CODES = {
     "CalibrationError": 7,
     "VerifyError": 8,
     "DeclinedError": 9,
+    "NotAllowedError": 9,
 }
 
 

@@ -167,7 +167,9 @@ def test_a_wrong_password_is_tried_once_and_shown_nowhere(tmp_path, monkeypatch)
         right = cell.run(*SET, "--json")
         assert right.code == 0
         seen = [repr((shown, as_document, right)), repr(list(cell.simulator.log))]
-    seen += [path.read_text() for path in (tmp_path / "cell").rglob("*") if path.is_file()]
+    files = [path for path in (tmp_path / "cell").rglob("*") if path.is_file()]
+    seen += [path.read_bytes().decode("latin-1") for path in files]
+    assert files
     assert not [text for text in seen if CANARY in text or WRONG in text]
 
 

@@ -10,7 +10,7 @@ import sys
 import pytest
 from robolink_cli import main
 
-from robolink.markers import FileOutcomeLog
+from robolink.journal import open_journal
 from robolink.model import Marker, MarkerKind, ToolOffset
 from tests.faults._nozzle_cell import OLD_TIP, served_cell
 from tests.faults._requests import changes
@@ -146,10 +146,11 @@ def test_the_dry_run_of_a_calibration_shows_every_step_and_writes_nothing(cell):
 
 
 def test_the_dry_run_of_resolve_says_what_is_true_and_settles_nothing(cell):
-    log = FileOutcomeLog(cell.url, cell.state_folder / "outcomes")
+    log = open_journal().log(cell.url)
     details = {"tool": 1, "before": [12.0, -3.5, -20.0, 0.0, 0.0, 0.0], "requested": [1.0] * 6}
     marker = Marker("a", MarkerKind.SET, "TLSet 1, XY(1)", "2026-01-01T00:00:00+00:00", details)
     log.begin(marker)
+    log.close()
     shown = cell.run("resolve", "--dry-run", "--json")
     assert shown.code == 0, shown.err
     document = json.loads(shown.out)

@@ -8,7 +8,7 @@ from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.in_process import register, unregister
 
 from robolink.config._settings import CellSettings
-from robolink.markers import memory_log
+from robolink.journal import memory_journal
 from robolink.model import Marker, MarkerKind, Secret
 
 URL = "epson+sim://config-cell"
@@ -160,16 +160,17 @@ def test_calibrate_takes_its_limits_from_the_cell(cell, simulator, monkeypatch, 
         plans.append(plan)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("robolink_cli._calibrating.Bench", remember)
+    monkeypatch.setattr("robolink_cli._calibrating.LiveCalibration", remember)
     assert main.run(["-c", "a", "calibrate", "two-pose", "--tool", "1", *options]) == 130
     (plan,) = plans
+    (one,) = plan.tools
     assert (
-        plan.speed_mm_s,
-        plan.box_mm,
-        plan.touch.lift_mm,
-        plan.touch.clearance_mm,
-        plan.max_change_mm,
-        plan.drift_tolerance_mm,
+        plan.limits.speed_mm_s,
+        plan.limits.box_mm,
+        one.source.touch.lift_mm,
+        one.source.touch.clearance_mm,
+        one.gate.max_change_mm,
+        one.gate.drift_tolerance_mm,
     ) == expected
 
 
@@ -191,11 +192,11 @@ def test_jog_takes_its_limits_from_the_cell(cell, simulator, monkeypatch, option
 
 def test_what_was_left_unfinished_is_resolved_by_the_cell_s_name(cell, simulator, capsys):
     cell()
-    log = memory_log(URL)
+    log = memory_journal(URL).log(URL)
     log.begin(Marker("a", MarkerKind.SET, "TLSet 3, XY(1,2,3,0)", "2026-01-01T00:00:00+00:00"))
     try:
         assert main.run(["-c", "a", "status"]) == 0
-        assert "robolink -c a resolve" in capsys.readouterr().err
+        assert "robolink -c a recover" in capsys.readouterr().err
     finally:
         log.clear("a")
 

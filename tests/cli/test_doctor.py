@@ -11,8 +11,7 @@ from robolink_cli import _checkup, main
 from robolink_cli._remark import Level
 from robolink_cli._requirements import check_name, check_versions, fits, requirement
 
-from robolink.errors import ConfigError
-from robolink.markers import FileOutcomeLog
+from robolink.journal import open_journal
 from robolink.model import Marker, MarkerKind
 
 IDENTITY = "epson+tcp://192.0.2.1:5000"
@@ -54,7 +53,7 @@ def test_a_healthy_computer_is_told_so(capsys, tmp_path):
     assert document["healthy"]
     found = {check["subject"]: check["level"] for check in document["checks"]}
     assert set(found) == {
-        *("python", "click", "name", "state", "cells", "keyring", "serial", "unsettled")
+        *("python", "click", "name", "state", "cells", "keyring", "serial", "journal")
     }
     assert set(found.values()) == {"ok"}
     assert main.run(["doctor"]) == 0
@@ -176,7 +175,7 @@ def test_a_state_folder_that_is_read_only_is_bad(monkeypatch):
 
 
 def test_a_state_folder_that_others_may_change_is_told(tmp_path):
-    folder = tmp_path / "state" / "outcomes"
+    folder = tmp_path / "state" / "backups"
     folder.mkdir(parents=True)
     folder.chmod(0o770)
     (remark,) = _checkup.check_state_folder()
@@ -231,31 +230,21 @@ def test_a_serial_port_that_may_not_be_used_names_its_group(monkeypatch):
 
 def test_unsettled_work_on_any_controller_is_listed(capsys):
     for number in (1, 2):
-        log = FileOutcomeLog(f"epson+tcp://192.0.2.{number}:5000")
+        log = open_journal().log(f"epson+tcp://192.0.2.{number}:5000")
         log.begin(Marker("a", MarkerKind.SET, "TLSet 3", "2026-01-01T00:00:00+00:00"))
     assert main.run(["doctor", "--json"]) == 0
     checks = json.loads(capsys.readouterr().out)["checks"]
     found = [check["remedy"] for check in checks if check["subject"] == "unsettled"]
     assert sorted(found) == [
-        f"Run: robolink -c epson+tcp://192.0.2.{number}:5000 resolve" for number in (1, 2)
+        f"Run: robolink -c epson+tcp://192.0.2.{number}:5000 recover" for number in (1, 2)
     ]
 
 
-@pytest.mark.parametrize("content", ["", "[]", "{}", '{"controller": 3}', '{"controller": "x"}'])
-def test_a_safety_record_that_makes_no_sense_is_bad(content):
-    log = FileOutcomeLog(IDENTITY)
-    log.path.parent.mkdir(parents=True)
-    log.path.write_text(content)
-    (remark,) = _checkup.check_markers()
+@pytest.mark.parametrize("content", ["nonsense", "SQLite format 3\0 and nothing else"])
+def test_a_journal_that_makes_no_sense_is_bad(tmp_path, monkeypatch, content):
+    journal = tmp_path / "broken.db"
+    journal.write_text(content)
+    monkeypatch.setenv("ROBOLINK_JOURNAL", str(journal))
+    (remark,) = _checkup.check_journal()
     assert remark.level is Level.BAD
-    assert str(log.path) in remark.what
-
-
-def test_a_damaged_record_of_a_known_controller_is_bad():
-    log = FileOutcomeLog(IDENTITY)
-    log.path.parent.mkdir(parents=True)
-    log.path.write_text(json.dumps({"controller": IDENTITY}))
-    with pytest.raises(ConfigError):
-        log.open_markers()
-    (remark,) = _checkup.check_markers()
-    assert remark.level is Level.BAD
+    assert str(journal) in remark.what

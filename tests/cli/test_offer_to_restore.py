@@ -6,7 +6,7 @@ from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.in_process import register, unregister
 
 import robolink
-from robolink.markers import memory_log
+from robolink.journal import memory_journal
 
 
 class Person:
@@ -34,12 +34,11 @@ def cell():
         controller._session.close()
     yield simulator, url
     unregister("offer-to-restore")
-    for marker in open_markers(url):
-        memory_log(url).clear(marker.operation)
+    memory_journal(url).close()
 
 
 def open_markers(url):
-    return memory_log(url).open_markers()
+    return memory_journal(url).log(url).open_markers()
 
 
 @pytest.fixture

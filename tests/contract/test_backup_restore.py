@@ -19,7 +19,7 @@ from robolink.errors import (
     OutcomeUnknownError,
     ToolChangedError,
 )
-from robolink.markers import FileOutcomeLog
+from robolink.journal import memory_journal, open_journal
 from robolink.model import ToolOffset
 
 pytestmark = pytest.mark.simulator_only
@@ -131,7 +131,7 @@ def test_a_running_program_lets_no_backup_be_taken(serve, simulator):
 def kept(serve, simulator):
     """Connect with a record that outlives the process, as for a real controller."""
     with serve(simulator) as cell:
-        yield lambda: cell.connect(outcomes=FileOutcomeLog(cell.url))
+        yield lambda: cell.connect(outcomes=open_journal().log(cell.url))
 
 
 def test_the_first_write_is_preceded_by_a_backup_and_the_second_is_not(kept):
@@ -153,8 +153,8 @@ def test_without_a_place_for_it_there_is_no_backup_and_an_error(kept, tmp_path, 
 
 
 def test_a_simulator_that_dies_with_the_process_needs_none(serve, simulator, tmp_path):
-    from robolink.markers import MemoryOutcomeLog
-
-    with serve(simulator) as cell, cell.connect(outcomes=MemoryOutcomeLog()) as controller:
-        assert keep_first_backup(controller) is None
+    with serve(simulator) as cell:
+        outcomes = memory_journal(cell.url).log(cell.url)
+        with cell.connect(outcomes=outcomes) as controller:
+            assert keep_first_backup(controller) is None
     assert not (tmp_path / "state").exists()

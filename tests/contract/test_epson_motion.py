@@ -50,8 +50,6 @@ def test_a_joint_move_turns_the_tool(controller):
     assert motion.wait(timeout_s=60) is MotionOutcome.ARRIVED
     assert group.pose().u_deg == pytest.approx(target.u_deg, abs=0.05)
 
-
-@pytest.mark.simulator_only
 def test_power_is_low_and_the_speed_is_set_before_a_move(cell):
     with cell.connect() as controller:
         controller.motors(True)
@@ -87,8 +85,6 @@ def test_a_remote_timeout_of_never_forbids_motion(cell):
             group.move_to(target, STRAIGHT, box=EVERYWHERE)
     assert caught.value.reason == "no_remote_timeout"
 
-
-@pytest.mark.simulator_only
 def test_motors_off_are_named_and_nothing_moves(cell):
     with cell.connect() as controller:
         controller.motors(False)
@@ -130,8 +126,6 @@ def test_a_move_that_takes_too_long_is_aborted_and_its_end_is_seen(controller):
     assert controller.outcomes.open_markers() == ()
     assert group.pose().z_mm < target.z_mm - 1
 
-
-@pytest.mark.simulator_only
 @pytest.mark.parametrize("danger", ["press_estop", "open_guard"])
 def test_an_emergency_stop_or_an_open_guard_ends_the_move_and_nothing_is_resent(cell, danger):
     with cell.connect() as controller:
@@ -148,8 +142,6 @@ def test_an_emergency_stop_or_an_open_guard_ends_the_move_and_nothing_is_resent(
         with pytest.raises(NotReadyError):
             group.move_to(target, STRAIGHT, box=EVERYWHERE)
 
-
-@pytest.mark.simulator_only
 def test_after_release_and_reset_the_robot_can_move_again(cell):
     with cell.connect() as controller:
         cell.simulator.panel.press_estop()
@@ -186,8 +178,6 @@ def test_they_are_put_back_when_the_procedure_dies(controller, error):
     assert controller.tools.selected() == selected
     assert controller.outcomes.open_markers() == ()
 
-
-@pytest.mark.simulator_only
 def test_what_cannot_be_put_back_is_named_by_the_message_and_the_marker(cell):
     with cell.connect() as controller:
         controller.motors(True)
@@ -206,8 +196,6 @@ def test_what_cannot_be_put_back_is_named_by_the_message_and_the_marker(cell):
         assert marker.details["tool"] == selected
         assert marker.details["now"] == 0
 
-
-@pytest.mark.simulator_only
 def test_a_tool_written_while_it_is_selected_moves_nothing(cell):
     with cell.connect() as controller:
         moved = cell.simulator.machine.arm.moves_started
@@ -216,17 +204,3 @@ def test_a_tool_written_while_it_is_selected_moves_nothing(cell):
         controller.tools.write(tool, ToolOffset(13, -3, -20), expected=before)
         assert cell.simulator.machine.arm.moves_started == moved
 
-
-@pytest.mark.simulator_only
-def test_a_tool_written_in_an_unfinished_procedure_is_named_until_it_holds_its_first_value(cell):
-    with cell.connect() as controller:
-        before = controller.tools.read(1)
-        with controller.preserved("a test"):
-            controller.tools.write(1, ToolOffset(13, -3, -20), expected=before)
-            (marker,) = controller.outcomes.open_markers()
-            finding = controller.resolver.examine(marker)
-            assert "Tool 1 was written meanwhile and not verified" in finding.sentence
-            assert "before it held X 12.000 Y -3.500" in finding.sentence
-            controller.tools.write(1, before, expected=ToolOffset(13, -3, -20))
-            (marker,) = controller.outcomes.open_markers()
-            assert "written" not in controller.resolver.examine(marker).sentence

@@ -3,7 +3,7 @@
 import pytest
 
 import robolink
-from robolink.markers import wall_label
+from robolink.timing import wall_label
 from robolink.transport import DialogueLog, format_dialogue
 
 pytest_plugins = ["pytester"]

@@ -18,7 +18,7 @@ from robolink_simulators.epson.options import EpsonOptions
 from robolink_simulators.hosting.tcp import serve_tcp
 from robolink_simulators.world import STORED
 
-from robolink.markers import FileOutcomeLog
+from robolink.journal import open_journal
 from robolink.model import Marker, Secret, ToolOffset
 from tests.faults._client_process import ClientProcess
 from tests.faults._requests import changes
@@ -111,7 +111,7 @@ class NozzleCell:
 
     def open_markers(self) -> tuple[Marker, ...]:
         """Return what the command line holds for unsettled."""
-        return FileOutcomeLog(self.url, self.state_folder / "outcomes").open_markers()
+        return open_journal().log(self.url).open_markers()
 
     def check_nothing_else_was_written(self) -> None:
         """Tool 1 holds the old or the measured value, written once at most; the rest stands."""

@@ -16,8 +16,8 @@ from robolink_simulators.hosting.in_process import register, unregister
 
 import robolink
 from robolink.interrupts import InterruptGate
-from robolink.markers import MemoryOutcomeLog
-from robolink.nozzle_change import ChangePlan, NozzleChange
+from robolink.journal import JournalOutcomeLog, memory_journal
+from robolink.nozzle_change import ChangePlan, NozzleChange, ToolPlan
 from tests.faults._nozzle_cell import OLD_TIP, NozzleCell, served_cell
 from tests.faults._steps import SHARES, Step, disturbed, steps_of
 
@@ -72,20 +72,27 @@ def test_ctrl_c_at_each_step_leaves_no_tool_selected_that_is_not_the_cell_s_own(
     print(f"{len(steps)} steps of {2 * len(requests)}")  # noqa: T201 - for pytest -s
 
 
-class InterruptingLog(MemoryOutcomeLog):
-    """Presses Ctrl-C just after the marker number ``at`` was written or cleared."""
+class InterruptingLog:
+    """Presses Ctrl-C just after the change number ``at`` of the journal."""
 
     def __init__(self, at: float) -> None:
-        super().__init__()
         self.changes = 0
         self._at = at
+        self._log: JournalOutcomeLog = memory_journal(f"interrupted-{at}").log("interrupted")
+
+    def __getattr__(self, name):
+        return getattr(self._log, name)
 
     def begin(self, marker):
-        super().begin(marker)
+        self._log.begin(marker)
         self._changed()
 
-    def clear(self, operation):
-        super().clear(operation)
+    def clear(self, operation, *entries):
+        self._log.clear(operation, *entries)
+        self._changed()
+
+    def append(self, *entries):
+        self._log.append(*entries)
         self._changed()
 
     def _changed(self) -> None:
@@ -108,8 +115,8 @@ class Change:
 
         with robolink.connect(register("interrupted", self.simulator), outcomes=outcomes) as robot:
             operator = AssistedOperator(look, self.said.append)
-            plan = ChangePlan(1, ask_before_write=False)
-            NozzleChange(robot, plan, operator=operator, show=lambda proposal: None).run()
+            plan = ChangePlan((ToolPlan(1),), ask_before_write=False)
+            NozzleChange(robot, plan, operator=operator).run()
 
 
 def test_ctrl_c_while_a_marker_is_written_or_cleared_leaves_none_open():

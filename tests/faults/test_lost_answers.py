@@ -8,7 +8,6 @@ from robolink_simulators.faults import Fault, FaultAction
 
 import robolink
 from robolink import ToolOffset
-from robolink.controllers.epson import Verdict
 from robolink.errors import (
     OutcomeUnknownError,
     ReadBackError,
@@ -17,7 +16,7 @@ from robolink.errors import (
     TransportClosedError,
     TransportError,
 )
-from robolink.model import MotionProfile, Path, WorkBox
+from robolink.model import MotionProfile, Path, Verdict, WorkBox
 
 NEW = ToolOffset(12.75, -3.25, -20)
 WRITE = "TLSet 1, XY"

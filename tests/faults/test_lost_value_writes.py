@@ -5,9 +5,8 @@ from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.faults import Fault, FaultAction
 
 import robolink
-from robolink.controllers.epson import Verdict
 from robolink.errors import ConfigError, OutcomeUnknownError
-from robolink.model import Marker, MarkerKind
+from robolink.model import Marker, MarkerKind, Verdict
 
 WRITES = {
     "SetIO": lambda controller: controller.io.set_output(3, True),

@@ -46,7 +46,7 @@ for module, names in NAMES.items():
 '''
 
 CHOSEN = (
-    "tests/unit/test_markers.py",
+    "tests/unit/test_recipe_files.py",
     "tests/unit/test_interrupts.py",
     "tests/unit/test_transport_registry.py",
     "tests/unit/test_transport_tcp_failures.py",

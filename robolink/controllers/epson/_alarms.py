@@ -1,6 +1,6 @@
 """Alarms: what the controller wants looked after, apart from errors (epson.md 1.2)."""
 
-from robolink.controllers.epson._guarded import ProcedureLock
+from robolink.controllers._guarded import ProcedureLock
 from robolink.controllers.epson._session import EpsonSession
 from robolink.controllers.epson._window import CommandWindow
 from robolink.errors import ConfigError, ControllerFaultError, RemoteProtocolError

@@ -1,21 +1,22 @@
 """An EPSON controller on Remote Ethernet."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from types import TracebackType
 from typing import Self
 
+from robolink.controllers._guarded import MarkerDesk, ProcedureLock
 from robolink.controllers.epson._alarms import EpsonAlarms
 from robolink.controllers.epson._answers import require_ready
 from robolink.controllers.epson._facts import FactReader
-from robolink.controllers.epson._guarded import MarkerDesk, ProcedureLock
 from robolink.controllers.epson._io import EpsonIo
 from robolink.controllers.epson._motion import EpsonGroup
 from robolink.controllers.epson._movement import request_abort
 from robolink.controllers.epson._points import EpsonPoints
 from robolink.controllers.epson._preserve import Preserver
 from robolink.controllers.epson._published import PublishedReader, PublishedTools
-from robolink.controllers.epson._resolve import Resolver
+from robolink.controllers.epson._raw import RawStatements
+from robolink.controllers.epson._resolve import EpsonResolver
 from robolink.controllers.epson._session import EpsonSession
 from robolink.controllers.epson._setter import ValueSetter
 from robolink.controllers.epson._tools import EpsonToolTable
@@ -34,7 +35,10 @@ from robolink.model import (
     Capabilities,
     ControllerFacts,
     ControllerStatus,
+    Marker,
+    MarkerKind,
     MotionProfile,
+    NewEntry,
     OutcomeLog,
 )
 from robolink.protocols import spel
@@ -49,7 +53,6 @@ class EpsonController:
         io: Inputs, outputs and memory bits.
         variables: The project's Global Preserve variables.
         alarms: The alarms that stand.
-        resolver: Settles what was begun and not proved finished.
 
     Args:
         session: A session that has logged in.
@@ -65,7 +68,7 @@ class EpsonController:
         self._outcomes = outcomes
         self._window = CommandWindow(session)
         self._lock = ProcedureLock(session.identity)
-        self._desk = MarkerDesk(session, outcomes)
+        self._desk = MarkerDesk(session.identity, outcomes)
         self._group = EpsonGroup(
             session, self._window, self._desk, self._lock, remote_timeout_s=remote_timeout_s
         )
@@ -76,8 +79,9 @@ class EpsonController:
         setter = ValueSetter(session, self._window, self._desk, self._lock)
         self.io = EpsonIo(session, self._window, setter)
         self.variables = EpsonVariables(session, setter)
+        self._raw = RawStatements(session, self._window, self._desk, self._lock)
         self.alarms = EpsonAlarms(session, self._window, self._lock)
-        self.resolver = Resolver(
+        self._resolver = EpsonResolver(
             self._desk,
             tools=self._tools,
             group=self._group,
@@ -132,12 +136,18 @@ class EpsonController:
         return self._outcomes
 
     @property
+    def resolver(self) -> EpsonResolver:
+        """Settles what was begun and not proved finished."""
+        return self._resolver
+
+    @property
     def exchanges(self) -> int:
         """Requests sent so far."""
         return self._session.exchanges
 
     def status(self) -> ControllerStatus:
-        """Read the state flags."""
+        """Read the state flags; others see by it that this process is alive."""
+        self._desk.beat()
         return self._window.status()
 
     def facts(self) -> ControllerFacts:
@@ -225,6 +235,28 @@ class EpsonController:
                     request=name,
                 )
 
+    def execute_raw(self, statement: str) -> str:
+        """Run a SPEL+ statement as it was typed, and put it on record.
+
+        Only here does text that a person typed reach the controller (design part 6). It has to
+        be answered within the time-out, so it is not for movements.
+
+        Args:
+            statement: One line of SPEL+ as the command window takes it.
+
+        Returns:
+            What it printed, empty for nothing.
+
+        Raises:
+            NotAllowedError: The person is an operator.
+            ConfigError: It is not one line of printable ASCII.
+            NotReadyError: The state forbids it.
+            RejectedError: The controller refused it.
+            ControllerFaultError: It put the controller in error.
+            OutcomeUnknownError: No answer came.
+        """
+        return self._raw.execute(statement)
+
     def require_settled(self, request: str) -> None:
         """Refuse ``request`` while something earlier is unsettled.
 
@@ -232,6 +264,18 @@ class EpsonController:
             OutcomeUnknownError: Names it.
         """
         self._desk.require_settled(request)
+
+    def begin(self, kind: MarkerKind, request: str, details: Mapping[str, object]) -> Marker:
+        """Store the durable marker of a procedure; see the model."""
+        return self._desk.begin(kind, request, details)
+
+    def finish(self, marker: Marker, *entries: NewEntry) -> None:
+        """Forget the marker of a procedure, and journal how it ended."""
+        self._desk.clear(marker, *entries)
+
+    def uninterrupted(self) -> AbstractContextManager[None]:
+        """Hold Ctrl-C back for a block that must be seen through."""
+        return self._session.uninterrupted()
 
     def preserved(self, reason: str) -> AbstractContextManager[None]:
         """Put back the tool, power and speed in force; see the model."""
@@ -254,6 +298,7 @@ class EpsonController:
             pass  # the link is going away in any case; markers keep what is in doubt
         finally:
             self._session.close()
+            self._outcomes.close()
 
     def __enter__(self) -> Self:
         return self

@@ -1,6 +1,6 @@
 """The robot arm of an EPSON controller: where it is, and how it is told to go elsewhere."""
 
-from robolink.controllers.epson._guarded import MarkerDesk, ProcedureLock
+from robolink.controllers._guarded import MarkerDesk, ProcedureLock
 from robolink.controllers.epson._movement import EpsonMotion, MovementParts, request_abort
 from robolink.controllers.epson._robot import RobotFacts
 from robolink.controllers.epson._session import EpsonSession

@@ -2,7 +2,7 @@
 
 from contextlib import suppress
 
-from robolink.controllers.epson._guarded import MarkerDesk
+from robolink.controllers._guarded import MarkerDesk
 from robolink.controllers.epson._pending import PendingExecute
 from robolink.controllers.epson._session import EpsonSession
 from robolink.controllers.epson._window import CommandWindow

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-from robolink.controllers.epson._guarded import MarkerDesk, ProcedureLock
+from robolink.controllers._guarded import MarkerDesk, ProcedureLock
 from robolink.controllers.epson._motion import EpsonGroup
 from robolink.controllers.epson._session import EpsonSession
 from robolink.controllers.epson._settings import PowerAndSpeed
@@ -87,6 +87,7 @@ class Preserver:
     def preserved(self, reason: str) -> Iterator[None]:
         """See :meth:`robolink.model.Controller.preserved`."""
         with self._lock.held(reason):
+            self._desk.look()
             self._desk.require_settled(reason)
             self._window.require_ready(reason)
             before = InForce(self._tools.selected(), self._group.settings.read())

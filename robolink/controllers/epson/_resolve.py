@@ -4,19 +4,20 @@ Nothing is sent again. A value that was being written is read; a robot that was 
 is looked at; the cell's own tool is selected again when a person says so.
 """
 
-from robolink.controllers.epson._findings import Finding, Verdict
-from robolink.controllers.epson._guarded import MarkerDesk
+from robolink.controllers._guarded import MarkerDesk
+from robolink.controllers._tool_doubts import examine_write
 from robolink.controllers.epson._motion import EpsonGroup
 from robolink.controllers.epson._preserve import InForce, Preserver
-from robolink.controllers.epson._tools import EpsonToolTable, describe, same_tool
+from robolink.controllers.epson._tools import EpsonToolTable
 from robolink.controllers.epson._value_doubts import ValueDoubts
+from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink.model import Marker, MarkerKind, ToolOffset
+from robolink.model import EntryKind, Finding, Marker, MarkerKind, NewEntry, Verdict
 from robolink.protocols import spel
 
 
-class Resolver:
-    """Examines and settles open markers."""
+class EpsonResolver:
+    """Examines and settles the open markers that this driver begins."""
 
     def __init__(
         self,
@@ -34,54 +35,31 @@ class Resolver:
         self._values = values
 
     def examine(self, marker: Marker) -> Finding:
-        """Read what is needed to judge ``marker``; changes nothing."""
+        """Read what is needed to judge ``marker``; see :class:`robolink.model.Resolver`."""
+        details = marker.details
         if marker.kind is MarkerKind.MOVE:
             return self._examine_move(marker)
         if marker.kind is MarkerKind.SELECTION:
             return self._examine_selection(marker)
-        if "select" in marker.details:
+        if "select" in details:
             return self._examine_select(marker)
-        if "item" in marker.details:
+        if "raw" in details:
+            return _examine_raw(marker)
+        if "item" in details:
             return self._values.examine(marker)
-        return self._examine_write(marker)
+        if "tool" in details:
+            return examine_write(self._tools, marker)
+        raise ConfigError(
+            tr("The marker of {when} cannot be understood.", when=marker.begun_at),
+            remedy=tr("Look at the controller, then 'robolink resolve --forget'."),
+        )
 
     def settle(self, finding: Finding) -> None:
         """Do what ``finding.action`` says and forget the marker."""
         if finding.verdict is Verdict.NOT_RESTORED:
             self._preserver.restore(InForce.from_marker(finding.marker), finding.marker)
         else:
-            self._desk.clear(finding.marker)
-
-    def forget(self, marker: Marker) -> None:
-        """Forget a marker on a person's word alone."""
-        self._desk.clear(marker)
-
-    def _examine_write(self, marker: Marker) -> Finding:
-        tool = int(str(marker.details["tool"]))
-        now = self._tools.read(tool)
-        requested = _offset(marker.details.get("requested"))
-        before = _offset(marker.details.get("before"))
-        if same_tool(now, requested):
-            verdict = Verdict.DONE
-            sentence = tr("Tool {tool} holds the new value {now}.", tool=tool, now=describe(now))
-        elif same_tool(now, before):
-            verdict = Verdict.NOT_APPLIED
-            sentence = tr(
-                "Tool {tool} still holds the old value {now}; the write did not take.",
-                tool=tool,
-                now=describe(now),
-            )
-        else:
-            verdict = Verdict.CONFLICT
-            sentence = tr(
-                "Tool {tool} holds {now}: neither the old value {before} nor the new one "
-                "{requested}.",
-                tool=tool,
-                now=describe(now),
-                before=describe(before),
-                requested=describe(requested),
-            )
-        return Finding(marker, verdict, sentence)
+            self._desk.clear(finding.marker, *finding.entries)
 
     def _examine_select(self, marker: Marker) -> Finding:
         now, wanted = self._tools.selected(), int(str(marker.details["select"]))
@@ -104,38 +82,25 @@ class Resolver:
 
     def _examine_selection(self, marker: Marker) -> Finding:
         before, now = InForce.from_marker(marker), self._tools.selected()
-        unverified = _written_in(marker)
         if now == before.tool and self._group.settings.read() == before.settings:
             sentence = tr("Tool {tool} is selected, as it was before.", tool=now)
-            return Finding(marker, Verdict.DONE, f"{sentence} {unverified}".rstrip())
+            return Finding(marker, Verdict.DONE, sentence)
         sentence = tr(
             "Tool {now} is selected; before {reason!r} it was tool {before}.",
             now=now,
             reason=marker.request,
             before=before.tool,
         )
-        return Finding(
-            marker,
-            Verdict.NOT_RESTORED,
-            f"{sentence} {unverified}".rstrip(),
-            tr("select tool {tool} again, with the power mode and speed of then", tool=before.tool),
+        action = tr(
+            "select tool {tool} again, with the power mode and speed of then", tool=before.tool
         )
+        entry = NewEntry(EntryKind.SELECTION, tool=before.tool, verdict=Verdict.NOT_RESTORED)
+        return Finding(marker, Verdict.NOT_RESTORED, sentence, action, (entry,))
 
 
-def _written_in(marker: Marker) -> str:
-    """Say which tools were written in a procedure that nobody saw end well."""
-    written = marker.details.get("written")
-    if not isinstance(written, dict):
-        return ""
-    return " ".join(
-        tr(
-            "Tool {tool} was written meanwhile and not verified; before it held {before}.",
-            tool=tool,
-            before=describe(_offset(before)),
-        )
-        for tool, before in written.items()
+def _examine_raw(marker: Marker) -> Finding:
+    sentence = tr(
+        "Nobody but you can tell what {statement!r} did. Look at the controller.",
+        statement=marker.request,
     )
-
-
-def _offset(value: object) -> ToolOffset | None:
-    return ToolOffset(*value) if isinstance(value, list) else None
+    return Finding(marker, Verdict.LOOK, sentence)

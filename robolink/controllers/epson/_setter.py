@@ -8,8 +8,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
+from robolink.controllers._guarded import MarkerDesk, ProcedureLock
 from robolink.controllers.epson._answers import NOT_EXECUTED
-from robolink.controllers.epson._guarded import MarkerDesk, ProcedureLock
 from robolink.controllers.epson._session import EpsonSession
 from robolink.controllers.epson._window import CommandWindow
 from robolink.errors import ReadBackError, RejectedError

@@ -1,26 +1,22 @@
 """The tool table of an EPSON controller: TLSet, TLClr, Tool (epson.md 3.1)."""
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import TypeVar
+from collections.abc import Sequence
 
+from robolink.controllers._guarded import MarkerDesk, ProcedureLock
+from robolink.controllers._tool_writing import ToolWrite, ToolWriter
 from robolink.controllers.epson._answers import NOT_EXECUTED
-from robolink.controllers.epson._guarded import MarkerDesk, ProcedureLock
 from robolink.controllers.epson._robot import RobotFacts
 from robolink.controllers.epson._window import CommandWindow
 from robolink.errors import (
     ReadBackError,
-    RejectedError,
     ReservedToolError,
-    ToolChangedError,
     ToolError,
     ToolIndexError,
     UndefinedToolError,
 )
 from robolink.messages import tr
-from robolink.model import ANY, Expected, Marker, MarkerKind, ToolOffset, ToolReceipt
+from robolink.model import Expected, ToolOffset, ToolReceipt
 from robolink.protocols import spel
-
-T = TypeVar("T")
 
 DECIMALS = 3
 """Places that a printed point shows (epson.md 3.3, from a real capture)."""
@@ -43,10 +39,22 @@ class EpsonToolTable:
         self._desk = desk
         self._lock = lock
         self._robot = robot
+        self._writer = ToolWriter(
+            desk,
+            same=self.same,
+            uninterrupted=window.uninterrupted,
+            not_executed=lambda error: error.code in NOT_EXECUTED,
+        )
 
     def indices(self) -> Sequence[int]:
         """Return 1 to 15; Tool 0 is the flange."""
         return range(1, 16)
+
+    def same(self, a: ToolOffset | None, b: ToolOffset | None) -> bool:
+        """Tell whether this controller prints both alike; undefined equals undefined only."""
+        if a is None or b is None:
+            return a is b
+        return a.matches(b, TOLERANCE)
 
     def read_all(self) -> dict[int, ToolOffset | None]:
         """Read all fifteen from one TLSet listing; it is empty when none is defined."""
@@ -70,7 +78,7 @@ class EpsonToolTable:
             six_axes = self._robot.read().six_axes
             self._check_axes(requested, six_axes=six_axes)
             statement = spel.set_tool(tool, requested, six_axes=six_axes)
-            return self._change(tool, requested, expected, statement)
+            return self._set(tool, requested, expected, statement)
 
     def preview_write(self, tool: int, offset: ToolOffset) -> tuple[spel.Statement, ...]:
         """Return what :meth:`write` would send besides its reads; reads only.
@@ -82,7 +90,7 @@ class EpsonToolTable:
         requested = offset.rounded(DECIMALS)
         six_axes = self._robot.read().six_axes
         self._check_axes(requested, six_axes=six_axes)
-        if same_tool(self._read(tool), requested):
+        if self.same(self._read(tool), requested):
             return ()
         return (spel.set_tool(tool, requested, six_axes=six_axes),)
 
@@ -101,7 +109,7 @@ class EpsonToolTable:
         self.require_writable(tool)
         with self._lock.held(f"TLClr {tool}"):
             self._window.require_ready(f"TLClr {tool}")
-            return self._change(tool, None, expected, spel.clear_tool(tool))
+            return self._set(tool, None, expected, spel.clear_tool(tool))
 
     def selected(self) -> int:
         """Read which tool is in force; the selection survives power-off (epson.md 3.1)."""
@@ -120,7 +128,12 @@ class EpsonToolTable:
             self._require_defined(tool)
             self._desk.note_selection(tool)
             details = {"select": tool, "before": before}
-            found = self._carry_out(statement, details, self._selected)
+            found = self._writer.carry_out(
+                statement,
+                details,
+                send=lambda: self._window.command(statement),
+                read=self._selected,
+            )
             if found != tool:
                 raise ReadBackError(
                     tr(
@@ -133,71 +146,17 @@ class EpsonToolTable:
                     request=statement,
                 )
 
-    def _change(
+    def _set(
         self, tool: int, requested: ToolOffset | None, expected: Expected, statement: spel.Statement
     ) -> ToolReceipt:
-        before = self._read(tool)
-        unconditional = expected is ANY
-        if same_tool(before, requested):
-            return ToolReceipt(
-                tool, before, requested, before, skipped=True, unconditional=unconditional
-            )
-        if expected is not ANY and not same_tool(before, expected):
-            raise ToolChangedError(
-                tr(
-                    "Tool {tool} holds {found}, not the expected {expected}; nothing was written.",
-                    tool=tool,
-                    found=describe(before),
-                    expected=describe(expected),
-                ),
-                remedy=tr(
-                    "Someone changed it: a program that runs TLSet at its start, the pendant, or "
-                    "a restored project. Read it again and decide anew."
-                ),
-                request=statement,
-            )
-        details = {"tool": tool, "before": _plain(before), "requested": _plain(requested)}
-        found = self._carry_out(statement, details, lambda: self._read(tool))
-        if not same_tool(found, requested):
-            raise ReadBackError(
-                tr(
-                    "Tool {tool} was written as {requested}, but reads back as {found}.",
-                    tool=tool,
-                    requested=describe(requested),
-                    found=describe(found),
-                ),
-                remedy=tr(
-                    "Do not run the cell with it. Before the write it held {before}.",
-                    before=describe(before),
-                ),
-                request=statement,
-            )
-        self._desk.note_written(tool, _plain(before), _plain(found))
-        return ToolReceipt(tool, before, requested, found, unconditional=unconditional)
-
-    def _carry_out(
-        self, statement: spel.Statement, details: Mapping[str, object], read: Callable[[], T]
-    ) -> T:
-        """Run a marked statement and return what ``read`` finds then; Ctrl-C waits for that."""
-        with self._window.uninterrupted():
-            marker = self._desk.begin(MarkerKind.SET, statement, details)
-            with self._desk.doubt(statement):
-                self._run(statement, marker)
-                found = read()
-            self._desk.clear(marker)
-        return found
-
-    def _run(self, statement: spel.Statement, marker: Marker) -> None:
-        """Run ``statement``; a plain refusal settles its marker, a fault does not.
-
-        A controller in error refuses to print the value that would prove what happened.
-        """
-        try:
-            self._window.command(statement)
-        except RejectedError as error:
-            if error.code in NOT_EXECUTED:
-                self._desk.clear(marker)
-            raise
+        write = ToolWrite(
+            tool,
+            requested,
+            statement,
+            send=lambda: self._window.command(statement),
+            read=lambda: self._read(tool),
+        )
+        return self._writer.change(write, expected)
 
     def _read(self, tool: int) -> ToolOffset | None:
         if tool == 0:
@@ -246,24 +205,3 @@ class EpsonToolTable:
                 tr("This robot has four axes: a tool's V and W must be 0."),
                 remedy=tr("Leave V and W out."),
             )
-
-
-def describe(offset: ToolOffset | None) -> str:
-    """Return an offset as a person reads it."""
-    if offset is None:
-        return tr("undefined")
-    names = ("X", "Y", "Z", "U", "V", "W")
-    pairs = zip(names, offset.components(), strict=True)
-    shown = [(n, v) for n, v in pairs if n not in "VW" or v]
-    return " ".join(f"{name} {spel.decimal(value, DECIMALS)}" for name, value in shown)
-
-
-def same_tool(a: ToolOffset | None, b: ToolOffset | None) -> bool:
-    """Tell whether this controller prints both alike; undefined equals undefined only."""
-    if a is None or b is None:
-        return a is b
-    return a.matches(b, TOLERANCE)
-
-
-def _plain(offset: ToolOffset | None) -> list[float] | None:
-    return None if offset is None else list(offset.components())

@@ -1,12 +1,11 @@
 """Judges the open marker of an output, a memory bit or a variable by reading it."""
 
-from robolink.controllers.epson._findings import Finding, Verdict
 from robolink.controllers.epson._io import EpsonIo
 from robolink.controllers.epson._setter import Value
 from robolink.controllers.epson._variables import EpsonVariables, equal_values
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink.model import Marker
+from robolink.model import Finding, Marker, Verdict
 
 
 class ValueDoubts:

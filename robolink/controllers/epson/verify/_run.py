@@ -7,10 +7,11 @@ from robolink.controllers.epson.verify import _wire_facts as wire
 from robolink.controllers.epson.verify._interview import Interview
 from robolink.controllers.epson.verify._not_tried import not_tried
 from robolink.controllers.epson.verify._verification import Fact, Verification
-from robolink.markers import memory_log, wall_label
+from robolink.journal import memory_journal
 from robolink.messages import tr
 from robolink.model import ControllerFacts, Secret
 from robolink.protocols import spel
+from robolink.timing import wall_label
 from robolink.transport import DialogueLog, TraceSink, TracingTransport, open_transport
 
 
@@ -45,7 +46,9 @@ def verify_epson(
     session = EpsonSession(traced, timeout_s=timeout_s)
     try:
         session.login(password)
-        controller = EpsonController(session, memory_log(session.identity), remote_timeout_s=0.0)
+        # It only reads, and the login sees to it that nobody else is there.
+        outcomes = memory_journal(session.identity).log(session.identity)
+        controller = EpsonController(session, outcomes, remote_timeout_s=0.0)
         try:
             about, facts = _found_out(Interview(controller, session, traced, log))
         finally:

@@ -3,7 +3,7 @@
 The command classes of design part 4 (faults_and_speed.md A3):
 
 =====  ==========================================  =======================================
-class  here                                        when no answer comes
+class  on an EPSON controller                      when no answer comes
 =====  ==========================================  =======================================
 READ   GetStatus, Print ..., TLSet, Where          ask again on a new link
 SET    TLSet n, TLClr n, Tool n, SetIO ...         OutcomeUnknownError; read back, resolve
@@ -18,17 +18,20 @@ move, and a lost answer leaves nothing that the next connection would not set ag
 import threading
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
+from typing import Final
 
-from robolink.controllers.epson._session import EpsonSession
 from robolink.errors import (
     BusyError,
     OutcomeUnknownError,
     RemoteProtocolError,
     TransportError,
 )
-from robolink.markers import new_operation, wall_label
 from robolink.messages import tr
-from robolink.model import Marker, MarkerKind, OutcomeLog
+from robolink.model import Marker, MarkerKind, NewEntry, OutcomeLog, new_operation
+from robolink.timing import wall_label
+
+_PROCEDURES: Final = frozenset({MarkerKind.SELECTION, MarkerKind.CHANGE})
 
 
 class ProcedureLock:
@@ -59,67 +62,82 @@ class ProcedureLock:
 
 
 class MarkerDesk:
-    """Writes and clears the durable markers of one controller."""
+    """Writes and clears the durable markers of one controller.
 
-    def __init__(self, session: EpsonSession, outcomes: OutcomeLog) -> None:
-        self._session = session
-        self._outcomes = outcomes
-        self._selection: Marker | None = None
+    Attributes:
+        outcomes: Where they are kept.
+
+    Args:
+        identity: Which controller.
+        outcomes: Where the markers are kept.
+    """
+
+    def __init__(self, identity: str, outcomes: OutcomeLog) -> None:
+        self._identity = identity
+        self.outcomes = outcomes
+        self._procedures: dict[MarkerKind, Marker] = {}
+
+    def look(self) -> None:
+        """Note the state of the lease before a value is read that a write will rely on.
+
+        Raises:
+            LeaseHeldError: Somebody else is changing this controller.
+        """
+        self.outcomes.look()
+
+    def beat(self) -> None:
+        """Let others see that this process is alive."""
+        self.outcomes.beat()
 
     def begin(self, kind: MarkerKind, request: str, details: Mapping[str, object]) -> Marker:
-        """Store a new marker durably; raises ConfigError when that is impossible."""
+        """Store a new marker durably.
+
+        Raises:
+            ConfigError: That is impossible.
+            BusyError: Another process has the controller.
+        """
         marker = Marker(new_operation(), kind, request, wall_label(), dict(details))
-        self._outcomes.begin(marker)
-        if kind is MarkerKind.SELECTION:
-            self._selection = marker
+        self.outcomes.begin(marker)
+        if kind in _PROCEDURES:
+            self._procedures[kind] = marker
         return marker
+
+    def clear(self, marker: Marker, *entries: NewEntry) -> None:
+        """Forget a marker whose outcome is proved, and journal how it ended."""
+        self.outcomes.clear(marker.operation, *entries)
+        known = self._procedures.get(marker.kind)
+        if known is not None and known.operation == marker.operation:
+            del self._procedures[marker.kind]
+
+    @property
+    def changing(self) -> bool:
+        """Whether a tool change of several steps is under way here."""
+        return MarkerKind.CHANGE in self._procedures
 
     def note_selection(self, tool: int) -> None:
         """Record, in the marker of the procedure under way, which tool is in force now."""
-        self._note({"now": tool})
-
-    def note_written(self, tool: int, before: object, now: object) -> None:
-        """Record, likewise, that ``tool`` was written, until it holds its first value again.
-
-        Args:
-            tool: Number of the tool.
-            before: Plain value that it held.
-            now: Plain value that it holds.
-        """
-        if self._selection is not None:
-            known = self._selection.details.get("written")
-            written = dict(known) if isinstance(known, dict) else {}
-            first = written.setdefault(str(tool), before)
-            if first == now:
-                del written[str(tool)]
-            self._note({"written": written})
-
-    def _note(self, more: Mapping[str, object]) -> None:
-        marker = self._selection
+        marker = self._procedures.get(MarkerKind.SELECTION)
         if marker is not None:
-            details = {**marker.details, **more}
-            self._selection = Marker(
-                marker.operation, marker.kind, marker.request, marker.begun_at, details
-            )
-            self._outcomes.begin(self._selection)
-
-    def clear(self, marker: Marker) -> None:
-        """Forget a marker whose outcome is proved."""
-        self._outcomes.clear(marker.operation)
-        if self._selection is not None and marker.operation == self._selection.operation:
-            self._selection = None
+            noted = replace(marker, details={**marker.details, "now": tool})
+            self._procedures[MarkerKind.SELECTION] = noted
+            self.outcomes.begin(noted)
 
     def require_settled(self, request: str) -> None:
         """Refuse to go on while something earlier is unsettled.
 
-        The marker of the procedure that is running here does not count.
+        The markers of the procedures that run here do not count.
 
         Raises:
             OutcomeUnknownError: Names what is unsettled.
+            LeaseHeldError: Somebody else is at it.
         """
-        for marker in self._outcomes.open_markers():
-            if self._selection is not None and marker.operation == self._selection.operation:
-                continue
+        unsettled = self._unsettled()
+        if unsettled:
+            # Whoever began it may still be at it, or have finished just now.
+            self.outcomes.look()
+            still = {marker.operation for marker in self._unsettled()}
+            unsettled = [marker for marker in unsettled if marker.operation in still]
+        for marker in unsettled:
             raise OutcomeUnknownError(
                 tr(
                     "{request!r} was not sent: {earlier!r} of {when} is not settled.",
@@ -127,10 +145,17 @@ class MarkerDesk:
                     earlier=marker.request,
                     when=marker.begun_at,
                 ),
-                remedy=tr("Run 'robolink resolve' first; motion is blocked until then."),
-                controller=self._session.identity,
+                remedy=tr(
+                    "Run 'robolink recover', or 'robolink resolve' to decide yourself; motion is "
+                    "blocked until then."
+                ),
+                controller=self._identity,
                 request=request,
             )
+
+    def _unsettled(self) -> list[Marker]:
+        own = {marker.operation for marker in self._procedures.values()}
+        return [m for m in self.outcomes.open_markers() if m.operation not in own]
 
     @contextmanager
     def doubt(self, request: str) -> Iterator[None]:
@@ -148,7 +173,7 @@ class MarkerDesk:
                     "It was not sent again. Look at the robot, connect again and run "
                     "'robolink resolve'; motion is blocked until then."
                 ),
-                controller=self._session.identity,
+                controller=self._identity,
                 request=request,
                 raw=error.raw,
             ) from error

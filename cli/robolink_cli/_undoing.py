@@ -1,0 +1,67 @@
+"""An undo on a terminal: what is shown, sent and reported."""
+
+from robolink.controllers.epson import EpsonController
+from robolink.messages import tr
+from robolink.protocols import spel
+from robolink.transaction import Undone, UndoPlan, undo
+from robolink_cli._render import note, say
+from robolink_cli._safekeeping import back_up_first
+from robolink_cli._tables import show_change
+from robolink_cli._views import offset_payload, receipt_payload
+
+
+class Undoing:
+    """One undo on one controller."""
+
+    def __init__(self, controller: EpsonController, plan: UndoPlan) -> None:
+        self._controller = controller
+        self._plan = plan
+        self._done = Undone("", ())
+
+    def requests(self) -> list[str]:
+        """Return what would be sent besides reads.
+
+        Raises:
+            ToolError: A value does not fit this robot.
+            NotReadyError: The state forbids a write.
+        """
+        tools = self._controller.tools
+        statements: list[spel.Statement] = []
+        for step in self._plan.steps:
+            if step.requested is None:
+                statements += tools.preview_clear(step.tool)
+            else:
+                statements += tools.preview_write(step.tool, step.requested)
+        return [self._controller.wire("Execute", statement) for statement in statements]
+
+    def show(self) -> None:
+        """Show what would change."""
+        say(self._plan.sentence)
+        for remark in self._plan.remarks:
+            say(f"  {remark}")
+        for step in self._plan.steps:
+            shown = offset_payload(step.before), offset_payload(step.requested)
+            show_change(step.tool, *shown, after_name=tr("restored"))
+
+    def run(self) -> dict[str, object]:
+        """Carry it out and return the document; nothing is sent when nothing differs."""
+        if self._plan.steps:
+            back_up_first(self._controller)
+            self._done = undo(self._controller, self._plan, tell=note)
+        return {
+            "sentence": self._plan.sentence,
+            "remarks": list(self._plan.remarks),
+            **self._plan.details,
+            "change": self._done.change or None,
+            "unchanged": list(self._plan.unchanged),
+            "restored": [receipt_payload(receipt) for receipt in self._done.receipts],
+        }
+
+    def show_end(self) -> None:
+        """Say how it ended, and how it is undone."""
+        if not self._done.receipts:
+            say(tr("The controller holds the old values already; nothing was written."))
+            return
+        numbers = ", ".join(str(receipt.tool) for receipt in self._done.receipts)
+        say(tr("Old values written and read back: tool {numbers}.", numbers=numbers))
+        say(tr("'robolink undo {change}' takes this back.", change=self._done.change[:8]))

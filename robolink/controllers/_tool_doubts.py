@@ -1,0 +1,60 @@
+"""Judges the open marker of a tool write by reading the tool."""
+
+from robolink.messages import tr
+from robolink.model import (
+    EntryKind,
+    Finding,
+    Marker,
+    NewEntry,
+    ToolOffset,
+    ToolTable,
+    Verdict,
+    describe_offset,
+    plain_offset,
+    read_offset,
+)
+
+_KINDS = {
+    Verdict.DONE: EntryKind.DONE,
+    Verdict.NOT_APPLIED: EntryKind.NOT_APPLIED,
+    Verdict.CONFLICT: EntryKind.CONFLICT,
+}
+
+
+def examine_write(tools: ToolTable, marker: Marker) -> Finding:
+    """Return what became of a write.
+
+    Raises:
+        ConfigError: The marker cannot be understood.
+    """
+    tool = int(str(marker.details["tool"]))
+    requested = read_offset(marker.details.get("requested"))
+    before = read_offset(marker.details.get("before"))
+    now = tools.read(tool)
+    if tools.same(now, requested):
+        verdict = Verdict.DONE
+        sentence = tr("Tool {tool} holds the new value {now}.", tool=tool, now=describe_offset(now))
+    elif tools.same(now, before):
+        verdict = Verdict.NOT_APPLIED
+        sentence = tr(
+            "Tool {tool} still holds the old value {now}; the write did not take.",
+            tool=tool,
+            now=describe_offset(now),
+        )
+    else:
+        verdict = Verdict.CONFLICT
+        sentence = tr(
+            "Tool {tool} holds {now}: neither the old value {before} nor the new one {requested}.",
+            tool=tool,
+            now=describe_offset(now),
+            before=describe_offset(before),
+            requested=describe_offset(requested),
+        )
+    return Finding(marker, verdict, sentence, entries=(_entry(marker, tool, verdict, now),))
+
+
+def _entry(marker: Marker, tool: int, verdict: Verdict, now: ToolOffset | None) -> NewEntry:
+    details = {**marker.details, "value": plain_offset(now), "found_later": True}
+    return NewEntry(
+        _KINDS[verdict], operation=marker.operation, tool=tool, verdict=verdict, details=details
+    )

@@ -1,0 +1,186 @@
+"""Compare-and-set of a tool offset: the same for every kind of controller (design part 4).
+
+Read; equal to what is wanted: nothing is written, because a write wears the controller's
+memory; not what was expected: nothing is written either; else a durable intent, one write,
+and a read-back of all six components. What became of it goes on record together with the
+end of the intent.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from typing import TypeVar
+
+from robolink.controllers._guarded import MarkerDesk
+from robolink.errors import ReadBackError, RejectedError, ToolChangedError
+from robolink.messages import tr
+from robolink.model import (
+    ANY,
+    EntryKind,
+    Expected,
+    Marker,
+    MarkerKind,
+    NewEntry,
+    ToolOffset,
+    ToolReceipt,
+    describe_offset,
+    plain_offset,
+    require_engineer,
+)
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True)
+class ToolWrite:
+    """One write as its controller carries it out.
+
+    Attributes:
+        tool: Number of the tool.
+        requested: The new value as the controller can hold it; ``None`` clears the tool.
+        request: What is sent, as a person may read it.
+        send: Sends it; raises unless the controller accepted it.
+        read: Reads what is stored.
+    """
+
+    tool: int
+    requested: ToolOffset | None
+    request: str
+    send: Callable[[], object]
+    read: Callable[[], ToolOffset | None]
+
+
+class ToolWriter:
+    """Carries out writes on one controller.
+
+    Args:
+        desk: Keeps the intents.
+        same: Whether the controller stores two values alike.
+        uninterrupted: Holds Ctrl-C back meanwhile.
+        not_executed: Whether a refusal proves that nothing was done.
+    """
+
+    def __init__(
+        self,
+        desk: MarkerDesk,
+        *,
+        same: Callable[[ToolOffset | None, ToolOffset | None], bool],
+        uninterrupted: Callable[[], AbstractContextManager[None]],
+        not_executed: Callable[[RejectedError], bool],
+    ) -> None:
+        self._desk = desk
+        self._same = same
+        self._uninterrupted = uninterrupted
+        self._not_executed = not_executed
+
+    def change(self, write: ToolWrite, expected: Expected) -> ToolReceipt:
+        """Write and read back; see :meth:`robolink.model.ToolTable.write`."""
+        tool, requested, unconditional = write.tool, write.requested, expected is ANY
+        if unconditional:
+            require_engineer(self._desk.outcomes, tr("write tool {tool} blindly", tool=tool))
+        self._desk.look()
+        before = write.read()
+        if self._same(before, requested):
+            return ToolReceipt(
+                tool, before, requested, before, skipped=True, unconditional=unconditional
+            )
+        if expected is not ANY and not self._same(before, expected):
+            raise ToolChangedError(
+                tr(
+                    "Tool {tool} holds {found}, not the expected {expected}; nothing was written.",
+                    tool=tool,
+                    found=describe_offset(before),
+                    expected=describe_offset(expected),
+                ),
+                remedy=tr(
+                    "Someone changed it: a program that runs TLSet at its start, the pendant, or "
+                    "a restored project. Read it again and decide anew."
+                ),
+                request=write.request,
+            )
+        found = self._write(write, before, unconditional=unconditional)
+        if not self._same(found, requested):
+            raise ReadBackError(
+                tr(
+                    "Tool {tool} was written as {requested}, but reads back as {found}.",
+                    tool=tool,
+                    requested=describe_offset(requested),
+                    found=describe_offset(found),
+                ),
+                remedy=tr(
+                    "Do not run the cell with it. Before the write it held {before}.",
+                    before=describe_offset(before),
+                ),
+                request=write.request,
+            )
+        return ToolReceipt(tool, before, requested, found, unconditional=unconditional)
+
+    def carry_out(
+        self,
+        request: str,
+        details: Mapping[str, object],
+        *,
+        send: Callable[[], object],
+        read: Callable[[], T],
+        entries: Callable[[Marker, T], Iterable[NewEntry]] = lambda _marker, _found: (),
+    ) -> T:
+        """Send something that is marked, and return what ``read`` finds then.
+
+        Ctrl-C waits for that. A plain refusal settles the marker; a fault does not, because a
+        controller in error may refuse to show the value that would prove what happened.
+        """
+        with self._uninterrupted():
+            marker = self._desk.begin(MarkerKind.SET, request, details)
+            with self._desk.doubt(request):
+                try:
+                    send()
+                except RejectedError as error:
+                    if self._not_executed(error):
+                        self._desk.clear(marker, _refusal(marker, error))
+                    raise
+                found = read()
+            self._desk.clear(marker, *entries(marker, found))
+        return found
+
+    def _write(
+        self, write: ToolWrite, before: ToolOffset | None, *, unconditional: bool
+    ) -> ToolOffset | None:
+        details: dict[str, object] = {
+            "tool": write.tool,
+            "before": plain_offset(before),
+            "requested": plain_offset(write.requested),
+        }
+        if unconditional:
+            details["unconditional"] = True
+        if self._desk.outcomes.change:
+            details["change"] = self._desk.outcomes.change
+
+        def entries(marker: Marker, found: ToolOffset | None) -> Iterator[NewEntry]:
+            now = {**details, "value": plain_offset(found)}
+            for kind in self._ends(found, write.requested):
+                said = {"request": write.request} if kind is EntryKind.WRITE else now
+                yield NewEntry(kind, operation=marker.operation, tool=write.tool, details=said)
+
+        return self.carry_out(
+            write.request, details, send=write.send, read=write.read, entries=entries
+        )
+
+    def _ends(self, found: ToolOffset | None, requested: ToolOffset | None) -> Iterator[EntryKind]:
+        yield EntryKind.WRITE
+        yield EntryKind.READ_BACK
+        if not self._same(found, requested):
+            yield EntryKind.CONFLICT
+        elif not self._desk.changing:
+            # A change of several steps says itself, at its end, whether it is done.
+            yield EntryKind.DONE
+
+
+def _refusal(marker: Marker, error: RejectedError) -> NewEntry:
+    tool = marker.details.get("tool")
+    return NewEntry(
+        EntryKind.REFUSED,
+        operation=marker.operation,
+        tool=tool if isinstance(tool, int) else None,
+        verdict=error.what,
+        details={"request": marker.request, "code": error.code},
+    )

@@ -1,0 +1,21 @@
+"""The journal: what was done to each tool, by whom, and what is not settled yet.
+
+Append-only, on SQLAlchemy Core: an SQLite file by default, PostgreSQL by URL (design parts 2
+and 8). Importing this package loads no database code; opening a journal does.
+"""
+
+from robolink.journal._journal import Journal as Journal
+from robolink.journal._log import JournalOutcomeLog as JournalOutcomeLog
+from robolink.journal._opening import memory_journal as memory_journal
+from robolink.journal._opening import open_journal as open_journal
+from robolink.journal._places import default_location as default_location
+from robolink.journal._places import may_exist as may_exist
+from robolink.journal._processes import Holder as Holder
+from robolink.journal._processes import signature_here as signature_here
+from robolink.journal._processes import this_process as this_process
+from robolink.journal._records import Verification as Verification
+from robolink.journal._sightings import LEASE_S as LEASE_S
+from robolink.model import EntryKind as EntryKind
+from robolink.model import NewEntry as NewEntry
+from robolink.model import Recorded as Recorded
+from robolink.model import Signature as Signature

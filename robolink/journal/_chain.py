@@ -1,0 +1,92 @@
+"""The hash chain: each entry holds the hash of the one before, so that no change goes unseen."""
+
+import json
+from collections.abc import Iterator, Mapping
+from hashlib import sha256
+from typing import Any, Final
+
+from robolink.messages import tr
+
+FIRST: Final = ""
+"""What the first entry holds in place of the hash of the one before."""
+
+_ENCODER: Final = json.JSONEncoder(sort_keys=True, separators=(",", ":"), allow_nan=False)
+
+
+def canonical(value: object) -> str:
+    """Return the one JSON text of ``value``: sorted keys, no blanks, ASCII.
+
+    Raises:
+        TypeError: It holds something that JSON does not know.
+        ValueError: It holds a number that is not finite.
+    """
+    return _ENCODER.encode(value)
+
+
+def storable(text: str) -> str:
+    """Return ``text`` as every database stores it: valid Unicode without NUL."""
+    return text.encode("utf-8", "backslashreplace").decode().replace("\0", "\\x00")
+
+
+def digest(row: Mapping[str, object]) -> str:
+    """Return the SHA-256 of a stored entry, over every field but the hash itself."""
+    fields = {name: value for name, value in row.items() if name != "hash"}
+    return sha256(canonical(fields).encode()).hexdigest()
+
+
+class ChainCheck:
+    """Follows the chain, entry by entry.
+
+    Attributes:
+        checked: How many entries were seen.
+        number: Number of the last one.
+    """
+
+    def __init__(self) -> None:
+        self.checked = 0
+        self.number = 0
+        self._hash = FIRST
+
+    def problems_of(self, row: Mapping[str, Any]) -> Iterator[str]:
+        """Take the next entry and yield what is wrong with it."""
+        number, expected = row["number"], self.number + 1
+        if number > expected:
+            yield _missing(expected, number - 1)
+        if not _is_unchanged(row):
+            yield tr("Entry {number} was changed after it was stored.", number=number)
+        elif number <= expected and row["previous"] != self._hash:
+            yield tr("Entry {number} does not follow the one before it.", number=number)
+        self.checked += 1
+        self.number = number
+        self._hash = str(row["hash"])
+
+    def problems_at_end(self, head: tuple[int, str] | None) -> Iterator[str]:
+        """Compare the end with number and hash of the entry that was stored last."""
+        if head is None:
+            yield tr("The note of which entry was stored last is missing.")
+            return
+        number, last_hash = head
+        if self.number < number:
+            yield _missing(self.number + 1, number)
+        elif self.number > number:
+            yield tr(
+                "The journal ends with entry {number}, but there are entries up to {last}.",
+                number=number,
+                last=self.number,
+            )
+        elif self._hash != last_hash:
+            yield tr("Entry {number} is not the one that was stored last.", number=number)
+
+
+def _is_unchanged(row: Mapping[str, Any]) -> bool:
+    try:
+        return bool(row["hash"] == digest(row))
+    except (TypeError, ValueError):  # a field holds what robolink never stores
+        return False
+
+
+def _missing(first: int, last: int) -> str:
+    """Return the sentence about entries that are gone."""
+    if first == last:
+        return tr("Entry {number} is missing.", number=first)
+    return tr("Entries {first} to {last} are missing.", first=first, last=last)

@@ -1,0 +1,151 @@
+"""Statements about entries."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
+from datetime import UTC, datetime
+from functools import lru_cache
+from typing import Any, Final, TypeAlias
+
+from sqlalchemy import Connection, Select, bindparam, func, insert, select, update
+
+from robolink.journal._chain import canonical, digest, storable
+from robolink.journal._prepared import Prepared
+from robolink.journal._records import Filter
+from robolink.journal._tables import ENTRIES, HEAD, IN_A_CHANGE
+from robolink.model import EntryKind, NewEntry, Signature
+
+_Head: TypeAlias = tuple[int, str]
+
+# The kinds whose value was read on the controller.
+_PROVING: Final = (EntryKind.READ_BACK, EntryKind.DONE, EntryKind.ROLLED_BACK)
+
+_SELECT_HEAD: Final = select(HEAD.c.number, HEAD.c.hash)
+_MOVE_HEAD: Final = Prepared(
+    update(HEAD)
+    .where(HEAD.c.number == bindparam("of_number"), HEAD.c.hash == bindparam("of_hash"))
+    .values(number=bindparam("number"), hash=bindparam("hash"))
+)
+_INSERT: Final = Prepared(insert(ENTRIES))
+_SIGNATURE: Final = tuple(field.name for field in fields(Signature))
+_COUNT: Final = select(func.count()).select_from(ENTRIES)
+
+
+class EntryRows:
+    """The append-only record over one connection."""
+
+    def __init__(self, connection: Connection) -> None:
+        self._connection = connection
+        self._head: _Head | None = None  # a guess: others add entries too
+
+    def append(
+        self, controller: str, signature: Signature, change: str, entries: Sequence[NewEntry]
+    ) -> None:
+        """Add entries, each chained to the one before; the caller's transaction holds the lock.
+
+        Args:
+            controller: Identity of the controller.
+            signature: Who does it.
+            change: Id of the tool change, for the entries that name none.
+            entries: What is put on record.
+
+        Raises:
+            TypeError: Details are no plain JSON.
+            ValueError: Details hold a number that is not finite.
+        """
+        if not entries:
+            return
+        head = self._head or self._locked_head()
+        rows = _chained(head, _common(controller, signature), change, entries)
+        if not self._move_head(head, rows[-1]):
+            head = self._locked_head()
+            rows = _chained(head, _common(controller, signature), change, entries)
+            self._move_head(head, rows[-1])
+        _INSERT.run_many(self._connection, rows)
+
+    def page(
+        self, wanted: Filter, *, before: int | None, after: int | None, limit: int
+    ) -> list[Mapping[str, Any]]:
+        """Return up to ``limit`` of the entries between two numbers, both left out."""
+        statement = _listing(wanted).limit(limit)
+        if before is not None:
+            statement = statement.where(ENTRIES.c.number < before)
+        if after is not None:
+            statement = statement.where(ENTRIES.c.number > after)
+        return [dict(row) for row in self._connection.execute(statement).mappings()]
+
+    def count(self) -> int:
+        """Return how many there are."""
+        return int(self._connection.execute(_COUNT).scalar_one())
+
+    def last_number(self) -> int:
+        """Return the highest number, 0 when there is none."""
+        highest = self._connection.execute(select(func.max(ENTRIES.c.number))).scalar_one()
+        return 0 if highest is None else int(highest)
+
+    def head(self) -> tuple[int, str] | None:
+        """Return number and hash of the entry that was stored last."""
+        row = self._connection.execute(_SELECT_HEAD).one_or_none()
+        return None if row is None else (row.number, row.hash)
+
+    def _locked_head(self) -> _Head:
+        number, last_hash = self._connection.execute(_SELECT_HEAD.with_for_update()).one()
+        return number, last_hash
+
+    def _move_head(self, head: _Head, last: Mapping[str, Any]) -> bool:
+        self._head = (last["number"], last["hash"])
+        values = {"number": last["number"], "hash": last["hash"]}
+        seen = {"of_number": head[0], "of_hash": head[1]}
+        return _MOVE_HEAD.run(self._connection, {**values, **seen}).rowcount == 1
+
+
+def _chained(
+    head: _Head, common: Mapping[str, Any], change: str, entries: Sequence[NewEntry]
+) -> list[dict[str, Any]]:
+    number, previous = head
+    rows = []
+    for entry in entries:
+        number += 1
+        row = {**common, **_fields(entry, change), "number": number, "previous": previous}
+        previous = row["hash"] = digest(row)
+        rows.append(row)
+    return rows
+
+
+def _listing(wanted: Filter) -> Select[Any]:
+    columns = ENTRIES.c
+    order = columns.number.desc() if wanted.newest_first else columns.number
+    listing = select(ENTRIES).order_by(order)
+    if wanted.controller is not None:
+        listing = listing.where(columns.controller == storable(wanted.controller))
+    if wanted.tool is not None:
+        listing = listing.where(columns.tool == wanted.tool)
+    if wanted.proved_tool is not None:
+        listing = listing.where(columns.proved_tool == wanted.proved_tool)
+    if wanted.change:
+        listing = listing.where(columns.change == storable(wanted.change), IN_A_CHANGE)
+    elif wanted.change is not None:
+        listing = listing.where(columns.change == "")
+    if wanted.kinds:
+        listing = listing.where(columns.kind.in_([str(kind) for kind in wanted.kinds]))
+    return listing
+
+
+@lru_cache(maxsize=64)
+def _common(controller: str, signature: Signature) -> dict[str, Any]:
+    signed = {name: storable(getattr(signature, name)) for name in _SIGNATURE}
+    return {**signed, "controller": storable(controller)}
+
+
+def _fields(entry: NewEntry, change: str) -> dict[str, Any]:
+    proves = entry.kind in _PROVING and "value" in entry.details
+    return {
+        "at": datetime.now(UTC).isoformat(timespec="milliseconds"),
+        "kind": str(entry.kind),
+        "change": storable(entry.change or change),
+        "operation": storable(entry.operation),
+        "tool": entry.tool,
+        "tolerance": storable(entry.tolerance),
+        "verdict": storable(entry.verdict),
+        "details": canonical(entry.details),
+        "proved_tool": entry.tool if proves else None,
+    }

@@ -1,0 +1,214 @@
+"""The journal of all controllers."""
+
+import json
+from collections.abc import Callable, Collection, Iterator, Mapping
+from dataclasses import fields
+from typing import TYPE_CHECKING, Any, Final, cast
+
+from robolink.errors import JournalError
+from robolink.journal._chain import ChainCheck
+from robolink.journal._log import JournalOutcomeLog
+from robolink.journal._processes import Holder
+from robolink.journal._records import Filter, Verification
+from robolink.messages import tr
+from robolink.model import EntryKind, Marker, Recorded, Signature
+from robolink.timing import Clock
+
+if TYPE_CHECKING:
+    from robolink.journal._store import Store
+
+PAGE: Final = 500
+"""How many entries are read at once; nothing is locked between two pages."""
+
+
+class Journal:
+    """The append-only record of what was done to each tool.
+
+    Made by :func:`open_journal` or :func:`memory_journal`. Thread-safe; many processes may use
+    one journal at once.
+
+    Attributes:
+        location: Its SQLAlchemy URL, without the password.
+        read_only: Whether nothing can be added.
+    """
+
+    def __init__(self, store: "Store", location: str, *, read_only: bool) -> None:
+        self.location = location
+        self.read_only = read_only
+        self._store = store
+
+    def log(
+        self,
+        identity: str,
+        *,
+        signature: Signature | None = None,
+        holder: Holder | None = None,
+        clock: Clock | None = None,
+    ) -> JournalOutcomeLog:
+        """Return the log of one controller.
+
+        Args:
+            identity: Which controller; any text.
+            signature: Who works here, and with what.
+            holder: Who holds the lease; by default this process.
+            clock: In which signs of life are stamped and watched; by default the time since
+                the start of the system. All logs of a controller must share it.
+        """
+        return JournalOutcomeLog(
+            self,
+            self._store,
+            identity,
+            signature=signature or Signature(),
+            holder=holder,
+            clock=clock,
+        )
+
+    def entries(
+        self,
+        *,
+        controller: str | None = None,
+        tool: int | None = None,
+        change: str | None = None,
+        kinds: Collection[EntryKind] = (),
+        before: int | None = None,
+        after: int | None = None,
+        limit: int | None = None,
+        newest_first: bool = True,
+    ) -> Iterator[Recorded]:
+        """Yield entries, read page by page.
+
+        Args:
+            controller: Of this controller only.
+            tool: About this tool only.
+            change: Of this tool change only.
+            kinds: Of these kinds only; empty for all.
+            before: With lower numbers than this only.
+            after: With higher numbers than this only.
+            limit: At most so many.
+            newest_first: In which order.
+
+        Raises:
+            JournalError: It cannot be read.
+        """
+        wanted = Filter(controller, tool, change, tuple(kinds), newest_first=newest_first)
+        for page in self._pages(wanted, before=before, after=after, limit=limit):
+            yield from map(_entry, page)
+
+    def entry(self, number: int) -> Recorded | None:
+        """Return one entry, ``None`` when there is none of that number.
+
+        Raises:
+            JournalError: It cannot be read.
+        """
+        return next(self.entries(after=number - 1, before=number + 1), None)
+
+    def last_value(self, controller: str, tool: int) -> Recorded | None:
+        """Return the newest entry that proves what a tool holds, in its ``details["value"]``.
+
+        Raises:
+            JournalError: It cannot be read.
+        """
+        wanted = Filter(controller, proved_tool=tool)
+        for page in self._pages(wanted, limit=1):
+            for row in page:
+                return _entry(row)
+        return None
+
+    def verify(self, progress: Callable[[int, int], None] | None = None) -> Verification:
+        """Check that no entry was changed and none is missing.
+
+        Args:
+            progress: Called now and then with how many were checked, and of how many.
+
+        Raises:
+            JournalError: It cannot be read, or a newer robolink made it.
+        """
+        # The last number comes first: whatever is added from here on is behind the head too.
+        with self._store.read() as tables:
+            if tables.newer:
+                raise _too_new(self.location)
+            last, head = tables.entries.last_number(), tables.entries.head()
+        check = ChainCheck()
+        problems: list[str] = []
+        for page in self._pages(Filter(newest_first=False), before=last + 1):
+            for row in page:
+                problems += check.problems_of(row)
+            if progress is not None:
+                progress(check.checked, max(last, check.checked))
+        problems += check.problems_at_end(head)
+        return Verification(check.checked, tuple(problems))
+
+    def count(self) -> int:
+        """Return how many entries there are.
+
+        Raises:
+            JournalError: It cannot be read.
+        """
+        with self._store.read() as tables:
+            return tables.entries.count()
+
+    def open_markers(self) -> tuple[tuple[str, Marker], ...]:
+        """Return what is unsettled on any controller, with the controller's identity.
+
+        Raises:
+            JournalError: It cannot be read.
+        """
+        with self._store.read() as tables:
+            return tables.markers.of_all()
+
+    def close(self) -> None:
+        """Close the connection; the next use makes a new one. A journal in memory ends here."""
+        self._store.close()
+
+    def _pages(
+        self,
+        wanted: Filter,
+        *,
+        before: int | None = None,
+        after: int | None = None,
+        limit: int | None = None,
+    ) -> Iterator[list[Mapping[str, Any]]]:
+        while limit is None or limit > 0:
+            size = PAGE if limit is None else min(PAGE, limit)
+            with self._store.read() as tables:
+                page = tables.entries.page(wanted, before=before, after=after, limit=size)
+            if page:
+                yield page
+            if len(page) < size:
+                return
+            if wanted.newest_first:
+                before = page[-1]["number"]
+            else:
+                after = page[-1]["number"]
+            limit = None if limit is None else limit - size
+
+
+def _entry(row: Mapping[str, Any]) -> Recorded:
+    return Recorded(
+        **{name: row[name] for name in _PLAIN},
+        # A kind that only a newer robolink knows stays the text that it is.
+        kind=_KINDS.get(row["kind"], cast(EntryKind, row["kind"])),
+        details=_details(row["details"]),
+        signature=Signature(**{field.name: row[field.name] for field in fields(Signature)}),
+    )
+
+
+def _details(text: str) -> Mapping[str, object]:
+    try:
+        found = json.loads(text)
+    except ValueError:
+        found = None
+    return found if isinstance(found, dict) else {"damaged": text}
+
+
+_PLAIN: Final = tuple(
+    field.name for field in fields(Recorded) if field.name not in ("kind", "details", "signature")
+)
+_KINDS: Final = {str(kind): kind for kind in EntryKind}
+
+
+def _too_new(location: str) -> JournalError:
+    return JournalError(
+        tr("The journal {name} was made by a newer robolink.", name=location),
+        remedy=tr("Verify it with that one: this one does not know all fields of an entry."),
+    )

@@ -1,0 +1,236 @@
+"""The journal as the driver of one controller uses it."""
+
+import threading
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager, suppress
+from typing import TYPE_CHECKING, Final
+
+from robolink.errors import JournalError
+from robolink.journal._leases import Lease
+from robolink.journal._processes import BootClock, Holder, this_process
+from robolink.messages import tr
+from robolink.model import EntryKind, Marker, MarkerKind, NewEntry, Recorded, Signature
+from robolink.timing import Clock
+
+if TYPE_CHECKING:
+    from robolink.journal._journal import Journal
+    from robolink.journal._store import Store
+
+_BEGINNINGS: Final = {
+    MarkerKind.SET: EntryKind.INTENT,
+    MarkerKind.CHANGE: EntryKind.INTENT,
+    MarkerKind.SELECTION: EntryKind.SELECTION,
+}
+
+
+class JournalOutcomeLog:
+    """Markers, entries and the lease of one controller (:class:`robolink.model.OutcomeLog`).
+
+    Made by :meth:`Journal.log`. Thread-safe.
+
+    Attributes:
+        signature: Who works here, and with what.
+        change: Id of the tool change under way, empty for none; it goes with every entry.
+        identity: Identity of the controller.
+        durable: Whether what is recorded outlives this process.
+    """
+
+    def __init__(
+        self,
+        journal: "Journal",
+        store: "Store",
+        identity: str,
+        *,
+        signature: Signature,
+        holder: Holder | None = None,
+        clock: Clock | None = None,
+    ) -> None:
+        self.signature = signature
+        self.change = ""
+        self.identity = identity
+        self.durable = store.durable
+        self._journal = journal
+        self._store = store
+        self._lock = threading.RLock()
+        self._lease = Lease(store, identity, holder or this_process(), clock or BootClock())
+        self._begun: set[str] = set()
+        self._holds = 0
+
+    def begin(self, marker: Marker) -> None:
+        """Store ``marker`` in one durable transaction that also proves or takes the lease.
+
+        Raises:
+            JournalError: It is not stored. The command must not be sent.
+            LeaseHeldError: Somebody else is changing this controller.
+            LeaseLostError: Somebody else was, since :meth:`look` or since the lease was taken.
+        """
+        with self._lock:
+            self._lease.prepare()
+            with self._store.write(_untouched()) as tables:
+                grip = self._lease.secure(tables.leases, marker.request, self.signature.operator)
+                first = tables.markers.put(self.identity, marker)
+                entries = (*grip.entries, *_beginning(marker, first=first))
+                tables.entries.append(self.identity, self.signature, self.change, entries)
+            self._begun.add(marker.operation)
+            self._lease.settle(grip)
+
+    def clear(self, operation: str, *entries: NewEntry) -> None:
+        """Forget a marker and record how it ended, in one durable transaction.
+
+        Raises:
+            JournalError: It is not stored; the marker stays.
+        """
+        with self._lock:
+            last = not self._holds and not self._begun - {operation}
+            with self._store.write(_left_open()) as tables:
+                if last:
+                    self._lease.release(tables.leases)
+                tables.markers.remove(self.identity, operation)
+                tables.entries.append(self.identity, self.signature, self.change, entries)
+            self._begun.discard(operation)
+            if last:
+                self._lease.forget()
+
+    def append(self, *entries: NewEntry) -> None:
+        """Put something on record, in one durable transaction.
+
+        Raises:
+            JournalError: It is not stored.
+        """
+        with self._store.write() as tables:
+            tables.entries.append(self.identity, self.signature, self.change, entries)
+
+    def open_markers(self) -> tuple[Marker, ...]:
+        """Return what is unsettled on this controller, oldest first, whoever began it.
+
+        Raises:
+            JournalError: It cannot be read.
+        """
+        with self._store.read() as tables:
+            return tables.markers.of(self.identity)
+
+    def recorded(
+        self, *, tool: int | None = None, change: str = "", kinds: Collection[EntryKind] = ()
+    ) -> Iterator[Recorded]:
+        """Yield what is on record about this controller, newest first.
+
+        Args:
+            tool: Only entries about this tool.
+            change: Only entries of this tool change.
+            kinds: Only entries of these kinds; empty for all.
+
+        Raises:
+            JournalError: It cannot be read.
+        """
+        return self._journal.entries(
+            controller=self.identity, tool=tool, change=change or None, kinds=kinds
+        )
+
+    def look(self) -> None:
+        """Note the state of the lease; a later :meth:`begin` fails if it changed meanwhile.
+
+        A holder on another computer is watched for as long as :data:`LEASE_S`.
+
+        Raises:
+            LeaseHeldError: Somebody else is changing this controller.
+            LeaseLostError: Somebody else took over what this log began.
+            JournalError: It cannot be read.
+        """
+        with self._lock:
+            # While something that it began is open, a lease that was lost stays lost: clearing
+            # up after it is not for this process any more.
+            self._lease.look(afresh=not self._begun)
+
+    @contextmanager
+    def hold(self, purpose: str) -> Iterator[None]:
+        """Keep the lease for the whole of a block, markers or not.
+
+        Raises:
+            LeaseHeldError: Somebody else is changing this controller.
+            LeaseLostError: Somebody else was, since :meth:`look`.
+            JournalError: It cannot be stored.
+        """
+        with self._lock:
+            self._lease.prepare()
+            with self._store.write(_untouched()) as tables:
+                grip = self._lease.secure(tables.leases, purpose, self.signature.operator)
+                tables.entries.append(self.identity, self.signature, self.change, grip.entries)
+            self._lease.settle(grip)
+            self._holds += 1
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._holds -= 1
+                if not self._holds and not self._begun:
+                    self.close()
+
+    def beat(self) -> None:
+        """Let others see that this process is alive.
+
+        Cheap, and raises nothing: whether the lease was lost, or the journal with it, the next
+        :meth:`begin` says.
+        """
+        with self._lock, suppress(JournalError):
+            self._lease.beat()
+
+    def take_over(self, reason: str) -> None:
+        """End the lease of whoever has it, because a person insists; this is put on record.
+
+        His open markers stay, and block until they are settled.
+
+        Args:
+            reason: Why, in the person's words.
+
+        Raises:
+            JournalError: It is not stored; the lease is as it was.
+            LeaseHeldError: Yet another has taken it at once.
+        """
+        with self._lock:
+            with self._store.write(_untouched()) as tables:
+                ended = self._lease.end(tables.leases, reason)
+                entries = () if ended is None else (ended,)
+                tables.entries.append(self.identity, self.signature, self.change, entries)
+            self._lease.look()
+
+    def close(self) -> None:
+        """Give the lease up; open markers stay, and block until they are settled.
+
+        A lease that cannot be given up ends by its holder's silence.
+        """
+        with self._lock:
+            if self._lease.held:
+                with suppress(JournalError), self._store.write() as tables:
+                    self._lease.release(tables.leases)
+                self._lease.forget()
+
+
+def _beginning(marker: Marker, *, first: bool) -> tuple[NewEntry, ...]:
+    """Return what is put on record when a marker is stored.
+
+    A write may be tried twice under one operation, and each try counts; the other markers are
+    stored again to keep what has become of them.
+    """
+    kind, tool = _BEGINNINGS.get(marker.kind), marker.details.get("tool")
+    writes = marker.kind is MarkerKind.SET
+    if kind is None or (writes and tool is None) or not (writes or first):
+        return ()
+    return (
+        NewEntry(
+            kind,
+            operation=marker.operation,
+            tool=tool if isinstance(tool, int) else None,
+            details={**marker.details, "request": marker.request},
+        ),
+    )
+
+
+def _untouched() -> str:
+    return tr("The controller was not touched.")
+
+
+def _left_open() -> str:
+    return tr(
+        "How the last command ended could not be recorded, so it counts as unfinished: run "
+        "'robolink recover' after that."
+    )

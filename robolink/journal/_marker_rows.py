@@ -1,0 +1,94 @@
+"""Statements about markers."""
+
+import json
+from typing import Any, Final
+
+from sqlalchemy import BindParameter, Connection, Row, bindparam, delete, insert, select, update
+
+from robolink.errors import JournalError
+from robolink.journal._chain import canonical, storable
+from robolink.journal._prepared import Prepared
+from robolink.journal._tables import MARKERS
+from robolink.messages import tr
+from robolink.model import Marker, MarkerKind
+
+_SAME: Final = (
+    MARKERS.c.controller == bindparam("of_controller"),
+    MARKERS.c.operation == bindparam("of_operation"),
+)
+_STATE: Final[dict[str, BindParameter[object]]] = {
+    name: bindparam(name) for name in ("kind", "request", "begun_at", "details")
+}
+_NAMES: Final[dict[str, BindParameter[object]]] = {
+    name: bindparam(f"of_{name}") for name in ("controller", "operation")
+}
+_UPDATE: Final = Prepared(update(MARKERS).where(*_SAME).values(**_STATE))
+_INSERT: Final = Prepared(insert(MARKERS).values(**_NAMES, **_STATE))
+_DELETE: Final = Prepared(delete(MARKERS).where(*_SAME))
+_SELECT: Final = Prepared(
+    select(MARKERS).where(MARKERS.c.controller == bindparam("of_controller")).order_by(MARKERS.c.id)
+)
+_SELECT_ALL: Final = select(MARKERS).order_by(MARKERS.c.id)
+
+
+class MarkerRows:
+    """What is not settled, over one connection."""
+
+    def __init__(self, connection: Connection) -> None:
+        self._connection = connection
+
+    def put(self, controller: str, marker: Marker) -> bool:
+        """Store a marker in place of an earlier one of its operation.
+
+        Returns:
+            Whether there was none before.
+        """
+        values = {
+            **_same(controller, marker.operation),
+            "kind": str(marker.kind),
+            "request": storable(marker.request),
+            "begun_at": storable(marker.begun_at),
+            "details": canonical(marker.details),
+        }
+        if _UPDATE.run(self._connection, values).rowcount:
+            return False
+        _INSERT.run(self._connection, values)
+        return True
+
+    def remove(self, controller: str, operation: str) -> None:
+        """Forget a marker; an unknown one is ignored."""
+        _DELETE.run(self._connection, _same(controller, operation))
+
+    def of(self, controller: str) -> tuple[Marker, ...]:
+        """Return the markers of a controller, oldest first."""
+        rows = _SELECT.run(self._connection, {"of_controller": storable(controller)})
+        return tuple(_marker(row) for row in rows)
+
+    def of_all(self) -> tuple[tuple[str, Marker], ...]:
+        """Return every marker with the identity of its controller, oldest first."""
+        rows = self._connection.execute(_SELECT_ALL)
+        return tuple((row.controller, _marker(row)) for row in rows)
+
+
+def _marker(row: Row[Any]) -> Marker:
+    try:
+        kind, details = MarkerKind(row.kind), json.loads(row.details)
+        if not isinstance(details, dict):
+            raise TypeError
+    except (ValueError, TypeError) as error:
+        raise JournalError(
+            tr("A safety record of {controller} makes no sense.", controller=row.controller),
+            remedy=tr(
+                "It says what was left unfinished, {request!r} of {when}, and may be of a newer "
+                "robolink. Check the robot's selected tool and its tool offsets by hand, then "
+                "move the journal away.",
+                request=row.request,
+                when=row.begun_at,
+            ),
+            controller=row.controller,
+        ) from error
+    return Marker(row.operation, kind, row.request, row.begun_at, details)
+
+
+def _same(controller: str, operation: str) -> dict[str, str]:
+    return {"of_controller": storable(controller), "of_operation": storable(operation)}

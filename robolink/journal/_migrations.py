@@ -1,0 +1,159 @@
+"""The tables of each version of the journal, and the way from one version to the next.
+
+A migration that was once released never changes; what comes later is a migration of its own.
+"""
+
+from collections.abc import Callable
+from typing import Final
+
+from sqlalchemy import (
+    BigInteger,
+    Column,
+    Connection,
+    Index,
+    Integer,
+    MetaData,
+    Table,
+    Text,
+    UniqueConstraint,
+    insert,
+    inspect,
+    select,
+    text,
+    update,
+)
+
+from robolink.errors import JournalError
+from robolink.journal._chain import FIRST
+from robolink.journal._tables import HEAD, IN_A_CHANGE, SCHEMA_VERSION
+from robolink.messages import tr
+
+# SQLite keeps a table in the order of its key only if the key is called INTEGER.
+_NUMBER: Final = BigInteger().with_variant(Integer, "sqlite")
+
+
+def _first_tables(connection: Connection) -> None:
+    metadata = MetaData()
+    _entries(metadata)
+    Table("schema_version", metadata, Column("version", Integer, nullable=False))
+    Table(
+        "head",
+        metadata,
+        Column("number", _NUMBER, nullable=False),
+        _text("hash"),
+    )
+    Table(
+        "markers",
+        metadata,
+        Column("id", _NUMBER, primary_key=True),
+        *map(_text, ("controller", "operation", "kind", "request", "begun_at", "details")),
+        UniqueConstraint("controller", "operation"),
+    )
+    Table(
+        "leases",
+        metadata,
+        Column("controller", Text, primary_key=True),
+        Column("epoch", BigInteger, nullable=False),
+        Column("beat", BigInteger, nullable=False),
+        Column("beat_ns", BigInteger, nullable=False),
+        *map(_text, ("token", "holder", "boot", "taken_at", "purpose")),
+    )
+    metadata.create_all(connection)
+    connection.execute(insert(HEAD).values(number=0, hash=FIRST))
+    connection.execute(insert(SCHEMA_VERSION).values(version=0))
+
+
+def _entries(metadata: MetaData) -> None:
+    texts = "operator role os_user host nozzle lot recipe recipe_hash station version previous hash"
+    with_value = text("proved_tool IS NOT NULL")
+    Table(
+        "entries",
+        metadata,
+        Column("number", _NUMBER, primary_key=True, autoincrement=False),
+        *map(_text, ("at", "controller", "kind", "change", "operation")),
+        Column("tool", Integer),
+        *map(_text, ("tolerance", "verdict", "details")),
+        Column("proved_tool", Integer),
+        *map(_text, texts.split()),
+        Index("entries_by_tool", "controller", "tool", "number"),
+        Index("entries_by_controller", "controller", "number"),
+        Index(
+            "entries_by_change",
+            "change",
+            "number",
+            sqlite_where=IN_A_CHANGE,
+            postgresql_where=IN_A_CHANGE,
+        ),
+        Index(
+            "entries_with_value",
+            "controller",
+            "proved_tool",
+            "number",
+            sqlite_where=with_value,
+            postgresql_where=with_value,
+        ),
+    )
+
+
+def _text(name: str) -> Column[str]:
+    return Column(name, Text, nullable=False)
+
+
+MIGRATIONS: tuple[Callable[[Connection], None], ...] = (_first_tables,)
+
+
+def stored_version(connection: Connection, name: str) -> int:
+    """Return the version of the tables, 0 for an empty database.
+
+    Raises:
+        JournalError: The database holds something else.
+    """
+    tables = inspect(connection).get_table_names()
+    if not tables:
+        return 0
+    if not {"schema_version", "entries", "head", "markers", "leases"} <= set(tables):
+        raise JournalError(
+            tr("{name} is a database, but not a journal of robolink.", name=name),
+            remedy=tr(
+                "Nothing was written to it. Give the journal a file or a database of its own; "
+                "ROBOLINK_JOURNAL names it."
+            ),
+        )
+    version = connection.execute(select(SCHEMA_VERSION.c.version)).scalar_one_or_none()
+    return 0 if version is None else version
+
+
+def migrate(connection: Connection, found: int) -> None:
+    """Bring tables of version ``found`` to the present one, inside the caller's transaction."""
+    for step in MIGRATIONS[found:]:
+        step(connection)
+    connection.execute(update(SCHEMA_VERSION).values(version=len(MIGRATIONS)))
+
+
+def newer_error(name: str, found: int) -> JournalError:
+    """Return the error about tables that a newer robolink made."""
+    return JournalError(
+        tr(
+            "The journal {name} has form {found}; this robolink knows forms up to {own}.",
+            name=name,
+            found=found,
+            own=len(MIGRATIONS),
+        ),
+        remedy=tr(
+            "Nothing was written to it. Install the newer robolink that made it; 'robolink "
+            "journal export --read-only' reads what this one understands."
+        ),
+    )
+
+
+def older_error(name: str, found: int) -> JournalError:
+    """Return the error about tables that would have to be migrated before they can be read."""
+    if found == 0:
+        return JournalError(
+            tr("The journal {name} is empty.", name=name),
+            remedy=tr("The first change that robolink makes starts it."),
+        )
+    return JournalError(
+        tr("The journal {name} has the older form {found}.", name=name, found=found),
+        remedy=tr("Open it once for writing; that brings it up to date."),
+    )

@@ -1,0 +1,51 @@
+"""Opening a journal: one connection for each place and process."""
+
+import threading
+from typing import Final
+
+from robolink.journal._journal import Journal
+from robolink.journal._places import Place, default_location, memory_place, place_of
+
+_lock: Final = threading.Lock()
+_opened: Final[dict[tuple[str, bool], Journal]] = {}
+_in_memory: Final[dict[str, Journal]] = {}
+
+
+def open_journal(location: str | None = None, *, read_only: bool = False) -> Journal:
+    """Open a journal, or return the one that this process has open already.
+
+    A new file is for its owner only, and so is a new folder.
+
+    Args:
+        location: Path, ``sqlite:///`` URL or PostgreSQL URL; by default
+            :func:`default_location`.
+        read_only: Whether nothing will be added. That also works where nothing can be, and
+            for a journal that a newer robolink made.
+
+    Raises:
+        JournalError: It cannot be opened.
+    """
+    place = place_of(location or default_location())
+    key = (place.url or place.location, read_only)
+    with _lock:
+        known = _opened.get(key)
+        if known is None:
+            known = _opened[key] = _open(place, read_only=read_only)
+        return known
+
+
+def memory_journal(identity: str) -> Journal:
+    """Return the journal of a far end that dies with this process, such as a simulator in it."""
+    with _lock:
+        known = _in_memory.get(identity)
+        if known is None:
+            known = _in_memory[identity] = _open(memory_place(identity), read_only=False)
+        return known
+
+
+def _open(place: Place, *, read_only: bool) -> Journal:
+    from robolink.journal._store import Store  # here, because it loads SQLAlchemy
+
+    store = Store(place, read_only=read_only)
+    store.open()
+    return Journal(store, place.location, read_only=read_only)

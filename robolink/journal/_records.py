@@ -1,0 +1,39 @@
+"""What the journal is asked for, and what it gives back."""
+
+from dataclasses import dataclass
+
+from robolink.model import EntryKind
+
+
+@dataclass(frozen=True, slots=True)
+class Verification:
+    """Whether the record is whole.
+
+    Attributes:
+        checked: How many entries were read.
+        problems: What is wrong, one sentence each, with the number of the entry.
+    """
+
+    checked: int
+    problems: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Filter:
+    """Which entries are wanted.
+
+    Attributes:
+        controller: Of this controller only.
+        tool: About this tool only.
+        change: Of this tool change only.
+        kinds: Of these kinds only; empty for all.
+        newest_first: In which order.
+        proved_tool: Those only that prove what this tool holds.
+    """
+
+    controller: str | None = None
+    tool: int | None = None
+    change: str | None = None
+    kinds: tuple[EntryKind, ...] = ()
+    newest_first: bool = True
+    proved_tool: int | None = None

@@ -1,0 +1,190 @@
+"""One connection to the journal's database, shared by the threads of this process."""
+
+import os
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from sqlalchemy import Connection, Engine
+
+from robolink.errors import JournalError
+from robolink.journal import _migrations
+from robolink.journal._engines import Backend, backend_of
+from robolink.journal._entry_rows import EntryRows
+from robolink.journal._failures import failures, journal_error
+from robolink.journal._lease_rows import LeaseRows
+from robolink.journal._marker_rows import MarkerRows
+from robolink.journal._places import Place
+from robolink.messages import tr
+
+
+class Tables:
+    """What can be asked and changed over one connection.
+
+    Attributes:
+        connection: The connection.
+        entries: The append-only record.
+        markers: What is not settled.
+        leases: Who may change which controller.
+        newer: Whether a newer robolink made the tables.
+    """
+
+    def __init__(self, connection: Connection, *, newer: bool) -> None:
+        self.connection = connection
+        self.entries = EntryRows(connection)
+        self.markers = MarkerRows(connection)
+        self.leases = LeaseRows(connection)
+        self.newer = newer
+
+
+class Store:
+    """Keeps one connection open and gives it to one thread at a time.
+
+    After any error the connection is dropped and the next use makes a new one, so that a
+    server that was restarted is found again.
+    """
+
+    def __init__(self, place: Place, *, read_only: bool) -> None:
+        self._place = place
+        self._read_only = read_only
+        self._lock = threading.RLock()
+        self._backend: Backend | None = None
+        self._tables: Tables | None = None
+        self._file: tuple[int, int] | None = None
+
+    @property
+    def durable(self) -> bool:
+        """Whether it outlives this process."""
+        return bool(self._place.path or self._place.url)
+
+    @contextmanager
+    def write(self, consequence: str = "") -> Iterator[Tables]:
+        """Run a block as one durable transaction; an exception undoes all of it.
+
+        Args:
+            consequence: What a failure means for the controller, one sentence.
+
+        Raises:
+            JournalError: It is not stored.
+        """
+        if self._read_only:
+            raise JournalError(
+                tr("The journal {name} was opened for reading only.", name=self._place.name),
+                remedy=tr("Open it for writing to add to it."),
+            )
+        with self._use(consequence) as (backend, tables), tables.connection.begin():
+            if backend.begin_writing:
+                tables.connection.exec_driver_sql(backend.begin_writing)
+            yield tables
+
+    @contextmanager
+    def read(self, consequence: str = "") -> Iterator[Tables]:
+        """Run a block that only reads.
+
+        Args:
+            consequence: What a failure means for the controller, one sentence.
+
+        Raises:
+            JournalError: It cannot be read.
+        """
+        with self._use(consequence) as (_, tables), tables.connection.begin():
+            yield tables
+
+    def open(self) -> None:
+        """Connect now, and bring older tables up to date.
+
+        Raises:
+            JournalError: That is impossible.
+        """
+        with self._use(tr("The controller was not touched.")):
+            pass
+
+    def close(self) -> None:
+        """Close the connection; the next use makes a new one. Memory is forgotten."""
+        with self._lock:
+            self._drop()
+            if self._backend is not None:
+                self._backend.engine.dispose()
+                self._backend = None
+
+    @contextmanager
+    def _use(self, consequence: str) -> Iterator[tuple[Backend, Tables]]:
+        with self._lock:
+            try:
+                with failures(self._place.name, consequence):
+                    yield self._connected()
+            except JournalError:
+                self._drop()
+                raise
+
+    def _connected(self) -> tuple[Backend, Tables]:
+        if self._backend is None:
+            self._backend = backend_of(self._place, read_only=self._read_only)
+        if self._tables is None:
+            self._tables = self._connect(self._backend)
+            self._file = self._file_now()
+        elif self._file_now() != self._file:
+            raise JournalError(
+                tr("The journal {name} was moved or deleted while in use.", name=self._place.name),
+                remedy=tr(
+                    "Put it back. Otherwise the next command starts a new one, which knows nothing "
+                    "of what is unfinished."
+                ),
+            )
+        return self._backend, self._tables
+
+    def _connect(self, backend: Backend) -> Tables:
+        try:
+            return self._tables_of(backend.engine, backend)
+        except Exception as error:
+            if backend.last_resort is None or isinstance(error, JournalError):
+                raise
+            first = journal_error(error, self._place.name, "")
+        try:
+            return self._tables_of(backend.last_resort, backend)
+        except Exception as error:
+            raise first from error
+
+    def _tables_of(self, engine: Engine, backend: Backend) -> Tables:
+        connection = engine.connect()
+        try:
+            newer = self._bring_up_to_date(connection, backend)
+        except BaseException:
+            connection.close()
+            raise
+        return Tables(connection, newer=newer)
+
+    def _bring_up_to_date(self, connection: Connection, backend: Backend) -> bool:
+        own, name = len(_migrations.MIGRATIONS), self._place.name
+        with connection.begin():
+            found = _migrations.stored_version(connection, name)
+        if found > own and not self._read_only:
+            raise _migrations.newer_error(name, found)
+        if found >= own:
+            return found > own
+        if self._read_only:
+            raise _migrations.older_error(name, found)
+        with connection.begin():
+            connection.exec_driver_sql(backend.begin_migrating)
+            # Another process may have been faster while this one waited for the lock.
+            found = _migrations.stored_version(connection, name)
+            if found > own:
+                raise _migrations.newer_error(name, found)
+            _migrations.migrate(connection, found)
+        return False
+
+    def _file_now(self) -> tuple[int, int] | None:
+        if self._place.path is None:
+            return None
+        try:
+            found = os.stat(self._place.path)
+        except FileNotFoundError:
+            return (0, 0)
+        return (found.st_dev, found.st_ino)
+
+    def _drop(self) -> None:
+        tables, self._tables = self._tables, None
+        if tables is not None:
+            tables.connection.close()
+        if self._place.path is not None:
+            self._backend = None  # a file that is gone is made anew

@@ -1,0 +1,40 @@
+"""Who may do what at a cell."""
+
+from enum import StrEnum
+
+from robolink.errors import NotAllowedError
+from robolink.messages import tr
+from robolink.model._journal_entries import EntryKind, NewEntry
+from robolink.model._outcomes import OutcomeLog
+
+
+class Role(StrEnum):
+    """What a person is, by the cell file.
+
+    An operator changes nozzles. Passing the jump limit, undo, restore, writes without an
+    expected value and raw statements take an engineer.
+    """
+
+    OPERATOR = "operator"
+    ENGINEER = "engineer"
+
+
+def require_engineer(outcomes: OutcomeLog, act: str) -> None:
+    """Refuse ``act`` to an operator, and put on record who else did it.
+
+    Where the cell names no people, everybody may; it is recorded all the same.
+
+    Raises:
+        NotAllowedError: The person is an operator.
+        ConfigError: It cannot be recorded.
+    """
+    signature = outcomes.signature
+    if signature.role == Role.OPERATOR:
+        person = signature.operator or tr("somebody who gave no name")
+        raise NotAllowedError(
+            tr("{person} may not {act}: it takes an engineer.", person=person, act=act),
+            remedy=tr(
+                "Nothing was sent. One whom the cell file calls an engineer may, with --operator."
+            ),
+        )
+    outcomes.append(NewEntry(EntryKind.DECISION, verdict=act, details={"engineer": True}))

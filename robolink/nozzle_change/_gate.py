@@ -1,0 +1,122 @@
+"""What a measurement must be like to be believed, and the verdict in words."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from robolink.calibration import CalibrationResult, require_shrinking
+from robolink.errors import CalibrationError
+from robolink.messages import tr
+from robolink.nozzle_change._proposal import Proposal
+
+
+@dataclass(frozen=True, slots=True)
+class Gate:
+    """Limits of a measurement; what is ``None`` is not judged.
+
+    Attributes:
+        max_change_mm: Largest plausible change against the stored value, in the plane.
+        rms_mm: Largest root mean square of the residuals.
+        max_residual_mm: Largest residual.
+        interval_mm: Largest half width of a component's 95 % interval.
+        drift_tolerance_mm: Largest drift that passes the verification.
+        accepted_change_mm: A larger change that an engineer accepts this time.
+    """
+
+    max_change_mm: float = 2.0
+    rms_mm: float | None = None
+    max_residual_mm: float | None = None
+    interval_mm: float | None = None
+    drift_tolerance_mm: float = 0.2
+    accepted_change_mm: float | None = None
+
+    @property
+    def limit_mm(self) -> float:
+        """The largest change that is believed this time."""
+        return max(self.max_change_mm, self.accepted_change_mm or 0.0)
+
+    def judge_fit(self, result: CalibrationResult) -> None:
+        """Refuse a measurement that does not agree with itself.
+
+        Raises:
+            CalibrationError: ``large_rms``, ``large_residual`` or ``large_interval``.
+        """
+        for code, name, found, limit in self._fit_limits(result):
+            if limit is not None and found is not None and found > limit:
+                raise CalibrationError(
+                    code,
+                    tr(
+                        "{name} is {found:.3f} mm; {limit:.3f} mm are allowed.",
+                        name=name,
+                        found=found,
+                        limit=limit,
+                    ),
+                    remedy=tr("Clean pin and tip, check that the nozzle sits firmly, and repeat."),
+                )
+
+    def judge_change(
+        self, proposal: Proposal, *, earlier_mm: Sequence[float] = (), remedy: str = ""
+    ) -> None:
+        """Refuse a change that no nozzle change explains.
+
+        Args:
+            proposal: What is to be written.
+            earlier_mm: Lengths of the corrections made since this nozzle was mounted, oldest
+                first.
+            remedy: What to do about an implausible change.
+
+        Raises:
+            CalibrationError: ``diverging`` or ``implausible_change``.
+        """
+        change = proposal.change_mm
+        if change is None:
+            return
+        require_shrinking(change, earlier_mm)
+        if change > self.limit_mm:
+            raise CalibrationError(
+                "implausible_change",
+                tr(
+                    "The tip would move by {change:.3f} mm against the stored tool; {limit:.3f} "
+                    "mm are plausible.",
+                    change=change,
+                    limit=self.limit_mm,
+                ),
+                remedy=remedy,
+            )
+
+    def jumps(self, proposal: Proposal) -> bool:
+        """Tell whether the change is larger than a nozzle change explains."""
+        change = proposal.change_mm
+        return change is not None and change > self.max_change_mm
+
+    @property
+    def tolerance(self) -> str:
+        """The limits in words."""
+        return "; ".join(self._in_words())
+
+    def _in_words(self) -> Iterator[str]:
+        yield tr("change up to {limit:g} mm", limit=self.max_change_mm)
+        if self.rms_mm is not None:
+            yield tr("rms up to {limit:g} mm", limit=self.rms_mm)
+        if self.max_residual_mm is not None:
+            yield tr("residual up to {limit:g} mm", limit=self.max_residual_mm)
+        if self.interval_mm is not None:
+            yield tr("95 % interval up to +-{limit:g} mm", limit=self.interval_mm)
+
+    def _fit_limits(
+        self, result: CalibrationResult
+    ) -> tuple[tuple[str, str, float | None, float | None], ...]:
+        return (
+            ("large_rms", tr("The rms residual"), result.rms_mm, self.rms_mm),
+            (
+                "large_residual",
+                tr("The largest residual"),
+                result.max_residual_mm,
+                self.max_residual_mm,
+            ),
+            (
+                "large_interval",
+                tr("Half the 95 % interval"),
+                max(result.half_width95, default=None),
+                self.interval_mm,
+            ),
+        )

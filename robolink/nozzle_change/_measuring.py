@@ -1,0 +1,91 @@
+"""The first half of a nozzle change: from a mounted nozzle to a proposal on record."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+
+from robolink.calibration import Ask, travel
+from robolink.errors import CalibrationError, ConfigError, RobolinkError
+from robolink.messages import tr
+from robolink.model import NewEntry, Pose
+from robolink.nozzle_change._listener import Listener, Moment
+from robolink.nozzle_change._plan import ToolPlan
+from robolink.nozzle_change._proposal import Proposal
+from robolink.nozzle_change._records import calibration_entry, refusal_entry
+from robolink.nozzle_change._source import Bench
+from robolink.runner import StepDone
+
+
+class Measuring:
+    """Measures the tools of one change.
+
+    Args:
+        bench: What the sources work with.
+        listener: Told of steps and refusals.
+    """
+
+    def __init__(self, bench: Bench, listener: Listener) -> None:
+        self._bench = bench
+        self._listener = listener
+
+    def propose(self, plan: ToolPlan) -> Proposal:
+        """Measure one tool, again where the plan allows it, and put it on record.
+
+        Raises:
+            CalibrationError: The last measurement is not trusted either; it is on record.
+            RobolinkError: Anything else that ended it.
+        """
+        for left in reversed(range(plan.attempts)):
+            try:
+                return self._attempt(plan)
+            except CalibrationError as error:
+                self._listener.refused(plan.tool, error, again=left > 0)
+                if not left:
+                    raise
+        raise AssertionError("a plan allows one attempt at least")
+
+    def go_to(self, pose: Pose | None, purpose: str) -> None:
+        """Drive the flange to ``pose``: up, over, down; nowhere when there is none."""
+        if pose is None:
+            return
+        controller = self._bench.controller
+        controller.tools.select(0)
+        here = controller.groups[0].pose()
+        target = Pose(*pose.coordinates(), hand=here.hand, local=here.local, tool=0)
+        self._bench.run(travel(target, here=here, purpose=purpose))
+
+    def _attempt(self, plan: ToolPlan) -> Proposal:
+        bench, tool = self._bench, plan.tool
+        self.go_to(plan.approach, tr("go to where tool {tool} is measured", tool=tool))
+        self._listener.moment(Moment.BEFORE_MEASURE, bench, tool)
+        before = bench.controller.tools.read(tool)
+        with self._watched(plan):
+            result = plan.source.measure(bench, tool, before)
+            plan.gate.judge_fit(result)
+            proposal = self._listener.adjusted(Proposal(tool, before, result), bench)
+        entry = calibration_entry(proposal, plan.gate, source=plan.source.sentence)
+        bench.controller.outcomes.append(entry)
+        self._listener.moment(Moment.AFTER_MEASURE, bench, tool)
+        self.go_to(plan.retreat, tr("go away from where tool {tool} is measured", tool=tool))
+        return proposal
+
+    @contextmanager
+    def _watched(self, plan: ToolPlan) -> Iterator[None]:
+        """Tell of each step; when the measurement ends early, keep its poses on record."""
+        poses: list[Pose] = []
+
+        def on_step(done: StepDone) -> None:
+            if isinstance(done.step, Ask):
+                poses.append(done.pose)
+            self._listener.step(plan.tool, done)
+
+        with self._bench.telling(on_step):
+            try:
+                yield
+            except BaseException as error:
+                self._record_end(refusal_entry(plan.tool, plan.gate, error, poses=poses))
+                raise
+
+    def _record_end(self, entry: NewEntry) -> None:
+        # The error that is under way matters more than that it cannot be recorded.
+        with suppress(ConfigError, RobolinkError):
+            self._bench.controller.outcomes.append(entry)

@@ -1,0 +1,87 @@
+"""What was measured, next to what is stored, and what became of it."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+from robolink.calibration import CalibrationResult, VerifyResult
+from robolink.model import ToolOffset, ToolReceipt
+
+
+@dataclass(frozen=True, slots=True)
+class Proposal:
+    """A new offset for one tool.
+
+    Attributes:
+        tool: Its number.
+        before: What is stored; ``None`` for undefined.
+        result: The proposed offset with all that the measurement says about it.
+        measured: The offset as it was measured, where another one is proposed (a difference
+            to a reference, or a Z that a person typed).
+        notes: How the proposal was made from the measurement, in sentences.
+        z_from: Where Z of the proposal comes from.
+        record: More for the record of the measurement, plain JSON.
+        kept_record: More for the record of the value, once it is kept.
+    """
+
+    tool: int
+    before: ToolOffset | None
+    result: CalibrationResult
+    measured: ToolOffset | None = None
+    notes: tuple[str, ...] = ()
+    z_from: Literal["measured", "typed", "kept"] = "kept"
+    record: Mapping[str, object] = field(default_factory=dict)
+    kept_record: Mapping[str, object] = field(default_factory=dict)
+
+    @property
+    def offset(self) -> ToolOffset:
+        """What is to be written."""
+        return self.result.offset
+
+    @property
+    def kept(self) -> tuple[str, ...]:
+        """Components that are neither measured nor typed."""
+        kept = self.result.kept
+        return kept if self.z_from == "kept" else tuple(name for name in kept if name != "z_mm")
+
+    @property
+    def tip(self) -> ToolOffset:
+        """Where the tip was found, whatever is to be written."""
+        return self.result.offset if self.measured is None else self.measured
+
+    @property
+    def change_mm(self) -> float | None:
+        """Length of the change in the plane, ``None`` when the tool was undefined."""
+        if self.before is None:
+            return None
+        after = self.result.offset
+        return math.hypot(after.x_mm - self.before.x_mm, after.y_mm - self.before.y_mm)
+
+
+@dataclass(frozen=True, slots=True)
+class ToolReport:
+    """What a nozzle change did to one tool.
+
+    Attributes:
+        proposal: What was proposed.
+        receipt: What was written, ``None`` when only a reference was taken.
+        verification: How the test about the new tip ended, ``None`` without one.
+    """
+
+    proposal: Proposal
+    receipt: ToolReceipt | None
+    verification: VerifyResult | None
+
+
+@dataclass(frozen=True, slots=True)
+class ChangeReport:
+    """What a nozzle change did.
+
+    Attributes:
+        change: Its id in the journal.
+        tools: One report a tool, in the order of the plan.
+    """
+
+    change: str
+    tools: tuple[ToolReport, ...]

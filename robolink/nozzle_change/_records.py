@@ -1,0 +1,102 @@
+"""What a nozzle change puts on record: raw poses, verdicts in words, decisions."""
+
+from collections.abc import Sequence
+from dataclasses import asdict
+
+from robolink.calibration import CalibrationResult, VerifyResult
+from robolink.errors import CalibrationError, RobolinkError
+from robolink.messages import tr
+from robolink.model import EntryKind, NewEntry, Pose, describe_offset, plain_offset
+from robolink.nozzle_change._gate import Gate
+from robolink.nozzle_change._proposal import Proposal
+
+
+def calibration_entry(proposal: Proposal, gate: Gate, *, source: str) -> NewEntry:
+    """Return the record of a measurement that was believed, with all that it rests on."""
+    result = proposal.result
+    details: dict[str, object] = {
+        "source": source,
+        "before": plain_offset(proposal.before),
+        "proposed": plain_offset(result.offset),
+        "tip": plain_offset(proposal.tip),
+        "notes": list(proposal.notes),
+        **_result(result),
+        **proposal.record,
+    }
+    verdict = tr("measured: {offset}", offset=describe_offset(result.offset))
+    return NewEntry(
+        EntryKind.CALIBRATION,
+        tool=proposal.tool,
+        tolerance=gate.tolerance,
+        verdict=verdict,
+        details=details,
+    )
+
+
+def refusal_entry(
+    tool: int, gate: Gate, error: BaseException, *, poses: Sequence[Pose] = ()
+) -> NewEntry:
+    """Return the record of a measurement that was not believed, or not finished.
+
+    Args:
+        tool: Number of the tool.
+        gate: What was allowed.
+        error: What ended it.
+        poses: The touches so far; they are for the record and never used again.
+    """
+    why = error.what if isinstance(error, RobolinkError) else tr("interrupted")
+    code = error.code if isinstance(error, CalibrationError) else type(error).__name__
+    return NewEntry(
+        EntryKind.REFUSED,
+        tool=tool,
+        tolerance=gate.tolerance,
+        verdict=why,
+        details={"code": code, "poses": [_pose(pose) for pose in poses]},
+    )
+
+
+def verification_entry(tool: int, result: VerifyResult) -> NewEntry:
+    """Return the record of a test about the new tip."""
+    verdict = tr("passed") if result.passed else tr("failed")
+    details: dict[str, object] = {
+        "passed": result.passed,
+        "max_drift_mm": result.max_drift_mm,
+        "tolerance_mm": result.tolerance_mm,
+        "drifts": [asdict(drift) for drift in result.drifts],
+        "warnings": list(result.warnings),
+    }
+    return NewEntry(
+        EntryKind.VERIFY,
+        tool=tool,
+        tolerance=tr("drift up to {limit:g} mm", limit=result.tolerance_mm),
+        verdict=tr("{verdict}: {drift:.3f} mm", verdict=verdict, drift=result.max_drift_mm),
+        details=details,
+    )
+
+
+def decision_entry(verdict: str, **details: object) -> NewEntry:
+    """Return the record of what a person decided."""
+    return NewEntry(EntryKind.DECISION, verdict=verdict, details=details)
+
+
+def _result(result: CalibrationResult) -> dict[str, object]:
+    return {
+        "method": result.method,
+        "measured": list(result.measured),
+        "kept": list(result.kept),
+        "reference_point_mm": list(result.reference_point_mm),
+        "poses": [_pose(pose) for pose in result.inputs],
+        "residuals_mm": [list(residual) for residual in result.residuals_mm],
+        "rejected": list(result.rejected),
+        "rms_mm": result.rms_mm,
+        "max_residual_mm": result.max_residual_mm,
+        "half_width95": list(result.half_width95),
+        "sigma_mm": result.sigma_mm,
+        "sigma_gain": result.sigma_gain,
+        "condition_number": result.condition_number,
+        "warnings": list(result.warnings),
+    }
+
+
+def _pose(pose: Pose) -> dict[str, object]:
+    return {name: value for name, value in asdict(pose).items() if value is not None}

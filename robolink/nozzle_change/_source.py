@@ -1,0 +1,111 @@
+"""Where a measurement comes from: what every source of it offers to a nozzle change."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Protocol, TypeVar, runtime_checkable
+
+from robolink.calibration import CalibrationResult, Procedure, VerifyResult
+from robolink.model import Controller, Pose, ToolOffset
+from robolink.runner import Operator, Runner, RunSettings, StepDone
+
+T = TypeVar("T")
+
+
+class Bench:
+    """What a source works with.
+
+    Attributes:
+        controller: The controller, connected.
+        operator: The person at the cell.
+        start: Flange pose at the start of the change; limits lie about it.
+
+    Args:
+        settings: Limits and speeds for a tip at an offset from the flange.
+    """
+
+    def __init__(
+        self,
+        controller: Controller,
+        operator: Operator,
+        *,
+        start: Pose | None,
+        settings: Callable[[Pose, ToolOffset | None], RunSettings],
+    ) -> None:
+        self.controller = controller
+        self.operator = operator
+        self.start = start
+        self._settings = settings
+        self._on_step: Callable[[StepDone], None] | None = None
+
+    @contextmanager
+    def telling(self, on_step: Callable[[StepDone], None]) -> Iterator[None]:
+        """Tell ``on_step`` of every step taken inside the block."""
+        self._on_step = on_step
+        try:
+            yield
+        finally:
+            self._on_step = None
+
+    def run(self, procedure: Procedure[T], *, tip: ToolOffset | None = None) -> T:
+        """Take the steps of a procedure; see :meth:`robolink.runner.Runner.run`.
+
+        Args:
+            procedure: What is to be done.
+            tip: Offset of the tip in whose frame it moves, ``None`` for the flange.
+        """
+        return self.runner(tip).run(procedure)
+
+    def runner(self, tip: ToolOffset | None = None) -> Runner:
+        """Return a runner for the flange, or for a tip at an offset from it."""
+        group = self.controller.groups[0]
+        start = group.pose() if self.start is None else self.start
+        return Runner(
+            self.controller, group, self.operator, self._settings(start, tip), on_step=self._on_step
+        )
+
+
+class TipSource(Protocol):
+    """Measures one tip."""
+
+    @property
+    def sentence(self) -> str:
+        """What it does, for a report."""
+
+    @property
+    def remedy(self) -> str:
+        """What to do when a measurement makes the tip jump."""
+
+    def measure(self, bench: Bench, tool: int, stored: ToolOffset | None) -> CalibrationResult:
+        """Measure the tip of ``tool``, whose stored offset is given.
+
+        Raises:
+            CalibrationError: No trustworthy result; its code says why.
+            RobolinkError: Anything else that ended it.
+        """
+
+
+@runtime_checkable
+class MovingSource(TipSource, Protocol):
+    """Measures a tip by moving the robot, and so can turn about the new tip as well."""
+
+    def procedure(self, stored: ToolOffset | None) -> Procedure[CalibrationResult]:
+        """Return the steps of a measurement, for a look at them before anything moves."""
+
+    def verify(
+        self,
+        bench: Bench,
+        tool: int,
+        result: CalibrationResult,
+        *,
+        tip: ToolOffset,
+        tolerance_mm: float,
+    ) -> VerifyResult:
+        """Turn about the new tip and report the drift.
+
+        Args:
+            bench: What to work with.
+            tool: The tool, written already.
+            result: What was measured, with the offset that was written.
+            tip: Where the tip was found, which differs from it where a difference was written.
+            tolerance_mm: Largest drift that passes.
+        """

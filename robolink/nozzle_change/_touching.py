@@ -1,0 +1,84 @@
+"""A pin in the cell, and a person who brings the tip onto it."""
+
+from dataclasses import dataclass, field
+
+from robolink.calibration import (
+    CalibrationResult,
+    Procedure,
+    TouchPlan,
+    VerifyResult,
+    contact_pose,
+    n_angle,
+    two_pose,
+    verify_by_turning,
+)
+from robolink.messages import tr
+from robolink.model import ToolOffset
+from robolink.nozzle_change._source import Bench
+
+
+@dataclass(frozen=True, slots=True)
+class PinAndPerson:
+    """Measures by touching one pin at several angles of U.
+
+    Attributes:
+        touch: Lift, clearance and angle.
+        turns_deg: Angles of the further touches against the first one; empty for the one of
+            ``touch``, which needs no more than two poses.
+        sigma_mm: Standard deviation of one coordinate of one placement, where it is known.
+    """
+
+    touch: TouchPlan = field(default_factory=TouchPlan)
+    turns_deg: tuple[float, ...] = ()
+    sigma_mm: float | None = None
+
+    @property
+    def sentence(self) -> str:
+        """What it does, for a report."""
+        if not self.turns_deg:
+            return tr("measured on the robot: one pin touched at two angles of U")
+        return tr(
+            "measured on the robot: one pin touched at {count} angles of U",
+            count=len(self.turns_deg) + 1,
+        )
+
+    @property
+    def remedy(self) -> str:
+        """What to do when a measurement makes the tip jump."""
+        return tr(
+            "Check that all poses touched the same point. If the change is real, allow it with "
+            "--max-change."
+        )
+
+    def measure(self, bench: Bench, tool: int, stored: ToolOffset | None) -> CalibrationResult:  # noqa: ARG002 - the flange is what moves
+        """Touch and solve; see :class:`~robolink.nozzle_change.MovingSource`."""
+        bench.controller.tools.select(0)
+        return bench.run(self.procedure(stored))
+
+    def procedure(self, stored: ToolOffset | None) -> Procedure[CalibrationResult]:
+        """Return the steps of a measurement; see :class:`~robolink.nozzle_change.MovingSource`."""
+        if not self.turns_deg:
+            return two_pose(self.touch, stored=stored, sigma_mm=self.sigma_mm)
+        return n_angle(self.touch, turns_deg=self.turns_deg, stored=stored, sigma_mm=self.sigma_mm)
+
+    def verify(
+        self,
+        bench: Bench,
+        tool: int,
+        result: CalibrationResult,
+        *,
+        tip: ToolOffset,
+        tolerance_mm: float,
+    ) -> VerifyResult:
+        """Turn about the new tip; see :class:`~robolink.nozzle_change.MovingSource`."""
+        first, *others = (pose.u_deg + result.offset.u_deg for pose in result.inputs)
+        bench.controller.tools.select(tool)
+        procedure = verify_by_turning(
+            self.touch,
+            contact=contact_pose(result, tool=tool),
+            angles_deg=((first + others[-1]) / 2, first),
+            tolerance_mm=tolerance_mm,
+            written=result.offset,
+            tip=tip,
+        )
+        return bench.run(procedure, tip=result.offset)

@@ -1,0 +1,126 @@
+"""What a person is asked, and what was answered beforehand."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+
+from robolink.errors import ConfigError, DeclinedError
+from robolink.messages import tr
+from robolink.nozzle_change import Bench
+from robolink.recipe._recipe import Recipe
+from robolink.recipe._tables import Prompt
+from robolink.runner import parse_decimal
+
+
+@dataclass(frozen=True, slots=True)
+class Answers:
+    """What was given with the command.
+
+    Attributes:
+        yes: Whether every yes-or-no question is answered with yes.
+        nozzle: Id of the nozzle or needle.
+        lot: Its lot.
+        texts: Answers to other questions, by the number of the prompt in the recipe, from 1.
+        z_mm: Z of the new tips, by tool, for z = "typed".
+    """
+
+    yes: bool = False
+    nozzle: str = ""
+    lot: str = ""
+    texts: Mapping[int, str] = field(default_factory=dict)
+    z_mm: Mapping[int, float] = field(default_factory=dict)
+
+    def prepared(self, number: int, prompt: Prompt) -> str | None:
+        """Return the answer that was given beforehand, ``None`` when there is none."""
+        if prompt.answer == "yes":
+            return "yes" if self.yes else None
+        if prompt.answer == "nozzle":
+            return self.nozzle or None
+        if prompt.answer == "lot":
+            return self.lot or None
+        return self.texts.get(number)
+
+    def missing(self, recipe: Recipe) -> Iterator[str]:
+        """Yield what nobody answered beforehand, as the options that would."""
+        for number, prompt in enumerate(recipe.prompts, start=1):
+            if self.prepared(number, prompt) is None:
+                yield _option(number, prompt)
+        if recipe.z == "kept" and not self.yes:
+            yield "--yes"
+        if recipe.z == "typed":
+            for tool in recipe.tools:
+                if tool.number not in self.z_mm:
+                    yield f"--z {tool.number}=MM"
+
+
+def require_answers(answers: Answers, recipe: Recipe) -> None:
+    """Refuse, before anything is sent, to run where a question would find nobody.
+
+    Raises:
+        ConfigError: Names the options that are missing.
+    """
+    options = ", ".join(dict.fromkeys(answers.missing(recipe)))
+    if options:
+        raise ConfigError(
+            tr("The recipe asks questions, and nobody can be asked here."),
+            remedy=tr("Run it on a terminal, or answer beforehand: {options}.", options=options),
+        )
+
+
+def ask_prompt(bench: Bench, prompt: Prompt) -> str:
+    """Put a question of the recipe to the person and return the answer.
+
+    Raises:
+        DeclinedError: A yes was needed.
+    """
+    runner = bench.runner()
+    if prompt.answer != "yes":
+        return runner.ask_text(prompt.text)
+    if not runner.confirm(prompt.text):
+        raise DeclinedError(
+            tr("{question!r} was answered with no.", question=prompt.text),
+            remedy=tr("Nothing was written. Start again when it is so."),
+        )
+    return "yes"
+
+
+def ask_height(bench: Bench, tool: int, name: str) -> float:
+    """Ask for Z of a new tip, mm from the flange, until it is a number."""
+    runner = bench.runner()
+    while True:
+        text = runner.ask_text(
+            tr(
+                "Z of the new tip of tool {tool} {name} in mm from the flange?",
+                tool=tool,
+                name=name,
+            )
+        )
+        try:
+            return parse_decimal(text)
+        except ConfigError as error:
+            bench.operator.tell(str(error))
+
+
+def confirm_height(bench: Bench, tool: int, name: str) -> None:
+    """Ask whether the new tip is as long as the old one.
+
+    Raises:
+        DeclinedError: It is not.
+    """
+    question = tr(
+        "Z of tool {tool} {name} is kept. Is the new tip just as long as the old one?",
+        tool=tool,
+        name=name,
+    )
+    if not bench.runner().confirm(question):
+        raise DeclinedError(
+            tr("The new tip of tool {tool} is not as long as the old one.", tool=tool),
+            remedy=tr('Nothing was written. Use a recipe with z = "typed" or "measured".'),
+        )
+
+
+def _option(number: int, prompt: Prompt) -> str:
+    if prompt.answer == "yes":
+        return "--yes"
+    if prompt.answer in ("nozzle", "lot"):
+        return f"--{prompt.answer} ID"
+    return f"--answer {number}=TEXT"

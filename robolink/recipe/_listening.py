@@ -1,0 +1,156 @@
+"""What a recipe does between the phases of a nozzle change: asks, switches, proposes."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Protocol
+
+from robolink.calibration import VerifyResult
+from robolink.errors import CalibrationError, ConfigError
+from robolink.messages import tr
+from robolink.model import Controller, EntryKind, NewEntry, Signature, ToolReceipt
+from robolink.nozzle_change import Bench, Listener, Moment, Proposal
+from robolink.recipe._answers import Answers, ask_height, ask_prompt, confirm_height
+from robolink.recipe._proposing import proposed
+from robolink.recipe._recipe import Recipe
+from robolink.recipe._reference import Reference
+from robolink.recipe._tables import Output, Prompt
+from robolink.runner import StepDone
+
+
+class Outputs(Protocol):
+    """Switches the outputs of a controller."""
+
+    def set_output(self, bit: int, on: bool) -> object:
+        """Switch one output and read it back."""
+
+
+class RecipeListener(Listener):
+    """Carries out the prompts, outputs, basis and Z of one recipe.
+
+    Attributes:
+        switched: The outputs that were switched, with their last state.
+
+    Args:
+        recipe: The recipe.
+        controller: The controller, connected.
+        answers: What was answered beforehand.
+        references: The references of basis "difference", by tool.
+        taking_reference: Whether this run only takes them.
+        audience: Told of everything as well.
+    """
+
+    def __init__(
+        self,
+        recipe: Recipe,
+        controller: Controller,
+        answers: Answers,
+        *,
+        references: Mapping[int, Reference],
+        taking_reference: bool = False,
+        audience: Listener,
+    ) -> None:
+        self._audience = audience
+        self._recipe = recipe
+        self._controller = controller
+        self._answers = answers
+        self._references = references
+        self._taking_reference = taking_reference
+        self._signature: Signature = controller.outcomes.signature
+        self._nozzles: dict[int, str] = {}
+        self._names = {tool.number: tool.name or "" for tool in recipe.tools}
+        self.switched: dict[int, bool] = {}
+
+    def moment(self, moment: Moment, bench: Bench, tool: int | None = None) -> None:
+        """Ask what is to be asked, then switch what is to be switched."""
+        self._audience.moment(moment, bench, tool)
+        if moment is Moment.AFTER_MEASURE:
+            # The id belonged to that tool; the value that is kept says it again.
+            self._sign(self._signature)
+        for number, prompt in enumerate(self._recipe.prompts, start=1):
+            if _meant(prompt, moment, tool):
+                self._ask(bench, number, prompt, tool)
+        for output in self._recipe.outputs:
+            if _meant(output, moment, tool):
+                self._switch(output)
+
+    def adjusted(self, proposal: Proposal, bench: Bench) -> Proposal:
+        """Return what the recipe proposes from a measurement."""
+        tool = proposal.tool
+        typed = None
+        if not self._taking_reference:
+            typed = self._height(bench, tool)
+        made = proposed(
+            self._recipe,
+            proposal,
+            reference=self._references.get(tool),
+            typed_z_mm=typed,
+            taking_reference=self._taking_reference,
+        )
+        nozzle = self._nozzles.get(tool)
+        return replace(made, kept_record={**made.kept_record, "nozzle": nozzle}) if nozzle else made
+
+    def step(self, tool: int, done: StepDone) -> None:
+        """Pass it on."""
+        self._audience.step(tool, done)
+
+    def refused(self, tool: int, error: CalibrationError, *, again: bool) -> None:
+        """Pass it on."""
+        self._audience.refused(tool, error, again=again)
+
+    def proposed(self, proposals: Sequence[Proposal]) -> None:
+        """Pass it on."""
+        self._audience.proposed(proposals)
+
+    def wrote(self, receipt: ToolReceipt) -> None:
+        """Pass it on."""
+        self._audience.wrote(receipt)
+
+    def verified(self, tool: int, result: VerifyResult) -> None:
+        """Pass it on."""
+        self._audience.verified(tool, result)
+
+    def told(self, sentence: str) -> None:
+        """Pass it on."""
+        self._audience.told(sentence)
+
+    def _height(self, bench: Bench, tool: int) -> float | None:
+        name = self._names[tool]
+        if self._recipe.z == "typed":
+            given = self._answers.z_mm.get(tool)
+            return ask_height(bench, tool, name) if given is None else given
+        if self._recipe.z == "kept" and not self._answers.yes:
+            confirm_height(bench, tool, name)
+        return None
+
+    def _ask(self, bench: Bench, number: int, prompt: Prompt, tool: int | None) -> None:
+        answer = self._answers.prepared(number, prompt)
+        given = answer is not None
+        if answer is None:
+            answer = ask_prompt(bench, prompt)
+        if prompt.answer == "nozzle" and tool is not None:
+            self._nozzles[tool] = answer
+            self._sign(replace(self._signature, nozzle=answer))
+        elif prompt.answer in ("nozzle", "lot"):
+            self._signature = replace(self._signature, **{prompt.answer: answer})
+            self._sign(self._signature)
+        details = {"question": prompt.text, "answer": answer, "given_beforehand": given}
+        self._controller.outcomes.append(
+            NewEntry(EntryKind.DECISION, tool=tool, verdict=answer, details=details)
+        )
+
+    def _sign(self, signature: Signature) -> None:
+        self._controller.outcomes.signature = signature
+
+    def _switch(self, output: Output) -> None:
+        outputs: Outputs | None = getattr(self._controller, "io", None)
+        if outputs is None:
+            raise ConfigError(
+                tr("{controller} has no outputs.", controller=self._controller.identity),
+                remedy=tr("Take [[outputs]] out of the recipe."),
+            )
+        outputs.set_output(output.output, output.on)
+        self.switched[output.output] = output.on
+
+
+def _meant(asked: Prompt | Output, moment: Moment, tool: int | None) -> bool:
+    return asked.at == moment and asked.tool in (None, tool)

@@ -1,0 +1,104 @@
+"""From a file to a recipe, or to everything that is wrong in it."""
+
+import hashlib
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from robolink.config import Problem
+from robolink.errors import ConfigError
+from robolink.messages import tr
+
+if TYPE_CHECKING:
+    from robolink.recipe._recipe import Recipe
+
+
+@dataclass(frozen=True, slots=True)
+class LoadedRecipe:
+    """A recipe that is right, and the file it came from.
+
+    Attributes:
+        recipe: What the file says.
+        path: The file.
+        sha256: Hash of the bytes that were read, hexadecimal; the journal keeps it, so that a
+            change of the recipe shows.
+    """
+
+    recipe: "Recipe"
+    path: Path
+    sha256: str
+
+    @property
+    def name(self) -> str:
+        """What people call the recipe."""
+        return self.recipe.name
+
+
+def load_recipe(path: Path) -> LoadedRecipe:
+    """Return the recipe in a file.
+
+    Raises:
+        ConfigError: It cannot be read, is no TOML, or is wrong; every problem is told with
+            its path.
+    """
+    from robolink.recipe._problems import refusal
+
+    content = _content(path)
+    recipe, problems = _checked(_document(path, content))
+    if recipe is None or problems:
+        raise refusal(path, problems)
+    return LoadedRecipe(recipe, path, hashlib.sha256(content).hexdigest())
+
+
+def check_recipe(path: Path) -> tuple[Problem, ...]:
+    """Return everything that is wrong in a recipe; nothing when it is right.
+
+    Raises:
+        ConfigError: It cannot be read, or is no TOML.
+    """
+    return _checked(_document(path, _content(path)))[1]
+
+
+def _checked(document: dict[str, object]) -> tuple["Recipe | None", tuple[Problem, ...]]:
+    from pydantic import ValidationError
+
+    from robolink.recipe._checks import problems_together
+    from robolink.recipe._draft import Draft
+    from robolink.recipe._problems import problems_of
+    from robolink.recipe._recipe import Recipe
+
+    sound: dict[str, object] = {}
+    recipe, problems = None, []
+    try:
+        recipe = Recipe.model_validate(document, context=sound)
+    except ValidationError as error:
+        problems = problems_of(error)
+    draft = Draft.of(sound, given=document)
+    return recipe, (*problems, *problems_together(draft))
+
+
+def _content(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise _unreadable(path, error.strerror or str(error)) from error
+
+
+def _document(path: Path, content: bytes) -> dict[str, object]:
+    try:
+        # Editors on Windows put a byte order mark in front, which TOML does not know.
+        return tomllib.loads(content.decode("utf-8-sig"))
+    except UnicodeError as error:
+        raise _unreadable(path, tr("it is not UTF-8 text")) from error
+    except RecursionError as error:
+        raise _unreadable(path, tr("it is nested too deeply")) from error
+    except ValueError as error:  # TOML, or a number with thousands of digits
+        raise _unreadable(path, str(error)) from error
+
+
+def _unreadable(path: Path, cause: str) -> ConfigError:
+    return ConfigError(
+        tr("The recipe {path} cannot be read: {cause}.", path=path, cause=cause),
+        remedy=tr("docs/recipes.md shows what a recipe looks like. Nothing was sent."),
+    )

@@ -1,0 +1,130 @@
+"""From a recipe to the plan of a nozzle change."""
+
+from robolink.calibration import TouchPlan
+from robolink.errors import ConfigError, LimitError
+from robolink.messages import tr
+from robolink.model import Controller, Pose
+from robolink.nozzle_change import (
+    ChangePlan,
+    Gate,
+    GivenPoses,
+    Limits,
+    PinAndPerson,
+    TipSource,
+    ToolPlan,
+    preview,
+    taught_poses,
+)
+from robolink.recipe._recipe import Recipe
+from robolink.recipe._sources import OperatorSource, PointsSource
+from robolink.recipe._tables import Tool
+
+
+def plan_of(
+    recipe: Recipe,
+    controller: Controller,
+    *,
+    ask_before_write: bool = True,
+    accepted_change_mm: float | None = None,
+) -> ChangePlan:
+    """Return what a recipe asks for, on one controller.
+
+    Args:
+        recipe: The recipe.
+        controller: The controller; nothing is sent yet.
+        ask_before_write: Whether a person accepts the proposals.
+        accepted_change_mm: A larger jump than the recipe's that an engineer accepts this time.
+
+    Raises:
+        ConfigError: This kind of controller has no taught points.
+    """
+    tolerances = recipe.tolerances
+    gate = Gate(
+        max_change_mm=tolerances.jump_mm,
+        rms_mm=tolerances.rms_mm,
+        max_residual_mm=tolerances.max_mm,
+        interval_mm=tolerances.interval_mm,
+        drift_tolerance_mm=tolerances.drift_mm,
+        accepted_change_mm=accepted_change_mm,
+    )
+    box, speeds, safe = recipe.box, recipe.speeds, recipe.poses.safe
+    return ChangePlan(
+        tuple(
+            ToolPlan(
+                tool.number,
+                _source(recipe, controller, tool),
+                gate,
+                verify=recipe.verifies,
+                attempts=recipe.attempts,
+                approach=tool.approach.pose if tool.approach else None,
+                retreat=tool.retreat.pose if tool.retreat else None,
+            )
+            for tool in recipe.tools
+        ),
+        limits=Limits(
+            box_mm=box.sideways_mm,
+            box_down_mm=box.down_mm,
+            box_up_mm=box.up_mm,
+            speed_percent=speeds.percent,
+            speed_mm_s=speeds.mm_s,
+        ),
+        ask_before_write=ask_before_write,
+        safe=safe.pose if safe else None,
+    )
+
+
+def require_inside(controller: Controller, plan: ChangePlan) -> None:
+    """Refuse a plan whose foreseen targets lie outside its limits; reads only.
+
+    Raises:
+        LimitError: Names the step.
+    """
+    for step in preview(controller, plan):
+        if step.refusal:
+            raise LimitError(
+                tr("{step}: {refusal}", step=step.text, refusal=step.refusal),
+                remedy=tr(
+                    "Nothing was moved. The box lies about where the robot stands at the start: "
+                    "bring it nearer, or widen [box] in the recipe."
+                ),
+                controller=controller.identity,
+            )
+
+
+def _source(recipe: Recipe, controller: Controller, tool: Tool) -> TipSource:
+    source, tolerances = recipe.source, recipe.tolerances
+    if isinstance(source, OperatorSource):
+        touch = TouchPlan(
+            lift_mm=source.lift_mm, clearance_mm=source.clearance_mm, turn_deg=source.turn_deg
+        )
+        return PinAndPerson(touch, turns_deg=source.turns_deg, sigma_mm=tolerances.sigma_mm)
+    return _from_points(source, controller, tool, recipe)
+
+
+def _from_points(
+    source: PointsSource, controller: Controller, tool: Tool, recipe: Recipe
+) -> TipSource:
+    points = getattr(controller, "points", None)
+    numbers = tool.points or ()
+    if points is None:
+        raise ConfigError(
+            tr("{controller} has no taught points.", controller=controller.identity),
+            remedy=tr('Use a recipe with source.kind = "operator".'),
+        )
+
+    def read() -> tuple[Pose, ...]:
+        return taught_poses(points, numbers)
+
+    names = ", ".join(f"P{number}" for number in numbers)
+    return GivenPoses(
+        read,
+        taught_tool=source.taught_tool,
+        plausible_mm=recipe.tolerances.jump_mm,
+        several=source.method == "n_angle",
+        sigma_mm=recipe.tolerances.sigma_mm,
+        sentence=tr(
+            "points {names} taught on the pendant with tool {tool}",
+            names=names,
+            tool=source.taught_tool,
+        ),
+    )

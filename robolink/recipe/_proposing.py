@@ -1,0 +1,100 @@
+"""What is proposed from a measurement: the basis, and where Z comes from."""
+
+from dataclasses import replace
+from statistics import fmean
+
+from robolink.errors import CalibrationError
+from robolink.messages import tr
+from robolink.model import ToolOffset
+from robolink.nozzle_change import Proposal
+from robolink.recipe._recipe import Recipe
+from robolink.recipe._reference import Reference, reference_details
+
+
+def contact_z_mm(proposal: Proposal) -> float:
+    """Return the height of the flange when the tip touched the pin, mean of all touches, mm."""
+    return fmean(pose.z_mm for pose in proposal.result.inputs)
+
+
+def proposed(
+    recipe: Recipe,
+    measured: Proposal,
+    *,
+    reference: Reference | None,
+    typed_z_mm: float | None = None,
+    taking_reference: bool = False,
+) -> Proposal:
+    """Return the proposal that the recipe makes of a bare measurement.
+
+    Args:
+        recipe: The recipe.
+        measured: What was measured; its Z is the stored one.
+        reference: The reference of basis "difference"; ``None`` while one is being taken.
+        typed_z_mm: What the person typed, for z = "typed".
+        taking_reference: Whether nothing will be written, and this is kept as the reference.
+    """
+    tip = measured.result.offset
+    offset, notes = tip, list[str]()
+    height = contact_z_mm(measured) if recipe.source.moves else None
+    if recipe.basis == "difference" and reference is not None:
+        offset = _moved(reference, tip)
+        notes.append(
+            tr(
+                "the stored offset moved by X {dx:+.3f} Y {dy:+.3f} mm, as the tip did since {at}",
+                dx=tip.x_mm - reference.tip.x_mm,
+                dy=tip.y_mm - reference.tip.y_mm,
+                at=reference.at,
+            )
+        )
+    if recipe.z == "typed" and typed_z_mm is not None:
+        offset = replace(offset, z_mm=typed_z_mm)
+        notes.append(tr("Z was typed"))
+    elif recipe.z == "measured" and height is not None:
+        offset = replace(offset, z_mm=_height(recipe, offset, height, reference))
+        notes.append(tr("Z was measured on the pin"))
+    station = recipe.station.id
+    stored = measured.before or ToolOffset()
+    return Proposal(
+        measured.tool,
+        measured.before,
+        replace(measured.result, offset=offset),
+        measured=None if offset == tip else tip,
+        notes=tuple(notes),
+        z_from=recipe.z,
+        record=_record(recipe, reference)
+        | (reference_details(station, tip, stored, height) if taking_reference else {}),
+        kept_record=_record(recipe, reference) | reference_details(station, tip, offset, height),
+    )
+
+
+def _moved(reference: Reference, tip: ToolOffset) -> ToolOffset:
+    return replace(
+        reference.value,
+        x_mm=reference.value.x_mm + tip.x_mm - reference.tip.x_mm,
+        y_mm=reference.value.y_mm + tip.y_mm - reference.tip.y_mm,
+    )
+
+
+def _height(
+    recipe: Recipe, offset: ToolOffset, height: float, reference: Reference | None
+) -> float:
+    """Return Z of the tip: the flange stands the higher at the contact, the longer the tip."""
+    if recipe.basis == "absolute":
+        assert recipe.station.z_mm is not None  # noqa: S101 - the recipe was checked
+        return recipe.station.z_mm - height
+    if reference is None:
+        return offset.z_mm
+    if reference.contact_z_mm is None:
+        raise CalibrationError(
+            "reference_outdated",
+            tr("The reference of {at} has no height of the contact.", at=reference.at),
+            remedy=tr("Take a new reference with --reference."),
+        )
+    return offset.z_mm - (height - reference.contact_z_mm)
+
+
+def _record(recipe: Recipe, reference: Reference | None) -> dict[str, object]:
+    record: dict[str, object] = {"basis": recipe.basis, "z": recipe.z}
+    if reference is not None:
+        record["reference_entry"] = reference.number
+    return record

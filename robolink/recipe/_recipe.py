@@ -1,0 +1,86 @@
+"""The whole recipe. Imported when one is loaded, for pydantic."""
+
+from typing import Annotated, Literal, TypeVar
+
+from pydantic import ConfigDict, Field, ValidationInfo, field_validator
+
+from robolink.recipe._sources import Source
+from robolink.recipe._tables import (
+    Box,
+    Line,
+    Note,
+    Output,
+    Poses,
+    Prompt,
+    Refusal,
+    Speeds,
+    Station,
+    Table,
+    Tolerances,
+    Tool,
+)
+
+Basis = Literal["difference", "absolute"]
+HeightRule = Literal["measured", "typed", "kept"]
+T = TypeVar("T")
+
+
+class Recipe(Table):
+    """A nozzle change, written down once by the integrator and run by whoever changes nozzles."""
+
+    model_config = ConfigDict(validate_default=True)
+
+    format: Annotated[Literal["robolink/recipe/1"], Field(alias="schema")]
+    """What this file is, and which version of it."""
+    name: Line
+    """What people call it; it goes on record with everything that the recipe does."""
+    notes: Note = ""
+    """For people."""
+    basis: Basis
+    """What is written: with "difference" the stored offset, moved by how much the tip moved
+    against the reference of the same tool at the same station; with "absolute" what was
+    measured."""
+    z: HeightRule
+    """Where Z of the offset comes from: "measured" on the pin, "typed" by the person each time,
+    or "kept", which the person confirms each time."""
+    verify: bool | None = None
+    """Whether the robot turns about the new tip after the write. It does so wherever it moves
+    unless this is false."""
+    source: Source
+    """Where the measurements come from."""
+    station: Station
+    """Where it is measured."""
+    poses: Poses = Field(default_factory=Poses)
+    """Poses of the whole change."""
+    tools: Annotated[tuple[Tool, ...], Field(strict=False, min_length=1)]
+    """The tools, in the order in which they are measured: all are written, or none."""
+    speeds: Speeds = Field(default_factory=Speeds)
+    """How fast the robot goes, in Power Low."""
+    box: Box = Field(default_factory=Box)
+    """How far the flange may go from where it is when the recipe starts."""
+    tolerances: Tolerances = Field(default_factory=Tolerances)
+    """What a measurement must be like to be believed."""
+    refusal: Refusal = Field(default_factory=Refusal)
+    """What follows when a measurement is not believed."""
+    prompts: Annotated[tuple[Prompt, ...], Field(strict=False)] = ()
+    """What a person is asked, in this order."""
+    outputs: Annotated[tuple[Output, ...], Field(strict=False)] = ()
+    """Outputs that are switched, in this order."""
+
+    @property
+    def verifies(self) -> bool:
+        """Whether the new tips are proved by turning about them."""
+        return self.source.moves and self.verify is not False
+
+    @property
+    def attempts(self) -> int:
+        """How often a tool is measured before a refusal ends the change."""
+        return 1 if self.refusal.action == "stop" else self.refusal.attempts or 2
+
+    @field_validator("*")
+    @classmethod
+    def _hand_on(cls, value: T, info: ValidationInfo) -> T:
+        """Hand on what is right in itself: how it goes with the rest is checked in any case."""
+        if isinstance(info.context, dict):
+            info.context[info.field_name] = value
+        return value

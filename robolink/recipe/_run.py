@@ -1,0 +1,156 @@
+"""One run of a recipe: preflight, then the nozzle change with all that the recipe adds."""
+
+from dataclasses import replace
+from functools import partial
+
+from robolink.errors import NotAllowedError, RobolinkError
+from robolink.messages import tr
+from robolink.model import Controller, Role
+from robolink.nozzle_change import ChangePlan, ChangeReport, Listener, NozzleChange
+from robolink.recipe._answers import Answers
+from robolink.recipe._listening import RecipeListener
+from robolink.recipe._loading import LoadedRecipe
+from robolink.recipe._plans import plan_of, require_inside
+from robolink.recipe._reference import Reference, find_reference
+from robolink.runner import Operator
+from robolink.transaction import ChangedSince, changed_since, earlier_corrections
+
+
+class RecipeRun:
+    """One run of a recipe on one controller.
+
+    Attributes:
+        plan: What will be done.
+        takes_reference: Whether the run only records a reference and writes nothing; known
+            after :meth:`preflight`.
+        changed: Tools that somebody else changed since they were last written from here; known
+            after :meth:`preflight`.
+
+    Args:
+        controller: The controller, connected.
+        loaded: The recipe.
+        operator: Who is asked, and brings the tip onto the pin.
+        answers: What was answered beforehand.
+        audience: Told of everything that happens.
+        take_reference: Whether to take a new reference in any case.
+        accepted_change_mm: A larger jump than the recipe's that an engineer accepts this time.
+        ask_before_write: Whether a person accepts the proposals.
+    """
+
+    def __init__(
+        self,
+        controller: Controller,
+        loaded: LoadedRecipe,
+        *,
+        operator: Operator,
+        answers: Answers,
+        audience: Listener,
+        take_reference: bool = False,
+        accepted_change_mm: float | None = None,
+        ask_before_write: bool = True,
+    ) -> None:
+        self._controller = controller
+        self._loaded = loaded
+        self._operator = operator
+        self._answers = answers
+        self._audience = audience
+        self._references: dict[int, Reference] = {}
+        self.plan: ChangePlan = plan_of(
+            loaded.recipe,
+            controller,
+            ask_before_write=ask_before_write,
+            accepted_change_mm=accepted_change_mm,
+        )
+        self.takes_reference = take_reference
+        self.changed: tuple[ChangedSince, ...] = ()
+
+    def preflight(self) -> None:
+        """Find out, reading only, whatever would end the run later.
+
+        Raises:
+            CalibrationError: ``reference_outdated``.
+            LimitError: A foreseen target lies outside the box.
+            NotAllowedError: A jump is accepted by somebody who is no engineer.
+            OutcomeUnknownError: Something earlier is unsettled.
+            BusyError: Somebody else is changing this controller.
+            RobolinkError: The controller's state forbids it.
+        """
+        controller, recipe = self._controller, self._loaded.recipe
+        controller.outcomes.look()
+        controller.require_settled(tr("recipe {name!r}", name=recipe.name))
+        self._require_role()
+        stored = {tool.number: controller.tools.read(tool.number) for tool in recipe.tools}
+        found = (changed_since(controller, tool, now) for tool, now in stored.items())
+        self.changed = tuple(change for change in found if change is not None)
+        if recipe.basis == "difference" and not self.takes_reference:
+            for tool in stored:
+                reference = find_reference(controller, tool, recipe.station.id)
+                if reference is not None:
+                    self._references[tool] = reference
+            # One without a reference makes all of them wait: all are written, or none.
+            self.takes_reference = len(self._references) < len(stored)
+        require_inside(controller, self.plan)
+
+    def run(self) -> ChangeReport:
+        """Carry it out, after :meth:`preflight`.
+
+        Raises:
+            RobolinkError: As :meth:`robolink.nozzle_change.NozzleChange.run`; outputs that the
+                recipe switched stay as they are, and the error names them.
+        """
+        outcomes, loaded = self._controller.outcomes, self._loaded
+        before = outcomes.signature
+        outcomes.signature = replace(
+            before,
+            recipe=loaded.name,
+            recipe_hash=loaded.sha256,
+            station=loaded.recipe.station.id,
+            nozzle=self._answers.nozzle,
+            lot=self._answers.lot,
+        )
+        listener = RecipeListener(
+            loaded.recipe,
+            self._controller,
+            self._answers,
+            references={} if self.takes_reference else self._references,
+            taking_reference=self.takes_reference,
+            audience=self._audience,
+        )
+        change = NozzleChange(
+            self._controller,
+            self.plan,
+            operator=self._operator,
+            listener=listener,
+            earlier=partial(earlier_corrections, self._controller),
+        )
+        try:
+            return change.run(write=not self.takes_reference)
+        except RobolinkError as error:
+            error.remedy = f"{error.remedy} {_switched(listener)}".strip()
+            raise
+        except KeyboardInterrupt:
+            if listener.switched:
+                self._operator.tell(_switched(listener))
+            raise
+        finally:
+            outcomes.signature = before
+
+    def _require_role(self) -> None:
+        if not any(plan.gate.accepted_change_mm for plan in self.plan.tools):
+            return
+        signature = self._controller.outcomes.signature
+        if signature.role == Role.OPERATOR:
+            raise NotAllowedError(
+                tr("Letting a tool jump takes an engineer."),
+                remedy=tr("Nothing was moved. Give --operator, or leave --accept-jump out."),
+            )
+
+
+def _switched(listener: RecipeListener) -> str:
+    """Say which outputs the recipe left switched."""
+    if not listener.switched:
+        return ""
+    states = ", ".join(
+        f"{number} {tr('on') if on else tr('off')}" for number, on in listener.switched.items()
+    )
+    return tr("Outputs stay as the recipe switched them: {states}.", states=states)

@@ -1,0 +1,163 @@
+"""The tables of a recipe: keys, units and limits. Imported when one is loaded, for pydantic.
+
+The sentence below a key is what an editor shows for it; the schema is made of them.
+"""
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from robolink.model import Pose
+
+Line = Annotated[str, Field(min_length=1, max_length=200, pattern=r"^[^\x00-\x1f\x7f-\x9f]*$")]
+"""One line for people. No control characters: they would reach a terminal."""
+
+Note = Annotated[str, Field(max_length=5000, pattern=r"^[^\x00-\x08\x0b-\x1f\x7f-\x9f]*$")]
+"""Lines for people."""
+
+Length = Annotated[float, Field(ge=0.001)]
+"""No limit is finer than the last digit that a controller prints, mm (design part 4)."""
+
+ToolNumber = Annotated[int, Field(ge=1, le=15)]
+OutputNumber = Annotated[int, Field(ge=0, le=0xFFFF)]
+PointNumber = Annotated[int, Field(ge=0, le=999)]
+
+
+class Table(BaseModel):
+    """What all tables have in common."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        frozen=True,
+        strict=True,
+        allow_inf_nan=False,
+        hide_input_in_errors=True,
+        use_attribute_docstrings=True,
+    )
+
+
+class FlangePose(Table):
+    """Where the flange (Tool 0) is, in base coordinates."""
+
+    x_mm: float
+    """X of the flange, base, mm."""
+    y_mm: float
+    """Y of the flange, base, mm."""
+    z_mm: float
+    """Z of the flange, base, mm."""
+    u_deg: float
+    """U of the flange, degrees."""
+
+    @property
+    def pose(self) -> Pose:
+        """The same as a pose."""
+        return Pose(self.x_mm, self.y_mm, self.z_mm, self.u_deg, tool=0)
+
+
+class Station(Table):
+    """Where it is measured."""
+
+    id: Line
+    """Id of the pin or gauge; it goes on record with every measurement."""
+    x_mm: float | None = None
+    """X of the pin's end, base, mm; for the record. Only together with y_mm."""
+    y_mm: float | None = None
+    """Y of the pin's end, base, mm; for the record."""
+    z_mm: float | None = None
+    """Z of the pin's end, base, mm; z = "measured" needs it when basis is "absolute"."""
+    note: Note = ""
+    """For people."""
+
+
+class Poses(Table):
+    """Poses of the whole change."""
+
+    safe: FlangePose | None = None
+    """Flange pose to which the robot goes first and last: up, over, down."""
+
+
+class Tool(Table):
+    """One tool whose nozzle was changed."""
+
+    number: ToolNumber
+    """Number of the tool in the controller."""
+    name: Line | None = None
+    """What people call it."""
+    approach: FlangePose | None = None
+    """Flange pose from which it is measured: tip some mm beside the pin and above it."""
+    retreat: FlangePose | None = None
+    """Flange pose to which the robot goes after the measurement."""
+    points: Annotated[tuple[PointNumber, ...], Field(strict=False, min_length=2)] | None = None
+    """Numbers of the taught points that touch the pin with this tool; source "points" only."""
+
+
+class Speeds(Table):
+    """How fast the robot goes, in Power Low."""
+
+    percent: Annotated[int, Field(ge=1, le=100)] = 5
+    """Speed of joint moves, percent of the speed in Power Low."""
+    mm_s: Annotated[float, Field(ge=1, le=100)] = 20.0
+    """Speed of straight moves, mm/s."""
+
+
+class Box(Table):
+    """How far the flange may go from where it is when the recipe starts."""
+
+    sideways_mm: Annotated[float, Field(ge=1)] = 150.0
+    """How far in X and in Y, mm."""
+    down_mm: Annotated[float, Field(ge=1)] = 30.0
+    """How far down, mm."""
+    up_mm: Annotated[float, Field(ge=1)] = 50.0
+    """How far up, mm."""
+
+
+class Tolerances(Table):
+    """What a measurement must be like to be believed."""
+
+    rms_mm: Length | None = None
+    """Largest rms of the residuals, mm; not for "two_pose", which leaves no residual."""
+    max_mm: Length | None = None
+    """Largest single residual, mm; not for "two_pose"."""
+    interval_mm: Length | None = None
+    """Largest half width of the 95 % interval of X or Y, mm; "two_pose" needs sigma_mm for it."""
+    sigma_mm: Length | None = None
+    """Standard deviation of one coordinate of one touch, mm, where it is known."""
+    jump_mm: Length = 2.0
+    """Largest change against the stored offset that a nozzle change explains, mm."""
+    drift_mm: Length = 0.2
+    """Largest drift about the new tip that passes the verification, mm."""
+
+
+class Refusal(Table):
+    """What follows when a measurement is not believed."""
+
+    action: Literal["stop", "measure_again"] = "stop"
+    """End the change with the old values in force, or measure that tool again."""
+    attempts: Annotated[int, Field(ge=2, le=5)] | None = None
+    """How often a tool is measured at most; 2 when it is not said."""
+
+
+class Prompt(Table):
+    """Something a person is asked."""
+
+    at: Literal["start", "before_measure", "before_write", "end"]
+    """When: once at start, before_write and end; before_measure for each tool."""
+    text: Line
+    """The question, as the person reads it."""
+    answer: Literal["yes", "nozzle", "lot", "text"] = "yes"
+    """A yes, without which the change ends; or the nozzle's id, its lot or a text to record."""
+    tool: ToolNumber | None = None
+    """Ask before this tool only."""
+
+
+class Output(Table):
+    """An output that is switched: vacuum, purge, light."""
+
+    at: Literal["start", "before_measure", "after_measure", "before_write", "end"]
+    """When: once at start, before_write and end; before and after the measuring of each tool."""
+    output: OutputNumber
+    """Number of the output bit."""
+    on: bool
+    """Whether it is switched on or off."""
+    tool: ToolNumber | None = None
+    """Switch it for this tool only."""

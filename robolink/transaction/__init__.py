@@ -1,0 +1,19 @@
+"""Tool changes that are done, or were never: all or none, put back once, recoverable."""
+
+from robolink.transaction._change import ToolChange as ToolChange
+from robolink.transaction._change import Wanted as Wanted
+from robolink.transaction._change import change_tools as change_tools
+from robolink.transaction._history import changed_since as changed_since
+from robolink.transaction._history import earlier_corrections as earlier_corrections
+from robolink.transaction._history import last_proof as last_proof
+from robolink.transaction._last_known import ChangedSince as ChangedSince
+from robolink.transaction._put_back import PutBack as PutBack
+from robolink.transaction._put_back import Step as Step
+from robolink.transaction._recovery import Recovery as Recovery
+from robolink.transaction._recovery import recover as recover
+from robolink.transaction._settling import Settler as Settler
+from robolink.transaction._undo import Undone as Undone
+from robolink.transaction._undo import UndoPlan as UndoPlan
+from robolink.transaction._undo import plan_undo as plan_undo
+from robolink.transaction._undo import undo as undo
+from robolink.transaction._undo_history import id_of_change as id_of_change

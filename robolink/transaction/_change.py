@@ -1,0 +1,289 @@
+"""One tool change: written as a whole, kept as a whole, or taken back as a whole.
+
+The order is that of design part 8: look at the lease, read the old values, compare them with
+what is expected, store the intent durably (which takes the lease), write, read back. A change
+of one tool that nothing is to verify is done then. Any other is open, in the journal too,
+until :meth:`ToolChange.keep`; whatever ends it earlier puts the old values back, once.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Self
+
+from robolink.errors import (
+    BusyError,
+    ConfigError,
+    LeaseLostError,
+    NotReadyError,
+    OutcomeUnknownError,
+    ReadBackError,
+    RemoteProtocolError,
+    RobolinkError,
+    ToolChangedError,
+    ToolError,
+    TransportError,
+)
+from robolink.messages import tr
+from robolink.model import (
+    ANY,
+    Controller,
+    EntryKind,
+    Expected,
+    Marker,
+    MarkerKind,
+    NewEntry,
+    ToolOffset,
+    ToolReceipt,
+    describe_offset,
+    new_operation,
+    plain_offset,
+)
+from robolink.transaction._put_back import PutBack, Step, put_back
+
+_OUT_OF_REACH = (OutcomeUnknownError, TransportError, RemoteProtocolError, LeaseLostError)
+"""After these nothing can be taken back here: the link is gone, or the right to write."""
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """What one tool is to hold.
+
+    Attributes:
+        tool: Its number.
+        offset: The new value; ``None`` clears it.
+        expected: What the caller believes it holds now.
+        details: More for the journal, plain JSON.
+    """
+
+    tool: int
+    offset: ToolOffset | None
+    expected: Expected
+    details: Mapping[str, object] | None = None
+
+
+class ToolChange:
+    """A change under way; a context manager that takes back what was not kept.
+
+    Attributes:
+        kept: Whether the new values stay.
+
+    Args:
+        controller: The controller, connected.
+        wanted: The tools to change, each once, in the order in which they are written.
+        verify: Whether something is to be verified between the writes and :meth:`keep`.
+        tell: Told, in sentences, what was put back.
+    """
+
+    def __init__(
+        self,
+        controller: Controller,
+        wanted: Sequence[Wanted],
+        *,
+        verify: bool = False,
+        tell: Callable[[str], None] = lambda _sentence: None,
+    ) -> None:
+        self._controller = controller
+        self._wanted = tuple(wanted)
+        self._several_steps = verify or len(self._wanted) > 1
+        self._verify = verify
+        self._tell = tell
+        self._own_id = False
+        self._marker: Marker | None = None
+        self._begun: list[Step] = []
+        self._receipts: tuple[ToolReceipt, ...] = ()
+        self._spoiled: int | None = None
+        self.kept = False
+
+    def __enter__(self) -> Self:
+        if not self._controller.outcomes.change:
+            self._controller.outcomes.change = new_operation()
+            self._own_id = True
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        try:
+            if not self.kept and (self._begun or self._marker):
+                with self._controller.uninterrupted():
+                    self._take_back(error)
+        finally:
+            if self._own_id:
+                self._controller.outcomes.change = ""
+
+    def write(self) -> tuple[ToolReceipt, ...]:
+        """Write everything and read it back.
+
+        Raises:
+            ToolChangedError: A tool does not hold what was expected; nothing was written.
+            OutcomeUnknownError: Something earlier is unsettled, or a write was not answered.
+            ReadBackError: Another value came back; the old ones are put back.
+            ConfigError: The intent cannot be stored; nothing was written.
+            BusyError: Another process has the controller.
+        """
+        self._controller.require_settled(self._request())
+        steps = self._compare()
+        if self._several_steps and any(self._differs(step) for step in steps):
+            tools = {
+                str(step.tool): {
+                    "before": plain_offset(step.before),
+                    "requested": plain_offset(step.requested),
+                }
+                for step in steps
+            }
+            details = {
+                "tools": tools,
+                "verify": self._verify,
+                "change": self._controller.outcomes.change,
+            }
+            with self._controller.uninterrupted():
+                self._marker = self._controller.begin(MarkerKind.CHANGE, self._request(), details)
+        self._receipts = tuple(
+            self._write(wanted, step) for wanted, step in zip(self._wanted, steps, strict=True)
+        )
+        return self._receipts
+
+    def keep(self, verdict: str = "") -> None:
+        """Put on record that the new values stay.
+
+        Args:
+            verdict: Why, in words.
+
+        Raises:
+            ConfigError: It cannot be recorded; the change stays open for ``recover``.
+        """
+        if self._marker is None:
+            self.kept = True
+            return
+        entries = [
+            NewEntry(
+                EntryKind.DONE,
+                operation=self._marker.operation,
+                tool=receipt.tool,
+                verdict=verdict,
+                details={
+                    **(wanted.details or {}),
+                    "before": plain_offset(receipt.before),
+                    "requested": plain_offset(receipt.requested),
+                    "value": plain_offset(receipt.read_back),
+                },
+            )
+            for wanted, receipt in zip(self._wanted, self._receipts, strict=True)
+        ]
+        with self._controller.uninterrupted():
+            self._controller.finish(self._marker, *entries)
+            self.kept = True
+
+    def _request(self) -> str:
+        numbers = ", ".join(str(wanted.tool) for wanted in self._wanted)
+        return tr("change of tool {numbers}", numbers=numbers)
+
+    def _compare(self) -> list[Step]:
+        """Read every tool before the first is written."""
+        tools = self._controller.tools
+        self._controller.outcomes.look()
+        steps = []
+        for wanted in self._wanted:
+            tools.require_writable(wanted.tool)
+            before = tools.read(wanted.tool)
+            step = Step(wanted.tool, before, wanted.offset)
+            steps.append(step)
+            expected = wanted.expected
+            if expected is ANY or tools.same(before, expected) or not self._differs(step):
+                continue
+            raise ToolChangedError(
+                tr(
+                    "Tool {tool} holds {found}, not the expected {expected}; nothing was written.",
+                    tool=wanted.tool,
+                    found=describe_offset(before),
+                    expected=describe_offset(expected),
+                ),
+                remedy=tr(
+                    "Someone changed it: a program that runs TLSet at its start, the pendant, or "
+                    "a restored project. Read it again and decide anew."
+                ),
+                controller=self._controller.identity,
+            )
+        return steps
+
+    def _differs(self, step: Step) -> bool:
+        return not self._controller.tools.same(step.before, step.requested)
+
+    def _write(self, wanted: Wanted, step: Step) -> ToolReceipt:
+        tools = self._controller.tools
+        # Before the write: whatever interrupts it, what was begun is looked at again.
+        self._begun.append(step)
+        expected: Expected = ANY if wanted.expected is ANY else step.before
+        try:
+            if wanted.offset is None:
+                return tools.clear(wanted.tool, expected=expected)
+            return tools.write(wanted.tool, wanted.offset, expected=expected)
+        except ReadBackError:
+            self._spoiled = wanted.tool
+            raise
+        except (NotReadyError, BusyError, ToolError):
+            self._begun.pop()  # these three say that nothing was sent
+            raise
+
+    def _take_back(self, error: BaseException | None) -> None:
+        if isinstance(error, _OUT_OF_REACH):
+            self._leave_open(error)
+            return
+        done = put_back(self._controller.tools, self._begun, spoiled=self._spoiled)
+        for result in done:
+            self._tell(result.sentence)
+        if isinstance(error, RobolinkError):
+            sentences = (result.sentence for result in done)
+            error.remedy = " ".join((error.remedy, *sentences)).strip()
+        self._record(done)
+
+    def _leave_open(self, error: RobolinkError) -> None:
+        """Say what stands in the journal for ``recover``."""
+        if not self._begun:
+            return
+        numbers = ", ".join(str(step.tool) for step in self._begun)
+        sentence = tr(
+            "Tool {numbers} may hold the new value, which nobody verified; 'robolink recover' "
+            "puts the old one back.",
+            numbers=numbers,
+        )
+        self._tell(sentence)
+        error.remedy = f"{error.remedy} {sentence}".strip()
+
+    def _record(self, done: Sequence[PutBack]) -> None:
+        entries = [result.entry for result in done]
+        # The error under way matters more than that it cannot be recorded; what is not
+        # recorded stays open.
+        with suppress(ConfigError):
+            if self._marker is not None and all(result.restored for result in done):
+                self._controller.finish(self._marker, *entries)
+            else:
+                self._controller.outcomes.append(*entries)
+
+
+def change_tools(
+    controller: Controller,
+    wanted: Sequence[Wanted],
+    *,
+    tell: Callable[[str], None] = lambda _sentence: None,
+) -> tuple[ToolReceipt, ...]:
+    """Write tools that nothing is to verify: all of them, or none.
+
+    Args:
+        controller: The controller, connected.
+        wanted: The tools to change.
+        tell: Told what was put back.
+
+    Raises:
+        RobolinkError: As :meth:`ToolChange.write`; the old values are back, or the error says
+            that they are not.
+    """
+    with ToolChange(controller, wanted, tell=tell) as change:
+        receipts = change.write()
+        change.keep()
+    return receipts

@@ -1,0 +1,62 @@
+"""What the record says about a tool: its last value, and how it was corrected before."""
+
+import math
+
+from robolink.model import Controller, EntryKind, Recorded, ToolOffset, read_offset
+from robolink.transaction._last_known import ChangedSince
+
+PROOFS = (EntryKind.READ_BACK, EntryKind.DONE, EntryKind.NOT_APPLIED, EntryKind.ROLLED_BACK)
+"""Entries whose value was read from the controller."""
+
+
+def last_proof(controller: Controller, tool: int) -> Recorded | None:
+    """Return the newest entry that says what was read from ``tool`` after a write."""
+    return next(
+        (
+            entry
+            for entry in controller.outcomes.recorded(tool=tool, kinds=PROOFS)
+            if "value" in entry.details
+        ),
+        None,
+    )
+
+
+def changed_since(controller: Controller, tool: int, now: ToolOffset | None) -> ChangedSince | None:
+    """Compare a tool with what this software last proved to be in it.
+
+    Args:
+        controller: The controller, connected.
+        tool: Number of the tool.
+        now: What it holds.
+
+    Returns:
+        ``None`` when it agrees, or was never written with this software.
+    """
+    last = last_proof(controller, tool)
+    if last is None:
+        return None
+    recorded = read_offset(last.details["value"])
+    if controller.tools.same(recorded, now):
+        return None
+    return ChangedSince(tool, recorded, last.at, now)
+
+
+def earlier_corrections(controller: Controller, tool: int) -> tuple[float, ...]:
+    """Return the lengths, mm, of the corrections since the nozzle was mounted, oldest first.
+
+    A nozzle is known by the id that was given for it; without one nothing is known to be the
+    same nozzle, and there is nothing to compare with.
+    """
+    nozzle = controller.outcomes.signature.nozzle
+    lengths: list[float] = []
+    if not nozzle:
+        return ()
+    for entry in controller.outcomes.recorded(tool=tool, kinds=(EntryKind.DONE,)):
+        if entry.signature.nozzle != nozzle:
+            break
+        before = read_offset(entry.details.get("before"))
+        value = read_offset(entry.details.get("value"))
+        if before is None or value is None:
+            break
+        lengths.append(math.hypot(value.x_mm - before.x_mm, value.y_mm - before.y_mm))
+    return tuple(reversed(lengths))

@@ -1,0 +1,122 @@
+"""Putting an old value back: once, and only over what this change wrote."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from robolink.errors import ReadBackError, RobolinkError
+from robolink.messages import tr
+from robolink.model import (
+    EntryKind,
+    NewEntry,
+    ToolOffset,
+    ToolTable,
+    describe_offset,
+    plain_offset,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One tool of a change.
+
+    Attributes:
+        tool: Its number.
+        before: What it held; ``None`` for undefined.
+        requested: What it is to hold.
+    """
+
+    tool: int
+    before: ToolOffset | None
+    requested: ToolOffset | None
+
+
+@dataclass(frozen=True, slots=True)
+class PutBack:
+    """What became of one tool whose change was taken back.
+
+    Attributes:
+        tool: Its number.
+        restored: Whether it holds its old value now, proved by reading.
+        written: Whether a write was needed for that.
+        sentence: The same for a person.
+        entry: The same for the journal.
+    """
+
+    tool: int
+    restored: bool
+    written: bool
+    sentence: str
+    entry: NewEntry
+
+
+def put_back(
+    tools: ToolTable, steps: Sequence[Step], *, spoiled: int | None = None
+) -> list[PutBack]:
+    """Give each tool its old value back, the last one first, with one write each at most.
+
+    Args:
+        tools: The table.
+        steps: What the change was to do.
+        spoiled: A tool whose write was read back as something else, so that what it holds is
+            this change's own doing.
+    """
+    return [_put_one_back(tools, step, spoiled=step.tool == spoiled) for step in reversed(steps)]
+
+
+def _put_one_back(tools: ToolTable, step: Step, *, spoiled: bool) -> PutBack:
+    tool, before = step.tool, step.before
+    try:
+        now = tools.read(tool)
+        if tools.same(now, before):
+            return _restored(step, tr("Tool {tool} holds its old value.", tool=tool), written=False)
+        if not (spoiled or tools.same(now, step.requested)):
+            return _conflict(step, now)
+        if before is None:
+            tools.clear(tool, expected=now)
+        else:
+            tools.write(tool, before, expected=now)
+    except RobolinkError as error:
+        return _failed(step, error)
+    sentence = tr("The old value of tool {tool} was written back.", tool=tool)
+    return _restored(step, sentence, written=True)
+
+
+def _restored(step: Step, sentence: str, *, written: bool) -> PutBack:
+    kind = EntryKind.ROLLED_BACK if written else EntryKind.NOT_APPLIED
+    entry = _entry(kind, step, step.before, sentence)
+    return PutBack(step.tool, restored=True, written=written, sentence=sentence, entry=entry)
+
+
+def _conflict(step: Step, now: ToolOffset | None) -> PutBack:
+    sentence = tr(
+        "Tool {tool} holds {now}: neither its old value {before} nor the new one {requested}. "
+        "Somebody else wrote it, so it was left alone.",
+        tool=step.tool,
+        now=describe_offset(now),
+        before=describe_offset(step.before),
+        requested=describe_offset(step.requested),
+    )
+    return PutBack(
+        step.tool, False, False, sentence, _entry(EntryKind.CONFLICT, step, now, sentence)
+    )
+
+
+def _failed(step: Step, error: RobolinkError) -> PutBack:
+    sentence = tr(
+        "The old value of tool {tool} could NOT be written back: {error}",
+        tool=step.tool,
+        error=error,
+    )
+    kind = EntryKind.CONFLICT if isinstance(error, ReadBackError) else EntryKind.UNKNOWN
+    entry = _entry(kind, step, None, sentence)
+    return PutBack(step.tool, restored=False, written=False, sentence=sentence, entry=entry)
+
+
+def _entry(kind: EntryKind, step: Step, now: ToolOffset | None, sentence: str) -> NewEntry:
+    details: dict[str, object] = {
+        "before": plain_offset(step.before),
+        "requested": plain_offset(step.requested),
+    }
+    if kind is not EntryKind.UNKNOWN:
+        details["value"] = plain_offset(now)
+    return NewEntry(kind, tool=step.tool, verdict=sentence, details=details)

@@ -1,0 +1,172 @@
+"""Settles open markers of every kind: those of the driver, and those of whole changes."""
+
+from robolink.errors import ConfigError, RobolinkError
+from robolink.messages import tr
+from robolink.model import (
+    Controller,
+    EntryKind,
+    Finding,
+    Marker,
+    MarkerKind,
+    NewEntry,
+    ToolOffset,
+    Verdict,
+    describe_offset,
+    plain_offset,
+    read_offset,
+)
+from robolink.transaction._put_back import Step, put_back
+
+
+class Settler:
+    """Examines and settles what was left open on one controller.
+
+    Args:
+        controller: The controller, connected.
+        keep: Whether new values that nobody verified stay, because a person says so.
+    """
+
+    def __init__(self, controller: Controller, *, keep: bool = False) -> None:
+        self._controller = controller
+        self._keep = keep
+
+    def examine(self, marker: Marker) -> Finding:
+        """Read what is needed to judge ``marker``; changes nothing.
+
+        Raises:
+            ConfigError: The marker was written by something else.
+        """
+        if marker.kind is not MarkerKind.CHANGE:
+            return self._controller.resolver.examine(marker)
+        tools = self._controller.tools
+        steps = _steps(marker)
+        now = {step.tool: tools.read(step.tool) for step in steps}
+        new = [tools.same(now[step.tool], step.requested) for step in steps]
+        old = [tools.same(now[step.tool], step.before) for step in steps]
+        sentence = " ".join(
+            tr("Tool {tool} holds {now}.", tool=step.tool, now=describe_offset(now[step.tool]))
+            for step in steps
+        )
+        if not all(n or o for n, o in zip(new, old, strict=True)):
+            return self._conflict(marker, steps, now)
+        if all(old):
+            text = tr("{holds} Nothing of the change took.", holds=sentence)
+            return _finding(marker, Verdict.NOT_APPLIED, text, steps, now)
+        if all(new) and (self._keep or not marker.details.get("verify")):
+            text = tr("{holds} The change is complete.", holds=sentence)
+            return _finding(marker, Verdict.DONE, text, steps, now)
+        why = tr("nobody verified it") if all(new) else tr("the change is not complete")
+        text = tr("{holds} Written, but {why}.", holds=sentence, why=why)
+        numbers = ", ".join(
+            str(step.tool) for step, is_old in zip(steps, old, strict=True) if not is_old
+        )
+        action = tr("put the old value of tool {numbers} back", numbers=numbers)
+        return Finding(marker, Verdict.NOT_FINISHED, text, action)
+
+    def settle(self, finding: Finding) -> None:
+        """Do what ``finding.action`` says and forget the marker.
+
+        Raises:
+            RobolinkError: It could not be done; the marker stays.
+        """
+        outcomes = self._controller.outcomes
+        outcomes.change = str(finding.marker.details.get("change", ""))
+        try:
+            if finding.marker.kind is not MarkerKind.CHANGE:
+                self._controller.resolver.settle(finding)
+            elif finding.verdict is not Verdict.NOT_FINISHED:
+                self._controller.finish(finding.marker, *finding.entries)
+            else:
+                self._put_back(finding.marker)
+        finally:
+            outcomes.change = ""
+
+    def forget(self, marker: Marker) -> None:
+        """Forget a marker on a person's word alone."""
+        self._controller.finish(
+            marker,
+            NewEntry(
+                EntryKind.DECISION,
+                operation=marker.operation,
+                verdict=tr("forgotten without looking"),
+                details={"request": marker.request, **marker.details},
+            ),
+        )
+
+    def _put_back(self, marker: Marker) -> None:
+        done = put_back(self._controller.tools, _steps(marker))
+        failures = [result for result in done if not result.restored]
+        entries = [result.entry for result in done]
+        if not failures:
+            self._controller.finish(marker, *entries)
+            return
+        self._controller.outcomes.append(*entries)
+        raise RobolinkError(
+            " ".join(result.sentence for result in failures),
+            remedy=tr("The change stays open. Look at the controller, then 'robolink resolve'."),
+            controller=self._controller.identity,
+        )
+
+    def _conflict(
+        self, marker: Marker, steps: list[Step], now: dict[int, ToolOffset | None]
+    ) -> Finding:
+        sentence = " ".join(
+            tr(
+                "Tool {tool} holds {now}; before the change it was {before}, it was to be "
+                "{requested}.",
+                tool=step.tool,
+                now=describe_offset(now[step.tool]),
+                before=describe_offset(step.before),
+                requested=describe_offset(step.requested),
+            )
+            for step in steps
+        )
+        return _finding(marker, Verdict.CONFLICT, sentence, steps, now)
+
+
+_KINDS = {
+    Verdict.DONE: EntryKind.DONE,
+    Verdict.NOT_APPLIED: EntryKind.NOT_APPLIED,
+    Verdict.CONFLICT: EntryKind.CONFLICT,
+}
+
+
+def _finding(
+    marker: Marker,
+    verdict: Verdict,
+    sentence: str,
+    steps: list[Step],
+    now: dict[int, ToolOffset | None],
+) -> Finding:
+    entries = tuple(
+        NewEntry(
+            _KINDS[verdict],
+            operation=marker.operation,
+            tool=step.tool,
+            verdict=verdict,
+            details={
+                "before": plain_offset(step.before),
+                "requested": plain_offset(step.requested),
+                "value": plain_offset(now[step.tool]),
+                "found_later": True,
+            },
+        )
+        for step in steps
+    )
+    return Finding(marker, verdict, sentence, entries=entries)
+
+
+def _steps(marker: Marker) -> list[Step]:
+    tools = marker.details.get("tools")
+    try:
+        if not isinstance(tools, dict):
+            raise TypeError
+        return [
+            Step(int(tool), read_offset(values["before"]), read_offset(values["requested"]))
+            for tool, values in tools.items()
+        ]
+    except (KeyError, TypeError, ValueError) as error:
+        raise ConfigError(
+            tr("The marker of {when} cannot be understood.", when=marker.begun_at),
+            remedy=tr("Compare the tools with a backup, then 'robolink resolve --forget'."),
+        ) from error

@@ -1,0 +1,15 @@
+"""What the tests of the journal do to it."""
+
+from robolink.journal import Journal
+from robolink.model import Marker, MarkerKind
+
+
+def marker(operation: str = "a", kind: MarkerKind = MarkerKind.SET) -> Marker:
+    """Return a marker of a tool write or another act on tool 3."""
+    return Marker(operation, kind, "TLSet 3, XY(...)", "2025-01-01T00:00:00+00:00", {"tool": 3})
+
+
+def run(journal: Journal, statement: str) -> None:
+    """Change the database behind the journal's back."""
+    with journal._store.write() as tables:
+        tables.connection.exec_driver_sql(statement)

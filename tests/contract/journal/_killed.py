@@ -1,0 +1,79 @@
+"""Work on a journal again and again, killed one statement later each time.
+
+Arguments: where the journal is, and ``again`` to do the steps of a tool write in it or ``anew``
+to make a journal for each run. For each run one line on stdout says how many steps were
+acknowledged before the process was killed; the last run comes to its end.
+"""
+
+import os
+import signal
+import sys
+from collections.abc import Callable
+from itertools import count
+
+from sqlalchemy import Engine, event
+
+from robolink.journal import EntryKind, JournalOutcomeLog, NewEntry, open_journal
+from tests.contract.journal._acts import marker
+
+STEPS: tuple[Callable[[JournalOutcomeLog], None], ...] = (
+    lambda log: log.look(),
+    lambda log: log.begin(marker("a")),
+    lambda log: log.clear("a", *(NewEntry(kind) for kind in list(EntryKind)[1:4])),
+    lambda log: log.append(NewEntry(EntryKind.VERIFY)),
+    lambda log: log.begin(marker("b")),
+)
+
+
+def kill_at(number: int) -> None:
+    """Let this process die before its statement or its commit of that number."""
+    left = number
+
+    def step(*_arguments: object) -> None:
+        nonlocal left
+        left -= 1
+        if left == 0:
+            os.kill(os.getpid(), signal.SIGKILL)
+
+    event.listen(Engine, "before_cursor_execute", step)
+    event.listen(Engine, "commit", step)
+
+
+def run_once(number: int, acknowledge: int, location: str) -> None:
+    """Do all steps, killed at statement ``number``; each step done is a byte on a pipe."""
+    log = open_journal(location).log(f"cell-{number}")
+    kill_at(number)
+    for step in STEPS:
+        step(log)
+        os.write(acknowledge, b".")
+
+
+def make_once(number: int, location: str) -> None:
+    """Make a new journal, killed at statement ``number``."""
+    kill_at(number)
+    open_journal(f"{location}-{number}")
+
+
+def main() -> None:
+    """Run until one run comes to its end."""
+    location, anew = sys.argv[1], sys.argv[2] == "anew"
+    for number in count(1):
+        reader, writer = os.pipe()
+        child = os.fork()
+        if child == 0:
+            if anew:
+                make_once(number, location)
+            else:
+                run_once(number, writer, location)
+            os._exit(0)
+        os.close(writer)
+        with open(reader, "rb") as pipe:
+            acknowledged = len(pipe.read())
+        _, status = os.waitpid(child, 0)
+        print(acknowledged, flush=True)  # noqa: T201 - this is what the test reads
+        if os.WIFEXITED(status):
+            sys.exit(os.WEXITSTATUS(status))
+
+
+if __name__ == "__main__":
+    main()

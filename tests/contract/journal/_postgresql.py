@@ -1,0 +1,126 @@
+"""A PostgreSQL server of the tests' own, on loopback, gone with them."""
+
+import os
+import shutil
+import socket
+import subprocess
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from uuid import uuid4
+
+_NOBODY = 65534  # PostgreSQL refuses to run as root
+_START_S = 30.0
+
+
+def is_installed() -> bool:
+    """Whether a server can be started here."""
+    return shutil.which("initdb") is not None and shutil.which("postgres") is not None
+
+
+@dataclass
+class Server:
+    """One server.
+
+    Attributes:
+        folder: Where its data are.
+        port: Where it listens on 127.0.0.1.
+    """
+
+    folder: Path
+    port: int
+    process: subprocess.Popen[bytes] | None = None
+
+    def url(self, database: str = "postgres") -> str:
+        """Return where a journal is kept in one of its databases."""
+        return f"postgresql+psycopg://journal@127.0.0.1:{self.port}/{database}"
+
+    def empty_place(self) -> str:
+        """Return where an empty journal can be kept: in a schema of its own."""
+        name = f"j{uuid4().hex}"
+        self.execute(f"CREATE SCHEMA {name}")
+        return f"{self.url()}?options=-csearch_path%3D{name}"
+
+    def execute(self, statement: str) -> None:
+        """Run one statement outside of any journal."""
+        import psycopg
+
+        url = self.url().replace("+psycopg", "")
+        with psycopg.connect(url, autocommit=True) as connection:
+            connection.execute(statement.encode())
+
+    def start(self) -> None:
+        """Start it and wait until it answers."""
+        log = (self.folder / "log").open("ab")
+        self.process = _run_as_nobody(
+            ["postgres", "-D", str(self.folder / "data"), "-p", str(self.port)], log.fileno()
+        )
+        log.close()
+        deadline = time.monotonic() + _START_S
+        while not self._answers():
+            assert self.process.poll() is None, (self.folder / "log").read_text()
+            assert time.monotonic() < deadline, "PostgreSQL did not start"
+            time.sleep(0.02)
+
+    def stop(self) -> None:
+        """End it at once, as an administrator's fast shutdown does."""
+        assert self.process is not None
+        self.process.send_signal(2)
+        self.process.wait(timeout=_START_S)
+
+    def _answers(self) -> bool:
+        import psycopg
+
+        try:
+            self.execute("SELECT 1")
+        except psycopg.OperationalError:
+            return False
+        return True
+
+
+@contextmanager
+def served() -> Iterator[Server]:
+    """Run a server for the length of a block."""
+    folder = Path(tempfile.mkdtemp(prefix="robolink-postgresql-"))
+    try:
+        if os.geteuid() == 0:
+            os.chown(folder, _NOBODY, _NOBODY)
+        made = _run_as_nobody(
+            ["initdb", "-D", str(folder / "data"), "-U", "journal", "-A", "trust", "--no-sync"],
+            subprocess.DEVNULL,
+        )
+        assert made.wait(timeout=_START_S) == 0
+        with (folder / "data" / "postgresql.conf").open("a") as settings:
+            settings.write("listen_addresses = '127.0.0.1'\nfsync = off\n")
+            settings.write(f"unix_socket_directories = '{folder}'\n")
+        server = Server(folder, _free_port())
+        server.start()
+        try:
+            yield server
+        finally:
+            server.stop()
+    finally:
+        shutil.rmtree(folder)
+
+
+def _run_as_nobody(command: list[str], output: int) -> subprocess.Popen[bytes]:
+    if os.geteuid() != 0:
+        return subprocess.Popen(command, stdout=output, stderr=output, cwd="/")
+    return subprocess.Popen(
+        command,
+        stdout=output,
+        stderr=output,
+        cwd="/",
+        user=_NOBODY,
+        group=_NOBODY,
+        extra_groups=[],
+    )
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])

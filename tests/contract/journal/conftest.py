@@ -1,0 +1,54 @@
+"""The two kinds of database that keep a journal, empty for each test."""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from robolink.journal._journal import Journal
+from robolink.journal._places import place_of
+from robolink.journal._store import Store
+from tests.contract.journal._postgresql import Server, is_installed, served
+
+Opener = Callable[..., Journal]
+
+
+@pytest.fixture(scope="session")
+def server() -> Iterator[Server]:
+    """A PostgreSQL server."""
+    if not is_installed():
+        pytest.skip("PostgreSQL is not installed here: initdb and postgres are missing")
+    with served() as server:
+        yield server
+
+
+@pytest.fixture(params=["sqlite", "postgresql"])
+def location(request: pytest.FixtureRequest, tmp_path: Path) -> str:
+    """Where an empty database is."""
+    if request.param == "sqlite":
+        return str(tmp_path / "journal.db")
+    server: Server = request.getfixturevalue("server")
+    return server.empty_place()
+
+
+@pytest.fixture
+def open_anew() -> Iterator[Opener]:
+    """Open a journal with a connection of its own, as another process would."""
+    opened: list[Store] = []
+
+    def open_it(location: str, *, read_only: bool = False) -> Journal:
+        place = place_of(location)
+        store = Store(place, read_only=read_only)
+        opened.append(store)
+        store.open()
+        return Journal(store, place.location, read_only=read_only)
+
+    yield open_it
+    for store in opened:
+        store.close()
+
+
+@pytest.fixture
+def journal(location: str, open_anew: Opener) -> Journal:
+    """A new journal."""
+    return open_anew(location)

@@ -1,0 +1,293 @@
+"""What can be wrong with the file: each says which file, what happened and what to do."""
+
+import os
+import shutil
+import sqlite3
+import subprocess
+import sys
+import tempfile
+import textwrap
+from pathlib import Path
+
+import pytest
+from sqlalchemy import Engine, event
+
+from robolink.errors import JournalError
+from robolink.journal import EntryKind, NewEntry, Verification, memory_journal, open_journal
+from tests.contract.journal._acts import marker
+
+ROOT = Path(__file__).parents[3]
+NOBODY = 65534
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "cell" / "journal.db"
+
+
+@pytest.fixture
+def filled(path, open_anew):
+    """A closed journal with 200 entries and one open marker."""
+    journal = open_anew(str(path))
+    log = journal.log("cell")
+    log.append(*[NewEntry(EntryKind.RAW, verdict="x" * 50)] * 199)
+    log.begin(marker("left open"))
+    log.close()
+    journal.close()
+    assert sorted(path.parent.iterdir()) == [path]
+    return path
+
+
+def refused(act, path, *said):
+    with pytest.raises(JournalError) as caught:
+        act()
+    assert str(path) in caught.value.what
+    for words in said:
+        assert words in str(caught.value)
+    assert caught.value.remedy
+    return caught.value
+
+
+def test_a_new_journal_and_its_folder_are_their_owner_s_only(path, open_anew):
+    before = os.umask(0)
+    try:
+        open_anew(str(path)).log("cell").append(NewEntry(EntryKind.RAW))
+    finally:
+        os.umask(before)
+    assert path.parent.stat().st_mode & 0o777 == 0o700
+    files = list(path.parent.iterdir())
+    assert len(files) == 3  # with the log and the index of WAL
+    assert all(file.stat().st_mode & 0o777 == 0o600 for file in files)
+
+
+def test_a_folder_that_is_there_keeps_its_rights(tmp_path, open_anew):
+    tmp_path.chmod(0o755)
+    open_anew(str(tmp_path / "journal.db"))
+    assert tmp_path.stat().st_mode & 0o777 == 0o755
+
+
+def test_commits_are_durable_and_writers_do_not_block_readers(path, open_anew):
+    journal = open_anew(str(path))
+    with journal._store.read() as tables:
+        pragmas = {
+            name: tables.connection.exec_driver_sql(f"PRAGMA {name}").scalar_one()
+            for name in ("journal_mode", "synchronous", "foreign_keys", "busy_timeout")
+        }
+    assert pragmas == {
+        "journal_mode": "wal",
+        "synchronous": 2,
+        "foreign_keys": 1,
+        "busy_timeout": 3000,
+    }
+
+
+def test_one_process_opens_a_place_once_and_memory_is_shared_by_name(path):
+    journal = open_journal(str(path))
+    assert open_journal(f"sqlite:///{path}") is journal
+    assert open_journal(str(path), read_only=True) is not journal
+    assert memory_journal(str(path)) is memory_journal(str(path))
+    assert memory_journal(str(path)) is not memory_journal("another")
+    journal.close()
+    journal.log("cell").append(NewEntry(EntryKind.RAW))
+    assert journal.count() == 1
+    journal.close()
+
+
+def test_a_journal_that_is_not_there_is_not_made_by_reading(path, open_anew):
+    refused(
+        lambda: open_anew(str(path), read_only=True), path, "There is no journal", "first change"
+    )
+    assert not path.parent.exists()
+
+
+def test_a_folder_that_cannot_be_made_is_told(tmp_path, open_anew):
+    (tmp_path / "file").write_text("in the way")
+    path = tmp_path / "file" / "journal.db"
+    refused(lambda: open_anew(str(path)), path, "ROBOLINK_JOURNAL", "not touched")
+
+
+@pytest.mark.parametrize(
+    "content",
+    [b"not a database at all" * 99, b"SQLite format 2\0" + bytes(5000)],
+    ids=["text", "2"],
+)
+def test_a_file_of_something_else_is_left_as_it_is(path, open_anew, content):
+    path.parent.mkdir()
+    path.write_bytes(content)
+    refused(
+        lambda: open_anew(str(path)), path, "it is not a journal", "Move it away", "not touched"
+    )
+    refused(lambda: open_anew(str(path), read_only=True), path, "it is not a journal")
+    assert path.read_bytes() == content
+
+
+def test_an_empty_file_becomes_a_journal(path, open_anew):
+    path.parent.mkdir()
+    path.touch()
+    refused(lambda: open_anew(str(path), read_only=True), path, "is empty")
+    assert open_anew(str(path)).verify() == Verification(0, ())
+
+
+def test_a_damaged_page_is_told_and_what_can_be_read_is_read(filled, open_anew):
+    content = bytearray(filled.read_bytes())
+    last = content.rindex(b"TLSet 3, XY")  # the page of the last entry or of the marker
+    page = last // 4096 * 4096
+    content[page : page + 200] = b"\xff" * 200
+    filled.write_bytes(content)
+    journal = open_anew(str(filled))
+
+    def everything():
+        list(journal.entries())
+        journal.log("cell").open_markers()
+        journal.log("other").begin(marker())
+
+    refused(everything, filled, "it is damaged", "journal export --read-only", "by hand")
+    assert open_anew(str(filled), read_only=True).entry(1).verdict == "x" * 50
+    assert filled.read_bytes()[page : page + 200] == b"\xff" * 200
+
+
+def test_a_disk_that_is_full_leaves_the_journal_as_it_was(filled, open_anew):
+    journal = open_anew(str(filled))
+    log = journal.log("other")
+    with journal._store.read() as tables:
+        pages = tables.connection.exec_driver_sql("PRAGMA page_count").scalar_one()
+        tables.connection.exec_driver_sql(f"PRAGMA max_page_count = {pages}")
+
+    def fill():
+        for _ in range(100):
+            log.append(NewEntry(EntryKind.RAW, verdict="x" * 500))
+
+    refused(fill, filled, "the disk is full", "Free space there")
+    # The connection of before was dropped, and the limit with it.
+    assert journal.verify().problems == ()
+    log.begin(marker())
+
+
+def test_nothing_is_sent_when_the_intent_finds_no_space(filled):
+    program = """
+        import resource, sys
+        from robolink.errors import JournalError
+        from robolink.journal import open_journal
+        from tests.contract.journal._acts import marker
+
+        log = open_journal(sys.argv[1]).log("other")
+        log.begin(marker("before"))
+        resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))
+        try:
+            log.begin(marker("a"))
+        except JournalError as error:
+            print(error)
+    """
+    shown = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(program), str(filled)],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert "the disk" in shown.stdout
+    assert "The controller was not touched." in shown.stdout
+    journal = open_journal(str(filled))
+    assert [known.operation for known in journal.log("other").open_markers()] == ["before"]
+    assert journal.verify() == Verification(201, ())
+    journal.close()
+
+
+@pytest.fixture
+def as_nobody():
+    """Be an ordinary user, for whom rights count."""
+    if os.geteuid() != 0:
+        yield
+        return
+    os.seteuid(NOBODY)
+    try:
+        yield
+    finally:
+        os.seteuid(0)
+
+
+@pytest.fixture
+def public(filled):
+    """The journal in a folder that every user may look into."""
+    folder = Path(tempfile.mkdtemp(prefix="robolink-journal-"))
+    yield Path(shutil.copy(filled, folder))
+    folder.chmod(0o755)
+    shutil.rmtree(folder)
+
+
+@pytest.mark.parametrize(("of_folder", "of_file"), [(0o555, 0o444), (0o555, 0o644), (0o755, 0o444)])
+def test_what_may_not_be_written_is_read(public, open_anew, of_folder, of_file, request):
+    public.chmod(of_file)
+    public.parent.chmod(of_folder)
+    request.getfixturevalue("as_nobody")
+
+    def write():
+        open_anew(str(public)).log("cell").begin(marker("b"))
+
+    refused(write, public, "may not write", "Make the file and its folder writable", "not touched")
+    reader = open_anew(str(public), read_only=True)
+    assert reader.verify() == Verification(200, ())
+    assert [known.operation for known in reader.log("cell").open_markers()] == ["left open"]
+
+
+def test_a_locked_journal_is_read_and_not_written(filled, open_anew, monkeypatch):
+    monkeypatch.setattr("robolink.journal._engines.BUSY_S", 0.1)
+    holder = sqlite3.connect(filled, isolation_level=None)
+    try:
+        holder.execute("PRAGMA locking_mode = EXCLUSIVE")
+        holder.execute("BEGIN EXCLUSIVE")
+        holder.execute("UPDATE head SET number = number")
+        refused(lambda: open_anew(str(filled)), filled, "keeps it locked", "Wait", "not touched")
+        assert open_anew(str(filled), read_only=True).count() == 200
+    finally:
+        holder.close()
+    open_anew(str(filled)).log("other").begin(marker())
+
+
+def test_a_journal_that_is_moved_away_while_in_use_is_not_written_into_nowhere(filled, open_anew):
+    journal = open_anew(str(filled))
+    log = journal.log("cell")
+    moved = filled.with_name("moved.db")
+    filled.rename(moved)
+    refused(lambda: log.begin(marker("b")), filled, "moved or deleted while in use", "Put it back")
+    moved.rename(filled)
+    log.begin(marker("b"))
+    assert len(log.open_markers()) == 2
+
+
+def test_many_entries_do_not_slow_down_the_questions_of_every_day(path, open_anew):
+    journal = open_anew(str(path))
+    log = journal.log("cell")
+    log.append(NewEntry(EntryKind.DONE, tool=3, details={"value": 1}))
+    for _ in range(4):
+        log.append(*[NewEntry(EntryKind.VERIFY, tool=3, change="c")] * 500)
+    asked = []
+
+    def note(_connection, _cursor, statement, parameters, *_rest):
+        asked.append((statement, parameters))
+
+    questions = (
+        lambda: journal.entry(5),
+        lambda: next(journal.entries()),
+        lambda: next(journal.entries(controller="cell", before=99)),
+        lambda: next(journal.entries(controller="cell", tool=3)),
+        lambda: next(journal.entries(change="c", newest_first=False)),
+        lambda: journal.last_value("cell", 3),
+    )
+    event.listen(Engine, "before_cursor_execute", note)
+    try:
+        assert all(question() for question in questions)
+    finally:
+        event.remove(Engine, "before_cursor_execute", note)
+    assert len(asked) == len(questions)
+    plans = {}
+    with journal._store.read() as tables:
+        for statement, parameters in asked:
+            plan = tables.connection.exec_driver_sql(f"EXPLAIN QUERY PLAN {statement}", parameters)
+            plans[statement] = [row.detail for row in plan]
+    for statement, plan in plans.items():
+        by_number = "WHERE" not in statement and plan == ["SCAN entries"]  # and a limit
+        assert by_number or (len(plan) == 1 and plan[0].startswith("SEARCH entries USING")), plan
+    assert any("entries_with_value" in plan[0] for plan in plans.values())
+    assert any("entries_by_change" in plan[0] for plan in plans.values())
+    assert journal.last_value("cell", 3).number == 1

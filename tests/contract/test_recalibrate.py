@@ -1,0 +1,387 @@
+"""``recalibrate``: the example recipes and what a recipe asks for, on a served simulator."""
+
+import json
+import signal
+from pathlib import Path
+
+import pytest
+from robolink_simulators.epson.points import Point
+
+from robolink.journal import EntryKind, open_journal
+from robolink.model import Pose, ToolOffset, rotate_xy
+from tests.faults._nozzle_cell import OLD_TIP, served_cell
+from tests.faults._requests import changes
+
+pytestmark = [pytest.mark.simulator_only, pytest.mark.timeout(120)]
+
+EXAMPLES = Path(__file__).parents[2] / "examples" / "recipes"
+PIN = (300.0, 100.0, -60.0)
+
+POINTS = """
+schema = "robolink/recipe/1"
+name = "points"
+basis = "{basis}"
+z = "{z}"
+[source]
+kind = "points"
+[station]
+id = "PIN"
+[[tools]]
+number = 1
+points = [901, 902]
+"""
+
+TOUCH = """
+schema = "robolink/recipe/1"
+name = "touch"
+basis = "{basis}"
+z = "{z}"
+[source]
+kind = "operator"
+[station]
+id = "PIN"
+{station}
+[[tools]]
+number = 1
+{more}
+"""
+
+
+@pytest.fixture
+def cell(tmp_path, monkeypatch):
+    with served_cell(tmp_path / "cell", monkeypatch) as cell:
+        cell.simulator.machine.motors_on = True
+        yield cell
+
+
+@pytest.fixture
+def recipe(tmp_path):
+    def write(text, **values):
+        values = {"basis": "absolute", "z": "kept", "station": "", "more": "", **values}
+        path = tmp_path / "recipe.toml"
+        path.write_text(text.format(**values))
+        return str(path)
+
+    return write
+
+
+def assisted(cell, path, *more):
+    return cell.run("recalibrate", path, "--assist", cell.assist_url, "--yes", *more)
+
+
+def truth(cell, tool=1):
+    return cell.simulator.world.tips[tool]
+
+
+def aside(offset, tip):
+    return pytest.approx(tip.components()[:2], abs=0.06) == offset.components()[:2]
+
+
+def teach(cell, tip):
+    """Teach P901 and P902 on the pin with this tip, in Tool 0."""
+    for number, u_deg in ((901, 10.0), (902, -170.0)):
+        x, y = rotate_xy(tip.x_mm, tip.y_mm, u_deg)
+        pose = Pose(PIN[0] - x, PIN[1] - y, PIN[2] - tip.z_mm, u_deg)
+        cell.simulator.machine.points.store(number, Point.at(pose))
+
+
+def journal(cell, *kinds):
+    return list(open_journal().log(cell.url).recorded(kinds=kinds))
+
+
+def test_a_scara_with_a_pin_and_a_person(cell):
+    done = assisted(cell, str(EXAMPLES / "scara-pin.toml"), "--nozzle", "N-7", "--operator", "anna")
+    assert done.code == 0, done.err
+    assert aside(cell.tool_1, truth(cell))
+    cell.check_settings_are_those_of_before()
+    (entry,) = journal(cell, EntryKind.DONE)
+    assert entry.signature.operator == "anna"
+    assert entry.signature.nozzle == "N-7"
+    assert entry.signature.recipe == "Dispensing needle on the pin"
+    assert len(entry.signature.recipe_hash) == 64
+    assert entry.signature.station == "PIN-07"
+    (calibration,) = journal(cell, EntryKind.CALIBRATION)
+    assert len(calibration.details["poses"]) == 2
+    assert "change up to 2 mm" in calibration.tolerance
+    assert calibration.change == entry.change
+    assert open_journal().verify().problems == ()
+
+
+def test_pendant_points_only_and_nothing_moves(cell):
+    path = str(EXAMPLES / "pendant-points.toml")
+    teach(cell, ToolOffset(12.3, -3.4, -20))
+    refused = cell.run("recalibrate", path, "--yes")
+    assert refused.code == 9
+    assert "consistent only with the tool value that they were taught with" in refused.err
+    first = cell.run("recalibrate", path, "--yes", "--reference")
+    assert first.code == 0, first.err
+    assert cell.tool_1 == OLD_TIP
+    assert cell.run("recalibrate", path, "--yes").code == 0
+    assert cell.tool_1 == OLD_TIP
+    teach(cell, ToolOffset(12.5, -3.5, -20))
+    second = cell.run("recalibrate", path, "--yes", "--json")
+    assert second.code == 0, second.err
+    # What was wrong with the stored offset stays: only the difference is written.
+    expected = ToolOffset(OLD_TIP.x_mm + 0.2, OLD_TIP.y_mm - 0.1, OLD_TIP.z_mm)
+    assert cell.tool_1.components() == pytest.approx(expected.components(), abs=2e-3)
+    (tool,) = json.loads(second.out)["tools"]
+    assert tool["tip"]["x_mm"] == pytest.approx(12.5, abs=1e-3)
+    assert cell.simulator.machine.arm.moves_started == 0
+    assert not [text for text in changes(cell.requests) if "TLSet 1" not in text]
+
+
+def test_two_nozzles_on_one_head(cell):
+    cell.simulator.machine.tools.set(2, ToolOffset(12.4, -3.7, -20))
+    cell.simulator.world.change_nozzle(2)
+    done = assisted(cell, str(EXAMPLES / "two-nozzles.toml"), "--json")
+    assert done.code == 0, done.err
+    assert aside(cell.tool_1, truth(cell, 1))
+    assert aside(cell.simulator.machine.tools.get(2), truth(cell, 2))
+    requests = cell.requests
+    first_write = next(n for n, text in enumerate(requests) if "TLSet" in text and "XY" in text)
+    measured = [entry.number for entry in journal(cell, EntryKind.CALIBRATION)]
+    written = [entry.number for entry in journal(cell, EntryKind.WRITE)]
+    assert len(measured) == len(written) == 2
+    assert max(measured) < min(written)
+    assert "$SetIO,8,0" not in requests[first_write:]
+    assert len({entry.change for entry in journal(cell)}) == 1
+    assert [tool["write"]["skipped"] for tool in json.loads(done.out)["tools"]] == [False, False]
+
+
+def test_two_nozzles_are_written_both_or_none(cell):
+    cell.simulator.machine.tools.set(2, ToolOffset(12.4, -3.7, -20))
+    cell.simulator.world.change_nozzle(2)
+    machine = cell.simulator.machine
+    kept = machine.tools.get(2)
+    written: list[ToolOffset | None] = []
+
+    def spoil_the_second_write(_number, text):
+        if len(written) == 1:
+            machine.tools.set(2, ToolOffset(1, 2, 3))
+            written.append(None)
+        elif text.startswith('$Execute,"TLSet 2, XY') and not written:
+            written.append(machine.tools.get(1))
+
+    with cell.simulator.lock:
+        cell.simulator.on_request = spoil_the_second_write
+    failed = assisted(cell, str(EXAMPLES / "two-nozzles.toml"))
+    assert failed.code == 5, failed.err
+    assert "reads back as X 1.000 Y 2.000 Z 3.000" in failed.err
+    assert written[0] not in (None, OLD_TIP)
+    assert cell.tool_1 == OLD_TIP
+    assert machine.tools.get(2) == kept
+    assert cell.open_markers() == ()
+    cell.check_settings_are_those_of_before()
+    assert {entry.tool for entry in journal(cell, EntryKind.ROLLED_BACK)} == {1, 2}
+    assert "Outputs stay as the recipe switched them: 8 off" in failed.err
+
+
+def test_every_event_is_one_json_line_and_the_last_is_the_result(cell, recipe):
+    done = assisted(cell, recipe(TOUCH), "--jsonl")
+    assert done.code == 0, done.err
+    events = [json.loads(line) for line in done.out.splitlines()]
+    assert {event["schema"] for event in events} == {"robolink/recalibration-event/1"}
+    names = [event["event"] for event in events]
+    assert names[0] == "start"
+    assert names[-1] == "result"
+    assert {"phase", "step", "proposal", "write", "verification"} <= set(names)
+    assert names.count("result") == 1
+
+
+@pytest.mark.parametrize("words", [(), ("--json",), ("--jsonl",)])
+def test_an_error_ends_the_output_in_the_form_that_was_asked_for(cell, recipe, words):
+    failed = cell.run("recalibrate", recipe(POINTS), "--yes", *words)
+    assert failed.code == 7
+    if words == ("--jsonl",):
+        last = json.loads(failed.out.splitlines()[-1])
+        assert (last["event"], last["exit_code"]) == ("error", 7)
+        assert last["error"]["code"] == "undefined_point"
+    elif words:
+        assert json.loads(failed.out)["error"]["code"] == "undefined_point"
+    assert ("Not taught on this controller: P901, P902" in failed.err) is (words != ("--json",))
+
+
+def test_a_dry_run_shows_the_requests_and_sends_none(cell):
+    shown = cell.run(
+        "recalibrate", str(EXAMPLES / "two-nozzles.toml"), "--dry-run", "--assist", cell.assist_url
+    )
+    assert shown.code == 0, shown.err
+    for words in ('$Execute,"Go XY(', "ask 'Lot of the new nozzles?'", "switch output 8 off"):
+        assert words in shown.out
+    assert changes(cell.requests) == []
+    assert journal(cell) == []
+
+
+def test_z_is_typed_for_each_tool(cell, recipe):
+    missing = cell.run("recalibrate", recipe(TOUCH, z="typed"), "--yes")
+    assert missing.code == 2
+    assert "--z 1=MM" in missing.err
+    wrong = assisted(cell, recipe(TOUCH, z="typed"), "--z", "1=long")
+    assert wrong.code == 2
+    assert cell.requests == []
+    done = assisted(cell, recipe(TOUCH, z="typed"), "--z", "1=-20.75")
+    assert done.code == 0, done.err
+    assert cell.tool_1.z_mm == -20.75
+    assert assisted(cell, recipe(TOUCH), "--z", "1=-20").code == 2
+
+
+def test_z_is_measured_on_a_pin_of_known_height(cell, recipe):
+    station = f"z_mm = {cell.simulator.world.pin_mm[2]}"
+    done = assisted(cell, recipe(TOUCH, z="measured", station=station))
+    assert done.code == 0, done.err
+    assert cell.tool_1.z_mm == pytest.approx(truth(cell).z_mm, abs=0.06)
+
+
+def test_z_is_measured_as_the_difference_of_two_contacts(cell, recipe):
+    path = recipe(TOUCH, basis="difference", z="measured")
+    reference = assisted(cell, path, "--reference")
+    assert reference.code == 0, reference.err
+    before = truth(cell)
+    cell.simulator.world.change_nozzle(1)
+    after = truth(cell)
+    done = assisted(cell, path)
+    assert done.code == 0, done.err
+    moved = [b - a for a, b in zip(before.components()[:3], after.components()[:3], strict=True)]
+    expected = [old + by for old, by in zip(OLD_TIP.components()[:3], moved, strict=True)]
+    assert cell.tool_1.components()[:3] == pytest.approx(expected, abs=0.08)
+
+
+def test_a_reference_does_not_stand_for_a_tool_that_somebody_changed(cell, recipe):
+    path = recipe(TOUCH, basis="difference")
+    assert assisted(cell, path, "--reference").code == 0
+    cell.simulator.machine.tools.set(1, ToolOffset(12.2, -3.5, -20))
+    refused = assisted(cell, path)
+    assert refused.code == 7
+    assert "stands for X 12.000" in refused.err
+
+
+def test_a_tool_that_somebody_else_changed_is_named_with_the_usual_causes(cell, recipe):
+    assert assisted(cell, recipe(TOUCH)).code == 0
+    cell.simulator.machine.tools.set(1, ToolOffset(12.2, -3.5, -20))
+    done = assisted(cell, recipe(TOUCH))
+    assert done.code == 0, done.err
+    for words in ("mm away", "a program that runs TLSet", "on the pendant", "restored project"):
+        assert words in done.err
+
+
+def test_a_target_outside_the_box_is_refused_before_anything_moves(cell, recipe):
+    more = "approach = { x_mm = 300, y_mm = 300, z_mm = -80, u_deg = 0 }\n[box]\nsideways_mm = 20"
+    refused = assisted(cell, recipe(TOUCH, more=more))
+    assert refused.code == 2, refused.err
+    assert cell.moves_requested == 0
+
+
+def test_a_measurement_that_is_refused_is_taken_again_and_then_ends_the_change(cell, recipe):
+    source = '[refusal]\naction = "measure_again"\nattempts = 3\n[tolerances]\nrms_mm = 0.001'
+    path = Path(recipe(TOUCH, more=source))
+    path.write_text(
+        path.read_text().replace('"operator"', '"operator"\nmethod = "n_angle"\ncount = 3')
+    )
+    refused = assisted(cell, str(path), "--jsonl")
+    assert refused.code == 7, refused.err
+    events = [json.loads(line) for line in refused.out.splitlines()]
+    again = [event["again"] for event in events if event["event"] == "refused"]
+    assert again == [True, True, False]
+    assert cell.tool_1 == OLD_TIP
+    assert len(journal(cell, EntryKind.REFUSED)) == 3
+    assert all(entry.details["poses"] for entry in journal(cell, EntryKind.REFUSED))
+
+
+def test_corrections_that_grow_on_one_nozzle_are_refused(cell, recipe):
+    world = cell.simulator.world
+    for step, (dx, code) in enumerate([(0.2, 0), (0.3, 7)]):
+        world.tips[1] = ToolOffset(cell.tool_1.x_mm + dx, cell.tool_1.y_mm, cell.tool_1.z_mm)
+        before = cell.tool_1
+        done = assisted(cell, recipe(TOUCH), "--nozzle", "N-1")
+        assert done.code == code, (step, done.err)
+    assert "they grow" in done.err
+    assert cell.tool_1 == before
+    # Another nozzle may sit further off.
+    assert assisted(cell, recipe(TOUCH), "--nozzle", "N-2").code == 0
+
+
+def test_a_jump_takes_an_engineer(cell, recipe, tmp_path, monkeypatch):
+    cell.simulator.world.tips[1] = ToolOffset(15.5, -3.5, -20)
+    (tmp_path / "robolink.toml").write_text(
+        f'[cells.a]\nurl = "{cell.url}"\nremote_timeout_s = 60.0\n'
+        'remote_timeout_confirmed_by = "me"\n'
+        '[cells.a.people]\nanna = "engineer"\n"4711" = "operator"\n'
+    )
+    monkeypatch.chdir(tmp_path)
+    path = recipe(TOUCH)
+
+    def run(*words):
+        return assisted(cell, path, "-c", "a", *words)
+
+    assert run("--operator", "anna").code == 7
+    assert run("--operator", "4711", "--accept-jump", "5").code == 9
+    assert run("--accept-jump", "5").code == 9
+    assert run("--operator", "eve").code == 2
+    assert cell.tool_1 == OLD_TIP
+    done = run("--operator", "anna", "--accept-jump", "5")
+    assert done.code == 0, done.err
+    decisions = [entry.verdict for entry in journal(cell, EntryKind.DECISION)]
+    assert any("let tool 1 jump by" in verdict for verdict in decisions)
+
+
+@pytest.mark.parametrize("nth", [2, 7, 12])
+def test_ctrl_c_during_a_recipe_leaves_the_old_value_and_the_tool_selected(cell, nth, recipe):
+    from tests.faults._client_process import ClientProcess
+
+    moves = []
+
+    def press(_number, text):
+        if '"Move ' in text or '"Go ' in text:
+            moves.append(text)
+            if len(moves) == nth:
+                client.signal(signal.SIGINT)
+
+    path = str(EXAMPLES / "scara-pin.toml")
+    with cell.simulator.lock:
+        cell.simulator.on_request = press
+        client = ClientProcess(
+            [
+                "-c",
+                cell.url,
+                "recalibrate",
+                path,
+                "--assist",
+                cell.assist_url,
+                "--yes",
+                "--nozzle",
+                "N",
+                "--jsonl",
+            ],
+            environment={"ROBOLINK_STATE_DIR": str(cell.state_folder)},
+            folder=cell.folder,
+        )
+    assert client.exit_code() == 130, client.err
+    assert json.loads(client.out.splitlines()[-1])["event"] == "error"
+    assert cell.tool_1 == OLD_TIP
+    assert cell.open_markers() == ()
+    cell.check_settings_are_those_of_before()
+
+
+@pytest.mark.parametrize("nth", [1, 5, 10, 16])
+def test_an_emergency_stop_during_a_recipe_repeats_nothing(cell, nth):
+    moves = []
+
+    def press(_number, text):
+        if '"Move ' in text or '"Go ' in text:
+            moves.append(text)
+            if len(moves) == nth:
+                cell.simulator.panel.press_estop()
+
+    with cell.simulator.lock:
+        cell.simulator.on_reply = None
+        cell.simulator.on_request = press
+    ended = assisted(cell, str(EXAMPLES / "scara-pin.toml"), "--nozzle", "N")
+    assert ended.code in (5, 6), ended.err
+    assert "mergency stop" in ended.err
+    assert len(moves) == nth
+    cell.simulator.panel.release_estop()
+    assert cell.run("reset").code == 0
+    assert cell.run("recover").code in (0, 6)
+    assert cell.run("resolve", "--yes").code == 0
+    assert cell.tool_1 == OLD_TIP
+    cell.check_settings_are_those_of_before()

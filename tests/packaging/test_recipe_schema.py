@@ -1,0 +1,111 @@
+"""The schema that editors read is the one the loader uses, and the page explains all of it."""
+
+import json
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from robolink.recipe import json_schema
+
+ROOT = Path(__file__).parents[2]
+SHIPPED = ROOT / "docs" / "recipe.schema.json"
+PAGE = ROOT / "docs" / "recipes.md"
+AGAIN = (
+    'run: python -c "import json, robolink.recipe as r; print(json.dumps(r.json_schema(), '
+    'indent=2))" > docs/recipe.schema.json'
+)
+LATER_THAN_DRAFT_4 = {"const", "$defs", "exclusiveMinimum", "if", "contains", "propertyNames"}
+HEADINGS = {
+    "Recipe": "The top of the file",
+    "OperatorSource": '`[source]` with `kind = "operator"`',
+    "PointsSource": '`[source]` with `kind = "points"`',
+    "Station": "`[station]`",
+    "Poses": "`[poses]`",
+    "FlangePose": "`[poses]`",
+    "Tool": "`[[tools]]`",
+    "Speeds": "`[speeds]`",
+    "Box": "`[box]`",
+    "Tolerances": "`[tolerances]`",
+    "Refusal": "`[refusal]`",
+    "Prompt": "`[[prompts]]`",
+    "Output": "`[[outputs]]`",
+}
+
+
+def tables(schema):
+    return {"Recipe": schema, **schema["definitions"]}
+
+
+def spelled(value, *, required):
+    """Yield what the page must say about a key: required, its default, its limits."""
+    if required:
+        yield "required"
+    for number in (value.get("default"), value.get("minimum"), value.get("maximum")):
+        if isinstance(number, (int, float)):
+            yield f"{number:g}"
+    for name in ("minItems", "maxItems", "maxLength"):
+        if name in value:
+            yield str(value[name])
+    yield from (f'"{word}"' for word in value.get("enum", ()))
+
+
+def test_the_shipped_schema_is_not_stale():
+    assert json.loads(SHIPPED.read_text(encoding="utf-8")) == json_schema(), AGAIN
+
+
+def test_the_wheel_brings_the_schema():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    included = project["tool"]["hatch"]["build"]["targets"]["wheel"]["force-include"]
+    assert included["docs/recipe.schema.json"] == "robolink/recipe/recipe.schema.json"
+
+
+def test_only_keywords_of_draft_4_are_used():
+    def keywords(node):
+        if isinstance(node, list):
+            return set().union(*map(keywords, node))
+        if not isinstance(node, dict):
+            return set()
+        inner = [keywords(value) for value in node.values()]
+        return set(node).union(*inner)
+
+    assert keywords(json_schema()) & LATER_THAN_DRAFT_4 == set()
+
+
+def test_every_key_is_described_to_the_editor():
+    schema = json_schema()
+    for name, table in tables(schema).items():
+        assert table["additionalProperties"] is False
+        for key, value in table["properties"].items():
+            assert "$ref" in value or value.get("description"), f"{name}.{key}"
+
+
+def test_no_key_allows_null_which_toml_does_not_have():
+    assert "null" not in json.dumps(json_schema())
+
+
+@pytest.mark.parametrize("table", HEADINGS)
+def test_the_page_explains_every_key_with_its_default_and_limits(table):
+    _, heading, rest = PAGE.read_text(encoding="utf-8").partition(f"\n### {HEADINGS[table]}\n")
+    assert heading
+    rows = dict(re.findall(r"^\| `(\w+)` \| (.*)$", rest.partition("\n#")[0], re.M))
+    schema = tables(json_schema())[table]
+    assert rows.keys() >= schema["properties"].keys()
+    for key, value in schema["properties"].items():
+        for words in spelled(value, required=key in schema.get("required", ())):
+            assert re.search(rf"(?<![\w.]){re.escape(words)}(?![\w.])", rows[key]), (key, words)
+
+
+def test_every_table_has_its_place_on_the_page():
+    assert HEADINGS.keys() == tables(json_schema()).keys()
+
+
+@pytest.mark.parametrize(
+    "path", sorted((ROOT / "examples" / "recipes").iterdir()), ids=lambda path: path.stem
+)
+def test_every_example_leads_an_editor_to_the_schema(path):
+    first = path.read_text(encoding="utf-8").splitlines()[0]
+    directive, _, where = first.partition(" ")
+    assert directive == "#:schema"
+    assert (path.parent / where).resolve() == SHIPPED

@@ -1,0 +1,98 @@
+"""Where a journal is: named by a variable, a path or a URL, and shown without passwords."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from robolink.errors import JournalError
+from robolink.journal import default_location
+from robolink.journal._places import place_of
+
+
+@pytest.fixture(autouse=True)
+def no_variables(monkeypatch):
+    for name in ("ROBOLINK_JOURNAL", "ROBOLINK_STATE_DIR"):
+        monkeypatch.delenv(name, raising=False)
+
+
+def test_the_journal_is_in_the_user_s_data_folder(monkeypatch, tmp_path):
+    monkeypatch.setattr("platformdirs.user_data_path", lambda name, appauthor: tmp_path / name)
+    assert default_location() == f"sqlite:///{tmp_path}/robolink/journal.db"
+
+
+def test_the_state_folder_goes_before_the_user_s_data_folder(monkeypatch, tmp_path):
+    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path))
+    assert default_location() == f"sqlite:///{tmp_path}/journal.db"
+
+
+def test_a_path_in_the_variable_goes_before_all(monkeypatch, tmp_path):
+    monkeypatch.setenv("ROBOLINK_STATE_DIR", "/elsewhere")
+    monkeypatch.setenv("ROBOLINK_JOURNAL", str(tmp_path / "cell.db"))
+    assert default_location() == f"sqlite:///{tmp_path}/cell.db"
+
+
+def test_a_url_in_the_variable_is_taken_as_it_is(monkeypatch):
+    monkeypatch.setenv("ROBOLINK_JOURNAL", "postgresql+psycopg://cells@db/journal")
+    assert default_location() == "postgresql+psycopg://cells@db/journal"
+
+
+@pytest.mark.parametrize("name", ["journal.db", "with blank.db", "per%20cent?#.db", "机器人.db"])
+def test_a_path_and_its_url_are_the_same_place(tmp_path, name):
+    path = tmp_path / name
+    place = place_of(str(path))
+    assert place.path == path
+    assert place_of(place.location) == place
+    assert place.name == str(path)
+
+
+def test_a_relative_path_is_made_absolute(monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    assert place_of("journal.db").path == tmp_path / "journal.db"
+    assert place_of("sqlite:///journal.db").path == tmp_path / "journal.db"
+
+
+@pytest.mark.parametrize(
+    ("url", "shown"),
+    [
+        ("postgresql://u:geheim@db:5432/j", "postgresql+psycopg://u:***@db:5432/j"),
+        ("postgresql+psycopg://u:ge@heim@db/j", "postgresql+psycopg://u:***@db/j"),
+        ("postgresql://u:ge/heim@db/j", "postgresql+psycopg://u:***@db/j"),
+        ("postgresql://u:geheim:@db/j", "postgresql+psycopg://u:***@db/j"),
+        ("postgresql://db/j?password=geheim&x=1", "postgresql+psycopg://db/j?password=***&x=1"),
+        ("postgresql://db/j?PassWord=geheim", "postgresql+psycopg://db/j?PassWord=***"),
+        ("postgresql://u@db/j", "postgresql+psycopg://u@db/j"),
+        ("postgresql:///j?host=/run/postgresql", "postgresql+psycopg:///j?host=/run/postgresql"),
+    ],
+)
+def test_a_password_is_not_shown(url, shown):
+    place = place_of(url)
+    assert place.location == place.name == shown
+    assert place.url.partition("://")[2] == url.partition("://")[2]
+    assert "heim" not in repr(place)
+
+
+@pytest.mark.parametrize(
+    "url", ["sqlite://", "sqlite:///", "mysql://db/j", "postgresql://", "x://"]
+)
+def test_a_database_that_cannot_keep_a_journal_is_refused(url):
+    with pytest.raises(JournalError) as caught:
+        place_of(url)
+    assert "ROBOLINK_JOURNAL" in caught.value.remedy
+
+
+def test_no_database_code_is_loaded_before_a_journal_is_opened():
+    program = (
+        "import sys, robolink.journal\n"
+        "robolink.journal.default_location\n"
+        "print([name for name in sys.modules if name.startswith(('sqlalchemy', 'psycopg'))])"
+    )
+    shown = subprocess.run(
+        [sys.executable, "-c", program],
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=Path(__file__).parents[2],
+    )
+    assert shown.stdout.strip() == "[]"

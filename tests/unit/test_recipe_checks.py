@@ -1,0 +1,302 @@
+"""How the tables of a recipe go together."""
+
+import tomllib
+
+import pytest
+
+from robolink.recipe._loading import _checked
+
+PIN = """\
+schema = "robolink/recipe/1"
+name = "Needle"
+basis = "absolute"
+z = "kept"
+[station]
+id = "PIN"
+[source]
+kind = "operator"
+[[tools]]
+number = 3
+"""
+POINTS = """\
+schema = "robolink/recipe/1"
+name = "Needle"
+basis = "absolute"
+z = "kept"
+[station]
+id = "PIN"
+[source]
+kind = "points"
+[[tools]]
+number = 3
+points = [1, 2]
+"""
+ANGLES = PIN.replace('"operator"', '"operator"\nmethod = "n_angle"')
+
+
+def at(x_mm, z_mm):
+    return f"{{ x_mm = {x_mm}, y_mm = 0, z_mm = {z_mm}, u_deg = 0 }}"
+
+
+def problems(text):
+    return {problem.where: problem.what for problem in _checked(tomllib.loads(text))[1]}
+
+
+def with_(text, header, *lines):
+    """Add lines below a header that is there, or add both."""
+    body = "\n".join(lines)
+    if f"{header}\n" in text:
+        return text.replace(f"{header}\n", f"{header}\n{body}\n")
+    return f"{text}{header}\n{body}\n"
+
+
+@pytest.mark.parametrize("text", [PIN, POINTS, with_(ANGLES, "[source]", "count = 3")])
+def test_the_recipes_that_are_varied_here_are_right(text):
+    assert problems(text) == {}
+
+
+@pytest.mark.parametrize(
+    ("text", "where", "what"),
+    [
+        (with_(PIN, "[source]", "count = 4"), "source.count", "means nothing with method"),
+        (
+            with_(PIN, "[source]", "angles_deg = [0, 90, 180]"),
+            "source.angles_deg",
+            "means nothing with method",
+        ),
+        (
+            with_(ANGLES, "[source]", "count = 4", "turn_deg = 180"),
+            "source.turn_deg",
+            "means nothing with method",
+        ),
+        (ANGLES, "source.angles_deg", "is missing"),
+        (
+            with_(ANGLES, "[source]", "count = 4", "angles_deg = [0, 90, 180]"),
+            "source.count",
+            "excludes angles_deg",
+        ),
+        (
+            with_(ANGLES, "[source]", "angles_deg = [90, 180, 270]"),
+            "source.angles_deg#1",
+            "must be 0",
+        ),
+        (
+            with_(ANGLES, "[source]", "angles_deg = [0, 180, 360]"),
+            "source.angles_deg",
+            "must not hold the same angle twice",
+        ),
+        (
+            with_(ANGLES, "[source]", "angles_deg = [0, -14, 15]"),
+            "source.angles_deg",
+            "must spread over at least 30 degrees",
+        ),
+    ],
+)
+def test_the_angles_are_those_of_the_method(text, where, what):
+    found = problems(text)
+    assert list(found) == [where]
+    assert found[where].startswith(what)
+
+
+@pytest.mark.parametrize("angles", ["0, 120, 240", "0, -15, 15", "0, 170, 340"])
+def test_angles_that_spread_are_accepted(angles):
+    assert problems(with_(ANGLES, "[source]", f"angles_deg = [{angles}]")) == {}
+
+
+def test_the_clearance_stays_below_the_lift():
+    found = problems(with_(PIN, "[source]", "lift_mm = 2"))
+    assert found == {"source.clearance_mm": "must be smaller than lift_mm, which is 2"}
+
+
+def test_the_lift_has_room_in_the_box():
+    text = with_(with_(PIN, "[source]", "lift_mm = 50"), "[box]", "down_mm = 20", "up_mm = 29")
+    assert list(problems(text)) == ["source.lift_mm"]
+    assert problems(text.replace("29", "30")) == {}
+
+
+def test_half_a_place_of_the_pin_is_refused():
+    assert list(problems(with_(PIN, "[station]", "x_mm = 1"))) == ["station.y_mm"]
+    assert list(problems(with_(PIN, "[station]", "y_mm = 1"))) == ["station.x_mm"]
+    assert problems(with_(PIN, "[station]", "y_mm = 1", "x_mm = 1")) == {}
+
+
+def test_a_measured_height_needs_the_height_of_the_pin_unless_it_is_a_difference():
+    measured = PIN.replace('"kept"', '"measured"')
+    assert list(problems(measured)) == ["station.z_mm"]
+    assert problems(with_(measured, "[station]", "z_mm = -100")) == {}
+    assert problems(measured.replace('"absolute"', '"difference"')) == {}
+
+
+@pytest.mark.parametrize("basis", ["absolute", "difference"])
+def test_a_height_cannot_be_measured_from_taught_points(basis):
+    text = POINTS.replace('"kept"', '"measured"').replace('"absolute"', f'"{basis}"')
+    assert list(problems(text)) == ["z"]
+
+
+def test_each_tool_stands_there_once():
+    assert list(problems(PIN + "[[tools]]\nnumber = 3\n")) == ["tools#2.number"]
+    assert problems(PIN + "[[tools]]\nnumber = 4\n") == {}
+
+
+@pytest.mark.parametrize(
+    ("method", "points", "where"),
+    [
+        ("two_pose", "points = [1, 2, 3]", "tools#1.points"),
+        ("n_angle", "points = [1, 2]", "tools#1.points"),
+        ("n_angle", "points = [1, 2, 3]", None),
+        ("two_pose", "", "tools#1.points"),
+        ("two_pose", "points = [1, 1]", "tools#1.points#2"),
+        ("two_pose", "points = [1, 2]\n[[tools]]\nnumber = 4\npoints = [3, 2]", "tools#2.points#2"),
+    ],
+)
+def test_each_tool_has_its_own_points_as_many_as_the_method_needs(method, points, where):
+    text = with_(POINTS, "[source]", f'method = "{method}"').replace("points = [1, 2]", points)
+    assert list(problems(text)) == ([where] if where else [])
+
+
+def test_points_mean_nothing_where_a_person_measures():
+    assert list(problems(PIN + "points = [1, 2]\n")) == ["tools#1.points"]
+
+
+@pytest.mark.parametrize(
+    ("text", "where"),
+    [
+        (with_(POINTS, "[poses]", f"safe = {at(1, 2)}"), "poses"),
+        (with_(POINTS, "[speeds]", "percent = 5"), "speeds"),
+        (with_(POINTS, "[box]", "up_mm = 50"), "box"),
+        (POINTS + f"approach = {at(1, 2)}\n", "tools#1.approach"),
+        (POINTS + f"retreat = {at(1, 2)}\n", "tools#1.retreat"),
+        ("verify = true\n" + POINTS, "verify"),
+        (with_(POINTS, "[refusal]", 'action = "measure_again"'), "refusal.action"),
+        (with_(POINTS, "[tolerances]", "drift_mm = 0.2"), "tolerances.drift_mm"),
+    ],
+)
+def test_what_says_how_to_move_is_refused_where_nothing_moves(text, where):
+    assert list(problems(text)) == [where]
+
+
+def test_saying_that_points_are_not_verified_is_fine():
+    assert problems("verify = false\n" + POINTS) == {}
+
+
+def test_a_drift_is_judged_only_where_one_is_measured():
+    text = with_(PIN, "[tolerances]", "drift_mm = 0.1")
+    assert problems(text) == {}
+    assert list(problems("verify = false\n" + text)) == ["tolerances.drift_mm"]
+
+
+@pytest.mark.parametrize(
+    ("approach", "inside"),
+    [((60, -30), True), ((61, 0), False), ((0, -31), False), ((0, 51), False), ((-60, 50), True)],
+)
+def test_from_the_safe_pose_every_pose_of_a_tool_is_within_the_box(approach, inside):
+    text = with_(PIN, "[box]", "sideways_mm = 60") + f"[poses]\nsafe = {at(0, 0)}\n"
+    text = text.replace("number = 3\n", f"number = 3\napproach = {at(*approach)}\n")
+    assert list(problems(text)) == ([] if inside else ["tools#1.approach"])
+
+
+@pytest.mark.parametrize(
+    ("retreat", "inside"), [((120, 80), True), ((121, 0), False), ((0, 81), False)]
+)
+def test_without_a_safe_pose_one_box_can_hold_all_poses(retreat, inside):
+    text = PIN + f"approach = {at(0, 0)}\nretreat = {at(*retreat)}\n[box]\nsideways_mm = 60\n"
+    assert list(problems(text)) == ([] if inside else ["box"])
+
+
+@pytest.mark.parametrize("key", ["rms_mm", "max_mm"])
+@pytest.mark.parametrize("text", [PIN, POINTS])
+def test_residuals_of_two_poses_are_not_judged_and_the_reason_is_told(text, key):
+    found = problems(with_(text, "[tolerances]", f"{key} = 0.1"))
+    assert list(found) == [f"tolerances.{key}"]
+    assert "two poses always agree" in found[f"tolerances.{key}"]
+
+
+def test_the_largest_residual_may_not_be_smaller_than_the_rms():
+    text = with_(with_(ANGLES, "[source]", "count = 4"), "[tolerances]", "rms_mm = 0.2")
+    assert list(problems(text + "max_mm = 0.1\n")) == ["tolerances.max_mm"]
+    assert problems(text + "max_mm = 0.2\n") == {}
+
+
+@pytest.mark.parametrize("text", [PIN, POINTS])
+def test_the_interval_of_two_poses_needs_a_stated_sigma(text):
+    text = with_(text, "[tolerances]", "interval_mm = 0.1")
+    assert list(problems(text)) == ["tolerances.sigma_mm"]
+    assert problems(text + "sigma_mm = 0.01\n") == {}
+
+
+def test_the_interval_of_many_angles_comes_from_the_residuals_as_well():
+    text = with_(ANGLES, "[source]", "count = 4")
+    assert problems(with_(text, "[tolerances]", "interval_mm = 0.1")) == {}
+
+
+@pytest.mark.parametrize(
+    ("text", "reached"),
+    [
+        (PIN, "0.139"),  # 1.96 x 0.1 / sqrt 2
+        (with_(PIN, "[source]", "turn_deg = 90"), "0.196"),
+        (with_(ANGLES, "[source]", "count = 4"), "0.098"),
+    ],
+)
+def test_an_interval_that_no_measurement_reaches_is_refused_beforehand(text, reached):
+    low = with_(text, "[tolerances]", "sigma_mm = 0.1", f"interval_mm = {float(reached) - 0.001}")
+    found = problems(low)
+    assert list(found) == ["tolerances.interval_mm"]
+    assert reached in found["tolerances.interval_mm"]
+    high = with_(text, "[tolerances]", "sigma_mm = 0.1", f"interval_mm = {float(reached) + 0.001}")
+    assert problems(high) == {}
+
+
+def test_an_interval_of_unknown_angles_is_not_judged():
+    text = with_(ANGLES, "[tolerances]", "sigma_mm = 0.1", "interval_mm = 0.001")
+    assert list(problems(text)) == ["source.angles_deg"]
+
+
+def test_attempts_belong_to_measuring_again():
+    assert list(problems(with_(PIN, "[refusal]", "attempts = 3"))) == ["refusal.attempts"]
+    again = with_(PIN, "[refusal]", 'action = "measure_again"')
+    recipe, found = _checked(tomllib.loads(again))
+    assert (recipe and recipe.attempts, found) == (2, ())
+    recipe, found = _checked(tomllib.loads(again + "attempts = 5\n"))
+    assert (recipe and recipe.attempts, found) == (5, ())
+
+
+@pytest.mark.parametrize("kind", ["prompts", "outputs"])
+@pytest.mark.parametrize(
+    ("at_", "tool", "what"),
+    [
+        ("before_measure", 3, None),
+        ("before_measure", 4, "is no tool of this recipe"),
+        ("start", 3, 'means nothing here: "start" comes once'),
+        ("before_write", 4, 'means nothing here: "before_write" comes once'),
+    ],
+)
+def test_prompts_and_outputs_name_tools_of_the_recipe_where_one_is_measured(kind, at_, tool, what):
+    rest = {"prompts": 'text = "?"', "outputs": "output = 1\non = true"}[kind]
+    found = problems(with_(PIN, f"[[{kind}]]", f'at = "{at_}"', f"tool = {tool}", rest))
+    if what is None:
+        assert found == {}
+    else:
+        assert list(found) == [f"{kind}#1.tool"]
+        assert found[f"{kind}#1.tool"].startswith(what)
+
+
+def test_an_output_may_be_switched_after_the_measurement_of_one_tool():
+    lines = ('at = "after_measure"', "tool = 3", "output = 1", "on = false")
+    assert problems(with_(PIN, "[[outputs]]", *lines)) == {}
+
+
+@pytest.mark.parametrize("answer", ["nozzle", "lot"])
+@pytest.mark.parametrize("moment", ["before_write", "end"])
+def test_a_nozzle_and_its_lot_are_asked_before_they_go_on_record(answer, moment):
+    lines = (f'at = "{moment}"', 'text = "?"', f'answer = "{answer}"')
+    assert list(problems(with_(PIN, "[[prompts]]", *lines))) == ["prompts#1.at"]
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "twice"),
+    [("", "", True), ("tool = 3", "tool = 3", True), ("", "tool = 3", True), (None, "", False)],
+)
+def test_a_nozzle_is_asked_once(first, second, twice):
+    ask = '[[prompts]]\nat = "before_measure"\ntext = "?"\nanswer = "nozzle"\n'
+    text = PIN + ("" if first is None else f"{ask}{first}\n") + f"{ask}{second}\n"
+    assert list(problems(text)) == (["prompts#2.answer"] if twice else [])

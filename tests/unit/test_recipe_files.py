@@ -1,0 +1,295 @@
+"""Recipe files: how they are read, and what is said about keys that are wrong."""
+
+import copy
+import hashlib
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+from typing import get_args
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robolink.calibration import TouchPlan
+from robolink.errors import ConfigError
+from robolink.nozzle_change import Gate, Limits, Moment
+from robolink.recipe import (
+    OperatorSource,
+    Output,
+    PointsSource,
+    Prompt,
+    Recipe,
+    check_recipe,
+    load_recipe,
+)
+from robolink.recipe._loading import _checked
+
+EXAMPLES = sorted((Path(__file__).parents[2] / "examples" / "recipes").iterdir())
+LEAST = """\
+schema = "robolink/recipe/1"
+name = "Needle"
+basis = "absolute"
+z = "kept"
+source = { kind = "operator" }
+station = { id = "PIN" }
+tools = [{ number = 1 }]
+"""
+
+
+def without(key):
+    return "".join(line for line in LEAST.splitlines(True) if not line.startswith(key))
+
+
+@pytest.fixture
+def problems(tmp_path):
+    """Writes a recipe and returns what is wrong in it, by path."""
+
+    def look(text):
+        path = tmp_path / "recipe.toml"
+        path.write_text(text, encoding="utf-8")
+        return {problem.where: problem.what for problem in check_recipe(path)}
+
+    return look
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_every_example_loads(path):
+    assert check_recipe(path) == ()
+    loaded = load_recipe(path)
+    assert loaded.path == path
+    assert loaded.name == loaded.recipe.name
+    assert loaded.sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def test_the_examples_are_those_that_the_page_describes():
+    assert [path.name for path in EXAMPLES] == [
+        "pendant-points.toml",
+        "scara-pin.toml",
+        "two-nozzles.toml",
+    ]
+    points, pin, nozzles = (load_recipe(path).recipe for path in EXAMPLES)
+    assert isinstance(points.source, PointsSource)
+    assert (points.basis, points.verifies, points.tools[0].points) == (
+        "difference",
+        False,
+        (901, 902),
+    )
+    assert isinstance(pin.source, OperatorSource)
+    assert (pin.basis, pin.z, pin.verifies, pin.attempts) == ("absolute", "kept", True, 1)
+    assert isinstance(nozzles.source, OperatorSource)
+    assert nozzles.source.turns_deg == (90, 180, 270)
+    assert pin.source.touches_deg == (0, 180)
+    assert ([tool.number for tool in nozzles.tools], nozzles.attempts) == ([1, 2], 2)
+
+
+def test_what_is_left_out_is_as_in_a_calibration_by_hand():
+    recipe = Recipe.model_validate(tomllib.loads(LEAST))
+    source, limits = recipe.source, Limits()
+    assert isinstance(source, OperatorSource)
+    assert TouchPlan(source.lift_mm, source.clearance_mm, source.turn_deg) == TouchPlan()
+    assert recipe.box.model_dump() == {
+        "sideways_mm": limits.box_mm,
+        "down_mm": limits.box_down_mm,
+        "up_mm": limits.box_up_mm,
+    }
+    assert recipe.speeds.model_dump() == {
+        "percent": limits.speed_percent,
+        "mm_s": limits.speed_mm_s,
+    }
+    assert recipe.tolerances.jump_mm == Gate().max_change_mm
+    assert recipe.tolerances.drift_mm == Gate().drift_tolerance_mm
+    assert (recipe.verifies, recipe.attempts, source.turns_deg) == (True, 1, ())
+
+
+def test_an_output_can_be_switched_at_every_moment_of_a_nozzle_change():
+    assert get_args(Output.model_fields["at"].annotation) == tuple(Moment)
+    assert {*get_args(Prompt.model_fields["at"].annotation)} < {*Moment}
+
+
+def test_a_pose_of_the_flange_is_a_pose_in_tool_0():
+    pose = load_recipe(EXAMPLES[1]).recipe.poses.safe
+    assert pose is not None
+    assert pose.pose.coordinates() == (158.6, 495.4, -40.0, 0.0, 0.0, 0.0)
+    assert pose.pose.tool == 0
+
+
+def test_no_value_can_be_changed_after_loading():
+    recipe = load_recipe(EXAMPLES[0]).recipe
+    with pytest.raises(ValueError, match="frozen"):
+        recipe.tolerances.jump_mm = 100
+
+
+@pytest.mark.parametrize(
+    ("key", "words"),
+    [
+        ("basis", "taught points agree only with the tool value that they were taught with"),
+        ("z", 'is missing: write "kept"'),
+        ("schema", 'begin the file with schema = "robolink/recipe/1"'),
+        ("tools", "one [[tools]] table for each tool"),
+        ("name", "is missing"),
+        ("source", "is missing"),
+        ("station", "is missing"),
+    ],
+)
+def test_a_required_key_that_is_missing_is_explained(problems, key, words):
+    found = problems(without(key))
+    assert list(found) == [key]
+    assert words in found[key]
+
+
+def test_a_missing_basis_says_what_both_mean(problems):
+    what = problems(without("basis"))["basis"]
+    assert '"difference" to move the stored value' in what
+    assert "the first run only records that reference" in what
+    assert '"absolute" to write what was measured' in what
+
+
+@pytest.mark.parametrize(
+    ("lines", "where", "what"),
+    [
+        ('[source]\nkind = "camera"', "source.kind", 'must be one of "operator", "points"'),
+        ("[source]\nlift_mm = 5", "source.kind", 'must be one of "operator", "points"'),
+        ('[source]\nkind = "operator"\nlift_mm = 0.5', "source.lift_mm", "must be at least 1"),
+        ('[source]\nkind = "operator"\nturn_deg = 350', "source.turn_deg", "must be at most 330"),
+        ('[source]\nkind = "operator"\ncount = 2', "source.count", "must be at least 3"),
+        (
+            '[source]\nkind = "operator"\nangles_deg = [0, 90]',
+            "source.angles_deg",
+            "must hold at least 3",
+        ),
+        (
+            '[source]\nkind = "operator"\nangles_deg = [0, 90, "180"]',
+            "source.angles_deg#3",
+            "must be a number",
+        ),
+        ('[station]\nid = ""', "station.id", "must not be empty"),
+        ("[station]\nid = 7", "station.id", "must be a text in quotes"),
+        ('[station]\nid = "a\\u001b[2J"', "station.id", "must not hold control characters"),
+        (f'[station]\nid = "{"a" * 201}"', "station.id", "must be at most 200 characters long"),
+        ("[[tools]]\nnumber = 0", "tools#1.number", "must be at least 1"),
+        ("[[tools]]\nnumber = true", "tools#1.number", "must be a whole number"),
+        ("[[tools]]\nnumber = 1\npoints = 3", "tools#1.points", "must be a list in brackets"),
+        (
+            "[[tools]]\nnumber = 1\n[[tools]]\nnumber = 2\napproach = { x_mm = 1, y_mm = 2, "
+            "z_mm = nan, u_deg = 0 }",
+            "tools#2.approach.z_mm",
+            "must be a finite number",
+        ),
+        ("[speeds]\npercent = 5.5", "speeds.percent", "must be a whole number"),
+        ("speeds = 5", "speeds", "must be a table"),
+        ("verify = 1", "verify", "must be true or false"),
+        (
+            "[refusal]\naction = 'again'",
+            "refusal.action",
+            'must be "stop" or "measure_again"',
+        ),
+        ("[tolerances]\njump_mm = 0", "tolerances.jump_mm", "must be at least 0.001"),
+        ("[tolerances]\ndrfit_mm = 1", "tolerances.drfit_mm", "is not known; is drift_mm meant?"),
+        ("[box]\nq = 1", "box.q", "is not known; these are: sideways_mm, down_mm, up_mm"),
+        ("nots = ''", "nots", "is not known; is notes meant?"),
+        ("[box]\nverify = false", "box.verify", "belongs at the top of the file, above the first"),
+    ],
+)
+def test_a_key_that_is_wrong_is_told_by_its_path(problems, lines, where, what):
+    top = lines.partition("\n")[0].strip("[]").split(" ")[0]
+    found = problems(f"{without(top)}{lines}\n")
+    assert list(found) == [where]
+    assert found[where].startswith(what)
+
+
+def test_all_problems_are_told_at_once_those_between_tables_too(tmp_path):
+    path = tmp_path / "wrong.toml"
+    path.write_text(
+        without("basis") + "verify = 3\n[tolerances]\nrms_mm = 0.1\n[refusal]\nattempts = 3\n"
+        '[[prompts]]\nat = "before_measure"\ntext = "?"\ntool = 2\n'
+    )
+    with pytest.raises(ConfigError) as caught:
+        load_recipe(path)
+    assert f"{path} is wrong in 5 places:\n" in caught.value.what
+    for where in ("basis", "verify", "tolerances.rms_mm", "refusal.attempts", "prompts#1.tool"):
+        assert f"\n    {where}: " in caught.value.what
+    assert "Nothing was sent" in caught.value.remedy
+
+
+def test_a_single_problem_is_not_counted(tmp_path):
+    path = tmp_path / "wrong.toml"
+    path.write_text(without("name"))
+    with pytest.raises(ConfigError) as caught:
+        load_recipe(path)
+    assert caught.value.what == f"The recipe {path} is wrong:\n    name: is missing"
+
+
+@pytest.mark.parametrize(
+    ("content", "cause"),
+    [
+        (b"[tools\n", "at line 1"),
+        (b"\xff\xfe", "not UTF-8"),
+        (b"a = " + b"[" * 100_000, "nested too deeply"),
+        (b"a = " + b"1" * 5000, "digits"),
+    ],
+    ids=["no TOML", "not text", "deep", "long number"],
+)
+def test_a_file_that_is_no_toml_is_told(tmp_path, content, cause):
+    path = tmp_path / "recipe.toml"
+    path.write_bytes(content)
+    with pytest.raises(ConfigError, match=cause) as caught:
+        load_recipe(path)
+    assert str(path) in caught.value.what
+    assert caught.value.remedy
+
+
+def test_a_file_that_is_not_there_is_told(tmp_path):
+    with pytest.raises(ConfigError, match="cannot be read: No such file"):
+        check_recipe(tmp_path / "absent.toml")
+
+
+def test_the_hash_is_of_the_bytes_and_a_byte_order_mark_does_not_matter(tmp_path):
+    content = b"\xef\xbb\xbf" + LEAST.encode()
+    path = tmp_path / "recipe.toml"
+    path.write_bytes(content)
+    assert load_recipe(path).sha256 == hashlib.sha256(content).hexdigest()
+
+
+def test_pydantic_waits_for_the_first_recipe():
+    code = (
+        "import sys, robolink.recipe\n"
+        "assert 'pydantic' not in sys.modules\n"
+        "robolink.recipe.Recipe\n"
+        "assert 'pydantic' in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=20)
+
+
+def _places(node, path=()):
+    yield path
+    keys = range(len(node)) if isinstance(node, list) else node if isinstance(node, dict) else ()
+    for key in keys:
+        yield from _places(node[key], (*path, key))
+
+
+DOCUMENTS = [tomllib.loads(path.read_text(encoding="utf-8")) for path in EXAMPLES]
+VALUES = st.recursive(
+    st.none()
+    | st.booleans()
+    | st.integers()
+    | st.floats()
+    | st.sampled_from(["points", "operator", "n_angle", "measured", "difference", "end", "\x1b"]),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=3), inner),
+    max_leaves=4,
+)
+
+
+@settings(max_examples=150, deadline=None)
+@given(data=st.data())
+def test_whatever_stands_in_a_place_is_accepted_or_told(data):
+    document = copy.deepcopy(data.draw(st.sampled_from(DOCUMENTS)))
+    *way, last = data.draw(st.sampled_from([path for path in _places(document) if path]))
+    parent = document
+    for key in way:
+        parent = parent[key]
+    parent[last] = data.draw(VALUES)
+    recipe, problems = _checked(document)
+    assert (recipe is None) <= bool(problems)
+    assert all(problem.where and problem.what for problem in problems)

@@ -8,8 +8,12 @@ from robolink.transport._dialogue import format_dialogue as format_dialogue
 from robolink.transport._dialogue import opening_line as opening_line
 from robolink.transport._dialogue import parse_dialogues as parse_dialogues
 from robolink.transport._dialogue import passage_line as passage_line
+from robolink.transport._mailbox_link import MailboxHead as MailboxHead
+from robolink.transport._mailbox_link import MailboxLink as MailboxLink
 from robolink.transport._registry import TRANSPORTS_GROUP as TRANSPORTS_GROUP
 from robolink.transport._registry import TransportOpener as TransportOpener
+from robolink.transport._registry import open_mailbox_link as open_mailbox_link
+from robolink.transport._registry import open_modbus as open_modbus
 from robolink.transport._registry import open_transport as open_transport
 from robolink.transport._trace import SECRET_PLACEHOLDER as SECRET_PLACEHOLDER
 from robolink.transport._trace import Direction as Direction

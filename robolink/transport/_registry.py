@@ -5,18 +5,32 @@ others, the bundled simulators among them, are found by the name of their full s
 entry-point group ``robolink.transports``.
 """
 
+from collections.abc import Callable, Mapping
 from importlib import import_module
-from typing import Protocol, cast
+from typing import TYPE_CHECKING, Any, Protocol, cast
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.timing import Clock
 from robolink.transport._base import Transport
+from robolink.transport._mailbox_link import MailboxLink
 from robolink.transport._url import LinkUrl, parse_url
+
+if TYPE_CHECKING:
+    from robolink.transport._modbus import ModbusClient
 
 TRANSPORTS_GROUP = "robolink.transports"
 
 _MEDIA = {"tcp": ("robolink.transport._tcp", "open_tcp")}
+_MAILBOX_MEDIA = {
+    "modbus-tcp": ("robolink.transport._modbus_link", "open_modbus_link"),
+    "modbus-rtu": ("robolink.transport._modbus_link", "open_modbus_link"),
+    "can": ("robolink.transport._canopen_link", "open_canopen_link"),
+}
+_REGISTER_MEDIA = {
+    "modbus-tcp": ("robolink.transport._modbus_open", "open_modbus"),
+    "modbus-rtu": ("robolink.transport._modbus_open", "open_modbus"),
+}
 
 
 class TransportOpener(Protocol):
@@ -41,25 +55,67 @@ def open_transport(
         ConnectError: No connection could be made.
     """
     link = parse_url(url) if isinstance(url, str) else url
-    return _find(link)(link, timeout_s=timeout_s, clock=clock)
+    opener = cast(TransportOpener, _find(link, _MEDIA))
+    return opener(link, timeout_s=timeout_s, clock=clock)
 
 
-def _find(link: LinkUrl) -> TransportOpener:
-    if link.medium in _MEDIA:
-        module, name = _MEDIA[link.medium]
-        return cast(TransportOpener, getattr(import_module(module), name))
+def open_mailbox_link(
+    url: str | LinkUrl, *, timeout_s: float = 3.0, clock: Clock | None = None
+) -> MailboxLink:
+    """Open a link to a PLC mailbox.
+
+    Args:
+        url: For example ``softmotion+modbus-tcp://192.168.0.2:502``.
+        timeout_s: Longest wait for the connection, and for each exchange.
+        clock: Replaces the machine's clock; a simulator brings its own.
+
+    Raises:
+        ConfigError: The URL is wrong, or nothing knows its scheme.
+        ConnectError: No connection could be made, or nobody answers.
+        TransportBrokenError: The bus or the line failed meanwhile.
+        RemoteProtocolError: What answers makes no sense.
+    """
+    link = parse_url(url) if isinstance(url, str) else url
+    opened: MailboxLink = _find(link, _MAILBOX_MEDIA)(link, timeout_s=timeout_s, clock=clock)
+    return opened
+
+
+def open_modbus(
+    url: str | LinkUrl, *, timeout_s: float = 3.0, clock: Clock | None = None
+) -> "ModbusClient":
+    """Open a client for the registers and coils of a Modbus server.
+
+    Args:
+        url: For example ``plc+modbus-tcp://192.168.0.2:502?unit=1``.
+        timeout_s: Longest wait for the connection, and for each answer.
+        clock: Replaces the machine's clock.
+
+    Raises:
+        ConfigError: The URL is wrong, or nothing knows its scheme.
+        ConnectError: No connection could be made, or nobody answers.
+        RemoteProtocolError: What answers is no Modbus.
+    """
+    link = parse_url(url) if isinstance(url, str) else url
+    opened: ModbusClient = _find(link, _REGISTER_MEDIA)(link, timeout_s=timeout_s, clock=clock)
+    return opened
+
+
+def _find(link: LinkUrl, media: Mapping[str, tuple[str, str]]) -> Callable[..., Any]:
+    if link.medium in media:
+        module, name = media[link.medium]
+        return cast(Callable[..., Any], getattr(import_module(module), name))
     from importlib import metadata  # costs more than all of this package; TCP needs none of it
 
     found = metadata.entry_points(group=TRANSPORTS_GROUP, name=link.scheme)
     if not found:
-        known = {f"{link.kind}+{medium}" for medium in _MEDIA}
+        known = {f"{link.kind}+{medium}" for medium in media}
         known |= metadata.entry_points(group=TRANSPORTS_GROUP).names
         raise ConfigError(
             tr("Nothing here knows how to reach {scheme!r}.", scheme=link.scheme),
             remedy=tr("Known are: {known}.", known=", ".join(sorted(known))),
         )
     try:
-        return cast(TransportOpener, next(iter(found)).load())
+        return cast(Callable[..., Any], next(iter(found)).load())
     except (ImportError, AttributeError) as error:
         raise ConfigError(
             tr(

@@ -1,0 +1,101 @@
+"""The contract of a link to a PLC mailbox (design parts 4 and 7)."""
+
+from collections.abc import Sequence
+from typing import Final, NamedTuple, Protocol
+
+from robolink.timing import Clock
+
+COMMAND_WORDS: Final = 64
+RESPONSE_WORDS: Final = 112
+SLOT_WORDS: Final = 36
+SLOTS: Final = 15
+HEARTBEAT_WORD: Final = 62
+"""The place of the client's heartbeat in the command block."""
+
+
+class MailboxHead(NamedTuple):
+    """What changes first in the response block.
+
+    It only says *when* to read the block; nothing is decided from it.
+    """
+
+    ack: int
+    state: int
+    error_class: int
+    group_state: int
+    heartbeat: int
+
+
+HEAD_PLACES: Final = MailboxHead(ack=1, state=2, error_class=3, group_state=7, heartbeat=9)
+"""Where each part of the head stands in the response block."""
+
+
+class MailboxLink(Protocol):
+    """Moves the blocks of one PLC mailbox; knows their sizes and places, not their meaning.
+
+    Words are 0 to 65535. One exchange at a time, under a lock of the link's own, and one
+    deadline for the whole of it. Nothing is ever sent twice and no link is renewed by itself.
+    After any error but :class:`~robolink.errors.RejectedError` of a TCP or CAN link, the link
+    is closed; a serial line finds its place again before it takes another answer.
+
+    Each method that exchanges something raises:
+        TransportTimeoutError: No answer in time. What was written may have arrived.
+        TransportBrokenError: The far side, the cable or the bus ended the link.
+        TransportClosedError: The link was closed.
+        RemoteProtocolError: What came makes no sense.
+        RejectedError: A well-formed refusal (Modbus exception, SDO abort): not done.
+    """
+
+    @property
+    def identity(self) -> str:
+        """Which far end this is: the URL, without the options that do not name one."""
+
+    @property
+    def durable(self) -> bool:
+        """Whether the far end outlives this process, so that markers about it must too."""
+
+    @property
+    def clock(self) -> Clock:
+        """The clock on which deadlines are kept."""
+
+    def write_command(self, words: Sequence[int]) -> None:
+        """Write the 64 words of the command block in one piece."""
+
+    def read_head(self) -> MailboxHead:
+        """Return the beginning of the response block, as new as it is to be had."""
+
+    def read_response(self) -> tuple[int, ...]:
+        """Return the 112 words of the response block, read in one piece."""
+
+    def read_slot(self, slot: int) -> tuple[int, ...]:
+        """Return the 36 words of tool slot 1 to 15."""
+
+    def beat(self, word: int) -> None:
+        """Write the client's heartbeat alone, word 62 of the command block."""
+
+    def close(self) -> None:
+        """Close. Idempotent; any thread may call it at any time."""
+
+
+def require_words(words: Sequence[int], count: int) -> tuple[int, ...]:
+    """Return ``words``, which must be ``count`` numbers of 0 to 65535.
+
+    Raises:
+        ValueError: They are not; a mistake of the caller.
+    """
+    if len(words) != count or not all(0 <= word <= 0xFFFF for word in words):
+        message = f"not {count} words of 0..65535"
+        raise ValueError(message)
+    return tuple(words)
+
+
+def require_slot(slot: int) -> int:
+    """Return ``slot``, which must be 1 to 15.
+
+    Raises:
+        ValueError: It is not; a mistake of the caller.
+    """
+    if not 1 <= slot <= SLOTS:
+        message = f"no tool slot {slot}"
+        raise ValueError(message)
+    return slot

@@ -1,0 +1,228 @@
+"""Modbus requests and answers as bytes, both framings. No I/O.
+
+The only module of the library that imports pymodbus, which renames what it offers in minor
+releases (ecosystem.md 1.2). It is used as a codec alone: its clients reconnect before each
+request, repeat writes, take an answer of another function or length for the one asked for,
+and on a serial line throw away what follows a frame.
+"""
+
+import logging
+from dataclasses import dataclass, replace
+from enum import Enum
+from typing import Final, Protocol
+
+from pymodbus.framer import FramerRTU, FramerSocket
+from pymodbus.pdu import DecodePDU, ModbusPDU
+from pymodbus.pdu.bit_message import (
+    ReadCoilsRequest,
+    ReadDiscreteInputsRequest,
+    WriteSingleCoilRequest,
+)
+from pymodbus.pdu.register_message import (
+    ReadHoldingRegistersRequest,
+    ReadInputRegistersRequest,
+    WriteMultipleRegistersRequest,
+)
+
+# It writes to standard error when nobody listens; every failure is an exception here.
+logging.getLogger("pymodbus").addHandler(logging.NullHandler())
+
+WRITE_COIL: Final = 5
+WRITE_REGISTERS: Final = 16
+MOST_REGISTERS_READ: Final = 125
+MOST_REGISTERS_WRITTEN: Final = 123
+MOST_BITS_READ: Final = 2000
+
+_REFUSED: Final = 0x80
+_MOST_BYTES_COUNTED: Final = 254  # unit and PDU, in the header of a TCP frame
+
+
+class Area(Enum):
+    """A table of a Modbus server: first digit of its reference numbers, function to read it."""
+
+    COILS = (0, 1)
+    DISCRETE = (1, 2)
+    INPUT = (3, 4)
+    HOLDING = (4, 3)
+
+    @property
+    def read_function(self) -> int:
+        """The function code that reads it."""
+        return self.value[1]
+
+    def reference(self, address: int) -> str:
+        """Return the number a manual gives this address: holding register 0 is ``40001``."""
+        digits = 4 if address < 9999 else 5
+        return f"{self.value[0]}{address + 1:0{digits}d}"
+
+
+@dataclass(frozen=True, slots=True)
+class ModbusRequest:
+    """What is asked of a server.
+
+    Attributes:
+        unit: Unit identifier.
+        function: Function code: 1 to 4, 5 or 16.
+        area: Which table.
+        address: First address, counted from 0.
+        count: Registers or bits.
+        values: What is written; empty for a read.
+    """
+
+    unit: int
+    function: int
+    area: Area
+    address: int
+    count: int
+    values: tuple[int, ...] = ()
+
+    def is_answered_by(self, reply: "ModbusReply") -> bool:
+        """Whether ``reply`` can be the answer: its unit, function, and size or echo fit."""
+        if reply.unit != self.unit or reply.function != self.function:
+            return False
+        if reply.refusal is not None:
+            return True
+        if self.function == WRITE_REGISTERS:
+            return (reply.address, reply.count) == (self.address, self.count)
+        if self.function == WRITE_COIL:
+            return (reply.address, reply.values) == (self.address, self.values)
+        bits = self.area in (Area.COILS, Area.DISCRETE)
+        return len(reply.values) == (-(-self.count // 8) * 8 if bits else self.count)
+
+
+@dataclass(frozen=True, slots=True)
+class ModbusReply:
+    """One frame from a server.
+
+    Attributes:
+        unit: Who sends it.
+        function: Function code, without the mark of a refusal.
+        refusal: Exception code, ``None`` when it is none.
+        values: Registers or bits; bits in multiples of eight.
+        address: First address of a write.
+        count: Registers written.
+        transaction: Number of the request that it answers; 0 on a serial line.
+    """
+
+    unit: int
+    function: int
+    refusal: int | None
+    values: tuple[int, ...]
+    address: int
+    count: int
+    transaction: int = 0
+
+
+class FrameError(Exception):
+    """Bytes that are no frame of this framing. Internal to the package.
+
+    Attributes:
+        raw: The bytes.
+    """
+
+    def __init__(self, raw: bytes) -> None:
+        super().__init__(raw.hex(" "))
+        self.raw = raw
+
+
+class Framing(Protocol):
+    """How frames are wrapped."""
+
+    def pack(self, request: ModbusRequest, transaction: int) -> bytes:
+        """Return the frame of ``request``."""
+
+    def take(self, buffer: bytearray) -> ModbusReply | None:
+        """Take one frame off the front of ``buffer``, ``None`` while it is incomplete.
+
+        Raises:
+            FrameError: The front is no frame.
+        """
+
+
+class TcpFraming:
+    """A header with transaction number, length and unit; no checksum."""
+
+    def __init__(self) -> None:
+        self._framer = FramerSocket(DecodePDU(is_server=False))
+
+    def pack(self, request: ModbusRequest, transaction: int) -> bytes:
+        """See :meth:`Framing.pack`."""
+        return self._framer.encode(_payload(request), request.unit, transaction)
+
+    def take(self, buffer: bytearray) -> ModbusReply | None:
+        """See :meth:`Framing.take`."""
+        if len(buffer) < FramerSocket.MIN_SIZE:
+            return None
+        counted = int.from_bytes(buffer[4:6], "big")
+        if buffer[2:4] != b"\0\0" or not 3 <= counted <= _MOST_BYTES_COUNTED:
+            raise FrameError(bytes(buffer))
+        end = 6 + counted
+        if len(buffer) < end:
+            return None
+        frame = bytes(buffer[:end])
+        del buffer[:end]
+        reply = _reply(self._framer.decoder, unit=frame[6], payload=frame[7:])
+        return replace(reply, transaction=int.from_bytes(frame[:2], "big"))
+
+
+class RtuFraming:
+    """Unit in front, CRC behind; the length follows from the function."""
+
+    _ANSWERED: Final = frozenset({1, 2, 3, 4, WRITE_COIL, WRITE_REGISTERS})
+
+    def __init__(self) -> None:
+        self._framer = FramerRTU(DecodePDU(is_server=False))
+
+    def pack(self, request: ModbusRequest, transaction: int) -> bytes:  # noqa: ARG002 - not numbered
+        """See :meth:`Framing.pack`."""
+        return self._framer.encode(_payload(request), request.unit, 0)
+
+    def take(self, buffer: bytearray) -> ModbusReply | None:
+        """See :meth:`Framing.take`."""
+        if len(buffer) < FramerRTU.MIN_SIZE:
+            return None
+        kind = self._framer.decoder.lookupPduClass(bytes(buffer))
+        if kind is None or buffer[1] & ~_REFUSED not in self._ANSWERED:
+            raise FrameError(bytes(buffer))
+        end = kind.calculateRtuFrameSize(bytes(buffer))
+        if len(buffer) < end:
+            return None
+        frame = bytes(buffer[:end])
+        if not FramerRTU.check_CRC(frame[:-2], int.from_bytes(frame[-2:], "big")):
+            raise FrameError(bytes(buffer))
+        del buffer[:end]
+        return _reply(self._framer.decoder, unit=frame[0], payload=frame[1:-2])
+
+
+def _payload(request: ModbusRequest) -> bytes:
+    pdu = _pdu(request)
+    return bytes([pdu.function_code]) + pdu.encode()
+
+
+def _pdu(request: ModbusRequest) -> ModbusPDU:
+    address, count = request.address, request.count
+    if request.function == WRITE_REGISTERS:
+        return WriteMultipleRegistersRequest(address=address, registers=list(request.values))
+    if request.function == WRITE_COIL:
+        return WriteSingleCoilRequest(address=address, bits=[bool(request.values[0])])
+    kind: type[ModbusPDU] = {
+        1: ReadCoilsRequest,
+        2: ReadDiscreteInputsRequest,
+        3: ReadHoldingRegistersRequest,
+        4: ReadInputRegistersRequest,
+    }[request.function]
+    return kind(address=address, count=count)
+
+
+def _reply(decoder: DecodePDU, *, unit: int, payload: bytes) -> ModbusReply:
+    pdu = decoder.decode(payload)
+    if pdu is None:
+        raise FrameError(payload)
+    return ModbusReply(
+        unit=unit,
+        function=pdu.function_code & ~_REFUSED,
+        refusal=pdu.exception_code if pdu.isError() else None,
+        values=tuple(int(value) for value in (*pdu.registers, *pdu.bits)),
+        address=pdu.address,
+        count=pdu.count,
+    )

@@ -1,0 +1,70 @@
+"""Reads the options of a controller URL, each once and each checked."""
+
+from collections.abc import Mapping
+from typing import TypeVar
+
+from robolink.errors import ConfigError
+from robolink.messages import tr
+from robolink.transport._url import LinkUrl
+
+_Choice = TypeVar("_Choice")
+
+
+class UrlOptions:
+    """The options of one URL; whoever knows some takes them, and :meth:`finish` ends it.
+
+    Every method raises :class:`~robolink.errors.ConfigError` that names the option.
+    """
+
+    def __init__(self, url: LinkUrl) -> None:
+        self._scheme = url.scheme
+        self._left = dict(url.options)
+        self._known: list[str] = []
+
+    def take_int(self, name: str, default: int | None, low: int, high: int) -> int:
+        """Return a whole number between ``low`` and ``high``; without a default it must stand."""
+        if default is None and name not in self._left:
+            raise ConfigError(
+                tr(
+                    "The option {name} is missing in the {scheme} URL.",
+                    name=name,
+                    scheme=self._scheme,
+                ),
+                remedy=tr(
+                    "Add ?{name}= and a number from {low} to {high}.", name=name, low=low, high=high
+                ),
+            )
+        text = self.take_text(name, str(default))
+        if text.isascii() and text.isdigit() and low <= int(text) <= high:
+            return int(text)
+        raise ConfigError(
+            tr("The option {name} cannot be {value!r}.", name=name, value=text),
+            remedy=tr("Give a whole number from {low} to {high}.", low=low, high=high),
+        )
+
+    def take_choice(self, name: str, default: str, choices: Mapping[str, _Choice]) -> _Choice:
+        """Return what ``choices`` holds for the value."""
+        text = self.take_text(name, default)
+        if text in choices:
+            return choices[text]
+        raise ConfigError(
+            tr("The option {name} cannot be {value!r}.", name=name, value=text),
+            remedy=tr("Give one of: {choices}.", choices=", ".join(choices)),
+        )
+
+    def take_text(self, name: str, default: str = "") -> str:
+        """Return the value as it stands."""
+        self._known.append(name)
+        return self._left.pop(name, default)
+
+    def finish(self) -> None:
+        """Refuse what nobody has taken."""
+        if self._left:
+            raise ConfigError(
+                tr(
+                    "A {scheme} URL has no option {name!r}.",
+                    scheme=self._scheme,
+                    name=next(iter(self._left)),
+                ),
+                remedy=tr("Known are: {known}.", known=", ".join(self._known)),
+            )

@@ -1,0 +1,164 @@
+"""On a serial line: whose answer an answer is, when no frame carries a number."""
+
+from itertools import pairwise
+
+import pytest
+
+from robolink.errors import ConfigError, RemoteProtocolError, TransportTimeoutError
+from robolink.transport._modbus import ModbusClient
+from robolink.transport._modbus_frames import Area
+from robolink.transport._modbus_rtu import RtuExchange, RtuLine
+from tests.unit._scripted_modbus import IDENTITY, ScriptedLine, rtu, words
+
+
+def honest(frame):
+    """Answer a read with as many words as it asks for, each its own number."""
+    function, count = frame[1], int.from_bytes(frame[4:6], "big")
+    return [rtu(words(*range(count), function=function), unit=frame[0])]
+
+
+def over_rtu(*steps, echo=False):
+    """A line whose opening question is answered, then ``steps``."""
+
+    def first(frame):
+        return [frame, *honest(frame)] if echo else honest(frame)
+
+    line = ScriptedLine(first, *steps)
+    settings = RtuLine(
+        silence_s=0.002, quiet_s=0.02, echo=echo, probe_area=Area.INPUT, probe_address=0
+    )
+    exchange = RtuExchange(line, IDENTITY, settings)
+    return line, ModbusClient(line, exchange, identity=IDENTITY, unit=1, timeout_s=1.0)
+
+
+def test_a_serial_line_is_proved_in_step_before_its_first_answer_is_taken():
+    stale = rtu(words(41))
+    line, client = over_rtu(lambda frame: [rtu(words(42))])
+    line.coming.append((0, stale))
+    assert client.read_input(0, 1) == (42,)
+    assert [frame[1:6].hex() for frame in line.sent] == ["0400000003", "0400000001"]
+
+
+def test_on_a_serial_line_a_late_answer_is_never_taken_for_the_next():
+    late = rtu(words(41))
+    line, client = over_rtu(
+        lambda frame: [(1.5, late)],
+        lambda frame: [(0.9, piece) for piece in honest(frame)],
+        lambda frame: [rtu(words(42))],
+    )
+    with pytest.raises(TransportTimeoutError):
+        client.read_input(0, 1)
+    assert client.read_input(1, 1) == (42,)
+    questions = [frame[1:6].hex() for frame in line.sent]
+    assert questions == ["0400000003", "0400000001", "0300000003", "0400010001"]
+
+
+def test_on_a_serial_line_an_unanswered_probe_is_not_asked_again_in_the_same_words():
+    line, client = over_rtu(lambda frame: [], lambda frame: [], lambda frame: [])
+    for _ in range(3):
+        with pytest.raises(TransportTimeoutError):
+            client.read_input(0, 1)
+    line.steps = [honest, lambda frame: [rtu(words(42))]]
+    assert client.read_input(0, 1) == (42,)
+    asked = [frame[1:6].hex() for frame in line.sent[1:-1]]
+    assert asked == ["0400000001", "0300000003", "0400000003", "0400000005"]
+
+
+def test_a_refusal_proves_a_line_in_step_only_when_no_earlier_question_can_have_it():
+    _, client = over_rtu(
+        lambda frame: [],
+        lambda frame: [rtu(b"\x83\x02")],
+        lambda frame: [rtu(words(42))],
+    )
+    with pytest.raises(TransportTimeoutError):
+        client.read_input(0, 1)
+    assert client.read_input(0, 1) == (42,)
+
+    line, client = over_rtu(lambda frame: [], lambda frame: [], lambda frame: [rtu(b"\x84\x02")])
+    for _ in range(3):
+        with pytest.raises(TransportTimeoutError):
+            client.read_input(0, 1)
+    assert line.sent[-1][1] == 4
+
+
+def test_each_unit_of_a_line_is_proved_in_step_for_itself():
+    late = rtu(words(41), unit=2)
+    line, client = over_rtu(
+        lambda frame: [rtu(words(7))],
+        honest,
+        lambda frame: [(3.0, late)],
+        lambda frame: [rtu(words(7))],
+        honest,
+        lambda frame: [rtu(words(42), unit=2)],
+    )
+    assert client.read_input(0, 1) == (7,)
+    with pytest.raises(TransportTimeoutError):
+        client.read_input(0, 1, unit=2)
+    assert client.read_input(0, 1) == (7,)
+    assert client.read_input(0, 1, unit=2) == (42,)
+    assert [(frame[0], frame[1], frame[5]) for frame in line.sent] == [
+        (1, 4, 3),  # unit 1 is proved
+        (1, 4, 1),
+        (2, 4, 3),  # unit 2 too
+        (2, 4, 1),  # asked in vain
+        (1, 4, 1),  # unit 1 is still in step
+        (2, 3, 3),  # unit 2 is not
+        (2, 4, 1),
+    ]
+
+
+def test_a_broadcast_is_not_a_question():
+    line, client = over_rtu()
+    with pytest.raises(ConfigError, match="unit 0"):
+        client.write_registers(0, [1], unit=0)
+    assert not line.sent
+
+
+def test_frames_on_a_serial_line_keep_their_distance():
+    line, client = over_rtu(*[honest] * 3)
+    for _ in range(3):
+        client.read_input(0, 1)
+    assert all(later - earlier >= 2_000_000 for earlier, later in pairwise(line.sent_at_ns))
+
+
+def test_a_line_that_never_falls_silent_is_named():
+    line, client = over_rtu()
+    line.coming = [(step * 5_000_000, b"\xff") for step in range(1000)]
+    with pytest.raises(TransportTimeoutError, match="does not fall silent"):
+        client.read_input(0, 1)
+    assert not line.sent
+
+
+def test_damage_on_a_serial_line_is_an_error_and_the_line_finds_its_place_again():
+    damaged = bytearray(rtu(words(41)))
+    damaged[3] ^= 1
+    line, client = over_rtu(lambda frame: [bytes(damaged)], honest, lambda frame: [rtu(words(42))])
+    with pytest.raises(RemoteProtocolError, match="not Modbus"):
+        client.read_input(0, 1)
+    assert client.read_input(0, 1) == (42,)
+    assert not line.closed
+
+
+def test_an_echo_is_stripped_where_it_is_expected():
+    line, client = over_rtu(lambda frame: [frame[:3], frame[3:] + rtu(words(42))], echo=True)
+    assert client.read_input(0, 1) == (42,)
+    assert len(line.sent) == 2
+
+
+def test_an_echo_that_nobody_expects_is_named():
+    _, client = over_rtu(lambda frame: [frame[:5], frame[5:], *honest(frame)])
+    with pytest.raises(RemoteProtocolError, match="returns what is sent") as caught:
+        client.read_input(0, 1)
+    assert "echo=yes" in caught.value.remedy
+
+
+@pytest.mark.parametrize("heard", [b"\x01\x04\x00\x01", rtu(words(42))])
+def test_an_echo_that_does_not_come_is_named(heard):
+    _, client = over_rtu(lambda frame: [heard], echo=True)
+    with pytest.raises(RemoteProtocolError, match="did not return what was sent"):
+        client.read_input(0, 1)
+
+
+def test_a_written_coil_comes_back_as_it_was_sent():
+    _, client = over_rtu(lambda frame: [frame])
+    client.write_coil(3, True)

@@ -1,8 +1,8 @@
-"""The truth behind a simulated robot: where its tips really are, and who looks at them."""
+"""The truth behind a simulated EPSON robot: where its tips really are, and who looks at them."""
 
 import random
-from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable, Hashable
+from dataclasses import asdict, replace
 from typing import Any, Final
 
 from robolink.errors import ConfigError
@@ -11,16 +11,16 @@ from robolink.model import Pose, ToolOffset
 from robolink_simulators.epson.kinematics import Joints, inverse, tip_of
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.points import Point
+from robolink_simulators.workplace import MOUNTED_TOOL as MOUNTED_TOOL
+from robolink_simulators.workplace import Look as Look
+from robolink_simulators.workplace import Operator, Workplace, XyzMm, exchanged, pin_beside
 
 STORED: Final = ToolOffset(12.0, -3.5, -20.0)
 """What the controller holds for tool 1 at first: the nozzle that was there before."""
 
-MOUNTED_TOOL: Final = 1
-"""The tool number of the nozzle on the arm."""
 
-
-class World:
-    """Ground truth. The controller knows none of it; only what it stores.
+class World(Workplace):
+    """Ground truth around an EPSON robot.
 
     Args:
         machine: The robot in this world.
@@ -39,19 +39,23 @@ class World:
         self,
         machine: Machine,
         tips: dict[int, ToolOffset],
-        pin_mm: tuple[float, float, float],
+        pin_mm: XyzMm,
         *,
         operator_sigma_mm: float = 0.01,
         seed: int,
         pendant_live: Callable[[], bool],
         now_ns: Callable[[], int],
     ) -> None:
+        super().__init__(
+            _HandledArm(machine, now_ns),
+            tips,
+            pin_mm,
+            operator_sigma_mm=operator_sigma_mm,
+            seed=seed,
+            replaced=STORED,
+        )
         self.machine = machine
-        self.tips = tips
-        self.pin_mm = pin_mm
-        self.operator_sigma_mm = operator_sigma_mm
-        self._random = random.Random(f"nozzles {seed}")
-        self.operator = Operator(self, pendant_live=pendant_live, now_ns=now_ns, seed=seed)
+        self.operator = PendantOperator(self, pendant_live=pendant_live, now_ns=now_ns, seed=seed)
 
     @classmethod
     def seeded(
@@ -67,7 +71,7 @@ class World:
         The arm is put where the physical tip stands some mm beside the pin and above it.
         """
         rng = random.Random(f"world {seed}")
-        tips = {MOUNTED_TOOL: _exchanged(STORED, rng)}
+        tips = {MOUNTED_TOOL: exchanged(STORED, rng)}
         stroke_mm = -machine.model.ranges[2].low
         machine.arm.place(Joints(45.0, 60.0, -0.4 * stroke_mm, -105.0), 0)
         machine.tools.restore(
@@ -78,49 +82,21 @@ class World:
             }
         )
         tip = tip_of(machine.arm.flange(), tips[MOUNTED_TOOL])
-        pin_mm = (
-            round(tip.x_mm + _signed(rng, 5.0, 9.0), 3),
-            round(tip.y_mm + _signed(rng, 5.0, 9.0), 3),
-            round(tip.z_mm - rng.uniform(3.0, 6.0), 3),
-        )
+        pin_mm = pin_beside((tip.x_mm, tip.y_mm, tip.z_mm), rng)
         return cls(machine, tips, pin_mm, seed=seed, pendant_live=pendant_live, now_ns=now_ns)
-
-    def tip_mm(self, tool: int = MOUNTED_TOOL) -> tuple[float, float, float]:
-        """Return where a physical tip is now, in base coordinates."""
-        tip = tip_of(self.machine.arm.true_flange(), self.tips.get(tool))
-        return (tip.x_mm, tip.y_mm, tip.z_mm)
-
-    def change_nozzle(self, tool: int = MOUNTED_TOOL) -> ToolOffset:
-        """Put another nozzle on; its tip is some tenths of a mm from the old one's."""
-        self.tips[tool] = _exchanged(self.tips.get(tool, STORED), self._random)
-        return self.tips[tool]
 
     def truth(self) -> dict[str, Any]:
         """Return all of it, ready for JSON."""
         stored = self.machine.tools.defined()
         return {
-            "tips": {str(tool): asdict(tip) for tool, tip in self.tips.items()},
+            **super().truth(),
             "stored": {str(tool): asdict(offset) for tool, offset in stored.items()},
             "selected_tool": self.machine.tools.selected,
-            "pin_mm": list(self.pin_mm),
-            "operator_sigma_mm": self.operator_sigma_mm,
         }
 
 
-@dataclass(frozen=True, slots=True)
-class Look:
-    """What an eye sees: the vector from the physical tip to the pin, in base axes."""
-
-    dx_mm: float
-    dy_mm: float
-    dz_mm: float
-
-
-class Operator:
-    """A person at the cell: looks at the tip, and jogs it onto the pin with the pendant.
-
-    The eye errs by the same amount however often it looks at one placement of the arm; each
-    new placement draws a new error.
+class PendantOperator(Operator):
+    """The person at an EPSON cell, who jogs with the pendant and teaches points.
 
     Args:
         world: What there is to see.
@@ -137,49 +113,10 @@ class Operator:
         now_ns: Callable[[], int],
         seed: int,
     ) -> None:
-        self._world = world
+        super().__init__(world, require_jogging=self._require_pendant, seed=seed)
+        self._machine = world.machine
         self._pendant_live = pendant_live
         self._now_ns = now_ns
-        self._random = random.Random(f"operator {seed}")
-        self._placement: tuple[Joints, int] | None = None
-        self._error = Look(0.0, 0.0, 0.0)
-
-    def look(self, tool: int | None = None) -> Look:
-        """Return the vector from the tip to the pin, with the eye's error.
-
-        Args:
-            tool: Whose tip; the nozzle on the arm by default, whatever tool is selected.
-        """
-        tool = MOUNTED_TOOL if tool is None else tool
-        self._take_up_position(tool)
-        gap = zip(self._world.pin_mm, self._world.tip_mm(tool), strict=True)
-        dx, dy, dz = (pin - tip for pin, tip in gap)
-        error = self._error
-        return Look(dx + error.dx_mm, dy + error.dy_mm, dz + error.dz_mm)
-
-    def jog_onto_pin(self, tool: int | None = None) -> Pose:
-        """Jog until the eye sees no gap; U stays. Return the flange pose.
-
-        Raises:
-            ConfigError: The controller is not in Teach mode, so the pendant moves nothing.
-            OutOfReach: The arm cannot get there.
-        """
-        self._require_pendant()
-        tool = MOUNTED_TOOL if tool is None else tool
-        arm = self._world.machine.arm
-        self._error = self._drawn_error()
-        pin_x, pin_y, pin_z = self._world.pin_mm
-        tip_x, tip_y, tip_z = self._world.tip_mm(tool)
-        flange = arm.flange()
-        target = replace(
-            flange,
-            x_mm=flange.x_mm + pin_x - tip_x + self._error.dx_mm,
-            y_mm=flange.y_mm + pin_y - tip_y + self._error.dy_mm,
-            z_mm=flange.z_mm + pin_z - tip_z + self._error.dz_mm,
-        )
-        arm.place(inverse(arm.model, target, arm.hand), self._now_ns())
-        self._placement = (arm.joints, tool)
-        return arm.flange()
 
     def teach_point(self, number: int, u_deg: float) -> Pose:
         """Turn the tool to ``u_deg``, jog its tip onto the pin, teach the flange pose there.
@@ -191,11 +128,11 @@ class Operator:
             OutOfReach: The arm cannot get there.
         """
         self._require_pendant()
-        arm = self._world.machine.arm
+        arm = self._machine.arm
         turned = replace(arm.flange(), u_deg=u_deg)
         arm.place(inverse(arm.model, turned, arm.hand), self._now_ns())
         flange = self.jog_onto_pin()
-        self._world.machine.points.store(number, Point.at(flange))
+        self._machine.points.store(number, Point.at(flange))
         return flange
 
     def _require_pendant(self) -> None:
@@ -205,21 +142,31 @@ class Operator:
                 remedy=tr("Turn the mode selector to Teach first."),
             )
 
-    def _take_up_position(self, tool: int) -> None:
-        placement = (self._world.machine.arm.joints, tool)
-        if placement != self._placement:
-            self._placement = placement
-            self._error = self._drawn_error()
 
-    def _drawn_error(self) -> Look:
-        sigma_mm = self._world.operator_sigma_mm
-        return Look(*(self._random.gauss(0.0, sigma_mm) for _ in range(3)))
+class _HandledArm:
+    """Implements :class:`~robolink_simulators.workplace.Handled`."""
 
+    def __init__(self, machine: Machine, now_ns: Callable[[], int]) -> None:
+        self._machine = machine
+        self._now_ns = now_ns
 
-def _exchanged(old: ToolOffset, rng: random.Random) -> ToolOffset:
-    x_mm, y_mm, z_mm = (_signed(rng, 0.2, 0.6) for _ in range(3))
-    return replace(old, x_mm=old.x_mm + x_mm, y_mm=old.y_mm + y_mm, z_mm=old.z_mm + z_mm).rounded(4)
+    def placement(self) -> Hashable:
+        return self._machine.arm.joints
 
+    def flange(self) -> Pose:
+        return self._machine.arm.flange()
 
-def _signed(rng: random.Random, low_mm: float, high_mm: float) -> float:
-    return rng.choice((-1.0, 1.0)) * rng.uniform(low_mm, high_mm)
+    def tip_mm(self, tip: ToolOffset | None) -> XyzMm:
+        met = tip_of(self._machine.arm.true_flange(), tip)
+        return (met.x_mm, met.y_mm, met.z_mm)
+
+    def carry(self, tip: ToolOffset | None, by_mm: XyzMm) -> None:  # noqa: ARG002 - U stays, so the flange goes as far as the tip
+        arm = self._machine.arm
+        flange = arm.flange()
+        target = replace(
+            flange,
+            x_mm=flange.x_mm + by_mm[0],
+            y_mm=flange.y_mm + by_mm[1],
+            z_mm=flange.z_mm + by_mm[2],
+        )
+        arm.place(inverse(arm.model, target, arm.hand), self._now_ns())

@@ -1,0 +1,152 @@
+"""The truth behind a simulated SoftMotion machine, and the person beside it."""
+
+import random
+from collections.abc import Hashable
+from typing import Final
+
+from robolink.errors import ConfigError
+from robolink.messages import tr
+from robolink.model import Pose, ToolOffset
+from robolink_simulators.sensing import TipSwitch
+from robolink_simulators.softmotion.condition import GroupState
+from robolink_simulators.softmotion.frames import (
+    NO_TURN,
+    ORIGIN,
+    Frame,
+    add,
+    subtract,
+    turned,
+    zyx,
+    zyx_angles,
+)
+from robolink_simulators.softmotion.group import AxisGroup
+from robolink_simulators.softmotion.kinematics import AxisValues
+from robolink_simulators.softmotion.smc_errors import ErrorKind, Refused
+from robolink_simulators.workplace import (
+    MOUNTED_TOOL,
+    Operator,
+    Workplace,
+    XyzMm,
+    exchanged,
+    pin_beside,
+)
+
+STORED: Final = ToolOffset(12.0, -3.5, -20.0)
+"""The nozzle that was there before, on a kinematics that carries any tool."""
+
+STORED_ON_AXIS: Final = ToolOffset(0.0, 0.0, -20.0)
+"""The same, where only a shift along Z fits."""
+
+_STANCE: Final = 0.6
+_ARRIVED_MM = 1e-9
+_MOST_TRIES = 100
+
+
+class SoftMotionWorld(Workplace):
+    """Ground truth around a simulated axis group.
+
+    Args:
+        group: The robot in this world.
+        tips: The physical tip of each tool number, seen from the flange.
+        pin_mm: Tip of the reference pin, in MCS.
+        seed: Decides the next nozzles and the errors of the eye.
+        stored: The nozzle that was there before.
+
+    Attributes:
+        operator: The person at the cell, who jogs with the machine's own panel.
+        stored: The nozzle that was there before.
+    """
+
+    def __init__(
+        self,
+        group: AxisGroup,
+        tips: dict[int, ToolOffset],
+        pin_mm: XyzMm,
+        *,
+        seed: int,
+        stored: ToolOffset,
+    ) -> None:
+        super().__init__(_HandledGroup(group), tips, pin_mm, seed=seed, replaced=stored)
+        self.group = group
+        self.stored = stored
+        self.operator = Operator(self, require_jogging=self._require_rest, seed=seed)
+
+    @classmethod
+    def seeded(cls, group: AxisGroup, seed: int) -> "SoftMotionWorld":
+        """Set up a nozzle change: the tip is some tenths of a mm from where it was.
+
+        The machine is put where the physical tip stands some mm beside the pin and above it.
+        What is stored, and which tool is set, is up to the PLC program.
+        """
+        rng = random.Random(f"softmotion world {seed}")
+        image = group.kinematics.orientation_image(NO_TURN)
+        any_tool = image is not None and image.accepts((1.0, 0.0, 0.0))
+        stored = STORED if any_tool else STORED_ON_AXIS
+        tip = exchanged(stored, rng)
+        if not any_tool:
+            tip = ToolOffset(0.0, 0.0, tip.z_mm)
+        group.place(tuple(_stance(axis.limits.low, axis.limits.high) for axis in group.axes))
+        pin_mm = pin_beside(_tip_at(group, group.values, tip), rng)
+        return cls(group, {MOUNTED_TOOL: tip}, pin_mm, seed=seed, stored=stored)
+
+    def connect(self, number: int, switch: TipSwitch, tool: int = MOUNTED_TOOL) -> None:
+        """Let a beam or a plate that the tip meets switch an input of the group."""
+        self.group.inputs.connect(
+            number, lambda axes: switch.trips(_tip_at(self.group, axes, self.tips.get(tool)))
+        )
+
+    def _require_rest(self) -> None:
+        if self.group.state not in (GroupState.DISABLED, GroupState.STANDBY):
+            raise ConfigError(
+                tr("The machine cannot be jogged by hand while it moves or is in error."),
+                remedy=tr("Wait for the end of the movement, or reset the error first."),
+            )
+
+
+class _HandledGroup:
+    """Implements :class:`~robolink_simulators.workplace.Handled`."""
+
+    def __init__(self, group: AxisGroup) -> None:
+        self._group = group
+
+    def placement(self) -> Hashable:
+        return self._group.values
+
+    def flange(self) -> Pose:
+        flange = self._group.flange()
+        return Pose(*flange.shift_mm, *zyx_angles(flange.rotation), tool=0)
+
+    def tip_mm(self, tip: ToolOffset | None) -> XyzMm:
+        return _tip_at(self._group, self._group.values, tip)
+
+    def carry(self, tip: ToolOffset | None, by_mm: XyzMm) -> None:
+        """Try again while the flange turns with the arms and takes the tip along."""
+        group, kinematics = self._group, self._group.kinematics
+        target = add(self.tip_mm(tip), by_mm)
+        axes = group.values
+        configuration = kinematics.configuration(axes)
+        for _ in range(_MOST_TRIES):
+            flange = kinematics.flange(axes)
+            arm = turned(flange.rotation, _frame(tip).shift_mm)
+            wanted = Frame(subtract(target, arm), flange.rotation)
+            axes = kinematics.axes_for(wanted, configuration, axes)
+            missed = subtract(target, _tip_at(group, axes, tip))
+            if max(map(abs, missed)) < _ARRIVED_MM:
+                group.place(axes)
+                return
+        raise Refused(ErrorKind.UNREACHABLE, "The tip cannot be brought there")
+
+
+def _stance(low: float, high: float) -> float:
+    return low + _STANCE * (high - low)
+
+
+def _tip_at(group: AxisGroup, axes: AxisValues, tip: ToolOffset | None) -> XyzMm:
+    return (group.kinematics.flange(axes) @ _frame(tip)).shift_mm
+
+
+def _frame(tip: ToolOffset | None) -> Frame:
+    if tip is None:
+        return ORIGIN
+    x_mm, y_mm, z_mm, u_deg, v_deg, w_deg = tip.components()
+    return Frame((x_mm, y_mm, z_mm), zyx(u_deg, v_deg, w_deg))

@@ -1,0 +1,270 @@
+"""Tools of a simulated axis group; numbers are those of softmotion.md 7."""
+
+from dataclasses import dataclass
+
+import pytest
+from robolink_simulators.softmotion import (
+    AxisGroup,
+    BufferMode,
+    CoordRef,
+    ErrorKind,
+    GroupOptions,
+    GroupState,
+    ReadToolMode,
+    Refused,
+    Tool,
+    machine_named,
+)
+from robolink_simulators.softmotion.catalogue import NAMES
+from robolink_simulators.softmotion.frames import zyz
+from robolink_simulators.softmotion.positions import Gantry3
+
+from tests.unit._softmotion_machine import (
+    FACTORS,
+    NOZZLE,
+    in_axes,
+    kind,
+    moved,
+    passing,
+    settled,
+    shifted,
+    standing,
+)
+
+TOOL_SYMBOL = "SMC_AXIS_GROUP_TOOL_OFFSET_INCOMPATIBLE_WITH_KINEMATICS"
+CP = "line"
+DIRECT = "direct"
+
+
+def set_to(group, x=0, y=0, z=0, a=0, b=0, c=0):
+    return group.set_tool(CoordRef(x, y, z, a, b, c))
+
+
+def shift_of(group, mode=ReadToolMode.SET):
+    return group.read_tool(mode).frame.shift_mm
+
+
+def commanded(group, how, *, x_mm=-20.0, mode=BufferMode.BUFFERED):
+    if how == CP:
+        return moved(group, x_mm=x_mm, mode=mode)
+    values = group.values
+    return group.move_direct_absolute(in_axes(values[0] + 10, *values[1:]), FACTORS, mode=mode)
+
+
+def test_no_tool_is_set_in_disabled():
+    """Behaviour 1."""
+    group = standing()
+    group.disable()
+    assert kind(set_to(group, z=50)) is ErrorKind.WRONG_STATE
+    assert group.read_tool() == Tool()
+
+
+def test_no_tool_is_set_in_error_stop_and_the_old_one_outlives_the_reset():
+    """Behaviour 2."""
+    group = standing()
+    set_to(group, z=20)
+    group.fail_axis(0)
+    assert kind(set_to(group, z=50)) is ErrorKind.WRONG_STATE
+    assert shift_of(group) == (0, 0, 20)
+    group.reset()
+    assert shift_of(group) == (0, 0, 20)
+
+
+def test_a_tool_that_does_not_fit_leaves_the_old_one():
+    """Behaviour 3."""
+    group = standing("Kin_Scara2_Z")
+    assert set_to(group, z=20).outputs.done
+    refused = set_to(group, x=10)
+    assert kind(refused) is ErrorKind.TOOL_INCOMPATIBLE
+    assert refused.outputs.error.symbol == TOOL_SYMBOL
+    assert shift_of(group) == (0, 0, 20)
+    assert group.state is GroupState.STANDBY
+
+
+def test_on_two_arms_a_shift_along_z_with_any_rotation_fits():
+    """Behaviour 4."""
+    group = standing("Kin_Scara2_Z")
+    assert set_to(group, z=-35, a=10, b=20, c=30).outputs.done
+    tool = group.read_tool().frame
+    assert tool.shift_mm == (0, 0, -35)
+    assert tool.rotation == zyz(10, 20, 30)
+
+
+def test_a_polar_kinematics_takes_shifts_along_z_only():
+    """Behaviour 5."""
+    group = standing("Kin_Polar_Z", at=(30.0, 300.0, 0.0))
+    assert kind(set_to(group, y=1)) is ErrorKind.TOOL_INCOMPATIBLE
+    assert set_to(group, z=1).outputs.done
+
+
+@pytest.mark.parametrize("name", [n for n in NAMES if n not in ("Kin_Scara2_Z", "Kin_Polar_Z")])
+def test_a_kinematics_whose_orientation_is_known_takes_any_tool(name):
+    """Behaviour 7, and a C axis behind an arm lifts its restriction (softmotion.md 0.3)."""
+    group = standing(name, at=(30.0, 45.0, 15.0, -20.0)[: len(machine_named(name).limits)])
+    assert set_to(group, 1, 2, 3, 4, 5, 6).outputs.done
+    assert shift_of(group) == (1, 2, 3)
+
+
+@pytest.mark.parametrize("other", ["Kin_Scara2_Z", "Kin_Scara2_Z+Kin_CAxis"])
+def test_exchanging_the_kinematics_takes_the_tool_off(other):
+    """Behaviour 8, also with the same kinematics again."""
+    group = standing("Kin_Scara2_Z+Kin_CAxis")
+    set_to(group, 1, 2, 3)
+    assert group.set_kin_transform(machine_named(other).kinematics).outputs.done
+    assert group.read_tool() == Tool()
+    assert group.kinematics.name == other
+    assert len(group.axes) == len(group.kinematics.kinds)
+    assert kind(set_to(group, x=1)) is (
+        ErrorKind.TOOL_INCOMPATIBLE if other == "Kin_Scara2_Z" else None
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class WithoutImage(Gantry3):
+    """A custom kinematics that does not implement ISMKinematicsWithOrientationImage."""
+
+    def orientation_image(self, wanted):
+        return None
+
+
+@pytest.mark.parametrize("shift", [{"x": 1}, {"z": 1}])
+def test_a_custom_kinematics_without_an_orientation_image_takes_no_tool(shift):
+    """Behaviour 9."""
+    group = AxisGroup(WithoutImage())
+    group.power(on=True)
+    group.enable()
+    refused = set_to(group, **shift)
+    assert kind(refused) is ErrorKind.NO_ORIENTATION_IMAGE
+    assert refused.outputs.error.symbol == TOOL_SYMBOL
+    assert moved(group, x_mm=10)
+
+
+def test_the_drives_must_fit_an_exchanged_kinematics():
+    group = standing("Kin_Gantry3")
+    set_to(group, 1, 2, 3)
+    scara = machine_named("Kin_Scara2_Z").kinematics
+    assert kind(group.set_kin_transform(scara)) is ErrorKind.AXES_MISMATCH
+    assert shift_of(group) == (1, 2, 3)
+
+
+def test_the_kinematics_is_not_exchanged_in_motion():
+    group = standing()
+    moved(group, x_mm=-20)
+    assert kind(group.set_kin_transform(group.kinematics)) is ErrorKind.WRONG_STATE
+
+
+def test_exchanging_the_kinematics_ends_what_was_interrupted():
+    group = standing()
+    move = moved(group, x_mm=-60)
+    passing(group, 0.2)
+    group.interrupt()
+    settled(group)
+    group.set_kin_transform(group.kinematics)
+    assert move.outputs.aborted
+    assert kind(group.resume()) is ErrorKind.NO_SUCH_MOVEMENT
+
+
+@pytest.mark.parametrize("allowed", [True, False])
+def test_setting_a_tool_while_a_stop_is_held_is_an_option(allowed):
+    group = standing(options=GroupOptions(set_tool_while_stopping=allowed))
+    group.stop()
+    assert kind(set_to(group, z=1)) is (None if allowed else ErrorKind.WRONG_STATE)
+
+
+def test_the_reported_tcp_jumps_when_a_tool_is_set():
+    group = standing()
+    assert group.set_tool(NOZZLE, "needle").outputs.done
+    position = group.read_actual_position()
+    assert position.values[:3] == pytest.approx((316.571429, 353.185165, 20), abs=2e-6)
+    assert group.read_tool().name == "needle"
+    assert position.configuration.elbow_right is True
+    group.set_tool(CoordRef())
+    assert group.read_actual_position().values[2] == -20
+
+
+def test_a_tool_counts_for_movements_commanded_after_it():
+    group = standing()
+    set_to(group, z=-10)
+    first = moved(group, x_mm=-20)
+    passing(group, 0.05)
+    assert set_to(group, z=-30).outputs.done
+    assert first.outputs.active
+    assert shift_of(group, ReadToolMode.ACTIVE_MOVEMENT) == (0, 0, -10)
+    assert shift_of(group, ReadToolMode.LAST_COMMANDED) == (0, 0, -10)
+    moved(group, x_mm=-30, mode=BufferMode.BUFFERED)
+    assert shift_of(group, ReadToolMode.ACTIVE_MOVEMENT) == (0, 0, -10)
+    assert shift_of(group, ReadToolMode.LAST_COMMANDED) == (0, 0, -30)
+    assert shift_of(group) == (0, 0, -30)
+
+
+@pytest.mark.parametrize("mode", [ReadToolMode.ACTIVE_MOVEMENT, ReadToolMode.LAST_COMMANDED])
+def test_the_tool_of_no_movement_cannot_be_read(mode):
+    with pytest.raises(Refused) as caught:
+        standing().read_tool(mode)
+    assert caught.value.kind is ErrorKind.NO_SUCH_MOVEMENT
+
+
+@pytest.mark.parametrize("kept", [True, False])
+def test_whether_the_last_commanded_tool_outlives_its_movement_is_an_option(kept):
+    options = GroupOptions(last_commanded_tool="kept" if kept else "unfinished")
+    group = standing(options=options)
+    set_to(group, z=-10)
+    moved(group, x_mm=-5)
+    settled(group)
+    set_to(group, z=-20)
+    if kept:
+        assert shift_of(group, ReadToolMode.LAST_COMMANDED) == (0, 0, -10)
+    else:
+        with pytest.raises(Refused):
+            group.read_tool(ReadToolMode.LAST_COMMANDED)
+
+
+@pytest.mark.parametrize("mode", [BufferMode.ABORTING, BufferMode.BLENDING_HIGH])
+@pytest.mark.parametrize("changed", [True, False])
+def test_a_tool_change_between_two_lines_makes_the_second_wait(mode, changed):
+    group = standing()
+    set_to(group, z=-10)
+    first = moved(group, x_mm=-40)
+    if changed:
+        set_to(group, z=-30)
+    second = moved(group, x_mm=-20, mode=mode)
+    while not second.outputs.active:
+        group.advance(group.next_change())
+    assert first.outputs.done is changed
+    settled(group)
+    assert second.outputs.done
+
+
+@pytest.mark.parametrize(("before", "after"), [(CP, DIRECT), (DIRECT, CP), (DIRECT, DIRECT)])
+def test_a_tool_change_beside_a_direct_movement_leaves_aborting_alone(before, after):
+    group = standing()
+    first = commanded(group, before)
+    passing(group, 0.05)
+    set_to(group, z=-30)
+    second = commanded(group, after, mode=BufferMode.ABORTING)
+    assert first.outputs.aborted
+    settled(group)
+    assert second.outputs.done
+
+
+def test_interrupted_movements_go_on_with_their_old_tool():
+    group = standing()
+    set_to(group, z=-10)
+    start = shifted(group)
+    first = moved(group, x_mm=-60)
+    second = moved(group, x_mm=-60, z_mm=5, mode=BufferMode.BUFFERED)
+    passing(group, 0.2)
+    group.interrupt()
+    settled(group)
+    set_to(group, z=-30)
+    assert group.resume().outputs.done
+    assert shift_of(group, ReadToolMode.ACTIVE_MOVEMENT) == (0, 0, -10)
+    later = moved(group, mode=BufferMode.BUFFERED)
+    assert shift_of(group, ReadToolMode.LAST_COMMANDED) == (0, 0, -30)
+    while not second.outputs.done:
+        group.advance(group.next_change())
+    assert first.outputs.done
+    old_tip_z_mm = group.flange().shift_mm[2] - 10
+    assert old_tip_z_mm == pytest.approx(start.position[2] + 5)
+    settled(group)
+    assert later.outputs.done

@@ -6,10 +6,9 @@ from dataclasses import replace
 from functools import partial
 
 from robolink.calibration import CalibrationResult, Impact, TouchPlan, VerifyResult
-from robolink.controllers.epson import EpsonController
 from robolink.errors import ConfigError, ReservedToolError, ToolIndexError
 from robolink.messages import tr
-from robolink.model import Pose, ToolReceipt
+from robolink.model import Controller, Pose, ToolReceipt
 from robolink.nozzle_change import (
     ChangePlan,
     Gate,
@@ -100,7 +99,7 @@ class CalibrationListener(Listener):
         self._points: dict[int, Pose | None] | None = None
         self.impact: Impact | None = None
 
-    def read_points(self, controller: EpsonController) -> None:
+    def read_points(self, controller: Controller) -> None:
         """Read the taught points on which the change is to be judged."""
         if self._request is not None:
             self._points = self._request.read(controller)
@@ -134,7 +133,7 @@ class LiveCalibration:
 
     def __init__(
         self,
-        controller: EpsonController,
+        controller: Controller,
         plan: ChangePlan,
         *,
         draft: Draft,
@@ -194,17 +193,14 @@ class LiveCalibration:
             show_report(self._report)
 
 
-def planned_steps(controller: EpsonController, plan: ChangePlan) -> list[dict[str, object]]:
+def planned_steps(controller: Controller, plan: ChangePlan) -> list[dict[str, object]]:
     """Return the foreseen steps of a plan with their requests and limit checks; reads only."""
     group = controller.groups[0]
     steps: list[dict[str, object]] = []
     for step in preview(controller, plan):
         requests: list[str] = []
         if step.target is not None and step.profile is not None:
-            requests = [
-                controller.wire("Execute", statement)
-                for statement in group.statements_for(step.target, step.profile)
-            ]
+            requests = list(group.requests_for(step.target, step.profile))
         target = pose_payload(step.target) if step.target else None
         steps.append(
             {"text": step.text, "target": target, "requests": requests, "refusal": step.refusal}

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from functools import partial
 
 from robolink.calibration import ToolFit
-from robolink.controllers.epson import EpsonController
 from robolink.errors import DeclinedError
 from robolink.messages import tr
+from robolink.model import Controller
 from robolink.nozzle_change import (
     Bench,
     ChangePlan,
@@ -146,7 +146,7 @@ def calibrate_from_poses(
 
 
 def _carry_out(
-    controller: EpsonController, plan: PosesPlan, given: GivenPoses, listener: Listener
+    controller: Controller, plan: PosesPlan, given: GivenPoses, listener: Listener
 ) -> ToolReport:
     one = ToolPlan(plan.tool, given, plan.gate, verify=False)
     change = NozzleChange(
@@ -161,7 +161,7 @@ def _carry_out(
 
 
 def _dry_run(
-    controller: EpsonController,
+    controller: Controller,
     plan: PosesPlan,
     given: GivenPoses,
     listener: Listener,
@@ -175,8 +175,7 @@ def _dry_run(
     if not quiet:
         listener.proposed([proposal])
     plan.gate.judge_change(proposal, remedy=given.remedy)
-    statements = controller.tools.preview_write(plan.tool, proposal.offset)
-    requests = [controller.wire("Execute", statement) for statement in statements]
+    requests = list(controller.tools.preview_write(plan.tool, proposal.offset))
     return {"dry_run": True, "requests": requests, **proposal_payload(proposal)}
 
 

@@ -11,7 +11,7 @@ from robolink.messages import tr
 
 if TYPE_CHECKING:
     from robolink.config import Cell
-    from robolink.controllers.epson import EpsonController
+    from robolink.model import Controller
 
 
 def is_cell_name(given: str) -> bool:
@@ -52,7 +52,7 @@ def with_cell_limits(
     return chosen
 
 
-def require_expected_robot(controller: "EpsonController", cell: "Cell") -> None:
+def require_expected_robot(controller: "Controller", cell: "Cell") -> None:
     """Refuse to work on another robot than the cell file names.
 
     Raises:

@@ -2,13 +2,16 @@
 
 import sys
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
 from robolink.errors import DeclinedError
 from robolink.messages import tr
 from robolink_cli._context import WATCHED
+
+if TYPE_CHECKING:
+    from robolink.model import Controller
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -65,6 +68,22 @@ def agree_to_motion(question: str, *, yes: bool) -> None:
             remedy=tr("Run it on a terminal, or give --yes when the cell is clear."),
         )
     _require_yes(question)
+
+
+def motion_question(
+    controller: "Controller", purpose: str, *, speed_mm_s: float, box_mm: float
+) -> str:
+    """Return the question before something moves: what, how fast, how far, what for."""
+    terms = controller.groups[0].terms()
+    return tr(
+        "{who} will move at most {speed:g} mm/s fast, within {box:g} mm, {purpose}. {watch} "
+        "Is the cell clear?",
+        who=terms.who,
+        speed=speed_mm_s,
+        box=box_mm,
+        purpose=purpose,
+        watch=terms.watch,
+    )
 
 
 def asked(question: str) -> bool:

@@ -25,8 +25,7 @@ from robolink_cli._shared_options import origin_of as origin_of
 
 if TYPE_CHECKING:
     from robolink.config import Cell
-    from robolink.controllers.epson import EpsonController
-    from robolink.model import OutcomeLog, Secret
+    from robolink.model import Controller, OutcomeLog, Secret
 
 WATCHED = "robolink.watched"
 """Where a prompt finds the controller whose status it must read while a person thinks."""
@@ -111,7 +110,7 @@ def open_controller(
     quiet: bool = False,
     any_robot: bool = False,
     changes: bool = False,
-) -> "Iterator[EpsonController]":
+) -> "Iterator[Controller]":
     """Connect to the controller and, unless ``quiet``, say what was left unfinished there.
 
     Args:

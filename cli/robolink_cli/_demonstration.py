@@ -8,11 +8,10 @@ from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.tcp import serve_tcp
 
 import robolink
-from robolink.controllers.epson import EpsonController
 from robolink.errors import VerifyError
 from robolink.journal import memory_journal
 from robolink.messages import tr
-from robolink.model import ToolOffset
+from robolink.model import Controller, ToolOffset
 from robolink.nozzle_change import (
     ChangePlan,
     Listener,
@@ -96,7 +95,7 @@ def demonstrate(*, seed: int, speed: float) -> None:
     )
 
 
-def _change(controller: EpsonController, simulator: EpsonSimulator) -> ToolReport:
+def _change(controller: Controller, simulator: EpsonSimulator) -> ToolReport:
     def look() -> tuple[float, float, float]:
         seen = simulator.world.operator.look(TOOL)
         return seen.dx_mm, seen.dy_mm, seen.dz_mm

@@ -9,13 +9,13 @@ import click
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink_cli._kinds import points_of
 from robolink_cli._pose_source import point_numbers
 from robolink_cli._render import say, table
 
 if TYPE_CHECKING:
     from robolink.calibration import Impact
-    from robolink.controllers.epson import EpsonController
-    from robolink.model import Pose, ToolOffset
+    from robolink.model import Controller, Pose, ToolOffset
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -27,10 +27,10 @@ class ImpactRequest:
     numbers: tuple[int, ...] = ()
     path: Path | None = None
 
-    def read(self, controller: "EpsonController") -> "dict[int, Pose | None]":
+    def read(self, controller: "Controller") -> "dict[int, Pose | None]":
         """Return the points by number, ``None`` for one that is not taught."""
         if self.path is None:
-            return controller.points.read_all(self.numbers)
+            return dict(points_of(controller).read_all(self.numbers))
         from robolink.pose_files import read_pts
 
         return read_pts(self.path)

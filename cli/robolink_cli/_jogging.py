@@ -1,8 +1,7 @@
 """Jogging through the runner, so that its limits and its watch hold."""
 
-from robolink.controllers.epson import EpsonController
 from robolink.messages import tr
-from robolink.model import MotionProfile, Pose, WorkBox
+from robolink.model import Controller, MotionProfile, Pose, WorkBox
 from robolink.runner import Operator, Runner, RunSettings, ask_for_pose, jog_target
 from robolink_cli._key_jog import KeyOperator
 from robolink_cli._keyboard import Keyboard
@@ -10,20 +9,18 @@ from robolink_cli._operator import TerminalOperator, terminal
 from robolink_cli._render import say
 
 
-def jog_by_steps(controller: EpsonController, steps: str, speed_mm_s: float, box_mm: float) -> Pose:
+def jog_by_steps(controller: Controller, steps: str, speed_mm_s: float, box_mm: float) -> Pose:
     """Make one move of ``steps`` and return where the tool is then."""
     return _runner(controller, TerminalOperator(_silent), speed_mm_s, box_mm).jog(steps)
 
 
-def jog_on_terminal(controller: EpsonController, speed_mm_s: float, box_mm: float) -> Pose:
+def jog_on_terminal(controller: Controller, speed_mm_s: float, box_mm: float) -> Pose:
     """Let a person jog until an empty line, and return where the tool is then."""
     runner = _runner(controller, terminal(), speed_mm_s, box_mm)
     return runner.run(ask_for_pose(tr("Jog the tool.")))
 
 
-def jog_by_keys(
-    controller: EpsonController, keys: Keyboard, speed_mm_s: float, box_mm: float
-) -> Pose:
+def jog_by_keys(controller: Controller, keys: Keyboard, speed_mm_s: float, box_mm: float) -> Pose:
     """Let a person jog by keys until q or ENTER, and return where the tool is then."""
     group = controller.groups[0]
     settings = _settings(group.pose(), speed_mm_s, box_mm)
@@ -31,23 +28,17 @@ def jog_by_keys(
     return Runner(controller, group, operator, settings).run(ask_for_pose(tr("Jog the tool.")))
 
 
-def plan_jog(
-    controller: EpsonController, steps: str, speed_mm_s: float, box_mm: float
-) -> list[str]:
+def plan_jog(controller: Controller, steps: str, speed_mm_s: float, box_mm: float) -> list[str]:
     """Return the requests that :func:`jog_by_steps` would send; refuse what it would refuse."""
     group = controller.groups[0]
     settings = _settings(group.pose(), speed_mm_s, box_mm)
     target, path = jog_target(group.pose(), steps, settings)
     settings.box.check(target)
     profile = MotionProfile(path, settings.speed_percent, settings.speed_mm_s)
-    return [
-        controller.wire("Execute", statement) for statement in group.statements_for(target, profile)
-    ]
+    return list(group.requests_for(target, profile))
 
 
-def _runner(
-    controller: EpsonController, operator: Operator, speed_mm_s: float, box_mm: float
-) -> Runner:
+def _runner(controller: Controller, operator: Operator, speed_mm_s: float, box_mm: float) -> Runner:
     group = controller.groups[0]
     return Runner(controller, group, operator, _settings(group.pose(), speed_mm_s, box_mm))
 

@@ -3,15 +3,14 @@
 from collections.abc import Iterable
 from contextlib import suppress
 
-from robolink.controllers.epson import EpsonController
 from robolink.errors import ControllerError
 from robolink.messages import tr
-from robolink.model import Marker, MarkerKind
+from robolink.model import Controller, Marker, MarkerKind
 from robolink_cli._consent import asked, on_terminal
 from robolink_cli._render import json_is_on, note
 
 
-def offer_to_restore(controller: EpsonController, markers: Iterable[Marker]) -> None:
+def offer_to_restore(controller: Controller, markers: Iterable[Marker]) -> None:
     """Ask whether a tool that an unfinished procedure left selected is to be changed back.
 
     A no changes nothing and the command goes on. Nothing is asked of a script, nor where the

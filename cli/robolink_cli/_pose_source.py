@@ -13,8 +13,7 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 
 if TYPE_CHECKING:
-    from robolink.controllers.epson import EpsonController
-    from robolink.model import Pose
+    from robolink.model import Controller, Pose
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -57,7 +56,7 @@ class PoseSource:
             named = tr("typed poses")
         return tr("{poses}; taught with tool {tool}", poses=named, tool=taught_tool)
 
-    def poses(self, controller: "EpsonController") -> "tuple[Pose, ...]":
+    def poses(self, controller: "Controller") -> "tuple[Pose, ...]":
         """Return the poses; taught points are read from the controller.
 
         Raises:
@@ -67,9 +66,10 @@ class PoseSource:
         from robolink.model import Pose
         from robolink.nozzle_change import taught_poses
         from robolink.pose_files import read_poses
+        from robolink_cli._kinds import points_of
 
         if self.kind == "points":
-            return taught_poses(controller.points, self.points)
+            return taught_poses(points_of(controller), self.points)
         if self.path is not None:
             return read_poses(self.path)
         return tuple(Pose(x_mm, y_mm, 0.0, u_deg) for x_mm, y_mm, u_deg in self.typed)

@@ -2,14 +2,15 @@
 
 from collections.abc import Callable
 
-from robolink.controllers.epson import EpsonController
 from robolink.errors import DeclinedError
 from robolink.messages import tr
+from robolink.model import Controller
 from robolink.nozzle_change import ChangeReport
 from robolink.recipe import Answers, LoadedRecipe, RecipeRun, require_answers
 from robolink_cli._calibrating import operator_at, planned_steps, report_payload, show_report
-from robolink_cli._consent import agree_to_motion, asked, on_terminal
+from robolink_cli._consent import agree_to_motion, asked, motion_question, on_terminal
 from robolink_cli._context import CliContext, open_controller
+from robolink_cli._kinds import io_of
 from robolink_cli._recipe_events import EventStream, Progress
 from robolink_cli._render import note, say
 from robolink_cli._safekeeping import back_up_first
@@ -83,7 +84,7 @@ class Recalibration:
         if not self._events.on:
             self._context.emit("recalibration", payload, lambda: show(payload))
 
-    def _start(self, controller: EpsonController, run: RecipeRun) -> None:
+    def _start(self, controller: Controller, run: RecipeRun) -> None:
         for change in run.changed:
             note(change.sentence)
         self._events.emit(
@@ -96,7 +97,7 @@ class Recalibration:
             changed_by_others=[change.sentence for change in run.changed],
         )
 
-    def _consent(self, controller: EpsonController, run: RecipeRun) -> None:
+    def _consent(self, controller: Controller, run: RecipeRun) -> None:
         """Have the person agree to what is about to happen; back up before it does."""
         if run.takes_reference and not self._take_reference:
             self._explain_reference()
@@ -106,16 +107,15 @@ class Recalibration:
             return
         limits = run.plan.limits
         agree_to_motion(
-            tr(
-                "Robot {robot} will move in Power Low, at most {speed:g} mm/s, within {box:g} mm, "
-                "as {recipe!r} says for tool {tools}. The remote time-out set in the controller "
-                "is taken to be {timeout:g} s. Is the cell clear?",
-                robot=controller.robot_number(),
-                speed=limits.speed_mm_s,
-                box=limits.box_mm,
-                recipe=self._loaded.name,
-                tools=", ".join(str(plan.tool) for plan in run.plan.tools),
-                timeout=self._context.remote_timeout_s,
+            motion_question(
+                controller,
+                tr(
+                    "as {recipe!r} says for tool {tools}",
+                    recipe=self._loaded.name,
+                    tools=", ".join(str(plan.tool) for plan in run.plan.tools),
+                ),
+                speed_mm_s=limits.speed_mm_s,
+                box_mm=limits.box_mm,
             ),
             yes=self._answers.yes,
         )
@@ -149,7 +149,7 @@ class Recalibration:
                 remedy=tr("Run it on a terminal, or give --yes. Nothing was written."),
             )
 
-    def _dry_run(self, controller: EpsonController, run: RecipeRun) -> dict[str, object]:
+    def _dry_run(self, controller: Controller, run: RecipeRun) -> dict[str, object]:
         recipe = self._loaded.recipe
         return {
             "dry_run": True,
@@ -163,13 +163,13 @@ class Recalibration:
                     "at": output.at,
                     "output": output.output,
                     "on": output.on,
-                    "requests": list(controller.io.preview_output(output.output, output.on)),
+                    "requests": list(io_of(controller).preview_output(output.output, output.on)),
                 }
                 for output in recipe.outputs
             ],
         }
 
-    def _carry_out(self, controller: EpsonController, run: RecipeRun) -> dict[str, object]:
+    def _carry_out(self, controller: Controller, run: RecipeRun) -> dict[str, object]:
         report = run.run()
         # Now, because Ctrl-C may come before the logout is answered.
         for one in report.tools:

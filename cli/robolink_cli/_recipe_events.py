@@ -66,9 +66,9 @@ class Progress(Listener):
         """Say which phase begins."""
         if tool is not None:
             self.tool = tool
-        heading = _HEADINGS[moment]
+        heading = _heading(moment, self.tool)
         if heading:
-            note(heading.format(tool=self.tool))
+            note(heading)
         self._events.emit("phase", phase=moment, tool=tool)
 
     def step(self, tool: int, done: StepDone) -> None:
@@ -109,10 +109,10 @@ class Progress(Listener):
         self._events.emit("note", text=sentence)
 
 
-_HEADINGS = {
-    Moment.START: "",
-    Moment.BEFORE_MEASURE: tr("-- tool {tool}: measure"),
-    Moment.AFTER_MEASURE: "",
-    Moment.BEFORE_WRITE: tr("-- propose and write"),
-    Moment.END: tr("-- done"),
-}
+def _heading(moment: Moment, tool: int) -> str:
+    """Return the line over what comes next, empty for none."""
+    if moment is Moment.BEFORE_MEASURE:
+        return tr("-- tool {tool}: measure", tool=tool)
+    if moment is Moment.BEFORE_WRITE:
+        return tr("-- propose and write")
+    return tr("-- done") if moment is Moment.END else ""

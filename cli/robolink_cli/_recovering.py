@@ -1,15 +1,14 @@
 """A recovery on a terminal: what is found, what is done, what is left."""
 
-from robolink.controllers.epson import EpsonController
 from robolink.messages import tr
-from robolink.model import Finding
+from robolink.model import Controller, Finding
 from robolink.transaction import Settler, recover
 from robolink_cli._render import note, say
 from robolink_cli._views import finding_payload
 
 
 def recover_all(
-    controller: EpsonController, *, keep: bool, take_over: str | None, dry_run: bool
+    controller: Controller, *, keep: bool, take_over: str | None, dry_run: bool
 ) -> dict[str, object]:
     """Settle what reading the controller can settle; return the document of it.
 
@@ -42,7 +41,7 @@ def show_end(payload: dict[str, object]) -> None:
         say(tr("Everything is settled; tool {tool} is in force.", tool=tool))
 
 
-def _looked_at(controller: EpsonController, *, keep: bool) -> dict[str, object]:
+def _looked_at(controller: Controller, *, keep: bool) -> dict[str, object]:
     settler = Settler(controller, keep=keep)
     findings = [settler.examine(marker) for marker in controller.outcomes.open_markers()]
     for finding in findings:

@@ -15,8 +15,7 @@ from robolink_cli._render import note
 
 if TYPE_CHECKING:
     from robolink.calibration import Impact, VerifyResult
-    from robolink.controllers.epson import EpsonController
-    from robolink.model import ControllerFacts, ToolOffset, ToolReceipt
+    from robolink.model import Controller, ControllerFacts, ToolOffset, ToolReceipt
     from robolink.nozzle_change import Proposal
     from robolink.report import Outcome, Report
 
@@ -72,7 +71,7 @@ class Draft:
     There is something to report from :meth:`propose` on.
     """
 
-    def __init__(self, controller: "EpsonController", facts: "ControllerFacts") -> None:
+    def __init__(self, controller: "Controller", facts: "ControllerFacts") -> None:
         self._controller = controller.identity
         self._facts = facts
         self._proposed: dict[str, Any] = {}
@@ -174,7 +173,7 @@ class Draft:
 
 
 @contextmanager
-def reporting(request: ReportRequest | None, controller: "EpsonController") -> "Iterator[Draft]":
+def reporting(request: ReportRequest | None, controller: "Controller") -> "Iterator[Draft]":
     """Collect what a command finds out, and write it at the end, whatever the end is.
 
     A report that cannot be written changes nothing about how the command ends: it is said.

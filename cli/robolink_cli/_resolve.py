@@ -1,9 +1,8 @@
 """Going through the open markers of a controller, one by one."""
 
-from robolink.controllers.epson import EpsonController
 from robolink.errors import OutcomeUnknownError, RobolinkError
 from robolink.messages import tr
-from robolink.model import Finding, MarkerKind
+from robolink.model import Controller, Finding, MarkerKind
 from robolink.transaction import Settler
 from robolink_cli._consent import agree
 from robolink_cli._render import note
@@ -11,7 +10,7 @@ from robolink_cli._views import finding_payload
 
 
 def resolve_all(
-    controller: EpsonController, *, dry_run: bool, yes: bool, forget: bool
+    controller: Controller, *, dry_run: bool, yes: bool, forget: bool
 ) -> dict[str, object]:
     """Settle every open marker a person agrees to, and return what was found.
 

@@ -2,10 +2,8 @@
 
 from robolink.backup import RestorePlan
 from robolink.backup import restore as restore_tools
-from robolink.controllers.epson import EpsonController
 from robolink.messages import tr
-from robolink.model import ToolReceipt, require_engineer
-from robolink.protocols import spel
+from robolink.model import Controller, ToolReceipt, require_engineer
 from robolink_cli._render import note, say
 from robolink_cli._safekeeping import back_up_first
 from robolink_cli._tables import show_change
@@ -15,7 +13,7 @@ from robolink_cli._views import offset_payload, receipt_payload
 class Restoration:
     """One restore of one controller."""
 
-    def __init__(self, controller: EpsonController, plan: RestorePlan) -> None:
+    def __init__(self, controller: Controller, plan: RestorePlan) -> None:
         self._controller = controller
         self._plan = plan
 
@@ -27,15 +25,15 @@ class Restoration:
             NotReadyError: The state forbids a write.
         """
         plan, tools = self._plan, self._controller.tools
-        statements: list[spel.Statement] = []
+        requests: list[str] = []
         for change in plan.writes:
             if change.wanted is not None:
-                statements += tools.preview_write(change.tool, change.wanted)
+                requests += tools.preview_write(change.tool, change.wanted)
         if plan.select is not None:
-            statements.append(spel.select_tool(plan.select))
+            requests += tools.preview_select(plan.select)
         for change in plan.clears:
-            statements += tools.preview_clear(change.tool)
-        return [self._controller.wire("Execute", statement) for statement in statements]
+            requests += tools.preview_clear(change.tool)
+        return requests
 
     def show(self) -> None:
         """Show what would change."""

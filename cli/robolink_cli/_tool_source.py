@@ -1,12 +1,13 @@
 """The tools of a controller: asked for, or as the project publishes them."""
 
 from robolink.backup import ToolState, read_tools
-from robolink.controllers.epson import EpsonController
 from robolink.errors import ConfigError, NotReadyError
 from robolink.messages import tr
+from robolink.model import Controller
+from robolink_cli._kinds import require_epson
 
 
-def find_tools(controller: EpsonController, *, published: bool) -> ToolState:
+def find_tools(controller: Controller, *, published: bool) -> ToolState:
     """Return all tools and the one in force.
 
     Args:
@@ -25,7 +26,7 @@ def find_tools(controller: EpsonController, *, published: bool) -> ToolState:
             hint = tr("With the companion program in the project, --published works now too.")
             error.remedy = " ".join((error.remedy, hint))
             raise
-    found = controller.published_tools()
+    found = require_epson(controller, tr("published tools")).published_tools()
     if found is None:
         raise ConfigError(
             tr("The project in {url} publishes no tools.", url=controller.identity),

@@ -1,12 +1,9 @@
 """What commands show: plain payloads, and the tables made from them."""
 
 from collections.abc import Mapping
-from contextlib import suppress
 
 from robolink.calibration import VerifyResult
-from robolink.controllers.epson import EpsonController
-from robolink.errors import RejectedError, ToolError
-from robolink.model import ControllerState, Finding, Pose, ToolOffset, ToolReceipt
+from robolink.model import Controller, Finding, Pose, ToolOffset, ToolReceipt
 from robolink.nozzle_change import Proposal
 
 COMPONENTS = ("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
@@ -90,13 +87,10 @@ def finding_payload(finding: Finding) -> dict[str, object]:
     }
 
 
-def status_payload(controller: EpsonController) -> dict[str, object]:
-    """Return the state; what needs Execute is left out where Execute is not available.
-
-    While production runs only the flags and the alarms are read (epson.md 1.2, 1.3).
-    """
+def status_payload(controller: Controller) -> dict[str, object]:
+    """Return the flags, and what more can be read now."""
     status = controller.status()
-    payload: dict[str, object] = {
+    return {
         "controller": controller.identity,
         "state": status.state,
         "remote": status.remote,
@@ -111,29 +105,8 @@ def status_payload(controller: EpsonController) -> dict[str, object]:
         "teach": status.teach,
         "test": status.test,
         "code": status.code,
-        "text": "",
-        "alarms": None,
-        "selected_tool": None,
-        "published_selected_tool": None,
-        "motors_on": None,
-        "power": None,
+        **controller.condition(),
     }
-    if status.code:
-        payload["text"] = controller.error_text(status.code)
-    with suppress(RejectedError):  # older firmware has no alarms
-        payload["alarms"] = list(controller.alarms.list())
-    if status.state is ControllerState.READY:
-        # A controller that serves monitoring only may not show it in its flags.
-        with suppress(RejectedError):
-            payload["selected_tool"] = controller.tools.selected()
-            payload["motors_on"] = controller.groups[0].motors_on()
-            payload["power"] = "high" if controller.groups[0].settings.power_high() else "low"
-    if payload["selected_tool"] is None:
-        # A table that is being changed just now must not hide the state.
-        with suppress(RejectedError, ToolError):
-            published = controller.published_tools()
-            payload["published_selected_tool"] = published.selected if published else None
-    return payload
 
 
 def number(value: object) -> str:

@@ -8,7 +8,7 @@ import click
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_cli._cell import with_cell_limits
-from robolink_cli._consent import agree_to_motion, dry_run_option, yes_option
+from robolink_cli._consent import agree_to_motion, dry_run_option, motion_question, yes_option
 from robolink_cli._context import CliContext, controller_options, open_controller
 from robolink_cli._impacting import ImpactRequest, impact_options, impact_request
 from robolink_cli._pose_source import pose_source, pose_source_options, refuse_motion_options
@@ -190,15 +190,11 @@ def _measure(
             return
         live.require_writable()
         agree_to_motion(
-            tr(
-                "Robot {robot} will move in Power Low, at most {speed:g} mm/s, within {box:g} mm, "
-                "to measure tool {tool}. The remote time-out set in the controller is taken to "
-                "be {timeout:g} s. Is the cell clear?",
-                robot=controller.robot_number(),
-                speed=plan.limits.speed_mm_s,
-                box=plan.limits.box_mm,
-                tool=live.tool,
-                timeout=context.remote_timeout_s,
+            motion_question(
+                controller,
+                tr("to measure tool {tool}", tool=live.tool),
+                speed_mm_s=plan.limits.speed_mm_s,
+                box_mm=plan.limits.box_mm,
             ),
             yes=yes,
         )

@@ -1,12 +1,19 @@
 """io get, set: inputs, outputs and memory bits."""
 
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
 import click
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_cli._consent import agree, dry_run_option, yes_option
 from robolink_cli._context import CliContext, controller_options, open_controller
+from robolink_cli._kinds import io_of, require_epson
 from robolink_cli._render import say
+
+if TYPE_CHECKING:
+    from robolink.model import Controller
 
 _number = click.IntRange(min=0, max=0xFFFF)
 _memory = click.option("--memory", is_flag=True, help="Memory bits in place of inputs or outputs.")
@@ -45,14 +52,16 @@ def get(
             remedy=tr("Write for example 'robolink io get 3 --output'."),
         )
     with open_controller(context) as controller:
-        bank = controller.io
-        if bit is not None:
-            bits = bank.read_memory if memory else bank.read_input
-            value: int = (bank.read_output if output else bits)(bit)
-        elif byte is not None:
-            value = (bank.read_memory_byte if memory else bank.read_input_byte)(byte)
+        if bit is not None and not (output or memory):
+            value: int = io_of(controller).read_input(bit)
         else:
-            value = (bank.read_memory_word if memory else bank.read_input_word)(word or 0)
+            bank = require_epson(controller, tr("outputs, memory, bytes or words to read")).io
+            if bit is not None:
+                value = (bank.read_output if output else bank.read_memory)(bit)
+            elif byte is not None:
+                value = (bank.read_memory_byte if memory else bank.read_input_byte)(byte)
+            else:
+                value = (bank.read_memory_word if memory else bank.read_input_word)(word or 0)
     size = "bit" if bit is not None else "byte" if byte is not None else "word"
     at = next(number for number in (bit, byte, word) if number is not None)
     kind = "output" if output else "memory" if memory else "input"
@@ -74,23 +83,38 @@ def set_bit(
     on = switch == "on"
     kind = tr("memory bit") if memory else tr("output")
     with open_controller(context) as controller:
-        bank = controller.io
+        preview, change = _switching(controller, memory=memory)
         if dry_run:
-            preview = bank.preview_memory if memory else bank.preview_output
             context.show_requests(preview(bit, on))
             return
         agree(tr("Switch {kind} {bit} {switch}?", kind=kind, bit=bit, switch=switch), yes=yes)
-        receipt = (bank.set_memory if memory else bank.set_output)(bit, on)
+        receipt = change(bit, on)
     payload: dict[str, object] = {
         "kind": "memory" if memory else "output",
         "number": bit,
-        "before": receipt.before,
-        "value": receipt.read_back,
-        "skipped": receipt.skipped,
+        "before": getattr(receipt, "before", None),
+        "value": getattr(receipt, "read_back", None),
+        "skipped": getattr(receipt, "skipped", False),
     }
-    done = tr("was so already") if receipt.skipped else tr("switched, read back")
+    if payload["skipped"]:
+        done = tr("was so already")
+    elif payload["value"] is None:
+        done = tr("switched, acknowledged; it cannot be read back")
+    else:
+        done = tr("switched, read back")
     line = tr("{kind} {bit} is {switch}: {done}", kind=kind, bit=bit, switch=switch, done=done)
     context.emit("io-set", payload, lambda: say(line))
+
+
+def _switching(
+    controller: "Controller", *, memory: bool
+) -> "tuple[Callable[[int, bool], Sequence[str]], Callable[[int, bool], object]]":
+    """Return what shows the requests of switching a bit, and what switches it."""
+    if memory:
+        bank = require_epson(controller, tr("memory bits")).io
+        return bank.preview_memory, bank.set_memory
+    outputs = io_of(controller)
+    return outputs.preview_output, outputs.set_output
 
 
 def _shown(kind: str, size: str, at: int, value: int) -> str:

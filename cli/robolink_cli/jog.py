@@ -8,7 +8,7 @@ import click
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_cli._cell import with_cell_limits
-from robolink_cli._consent import agree_to_motion, dry_run_option, yes_option
+from robolink_cli._consent import agree_to_motion, dry_run_option, motion_question, yes_option
 from robolink_cli._context import CliContext, controller_options, open_controller
 
 if TYPE_CHECKING:
@@ -66,15 +66,11 @@ def jog(
         if dry_run:
             context.show_requests(plan_jog(controller, " ".join(steps), speed_mm_s, box_mm))
             return
-        question = tr(
-            "Robot {robot} will move in Power Low, at most {speed:g} mm/s, with tool {tool}, "
-            "within {box:g} mm. The remote time-out set in the controller is taken to be "
-            "{timeout:g} s. Is the cell clear?",
-            robot=controller.robot_number(),
-            speed=speed_mm_s,
-            tool=controller.tools.selected(),
-            box=box_mm,
-            timeout=context.remote_timeout_s,
+        question = motion_question(
+            controller,
+            tr("with tool {tool}", tool=controller.tools.selected()),
+            speed_mm_s=speed_mm_s,
+            box_mm=box_mm,
         )
         if board is None:
             agree_to_motion(question, yes=yes)

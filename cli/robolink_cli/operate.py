@@ -4,8 +4,10 @@ import click
 
 from robolink.errors import ConnectError
 from robolink.messages import tr
+from robolink.model import Act
 from robolink_cli._consent import agree, agree_to_motion, dry_run_option, yes_option
 from robolink_cli._context import CliContext, controller_options, open_controller
+from robolink_cli._kinds import require_epson
 from robolink_cli._render import say
 
 
@@ -30,9 +32,8 @@ def where(context: CliContext) -> None:
 
     with open_controller(context) as controller:
         group = controller.groups[0]
-        pose, printed = group.pose(), group.joints()
-    payload = pose_payload(pose)
-    payload |= {"joints": list(printed.joints), "pulses": list(printed.pulses)}
+        pose, axes = group.pose(), group.axes()
+    payload = pose_payload(pose) | {name: list(values) for name, values in axes.items()}
     context.emit("where", payload, lambda: show_pose(payload))
 
 
@@ -45,7 +46,7 @@ def stop(context: CliContext, dry_run: bool) -> None:
         # Whatever robot it is: a stop does not wait for a look at the model.
         with open_controller(context, any_robot=True) as controller:
             if dry_run:
-                context.show_requests([controller.wire("Stop")])
+                context.show_requests(controller.preview(Act.STOP))
                 return
             controller.stop()
             state = controller.status().state
@@ -68,7 +69,7 @@ def reset(context: CliContext, dry_run: bool, yes: bool) -> None:
     """Clear an error. May switch outputs off: a gripper may drop its part."""
     with open_controller(context) as controller:
         if dry_run:
-            context.show_requests([controller.wire("Reset")])
+            context.show_requests(controller.preview(Act.RESET))
             return
         agree(
             tr("Reset may switch outputs off (vacuum, gripper). Go on?"),
@@ -94,9 +95,7 @@ def motors(context: CliContext, switch: str, dry_run: bool, yes: bool) -> None:
     on = switch == "on"
     with open_controller(context) as controller:
         if dry_run:
-            name = "SetMotorsOn" if on else "SetMotorsOff"
-            robot = controller.robot_number()
-            context.show_requests([controller.wire(name, str(robot))])
+            context.show_requests(controller.preview(Act.MOTORS_ON if on else Act.MOTORS_OFF))
             return
         if on:
             agree(tr("Is the cell clear? The motors go on."), yes=yes)
@@ -147,7 +146,7 @@ def execute_raw(context: CliContext, statement: str, yes: bool) -> None:
             tr("Send {statement!r} as it stands? It may do anything.", statement=statement),
             yes=yes,
         )
-        printed = controller.execute_raw(statement)
+        printed = require_epson(controller, tr("SPEL+ statements")).execute_raw(statement)
     payload: dict[str, object] = {"statement": statement, "printed": printed}
     context.emit("execute-raw", payload, lambda: say(printed or tr("carried out")))
 

@@ -89,8 +89,8 @@ def set_tool(
         kept = [name for name in units.values() if name not in changes]
         shown = offset_payload(before), offset_payload(wanted)
         if dry_run:
-            statements = controller.tools.preview_write(number, wanted)
-            context.show_requests([controller.wire("Execute", text) for text in statements])
+            requests = controller.tools.preview_write(number, wanted)
+            context.show_requests(requests)
             return
         if not context.json:
             show_change(number, *shown, after_name=tr("new"))
@@ -122,8 +122,8 @@ def clear(context: CliContext, number: int, dry_run: bool, yes: bool) -> None:
     with open_controller(context, changes=not dry_run) as controller:
         before = controller.tools.read(number)
         if dry_run:
-            statements = controller.tools.preview_clear(number)
-            context.show_requests([controller.wire("Execute", text) for text in statements])
+            requests = controller.tools.preview_clear(number)
+            context.show_requests(requests)
             return
         if not context.json:
             agree(tr("Clear tool {number}?", number=number), yes=yes)
@@ -147,8 +147,8 @@ def select(context: CliContext, number: int, dry_run: bool, yes: bool) -> None:
     with open_controller(context, changes=not dry_run) as controller:
         before = controller.tools.selected()
         if dry_run:
-            statements = controller.tools.preview_select(number)
-            context.show_requests([controller.wire("Execute", text) for text in statements])
+            requests = controller.tools.preview_select(number)
+            context.show_requests(requests)
             return
         if not context.json and before != number:
             agree(

@@ -11,9 +11,17 @@ from robolink_cli._context import CliContext, controller_options, open_controlle
 from robolink_cli._render import say
 
 if TYPE_CHECKING:
-    from robolink.controllers.epson import EpsonController
+    from robolink.controllers.epson import EpsonVariables
+    from robolink.model import Controller
 
 _TYPES = ("Boolean", "Byte", "Double", "Integer", "Long", "Real", "String")
+
+
+def variables_of(controller: "Controller") -> "EpsonVariables":
+    """Return the project's variables; only EPSON controllers have them."""
+    from robolink_cli._kinds import require_epson
+
+    return require_epson(controller, tr("project variables")).variables
 
 
 @click.group()
@@ -75,10 +83,10 @@ def set_variable(
     wanted = typed_value(value, kind)
     with open_controller(context) as controller:
         if dry_run:
-            context.show_requests(controller.variables.preview_write(name, wanted, kind))
+            context.show_requests(variables_of(controller).preview_write(name, wanted, kind))
             return
         agree(tr("Set {name} to {value}?", name=name, value=wanted), yes=yes)
-        receipt = controller.variables.write(name, wanted, kind)
+        receipt = variables_of(controller).write(name, wanted, kind)
     payload: dict[str, object] = {
         "name": name,
         "type": kind,
@@ -92,7 +100,7 @@ def set_variable(
 
 
 def _read(
-    controller: "EpsonController",
+    controller: "Controller",
     name: str,
     kind: str | None,
     subscripts: tuple[int, ...],
@@ -100,10 +108,10 @@ def _read(
     count: int | None,
 ) -> object:
     if kind is None:
-        return controller.variables.text(name)
+        return variables_of(controller).text(name)
     if subscripts:
-        return list(controller.variables.read_array(name, subscripts, kind, count=count or 1))
-    return controller.variables.read(name, kind)
+        return list(variables_of(controller).read_array(name, subscripts, kind, count=count or 1))
+    return variables_of(controller).read(name, kind)
 
 
 def _subscripts(text: str | None) -> tuple[int, ...]:

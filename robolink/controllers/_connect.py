@@ -2,12 +2,23 @@
 
 from robolink import __version__
 from robolink.controllers.epson import EpsonController, open_epson
+from robolink.controllers.plc_map import PlcMapController, open_plc_map
+from robolink.controllers.softmotion import SoftMotionController, open_softmotion
 from robolink.errors import ConfigError, LoginUnansweredError
 from robolink.journal import memory_journal, open_journal, signature_here
 from robolink.messages import tr
-from robolink.model import OutcomeLog, Secret, Signature
+from robolink.model import Controller, OutcomeLog, Secret, Signature
 from robolink.timing import Clock
-from robolink.transport import TraceSink, TracingTransport, open_transport, parse_url
+from robolink.transport import (
+    LinkUrl,
+    MailboxLink,
+    TraceSink,
+    TracingTransport,
+    Transport,
+    open_mailbox_link,
+    open_transport,
+    parse_url,
+)
 
 
 def connect(
@@ -20,54 +31,109 @@ def connect(
     trace: TraceSink | None = None,
     outcomes: OutcomeLog | None = None,
     signature: Signature | None = None,
-) -> EpsonController:
-    """Connect to a controller and log in.
+) -> Controller:
+    """Connect to a controller; log in where there is a login.
 
     Args:
-        url: For example ``epson+tcp://192.168.0.1:5000`` or ``epson+sim://cell-a?seed=1``.
-        password: The controller's remote password, if one is set.
+        url: For example ``epson+tcp://192.168.0.1:5000``, ``epson+sim://cell-a?seed=1`` or
+            ``softmotion+modbus-tcp://192.168.0.2:502`` or
+            ``plc+modbus-tcp://192.168.0.2?map=machine.toml``.
+        password: An EPSON controller's remote password, if one is set; a PLC has none.
         timeout_s: Longest wait for one answer.
-        remote_timeout_s: The remote time-out set on the controller. It cannot be read over
-            the wire; 0 forbids motion.
+        remote_timeout_s: The remote time-out set on an EPSON controller. It cannot be read
+            over the wire; 0 forbids motion. A PLC's watchdog is part of its mailbox program.
         clock: Replaces the machine's clock; a simulator brings its own.
         trace: Called with (time in ns, "sent" or "received", bytes) for all traffic but the
-            login frame.
+            login frame; of an EPSON controller only.
         outcomes: Where outcomes are recorded; by default the journal of this user, or memory
             for a simulator that dies with this process.
         signature: Who works here, and with what; by default the user of this computer.
 
     Raises:
         ConfigError: The URL or an option is wrong.
-        ConnectError: Nobody is reached, or nobody answers the login.
+        ConnectError: Nobody is reached, nobody answers the login, or the PLC's mailbox program
+            does not run.
+        RemoteProtocolError: What answers is no mailbox of this version, or the probe of a
+            map differs.
         LoginRefusedError: Wrong or missing password.
         LeaseHeldError: Nobody answers the login, and somebody else has the controller.
     """
     link = parse_url(url)
+    if link.kind == "softmotion":
+        return _connect_softmotion(
+            link, timeout_s, clock=clock, trace=trace, outcomes=outcomes, signature=signature
+        )
+    if link.kind == "plc":
+        return _connect_plc(
+            link, timeout_s, clock=clock, trace=trace, outcomes=outcomes, signature=signature
+        )
     if link.kind != "epson":
         raise ConfigError(
             tr("robolink does not know controllers of the kind {kind!r}.", kind=link.kind),
             remedy=tr("Write for example epson+tcp://192.168.0.1:5000."),
         )
     transport = open_transport(link, timeout_s=timeout_s, clock=clock)
-    try:
-        if outcomes is None:
-            identity = transport.identity
-            journal = open_journal() if transport.durable else memory_journal(identity)
-            outcomes = journal.log(identity, signature=signature or signature_here(__version__))
-        if trace is not None:
-            transport = TracingTransport(transport, trace)
-    except BaseException:
-        transport.close()
-        raise
+    kept = outcomes or _outcomes(transport, signature)
     try:
         return open_epson(
-            transport,
-            outcomes=outcomes,
+            transport if trace is None else TracingTransport(transport, trace),
+            outcomes=kept,
             password=Secret(password) if isinstance(password, str) else password,
             timeout_s=timeout_s,
             remote_timeout_s=remote_timeout_s,
         )
     except LoginUnansweredError:
         # One client at a time is served (epson.md 1.1). The lease may say who that is.
-        outcomes.look()
+        kept.look()
+        raise
+
+
+def _connect_softmotion(
+    url: LinkUrl,
+    timeout_s: float,
+    *,
+    clock: Clock | None,
+    trace: TraceSink | None,
+    outcomes: OutcomeLog | None,
+    signature: Signature | None,
+) -> SoftMotionController:
+    if trace is not None:
+        raise ConfigError(
+            tr("The dialogue with a PLC mailbox cannot be recorded."),
+            remedy=tr("Leave --record out; a network capture shows the registers."),
+        )
+    link = open_mailbox_link(url, timeout_s=timeout_s, clock=clock)
+    kept = outcomes or _outcomes(link, signature)
+    return open_softmotion(link, outcomes=kept, timeout_s=timeout_s)
+
+
+def _connect_plc(
+    url: LinkUrl,
+    timeout_s: float,
+    *,
+    clock: Clock | None,
+    trace: TraceSink | None,
+    outcomes: OutcomeLog | None,
+    signature: Signature | None,
+) -> PlcMapController:
+    if trace is not None:
+        raise ConfigError(
+            tr("The dialogue with a PLC's registers cannot be recorded."),
+            remedy=tr("Leave --record out; a network capture shows the registers."),
+        )
+
+    def record(identity: str) -> OutcomeLog:
+        signed = signature or signature_here(__version__)
+        return outcomes or open_journal().log(identity, signature=signed)
+
+    return open_plc_map(url, outcomes=record, timeout_s=timeout_s, clock=clock)
+
+
+def _outcomes(link: Transport | MailboxLink, signature: Signature | None) -> OutcomeLog:
+    """Open the record of a controller; the link is closed when that fails."""
+    try:
+        journal = open_journal() if link.durable else memory_journal(link.identity)
+        return journal.log(link.identity, signature=signature or signature_here(__version__))
+    except BaseException:
+        link.close()
         raise

@@ -112,7 +112,9 @@ class MarkerDesk:
     @property
     def changing(self) -> bool:
         """Whether a tool change of several steps is under way here."""
-        return MarkerKind.CHANGE in self._procedures
+        marker = self._procedures.get(MarkerKind.CHANGE)
+        # One that could not be taken back stays open when its change is over.
+        return marker is not None and marker.details.get("change") == self.outcomes.change
 
     def note_selection(self, tool: int) -> None:
         """Record, in the marker of the procedure under way, which tool is in force now."""
@@ -154,7 +156,11 @@ class MarkerDesk:
             )
 
     def _unsettled(self) -> list[Marker]:
-        own = {marker.operation for marker in self._procedures.values()}
+        own = {
+            marker.operation
+            for kind, marker in self._procedures.items()
+            if kind is not MarkerKind.CHANGE or self.changing
+        }
         return [m for m in self.outcomes.open_markers() if m.operation not in own]
 
     @contextmanager

@@ -1,5 +1,6 @@
 """Values and interfaces. No I/O."""
 
+from robolink.model._controller import Act as Act
 from robolink.model._controller import Capabilities as Capabilities
 from robolink.model._controller import Controller as Controller
 from robolink.model._controller import ControllerState as ControllerState
@@ -12,6 +13,7 @@ from robolink.model._geometry import Hand as Hand
 from robolink.model._geometry import Pose as Pose
 from robolink.model._geometry import angle_difference_deg as angle_difference_deg
 from robolink.model._geometry import rotate_xy as rotate_xy
+from robolink.model._io import DigitalIo as DigitalIo
 from robolink.model._journal_entries import EntryKind as EntryKind
 from robolink.model._journal_entries import NewEntry as NewEntry
 from robolink.model._journal_entries import Recorded as Recorded
@@ -20,6 +22,7 @@ from robolink.model._motion import Motion as Motion
 from robolink.model._motion import MotionGroup as MotionGroup
 from robolink.model._motion import MotionOutcome as MotionOutcome
 from robolink.model._motion import MotionProfile as MotionProfile
+from robolink.model._motion import MotionTerms as MotionTerms
 from robolink.model._motion import Path as Path
 from robolink.model._motion import WorkBox as WorkBox
 from robolink.model._outcomes import Marker as Marker

@@ -70,6 +70,15 @@ class ControllerStatus:
         return next((state for true, state in checks if true), ControllerState.STARTING)
 
 
+class Act(StrEnum):
+    """What a person asks of a controller as a whole."""
+
+    STOP = "stop"
+    RESET = "reset"
+    MOTORS_ON = "motors on"
+    MOTORS_OFF = "motors off"
+
+
 @dataclass(frozen=True, slots=True)
 class Capabilities:
     """What this kind of controller can be asked for."""
@@ -107,6 +116,10 @@ class Controller(Protocol):
         """What moves."""
 
     @property
+    def exchanges(self) -> int:
+        """Requests sent so far."""
+
+    @property
     def outcomes(self) -> OutcomeLog:
         """The doubtful outcomes and the unfinished procedures of this controller."""
 
@@ -116,6 +129,15 @@ class Controller(Protocol):
 
     def status(self) -> ControllerStatus:
         """Read the state flags."""
+
+    def condition(self) -> Mapping[str, object]:
+        """Read more about the state than the flags say, plain JSON.
+
+        What cannot be read now, or not by this kind of controller, is ``None`` or left out.
+        """
+
+    def preview(self, act: Act) -> tuple[str, ...]:
+        """Return the requests of an act, as they stand on the wire. Reads at most."""
 
     def facts(self) -> ControllerFacts:
         """Read which controller and robots these are."""

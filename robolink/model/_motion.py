@@ -1,6 +1,7 @@
 """Movements, and the limits inside which they are allowed."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum, StrEnum
 from typing import Protocol
@@ -99,6 +100,19 @@ class Motion(Protocol):
         """
 
 
+@dataclass(frozen=True, slots=True)
+class MotionTerms:
+    """What a person must know before an axis group moves.
+
+    Attributes:
+        who: What moves, and in which mode, to be followed by "will move".
+        watch: Who stops it when this computer falls silent, one sentence.
+    """
+
+    who: str
+    watch: str
+
+
 class MotionGroup(Protocol):
     """Axes that move together: a robot arm or an axis group."""
 
@@ -117,6 +131,15 @@ class MotionGroup(Protocol):
             NotReadyError: The state, the motors or the tool in force forbid it.
             OutcomeUnknownError: An earlier command on this controller is unresolved.
         """
+
+    def requests_for(self, target: Pose, profile: MotionProfile) -> tuple[str, ...]:
+        """Return what :meth:`move_to` would send besides its reads, as it stands on the wire."""
+
+    def terms(self) -> MotionTerms:
+        """Read what a person must know before it moves."""
+
+    def axes(self) -> Mapping[str, tuple[float, ...]]:
+        """Read the positions of the axes, by the names of what they count in."""
 
     def stop(self) -> None:
         """Stop it; may be called from any thread, at any time, more than once."""

@@ -157,6 +157,18 @@ class ToolTable(Protocol):
             OutcomeUnknownError: No answer came to the write.
         """
 
+    def preview_write(self, tool: int, offset: ToolOffset) -> tuple[str, ...]:
+        """Return what :meth:`write` would send besides its reads, as it stands on the wire.
+
+        Empty when the value is stored already. Reads only; raises what the write would.
+        """
+
+    def preview_clear(self, tool: int) -> tuple[str, ...]:
+        """Return what :meth:`clear` would send besides its reads."""
+
+    def preview_select(self, tool: int) -> tuple[str, ...]:
+        """Return what :meth:`select` would send besides its reads."""
+
     def clear(self, tool: int, *, expected: Expected) -> ToolReceipt:
         """Remove a definition; same conditions and errors as :meth:`write`."""
 

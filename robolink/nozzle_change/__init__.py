@@ -5,6 +5,7 @@ from robolink.nozzle_change._change import NozzleChange as NozzleChange
 from robolink.nozzle_change._flange import flange_pose as flange_pose
 from robolink.nozzle_change._gate import Gate as Gate
 from robolink.nozzle_change._given_poses import GivenPoses as GivenPoses
+from robolink.nozzle_change._given_poses import PointReader as PointReader
 from robolink.nozzle_change._given_poses import PosesFound as PosesFound
 from robolink.nozzle_change._given_poses import taught_poses as taught_poses
 from robolink.nozzle_change._listener import Listener as Listener

@@ -181,11 +181,13 @@ def test_what_was_left_unfinished_is_said_on_connecting(command, capsys, monkeyp
     assert main.run(["-c", URL, "status", "--timeout", "2"]) == 0
     assert controller.closed
     assert connected.pop("password").reveal() == "hunter2"
+    assert connected.pop("signature").version == robolink.__version__
     assert connected == {
         "url": URL,
         "timeout_s": 2.0,
         "remote_timeout_s": 60.0,
         "trace": None,
+        "outcomes": None,
     }
     shown = capsys.readouterr()
     assert shown.out == ""

@@ -6,6 +6,7 @@ from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.in_process import register, unregister
 
 import robolink
+from robolink.controllers.epson import EpsonController
 from robolink.journal import memory_journal
 
 
@@ -31,6 +32,7 @@ def cell():
         died = controller.preserved("calibrate tool 1")
         died.__enter__()
         controller.tools.select(0)
+        assert isinstance(controller, EpsonController)
         controller._session.close()
     yield simulator, url
     unregister("offer-to-restore")

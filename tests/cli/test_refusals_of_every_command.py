@@ -78,6 +78,7 @@ BAD = {
     "where": (["here"], "unexpected extra argument"),
     "stop": (["now"], "unexpected extra argument"),
     "reset": (["--force"], "No such option"),
+    "recalibrate": (["missing.toml"], "missing.toml"),
     "recover": (["all"], "unexpected extra argument"),
     "execute-raw": (["--yes", "Print\u20ac"], "printable ASCII"),
     "plc export": (["golden.json"], "is a file"),

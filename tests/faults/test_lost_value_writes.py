@@ -5,6 +5,7 @@ from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.faults import Fault, FaultAction
 
 import robolink
+from robolink.controllers.epson import EpsonController
 from robolink.errors import ConfigError, OutcomeUnknownError
 from robolink.model import Marker, MarkerKind, Verdict
 
@@ -13,6 +14,11 @@ WRITES = {
     "SetMemIO": lambda controller: controller.io.set_memory(3, True),
     "SetVariable": lambda controller: controller.variables.write("g_Real", 0.1, "Real"),
 }
+
+
+def epson(controller):
+    assert isinstance(controller, EpsonController)
+    return controller
 
 
 @pytest.mark.parametrize("name", WRITES)
@@ -42,7 +48,7 @@ def test_a_value_that_is_neither_old_nor_new_is_a_conflict(serve):
     with serve(simulator) as url:
         with robolink.connect(url, timeout_s=0.3) as controller:
             with pytest.raises(OutcomeUnknownError):
-                controller.variables.write("g_Long", 5, "Long")
+                epson(controller).variables.write("g_Long", 5, "Long")
         simulator.variables.set("g_Long", "9", "Long")
         with robolink.connect(url) as controller:
             (marker,) = controller.outcomes.open_markers()
@@ -54,7 +60,7 @@ def test_a_value_that_is_neither_old_nor_new_is_a_conflict(serve):
 def test_a_refusal_leaves_no_marker(serve):
     with serve(EpsonSimulator()) as url, robolink.connect(url) as controller:
         with pytest.raises(robolink.errors.RejectedError):
-            controller.variables.write("g_unknown", 5, "Long")
+            epson(controller).variables.write("g_unknown", 5, "Long")
         assert controller.outcomes.open_markers() == ()
 
 

@@ -8,6 +8,8 @@ from typing import Self
 from robolink.controllers._guarded import MarkerDesk, ProcedureLock
 from robolink.controllers.epson._alarms import EpsonAlarms
 from robolink.controllers.epson._answers import require_ready
+from robolink.controllers.epson._as_sent import as_sent
+from robolink.controllers.epson._condition import ConditionReader
 from robolink.controllers.epson._facts import FactReader
 from robolink.controllers.epson._io import EpsonIo
 from robolink.controllers.epson._motion import EpsonGroup
@@ -32,6 +34,7 @@ from robolink.errors import (
 )
 from robolink.messages import tr
 from robolink.model import (
+    Act,
     Capabilities,
     ControllerFacts,
     ControllerStatus,
@@ -42,7 +45,7 @@ from robolink.model import (
     OutcomeLog,
 )
 from robolink.protocols import spel
-from robolink.protocols.epson_text import EpsonTextCodec, Request, Role
+from robolink.protocols.epson_text import Request
 from robolink.timing import Clock
 
 
@@ -210,9 +213,19 @@ class EpsonController:
         (number,) = self._session.exchange("GetCurRobot").fields
         return spel.parse_integer(number)
 
-    def wire(self, name: str, *parameters: str) -> str:
-        """Return a request as it would be sent, for a person to read."""
-        return EpsonTextCodec(Role.HOST).send(Request(name, parameters)).decode("ascii").strip()
+    def condition(self) -> dict[str, object]:
+        """Read the error's text, the alarms, the tool in force, motors and power."""
+        reader = ConditionReader(
+            self._window, alarms=self.alarms, tools=self._tools, group=self._group
+        )
+        return reader.read(published=self.published_tools)
+
+    def preview(self, act: Act) -> tuple[str, ...]:
+        """Return the requests of an act, as they stand on the wire."""
+        if act is Act.STOP or act is Act.RESET:
+            return (as_sent(Request("Stop" if act is Act.STOP else "Reset")),)
+        name = "SetMotorsOn" if act is Act.MOTORS_ON else "SetMotorsOff"
+        return (as_sent(Request(name, (str(self.robot_number()),))),)
 
     def motors(self, on: bool) -> None:
         """Switch the motors of the robot in force, and prove it.

@@ -1,6 +1,7 @@
 """The robot arm of an EPSON controller: where it is, and how it is told to go elsewhere."""
 
 from robolink.controllers._guarded import MarkerDesk, ProcedureLock
+from robolink.controllers.epson._as_sent import executes
 from robolink.controllers.epson._movement import EpsonMotion, MovementParts, request_abort
 from robolink.controllers.epson._robot import RobotFacts
 from robolink.controllers.epson._session import EpsonSession
@@ -8,7 +9,7 @@ from robolink.controllers.epson._settings import Settings
 from robolink.controllers.epson._window import CommandWindow
 from robolink.errors import NotReadyError, NotReadyReason
 from robolink.messages import tr
-from robolink.model import MarkerKind, MotionProfile, Path, Pose, WorkBox
+from robolink.model import MarkerKind, MotionProfile, MotionTerms, Path, Pose, WorkBox
 from robolink.protocols import spel
 
 
@@ -88,9 +89,25 @@ class EpsonGroup:
                 raise
             return self._current
 
-    def statements_for(self, target: Pose, profile: MotionProfile) -> tuple[spel.Statement, ...]:
-        """Return what :meth:`move_to` would send besides its reads."""
-        return (*self._settings.statements(profile), self._statement_for(target, profile))
+    def requests_for(self, target: Pose, profile: MotionProfile) -> tuple[str, ...]:
+        """Return what :meth:`move_to` would send besides its reads, as it stands on the wire."""
+        return executes((*self._settings.statements(profile), self._statement_for(target, profile)))
+
+    def terms(self) -> MotionTerms:
+        """Read what a person must know before the robot moves."""
+        (number,) = self._parts.session.exchange("GetCurRobot").fields
+        return MotionTerms(
+            tr("Robot {number}, in Power Low,", number=spel.parse_integer(number)),
+            tr(
+                "The remote time-out set in the controller is taken to be {timeout:g} s.",
+                timeout=self._remote_timeout_s,
+            ),
+        )
+
+    def axes(self) -> dict[str, tuple[float, ...]]:
+        """Read the commanded joints and pulses."""
+        printed = self.joints()
+        return {"joints": tuple(printed.joints), "pulses": tuple(printed.pulses)}
 
     def stop(self) -> None:
         """Abort the movement of this session, or stop the controller's tasks."""

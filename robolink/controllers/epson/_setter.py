@@ -10,12 +10,13 @@ from typing import Generic, TypeVar
 
 from robolink.controllers._guarded import MarkerDesk, ProcedureLock
 from robolink.controllers.epson._answers import NOT_EXECUTED
+from robolink.controllers.epson._as_sent import as_sent
 from robolink.controllers.epson._session import EpsonSession
 from robolink.controllers.epson._window import CommandWindow
 from robolink.errors import ReadBackError, RejectedError
 from robolink.messages import tr
 from robolink.model import MarkerKind
-from robolink.protocols.epson_text import EpsonTextCodec, Request, Role
+from robolink.protocols.epson_text import Request
 
 Value = bool | int | float | str
 ValueT = TypeVar("ValueT", bound=Value)
@@ -72,7 +73,7 @@ class ValueSetter:
 
     def preview(self, change: Change[ValueT]) -> tuple[str, ...]:
         """Return the requests that :meth:`carry_out` would send besides its reads."""
-        request = _on_the_wire(change.request)
+        request = as_sent(change.request)
         self._window.require_ready(request)
         return () if change.same(change.read(), change.requested) else (request,)
 
@@ -85,7 +86,7 @@ class ValueSetter:
             ReadBackError: Another value is there afterwards.
             OutcomeUnknownError: No answer came; motion is blocked until ``resolve``.
         """
-        request = _on_the_wire(change.request)
+        request = as_sent(change.request)
         with self._lock.held(request):
             self._window.require_ready(request)
             before = change.read()
@@ -119,7 +120,3 @@ class ValueSetter:
             found = change.read()
         self._desk.clear(marker)
         return found
-
-
-def _on_the_wire(request: Request) -> str:
-    return EpsonTextCodec(Role.HOST).send(request).decode("ascii").rstrip()

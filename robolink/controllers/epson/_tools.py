@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from robolink.controllers._guarded import MarkerDesk, ProcedureLock
 from robolink.controllers._tool_writing import ToolWrite, ToolWriter
 from robolink.controllers.epson._answers import NOT_EXECUTED
+from robolink.controllers.epson._as_sent import executes
 from robolink.controllers.epson._robot import RobotFacts
 from robolink.controllers.epson._window import CommandWindow
 from robolink.errors import (
@@ -39,6 +40,9 @@ class EpsonToolTable:
         self._desk = desk
         self._lock = lock
         self._robot = robot
+        # Seen defined in this session. Only a person who turns the key to Teach could change
+        # that meanwhile, so it is not asked again before each read.
+        self._defined: set[int] = set()
         self._writer = ToolWriter(
             desk,
             same=self.same,
@@ -80,11 +84,8 @@ class EpsonToolTable:
             statement = spel.set_tool(tool, requested, six_axes=six_axes)
             return self._set(tool, requested, expected, statement)
 
-    def preview_write(self, tool: int, offset: ToolOffset) -> tuple[spel.Statement, ...]:
-        """Return what :meth:`write` would send besides its reads; reads only.
-
-        Empty when the value is stored already.
-        """
+    def preview_write(self, tool: int, offset: ToolOffset) -> tuple[str, ...]:
+        """Return what :meth:`write` would send besides its reads; reads only."""
         self.require_writable(tool)
         self._window.require_ready(f"TLSet {tool}")
         requested = offset.rounded(DECIMALS)
@@ -92,17 +93,17 @@ class EpsonToolTable:
         self._check_axes(requested, six_axes=six_axes)
         if self.same(self._read(tool), requested):
             return ()
-        return (spel.set_tool(tool, requested, six_axes=six_axes),)
+        return executes([spel.set_tool(tool, requested, six_axes=six_axes)])
 
-    def preview_clear(self, tool: int) -> tuple[spel.Statement, ...]:
+    def preview_clear(self, tool: int) -> tuple[str, ...]:
         """Return what :meth:`clear` would send besides its reads."""
         self.require_writable(tool)
-        return () if self.read(tool) is None else (spel.clear_tool(tool),)
+        return () if self.read(tool) is None else executes([spel.clear_tool(tool)])
 
-    def preview_select(self, tool: int) -> tuple[spel.Statement, ...]:
+    def preview_select(self, tool: int) -> tuple[str, ...]:
         """Return what :meth:`select` would send besides its reads."""
         self._require_defined(tool)
-        return () if self.selected() == tool else (spel.select_tool(tool),)
+        return () if self.selected() == tool else executes([spel.select_tool(tool)])
 
     def clear(self, tool: int, *, expected: Expected) -> ToolReceipt:
         """Clear and read back; see :class:`robolink.model.ToolTable`."""
@@ -149,21 +150,29 @@ class EpsonToolTable:
     def _set(
         self, tool: int, requested: ToolOffset | None, expected: Expected, statement: spel.Statement
     ) -> ToolReceipt:
-        write = ToolWrite(
-            tool,
-            requested,
-            statement,
-            send=lambda: self._window.command(statement),
-            read=lambda: self._read(tool),
-        )
+        def send() -> None:
+            if requested is None:
+                self._defined.discard(tool)
+            self._window.command(statement)
+
+        write = ToolWrite(tool, requested, statement, send=send, read=lambda: self._read(tool))
         return self._writer.change(write, expected)
 
     def _read(self, tool: int) -> ToolOffset | None:
         if tool == 0:
             return ToolOffset()
-        defined = self._window.printed(spel.print_tool_defined(tool))
-        if not spel.parse_boolean(defined):
+        if tool in self._defined:
+            offset = self._printed(tool)
+            # Zeros may stand for an undefined tool: what TLSet(n) gives for one is not documented.
+            if any(offset.components()):
+                return offset
+            self._defined.discard(tool)
+        if not spel.parse_boolean(self._window.printed(spel.print_tool_defined(tool))):
             return None
+        self._defined.add(tool)
+        return self._printed(tool)
+
+    def _printed(self, tool: int) -> ToolOffset:
         point = spel.parse_point(self._window.printed(spel.print_tool(tool)))
         return ToolOffset(*point.coordinates)
 

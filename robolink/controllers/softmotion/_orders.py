@@ -1,0 +1,215 @@
+"""Telling the PLC something, once, and knowing what became of it (design part 7).
+
+A command goes out with a number that is new, the owner's token, the epoch and the PLC start
+that was met. Its answer counts as ours only when owner, number and opcode are ours; an answer
+to somebody else in its place leaves it unknown. A block is written again in one case only: the
+PLC counts one more damaged block and has acknowledged nothing since. Never after a time-out.
+"""
+
+import threading
+from dataclasses import replace
+from typing import Final
+
+from robolink.controllers.softmotion._answers import Ended, cut_short, describe, refused
+from robolink.controllers.softmotion._ownership import Ownership
+from robolink.controllers.softmotion._rides import has_ended
+from robolink.controllers.softmotion._snapshots import Snapshots
+from robolink.controllers.softmotion._wire import MailboxWire
+from robolink.errors import (
+    ConfigError,
+    RejectedError,
+    RemoteProtocolError,
+    TransportTimeoutError,
+)
+from robolink.messages import tr
+from robolink.protocols.mailbox import (
+    OPCODES,
+    BlockError,
+    Command,
+    CommandState,
+    ErrorClass,
+    Opcode,
+    Response,
+    Words,
+    encode_command,
+    next_number,
+)
+from robolink.timing import Deadline
+
+COMPLETION_S: Final = 10.0
+"""Longest time between the acknowledgement and the end of what is not a movement."""
+
+_WRITES: Final = 3
+_DISPOSSESSED: Final = frozenset({ErrorClass.NOT_OWNER, ErrorClass.STALE_EPOCH})
+
+
+class Orders:
+    """Sends commands. Drafts carry no sequence, owner, epoch or boot_id; they are added here.
+
+    Attributes:
+        ownership: Of the mailbox; taken by the first command that needs it.
+    """
+
+    def __init__(self, wire: MailboxWire, snapshots: Snapshots) -> None:
+        self._wire = wire
+        self._snapshots = snapshots
+        self._lock = threading.RLock()
+        self._last = 0
+        self.ownership = Ownership(wire, self._to_end)
+
+    def carry_out(self, draft: Command) -> Response:
+        """Send a command that is no movement and return the snapshot that shows its end.
+
+        Raises:
+            RejectedError: The PLC refused it; it did nothing.
+            ControllerFaultError: It was ended before it was done.
+            LeaseHeldError, LeaseLostError: Another client owns the mailbox; nothing was sent.
+            ConfigError: A value does not fit; nothing was sent.
+            TransportError, RemoteProtocolError: The session is over; it may have been done.
+        """
+        with self._wire.uninterrupted():
+            self._possess(draft)
+            end = self._to_end(draft)
+            if end.state == CommandState.ERROR:
+                raise self._refusal(end.command, end.now, end.error_class)
+            if end.state == CommandState.ABORTED:
+                raise cut_short(end.command)
+            return end.now
+
+    def start(self, draft: Command) -> Command:
+        """Send a movement or a jog and return it as it was accepted; raises like the other."""
+        with self._wire.uninterrupted():
+            self._possess(draft)
+            command, now = self._send(draft, ride=draft.opcode != Opcode.JOG)
+            if now.state == CommandState.ERROR:
+                self._wire.rides.forget(command.sequence)
+                raise self._refusal(command, now, now.error_class)
+            return command
+
+    def _possess(self, draft: Command) -> None:
+        if OPCODES[Opcode(draft.opcode)].needs_owner:
+            self.ownership.require(describe(draft))
+
+    def _refusal(self, command: Command, now: Response, error_class: int) -> RejectedError:
+        if error_class in _DISPOSSESSED and OPCODES[Opcode(command.opcode)].needs_owner:
+            self.ownership.lose()
+        return refused(command, now, error_class)
+
+    def _to_end(self, draft: Command) -> Ended:
+        command, now = self._send(draft)
+        deadline = Deadline.after(self._wire.clock, COMPLETION_S)
+        while (end := self._end_of(command, now)) is None:
+            if deadline.expired:
+                raise self._wire.ended(self._silence(command, tr("began, and has not ended")))
+            now = self._snapshots.news(now)
+        return end
+
+    def _end_of(self, command: Command, now: Response) -> Ended | None:
+        if is_own(command, now):
+            if not has_ended(now.state):
+                return None
+            return Ended(command, now.state, now.error_class, now)
+        if now.ack_owner != command.owner:
+            raise self._wire.ended(self._overtaken(command, now))
+        # Our own stop was accepted after it, from another thread.
+        ends = (end for end in now.finished if end.sequence == command.sequence)
+        return next((Ended(command, end.state, end.error_class, now) for end in ends), None)
+
+    def _send(self, draft: Command, *, ride: bool = False) -> tuple[Command, Response]:
+        """Write a command and return it with the snapshot that acknowledges it."""
+        with self._lock:
+            before = self._snapshots.take()
+            self._require_able(draft, before)
+            command = self._addressed(draft, before)
+            words = self._encode(command)
+            if ride:
+                self._wire.rides.begin(command.sequence)
+            for _ in range(_WRITES):
+                try:
+                    self._wire.write(words)
+                except RejectedError:
+                    self._wire.rides.forget(command.sequence)
+                    raise
+                before, accepted = self._await_acknowledgement(command, before)
+                if accepted:
+                    return command, before
+            raise self._wire.ended(
+                RemoteProtocolError(
+                    tr("{request!r} arrived damaged each time.", request=describe(command)),
+                    remedy=tr("Look for a gateway that changes registers, or a bad line."),
+                )
+            )
+
+    def _await_acknowledgement(self, command: Command, before: Response) -> tuple[Response, bool]:
+        """Return the snapshot that shows the acknowledgement, or the damage, of a block."""
+        deadline = Deadline.after(self._wire.clock, self._wire.timeout_s)
+        now = before
+        while True:
+            now = self._snapshots.news(now)
+            if is_own(command, now):
+                return now, True
+            if (now.ack_head, now.ack_owner) != (before.ack_head, before.ack_owner):
+                raise self._wire.ended(self._overtaken(command, now))
+            if now.rejected != before.rejected:
+                return now, False
+            if deadline.expired:
+                raise self._wire.ended(self._silence(command, tr("was not acknowledged")))
+
+    def _addressed(self, draft: Command, before: Response) -> Command:
+        taken = {before.ack_head, before.active_movement}
+        taken |= {end.sequence for end in before.finished}
+        number = next_number(self._last or before.ack_head)
+        while number in taken or self._wire.rides.holds(number):
+            number = next_number(number)
+        self._last = number
+        return replace(
+            draft,
+            sequence=number,
+            owner=self._wire.owner,
+            epoch=self._wire.epoch,
+            boot_id=before.boot_id,
+        )
+
+    def _encode(self, command: Command) -> Words:
+        try:
+            return encode_command(command, heartbeat=self._wire.next_beat())
+        except BlockError as error:
+            raise ConfigError(
+                tr("{request!r} cannot be sent: {cause}.", request=describe(command), cause=error),
+                remedy=tr("Correct the value; nothing was sent."),
+                controller=self._wire.identity,
+            ) from error
+
+    def _require_able(self, draft: Command, before: Response) -> None:
+        opcode = Opcode(draft.opcode)
+        if OPCODES[opcode].capability not in before.capabilities:
+            raise refused(draft, before, ErrorClass.UNKNOWN_OPCODE)
+
+    def _silence(self, command: Command, how: str) -> TransportTimeoutError:
+        return TransportTimeoutError(
+            tr("{request!r} {how}.", request=describe(command), how=how),
+            remedy=tr("Look at the PLC; the command may still be carried out."),
+            request=describe(command),
+        )
+
+    def _overtaken(self, command: Command, now: Response) -> RemoteProtocolError:
+        return RemoteProtocolError(
+            tr(
+                "The PLC acknowledged command {number} of another client ({owner:08X}) in place of "
+                "{request!r}.",
+                number=now.ack_head,
+                owner=now.ack_owner,
+                request=describe(command),
+            ),
+            remedy=tr("Find the other client; one at a time may command this mailbox."),
+            request=describe(command),
+        )
+
+
+def is_own(command: Command, now: Response) -> bool:
+    """Whether a snapshot acknowledges this very command: owner, number and opcode."""
+    return (now.ack_owner, now.ack_head, now.opcode_echo) == (
+        command.owner,
+        command.sequence,
+        command.opcode,
+    )

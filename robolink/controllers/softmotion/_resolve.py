@@ -1,0 +1,106 @@
+"""Settles what an earlier process left open: by reading, and with a person's word.
+
+Nothing is sent again. What was being written is read; a robot that was told to move is looked
+at; the cell's own tool is selected again when a person says so.
+"""
+
+from robolink.controllers._tool_doubts import examine_write
+from robolink.controllers.softmotion._group import SoftMotionGroup
+from robolink.controllers.softmotion._mailbox import Mailbox
+from robolink.controllers.softmotion._preserve import Preserver, tool_before
+from robolink.controllers.softmotion._tools import SoftMotionToolTable
+from robolink.errors import ConfigError
+from robolink.messages import tr
+from robolink.model import EntryKind, Finding, Marker, MarkerKind, NewEntry, Verdict
+
+
+class SoftMotionResolver:
+    """Examines and settles the open markers that this driver begins."""
+
+    def __init__(
+        self,
+        mailbox: Mailbox,
+        *,
+        tools: SoftMotionToolTable,
+        group: SoftMotionGroup,
+        preserver: Preserver,
+    ) -> None:
+        self._mailbox = mailbox
+        self._tools = tools
+        self._group = group
+        self._preserver = preserver
+
+    def examine(self, marker: Marker) -> Finding:
+        """Read what is needed to judge ``marker``; see :class:`robolink.model.Resolver`."""
+        details = marker.details
+        if marker.kind is MarkerKind.MOVE:
+            return self._examine_move(marker)
+        if marker.kind is MarkerKind.SELECTION:
+            return self._examine_selection(marker)
+        if "select" in details:
+            return self._examine_select(marker)
+        if "kinematics" in details:
+            return self._examine_kinematics(marker)
+        if "output" in details:
+            return _examine_output(marker)
+        if "tool" in details:
+            return examine_write(self._tools, marker)
+        raise ConfigError(
+            tr("The marker of {when} cannot be understood.", when=marker.begun_at),
+            remedy=tr("Look at the PLC, then 'robolink resolve --forget'."),
+        )
+
+    def settle(self, finding: Finding) -> None:
+        """Do what ``finding.action`` says and forget the marker."""
+        if finding.verdict is Verdict.NOT_RESTORED:
+            self._preserver.restore(finding.marker)
+        else:
+            self._mailbox.desk.clear(finding.marker, *finding.entries)
+
+    def _examine_select(self, marker: Marker) -> Finding:
+        now, wanted = self._tools.selected(), marker.details["select"]
+        verdict = Verdict.DONE if now == wanted else Verdict.NOT_APPLIED
+        return Finding(marker, verdict, tr("Tool {now} is selected now.", now=now))
+
+    def _examine_kinematics(self, marker: Marker) -> Finding:
+        now = self._mailbox.snapshots.take().kinematics
+        done = now == marker.details["kinematics"]
+        sentence = tr("Kinematics {now:#06x} is in force now.", now=now)
+        return Finding(marker, Verdict.DONE if done else Verdict.NOT_APPLIED, sentence)
+
+    def _examine_move(self, marker: Marker) -> Finding:
+        pose = self._group.pose()
+        sentence = tr(
+            "The robot is at X {x:.3f} Y {y:.3f} Z {z:.3f} U {u:.3f} (tool {tool}); it had been "
+            "told {request!r}. Look at it: nothing is sent again.",
+            x=pose.x_mm,
+            y=pose.y_mm,
+            z=pose.z_mm,
+            u=pose.u_deg,
+            tool=pose.tool,
+            request=marker.request,
+        )
+        return Finding(marker, Verdict.LOOK, sentence)
+
+    def _examine_selection(self, marker: Marker) -> Finding:
+        before, now = tool_before(marker), self._tools.selected()
+        if now == before:
+            sentence = tr("Tool {tool} is selected, as it was before.", tool=now)
+            return Finding(marker, Verdict.DONE, sentence)
+        sentence = tr(
+            "Tool {now} is selected; before {reason!r} it was tool {before}.",
+            now=now,
+            reason=marker.request,
+            before=before,
+        )
+        action = tr("select tool {tool} again", tool=before)
+        entry = NewEntry(EntryKind.SELECTION, tool=before, verdict=Verdict.NOT_RESTORED)
+        return Finding(marker, Verdict.NOT_RESTORED, sentence, action, (entry,))
+
+
+def _examine_output(marker: Marker) -> Finding:
+    sentence = tr(
+        "A PLC's output cannot be read through the mailbox: look what {request!r} did.",
+        request=marker.request,
+    )
+    return Finding(marker, Verdict.LOOK, sentence)

@@ -1,0 +1,158 @@
+"""Whole snapshots of a mailbox: never half of one, never another PLC's.
+
+The PLC may write while it is read, so a block counts only when its two ends and its checksum
+agree (faults_and_speed.md F31). Only such snapshots decide anything; the head of the block
+says when to read the next one.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Final, TypeVar
+
+from robolink.controllers.softmotion._pulse import FROZEN_S, PlcPulse
+from robolink.controllers.softmotion._reading import PASSING, read_block
+from robolink.controllers.softmotion._wire import MailboxWire
+from robolink.errors import (
+    ConnectError,
+    RemoteProtocolError,
+    TransportBrokenError,
+    TransportTimeoutError,
+)
+from robolink.messages import tr
+from robolink.protocols.mailbox import BlockError, Response, Slot, decode_slot
+from robolink.timing import Deadline
+
+POLL_S: Final = 0.02
+"""Between two looks at the head of the response block."""
+
+LOOK_S: Final = 0.3
+"""Longest time between two snapshots while something is awaited."""
+
+_READS: Final = 3
+
+T = TypeVar("T")
+
+
+class Snapshots:
+    """Reads snapshots of the one PLC start that was met.
+
+    Args:
+        wire: The session.
+    """
+
+    def __init__(self, wire: MailboxWire) -> None:
+        self._wire = wire
+        self._pulse = PlcPulse()
+        self._met: Response | None = None
+
+    @property
+    def met(self) -> Response:
+        """The first snapshot; known after :meth:`meet`."""
+        assert self._met is not None  # noqa: S101 - a controller is made after the meeting
+        return self._met
+
+    def meet(self) -> None:
+        """Make sure that a mailbox program of our version runs there; writes nothing.
+
+        Raises:
+            ConnectError: Its heartbeat stands still.
+            RemoteProtocolError: It is no mailbox, or its words are in another order.
+        """
+        first = self.take()
+        deadline = Deadline.after(self._wire.clock, FROZEN_S)
+        while self._wire.read_head().heartbeat == first.plc_heartbeat:
+            if deadline.expired:
+                raise self._wire.ended(
+                    ConnectError(
+                        tr("The mailbox of {identity} stands still.", identity=self._wire.identity),
+                        remedy=tr(
+                            "Its heartbeat does not count: the PLC is stopped, or the mailbox "
+                            "program is not called in the motion task."
+                        ),
+                    )
+                )
+            self._wire.clock.sleep(POLL_S)
+        self._met = first
+
+    def take(self) -> Response:
+        """Read a whole response block.
+
+        Raises:
+            RemoteProtocolError: It was torn each time, or it is no mailbox of ours.
+            TransportBrokenError: The PLC has started anew, or runs another program.
+            TransportError: The session is over.
+        """
+        now = self._whole(self._wire.read_response, self._read_block, tr("The response block"))
+        self._require_met(now)
+        self._pulse.note(now.plc_heartbeat, self._wire.clock.now_ns())
+        self._wire.rides.note(now)
+        return now
+
+    def slot(self, number: int) -> Slot:
+        """Read a tool slot; needs no ownership, and raises like :meth:`take`."""
+        name = tr("Tool slot {number}", number=number)
+        return self._whole(lambda: self._wire.read_slot(number), decode_slot, name)
+
+    def news(self, since: Response, *, wait_s: float = LOOK_S) -> Response:
+        """Return a snapshot once the head differs from ``since``, or ``wait_s`` has passed.
+
+        Raises:
+            TransportTimeoutError: The PLC's heartbeat stands still; the session is over.
+        """
+        known = (since.ack_head, since.state, since.error_class, since.group_state)
+        clock = self._wire.clock
+        until = Deadline.after(clock, wait_s)
+        while True:
+            head = self._wire.read_head()
+            self._pulse.note(head.heartbeat, clock.now_ns())
+            if head[:4] != known or until.expired:
+                break
+            clock.sleep(POLL_S)
+        now = self.take()
+        if self._pulse.frozen(clock.now_ns()):
+            raise self._wire.ended(
+                TransportTimeoutError(
+                    tr("The heartbeat of {identity} stands still.", identity=self._wire.identity),
+                    remedy=tr("The PLC was stopped, or its motion task is dead."),
+                )
+            )
+        return now
+
+    def _read_block(self, words: Sequence[int]) -> Response:
+        return read_block(words, controller=self._wire.identity)
+
+    def _whole(
+        self, read: Callable[[], Sequence[int]], decode: Callable[[Sequence[int]], T], name: str
+    ) -> T:
+        cause = ""
+        for _ in range(_READS):
+            try:
+                return decode(read())
+            except BlockError as error:
+                cause = str(error)
+                if error.fault not in PASSING:
+                    break
+            except RemoteProtocolError as error:
+                self._wire.ended(error)
+                raise
+        raise self._wire.ended(
+            RemoteProtocolError(
+                tr("{name} cannot be used: {cause}.", name=name, cause=cause),
+                remedy=tr("Connect again; if it stays so, compare the PLC's register map."),
+            )
+        )
+
+    def _require_met(self, now: Response) -> None:
+        """Refuse a PLC that is not, or no longer, the one that was met."""
+        met = self._met
+        if met is None or (now.boot_id, now.unit_um) == (met.boot_id, met.unit_um):
+            return
+        if now.boot_id != met.boot_id:
+            what = tr("The PLC {identity} has started anew.", identity=self._wire.identity)
+            remedy = tr(
+                "Nothing is re-applied by itself: no tool slot is selected now and the group is "
+                "disabled. Connect again and select the tool."
+            )
+        else:
+            what = tr("The unit of length of {identity} changed.", identity=self._wire.identity)
+            remedy = tr("Another program was loaded into the PLC. Connect again.")
+        raise self._wire.ended(TransportBrokenError(what, remedy=remedy))

@@ -1,0 +1,248 @@
+"""The tool slots of a PLC mailbox: fifteen that are retained, and the selected one.
+
+SoftMotion has no table of its own (softmotion.md 3.3): the mailbox program keeps the slots,
+and selecting one, or writing the selected one, calls SMC_GroupSetTool (design part 4).
+"""
+
+from collections.abc import Sequence
+
+from robolink.controllers._tool_writing import ToolWrite
+from robolink.controllers.softmotion._answers import describe
+from robolink.controllers.softmotion._condition import require_enabled, require_still
+from robolink.controllers.softmotion._mailbox import Mailbox
+from robolink.errors import (
+    ReadBackError,
+    RejectedError,
+    ReservedToolError,
+    ToolError,
+    ToolIndexError,
+    UndefinedToolError,
+)
+from robolink.messages import tr
+from robolink.model import Expected, ToolOffset, ToolReceipt, describe_offset
+from robolink.protocols.mailbox import (
+    SLOTS,
+    Command,
+    ErrorClass,
+    Opcode,
+    ReadMode,
+    Response,
+)
+
+
+class SoftMotionToolTable:
+    """Slots 1 to 15; reading them needs no ownership.
+
+    Every write is compare-and-set and read back, from the slot and, for the selected one, from
+    the axis group too.
+    """
+
+    def __init__(self, mailbox: Mailbox) -> None:
+        self._mailbox = mailbox
+
+    def indices(self) -> Sequence[int]:
+        """Return 1 to 15; tool 0 is the flange."""
+        return SLOTS
+
+    def same(self, a: ToolOffset | None, b: ToolOffset | None) -> bool:
+        """Tell whether the PLC holds both alike: 1e-9, rotations as matrices."""
+        return self._mailbox.same(a, b)
+
+    def require_writable(self, tool: int) -> None:
+        """Refuse a slot number that cannot be written; sends nothing.
+
+        Raises:
+            ReservedToolError, ToolIndexError: As :meth:`write` would.
+        """
+        if tool == 0:
+            raise ReservedToolError(
+                tr("Tool 0 is the flange itself and is never written."),
+                remedy=tr("Choose a tool from 1 to 15."),
+            )
+        self._check_index(tool)
+
+    def read_all(self) -> dict[int, ToolOffset | None]:
+        """Read all fifteen slots."""
+        return {tool: self.read(tool) for tool in self.indices()}
+
+    def read(self, tool: int) -> ToolOffset | None:
+        """Read one slot, ``None`` when it is empty; tool 0 reads as all zeros."""
+        self._check_index(tool)
+        if tool == 0:
+            return ToolOffset()
+        slot = self._mailbox.snapshots.slot(tool)
+        return self._mailbox.from_plc(slot.tool) if slot.defined else None
+
+    def name(self, tool: int) -> str:
+        """Read the name of a slot, empty when it has none."""
+        self.require_writable(tool)
+        return self._mailbox.snapshots.slot(tool).name
+
+    def read_mode(self, mode: ReadMode) -> ToolOffset | None:
+        """Read a tool of the axis group itself (SMC_GroupReadTool); needs the ownership.
+
+        Args:
+            mode: The tool set now, of the movement that runs, or of the one commanded last.
+
+        Returns:
+            ``None`` when there is no such movement.
+        """
+        draft = Command(0, Opcode.READ_TOOL, operands=(mode, 0, 0, 0))
+        try:
+            now = self._mailbox.orders.carry_out(draft)
+        except RejectedError as error:
+            if error.code == ErrorClass.NO_SUCH_MOVEMENT:
+                return None
+            raise
+        return self._mailbox.from_plc(now.answer.pose)
+
+    def write(self, tool: int, offset: ToolOffset, *, expected: Expected) -> ToolReceipt:
+        """Write and read back; see :class:`robolink.model.ToolTable`."""
+        self.require_writable(tool)
+        return self._set(tool, offset, expected, self._write_draft(tool, offset))
+
+    def clear(self, tool: int, *, expected: Expected) -> ToolReceipt:
+        """Empty a slot that is not selected; see :class:`robolink.model.ToolTable`."""
+        self.require_writable(tool)
+        return self._set(tool, None, expected, _clear_draft(tool))
+
+    def preview_write(self, tool: int, offset: ToolOffset) -> tuple[str, ...]:
+        """Return what :meth:`write` would send, in words; reads only.
+
+        Empty when the value is stored already.
+        """
+        self.require_writable(tool)
+        if self.same(self.read(tool), offset):
+            return ()
+        return (describe(self._write_draft(tool, offset)),)
+
+    def preview_clear(self, tool: int) -> tuple[str, ...]:
+        """Return what :meth:`clear` would send, in words."""
+        self.require_writable(tool)
+        return () if self.read(tool) is None else (describe(_clear_draft(tool)),)
+
+    def preview_select(self, tool: int) -> tuple[str, ...]:
+        """Return what :meth:`select` would send, in words."""
+        self._require_defined(tool)
+        return () if self.selected() == tool else (describe(_select_draft(tool)),)
+
+    def selected(self) -> int:
+        """Read which slot is in force; after a PLC start and a new kinematics it is 0."""
+        return self._mailbox.snapshots.take().tool_slot
+
+    def select(self, tool: int) -> None:
+        """Put a slot in force, and prove it by the slot number and the group's own tool."""
+        self._check_index(tool)
+        draft = _select_draft(tool)
+        request = describe(draft)
+        mailbox = self._mailbox
+        with mailbox.lock.held(request):
+            before = self.selected()
+            if before == tool:
+                return
+            offset = self._require_defined(tool)
+            now = mailbox.prepare(draft, request)
+            require_still(now, controller=mailbox.identity, request=request)
+            require_enabled(now, controller=mailbox.identity, request=request)
+            mailbox.desk.note_selection(tool)
+            found = mailbox.writer.carry_out(
+                request,
+                {"select": tool, "before": before},
+                send=lambda: mailbox.orders.carry_out(draft),
+                read=self.selected,
+            )
+            if found != tool:
+                raise ReadBackError(
+                    tr(
+                        "Tool {tool} was selected, but the PLC says that tool {found} is in force.",
+                        tool=tool,
+                        found=found,
+                    ),
+                    remedy=tr("Do not move the robot; look at the PLC's tool selection."),
+                    request=request,
+                )
+            self._require_in_force(offset, request)
+
+    def _set(
+        self, tool: int, requested: ToolOffset | None, expected: Expected, draft: Command
+    ) -> ToolReceipt:
+        mailbox, request = self._mailbox, describe(draft)
+        with mailbox.lock.held(request):
+            now = mailbox.snapshots.take()
+            require_still(now, controller=mailbox.identity, request=request)
+            in_force = now.tool_slot == tool
+            if not self.same(self.read(tool), requested):
+                if in_force:
+                    self._require_changeable(tool, requested, now, request)
+                mailbox.prepare(draft, request)
+            write = ToolWrite(
+                tool,
+                requested,
+                request,
+                send=lambda: mailbox.orders.carry_out(draft),
+                read=lambda: self.read(tool),
+            )
+            receipt = mailbox.writer.change(write, expected)
+            if in_force and not receipt.skipped:
+                self._require_in_force(requested, request)
+            return receipt
+
+    def _write_draft(self, tool: int, offset: ToolOffset) -> Command:
+        name = self.name(tool)
+        if not (name.isascii() and name.isprintable() and name):
+            name = f"Tool {tool}"
+        pose = self._mailbox.to_plc(offset)
+        return Command(0, Opcode.WRITE_TOOL, operands=(tool, 0, 0, 0), pose=pose, name=name)
+
+    def _require_changeable(
+        self, tool: int, requested: ToolOffset | None, now: Response, request: str
+    ) -> None:
+        """Hold back what the PLC would refuse for the slot in force."""
+        if requested is None:
+            raise ToolError(
+                tr("Tool {tool} is in force, so it cannot be cleared.", tool=tool),
+                remedy=tr("Select another tool first, or tool 0."),
+                controller=self._mailbox.identity,
+                request=request,
+            )
+        require_enabled(now, controller=self._mailbox.identity, request=request)
+
+    def _require_in_force(self, offset: ToolOffset | None, request: str) -> None:
+        """Prove that the axis group itself has the tool (faults_and_speed.md F43, F44)."""
+        found = self.read_mode(ReadMode.SET)
+        if not self.same(found, offset):
+            raise ReadBackError(
+                tr(
+                    "The slot holds {offset}, but the axis group works with {found}.",
+                    offset=describe_offset(offset),
+                    found=describe_offset(found),
+                ),
+                remedy=tr("Do not move the robot; another program may set the group's tool."),
+                controller=self._mailbox.identity,
+                request=request,
+            )
+
+    def _require_defined(self, tool: int) -> ToolOffset:
+        offset = self.read(tool)
+        if offset is None:
+            raise UndefinedToolError(
+                tr("Tool {tool} is not defined, so it was not selected.", tool=tool),
+                remedy=tr("Define it first, with a calibration or 'robolink tool set'."),
+                request=describe(_select_draft(tool)),
+            )
+        return offset
+
+    def _check_index(self, tool: int) -> None:
+        if isinstance(tool, bool) or not isinstance(tool, int) or not 0 <= tool <= SLOTS[-1]:
+            raise ToolIndexError(
+                tr("There is no tool {tool}.", tool=tool),
+                remedy=tr("The mailbox has tools 0 to 15."),
+            )
+
+
+def _clear_draft(tool: int) -> Command:
+    return Command(0, Opcode.CLEAR_TOOL, operands=(tool, 0, 0, 0))
+
+
+def _select_draft(tool: int) -> Command:
+    return Command(0, Opcode.SELECT_TOOL, operands=(tool, 0, 0, 0))

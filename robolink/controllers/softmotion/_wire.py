@@ -1,0 +1,153 @@
+"""One session on a mailbox link: requests, beats in between, and an end that is final.
+
+A read that gets no answer may be asked again as long as the link says that it can still be
+used: a serial line finds its place again, TCP and CAN do not. A write is never repeated here.
+What ends the session ends it for good; a movement that was under way then is found again
+through its marker, not through this object.
+"""
+
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
+from typing import Final, TypeVar
+
+from robolink.controllers.softmotion._pulse import ClientBeat
+from robolink.controllers.softmotion._rides import Rides
+from robolink.errors import (
+    RemoteProtocolError,
+    RobolinkError,
+    TransportClosedError,
+    TransportError,
+)
+from robolink.interrupts import InterruptGate
+from robolink.messages import tr
+from robolink.timing import Clock
+from robolink.transport import MailboxHead, MailboxLink
+
+_READS: Final = 3
+
+T = TypeVar("T")
+ErrorT = TypeVar("ErrorT", bound=RobolinkError)
+
+
+class MailboxWire:
+    """Exchanges on an open link, which it owns from here on.
+
+    Attributes:
+        owner: This client's token, never 0.
+        epoch: The epoch of our ownership, 0 while we have none.
+        rides: The movements of this client.
+        timeout_s: Longest wait for the PLC to acknowledge a command.
+        exchanges: Requests sent so far.
+    """
+
+    def __init__(self, link: MailboxLink, *, owner: int, timeout_s: float) -> None:
+        self._link = link
+        self._gate = InterruptGate()
+        self._gate.open()
+        self._beat = ClientBeat()
+        self._ended_by: RobolinkError | None = None
+        self.owner = owner
+        self.epoch = 0
+        self.rides = Rides(owner)
+        self.timeout_s = timeout_s
+        self.exchanges = 0
+
+    @property
+    def identity(self) -> str:
+        """Which PLC this is."""
+        return self._link.identity
+
+    @property
+    def clock(self) -> Clock:
+        """The clock on which the PLC's time passes."""
+        return self._link.clock
+
+    @property
+    def alive(self) -> bool:
+        """Whether the session can still be used."""
+        return self._ended_by is None
+
+    def uninterrupted(self) -> AbstractContextManager[None]:
+        """Hold Ctrl-C back over exchanges that belong together; it is raised at their end."""
+        return self._gate
+
+    def read_head(self) -> MailboxHead:
+        """Read the beginning of the response block, after a beat if one is due."""
+        self.beat()
+        return self._ask(self._link.read_head)
+
+    def read_response(self) -> tuple[int, ...]:
+        """Read the response block, after a beat if one is due."""
+        self.beat()
+        return self._ask(self._link.read_response)
+
+    def read_slot(self, slot: int) -> tuple[int, ...]:
+        """Read a tool slot, after a beat if one is due."""
+        self.beat()
+        return self._ask(lambda: self._link.read_slot(slot))
+
+    def write(self, words: Sequence[int]) -> None:
+        """Write the command block, once.
+
+        Raises:
+            RejectedError: The link's far end refused to take it.
+            TransportError, RemoteProtocolError: The session is over; it may have arrived.
+        """
+        self._require_alive()
+        with self._gate:
+            self.exchanges += 1
+            try:
+                self._link.write_command(words)
+            except (TransportError, RemoteProtocolError) as error:
+                self.ended(error)
+                raise
+
+    def next_beat(self) -> int:
+        """Return the heartbeat word that goes with a command block."""
+        return self._beat.word(self.epoch, self.clock.now_ns())
+
+    def beat(self) -> None:
+        """Write the heartbeat alone, if we own the mailbox and it is due."""
+        now_ns = self.clock.now_ns()
+        if self.epoch and self._beat.due(now_ns, busy=self.rides.unfinished):
+            word = self._beat.word(self.epoch, now_ns)
+            self._ask(lambda: self._link.beat(word))
+
+    def ended(self, error: ErrorT) -> ErrorT:
+        """End the session because of ``error``, and return it to be raised."""
+        error.controller = error.controller or self.identity
+        self._ended_by = self._ended_by or error
+        self._link.close()
+        return error
+
+    def close(self) -> None:
+        """Close the link. Idempotent."""
+        self._ended_by = self._ended_by or TransportClosedError(
+            tr("The connection to {identity} is closed.", identity=self.identity),
+            remedy=tr("Connect again."),
+            controller=self.identity,
+        )
+        self._link.close()
+        self._gate.close()
+
+    def _ask(self, exchange: Callable[[], T]) -> T:
+        self._require_alive()
+        lost: list[RobolinkError] = []
+        while len(lost) < _READS:
+            try:
+                with self._gate:
+                    self.exchanges += 1
+                    return exchange()
+            except (TransportError, RemoteProtocolError) as error:
+                lost.append(error)
+                if isinstance(error, TransportClosedError):
+                    break  # the link cannot be used any more
+        raise self.ended(lost[0])
+
+    def _require_alive(self) -> None:
+        if self._ended_by is not None:
+            raise TransportClosedError(
+                tr("The connection to {identity} has ended.", identity=self.identity),
+                remedy=tr("Connect again; the controller's state is read anew then."),
+                controller=self.identity,
+            ) from self._ended_by

@@ -1,16 +1,25 @@
 """Print the table of ratios."""
 
 from benchmarks.exchange import measure_exchange
+from benchmarks.journal import measure_journal
 from benchmarks.nozzle_change import measure_nozzle_change
 from benchmarks.solvers import measure_solvers
 from benchmarks.start_up import measure_start_up
 from benchmarks.table import print_table
+from benchmarks.transaction import measure_transaction
 
 
 def main() -> None:
     """Run every measurement."""
     print_table(
-        [*measure_exchange(), *measure_nozzle_change(), *measure_start_up(), *measure_solvers()]
+        [
+            *measure_exchange(),
+            *measure_transaction(),
+            *measure_journal(),
+            *measure_nozzle_change(),
+            *measure_start_up(),
+            *measure_solvers(),
+        ]
     )
 
 

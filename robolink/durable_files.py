@@ -2,6 +2,7 @@
 
 import os
 import re
+from collections.abc import Iterable
 from pathlib import Path
 
 
@@ -37,14 +38,16 @@ def make_folder(folder: Path) -> None:
         sync_folder(folder.parent)
 
 
-def write_whole(path: Path, data: bytes, *, replace: bool = True, mode: int = 0o600) -> None:
+def write_whole(
+    path: Path, data: bytes | Iterable[bytes], *, replace: bool = True, mode: int = 0o600
+) -> None:
     """Put ``data`` at ``path``, whole and on the disk, or leave everything as it was.
 
     The rename is durable after :func:`sync_folder`.
 
     Args:
         path: Where; its folder exists.
-        data: All of the file.
+        data: All of the file, in one piece or in several.
         replace: Whether a file that is there already may go.
         mode: Who may read and write it, before the process's umask.
 
@@ -58,7 +61,7 @@ def write_whole(path: Path, data: bytes, *, replace: bool = True, mode: int = 0o
     try:
         descriptor = os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode)
         with open(descriptor, "wb") as file:
-            file.write(data)
+            file.writelines([data] if isinstance(data, bytes) else data)
             file.flush()
             os.fsync(descriptor)
         if replace:

@@ -1,6 +1,7 @@
 """Files that a person named: never written over unasked, whole or not there at all."""
 
 import os
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Final
 
@@ -24,8 +25,10 @@ def require_free(path: Path, *, replace: bool = False) -> None:
         raise _unwritable(path, tr("there is no such folder, or it may not be written"))
 
 
-def save_named(path: Path, data: bytes, *, replace: bool = False) -> None:
+def save_named(path: Path, data: bytes | Iterable[bytes], *, replace: bool = False) -> None:
     """Write ``data``; the file is whole and on the disk when this returns.
+
+    The data may come in one piece or in several.
 
     Raises:
         ConfigError: A file is there already and ``replace`` is not set, or it cannot be

@@ -67,7 +67,7 @@ def plan_from(
     if not 1 <= tool <= 15:
         raise ToolIndexError(
             tr("There is no tool {tool}.", tool=tool),
-            remedy=tr("EPSON controllers have tools 1 to 15."),
+            remedy=tr("Choose a tool from 1 to 15."),
         )
     if clearance_mm >= lift_mm:
         raise ConfigError(

@@ -82,12 +82,13 @@ def entries_of_change(
         JournalError: The journal cannot be read.
     """
     entry = _entry_numbered(journal, name)
-    wanted = id_of_change(entry) if entry else ""
+    wanted = id_of_change(entry) if entry and controller in (None, entry.controller) else ""
     if not wanted:
         wanted = change_named(journal.entries(controller=controller), name)
     found = list(journal.entries(controller=controller, change=wanted, newest_first=False))
     if found:
         return found
+    # A single write, known by its operation.
     every = journal.entries(controller=controller, newest_first=False)
     return [entry for entry in every if id_of_change(entry) == wanted]
 

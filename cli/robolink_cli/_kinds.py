@@ -7,6 +7,7 @@ from robolink.messages import tr
 
 if TYPE_CHECKING:
     from robolink.controllers.epson import EpsonController
+    from robolink.controllers.softmotion import SoftMotionController
     from robolink.model import Controller, DigitalIo
     from robolink.nozzle_change import PointReader
 
@@ -26,6 +27,19 @@ def require_epson(controller: "Controller", what: str) -> "EpsonController":
     if isinstance(controller, EpsonController):
         return controller
     raise _without(controller, what)
+
+
+def require_softmotion(controller: "Controller") -> "SoftMotionController":
+    """Return the controller if it is a SoftMotion PLC with a mailbox.
+
+    Raises:
+        ConfigError: It is of another kind.
+    """
+    from robolink.controllers.softmotion import SoftMotionController
+
+    if isinstance(controller, SoftMotionController):
+        return controller
+    raise _without(controller, tr("SoftMotion axis group"))
 
 
 def points_of(controller: "Controller") -> "PointReader":

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
+from pathlib import Path
 
 from robolink import __version__
 from robolink.errors import ConfigError, JournalError
@@ -12,7 +13,7 @@ from robolink.model import EntryKind, Recorded
 from robolink.report import Report, reports_of
 from robolink.transaction import id_of_change
 from robolink_cli._context import CliContext, open_controller
-from robolink_cli._impacting import impact_request, judge
+from robolink_cli._impacting import ImpactRequest, judge
 from robolink_cli._journal_lookup import controller_meant, entries_of_change
 
 _OF_A_CHANGE = (
@@ -70,27 +71,35 @@ def reports_from(
     return reports, problems
 
 
-def with_points(context: CliContext, reports: Sequence[Report], points: str) -> tuple[Report, ...]:
+def with_points(
+    context: CliContext, reports: Sequence[Report], request: ImpactRequest
+) -> tuple[Report, ...]:
     """Add what the controller says now: which it is, and where taught points lead.
 
     Raises:
-        ConfigError: The points are none, or the controller is another than that of the change.
+        ConfigError: It has no taught points.
     """
-    request = impact_request(points, None, names=("--points", "--points"))
     with open_controller(context) as controller:
-        _require_same(controller.identity, reports[0].controller)
-        facts = controller.facts()
-        taught = None if request is None else request.read(controller)
+        facts, taught = controller.facts(), request.read(controller)
     return tuple(
-        replace(
-            report,
-            facts=facts,
-            impact=None
-            if report.after is None
-            else judge(taught, old=report.before, new=report.after),
-        )
+        replace(report, facts=facts, impact=judge(taught, old=report.before, new=report.after))
+        if report.after is not None
+        else replace(report, facts=facts)
         for report in reports
     )
+
+
+def report_payload(reports: Sequence[Report], path: Path) -> dict[str, object]:
+    """Return the document of a page that was written."""
+    record = reports[0].record
+    assert record is not None  # noqa: S101 - made from the journal
+    return {
+        "file": str(path),
+        "change": record.change,
+        "tools": [{"tool": one.tool, "outcome": str(one.outcome)} for one in reports],
+        "entries": [entry.number for entry in record.entries],
+        "problems": list(record.problems),
+    }
 
 
 def _checked(journal: Journal) -> tuple[str, list[str]]:
@@ -105,11 +114,3 @@ def _checked(journal: Journal) -> tuple[str, list[str]]:
         "changed and none is missing.",
         count=found.checked,
     ), []
-
-
-def _require_same(found: str, recorded: str) -> None:
-    if found != recorded:
-        raise ConfigError(
-            tr("The change is of {recorded}, not of {found}.", recorded=recorded, found=found),
-            remedy=tr("Name its controller with -c, or leave --points out."),
-        )

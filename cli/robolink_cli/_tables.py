@@ -9,13 +9,26 @@ from robolink_cli._views import number, offset_cells
 AXES = ("X mm", "Y mm", "Z mm", "U deg", "V deg", "W deg")
 
 
+_SAID = ("controller", "state", "code", "text")
+
+
 def show_status(payload: Mapping[str, object]) -> None:
-    """Print the state in words, then the flags that are on."""
+    """Print the state in words, then the flags that are on, then what else is known."""
     say(f"{payload['controller']}: {payload['state']}")
     if payload["code"]:
-        say(tr("  code {code:04d} {text}", code=payload["code"], text=payload["text"]).rstrip())
+        text = payload.get("text", "")
+        say(tr("  code {code:04d} {text}", code=payload["code"], text=text).rstrip())
     on = [key for key, value in payload.items() if value is True and key != "motors_on"]
     say(tr("  flags: {flags}", flags=", ".join(on).replace("_", " ") or tr("none")))
+    if "power" in payload:
+        _show_epson(payload)
+        return
+    for key in [name for name in payload if name not in _SAID]:
+        if payload[key] not in (None, "") and not isinstance(payload[key], bool):
+            say(f"  {key.replace('_', ' ')}: {payload[key]}")
+
+
+def _show_epson(payload: Mapping[str, object]) -> None:
     alarms = payload["alarms"]
     if isinstance(alarms, Sequence) and alarms:
         say(tr("  alarms: {numbers}", numbers=", ".join(str(number) for number in alarms)))
@@ -53,6 +66,14 @@ def show_tools(tools: Mapping[str, Mapping[str, object] | None], selected: int) 
     missing = [tool for tool, offset in tools.items() if offset is None]
     if missing:
         say(tr("  undefined: {tools}", tools=", ".join(missing)))
+
+
+def show_offset(title: str, offset: Mapping[str, object] | None) -> None:
+    """Print one offset under a title."""
+    if offset is None:
+        say(tr("{title}: there is none now", title=title))
+    else:
+        table(title, AXES, [offset_cells(offset)])
 
 
 def show_change(

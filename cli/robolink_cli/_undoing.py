@@ -1,8 +1,7 @@
 """An undo on a terminal: what is shown, sent and reported."""
 
-from robolink.controllers.epson import EpsonController
 from robolink.messages import tr
-from robolink.protocols import spel
+from robolink.model import Controller
 from robolink.transaction import Undone, UndoPlan, undo
 from robolink_cli._render import note, say
 from robolink_cli._safekeeping import back_up_first
@@ -13,7 +12,7 @@ from robolink_cli._views import offset_payload, receipt_payload
 class Undoing:
     """One undo on one controller."""
 
-    def __init__(self, controller: EpsonController, plan: UndoPlan) -> None:
+    def __init__(self, controller: Controller, plan: UndoPlan) -> None:
         self._controller = controller
         self._plan = plan
         self._done = Undone("", ())
@@ -26,13 +25,13 @@ class Undoing:
             NotReadyError: The state forbids a write.
         """
         tools = self._controller.tools
-        statements: list[spel.Statement] = []
+        requests: list[str] = []
         for step in self._plan.steps:
             if step.requested is None:
-                statements += tools.preview_clear(step.tool)
+                requests += tools.preview_clear(step.tool)
             else:
-                statements += tools.preview_write(step.tool, step.requested)
-        return [self._controller.wire("Execute", statement) for statement in statements]
+                requests += tools.preview_write(step.tool, step.requested)
+        return requests
 
     def show(self) -> None:
         """Show what would change."""

@@ -7,7 +7,7 @@ from robolink.messages import tr
 from robolink.model import Act
 from robolink_cli._consent import agree, agree_to_motion, dry_run_option, yes_option
 from robolink_cli._context import CliContext, controller_options, open_controller
-from robolink_cli._kinds import require_epson
+from robolink_cli._kinds import require_epson, require_softmotion
 from robolink_cli._render import say
 
 
@@ -102,6 +102,38 @@ def motors(context: CliContext, switch: str, dry_run: bool, yes: bool) -> None:
         controller.motors(on)
     payload: dict[str, object] = {"motors_on": on}
     context.emit("motors", payload, lambda: say(tr("The motors are {switch}.", switch=switch)))
+
+
+@click.command()
+@controller_options
+@dry_run_option
+@yes_option
+def enable(context: CliContext, dry_run: bool, yes: bool) -> None:
+    """Enable the axis group of a PLC, and prove it; its own program switches the drives."""
+    _switch_group(context, on=True, dry_run=dry_run, yes=yes)
+
+
+@click.command()
+@controller_options
+@dry_run_option
+@yes_option
+def disable(context: CliContext, dry_run: bool, yes: bool) -> None:
+    """Disable the axis group of a PLC, which must stand still, and prove it."""
+    _switch_group(context, on=False, dry_run=dry_run, yes=yes)
+
+
+def _switch_group(context: CliContext, *, on: bool, dry_run: bool, yes: bool) -> None:
+    with open_controller(context) as controller:
+        require_softmotion(controller)
+        if dry_run:
+            context.show_requests(controller.preview(Act.MOTORS_ON if on else Act.MOTORS_OFF))
+            return
+        if on:
+            agree(tr("Is the machine clear? The axis group is enabled."), yes=yes)
+        controller.motors(on)
+    payload: dict[str, object] = {"enabled": on}
+    state = tr("enabled") if on else tr("disabled")
+    context.emit("group", payload, lambda: say(tr("The axis group is {state}.", state=state)))
 
 
 @click.command("recover")

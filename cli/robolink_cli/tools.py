@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import click
 
+from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_cli._consent import agree, dry_run_option, published_option, yes_option
 from robolink_cli._context import CliContext, controller_options, open_controller
@@ -33,13 +34,27 @@ def list_tools(context: CliContext, published: bool) -> None:
 
 
 @tool.command("get")
-@click.argument("number", type=int)
+@click.argument("number", type=int, required=False)
+@click.option(
+    "--mode",
+    type=click.Choice(["set", "active", "last"]),
+    help="On a PLC, what SMC_GroupReadTool says: the tool set, that of the movement under way, or "
+    "that of the movement commanded last.",
+)
 @controller_options
-def get(context: CliContext, number: int) -> None:
+def get(context: CliContext, number: int | None, mode: str | None) -> None:
     """Show one tool; 0 is the flange."""
     from robolink_cli._tables import show_tools
     from robolink_cli._views import offset_payload
 
+    if (number is None) == (mode is None):
+        raise ConfigError(
+            tr("Either a tool number or --mode is needed."),
+            remedy=tr("Write for example 'robolink tool get 1', or with a PLC --mode set."),
+        )
+    if number is None:
+        _get_by_mode(context, str(mode))
+        return
     with open_controller(context) as controller:
         offset, selected = controller.tools.read(number), controller.tools.selected()
     value = offset_payload(offset)
@@ -50,6 +65,21 @@ def get(context: CliContext, number: int) -> None:
         "selected": selected == number,
     }
     context.emit("tool", payload, lambda: show_tools({str(number): value}, selected))
+
+
+def _get_by_mode(context: CliContext, mode: str) -> None:
+    """Show what the PLC's own reading block says about the tool in force."""
+    from robolink.protocols.mailbox import ReadMode
+    from robolink_cli._kinds import require_softmotion
+    from robolink_cli._tables import show_offset
+    from robolink_cli._views import offset_payload
+
+    modes = {"set": ReadMode.SET, "active": ReadMode.ACTIVE, "last": ReadMode.LAST_COMMANDED}
+    with open_controller(context) as controller:
+        offset = require_softmotion(controller).tools.read_mode(modes[mode])
+    value = offset_payload(offset)
+    payload: dict[str, object] = {"mode": mode, "offset": value}
+    context.emit("tool-mode", payload, lambda: show_offset(mode, value))
 
 
 @tool.command("set")
@@ -67,7 +97,6 @@ def set_tool(
     context: CliContext, number: int, dry_run: bool, yes: bool, **given: float | None
 ) -> None:
     """Write a tool offset; components that are not given are kept."""
-    from robolink.errors import ConfigError
     from robolink.model import ToolOffset
     from robolink.transaction import Wanted, change_tools
     from robolink_cli._safekeeping import back_up_first

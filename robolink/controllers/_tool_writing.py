@@ -41,6 +41,8 @@ class ToolWrite:
         request: What is sent, as a person may read it.
         send: Sends it; raises unless the controller accepted it.
         read: Reads what is stored.
+        read_back: Reads it after the controller has accepted the write, where that is another
+            question.
     """
 
     tool: int
@@ -48,6 +50,7 @@ class ToolWrite:
     request: str
     send: Callable[[], object]
     read: Callable[[], ToolOffset | None]
+    read_back: Callable[[], ToolOffset | None] | None = None
 
 
 class ToolWriter:
@@ -161,9 +164,8 @@ class ToolWriter:
                 said = {"request": write.request} if kind is EntryKind.WRITE else now
                 yield NewEntry(kind, operation=marker.operation, tool=write.tool, details=said)
 
-        return self.carry_out(
-            write.request, details, send=write.send, read=write.read, entries=entries
-        )
+        read = write.read_back or write.read
+        return self.carry_out(write.request, details, send=write.send, read=read, entries=entries)
 
     def _ends(self, found: ToolOffset | None, requested: ToolOffset | None) -> Iterator[EntryKind]:
         yield EntryKind.WRITE

@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 PAGE: Final = 500
 """How many entries are read at once; nothing is locked between two pages."""
 
+FIRST_PAGE: Final = 20
+"""How many are read first: whoever looks for the newest of a kind mostly finds it there."""
+
 
 class Journal:
     """The append-only record of what was done to each tool.
@@ -168,8 +171,9 @@ class Journal:
         after: int | None = None,
         limit: int | None = None,
     ) -> Iterator[list[Mapping[str, Any]]]:
+        most = FIRST_PAGE if wanted.newest_first else PAGE
         while limit is None or limit > 0:
-            size = PAGE if limit is None else min(PAGE, limit)
+            size = most if limit is None else min(most, limit)
             with self._store.read() as tables:
                 page = tables.entries.page(wanted, before=before, after=after, limit=size)
             if page:
@@ -181,6 +185,7 @@ class Journal:
             else:
                 after = page[-1]["number"]
             limit = None if limit is None else limit - size
+            most = PAGE
 
 
 def _entry(row: Mapping[str, Any]) -> Recorded:

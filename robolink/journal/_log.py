@@ -5,7 +5,7 @@ from collections.abc import Collection, Iterator
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Final
 
-from robolink.errors import JournalError
+from robolink.errors import JournalError, OutcomeUnknownError
 from robolink.journal._leases import Lease
 from robolink.journal._processes import BootClock, Holder, this_process
 from robolink.messages import tr
@@ -79,13 +79,17 @@ class JournalOutcomeLog:
 
         Raises:
             JournalError: It is not stored; the marker stays.
+            OutcomeUnknownError: Another has settled it meanwhile, so nothing is recorded: what
+                was true here need not be true any more.
         """
         with self._lock:
             last = not self._holds and not self._begun - {operation}
             with self._store.write(_left_open()) as tables:
                 if last:
                     self._lease.release(tables.leases)
-                tables.markers.remove(self.identity, operation)
+                known = tables.markers.remove(self.identity, operation)
+                if operation in self._begun and not known:
+                    raise self._settled_by_another()
                 tables.entries.append(self.identity, self.signature, self.change, entries)
             self._begun.discard(operation)
             if last:
@@ -192,6 +196,13 @@ class JournalOutcomeLog:
                 entries = () if ended is None else (ended,)
                 tables.entries.append(self.identity, self.signature, self.change, entries)
             self._lease.look()
+
+    def _settled_by_another(self) -> OutcomeUnknownError:
+        return OutcomeUnknownError(
+            tr("Another settled meanwhile what was begun on {name}.", name=self.identity),
+            remedy=tr("Read the tools again: 'robolink journal list' shows who did what."),
+            controller=self.identity,
+        )
 
     def close(self) -> None:
         """Give the lease up; open markers stay, and block until they are settled.

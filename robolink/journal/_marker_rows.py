@@ -55,9 +55,9 @@ class MarkerRows:
         _INSERT.run(self._connection, values)
         return True
 
-    def remove(self, controller: str, operation: str) -> None:
-        """Forget a marker; an unknown one is ignored."""
-        _DELETE.run(self._connection, _same(controller, operation))
+    def remove(self, controller: str, operation: str) -> bool:
+        """Forget a marker; return whether it was there."""
+        return _DELETE.run(self._connection, _same(controller, operation)).rowcount == 1
 
     def of(self, controller: str) -> tuple[Marker, ...]:
         """Return the markers of a controller, oldest first."""

@@ -19,10 +19,15 @@ class Role(StrEnum):
     ENGINEER = "engineer"
 
 
-def require_engineer(outcomes: OutcomeLog, act: str) -> None:
+def require_engineer(outcomes: OutcomeLog, act: str, **details: object) -> None:
     """Refuse ``act`` to an operator, and put on record who else did it.
 
     Where the cell names no people, everybody may; it is recorded all the same.
+
+    Args:
+        outcomes: Where it goes on record.
+        act: What it takes an engineer for.
+        details: More for the record, plain JSON.
 
     Raises:
         NotAllowedError: The person is an operator.
@@ -37,4 +42,4 @@ def require_engineer(outcomes: OutcomeLog, act: str) -> None:
                 "Nothing was sent. One whom the cell file calls an engineer may, with --operator."
             ),
         )
-    outcomes.append(NewEntry(EntryKind.DECISION, verdict=act, details={"engineer": True}))
+    outcomes.append(NewEntry(EntryKind.DECISION, verdict=act, details={**details, "engineer": True}))

@@ -1,6 +1,6 @@
 """The offset before and after, what is doubtful about it, and the poses behind it."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Final
 from xml.etree.ElementTree import Element
 
@@ -15,17 +15,15 @@ _AXES: Final = ("X mm", "Y mm", "Z mm", "U deg", "V deg", "W deg")
 
 def offsets(report: Report) -> Iterator[Element]:
     """Yield the table of the offset."""
+    if not report.compared:
+        return
     measured = report.method is not None
     after_name = tr("measured") if measured else tr("new")
     rows = [_row(tr("before"), report.before), _row(after_name, report.after)]
-    if report.before is not None:
+    if report.before is not None and report.after is not None:
         rows.append(_change(report.before, report.after))
-    own, kept = (tr("measured"), tr("kept")) if measured else (tr("given"), tr("as stored"))
-    origins = [
-        element("td", own, class_="own") if name in report.determined else element("td", kept)
-        for name in _NAMES
-    ]
-    rows.append(element("tr", element("td", tr("where from")), *origins, class_="origin"))
+    if report.determined:
+        rows.append(_origins(report, measured=measured))
     yield element("h2", tr("Offset"))
     yield table(("", *_AXES), rows)
     if measured and set(report.determined) != set(_NAMES):
@@ -40,17 +38,17 @@ def doubts(report: Report) -> Iterator[Element]:
 
 
 def poses(report: Report) -> Iterator[Element]:
-    """Yield the poses that went in."""
-    if not report.poses:
-        return
-    # What does not determine Z was never asked for a height; typed poses have none.
-    heights = "z_mm" in report.determined
-    columns = ("", "X mm", "Y mm", *(("Z mm",) if heights else ()), "U deg", tr("hand"))
-    rows = [
-        _pose(number, pose, heights=heights) for number, pose in enumerate(report.poses, start=1)
-    ]
-    yield element("h2", tr("Poses of the flange that it was computed from"))
-    yield table(columns, rows)
+    """Yield the poses that went in, and those of measurements that were refused."""
+    if report.poses:
+        # What does not determine Z was never asked for a height; typed poses have none.
+        heights = report.record is not None or "z_mm" in report.determined
+        yield element("h2", tr("Poses of the flange that it was computed from"))
+        yield _poses(report.poses, report.residuals_mm, heights=heights)
+    for attempt in report.attempts:
+        if attempt.poses:
+            yield element("h2", tr("Poses of a measurement that was refused"))
+            yield element("p", attempt.why, class_="lead")
+            yield _poses(attempt.poses, (), heights=True)
 
 
 def table(columns: tuple[str, ...], rows: list[Element], **attributes: object) -> Element:
@@ -78,8 +76,27 @@ def _change(before: ToolOffset, after: ToolOffset) -> Element:
     return element("tr", element("td", tr("change")), *cells, class_="strong")
 
 
-def _pose(number: int, pose: Pose, *, heights: bool) -> Element:
-    shown = (pose.x_mm, pose.y_mm, *((pose.z_mm,) if heights else ()), pose.u_deg)
-    cells = (element("td", figure(value)) for value in shown)
-    hand = element("td", str(pose.hand) if pose.hand else "-")
-    return element("tr", element("td", str(number)), *cells, hand)
+def _origins(report: Report, *, measured: bool) -> Element:
+    """Return the row that says which components were measured or typed."""
+    own, kept = (tr("measured"), tr("kept")) if measured else (tr("given"), tr("as stored"))
+    cells = [
+        element("td", own, class_="own") if name in report.determined else element("td", kept)
+        for name in _NAMES
+    ]
+    return element("tr", element("td", tr("where from")), *cells, class_="origin")
+
+
+def _poses(poses: Sequence[Pose], residuals_mm: Sequence[float], *, heights: bool) -> Element:
+    names = ["x_mm", "y_mm", *(["z_mm"] if heights else []), "u_deg"]
+    names += [name for name in ("v_deg", "w_deg") if any(getattr(pose, name) for pose in poses)]
+    columns = ["", *(_AXES[_NAMES.index(name)] for name in names), tr("hand")]
+    rows = []
+    for number, pose in enumerate(poses, start=1):
+        cells = [element("td", figure(getattr(pose, name))) for name in names]
+        cells.append(element("td", str(pose.hand) if pose.hand else "-"))
+        if residuals_mm:
+            cells.append(element("td", figure(residuals_mm[number - 1])))
+        rows.append(element("tr", element("td", str(number)), *cells))
+    if residuals_mm:
+        columns.append(tr("residual mm"))
+    return table(tuple(columns), rows)

@@ -1,5 +1,6 @@
 """The whole page. It runs no script and loads nothing: it can be kept, mailed and printed."""
 
+from collections.abc import Iterator
 from importlib.resources import files
 from xml.etree.ElementTree import Element
 
@@ -7,16 +8,25 @@ from robolink.messages import tr
 from robolink.report._markup import document, element
 from robolink.report._offset_sections import doubts, offsets, poses
 from robolink.report._point_sections import points
+from robolink.report._record_sections import evidence, judgements
 from robolink.report._summary import facts, heading
+from robolink.report._tip_picture import tip
 from robolink.report._values import Report
 from robolink.report._verification import verification
 
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'"
 
 
-def render(report: Report) -> str:
-    """Return the report as one HTML page, in Unicode."""
-    title = tr("Tool {tool} of {controller}", tool=report.tool, controller=report.controller)
+def render(report: Report, *others: Report) -> str:
+    """Return a change as one HTML page, in Unicode.
+
+    Args:
+        report: What became of a tool.
+        others: The same of the other tools of that change.
+    """
+    reports = (report, *others)
+    numbers = ", ".join(str(one.tool) for one in reports)
+    title = tr("Tool {tool} of {controller}", tool=numbers, controller=report.controller)
     style = files("robolink.report").joinpath("style.css").read_text(encoding="utf-8")
     # The style is the one text that is not escaped: a page takes it as it stands.
     sheet = Element("style")
@@ -29,18 +39,29 @@ def render(report: Report) -> str:
         element("title", title),
         sheet,
     )
+    sections = (section for one in reports for section in _of_tool(one, alone=not others))
     body = element(
         "body",
-        heading(report),
-        facts(report),
-        *doubts(report),
-        *offsets(report),
-        *poses(report),
-        *verification(report),
-        *points(report),
+        heading(reports),
+        facts(reports),
+        *sections,
+        *evidence(report.record),
         _foot(report),
     )
     return document(element("html", head, body, lang="en"))
+
+
+def _of_tool(report: Report, *, alone: bool) -> Iterator[Element]:
+    if not alone:
+        yield element("h2", tr("Tool {tool}", tool=report.tool), class_="tool")
+    yield from doubts(report)
+    yield from offsets(report)
+    yield from tip(report)
+    yield from judgements(report)
+    yield from poses(report)
+    yield from verification(report)
+    if report.record is None or report.impact is not None:
+        yield from points(report)
 
 
 def _foot(report: Report) -> Element:

@@ -10,12 +10,11 @@ from robolink.messages import tr
 from robolink.report._labels import Paper
 from robolink.report._markup import element
 from robolink.report._plane import WIDTH, Plane, enlargement, plane_around, step_down
+from robolink.report._shapes import Place, arrow, circle, line, words
 
 _LEFT, _TOP, _BELOW = 46.0, 10.0, 66.0
 _STILL_MM: Final = 5e-7
 """A displacement below this is a rounding, and has no direction."""
-
-_HEAD: Final = 7.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,9 +71,9 @@ class _Marks:
         return element(
             "g",
             element("title", f"P{entry.number}: {entry.distance_mm:.3f} mm"),
-            _circle(start, 7.5, class_="ring") if chosen else None,
-            *_arrow(start, end),
-            _circle(start, 2.6),
+            circle(start, 7.5, class_="ring") if chosen else None,
+            *arrow(start, end),
+            circle(start, 2.6),
             class_="largest" if chosen else "point",
         )
 
@@ -95,10 +94,10 @@ class _Marks:
                 continue
             middle, foot = corner[0] + size[0] / 2, corner[1] + 0.82 * size[1]
             kind = "name largest" if chosen else "name"
-            drawn.append(_text(text, middle, foot, class_=kind, text_anchor="middle"))
+            drawn.append(words(text, middle, foot, class_=kind, text_anchor="middle"))
         return drawn[::-1], unnamed
 
-    def _line(self, entry: PointImpact) -> tuple[tuple[float, float], tuple[float, float]]:
+    def _line(self, entry: PointImpact) -> tuple[Place, Place]:
         x_mm, y_mm = entry.pose.x_mm, entry.pose.y_mm
         along = (x_mm + self._factor * entry.dx_mm, y_mm + self._factor * entry.dy_mm)
         return self._plane.at(x_mm, y_mm), self._plane.at(*along)
@@ -114,14 +113,14 @@ def _grid(plane: Plane) -> list[Element]:
     parts = [element("rect", width=f"{width:g}", height=f"{height:.1f}", class_="paper")]
     for x_mm in plane.grid_x_mm():
         x, _ = plane.at(x_mm, 0)
-        parts.append(_line((x, 0), (x, height), class_="grid"))
-        parts.append(_text(f"{x_mm:g}", x, height + 13, class_="tick", text_anchor="middle"))
+        parts.append(line((x, 0), (x, height), class_="grid"))
+        parts.append(words(f"{x_mm:g}", x, height + 13, class_="tick", text_anchor="middle"))
     for y_mm in plane.grid_y_mm():
         _, y = plane.at(0, y_mm)
-        parts.append(_line((0, y), (width, y), class_="grid"))
-        parts.append(_text(f"{y_mm:g}", -5, y + 3, class_="tick", text_anchor="end"))
-    parts.append(_text("X mm", width, height + 25, class_="axis", text_anchor="end"))
-    parts.append(_text("Y mm", 6, 13, class_="axis"))
+        parts.append(line((0, y), (width, y), class_="grid"))
+        parts.append(words(f"{y_mm:g}", -5, y + 3, class_="tick", text_anchor="end"))
+    parts.append(words("X mm", width, height + 25, class_="axis", text_anchor="end"))
+    parts.append(words("Y mm", 6, 13, class_="axis"))
     return parts
 
 
@@ -130,48 +129,16 @@ def _scales(plane: Plane, factor: float | None, longest_mm: float) -> Element:
     y = plane.height + 48
     bar_mm = plane.step_mm()
     bar = bar_mm * plane.per_mm
-    ends = [_line((x, y - 4), (x, y + 4), class_="bar") for x in (0.0, bar)]
-    parts = [_line((0, y), (bar, y), class_="bar"), *ends]
-    parts.append(_text(tr("points: {length:g} mm", length=bar_mm), bar + 8, y + 4, class_="scale"))
+    ends = [line((x, y - 4), (x, y + 4), class_="bar") for x in (0.0, bar)]
+    parts = [line((0, y), (bar, y), class_="bar"), *ends]
+    parts.append(words(tr("points: {length:g} mm", length=bar_mm), bar + 8, y + 4, class_="scale"))
     if factor is not None:
         shown_mm = step_down(longest_mm)
         start, length = WIDTH / 2, shown_mm * factor * plane.per_mm
         said = tr(
             "arrows: {length:g} mm, drawn {factor:g} times as long", length=shown_mm, factor=factor
         )
-        arrow = _arrow((start, y), (start + length, y))
-        parts.append(element("g", *arrow, class_="point"))
-        parts.append(_text(said, start + length + 8, y + 4, class_="scale"))
+        shaft = arrow((start, y), (start + length, y))
+        parts.append(element("g", *shaft, class_="point"))
+        parts.append(words(said, start + length + 8, y + 4, class_="scale"))
     return element("g", *parts, transform=f"translate({_LEFT:g} {_TOP:g})")
-
-
-def _arrow(start: tuple[float, float], end: tuple[float, float]) -> tuple[Element, ...]:
-    length = math.dist(start, end)
-    if length < 0.5:
-        return ()
-    along_x, along_y = (end[0] - start[0]) / length, (end[1] - start[1]) / length
-    head = min(_HEAD, 0.6 * length)
-    back = end[0] - head * along_x, end[1] - head * along_y
-    wing_x, wing_y = -0.4 * head * along_y, 0.4 * head * along_x
-    corners = (
-        end,
-        (back[0] + wing_x, back[1] + wing_y),
-        (back[0] - wing_x, back[1] - wing_y),
-    )
-    points = " ".join(f"{x:.2f},{y:.2f}" for x, y in corners)
-    return _line(start, back, class_="shaft"), element("polygon", points=points)
-
-
-def _line(start: tuple[float, float], end: tuple[float, float], *, class_: str) -> Element:
-    (x1, y1), (x2, y2) = start, end
-    ends = {"x1": x1, "y1": y1, "x2": x2, "y2": y2}
-    return element("line", class_=class_, **{k: f"{v:.2f}" for k, v in ends.items()})
-
-
-def _circle(centre: tuple[float, float], radius: float, class_: str | None = None) -> Element:
-    x, y = centre
-    return element("circle", cx=f"{x:.2f}", cy=f"{y:.2f}", r=f"{radius:g}", class_=class_)
-
-
-def _text(text: str, x: float, y: float, **attributes: object) -> Element:
-    return element("text", text, x=f"{x:.2f}", y=f"{y:.2f}", **attributes)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from robolink.calibration import Impact, VerifyResult
-from robolink.model import ControllerFacts, Pose, ToolOffset
+from robolink.model import ControllerFacts, Pose, Recorded, Signature, ToolOffset
 
 
 class Outcome(StrEnum):
@@ -17,7 +17,59 @@ class Outcome(StrEnum):
     DECLINED = "declined"
     REFUSED = "refused"
     VERIFY_FAILED = "verify failed"
+    NOT_APPLIED = "not applied"
+    ROLLED_BACK = "rolled back"
+    CONFLICT = "conflict"
     UNFINISHED = "unfinished"
+
+
+@dataclass(frozen=True, slots=True)
+class Judgement:
+    """What was judged on the way, in words.
+
+    Attributes:
+        what: What it was about.
+        allowed: The limits.
+        found: The verdict.
+    """
+
+    what: str
+    allowed: str
+    found: str
+
+
+@dataclass(frozen=True, slots=True)
+class Attempt:
+    """A measurement that was refused.
+
+    Attributes:
+        why: What was wrong with it.
+        poses: The flange poses that were taken; they were not used.
+    """
+
+    why: str
+    poses: tuple[Pose, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """What the journal adds to the report of a change: the same for all of its tools.
+
+    Attributes:
+        change: Id of the change.
+        signature: With what it was done, as the entry says that ended it.
+        people: Who took part, in the order in which they did.
+        entries: What is on record, in the order in which it was stored.
+        check: What a check of the whole journal found, one sentence.
+        problems: What is wrong with the journal, one sentence each.
+    """
+
+    change: str
+    signature: Signature
+    people: tuple[str, ...]
+    entries: tuple[Recorded, ...]
+    check: str
+    problems: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +83,7 @@ class Report:
         facts: What the controller says about itself.
         tool: Number of the tool.
         before: What is stored, ``None`` for an undefined tool.
-        after: The new offset.
+        after: The new offset, ``None`` for an undefined tool.
         outcome: What became of it.
         ending: Sentences that say why it ended so; empty when it went well.
         source: Where the new offset comes from, one sentence.
@@ -41,6 +93,12 @@ class Report:
         poses: The flange poses that went in.
         impact: Where taught points lead afterwards, ``None`` when none were named.
         verification: Drift about the new tip, ``None`` when nothing was turned.
+        compared: Whether ``before`` and ``after`` are known; a measurement that was refused
+            early comes to nothing.
+        residuals_mm: How far each pose is from agreement, where that is known.
+        attempts: Measurements that were refused.
+        judgements: What was judged on the way.
+        record: What the journal adds, ``None`` for a report that is made on the way.
     """
 
     made_at: str
@@ -49,7 +107,7 @@ class Report:
     facts: ControllerFacts
     tool: int
     before: ToolOffset | None
-    after: ToolOffset
+    after: ToolOffset | None
     outcome: Outcome
     ending: str = ""
     source: str = ""
@@ -59,3 +117,8 @@ class Report:
     poses: tuple[Pose, ...] = ()
     impact: Impact | None = None
     verification: VerifyResult | None = None
+    compared: bool = True
+    residuals_mm: tuple[float, ...] = ()
+    attempts: tuple[Attempt, ...] = ()
+    judgements: tuple[Judgement, ...] = ()
+    record: Record | None = None

@@ -45,15 +45,21 @@ def earlier_corrections(controller: Controller, tool: int) -> tuple[float, ...]:
     """Return the lengths, mm, of the corrections since the nozzle was mounted, oldest first.
 
     A nozzle is known by the id that was given for it; without one nothing is known to be the
-    same nozzle, and there is nothing to compare with.
+    same nozzle, and there is nothing to compare with. What was taken back is none.
     """
     nozzle = controller.outcomes.signature.nozzle
     lengths: list[float] = []
+    taken_back: set[str] = set()
     if not nozzle:
         return ()
-    for entry in controller.outcomes.recorded(tool=tool, kinds=(EntryKind.DONE,)):
+    kinds = (EntryKind.DONE, EntryKind.ROLLED_BACK)
+    for entry in controller.outcomes.recorded(tool=tool, kinds=kinds):
         if entry.signature.nozzle != nozzle:
             break
+        if entry.kind is EntryKind.ROLLED_BACK:
+            taken_back.add(entry.change)
+        if entry.change in taken_back:
+            continue
         before = read_offset(entry.details.get("before"))
         value = read_offset(entry.details.get("value"))
         if before is None or value is None:

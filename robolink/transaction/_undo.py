@@ -119,7 +119,7 @@ def undo(
     controller.require_settled(plan.sentence)
     change = outcomes.change = new_operation()
     try:
-        require_engineer(outcomes, plan.sentence)
+        require_engineer(outcomes, tr("undo a change of a tool"))
         outcomes.append(
             NewEntry(EntryKind.DECISION, verdict=plan.sentence, details=dict(plan.details))
         )

@@ -9,7 +9,8 @@ and move, and every 24th of the other exchanges. ``ROBOLINK_ALL_KILL_POINTS=1`` 
 
 import pytest
 
-from tests.faults._nozzle_cell import NozzleCell, served_cell
+from robolink.journal import EntryKind, open_journal
+from tests.faults._nozzle_cell import OLD_TIP, NozzleCell, served_cell
 from tests.faults._steps import SHARES, Step, disturbed, steps_of
 
 pytestmark = pytest.mark.timeout(600)
@@ -45,8 +46,8 @@ def check_the_next_command_says_what_is_selected(cell):
     assert shown.code == 0, shown.err
     if cell.selected_tool != 1:
         assert "Tool 0 is selected now; it was tool 1 before" in shown.err
-        assert f"'robolink -c {cell.url} resolve' puts tool 1 back" in shown.err
-    assert shown.err.count("resolve") == len(markers)
+        assert f"'robolink -c {cell.url} recover' puts tool 1 back" in shown.err
+    assert shown.err.count("recover'") == len(markers)
     assert cell.open_markers() == markers
 
 
@@ -56,6 +57,8 @@ def check_resolve_puts_the_cell_s_own_tool_back(cell):
     cell.check_settings_are_those_of_before()
     assert cell.open_markers() == ()
     cell.check_nothing_else_was_written()
+    kept = list(open_journal().log(cell.url).recorded(kinds=(EntryKind.DONE,)))
+    assert (cell.tool_1 == OLD_TIP) is not bool(kept), "what nobody verified is taken back"
 
 
 def check_motion_is_allowed_again(cell):

@@ -223,6 +223,9 @@ OUTCOMES = {
     Outcome.DECLINED: "Declined, nothing was written",
     Outcome.REFUSED: "Refused, nothing was written",
     Outcome.VERIFY_FAILED: "The verification failed",
+    Outcome.NOT_APPLIED: "Not applied, the tool keeps its old value",
+    Outcome.ROLLED_BACK: "Taken back, the tool has its old value again",
+    Outcome.CONFLICT: "Conflict: the tool holds neither the old nor the new value",
     Outcome.UNFINISHED: "Not finished",
 }
 

@@ -42,7 +42,6 @@ class EpsonToolTable:
         self._robot = robot
         # Seen defined in this session. Only a person who turns the key to Teach could change
         # that meanwhile, so it is not asked again before each read.
-        self._defined: set[int] = set()
         self._writer = ToolWriter(
             desk,
             same=self.same,
@@ -150,27 +149,23 @@ class EpsonToolTable:
     def _set(
         self, tool: int, requested: ToolOffset | None, expected: Expected, statement: spel.Statement
     ) -> ToolReceipt:
-        def send() -> None:
-            if requested is None:
-                self._defined.discard(tool)
-            self._window.command(statement)
-
-        write = ToolWrite(tool, requested, statement, send=send, read=lambda: self._read(tool))
+        write = ToolWrite(
+            tool,
+            requested,
+            statement,
+            send=lambda: self._window.command(statement),
+            read=lambda: self._read(tool),
+            # A tool that was set just now is defined.
+            read_back=None if requested is None else lambda: self._printed(tool),
+        )
         return self._writer.change(write, expected)
 
     def _read(self, tool: int) -> ToolOffset | None:
         if tool == 0:
             return ToolOffset()
-        if tool in self._defined:
-            offset = self._printed(tool)
-            # Zeros may stand for an undefined tool: what TLSet(n) gives for one is not documented.
-            if any(offset.components()):
-                return offset
-            self._defined.discard(tool)
-        if not spel.parse_boolean(self._window.printed(spel.print_tool_defined(tool))):
-            return None
-        self._defined.add(tool)
-        return self._printed(tool)
+        # What TLSet(n) gives for an undefined tool is not documented, so that is asked first.
+        defined = self._window.printed(spel.print_tool_defined(tool))
+        return self._printed(tool) if spel.parse_boolean(defined) else None
 
     def _printed(self, tool: int) -> ToolOffset:
         point = spel.parse_point(self._window.printed(spel.print_tool(tool)))

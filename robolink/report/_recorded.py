@@ -1,0 +1,115 @@
+"""From the entries of a change in the journal to its report; no controller is needed."""
+
+from collections.abc import Iterator, Mapping, Sequence
+
+from robolink.errors import ConfigError
+from robolink.messages import tr
+from robolink.model import EntryKind, Recorded
+from robolink.report._recorded_tool import report_of_tool
+from robolink.report._values import Judgement, Record, Report
+
+_NOT_ABOUT_A_CHANGE = (
+    EntryKind.SELECTION,
+    EntryKind.LEASE,
+    EntryKind.RECONNECT,
+    EntryKind.RAW,
+    EntryKind.DECISION,
+)
+"""Their tool, where they name one, is not one that was changed."""
+
+
+def reports_of(
+    entries: Sequence[Recorded],
+    *,
+    made_at: str,
+    robolink_version: str,
+    check: str,
+    problems: Sequence[str] = (),
+) -> tuple[Report, ...]:
+    """Return what became of each tool of a change.
+
+    Args:
+        entries: All that is on record about the change, in the order in which it was stored.
+        made_at: Wall-clock label, ISO 8601.
+        robolink_version: What makes the reports.
+        check: What a check of the whole journal found, one sentence.
+        problems: What is wrong with the journal.
+
+    Raises:
+        ConfigError: It changed no tool, or an entry cannot be understood.
+    """
+    tools = sorted({tool for entry in entries for tool in _tools(entry)})
+    if not tools:
+        raise ConfigError(
+            tr("These entries are not about a change of a tool's offset."),
+            remedy=tr("'robolink journal list --kind done' shows entries that are."),
+        )
+    record = Record(
+        change=entries[-1].change or entries[-1].operation,
+        signature=entries[-1].signature,
+        people=tuple(dict.fromkeys(_people(entries))),
+        entries=tuple(entries),
+        check=check,
+        problems=tuple(problems),
+    )
+    made = {"made_at": made_at, "robolink_version": robolink_version}
+    return tuple(
+        _report(tool, [e for e in entries if _concerns(e, tool)], record, made) for tool in tools
+    )
+
+
+def _report(
+    tool: int, entries: Sequence[Recorded], record: Record, made: Mapping[str, str]
+) -> Report:
+    try:
+        return report_of_tool(tool, entries, record, judgements=tuple(_judged(entries)), **made)
+    except (KeyError, TypeError, ValueError) as error:
+        raise ConfigError(
+            tr(
+                "The entries {first} to {last} cannot be understood: {error!r}.",
+                first=entries[0].number,
+                last=entries[-1].number,
+                error=error,
+            ),
+            remedy=tr("'robolink journal verify' tells whether they were changed."),
+        ) from error
+
+
+def _tools(entry: Recorded) -> Iterator[int]:
+    if entry.kind in _NOT_ABOUT_A_CHANGE:
+        return
+    if entry.tool is not None:
+        yield entry.tool
+    several = entry.details.get("tools")
+    if isinstance(several, Mapping):
+        yield from (int(tool) for tool in several)
+
+
+def _concerns(entry: Recorded, tool: int) -> bool:
+    """Tell whether an entry is about a tool, or about the whole change."""
+    if entry.kind in _NOT_ABOUT_A_CHANGE:
+        return entry.kind is EntryKind.DECISION
+    return entry.tool in (None, tool)
+
+
+def _people(entries: Sequence[Recorded]) -> Iterator[str]:
+    for entry in entries:
+        signed = entry.signature
+        role = f" ({signed.role})" if signed.role else ""
+        user = tr("user {user} on {host}", user=signed.os_user, host=signed.host)
+        yield f"{signed.operator}{role}, {user}" if signed.operator else user + role
+
+
+def _judged(entries: Sequence[Recorded]) -> Iterator[Judgement]:
+    for entry in entries:
+        if entry.tolerance or entry.verdict:
+            found = "; ".join(part for part in (entry.verdict, _fit(entry.details)) if part)
+            yield Judgement(str(entry.kind), entry.tolerance, found)
+
+
+def _fit(details: Mapping[str, object]) -> str:
+    """Return how well a measurement agreed with itself, in words."""
+    rms_mm, largest_mm = details.get("rms_mm"), details.get("max_residual_mm")
+    if not isinstance(rms_mm, float) or not isinstance(largest_mm, float):
+        return ""
+    return tr("rms {rms:.3f} mm, largest residual {largest:.3f} mm", rms=rms_mm, largest=largest_mm)

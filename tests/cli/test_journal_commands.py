@@ -1,0 +1,250 @@
+"""journal list, show, diff, export, verify: read only, without a controller."""
+
+import json
+import sqlite3
+import subprocess
+import sys
+
+import pytest
+from robolink_cli import main
+
+from robolink.model import EntryKind
+from tests.cli._recorded_changes import (
+    FIRST,
+    HERE,
+    NEW,
+    OLD,
+    POSES,
+    SECOND,
+    THERE,
+    entry,
+    record_changes,
+)
+
+
+@pytest.fixture
+def recorded(state_folder):
+    return record_changes()
+
+
+@pytest.fixture
+def run(state_folder, capsys):
+    def ran(*arguments):
+        code = main.run(arguments)
+        shown = capsys.readouterr()
+        return code, shown.out, shown.err
+
+    return ran
+
+
+@pytest.fixture
+def document(run):
+    def ran(*arguments):
+        code, out, err = run(*arguments, "--json")
+        assert (code, err) == (0, "")
+        return json.loads(out)
+
+    return ran
+
+
+def numbers(found):
+    return [entry["number"] for entry in found["entries"]]
+
+
+def test_the_list_shows_the_newest_first_with_value_and_person(run, recorded):
+    code, out, _ = run("journal", "list")
+    assert code == 0
+    lines = [line.split() for line in out.splitlines() if line.strip()[:1].isdigit()]
+    assert [line[0] for line in lines] == ["4", "3", "2", "1"]
+    assert lines[0][4:] == ["aaaa2222", "1", "done", "undefined", "Ann", "(engineer)"]
+    assert "X 12.250 Y -3.500 Z -20.000 U 0.000" in out
+    assert HERE in out
+    assert THERE in out
+
+
+FILTERS = {
+    "a tool": (["--tool", "1"], [4, 2, 1]),
+    "a controller": (["-c", THERE], [3]),
+    "a controller before the command": ([], [4, 2, 1]),
+    "a kind": (["--kind", "done"], [4, 3, 2]),
+    "several kinds": (["--kind", "calibration", "--kind", "read-back"], [1]),
+    "a change": (["--change", FIRST[:6]], [2, 1]),
+    "a kind of a change": (["--change", FIRST[:6], "--kind", "done"], [2]),
+    "no more than": (["--limit", "2"], [4, 3]),
+}
+
+
+@pytest.mark.parametrize("name", FILTERS)
+def test_the_list_shows_what_is_asked_for(document, recorded, name):
+    options, expected = FILTERS[name]
+    before = ["-c", HERE] if name.endswith("before the command") else []
+    assert numbers(document(*before, "journal", "list", *options)) == expected
+
+
+def test_a_cell_stands_for_its_controller(document, recorded, tmp_path):
+    (tmp_path / "robolink.toml").write_text(f'[cells.five]\nurl = "{THERE}"\n', encoding="utf-8")
+    assert numbers(document("journal", "list", "-c", "five")) == [3]
+
+
+def test_an_entry_as_a_document_has_its_units_in_its_keys_and_the_stored_details(
+    document, recorded
+):
+    (found,) = document("journal", "show", "2")["entries"]
+    assert found["before"]["x_mm"] == 12.0
+    assert found["after"]["u_deg"] == 0.0
+    assert found["details"]["value"] == NEW
+    assert (found["operator"], found["nozzle"], found["change"]) == ("Ann", "N-1", FIRST)
+    assert len(found["hash"]) == 64
+
+
+def test_an_entry_is_shown_with_all_its_fields_and_poses(run, recorded):
+    code, out, _ = run("journal", "show", "1")
+    assert code == 0
+    for words in ("change up to 2 mm", "measured", "Ann", "N-1", "L-7", "12.250", "rms mm: 0.0125"):
+        assert words in out
+    assert "1 1.500 2.000 -3.000 90.000 - - right" in " ".join(out.split())
+    assert recorded.entry(1).hash in out
+
+
+@pytest.mark.parametrize("name", [FIRST, FIRST[:6], FIRST[:5].upper()])
+def test_a_change_is_named_by_the_beginning_of_its_id(document, recorded, name):
+    assert numbers(document("journal", "show", name)) == [1, 2]
+
+
+WRONG_NAMES = {
+    "aaaa": "2 changes begin with 'aaaa': aaaa2222, aaaa1111",
+    "aaa": "neither the number of an entry nor an id",
+    "cccc": "No entry and no change in the journal is called 'cccc'",
+    "99": "neither the number",
+    "99999999999999999999999": "No entry and no change",
+    "\u0661": "neither the number",
+}
+
+
+@pytest.mark.parametrize("name", WRONG_NAMES)
+def test_a_name_that_means_nothing_or_too_much_is_refused(run, recorded, name):
+    code, out, err = run("journal", "show", name)
+    assert (code, out) == (2, "")
+    assert WRONG_NAMES[name] in err
+    assert "'robolink journal list'" in err
+
+
+def test_the_difference_of_two_changes(document, run, recorded):
+    found = document("journal", "diff", FIRST[:5], "3")
+    (tool,) = found["tools"]
+    assert tool["tool"] == {"a": 1, "b": 2}
+    assert tool["after"]["difference"]["x_mm"] == pytest.approx(-0.25)
+    assert tool["before"]["b"] is tool["before"]["difference"] is None
+    differing = {field["name"]: (field["a"], field["b"]) for field in found["fields"]}
+    assert differing["operator"] == ("Ann", "")
+    assert differing["tolerance"] == ("change up to 2 mm", "")
+    assert differing["controller"] == (HERE, THERE)
+    assert found["poses"] == {"a": POSES, "b": []}
+    code, out, _ = run("journal", "diff", FIRST[:5], "3")
+    assert code == 0
+    shown = " ".join(out.split())
+    assert "after difference -0.250 0.000 0.000 0.000 0.000 0.000" in shown
+    assert "before entry 3 undefined" in shown
+
+
+def test_a_change_is_one_side_from_its_first_before_to_its_last_value(document, recorded):
+    (tool,) = document("journal", "diff", FIRST[:5], SECOND[:5])["tools"]
+    assert tool["tool"] == {"a": 1, "b": 1}
+    assert tool["before"]["difference"]["x_mm"] == 0.25
+    assert tool["after"]["a"]["x_mm"] == 12.25
+    assert tool["after"]["b"] is None
+
+
+def test_a_tool_on_one_side_only_is_named(run, recorded):
+    log = recorded.log(HERE)
+    log.append(*(entry(EntryKind.DONE, "cccc" * 8, tool, before=OLD, value=NEW) for tool in (1, 5)))
+    code, out, _ = run("journal", "diff", "cccc", FIRST[:5])
+    assert code == 0
+    assert "on one side only: tool 5" in out
+
+
+def test_an_intact_journal_is_whole(run, document, recorded):
+    code, out, _ = run("journal", "verify")
+    assert (code, out) == (
+        0,
+        "4 entries checked: nothing was changed and nothing is missing.\n",
+    )
+    assert document("journal", "verify")["problems"] == []
+
+
+def test_a_changed_entry_and_a_missing_one_are_named(run, recorded, state_folder):
+    with sqlite3.connect(state_folder / "journal.db") as database:
+        database.execute("update entries set verdict = 'better' where number = 2")
+        database.execute("delete from entries where number = 3")
+    database.close()
+    code, out, _ = run("journal", "verify")
+    assert code == 1
+    assert "Entry 2 was changed after it was stored." in out
+    assert "Entry 3 is missing." in out
+    assert "problems: 2" in out
+
+
+@pytest.mark.parametrize(
+    "arguments", [["show", "1"], ["diff", "1", "2"], ["export", "x.csv"], ["verify"]]
+)
+def test_a_journal_that_does_not_exist_is_said_so_and_not_made(run, state_folder, arguments):
+    code, out, err = run("journal", *arguments)
+    assert (code, out) == (2, "")
+    assert "There is no journal" in err
+    assert not state_folder.exists()
+
+
+def test_an_empty_list_is_no_error(run, document, state_folder, tmp_path):
+    code, out, _ = run("journal", "list")
+    assert code == 0
+    assert "There is no journal yet" in out
+    assert document("journal", "list")["entries"] == []
+    assert not state_folder.exists()
+
+
+def test_a_list_without_a_match_says_so(run, recorded):
+    code, out, _ = run("journal", "list", "--tool", "15")
+    assert (code, out) == (0, "The journal has no such entry.\n")
+
+
+def test_a_journal_that_may_only_be_read_is_listed_and_exported(document, recorded, state_folder):
+    recorded.close()
+    folder_mode = state_folder.stat().st_mode
+    (state_folder / "journal.db").chmod(0o400)
+    state_folder.chmod(0o500)
+    try:
+        assert numbers(document("journal", "list", "--limit", "1")) == [4]
+        assert document("journal", "export", "all.jsonl")["entry_count"] == 4
+    finally:
+        state_folder.chmod(folder_mode)
+
+
+def test_a_journal_that_another_program_writes_is_listed(document, recorded, state_folder):
+    other = sqlite3.connect(state_folder / "journal.db", isolation_level=None)
+    other.execute("BEGIN IMMEDIATE")
+    try:
+        assert numbers(document("journal", "list", "--limit", "1")) == [4]
+    finally:
+        other.close()
+
+
+def test_a_newer_journal_is_exported_but_not_verified(run, document, recorded, state_folder):
+    recorded.close()
+    with sqlite3.connect(state_folder / "journal.db") as database:
+        database.execute("update schema_version set version = 99")
+    database.close()
+    assert document("journal", "export", "all.jsonl")["entry_count"] == 4
+    code, _, err = run("journal", "verify")
+    assert (code, "newer robolink" in err) == (2, True)
+
+
+def test_looking_at_the_journal_loads_no_driver(recorded):
+    code = (
+        "import sys; from robolink_cli import main; main.run(['journal', 'list']);"
+        "print([m for m in sys.modules if m.startswith(('robolink.controllers', 'numpy',"
+        " 'pymodbus', 'can', 'serial'))])"
+    )
+    shown = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=30
+    )
+    assert shown.stdout.splitlines()[-1] == "[]"

@@ -1,0 +1,187 @@
+"""A served cell with two tools, programs that are killed while they change them, recovery."""
+
+import contextlib
+import io
+import re
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from queue import SimpleQueue
+from typing import Any
+
+import pytest
+from robolink_cli import main
+from robolink_simulators.clock import ManualClock, ScaledClock
+from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.epson.options import EpsonOptions
+from robolink_simulators.hosting.tcp import serve_tcp
+
+import robolink
+from robolink.journal import Journal, open_journal
+from robolink.model import EntryKind, MarkerKind, ToolOffset
+from robolink.transaction import changed_since
+from tests.faults._change_process import OLD, CommitStep, ProgramProcess, acknowledged
+from tests.faults._steps import MOMENTS, Moment
+
+_WRITE = re.compile(r'\$Execute,"TLSet (\d+), XY')
+
+
+@dataclass(frozen=True)
+class WireStep:
+    """One instant of a program: an exchange by its running number, and a moment of it."""
+
+    number: int
+    moment: Moment
+    request: str
+
+    def __str__(self) -> str:
+        return f"exchange {self.number}, {self.moment}: {self.request}"
+
+
+Step = WireStep | CommitStep
+
+
+class ChangeCell:
+    """A controller that holds ``OLD`` in tools 1 and 2, of which 1 is selected."""
+
+    def __init__(self, simulator: EpsonSimulator, url: str, folder: Path) -> None:
+        self.simulator = simulator
+        self.url = url
+        self.folder = folder
+        self.journal: Journal = open_journal(str(folder / "journal.db"))
+
+    @property
+    def tools(self) -> dict[int, ToolOffset | None]:
+        """What is stored in both, past the wire."""
+        return {tool: self.simulator.machine.tools.get(tool) for tool in OLD}
+
+    @property
+    def requests(self) -> list[str]:
+        """What came in so far."""
+        return [text for _, direction, text in self.simulator.log if direction == ">"]
+
+    def writes(self) -> list[int]:
+        """Return the tools that were written so far, in order."""
+        found = [match.group(1) for match in map(_WRITE.match, self.requests) if match]
+        assert len(found) == self.simulator.machine.flash_writes
+        return [int(tool) for tool in found]
+
+    def values_written(self) -> list[ToolOffset]:
+        """Return what tool 1 was written as so far, in order."""
+        texts = [text.partition("XY(")[2].partition(")")[0] for text in self.requests]
+        return [ToolOffset(*map(float, text.split(","))) for text in texts if text]
+
+    def steps_of(self, program: str) -> list[Step]:
+        """Run a program undisturbed and return all its instants."""
+        exchanges, commits = len(self.requests), len(acknowledged(self.folder))
+        assert ProgramProcess(program, self.url, self.folder).exit_code() == 0
+        wire = [
+            WireStep(number, moment, request)
+            for number, request in enumerate(self.requests[exchanges:], start=1)
+            for moment in MOMENTS
+        ]
+        count = len(acknowledged(self.folder)) - commits
+        durable = [
+            step
+            for number in range(1, count + 1)
+            for step in (
+                CommitStep(number, "before it is durable"),
+                CommitStep(number, "once it is durable"),
+            )
+        ]
+        return [*wire, *durable]
+
+    def kill(self, program: str, step: Step) -> None:
+        """Run a program and kill it at ``step``."""
+        if isinstance(step, CommitStep):
+            client = ProgramProcess(program, self.url, self.folder, kill_at=step)
+        else:
+            client = self._killed_at_the_wire(program, step)
+        assert client.exit_code() == -9, f"it was not killed at {step}"
+
+    def recover(self) -> str:
+        """Run ``robolink recover`` and return what it said; nothing may be left."""
+        said = io.StringIO()
+        with (
+            pytest.MonkeyPatch.context() as environment,
+            contextlib.redirect_stdout(said),
+            contextlib.redirect_stderr(said),
+        ):
+            environment.setenv("ROBOLINK_JOURNAL", str(self.folder / "journal.db"))
+            environment.setenv("ROBOLINK_STATE_DIR", str(self.folder))
+            code = main.run(["-c", self.url, "recover"])
+        assert code == 0, said.getvalue()
+        return said.getvalue()
+
+    def check_what_was_acknowledged_is_there(self) -> None:
+        """Every entry that a process was told is durable is in the journal, which is whole."""
+        assert self.journal.verify().problems == ()
+        for number, last_hash in acknowledged(self.folder):
+            entry = self.journal.entry(number) if number else None
+            assert number == 0 or (entry is not None and entry.hash == last_hash), number
+
+    def check_the_selected_tool_is_right_or_named(self) -> None:
+        """Whoever looks is told which tool the cell's own one is."""
+        if self.simulator.machine.tools.selected != 1:
+            markers = [marker for _, marker in self.journal.open_markers()]
+            (named,) = [marker for marker in markers if marker.kind is MarkerKind.SELECTION]
+            assert named.details["tool"] == 1
+
+    def check_all_is_settled(self) -> None:
+        """Nothing is open, the record says what is true, and the cell's own tool is selected."""
+        assert self.journal.open_markers() == ()
+        assert self.simulator.machine.tools.selected == 1
+        self.check_what_was_acknowledged_is_there()
+        outcomes = self.journal.log(self.url, clock=ManualClock())
+        with robolink.connect(self.url, outcomes=outcomes) as controller:
+            controller.require_settled("the next command")
+            for tool, held in self.tools.items():
+                assert changed_since(controller, tool, held) is None, tool
+
+    def verified(self) -> bool:
+        """Whether it is on record that a verified change stays."""
+        done = self.journal.entries(kinds=(EntryKind.DONE,))
+        return any(entry.verdict == "verified" for entry in done)
+
+    def _killed_at_the_wire(self, program: str, step: WireStep) -> ProgramProcess:
+        started: SimpleQueue[ProgramProcess] = SimpleQueue()
+        reached = threading.Event()
+        before = len(self.requests)
+
+        def hold(number: int, _text: str) -> None:
+            if number == before + step.number and not reached.is_set():
+                started.get(timeout=30).kill()
+                reached.set()
+
+        with self.simulator.lock:
+            if step.moment == MOMENTS[0]:
+                self.simulator.on_request = hold
+            else:
+                self.simulator.on_reply = hold
+        client = ProgramProcess(program, self.url, self.folder)
+        started.put(client)
+        assert reached.wait(30), "the step was not reached"
+        with self.simulator.lock:
+            self.simulator.on_request = self.simulator.on_reply = None
+        return client
+
+
+@contextmanager
+def change_cell(
+    folder: Path, kind: type[EpsonSimulator] = EpsonSimulator, **habits: Any
+) -> Iterator[ChangeCell]:
+    """Serve a cell with a journal of its own."""
+    folder.mkdir(parents=True)
+    options = EpsonOptions(**{"remote_timeout_s": 0, "login_timeout_s": 0, **habits})
+    simulator = kind(seed=1, options=options)
+    for tool, offset in OLD.items():
+        simulator.machine.tools.set(tool, offset)
+    simulator.machine.tools.flash_writes = 0
+    with serve_tcp(simulator, clock=ScaledClock(200.0)) as host:
+        cell = ChangeCell(simulator, host.url, folder)
+        try:
+            yield cell
+        finally:
+            cell.journal.close()

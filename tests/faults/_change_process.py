@@ -1,0 +1,139 @@
+"""Tool changes and recoveries as processes of their own, to be killed or held at a commit.
+
+Every durable transaction of the journal is counted in the process; when it has ended, number
+and hash of the newest entry are written down, so that what was acknowledged can be looked for
+afterwards.
+"""
+
+import os
+import signal
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from multiprocessing.connection import wait
+from pathlib import Path
+from typing import Final, Literal
+
+from robolink_simulators.clock import ManualClock
+
+import robolink
+from robolink.journal import open_journal
+from robolink.model import Controller, ToolOffset
+from robolink.transaction import ToolChange, Wanted, change_tools, recover
+from tests.faults import _client_process
+
+OLD: Final = {1: ToolOffset(12.0, -3.5, -20.0), 2: ToolOffset(-12.0, -3.5, -21.0)}
+NEW: Final = {1: ToolOffset(12.25, -3.25, -20.0), 2: ToolOffset(-11.75, -3.5, -21.0)}
+
+CommitMoment = Literal["before it is durable", "once it is durable"]
+_PATIENCE_S: Final = 30.0
+
+
+@dataclass(frozen=True)
+class CommitStep:
+    """One instant of a program: a durable transaction by its running number, and a moment."""
+
+    number: int
+    moment: CommitMoment
+
+    def __str__(self) -> str:
+        return f"commit {self.number}, {self.moment}"
+
+
+def _wanted(*tools: int) -> list[Wanted]:
+    return [Wanted(tool, NEW[tool], OLD[tool]) for tool in tools]
+
+
+def _write_verified(controller: Controller) -> None:
+    with controller.preserved("nozzle change"):
+        controller.tools.select(0)
+        with ToolChange(controller, _wanted(1, 2), verify=True) as change:
+            change.write()
+            controller.status()
+            change.keep("verified")
+
+
+PROGRAMS: Final[dict[str, Callable[[Controller], object]]] = {
+    "one tool": lambda controller: change_tools(controller, _wanted(1)),
+    "two tools": lambda controller: change_tools(controller, _wanted(1, 2)),
+    "two tools, verified": _write_verified,
+    "recover": recover,
+}
+
+
+class ProgramProcess:
+    """One of :data:`PROGRAMS` on a controller.
+
+    Args:
+        program: Its name.
+        url: The controller.
+        folder: Where its journal is, and where it writes down what was acknowledged.
+        kill_at: Where it ends itself with SIGKILL.
+    """
+
+    def __init__(
+        self, program: str, url: str, folder: Path, *, kill_at: CommitStep | None = None
+    ) -> None:
+        self._process = _client_process._FORKS.Process(
+            target=_run, args=(program, url, str(folder), kill_at)
+        )
+        self._process.start()
+
+    def kill(self) -> None:
+        """Send SIGKILL and return when the process, and with it its socket, is gone."""
+        assert self._process.pid is not None
+        os.kill(self._process.pid, signal.SIGKILL)
+        assert wait([self._process.sentinel], _PATIENCE_S), "it outlived SIGKILL"
+
+    def exit_code(self) -> int:
+        """Wait for its end and return the exit code, negative for a signal."""
+        assert wait([self._process.sentinel], _PATIENCE_S), "it hangs"
+        self._process.join()
+        code = self._process.exitcode
+        self._process.close()
+        assert code is not None
+        return code
+
+
+def acknowledged(folder: Path) -> list[tuple[int, str]]:
+    """Return number and hash of the newest entry after each transaction that was acknowledged."""
+    noted = folder / "acknowledged"
+    lines = noted.read_text().splitlines() if noted.exists() else []
+    return [(int(number), last_hash) for number, last_hash in map(str.split, lines)]
+
+
+def _run(program: str, url: str, folder: str, kill_at: CommitStep | None) -> None:
+    _watch_commits(Path(folder) / "acknowledged", kill_at)
+    journal = open_journal(f"{folder}/journal.db")
+    # Its time stands still: no sign of life comes between the transactions that are counted.
+    outcomes = journal.log(url, clock=ManualClock())
+    with robolink.connect(url, outcomes=outcomes) as controller:
+        PROGRAMS[program](controller)
+    sys.exit(0)
+
+
+def _watch_commits(noted: Path, kill_at: CommitStep | None) -> None:
+    from robolink.journal._store import Store, Tables
+
+    write = Store.write
+    file = os.open(noted, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
+    number = 0
+
+    def reach(moment: CommitMoment) -> None:
+        if kill_at == CommitStep(number, moment):
+            os.kill(os.getpid(), signal.SIGKILL)
+
+    @contextmanager
+    def watched(store: Store, consequence: str = "") -> Iterator[Tables]:
+        nonlocal number
+        with write(store, consequence) as tables:
+            yield tables
+            number += 1
+            head = tables.entries.head()
+            reach("before it is durable")
+        assert head is not None
+        os.write(file, f"{head[0]} {head[1]}\n".encode())
+        reach("once it is durable")
+
+    Store.write = watched  # type: ignore[method-assign, assignment]

@@ -1,0 +1,130 @@
+"""SIGKILL at each step of a tool write, of a change of two tools, and of ``recover`` itself.
+
+A program is a process of its own against a served simulator. It is killed at an exchange,
+before the controller carries it out (which it does all the same) or before its answer leaves,
+or at a durable transaction of the journal, just before or just after it counts. Then
+``robolink recover`` runs, and what is stored, selected and on record is looked at. By default
+a sample is taken: every transaction, and the exchanges that log in or out, select or write.
+``ROBOLINK_ALL_KILL_POINTS=1`` takes all. ``pytest -s`` shows how many.
+"""
+
+import os
+import re
+from itertools import dropwhile
+
+import pytest
+
+from robolink.model import ToolOffset
+from tests.faults._change_cell import ChangeCell, Step, WireStep, change_cell
+from tests.faults._change_process import NEW, OLD, CommitStep
+from tests.faults._steps import MOMENTS
+
+pytestmark = pytest.mark.timeout(600)
+
+_MATTERS = re.compile(r'\$(Log|Execute,"(Tool \d|TLSet ))')
+
+NOTHING_LEFT = "Nothing is unsettled on this controller."
+
+CHANGES = ("one tool", "two tools", "two tools, verified")
+
+# Where a change was killed, whose recovery is killed in turn: before the first answer of the
+# second kind after the first kind leaves.
+WRITE_1, WRITE_2, LOOK = '$Execute,"TLSet 1,', '$Execute,"TLSet 2,', "$GetStatus"
+LEFT = {
+    "a write whose answer was lost": ("one tool", WRITE_1, WRITE_1),
+    "one tool of two": ("two tools", WRITE_1, LOOK),
+    "the second of two in doubt": ("two tools", WRITE_2, WRITE_2),
+    "two that nobody verified": ("two tools, verified", WRITE_2, LOOK),
+    "two, in doubt and not verified": ("two tools, verified", WRITE_2, WRITE_2),
+}
+
+
+def chosen(steps: list[Step]) -> list[Step]:
+    if os.environ.get("ROBOLINK_ALL_KILL_POINTS") == "1":
+        return steps
+    return [step for step in steps if isinstance(step, CommitStep) or _MATTERS.match(step.request)]
+
+
+def right_values(program: str, cell: ChangeCell, written: list[int]) -> dict[int, ToolOffset]:
+    """Return what the tools must hold after a recovery."""
+    whole = len(written) == (1 if program == "one tool" else 2)
+    kept = whole and (program != "two tools, verified" or cell.verified())
+    return {tool: NEW[tool] if kept and tool in written else OLD[tool] for tool in OLD}
+
+
+def check_recovered(cell: ChangeCell, program: str, written: list[int]) -> None:
+    right = right_values(program, cell, written)
+    assert cell.tools == right
+    put_back = cell.writes()[len(written) :]
+    # One write puts one tool back; a tool that is right already is not written.
+    assert sorted(put_back) == [tool for tool in sorted(written) if right[tool] == OLD[tool]]
+    cell.check_all_is_settled()
+
+
+def check_killed_change(cell: ChangeCell, program: str, step: Step) -> None:
+    cell.kill(program, step)
+    written = cell.writes()
+    assert len(set(written)) == len(written)
+    cell.check_what_was_acknowledged_is_there()
+    cell.check_the_selected_tool_is_right_or_named()
+    cell.recover()
+    assert NOTHING_LEFT in cell.recover()
+    check_recovered(cell, program, written)
+
+
+@pytest.mark.parametrize("program", CHANGES)
+def test_a_change_killed_at_each_step_is_recovered_as_a_whole(tmp_path, program):
+    with change_cell(tmp_path / "whole") as cell:
+        all_steps = cell.steps_of(program)
+        right = {tool: NEW[tool] if tool in cell.writes() else OLD[tool] for tool in OLD}
+        assert cell.tools == right
+        assert NOTHING_LEFT in cell.recover()
+    steps = chosen(all_steps)
+    for number, step in enumerate(steps):
+        with change_cell(tmp_path / str(number)) as cell:
+            try:
+                check_killed_change(cell, program, step)
+            except AssertionError as error:
+                error.add_note(f"killed at {step}")
+                raise
+    print(f"{program}: {len(steps)} kill points of {len(all_steps)}")  # noqa: T201 - for pytest -s
+
+
+def leave(cell: ChangeCell, left: str, all_steps: list[Step]) -> list[int]:
+    """Kill a change where ``left`` says; return which tools were written until then."""
+    program, *path = LEFT[left]
+    exchanges = [s for s in all_steps if isinstance(s, WireStep) and s.moment == MOMENTS[1]]
+    for request in path:
+        exchanges = list(dropwhile(lambda s: not s.request.startswith(request), exchanges))  # noqa: B023 - used at once
+    cell.kill(program, exchanges[0])
+    return cell.writes()
+
+
+def check_killed_recovery(cell: ChangeCell, left: str, all_steps: list[Step], step: Step) -> None:
+    written = leave(cell, left, all_steps)
+    cell.kill("recover", step)
+    cell.check_what_was_acknowledged_is_there()
+    cell.check_the_selected_tool_is_right_or_named()
+    cell.recover()
+    assert NOTHING_LEFT in cell.recover()
+    check_recovered(cell, LEFT[left][0], written)
+
+
+@pytest.mark.parametrize("left", LEFT)
+def test_a_recovery_killed_at_each_step_may_be_run_again(tmp_path, left):
+    program = LEFT[left][0]
+    with change_cell(tmp_path / "change") as cell:
+        change_steps = cell.steps_of(program)
+    with change_cell(tmp_path / "whole") as cell:
+        written = leave(cell, left, change_steps)
+        all_steps = cell.steps_of("recover")
+        check_recovered(cell, program, written)
+    steps = chosen(all_steps)
+    for number, step in enumerate(steps):
+        with change_cell(tmp_path / str(number)) as cell:
+            try:
+                check_killed_recovery(cell, left, change_steps, step)
+            except AssertionError as error:
+                error.add_note(f"recovery killed at {step}")
+                raise
+    print(f"recover, {left}: {len(steps)} kill points of {len(all_steps)}")  # noqa: T201 - for pytest -s

@@ -1,0 +1,136 @@
+"""A nozzle change that is refused leaves the old tool in place, and why is on record."""
+
+from dataclasses import replace
+from itertools import count
+
+import pytest
+from robolink_cli._operator import AssistedOperator
+from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.hosting.in_process import register, unregister
+from robolink_simulators.world import STORED
+
+import robolink
+from robolink.errors import CalibrationError, DeclinedError, VerifyError
+from robolink.journal import memory_journal
+from robolink.model import EntryKind, Signature, ToolReceipt, read_offset
+from robolink.nozzle_change import ChangePlan, Listener, NozzleChange, ToolPlan
+from robolink.transaction import earlier_corrections
+
+_names = count()
+
+
+class Cell:
+    """A simulated cell, its journal, and the person who touches the pin."""
+
+    def __init__(self, simulator, controller):
+        self.simulator = simulator
+        self.controller = controller
+
+    def mount(self, dx_mm):
+        """Put a nozzle on whose tip is off the first one's by so much."""
+        self.simulator.world.tips[1] = replace(STORED, x_mm=STORED.x_mm + dx_mm)
+
+    def look(self):
+        seen = self.simulator.world.operator.look(1)
+        return seen.dx_mm, seen.dy_mm, seen.dz_mm
+
+    def change(self, *, operator=None, listener=None):
+        NozzleChange(
+            self.controller,
+            ChangePlan((ToolPlan(1),), ask_before_write=False),
+            operator=operator or AssistedOperator(self.look, lambda _: None),
+            listener=listener,
+            earlier=lambda tool: earlier_corrections(self.controller, tool),
+        ).run()
+
+    def recorded(self, kind):
+        return list(self.controller.outcomes.recorded(kinds=(kind,)))
+
+    def check_the_tool_is(self, offset, *, writes):
+        machine = self.simulator.machine
+        assert machine.tools.get(1) == offset
+        assert machine.tools.selected == 1
+        assert machine.flash_writes == writes
+        assert self.controller.outcomes.open_markers() == ()
+
+
+@pytest.fixture
+def cell():
+    simulator = EpsonSimulator(seed=3)
+    name = f"refusals-{next(_names)}"
+    outcomes = memory_journal(name).log(name, signature=Signature(nozzle="N-7"))
+    with robolink.connect(register(name, simulator), outcomes=outcomes) as controller:
+        yield Cell(simulator, controller)
+    unregister(name)
+
+
+def test_a_nozzle_that_is_too_far_off_is_refused(cell):
+    cell.mount(dx_mm=4.0)
+    with pytest.raises(CalibrationError, match="would move by 4") as refused:
+        cell.change()
+    assert refused.value.code == "implausible_change"
+    assert "allow it with --max-change" in refused.value.remedy
+    cell.check_the_tool_is(STORED, writes=0)
+    (entry,) = cell.recorded(EntryKind.REFUSED)
+    assert (entry.tool, entry.details["code"]) == (1, "implausible_change")
+    assert "change up to 2 mm" in entry.tolerance
+    assert cell.recorded(EntryKind.INTENT) == []
+
+
+class GivesUp(AssistedOperator):
+    """A person who ends it when the pin has not been reached after some steps."""
+
+    def poll(self, wait_s):
+        self.patience = getattr(self, "patience", 60) - 1
+        return super().poll(wait_s) if self.patience else "q"
+
+
+def test_a_pin_that_is_not_reached_is_refused(cell):
+    x_mm, y_mm, z_mm = cell.simulator.world.pin_mm
+    cell.simulator.world.pin_mm = (x_mm, y_mm, z_mm - 100)
+    said: list[str] = []
+    with pytest.raises(DeclinedError, match="ended by the operator"):
+        cell.change(operator=GivesUp(cell.look, said.append))
+    assert any("box" in sentence for sentence in said), said
+    cell.check_the_tool_is(STORED, writes=0)
+    (entry,) = cell.recorded(EntryKind.REFUSED)
+    assert entry.details == {"code": "DeclinedError", "poses": []}
+
+
+class LooseNozzle(Listener):
+    """The nozzle slips when the robot begins to turn after the write."""
+
+    def __init__(self, cell):
+        self.cell = cell
+
+    def wrote(self, receipt: ToolReceipt) -> None:
+        assert receipt.read_back == self.cell.simulator.machine.tools.get(1) != STORED
+        self.cell.mount(dx_mm=2.0)
+
+
+def test_a_failed_verification_puts_the_old_tool_back(cell):
+    cell.mount(dx_mm=0.4)
+    with pytest.raises(VerifyError, match="drifts") as failed:
+        cell.change(listener=LooseNozzle(cell))
+    assert "The old value of tool 1 was written back." in failed.value.remedy
+    cell.check_the_tool_is(STORED, writes=2)
+    (verify,) = cell.recorded(EntryKind.VERIFY)
+    assert verify.details["passed"] is False
+    (rolled_back,) = cell.recorded(EntryKind.ROLLED_BACK)
+    assert read_offset(rolled_back.details["value"]) == STORED
+    assert read_offset(rolled_back.details["requested"]) != STORED
+    assert rolled_back.change == verify.change != ""
+
+
+def test_corrections_of_one_nozzle_that_grow_are_refused(cell):
+    cell.mount(dx_mm=0.3)
+    cell.change()
+    kept = cell.simulator.machine.tools.get(1)
+    assert kept.x_mm == pytest.approx(STORED.x_mm + 0.3, abs=0.1)
+    cell.mount(dx_mm=0.9)
+    with pytest.raises(CalibrationError) as refused:
+        cell.change()
+    assert refused.value.code == "diverging"
+    cell.check_the_tool_is(kept, writes=1)
+    (entry,) = cell.recorded(EntryKind.REFUSED)
+    assert entry.details["code"] == "diverging"

@@ -1,0 +1,138 @@
+"""A journal that cannot be kept: the controller is not touched, and what to do is said.
+
+The real command line against a served simulator (F61, F62, F63).
+"""
+
+import os
+import shutil
+import sqlite3
+import tempfile
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from robolink_cli._exit import USAGE
+
+from robolink.errors import JournalError
+from robolink.journal import EntryKind, NewEntry, _engines, open_journal
+from tests.faults._nozzle_cell import OLD_TIP, NozzleCell, served_cell
+from tests.faults._requests import changes
+
+NOBODY = 65534
+
+
+@contextmanager
+def full_disk(path, monkeypatch):
+    """Let the file have no more pages than it has, as a full disk would."""
+    prepare = _engines._prepare
+
+    def prepared(connection):
+        prepare(connection)
+        connection.execute("PRAGMA max_page_count = 1")  # SQLite takes what it has got already
+
+    open_journal(str(path)).close()
+    monkeypatch.setattr(_engines, "_prepare", prepared)
+    log = open_journal(str(path)).log("somebody else")
+    with pytest.raises(JournalError, match="disk is full"):
+        for _ in range(1000):
+            log.append(NewEntry(EntryKind.RAW))
+    yield
+
+
+@contextmanager
+def read_only(path, monkeypatch):
+    """Give the file to another user, who alone may write it."""
+    path.chmod(0o444)
+    path.parent.chmod(0o555)
+    root = os.geteuid() == 0
+    if root:
+        os.seteuid(NOBODY)  # rights do not count for root
+    try:
+        yield
+    finally:
+        if root:
+            os.seteuid(0)
+        path.parent.chmod(0o755)
+
+
+@contextmanager
+def corrupt(path, monkeypatch):
+    """Overwrite most of the first two pages."""
+    content = bytearray(path.read_bytes())
+    content[100:8192] = b"\xff" * 8092
+    path.write_bytes(content)
+    yield
+
+
+@contextmanager
+def newer(path, monkeypatch):
+    """Let a newer robolink have been here."""
+    with sqlite3.connect(path) as connection:
+        connection.execute("UPDATE schema_version SET version = version + 1")
+    connection.close()
+    yield
+
+
+@contextmanager
+def locked(path, monkeypatch):
+    """Let another program write for a long time."""
+    monkeypatch.setattr(_engines, "BUSY_S", 0.1)
+    other = sqlite3.connect(path, isolation_level=None)
+    other.execute("BEGIN IMMEDIATE")
+    try:
+        yield
+    finally:
+        other.close()
+
+
+BROKEN = {
+    full_disk: ("the disk is full", "Free space there, then repeat the command."),
+    read_only: ("this user may not write", "Make the file and its folder writable."),
+    corrupt: ("it is damaged", "Save what can be read with 'robolink journal export --read-only'"),
+    newer: ("this robolink knows forms up to", "Install the newer robolink that made it"),
+    locked: ("another program keeps it locked", "Wait until it has finished, or end it"),
+}
+
+
+@pytest.fixture
+def folder():
+    """A folder into which every user may look."""
+    folder = Path(tempfile.mkdtemp(prefix="robolink-transaction-"))
+    folder.chmod(0o755)
+    yield folder
+    shutil.rmtree(folder)
+
+
+@pytest.fixture
+def cell(folder, monkeypatch):
+    """A cell that was written to before, with a journal in a folder of its own."""
+    with served_cell(folder / "cell", monkeypatch) as cell:
+        (folder / "journal").mkdir()
+        monkeypatch.setenv("ROBOLINK_JOURNAL", str(folder / "journal" / "journal.db"))
+        first = cell.run("tool", "set", "2", "--x", "1", "--yes")
+        assert first.code == 0, first.err
+        open_journal().close()
+        yield cell
+
+
+COMMANDS = {
+    "tool set": lambda cell: ["tool", "set", "1", "--x", "12.5", "--yes"],
+    "calibrate": lambda cell: cell.calibration,
+}
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("broken", BROKEN, ids=lambda broken: broken.__name__)
+def test_without_a_journal_nothing_is_changed(cell: NozzleCell, monkeypatch, broken, command):
+    cause, remedy = BROKEN[broken]
+    path = Path(os.environ["ROBOLINK_JOURNAL"])
+    asked = len(cell.requests)
+    with broken(path, monkeypatch):
+        refused = cell.run(*COMMANDS[command](cell))
+    assert refused.code == USAGE
+    assert cause in refused.err
+    assert remedy in refused.err
+    assert str(path) in refused.err
+    assert changes(cell.requests[asked:]) == []
+    assert cell.tool_1 == OLD_TIP
+    assert cell.selected_tool == 1

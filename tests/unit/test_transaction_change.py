@@ -1,0 +1,241 @@
+"""A tool change is done as a whole, or never was; what became of it is on record."""
+
+import pytest
+from robolink_simulators.faults import Fault, FaultAction
+
+from robolink.errors import (
+    ControllerFaultError,
+    JournalError,
+    NotAllowedError,
+    OutcomeUnknownError,
+    ReadBackError,
+    ToolChangedError,
+    ToolError,
+    VerifyError,
+)
+from robolink.model import ANY, EntryKind, MarkerKind, Role, ToolOffset, read_offset
+from robolink.transaction import ToolChange, Wanted, change_tools, recover
+from tests.unit._transaction_cell import NEW, OLD, OTHER, UNDEFINED, tool_cell, wanted
+
+ONE_WRITE = ["intent", "write", "read back", "done"]
+
+
+@pytest.fixture
+def cell():
+    with tool_cell() as cell:
+        yield cell
+
+
+@pytest.fixture
+def controller(cell):
+    with cell.connected() as controller:
+        yield controller
+        assert controller.outcomes.change == ""
+
+
+def test_one_tool_is_one_intent_one_write_and_one_end(cell, controller):
+    (receipt,) = change_tools(controller, wanted(1))
+    assert (receipt.before, receipt.read_back, receipt.skipped) == (OLD[1], NEW[1], False)
+    assert cell.tools == {1: NEW[1], 2: OLD[2]}
+    assert cell.story() == ONE_WRITE
+    changes = {entry.change for entry in cell.entries()}
+    assert len(changes) == 1
+    assert changes != {""}
+    assert cell.journal.open_markers() == ()
+
+
+def test_several_tools_are_done_when_all_are(cell, controller):
+    change_tools(controller, wanted(1, 2))
+    assert cell.tools == NEW
+    each = ["intent", "write", "read back"]
+    assert cell.story() == ["intent", *each, *each, "done", "done"]
+    assert cell.journal.open_markers() == ()
+
+
+def test_a_value_that_is_there_already_is_not_written(cell, controller):
+    receipts = change_tools(controller, [Wanted(1, OLD[1], OTHER), Wanted(2, OLD[2], OLD[2])])
+    assert all(receipt.skipped for receipt in receipts)
+    assert cell.writes == 0
+    assert cell.story() == []
+
+
+def test_an_undefined_tool_is_defined_and_a_defined_one_cleared(cell, controller):
+    change_tools(controller, [Wanted(UNDEFINED, OTHER, None), Wanted(2, None, OLD[2])])
+    assert controller.tools.read(UNDEFINED) == OTHER
+    assert cell.tools[2] is None
+
+
+@pytest.mark.parametrize("place", [1, 2])
+def test_nothing_is_written_when_a_tool_holds_something_else(cell, controller, place):
+    cell.put(place, OTHER)
+    with pytest.raises(ToolChangedError, match=r"holds X 1\.000 .* not the expected") as refused:
+        change_tools(controller, wanted(1, 2))
+    assert "Read it again" in refused.value.remedy
+    assert cell.writes == 0
+    assert cell.story() == []
+
+
+def test_a_value_that_changes_between_the_comparison_and_the_write_is_not_overwritten(
+    cell, controller
+):
+    cell.after_answer_to("Print TLSet(2)", 1, OTHER)
+    with pytest.raises(ToolChangedError):
+        change_tools(controller, wanted(1, 2))
+    assert cell.writes == 0
+    assert cell.tools == {1: OTHER, 2: OLD[2]}
+    assert cell.journal.open_markers() == ()
+
+
+def test_what_is_not_kept_is_put_back(cell, controller):
+    told: list[str] = []
+    with ToolChange(controller, wanted(1, 2), verify=True, tell=told.append) as change:
+        change.write()
+        assert cell.tools == NEW
+    assert cell.tools == OLD
+    assert cell.writes == 4
+    assert told == [f"The old value of tool {tool} was written back." for tool in (2, 1)]
+    assert cell.story(1)[-1] == cell.story(2)[-1] == "rolled back"
+    assert "done" not in cell.story()
+    assert cell.journal.open_markers() == ()
+
+
+def test_what_is_kept_stays_whatever_comes_then(cell, controller):
+    with pytest.raises(VerifyError):
+        with ToolChange(controller, wanted(1), verify=True) as change:
+            change.write()
+            change.keep("looked at")
+            raise VerifyError("too late")
+    assert cell.tools[1] == NEW[1]
+    (done,) = cell.entries(EntryKind.DONE)
+    assert done.verdict == "looked at"
+    assert read_offset(done.details["value"]) == NEW[1]
+
+
+def test_an_error_says_that_the_old_value_is_back(cell, controller):
+    with pytest.raises(VerifyError) as failed:
+        with ToolChange(controller, wanted(1), verify=True) as change:
+            change.write()
+            raise VerifyError("It drifts.", remedy="Measure again.")
+    assert failed.value.remedy == "Measure again. The old value of tool 1 was written back."
+    assert cell.tools == OLD
+
+
+def test_a_second_tool_that_is_refused_takes_the_first_one_back(cell, controller):
+    tilted = ToolOffset(1, 2, 3, v_deg=5)
+    with pytest.raises(ToolError, match="four axes"):
+        change_tools(controller, [*wanted(1), Wanted(2, tilted, OLD[2])])
+    assert cell.tools == OLD
+    assert cell.writes == 2
+    assert cell.journal.open_markers() == ()
+
+
+def test_a_write_that_did_not_take_takes_the_others_back(cell, controller):
+    cell.simulator.faults.add(Fault(FaultAction.IGNORE_WRITE, match="TLSet 2"))
+    with pytest.raises(ReadBackError) as failed:
+        change_tools(controller, wanted(1, 2))
+    assert "Tool 2 holds its old value. The old value of tool 1 was" in failed.value.remedy
+    assert cell.tools == OLD
+    assert cell.writes == 2
+    assert cell.journal.open_markers() == ()
+
+
+def test_a_value_that_was_stored_as_another_is_put_back_once(cell, controller):
+    cell.after_answer_to("TLSet 1", 1, OTHER)
+    with pytest.raises(ReadBackError, match=r"reads back as X 1\.000"):
+        change_tools(controller, wanted(1))
+    assert cell.tools == OLD
+    assert cell.writes == 2
+    assert cell.story()[:4] == ["intent", "write", "read back", "conflict"]
+    assert cell.story()[-1] == "rolled back"
+
+
+def test_what_somebody_else_wrote_is_left_alone_and_stays_open(cell, controller):
+    with pytest.raises(VerifyError) as failed:
+        with ToolChange(controller, wanted(1, 2), verify=True) as change:
+            change.write()
+            cell.put(1, OTHER)
+            raise VerifyError("It drifts.")
+    assert "Somebody else wrote it, so it was left alone." in failed.value.remedy
+    assert cell.tools == {1: OTHER, 2: OLD[2]}
+    assert cell.story(1)[-1] == "conflict"
+    ((_, marker),) = cell.journal.open_markers()
+    assert marker.kind is MarkerKind.CHANGE
+    with pytest.raises(OutcomeUnknownError, match="not settled"):
+        change_tools(controller, [Wanted(1, NEW[1], OTHER)])
+
+
+def test_a_controller_in_error_keeps_the_change_open(cell, controller):
+    fault = Fault(FaultAction.DEVICE_FAULT, match="TLSet 2", code=4000)
+    cell.simulator.faults.add(fault)
+    with pytest.raises(ControllerFaultError) as failed:
+        change_tools(controller, wanted(1, 2))
+    assert failed.value.remedy.count("could NOT be written back") == 2
+    assert cell.tools == {1: NEW[1], 2: OLD[2]}
+    controller.reset_fault()
+    assert recover(controller).left == ()
+    assert cell.tools == OLD
+
+
+def test_a_link_that_is_gone_leaves_the_change_to_recover(cell):
+    cell.simulator.faults.add(Fault(FaultAction.DISCONNECT, match="TLSet 2"))
+    told: list[str] = []
+    with cell.connected() as controller:
+        with pytest.raises(OutcomeUnknownError) as lost:
+            change_tools(controller, wanted(1, 2), tell=told.append)
+    sentence = "Tool 1, 2 may hold the new value, which nobody verified; 'robolink recover' puts"
+    assert sentence in lost.value.remedy
+    assert sentence in told[0]
+    kinds = {marker.kind for _, marker in cell.journal.open_markers()}
+    assert kinds == {MarkerKind.SET, MarkerKind.CHANGE}
+
+
+def test_a_change_that_another_recovered_meanwhile_is_neither_kept_nor_taken_back(cell):
+    with cell.connected() as controller:
+        with pytest.raises(OutcomeUnknownError, match="Another settled meanwhile"):
+            with ToolChange(controller, wanted(1), verify=True) as change:
+                change.write()
+                # He is silent for so long that another may do his work.
+                cell.clock.advance(11)
+                cell.simulator._slot.free()
+                with cell.connected(cell.log("Bob")) as other:
+                    assert recover(other, keep=True).left == ()
+                    change_tools(other, [Wanted(1, OTHER, NEW[1])])
+                cell.simulator._slot.admit(cell.simulator._links[0], cell.simulator.now_ns)
+                change.keep("verified")
+    assert cell.tools[1] == OTHER
+    assert "verified" not in {entry.verdict for entry in cell.entries(EntryKind.DONE)}
+
+
+def test_an_operator_may_not_write_blindly(cell):
+    with cell.connected(cell.log("Ann", role=Role.OPERATOR)) as controller:
+        with pytest.raises(NotAllowedError, match="Ann may not write tool 2 blindly"):
+            change_tools(controller, [*wanted(1), Wanted(2, NEW[2], ANY)])
+    assert cell.tools == OLD
+    assert cell.journal.open_markers() == ()
+
+
+def test_an_engineer_who_writes_blindly_is_on_record(cell):
+    cell.put(1, OTHER)
+    with cell.connected(cell.log("Bob", role=Role.ENGINEER)) as controller:
+        (receipt,) = change_tools(controller, [Wanted(1, NEW[1], ANY)])
+    assert receipt.unconditional
+    decision, intent, *_ = cell.entries()
+    assert decision.kind is EntryKind.DECISION
+    assert decision.signature.operator == intent.signature.operator == "Bob"
+    assert intent.details["unconditional"] is True
+    assert read_offset(intent.details["before"]) == OTHER
+
+
+def test_an_end_that_cannot_be_recorded_leaves_the_change_open(cell, controller, monkeypatch):
+    def full(*_given):
+        raise JournalError("The disk is full.")
+
+    with ToolChange(controller, wanted(1), verify=True) as change:
+        change.write()
+        with monkeypatch.context() as broken:
+            broken.setattr(controller.outcomes, "clear", full)
+            with pytest.raises(JournalError):
+                change.keep("verified")
+    # Not kept, so taken back.
+    assert cell.tools == OLD
+    assert cell.journal.open_markers() == ()

@@ -21,7 +21,8 @@ from robolink.nozzle_change import (
     ToolReport,
 )
 from robolink.transaction import earlier_corrections
-from robolink_cli._calibrating import CalibrationListener, doubts, report_payload
+from robolink_cli._calibrating import CalibrationListener
+from robolink_cli._calibration_views import doubts, report_payload
 from robolink_cli._consent import agree, on_terminal
 from robolink_cli._context import CliContext, open_controller
 from robolink_cli._impacting import ImpactRequest, impact_payload, show_impact

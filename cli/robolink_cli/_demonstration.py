@@ -20,7 +20,7 @@ from robolink.nozzle_change import (
     ToolPlan,
     ToolReport,
 )
-from robolink_cli._calibrating import report_payload, show_proposal, show_report
+from robolink_cli._calibration_views import report_payload, show_proposal, show_report
 from robolink_cli._operator import AssistedOperator
 from robolink_cli._render import emit_json, json_is_on, say
 from robolink_cli._views import offset_payload

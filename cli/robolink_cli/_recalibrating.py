@@ -7,7 +7,8 @@ from robolink.messages import tr
 from robolink.model import Controller
 from robolink.nozzle_change import ChangeReport
 from robolink.recipe import Answers, LoadedRecipe, RecipeRun, require_answers
-from robolink_cli._calibrating import operator_at, planned_steps, report_payload, show_report
+from robolink_cli._calibrating import operator_at, planned_steps
+from robolink_cli._calibration_views import report_payload, show_report
 from robolink_cli._consent import agree_to_motion, asked, motion_question, on_terminal
 from robolink_cli._context import CliContext, open_controller
 from robolink_cli._kinds import io_of
@@ -195,7 +196,7 @@ def _nothing(_payload: dict[str, object]) -> None:
 
 
 def _shown_plan(payload: dict[str, object]) -> None:
-    from robolink_cli._calibrating import show_steps
+    from robolink_cli._calibration_views import show_steps
 
     say(tr("Dry run; nothing is sent. The recipe {recipe!r}:", recipe=payload["recipe"]))
     prompts, outputs = payload["prompts"], payload["outputs"]

@@ -89,7 +89,7 @@ class Progress(Listener):
 
     def proposed(self, proposals: Sequence[Proposal]) -> None:
         """Show what was measured, next to what is stored."""
-        from robolink_cli._calibrating import show_proposal
+        from robolink_cli._calibration_views import show_proposal
 
         for proposal in proposals:
             show_proposal(proposal)

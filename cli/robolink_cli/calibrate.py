@@ -177,7 +177,8 @@ def _measure(
     yes: bool,
 ) -> None:
     """Let the robot and a person take the poses, then propose, write and verify."""
-    from robolink_cli._calibrating import LiveCalibration, show_plan
+    from robolink_cli._calibrating import LiveCalibration
+    from robolink_cli._calibration_views import show_plan
 
     with (
         open_controller(context, changes=not dry_run) as controller,

@@ -89,14 +89,28 @@ class MarkerDesk:
         """Let others see that this process is alive."""
         self.outcomes.beat()
 
-    def begin(self, kind: MarkerKind, request: str, details: Mapping[str, object]) -> Marker:
-        """Store a new marker durably.
+    def begin(
+        self,
+        kind: MarkerKind,
+        request: str,
+        details: Mapping[str, object],
+        *,
+        operation: str = "",
+    ) -> Marker:
+        """Store a marker durably: a new one, or one of before whose work is taken up again.
+
+        Args:
+            kind: What it stands for.
+            request: What is begun, as a person may read it.
+            details: Plain JSON values needed to settle it.
+            operation: Id of the marker of before; empty for a new one.
 
         Raises:
             ConfigError: That is impossible.
             BusyError: Another process has the controller.
         """
-        marker = Marker(new_operation(), kind, request, wall_label(), dict(details))
+        name = operation or new_operation()
+        marker = Marker(name, kind, request, wall_label(), dict(details))
         self.outcomes.begin(marker)
         if kind in _PROCEDURES:
             self._procedures[kind] = marker

@@ -55,6 +55,8 @@ def examine_write(tools: ToolTable, marker: Marker) -> Finding:
 
 def _entry(marker: Marker, tool: int, verdict: Verdict, now: ToolOffset | None) -> NewEntry:
     details = {**marker.details, "value": plain_offset(now), "found_later": True}
-    return NewEntry(
-        _KINDS[verdict], operation=marker.operation, tool=tool, verdict=verdict, details=details
-    )
+    kind = _KINDS[verdict]
+    if kind is EntryKind.DONE and marker.details.get("part"):
+        # Whether the change that it is part of is done, is settled after it.
+        kind = EntryKind.READ_BACK
+    return NewEntry(kind, operation=marker.operation, tool=tool, verdict=verdict, details=details)

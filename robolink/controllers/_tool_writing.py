@@ -157,6 +157,8 @@ class ToolWriter:
             details["unconditional"] = True
         if self._desk.outcomes.change:
             details["change"] = self._desk.outcomes.change
+        if self._desk.changing:
+            details["part"] = True
 
         def entries(marker: Marker, found: ToolOffset | None) -> Iterator[NewEntry]:
             now = {**details, "value": plain_offset(found)}

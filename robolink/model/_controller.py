@@ -158,8 +158,21 @@ class Controller(Protocol):
             OutcomeUnknownError: Names it.
         """
 
-    def begin(self, kind: MarkerKind, request: str, details: Mapping[str, object]) -> Marker:
+    def begin(
+        self,
+        kind: MarkerKind,
+        request: str,
+        details: Mapping[str, object],
+        *,
+        operation: str = "",
+    ) -> Marker:
         """Store the durable marker of a procedure of several steps.
+
+        Args:
+            kind: What it stands for.
+            request: What is begun, as a person may read it.
+            details: Plain JSON values needed to settle it.
+            operation: Id of a marker of before whose work is taken up; empty for a new one.
 
         Raises:
             ConfigError: That is impossible; nothing may be sent.

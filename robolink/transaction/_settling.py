@@ -94,6 +94,9 @@ class Settler:
         )
 
     def _put_back(self, marker: Marker) -> None:
+        self._controller.begin(
+            marker.kind, marker.request, marker.details, operation=marker.operation
+        )
         done = put_back(self._controller.tools, _steps(marker))
         failures = [result for result in done if not result.restored]
         entries = [result.entry for result in done]

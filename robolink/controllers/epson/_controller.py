@@ -6,14 +6,12 @@ from types import TracebackType
 from typing import Self
 
 from robolink.controllers._guarded import MarkerDesk, ProcedureLock
+from robolink.controllers.epson._acts import EpsonActs
 from robolink.controllers.epson._alarms import EpsonAlarms
-from robolink.controllers.epson._answers import require_ready
-from robolink.controllers.epson._as_sent import as_sent
 from robolink.controllers.epson._condition import ConditionReader
 from robolink.controllers.epson._facts import FactReader
 from robolink.controllers.epson._io import EpsonIo
 from robolink.controllers.epson._motion import EpsonGroup
-from robolink.controllers.epson._movement import request_abort
 from robolink.controllers.epson._points import EpsonPoints
 from robolink.controllers.epson._preserve import Preserver
 from robolink.controllers.epson._published import PublishedReader, PublishedTools
@@ -26,13 +24,8 @@ from robolink.controllers.epson._value_doubts import ValueDoubts
 from robolink.controllers.epson._variables import EpsonVariables
 from robolink.controllers.epson._window import CommandWindow
 from robolink.errors import (
-    ControllerFaultError,
-    NotReadyError,
-    NotReadyReason,
-    ReadBackError,
     RobolinkError,
 )
-from robolink.messages import tr
 from robolink.model import (
     Act,
     Capabilities,
@@ -40,12 +33,9 @@ from robolink.model import (
     ControllerStatus,
     Marker,
     MarkerKind,
-    MotionProfile,
     NewEntry,
     OutcomeLog,
 )
-from robolink.protocols import spel
-from robolink.protocols.epson_text import Request
 from robolink.timing import Clock
 
 
@@ -79,6 +69,7 @@ class EpsonController:
         self._preserver = Preserver(
             session, self._window, self._desk, self._lock, tools=self._tools, group=self._group
         )
+        self._acts = EpsonActs(session, self._window, self._lock, self._group)
         setter = ValueSetter(session, self._window, self._desk, self._lock)
         self.io = EpsonIo(session, self._window, setter)
         self.variables = EpsonVariables(session, setter)
@@ -169,13 +160,7 @@ class EpsonController:
         Raises:
             RobolinkError: It was not confirmed; the message says to use the emergency stop.
         """
-        try:
-            request_abort(self._session)
-        except RobolinkError as error:
-            error.remedy = " ".join(
-                (tr("The stop is not confirmed: press the emergency stop."), error.remedy)
-            )
-            raise
+        self._acts.stop()
 
     def reset_fault(self) -> None:
         """Send Reset because a person asked for it; it may switch outputs off.
@@ -185,47 +170,7 @@ class EpsonController:
                 running, no remote control).
             ControllerFaultError: The error or the emergency stop is still there afterwards.
         """
-        with self._lock.held("Reset"):
-            self._require_resettable(self.status())
-            self._session.exchange("Reset")
-            status = self.status()
-            if status.emergency_stop:
-                raise ControllerFaultError(
-                    tr("The emergency stop is still in force after the reset."),
-                    code=status.code,
-                    remedy=tr("Release the button, then reset again."),
-                    controller=self.identity,
-                    request="Reset",
-                )
-            if status.fault or status.serious_fault:
-                raise ControllerFaultError(
-                    tr("The reset did not clear error {code:04d}.", code=status.code),
-                    code=status.code,
-                    remedy=tr("Remove the cause; a serious error needs the power switched off."),
-                    controller=self.identity,
-                    request="Reset",
-                )
-            if status.remote and status.ready:
-                self._group.settings.slow_down(MotionProfile())
-
-    def robot_number(self) -> int:
-        """Read which robot motors and statements act on."""
-        (number,) = self._session.exchange("GetCurRobot").fields
-        return spel.parse_integer(number)
-
-    def condition(self) -> dict[str, object]:
-        """Read the error's text, the alarms, the tool in force, motors and power."""
-        reader = ConditionReader(
-            self._window, alarms=self.alarms, tools=self._tools, group=self._group
-        )
-        return reader.read(published=self.published_tools)
-
-    def preview(self, act: Act) -> tuple[str, ...]:
-        """Return the requests of an act, as they stand on the wire."""
-        if act is Act.STOP or act is Act.RESET:
-            return (as_sent(Request("Stop" if act is Act.STOP else "Reset")),)
-        name = "SetMotorsOn" if act is Act.MOTORS_ON else "SetMotorsOff"
-        return (as_sent(Request(name, (str(self.robot_number()),))),)
+        self._acts.reset()
 
     def motors(self, on: bool) -> None:
         """Switch the motors of the robot in force, and prove it.
@@ -234,19 +179,15 @@ class EpsonController:
             NotReadyError: The state forbids it.
             ReadBackError: The motors are not as asked.
         """
-        name = "SetMotorsOn" if on else "SetMotorsOff"
-        with self._lock.held(name):
-            self._window.require_ready(name)
-            self._session.exchange(name, str(self.robot_number()))
-            if on:
-                self._group.settings.slow_down(MotionProfile())
-            if self._group.motors_on() is not on:
-                raise ReadBackError(
-                    tr("The motors are not {wanted}.", wanted=tr("on") if on else tr("off")),
-                    remedy=tr("Look at the controller; nothing was repeated."),
-                    controller=self.identity,
-                    request=name,
-                )
+        self._acts.motors(on)
+
+    def robot_number(self) -> int:
+        """Read which robot motors and statements act on."""
+        return self._acts.robot_number()
+
+    def preview(self, act: Act) -> tuple[str, ...]:
+        """Return the requests of an act, as they stand on the wire."""
+        return self._acts.preview(act)
 
     def execute_raw(self, statement: str) -> str:
         """Run a SPEL+ statement as it was typed, and put it on record.
@@ -270,6 +211,13 @@ class EpsonController:
         """
         return self._raw.execute(statement)
 
+    def condition(self) -> dict[str, object]:
+        """Read the error's text, the alarms, the tool in force, motors and power."""
+        reader = ConditionReader(
+            self._window, alarms=self.alarms, tools=self._tools, group=self._group
+        )
+        return reader.read(published=self.published_tools)
+
     def require_settled(self, request: str) -> None:
         """Refuse ``request`` while something earlier is unsettled.
 
@@ -278,9 +226,16 @@ class EpsonController:
         """
         self._desk.require_settled(request)
 
-    def begin(self, kind: MarkerKind, request: str, details: Mapping[str, object]) -> Marker:
+    def begin(
+        self,
+        kind: MarkerKind,
+        request: str,
+        details: Mapping[str, object],
+        *,
+        operation: str = "",
+    ) -> Marker:
         """Store the durable marker of a procedure; see the model."""
-        return self._desk.begin(kind, request, details)
+        return self._desk.begin(kind, request, details, operation=operation)
 
     def finish(self, marker: Marker, *entries: NewEntry) -> None:
         """Forget the marker of a procedure, and journal how it ended."""
@@ -323,17 +278,3 @@ class EpsonController:
         trace: TracebackType | None,
     ) -> None:
         self.close()
-
-    def _require_resettable(self, status: ControllerStatus) -> None:
-        # The flag of an emergency stop stays on after its release until the reset
-        # (epson.md 1.7), so it cannot hold the reset back.
-        if status.serious_fault or status.running or not status.remote:
-            require_ready(status, controller=self.identity, request="Reset")
-        if status.guard_open:
-            raise NotReadyError(
-                tr("The safety guard is open."),
-                reason=NotReadyReason.GUARD_OPEN,
-                remedy=tr("Close it before the reset."),
-                controller=self.identity,
-                request="Reset",
-            )

@@ -225,9 +225,16 @@ class SoftMotionController:
         """
         self._mailbox.desk.require_settled(request)
 
-    def begin(self, kind: MarkerKind, request: str, details: Mapping[str, object]) -> Marker:
+    def begin(
+        self,
+        kind: MarkerKind,
+        request: str,
+        details: Mapping[str, object],
+        *,
+        operation: str = "",
+    ) -> Marker:
         """Store the durable marker of a procedure; see the model."""
-        return self._mailbox.desk.begin(kind, request, details)
+        return self._mailbox.desk.begin(kind, request, details, operation=operation)
 
     def finish(self, marker: Marker, *entries: NewEntry) -> None:
         """Forget the marker of a procedure, and journal how it ended."""

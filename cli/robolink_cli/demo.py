@@ -1,4 +1,4 @@
-"""demo: a whole nozzle change on a simulated robot, over a real socket."""
+"""demo: a whole nozzle change on each kind of simulated controller."""
 
 import click
 
@@ -16,9 +16,10 @@ from robolink_cli._context import json_option
 )
 @json_option
 def demo(seed: int, speed: float) -> None:
-    """Change the nozzle of a simulated EPSON SCARA and recalibrate its tool.
+    """Change the nozzle of a simulated EPSON SCARA, then of a simulated SoftMotion PLC.
 
-    Everything crosses a TCP connection on this machine's loopback. No robot is touched.
+    The SCARA is reached over a TCP connection on this machine's loopback, the PLC through its
+    mailbox inside this process. No machine is touched.
     """
     from robolink_cli._demonstration import demonstrate
 

@@ -191,10 +191,12 @@ def test_a_calibration_finds_the_true_offset_and_names_what_it_did_not_measure(c
 def test_the_demo_gives_truth_and_error_as_one_document(capsys):
     assert main.run(["demo", "--json", "--speed", "100"]) == 0
     document = json.loads(capsys.readouterr().out)
-    assert document["schema"] == "robolink/demo/1"
-    assert {"recovered", "truth", "error_mm", "drift_mm", "exchanges"} <= set(document)
-    assert document["error_mm"] < 0.05
-    assert document["exchanges"] > 100
+    assert document["schema"] == "robolink/demo/2"
+    assert [one["kind"] for one in document["controllers"]] == ["epson", "softmotion"]
+    for one in document["controllers"]:
+        assert {"recovered", "truth", "error_mm", "drift_mm", "exchanges"} <= set(one)
+        assert one["error_mm"] < 0.05
+        assert one["exchanges"] > 100
 
 
 def test_the_demo_shows_before_after_drift_and_what_was_sent_on_the_wire(capsys):

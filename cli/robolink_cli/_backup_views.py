@@ -37,13 +37,14 @@ def show_backup(backup: Backup, file: Path) -> None:
     )
     say(
         tr(
-            "Saved in {file}: {defined} of {count} tools are defined, tool {selected} is in force.",
+            "Saved in {file}: {defined} of {count} tools are defined.",
             file=file,
             defined=sum(offset is not None for offset in tools.values()),
             count=len(tools),
-            selected=backup.state.selected,
         )
     )
+    if backup.state.selected is not None:
+        say(tr("Tool {selected} is in force.", selected=backup.state.selected))
 
 
 def comparison_payload(comparison: Comparison, tolerance: Tolerance) -> dict[str, object]:

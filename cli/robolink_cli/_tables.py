@@ -54,7 +54,7 @@ def show_pose(payload: Mapping[str, object]) -> None:
         say(tr("  joints: {joints}", joints="  ".join(number(j) for j in joints)))
 
 
-def show_tools(tools: Mapping[str, Mapping[str, object] | None], selected: int) -> None:
+def show_tools(tools: Mapping[str, Mapping[str, object] | None], selected: int | None) -> None:
     """Print the defined tools; the one in force is marked."""
     rows = []
     for tool, offset in tools.items():

@@ -26,6 +26,8 @@ COMMANDS: Final = {
     "stop": ("robolink_cli.operate:stop", tr("Stop every motion.")),
     "reset": ("robolink_cli.operate:reset", tr("Clear an error of the controller.")),
     "motors": ("robolink_cli.operate:motors", tr("Switch the motors on or off.")),
+    "enable": ("robolink_cli.operate:enable", tr("Enable the axis group of a PLC.")),
+    "disable": ("robolink_cli.operate:disable", tr("Disable the axis group of a PLC.")),
     "recover": (
         "robolink_cli.operate:recover",
         tr("Settle what a crash left: finish or take back each tool change."),

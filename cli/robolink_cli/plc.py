@@ -5,6 +5,7 @@ from pathlib import Path
 import click
 
 from robolink.messages import tr
+from robolink_cli._check_map import check_map
 from robolink_cli._context import json_option
 from robolink_cli._render import emit_json, json_is_on, say
 
@@ -13,7 +14,10 @@ _LAST_BASE = 64884  # the response block and fifteen slots end at register 65535
 
 @click.group()
 def plc() -> None:
-    """The mailbox of a CODESYS SoftMotion PLC."""
+    """The mailbox of a CODESYS SoftMotion PLC, or the registers of any other."""
+
+
+plc.add_command(check_map)
 
 
 @plc.command("export")

@@ -1,30 +1,20 @@
 """sim: serve a simulated controller for anybody's client."""
 
-import json
-import signal
-import threading
-from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 import click
 
-from robolink.errors import ConfigError
-from robolink.messages import tr
 from robolink_cli._context import json_option
-from robolink_cli._render import json_is_on
-from robolink_cli._replaying import serve_recording
-
-if TYPE_CHECKING:
-    from robolink_simulators.epson import EpsonOptions, EpsonSimulator
-
-    from robolink.model import Secret
+from robolink_cli._sim_plc import sim_plc
 
 
 @click.group()
 @json_option
 def sim() -> None:
     """Serve a simulated controller on this machine."""
+
+
+sim.add_command(sim_plc)
 
 
 @sim.command()
@@ -99,21 +89,130 @@ def epson(
     A second port, assist, stands in for the person at the cell: it looks at the tip, knows
     the truth, and presses the emergency stop.
     """
-    from robolink_simulators.epson import EpsonSimulator
+    from robolink_cli._serving import Termination, host_and_port
 
-    listen = _host_and_port(address)
+    listen = host_and_port(address, "--tcp")
     if replay is not None:
-        with _Termination() as stopped:
+        from robolink_cli._replaying import serve_recording
+
+        with Termination() as stopped:
             serve_recording(replay, listen, allow_remote=allow_remote, wait=stopped.wait)
         return
+    from robolink_simulators.epson import EpsonSimulator
+
+    from robolink_cli._serving_epson import habits, password_in, serve_epson
+
     simulator = EpsonSimulator(
         robot,
         seed=seed,
-        password=_password(password_env),
-        options=_habits(options, profile),
+        password=password_in(password_env),
+        options=habits(options, profile),
         state_path=state,
     )
-    _serve(simulator, listen, speed=speed, allow_remote=allow_remote)
+    serve_epson(simulator, listen, speed=speed, allow_remote=allow_remote)
+
+
+@sim.command()
+@click.option(
+    "--modbus-tcp",
+    metavar="HOST:PORT",
+    help="Serve Modbus TCP there; port 0 takes a free one. Without any bus: 127.0.0.1:5020.",
+)
+@click.option(
+    "--modbus-rtu",
+    type=click.Choice(["pty"]),
+    help="Serve Modbus RTU on a pseudo terminal, whose path is printed.",
+)
+@click.option(
+    "--can",
+    metavar="INTERFACE:CHANNEL",
+    help="Be a CANopen node, for example on udp_multicast:239.74.163.2:43113 or socketcan:vcan0.",
+)
+@click.option(
+    "--unit", type=click.IntRange(1, 247), default=1, show_default=True, help="On the serial line."
+)
+@click.option(
+    "--node", type=click.IntRange(1, 127), default=5, show_default=True, help="On the CAN bus."
+)
+@click.option(
+    "--kinematics",
+    default="Kin_Scara3_Z",
+    show_default=True,
+    metavar="NAME[+ORIENTATION]",
+    help="Kinematics of the axis group; a wrong name lists them all.",
+)
+@click.option(
+    "--param",
+    "parameters",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="A parameter of the kinematics or a drive, for example dArmLength1=250. May be repeated.",
+)
+@click.option(
+    "--seed",
+    type=click.IntRange(min=0),
+    default=1,
+    show_default=True,
+    help="Another cell, another tip.",
+)
+@click.option(
+    "--state",
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="File that keeps the tool slots over a restart, as retained memory does.",
+)
+@click.option(
+    "--speed",
+    type=click.FloatRange(min=0.01, max=1000),
+    default=1.0,
+    show_default=True,
+    metavar="FACTOR",
+    help="How many times faster than real the simulated time passes.",
+)
+@click.option(
+    "--option",
+    "options",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="A habit of the PLC; a wrong name lists them all. May be repeated.",
+)
+@click.option("--allow-remote", is_flag=True, help="Listen where other machines can reach it, too.")
+@json_option
+def softmotion(
+    *,
+    modbus_tcp: str | None,
+    modbus_rtu: str | None,
+    can: str | None,
+    unit: int,
+    node: int,
+    kinematics: str,
+    parameters: tuple[str, ...],
+    seed: int,
+    state: Path | None,
+    speed: float,
+    options: tuple[str, ...],
+    allow_remote: bool,
+) -> None:
+    """Serve a simulated SoftMotion PLC with a mailbox until Ctrl-C.
+
+    Several buses may be given; one PLC stands behind them. The assist port stands in for the
+    person at the machine.
+    """
+    from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
+    from robolink_simulators.softmotion.mailbox.option_text import options_from_text
+    from robolink_simulators.softmotion.mailbox.parameters import parameters_from_text
+
+    from robolink_cli._serving import named_values
+    from robolink_cli._serving_softmotion import Buses, serve_plc
+
+    simulator = SoftMotionSimulator(
+        kinematics,
+        seed=seed,
+        parameters=parameters_from_text(named_values(parameters, "--param dArmLength1=250")),
+        options=options_from_text(named_values(options, "--option profile=tools")),
+        state_path=state,
+    )
+    buses = Buses(modbus_tcp, modbus_rtu, can, unit=unit, node=node, allow_remote=allow_remote)
+    serve_plc(simulator, buses, speed=speed)
 
 
 @sim.command()
@@ -124,116 +223,10 @@ def epson(
 def assist(url: str, act: str, values: tuple[str, ...]) -> None:
     """Be the person at a simulated cell: press its buttons, teach its points, see its truth.
 
-    URL is the assist URL that 'robolink sim epson' prints. Acts are for example press_estop,
+    URL is the assist URL that 'robolink sim' prints. Acts are for example press_estop,
     release_estop, open_guard, teach, auto, teach_point number=901 u_deg=180, truth; an unknown
     one lists them all.
     """
     from robolink_cli._assisting import do_act
 
     do_act(url, act, values)
-
-
-def _serve(
-    simulator: "EpsonSimulator", address: tuple[str, int], *, speed: float, allow_remote: bool
-) -> None:
-    from robolink_simulators.assist import serve_assist
-    from robolink_simulators.clock import ScaledClock
-    from robolink_simulators.hosting.tcp import serve_tcp
-
-    clock = ScaledClock(speed)
-    with ExitStack() as stack:
-        stopped = stack.enter_context(_Termination())
-        tcp = stack.enter_context(
-            serve_tcp(simulator, *address, clock=clock, allow_remote=allow_remote)
-        )
-        assist = stack.enter_context(serve_assist(simulator, clock=clock))
-        _announce(tcp.url, assist.url, simulator.machine.model.name, simulator.seed)
-        stopped.wait()
-
-
-class _Termination:
-    """Makes SIGTERM an orderly end; Ctrl-C stays what it is."""
-
-    def __init__(self) -> None:
-        self._stopped = threading.Event()
-        self._before: Any = None
-
-    def wait(self) -> None:
-        """Block until SIGTERM."""
-        # In slices, because Windows delivers Ctrl-C only between waits.
-        while not self._stopped.wait(0.5):
-            pass
-
-    def __enter__(self) -> "_Termination":
-        self._before = signal.signal(signal.SIGTERM, lambda _number, _frame: self._stopped.set())
-        return self
-
-    def __exit__(self, *_details: object) -> None:
-        signal.signal(signal.SIGTERM, self._before)
-
-
-def _announce(url: str, assist_url: str, robot: str, seed: int) -> None:
-    if json_is_on():
-        document = {
-            "schema": "robolink/sim/1",
-            "url": url,
-            "assist": assist_url,
-            "robot": robot,
-            "seed": seed,
-            "simulated": True,
-        }
-        # One line; click flushes it, because whoever started us waits for it.
-        lines = [json.dumps(document)]
-    else:
-        lines = [
-            tr("SIMULATED EPSON {robot} (seed {seed}). No robot moves.", robot=robot, seed=seed),
-            tr("  controller  {url}", url=url),
-            tr("  assist      {url}", url=assist_url),
-            tr("Try: robolink -c {url} status", url=url),
-            tr("Ctrl-C ends it."),
-        ]
-    click.echo("\n".join(lines))
-
-
-def _host_and_port(address: str) -> tuple[str, int]:
-    host, colon, port = address.rpartition(":")
-    host = host.removeprefix("[").removesuffix("]")
-    if not (colon and host and port.isascii() and port.isdigit() and int(port) <= 0xFFFF):
-        raise ConfigError(
-            tr("{address!r} is no address to listen on.", address=address),
-            remedy=tr("Write for example --tcp 127.0.0.1:5000."),
-        )
-    return host, int(port)
-
-
-def _password(variable: str | None) -> "Secret | None":
-    if variable is None:
-        return None
-    import os
-
-    from robolink.model import Secret
-
-    value = os.environ.get(variable)
-    if not value:
-        raise ConfigError(
-            tr("The environment variable {variable} holds no password.", variable=variable),
-            remedy=tr("Set it first, or leave --password-env out."),
-        )
-    return Secret(value)
-
-
-def _habits(options: tuple[str, ...], profile: Path | None) -> "EpsonOptions":
-    from robolink_simulators.epson.option_text import options_from_text
-    from robolink_simulators.epson.profile import read_profile
-
-    pairs: dict[str, str] = {}
-    for option in options:
-        name, equals, value = option.partition("=")
-        if not equals or name in pairs:
-            raise ConfigError(
-                tr("The option {option!r} is not NAME=VALUE, or stands twice.", option=option),
-                remedy=tr("Write for example --option terminator=cr."),
-            )
-        pairs[name] = value
-    settled = {} if profile is None else read_profile(profile)
-    return options_from_text({**settled, **pairs})

@@ -93,8 +93,8 @@ class Comparison:
     """
 
     tools: tuple[ToolComparison, ...]
-    expected_selected: int
-    found_selected: int
+    expected_selected: int | None
+    found_selected: int | None
     selection_counts: bool = True
 
     @property

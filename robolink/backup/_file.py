@@ -91,9 +91,13 @@ def backup_from_text(text: str, *, source: str) -> Backup:
         facts=_facts(read, members["facts"]),
         state=ToolState(
             {int(tool): _offset(read, value, f"tools.{tool}") for tool, value in tools.items()},
-            read.whole(members["selected_tool"], "selected_tool", 0, TOOLS[-1]),
+            _selected(read, members["selected_tool"]),
         ),
     )
+
+
+def _selected(read: JsonReader, value: object) -> int | None:
+    return None if value is None else read.whole(value, "selected_tool", 0, TOOLS[-1])
 
 
 def _check_schema(read: JsonReader, document: object) -> None:

@@ -40,11 +40,12 @@ class ToolState:
 
     Attributes:
         tools: Every tool by number; an undefined one is ``None``.
-        selected: The tool in force, 0 for the flange.
+        selected: The tool in force, 0 for the flange; ``None`` where the controller does not
+            tell.
     """
 
     tools: Mapping[int, ToolOffset | None]
-    selected: int
+    selected: int | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +73,9 @@ def read_tools(controller: ToolHolder) -> ToolState:
     Raises:
         NotReadyError: The controller cannot be asked now, for example because a program runs.
     """
-    return ToolState(controller.tools.read_all(), controller.tools.selected())
+    # A machine builder's own registers may hold fewer tools; the others are not there.
+    tools = {**dict.fromkeys(TOOLS), **controller.tools.read_all()}
+    return ToolState(tools, controller.tools.selected())
 
 
 def take_backup(controller: ToolHolder) -> Backup:

@@ -1,7 +1,7 @@
 """From a URL to a controller."""
 
 from robolink import __version__
-from robolink.controllers.epson import EpsonController, open_epson
+from robolink.controllers.epson import open_epson
 from robolink.controllers.plc_map import PlcMapController, open_plc_map
 from robolink.controllers.softmotion import SoftMotionController, open_softmotion
 from robolink.errors import ConfigError, LoginUnansweredError

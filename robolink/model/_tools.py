@@ -172,8 +172,11 @@ class ToolTable(Protocol):
     def clear(self, tool: int, *, expected: Expected) -> ToolReceipt:
         """Remove a definition; same conditions and errors as :meth:`write`."""
 
-    def selected(self) -> int:
-        """Return the number of the tool in force, 0 for the flange."""
+    def selected(self) -> int | None:
+        """Return the number of the tool in force, 0 for the flange.
+
+        ``None`` where the controller does not tell.
+        """
 
     def select(self, tool: int) -> None:
         """Put a tool in force and read the selection back.

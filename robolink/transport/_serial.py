@@ -23,6 +23,18 @@ _SLICE_S: Final = 0.02
 _CHUNK_BYTES: Final = 4096
 
 
+def _settings_refused() -> tuple[type[Exception], ...]:
+    """Return what POSIX raises when a device takes no such settings, as a pty may."""
+    try:
+        import termios
+    except ImportError:
+        return ()
+    return (termios.error,)
+
+
+_REFUSALS: Final[tuple[type[Exception], ...]] = (OSError, *_settings_refused())
+
+
 @dataclass(frozen=True, slots=True)
 class SerialSettings:
     """How a serial line is set.
@@ -92,9 +104,10 @@ def open_serial(
             remedy=tr("Check baud, parity and stopbits in the URL."),
             controller=url.identity,
         ) from error
-    except OSError as error:
+    except _REFUSALS as error:
+        cause = getattr(error, "strerror", None) or error
         raise ConnectError(
-            tr("{device} cannot be opened: {cause}.", device=device, cause=error.strerror or error),
+            tr("{device} cannot be opened: {cause}.", device=device, cause=cause),
             remedy=tr(
                 "Check that it is plugged in, that you may use it and that no other program "
                 "does; 'robolink ports' lists the ports."

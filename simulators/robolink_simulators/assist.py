@@ -7,7 +7,7 @@ that a web page which posts to the port gets nothing done.
 
 import json
 import socket
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from types import TracebackType
 from typing import Any, Final, Self
@@ -15,20 +15,23 @@ from urllib.parse import urlsplit
 
 from robolink.errors import ConfigError, ConnectError, RobolinkError, TransportBrokenError
 from robolink.messages import tr
-from robolink_simulators.assist_acts import perform
+from robolink_simulators.assist_acts import Assisted, perform
 from robolink_simulators.clock import ScaledClock
-from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.refusals import Refusal
+from robolink_simulators.hosting import in_process, plc_in_process
 from robolink_simulators.hosting._tcp_host import TcpHost
-from robolink_simulators.hosting.in_process import simulator_named
-from robolink_simulators.world import Look
+from robolink_simulators.softmotion.smc_errors import Refused
+from robolink_simulators.workplace import Look
 
 _MAX_LINE: Final = 65536
 _SCHEME: Final = "assist+tcp"
-_IN_PROCESS: Final = "epson+sim://"
+_IN_PROCESS: Final[Mapping[str, Callable[[str], Assisted]]] = {
+    "epson+sim": in_process.simulator_named,
+    "softmotion+sim": plc_in_process.simulator_named,
+}
 
 
-def serve_assist(simulator: EpsonSimulator, *, port: int = 0, clock: ScaledClock) -> TcpHost:
+def serve_assist(simulator: Assisted, *, port: int = 0, clock: ScaledClock) -> TcpHost:
     """Serve the assist port of a simulator, on loopback only.
 
     Args:
@@ -51,7 +54,7 @@ def serve_assist(simulator: EpsonSimulator, *, port: int = 0, clock: ScaledClock
 class _AssistDevice:
     """Implements :class:`~robolink_simulators.wire.WireDevice`."""
 
-    def __init__(self, simulator: EpsonSimulator) -> None:
+    def __init__(self, simulator: Assisted) -> None:
         self._simulator = simulator
 
     def connect(self, now_ns: int) -> "_AssistLink":  # noqa: ARG002 - time plays no part
@@ -67,7 +70,7 @@ class _AssistDevice:
 class _AssistLink:
     """Implements :class:`~robolink_simulators.wire.DeviceLink`."""
 
-    def __init__(self, simulator: EpsonSimulator) -> None:
+    def __init__(self, simulator: Assisted) -> None:
         self._simulator = simulator
         self._held = b""
         self._out = b""
@@ -96,7 +99,7 @@ class _AssistLink:
             return b""
         try:
             answer = {"ok": True, **perform(self._simulator, request)}
-        except (RobolinkError, Refusal) as error:
+        except (RobolinkError, Refusal, Refused) as error:
             answer = {"ok": False, "error": str(error)}
         return json.dumps(answer).encode() + b"\n"
 
@@ -126,7 +129,7 @@ class AssistClient:
         except OSError as error:
             raise ConnectError(
                 tr("No simulator listens on {url}.", url=url),
-                remedy=tr("Start one with 'robolink sim epson'."),
+                remedy=tr("Start one with 'robolink sim epson' or 'robolink sim softmotion'."),
             ) from error
         self._lines = self._socket.makefile("rb")
 
@@ -188,7 +191,7 @@ class AssistClient:
 class InProcessEyes:
     """Looks at a simulator of this process, as :class:`AssistClient` does at a served one."""
 
-    def __init__(self, simulator: EpsonSimulator) -> None:
+    def __init__(self, simulator: Assisted) -> None:
         self._simulator = simulator
 
     def look(self, tool: int | None = None) -> Look:
@@ -202,15 +205,16 @@ def open_eyes(url: str) -> Iterator[AssistClient | InProcessEyes]:
     """Open the operator's eyes on a simulator.
 
     Args:
-        url: An assist URL, or ``epson+sim://NAME`` for a simulator of this process.
+        url: An assist URL, or that of a simulator of this process: ``epson+sim://NAME`` or
+            ``softmotion+sim://NAME``.
 
     Raises:
         ConfigError: It is neither, or no simulator has that name.
         ConnectError: Nobody listens there.
     """
-    if url.startswith(_IN_PROCESS):
-        name = urlsplit(url).hostname or ""
-        yield InProcessEyes(simulator_named(name))
+    parts = urlsplit(url)
+    if named := _IN_PROCESS.get(parts.scheme):
+        yield InProcessEyes(named(parts.hostname or ""))
     else:
         with AssistClient(url) as client:
             yield client

@@ -7,6 +7,7 @@ import random
 from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum, auto
+from typing import Generic, Protocol, TypeVar
 
 
 class FaultAction(Enum):
@@ -68,36 +69,52 @@ _SPLIT_S = 0.01
 """Between the halves of a split reply for which no other time is given."""
 
 
-class FaultPlan:
+class Planned(Protocol):
+    """A fault that waits for its request."""
+
+    @property
+    def on_exchange(self) -> int:
+        """Which of the requests that match, counted from 0."""
+
+    @property
+    def match(self) -> str:
+        """Text that a request must contain to be counted; empty counts all."""
+
+
+AnyFault = TypeVar("AnyFault", bound=Planned)
+
+
+class CountedFaults(Generic[AnyFault]):
     """Counts requests and hands out the faults that are due.
 
     Args:
         faults: What to plan; more may be added at any time.
-        seed: Decides what no fault says: which byte and bit is garbled.
+
+    Attributes:
+        fired: What has been handed out.
     """
 
-    def __init__(self, faults: Iterable[Fault] = (), seed: int = 1) -> None:
-        self._random = random.Random(f"faults {seed}")
-        self._waiting: list[tuple[Fault, int]] = []
-        self.fired: list[Fault] = []
+    def __init__(self, faults: Iterable[AnyFault] = ()) -> None:
+        self._waiting: list[tuple[AnyFault, int]] = []
+        self.fired: list[AnyFault] = []
         for fault in faults:
             self.add(fault)
 
-    def add(self, fault: Fault) -> None:
+    def add(self, fault: AnyFault) -> None:
         """Plan one more; its count starts with the next request."""
         self._waiting.append((fault, fault.on_exchange))
 
     @property
-    def pending(self) -> tuple[Fault, ...]:
+    def pending(self) -> tuple[AnyFault, ...]:
         """What has not fired yet."""
         return tuple(fault for fault, _ in self._waiting)
 
-    def take(self, request: str) -> tuple[Fault, ...]:
+    def take(self, request: str) -> tuple[AnyFault, ...]:
         """Count one request and return the faults that it meets."""
         if not self._waiting:
             return ()
-        due: list[Fault] = []
-        waiting: list[tuple[Fault, int]] = []
+        due: list[AnyFault] = []
+        waiting: list[tuple[AnyFault, int]] = []
         for fault, left in self._waiting:
             if fault.match not in request:
                 waiting.append((fault, left))
@@ -108,6 +125,19 @@ class FaultPlan:
         self._waiting = waiting
         self.fired += due
         return tuple(due)
+
+
+class FaultPlan(CountedFaults[Fault]):
+    """The faults of a byte stream.
+
+    Args:
+        faults: What to plan; more may be added at any time.
+        seed: Decides what no fault says: which byte and bit is garbled.
+    """
+
+    def __init__(self, faults: Iterable[Fault] = (), seed: int = 1) -> None:
+        super().__init__(faults)
+        self._random = random.Random(f"faults {seed}")
 
     def departures(self, reply: bytes, faults: Iterable[Fault]) -> list[Departure]:
         """Return what leaves instead of ``reply``, in order, when ``faults`` meet it."""

@@ -14,6 +14,7 @@ import pytest
 
 if TYPE_CHECKING:
     from robolink_simulators.epson.device import EpsonSimulator
+    from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +30,19 @@ class ServedEpson:
     url: str
     assist: str
     simulator: "EpsonSimulator"
+
+
+@dataclass(frozen=True, slots=True)
+class ServedSoftMotion:
+    """A simulated SoftMotion PLC with a mailbox.
+
+    Attributes:
+        url: Where to connect to.
+        simulator: The device; hold its ``lock`` while touching it.
+    """
+
+    url: str
+    simulator: "SoftMotionSimulator"
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -75,6 +89,39 @@ def epson_tcp(request: pytest.FixtureRequest) -> Iterator[ServedEpson]:
         tcp = stack.enter_context(serve_tcp(simulator, clock=clock))
         assist = stack.enter_context(serve_assist(simulator, clock=clock))
         yield ServedEpson(tcp.url, assist.url, simulator)
+
+
+@pytest.fixture
+def softmotion_sim(request: pytest.FixtureRequest) -> Iterator[ServedSoftMotion]:
+    """A simulated SoftMotion PLC in this process.
+
+    Parametrize it indirectly for other ways to reach it: ``sim``, ``modbus-tcp``,
+    ``modbus-rtu`` (not on Windows) and ``can``.
+    """
+    from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
+
+    simulator = SoftMotionSimulator(seed=request.config.getoption("--robolink-seed"))
+    with ExitStack() as stack:
+        _serve(simulator, getattr(request, "param", "sim"), stack)
+        yield ServedSoftMotion(simulator.url, simulator)
+
+
+def _serve(simulator: "SoftMotionSimulator", medium: str, stack: ExitStack) -> None:
+    name = f"pytest-{id(simulator):x}"
+    if medium == "sim":
+        from robolink_simulators.hosting.plc_in_process import register, unregister
+
+        register(name, simulator)
+        stack.callback(unregister, name)
+    elif medium == "can":
+        from robolink_simulators.hosting.canopen_node import CanPlace, serve_canopen
+
+        stack.enter_context(serve_canopen(simulator, CanPlace("virtual", name)))
+    else:
+        from robolink_simulators.hosting.modbus import serve_modbus_rtu, serve_modbus_tcp
+
+        tcp = medium == "modbus-tcp"
+        stack.enter_context(serve_modbus_tcp(simulator) if tcp else serve_modbus_rtu(simulator))
 
 
 @pytest.fixture

@@ -19,7 +19,8 @@ def test_a_backup_says_what_it_saved_and_of_which_robot(run, tmp_path):
     code, out, _ = run("backup", "cell.json")
     assert code == 0
     assert "robot T6-602S, serial SIM00001" in out
-    assert "1 of 15 tools are defined, tool 1 is in force" in out
+    assert "1 of 15 tools are defined." in out
+    assert "Tool 1 is in force." in out
     assert load(tmp_path / "cell.json").state.selected == 1
 
 

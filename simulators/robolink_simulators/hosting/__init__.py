@@ -1,1 +1,1 @@
-"""Hosts that carry a simulated device: inside this process, or on a loopback TCP port."""
+"""Hosts that carry a simulated device: in this process, on a port, a serial cable, a CAN bus."""

@@ -1,7 +1,6 @@
 """Serves a device on a TCP port: one thread, one selector, loopback unless told otherwise."""
 
 import contextlib
-import ipaddress
 import selectors
 import socket
 import threading
@@ -9,10 +8,11 @@ from contextlib import AbstractContextManager
 from types import TracebackType
 from typing import Final, Self
 
-from robolink.errors import ConfigError, ConnectError
+from robolink.errors import ConnectError
 from robolink.messages import tr
 from robolink_simulators.clock import ScaledClock
 from robolink_simulators.hosting._connection import Connection
+from robolink_simulators.hosting._loopback import require_loopback
 from robolink_simulators.wire import WireDevice
 
 _LONGEST_SLEEP_S: Final = 3600.0
@@ -146,11 +146,7 @@ class TcpHost:
 
 def _listening(address: tuple[str, int], *, allow_remote: bool) -> socket.socket:
     host, port = address
-    if not (allow_remote or _is_loopback(host)):
-        raise ConfigError(
-            tr("The simulator does not serve {host}: other machines could reach it.", host=host),
-            remedy=tr("Use 127.0.0.1, or allow it with --allow-remote."),
-        )
+    require_loopback(host, allow_remote=allow_remote)
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     listener = socket.socket(family, socket.SOCK_STREAM)
     try:
@@ -174,12 +170,3 @@ def _listening(address: tuple[str, int], *, allow_remote: bool) -> socket.socket
             remedy=tr("Use another port; 0 takes a free one."),
         ) from error
     return listener
-
-
-def _is_loopback(host: str) -> bool:
-    if host == "localhost":
-        return True
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return False

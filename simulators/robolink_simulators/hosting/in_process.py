@@ -1,9 +1,7 @@
 """``epson+sim://NAME``: simulators that live in this process and are shared by name."""
 
 import random
-import threading
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -14,20 +12,12 @@ from robolink.transport import LinkUrl
 from robolink_simulators.clock import ManualClock
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.option_text import option_names, options_from_text
+from robolink_simulators.hosting._named import NamedSimulators, seed_from_text
 from robolink_simulators.hosting._transport import InProcessTransport
 
 _OWN_OPTIONS: Final = ("robot", "seed", "state", "split")
 
-
-@dataclass(frozen=True, slots=True)
-class _Hosted:
-    simulator: EpsonSimulator
-    clock: ManualClock
-    made_with: Mapping[str, str]
-
-
-_hosted: Final[dict[str, _Hosted]] = {}
-_registry: Final = threading.Lock()
+_named: Final = NamedSimulators[EpsonSimulator]("epson+sim")
 
 
 def open_epson(
@@ -57,21 +47,12 @@ def open_epson(
             tr("The option split cannot be {value!r}.", value=split),
             remedy=tr("Give 1 to cut what arrives into pieces, or leave it out."),
         )
-    name = _checked_name(link_url)
-    with _registry:
-        hosted = _hosted.get(name)
-        if hosted is None:
-            hosted = _hosted[name] = _made(name, options, clock)
-        elif options and options != hosted.made_with:
-            raise ConfigError(
-                tr("The simulator {name!r} already runs with other options.", name=name),
-                remedy=tr("Leave the options out, or use another name."),
-            )
-    simulator = hosted.simulator
+    named = _named.open(link_url, options, clock, _made)
+    simulator = named.simulator
     return InProcessTransport(
         link_url,
         simulator,
-        hosted.clock,
+        named.clock,
         simulator.lock,
         durable=simulator.durable,
         splitter=random.Random(f"split {simulator.seed}") if split == "1" else None,
@@ -84,14 +65,7 @@ def simulator_named(name: str) -> EpsonSimulator:
     Raises:
         ConfigError: Nothing was opened or registered under that name.
     """
-    with _registry:
-        hosted = _hosted.get(name.lower())
-    if hosted is None:
-        raise ConfigError(
-            tr("No simulator is called {name!r}.", name=name),
-            remedy=tr("Open epson+sim://{name} or register one first.", name=name),
-        )
-    return hosted.simulator
+    return _named.find(name).simulator
 
 
 def register(name: str, simulator: EpsonSimulator, *, clock: ManualClock | None = None) -> str:
@@ -100,22 +74,12 @@ def register(name: str, simulator: EpsonSimulator, *, clock: ManualClock | None 
     Raises:
         ConfigError: The name is taken.
     """
-    name = name.lower()
-    clock = clock or ManualClock(simulator.now_ns)
-    with _registry:
-        if name in _hosted:
-            raise ConfigError(
-                tr("The name {name!r} is taken by another simulator.", name=name),
-                remedy=tr("Use another name, or unregister that one."),
-            )
-        _hosted[name] = _host(name, simulator, clock, {})
-    return simulator.url
+    return _named.register(name, simulator, clock)
 
 
 def unregister(name: str) -> None:
     """Forget a simulator; open connections go on. An unknown name is fine."""
-    with _registry:
-        _hosted.pop(name.lower(), None)
+    _named.unregister(name)
 
 
 def clock_of(name: str) -> ManualClock:
@@ -124,20 +88,10 @@ def clock_of(name: str) -> ManualClock:
     Raises:
         ConfigError: There is none.
     """
-    simulator_named(name)
-    return _hosted[name.lower()].clock
+    return _named.find(name).clock
 
 
-def _checked_name(link_url: LinkUrl) -> str:
-    if not link_url.host or link_url.port is not None or link_url.path not in ("", "/"):
-        raise ConfigError(
-            tr("{identity} does not name a simulator.", identity=link_url.identity),
-            remedy=tr("Write for example epson+sim://cell-a?seed=1."),
-        )
-    return link_url.host.lower()
-
-
-def _made(name: str, options: Mapping[str, str], clock: Clock | None) -> _Hosted:
+def _made(options: Mapping[str, str]) -> EpsonSimulator:
     known = {key: options[key] for key in _OWN_OPTIONS if key in options}
     habits = {key: value for key, value in options.items() if key not in _OWN_OPTIONS}
     unknown = sorted(set(habits) - set(option_names()))
@@ -147,28 +101,9 @@ def _made(name: str, options: Mapping[str, str], clock: Clock | None) -> _Hosted
             remedy=tr("Known are: {names}.", names=", ".join((*_OWN_OPTIONS, *option_names()))),
         )
     state = known.get("state")
-    simulator = EpsonSimulator(
+    return EpsonSimulator(
         known.get("robot", "T6-602S"),
-        seed=_seed(known.get("seed", "1")),
+        seed=seed_from_text(known.get("seed", "1")),
         options=options_from_text(habits),
         state_path=Path(state) if state else None,
     )
-    own_clock = clock if isinstance(clock, ManualClock) else ManualClock()
-    return _host(name, simulator, own_clock, options)
-
-
-def _host(
-    name: str, simulator: EpsonSimulator, clock: ManualClock, made_with: Mapping[str, str]
-) -> _Hosted:
-    simulator.url = f"epson+sim://{name}"
-    simulator.present_ns = clock.now_ns
-    return _Hosted(simulator, clock, dict(made_with))
-
-
-def _seed(text: str) -> int:
-    if not (text.isascii() and text.isdigit() and len(text) < 10):
-        raise ConfigError(
-            tr("The seed {text!r} is not a whole number.", text=text),
-            remedy=tr("Give for example seed=1."),
-        )
-    return int(text)

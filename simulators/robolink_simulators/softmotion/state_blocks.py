@@ -2,7 +2,11 @@
 
 from robolink_simulators.softmotion.blocks import Execution
 from robolink_simulators.softmotion.condition import GroupState
+from robolink_simulators.softmotion.coordinates import CoordinateTransforms
 from robolink_simulators.softmotion.group_core import GroupCore, block
+from robolink_simulators.softmotion.kinematics import Kinematics
+from robolink_simulators.softmotion.movement import Tool
+from robolink_simulators.softmotion.signals import OutputBits
 from robolink_simulators.softmotion.smc_errors import ErrorKind, Overruled, Refused
 
 _SAME_PLACE = 1e-6
@@ -19,6 +23,18 @@ class StateBlocks(GroupCore):
             self.motion.abort_singles(self.drives)
         for axis in self.drives:
             axis.switch(on)
+
+    def restart(self, kinematics: Kinematics) -> None:
+        """Start the PLC: Disabled, without a tool, with the kinematics of its project.
+
+        Drives keep their place, their power and their errors.
+        """
+        self.machine.restart()
+        self.motion.queue.last = None
+        self.kinematics = kinematics
+        self.tool = Tool()
+        self.transforms = CoordinateTransforms()
+        self.outputs = OutputBits()
 
     def fail_axis(self, number: int, error_number: int | None = None) -> None:
         """Let a drive fail, as the world may: an enabled group goes to ErrorStop.

@@ -153,6 +153,12 @@ class StateMachine:
         if self.state is GroupState.ERROR_STOP:
             self.state, self.error = GroupState.STANDBY, None
 
+    def restart(self) -> None:
+        """The PLC starts anew: what moved stands still where it is, the group is Disabled."""
+        self._end_everything(None)
+        self.state, self.error = GroupState.DISABLED, None
+        self._free_axes()
+
     def advance(self, now_ns: int) -> None:
         """Let simulated time reach ``now_ns``, stopping wherever something changes."""
         while (change := self.next_change()) is not None and change <= now_ns:

@@ -1,0 +1,31 @@
+"""Maps of a machine builder's own registers: where a PLC keeps its tool offsets.
+
+A map is a TOML file of the schema ``robolink/plc-map/1``; docs/plc-maps.md explains every key.
+It is checked by pydantic, which is imported when a map is loaded and not before.
+"""
+
+from robolink.register_maps._confirmations import Confirmation as Confirmation
+from robolink.register_maps._confirmations import confirm as confirm
+from robolink.register_maps._confirmations import confirmation_of as confirmation_of
+from robolink.register_maps._drafts import Draft as Draft
+from robolink.register_maps._drafts import draft_from_csv as draft_from_csv
+from robolink.register_maps._loading import check_map as check_map
+from robolink.register_maps._loading import load_map as load_map
+from robolink.register_maps._map import ANGLES as ANGLES
+from robolink.register_maps._map import COMPONENTS as COMPONENTS
+from robolink.register_maps._map import AllZero as AllZero
+from robolink.register_maps._map import Commit as Commit
+from robolink.register_maps._map import CommitKind as CommitKind
+from robolink.register_maps._map import Input as Input
+from robolink.register_maps._map import Probe as Probe
+from robolink.register_maps._map import RegisterMap as RegisterMap
+from robolink.register_maps._map import Slot as Slot
+from robolink.register_maps._map import span_of as span_of
+from robolink.register_maps._numbers import LREAL_TOLERANCE as LREAL_TOLERANCE
+from robolink.register_maps._numbers import Number as Number
+from robolink.register_maps._numbers import NumberType as NumberType
+from robolink.register_maps._places import Signal as Signal
+from robolink.register_maps._places import Table as Table
+from robolink.register_maps._places import Word as Word
+from robolink.register_maps._places import describe_place as describe_place
+from robolink.register_maps._problems import MapProblem as MapProblem

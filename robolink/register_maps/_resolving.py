@@ -1,0 +1,178 @@
+"""Fills in what ``[numbers]`` says for all, and turns units into mm and degrees."""
+
+import math
+from collections.abc import Mapping
+from typing import Final
+
+from robolink.messages import tr
+from robolink.register_maps._map import (
+    ANGLES,
+    COMPONENTS,
+    AllZero,
+    Commit,
+    CommitKind,
+    Input,
+    Probe,
+    RegisterMap,
+    Slot,
+)
+from robolink.register_maps._numbers import Number, NumberType
+from robolink.register_maps._places import Signal, Table, Word
+from robolink.register_maps._problems import MapProblem
+from robolink.register_maps._tables import (
+    CommitBitKeys,
+    FlangeKeys,
+    LevelKeys,
+    MapFile,
+    NoneKeys,
+    NumberKeys,
+    SignalKeys,
+    ToolKeys,
+    WordKeys,
+)
+
+_LENGTHS: Final = {"mm": 1.0, "um": 0.001, "m": 1000.0, "inch": 25.4}
+_ANGLES: Final = {"deg": 1.0, "rad": math.degrees(1.0)}
+
+
+class Resolving:
+    """Turns one file that pydantic accepted into a map.
+
+    Attributes:
+        problems: What it found missing or wrong on the way.
+    """
+
+    def __init__(self, file: MapFile) -> None:
+        self.problems: list[MapProblem] = []
+        self._file = file
+
+    def resolve(self, sha256: str) -> RegisterMap | None:
+        """Return the map; ``None``, with :attr:`problems`, when something is missing."""
+        file = self._file
+        slots = [self._slot(number, keys) for number, keys in enumerate(file.tools, start=1)]
+        flange = self._components("flange", file.flange) if file.flange else {}
+        probe = self._probe()
+        if self.problems:
+            return None
+        return RegisterMap(
+            name=file.name,
+            sha256=sha256,
+            slots={slot.tool: slot for slot in slots},
+            commit=_commit(file.commit),
+            probe=probe,
+            permit=_signal(file.permit),
+            selected=_word(file.selected),
+            flange=flange,
+            inputs={
+                keys.number: Input(keys.number, keys.name, _some_signal(keys))
+                for keys in file.inputs
+            },
+            all_zero=AllZero(file.all_zero),
+            largest_mm=file.largest_mm,
+        )
+
+    def _slot(self, position: int, keys: ToolKeys) -> Slot:
+        path = f"tools#{position}"
+        components = self._components(path, keys)
+        if not components:
+            self._tell(path, tr("names no component: give at least one of x y z u v w"))
+        return Slot(keys.number, keys.name, components, _signal(keys.defined))
+
+    def _components(self, path: str, keys: ToolKeys | FlangeKeys) -> dict[str, Number]:
+        found: dict[str, Number] = {}
+        for name in COMPONENTS:
+            given = getattr(keys, name)
+            if given is not None:
+                number = self._number(f"{path}.{name}", given, angle=name in ANGLES)
+                if number is not None:
+                    found[name] = number
+        if self._file.rotation is None and {"v", "w"} & set(found):
+            self._tell(
+                path,
+                tr(
+                    'has V or W: state rotation = "Rz(U) Ry(V) Rx(W)" at the top of the map, if '
+                    "the PLC means them so"
+                ),
+            )
+        return found
+
+    def _probe(self) -> Probe | None:
+        keys = self._file.probe
+        if keys is None:
+            return None
+        if keys.unit is not None or keys.scale is not None:
+            self._tell("probe", tr("is compared as it stands: take unit and scale out"))
+        plain = keys.model_copy(update={"scale": 1.0, "unit": None})
+        number = self._number("probe", plain, angle=None)
+        return None if number is None else Probe(number, keys.value)
+
+    def _number(self, path: str, keys: NumberKeys, *, angle: bool | None) -> Number | None:
+        """Return a number; ``angle`` is ``None`` for one that is neither length nor angle."""
+        common = self._file.numbers
+        type_name = keys.type or common.type
+        order = keys.word_order or common.word_order
+        if type_name is None:
+            self._tell(f"{path}.type", tr("is missing, here and in [numbers]"))
+            return None
+        kind = NumberType(type_name)
+        if kind.words > 1 and order is None:
+            self._tell(f"{path}.word_order", tr("is missing, here and in [numbers]"))
+            return None
+        scale = common.scale if keys.scale is None else keys.scale
+        if scale == 0:
+            self._tell(f"{path}.scale", tr("must not be 0"))
+            return None
+        return Number(
+            Table(keys.table or common.table),
+            keys.address,
+            kind,
+            low_word_first=order == "low_first",
+            swapped_bytes=(keys.byte_order or common.byte_order) == "little",
+            factor=scale * self._unit(path, keys, angle=angle),
+        )
+
+    def _unit(self, path: str, keys: NumberKeys, *, angle: bool | None) -> float:
+        if angle is None:
+            return 1.0
+        common = self._file.numbers
+        units: Mapping[str, float] = _ANGLES if angle else _LENGTHS
+        unit = keys.unit or (common.angle_unit if angle else common.length_unit)
+        if unit not in units:
+            self._tell(f"{path}.unit", tr("must be one of {units}", units=", ".join(units)))
+            return 1.0
+        return units[unit]
+
+    def _tell(self, where: str, what: str) -> None:
+        self.problems.append(MapProblem(where, what))
+
+
+def _commit(keys: CommitBitKeys | LevelKeys | NoneKeys) -> Commit:
+    if isinstance(keys, NoneKeys):
+        return Commit(settle_s=keys.settle_s)
+    if isinstance(keys, CommitBitKeys):
+        request, answer = keys.trigger, keys.done
+    else:
+        request, answer = keys.request, keys.acknowledge
+    return Commit(
+        CommitKind(keys.kind),
+        request=_signal(request),
+        answer=_signal(answer),
+        busy=_signal(keys.busy),
+        error=_signal(keys.error),
+        error_code=_word(keys.error_code),
+        error_texts={int(number): text for number, text in keys.error_texts.items()},
+        tool_number=_word(keys.tool_number),
+        timeout_s=keys.timeout_s,
+    )
+
+
+def _signal(keys: SignalKeys | None) -> Signal | None:
+    return None if keys is None else _some_signal(keys)
+
+
+def _some_signal(keys: SignalKeys) -> Signal:
+    return Signal(Table(keys.table), keys.address, keys.bit, keys.on, keys.off)
+
+
+def _word(keys: WordKeys | None) -> Word | None:
+    return None if keys is None else Word(Table(keys.table), keys.address)

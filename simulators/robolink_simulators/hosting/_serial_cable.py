@@ -1,0 +1,47 @@
+"""Two pseudo terminals joined by a thread: a serial cable without hardware."""
+
+import os
+import select
+import threading
+from typing import Final
+
+_CHUNK_BYTES: Final = 4096
+
+
+class SerialCable:
+    """Carries bytes between two device paths until it is closed; needs a Unix.
+
+    Attributes:
+        near: Path for one end.
+        far: Path for the other end.
+    """
+
+    def __init__(self) -> None:
+        import tty  # not on Windows, where this module must still be importable
+
+        pairs = [os.openpty() for _ in range(2)]
+        self._ends = [controller for controller, _ in pairs]
+        self._devices = [device for _, device in pairs]
+        self.near, self.far = (os.ttyname(device) for device in self._devices)
+        for device in self._devices:
+            tty.setraw(device)
+        self._stop, self._stopped = os.pipe()
+        self._thread = threading.Thread(target=self._carry, name="serial cable", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Unplug both ends."""
+        os.write(self._stopped, b"x")
+        self._thread.join()
+        for descriptor in (*self._ends, *self._devices, self._stop, self._stopped):
+            os.close(descriptor)
+
+    def _carry(self) -> None:
+        one, other = self._ends
+        while True:
+            ready, _, _ = select.select([one, other, self._stop], [], [])
+            if self._stop in ready:
+                return
+            for end in ready:
+                data = os.read(end, _CHUNK_BYTES)
+                os.write(other if end == one else one, data)

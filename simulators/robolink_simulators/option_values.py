@@ -1,0 +1,54 @@
+"""Values of simulator options as text, as URLs and command lines carry them."""
+
+from collections.abc import Mapping
+from dataclasses import fields
+from typing import Any, Final, Literal, get_args, get_origin, get_type_hints
+
+from robolink.errors import ConfigError
+from robolink.messages import tr
+
+_TRUTH: Final = {"1": True, "true": True, "yes": True, "0": False, "false": False, "no": False}
+
+
+def values_from_text(
+    options: type, pairs: Mapping[str, str], *, prefix: str = ""
+) -> dict[str, Any]:
+    """Return the values of those ``pairs`` that name a field of a dataclass.
+
+    Args:
+        options: The dataclass.
+        pairs: Names and values.
+        prefix: Stands before each name of a field.
+
+    Raises:
+        ConfigError: A value does not fit its field.
+    """
+    hints = get_type_hints(options)
+    names = [field.name for field in fields(options) if prefix + field.name in pairs]
+    return {name: _value(prefix + name, pairs[prefix + name], hints[name]) for name in names}
+
+
+def _value(name: str, text: str, hint: Any) -> object:  # noqa: ANN401 - a type annotation
+    if get_origin(hint) is Literal:
+        for choice in get_args(hint):
+            if text == str(choice):
+                return choice
+        raise _refused(name, text, ", ".join(str(choice) for choice in get_args(hint)))
+    if hint is bool:
+        if text.lower() in _TRUTH:
+            return _TRUTH[text.lower()]
+        raise _refused(name, text, "true, false")
+    try:
+        value = hint(text)
+    except ValueError:
+        value = -1
+    if not 0 <= value < float("inf"):
+        raise _refused(name, text, tr("a number from 0 up"))
+    return value
+
+
+def _refused(name: str, text: str, allowed: str) -> ConfigError:
+    return ConfigError(
+        tr("The simulator option {name} cannot be {text!r}.", name=name, text=text),
+        remedy=tr("It takes: {allowed}.", allowed=allowed),
+    )

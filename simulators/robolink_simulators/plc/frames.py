@@ -1,0 +1,165 @@
+"""Modbus TCP frames and numbers in registers, by pymodbus: the only module here that knows it.
+
+The driver encodes numbers itself, so that each proves the other.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from pymodbus.client.mixin import ModbusClientMixin
+from pymodbus.framer import FramerSocket
+from pymodbus.pdu import DecodePDU, ExceptionResponse, ModbusPDU
+from pymodbus.pdu.bit_message import (
+    ReadCoilsResponse,
+    ReadDiscreteInputsResponse,
+    WriteSingleCoilResponse,
+)
+from pymodbus.pdu.register_message import (
+    ReadHoldingRegistersResponse,
+    ReadInputRegistersResponse,
+    WriteMultipleRegistersResponse,
+    WriteSingleRegisterResponse,
+)
+
+from robolink.register_maps import Number, NumberType, Table
+
+ILLEGAL_FUNCTION: Final = 1
+ILLEGAL_ADDRESS: Final = 2
+NO_SUCH_UNIT: Final = 11
+
+_HEADER: Final = 7
+_DATA: Final = ModbusClientMixin.DATATYPE
+_TYPES: Final = {
+    NumberType.INT16: _DATA.INT16,
+    NumberType.UINT16: _DATA.UINT16,
+    NumberType.INT32: _DATA.INT32,
+    NumberType.UINT32: _DATA.UINT32,
+    NumberType.REAL: _DATA.FLOAT32,
+    NumberType.LREAL: _DATA.FLOAT64,
+}
+_READ: Final = {1: Table.COIL, 2: Table.DISCRETE, 3: Table.HOLDING, 4: Table.INPUT}
+_WRITE_COIL: Final = 5
+_WRITE: Final = {_WRITE_COIL: Table.COIL, 6: Table.HOLDING, 16: Table.HOLDING}
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """What a client asks.
+
+    Attributes:
+        number: Of the transaction.
+        unit: Who is asked.
+        function: Function code.
+        table: Which table, ``None`` for a function that this server does not have.
+        address: First address.
+        count: Registers or bits.
+        values: What is written; ``None`` for a read.
+    """
+
+    number: int
+    unit: int
+    function: int
+    table: Table | None
+    address: int = 0
+    count: int = 0
+    values: tuple[int, ...] | None = None
+
+    @property
+    def words(self) -> str:
+        """Function and address, as faults and records name a request."""
+        return f"fc{self.function} {self.address}"
+
+
+class Frames:
+    """Takes requests off a stream, and packs answers."""
+
+    def __init__(self) -> None:
+        self._framer = FramerSocket(DecodePDU(is_server=True))
+        self._buffer = b""
+
+    def feed(self, data: bytes) -> None:
+        """Add what a client sent."""
+        self._buffer += data
+
+    def take(self) -> Request | None:
+        """Return the next request, ``None`` while there is no whole one.
+
+        Raises:
+            ValueError: What came is no frame.
+        """
+        if len(self._buffer) <= _HEADER:
+            return None
+        end = 6 + int.from_bytes(self._buffer[4:6], "big")
+        if end <= _HEADER:
+            raise ValueError(self._buffer.hex(" "))
+        if len(self._buffer) < end:
+            return None
+        frame, self._buffer = self._buffer[:end], self._buffer[end:]
+        number, unit, function = int.from_bytes(frame[:2], "big"), frame[6], frame[_HEADER]
+        pdu = self._framer.decoder.decode(frame[_HEADER:])
+        if pdu is None or function not in _READ | _WRITE:
+            return Request(number, unit, function, None)
+        if function in _READ:
+            return Request(number, unit, function, _READ[function], pdu.address, pdu.count)
+        values = pdu.bits[:1] if function == _WRITE_COIL else pdu.registers
+        written = tuple(int(value) for value in values)
+        return Request(number, unit, function, _WRITE[function], pdu.address, len(written), written)
+
+    def answer(self, request: Request, found: Sequence[int] = ()) -> bytes:
+        """Return the frame of an answer; ``found`` is what was read."""
+        return self._packed(request, _pdu(request, found))
+
+    def refusal(self, request: Request, code: int) -> bytes:
+        """Return the frame of an exception."""
+        return self._packed(request, ExceptionResponse(request.function, code))
+
+    def _packed(self, request: Request, pdu: ModbusPDU) -> bytes:
+        payload = bytes([pdu.function_code]) + pdu.encode()
+        return self._framer.encode(payload, request.unit, request.number)
+
+
+def encode(number: Number, value: float) -> list[int]:
+    """Return the registers of a value in mm, degrees, or the probe's own unit."""
+    raw = value / number.factor + 0.0
+    words = ModbusClientMixin.convert_to_registers(
+        round(raw) if number.type.whole else raw,
+        _TYPES[number.type],
+        word_order="little" if number.low_word_first else "big",
+    )
+    return _swapped(words) if number.swapped_bytes else words
+
+
+def decode(number: Number, words: Sequence[int]) -> float:
+    """Return the value that registers hold."""
+    found = ModbusClientMixin.convert_from_registers(
+        _swapped(words) if number.swapped_bytes else list(words),
+        _TYPES[number.type],
+        word_order="little" if number.low_word_first else "big",
+    )
+    if not isinstance(found, (int, float)):
+        raise TypeError(f"no number: {found!r}")
+    return found * number.factor
+
+
+def _pdu(request: Request, found: Sequence[int]) -> ModbusPDU:
+    address, values = request.address, list(request.values or ())
+    match request.function:
+        case 1:
+            return ReadCoilsResponse(bits=[bool(value) for value in found])
+        case 2:
+            return ReadDiscreteInputsResponse(bits=[bool(value) for value in found])
+        case 3:
+            return ReadHoldingRegistersResponse(registers=list(found))
+        case 4:
+            return ReadInputRegistersResponse(registers=list(found))
+        case 5:
+            return WriteSingleCoilResponse(address=address, bits=[bool(values[0])])
+        case 6:
+            return WriteSingleRegisterResponse(address=address, registers=values)
+        case _:
+            return WriteMultipleRegistersResponse(address=address, count=len(values))
+
+
+def _swapped(words: Sequence[int]) -> list[int]:
+    return [(word & 0xFF) << 8 | word >> 8 for word in words]

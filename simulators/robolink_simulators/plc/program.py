@@ -1,0 +1,161 @@
+"""What the PLC's program does: keeps tools, takes new values over when it is asked."""
+
+import random
+from collections.abc import Iterator, Mapping
+
+from robolink.register_maps import ANGLES, CommitKind, Number, RegisterMap, Slot, Table
+from robolink.timing import NS_PER_S
+from robolink_simulators.plc.frames import decode, encode
+from robolink_simulators.plc.memory import Memory
+
+Components = dict[str, float]
+"""Components of an offset or a pose by name, mm and degrees; those that the map has."""
+
+
+class PlcProgram:
+    """Tools, handshake and signals of one machine.
+
+    Attributes:
+        in_force: What the machine works with, by tool.
+        takeovers: How often values were taken over on a request.
+        answer_s: How long the program takes to answer a request, simulated seconds.
+        refuse_with: Error number with which it refuses the next request, ``None`` for none.
+        silent: Whether it lets requests stand without an answer.
+
+    Args:
+        register_map: Where everything stands.
+        seed: Other tools.
+    """
+
+    def __init__(self, register_map: RegisterMap, seed: int = 1) -> None:
+        self._map = register_map
+        self.memory = Memory(_used(register_map))
+        self.in_force: dict[int, Components] = {}
+        self.takeovers = 0
+        self.answer_s = 0.005
+        self.refuse_with: int | None = None
+        self.silent = False
+        self._answer_at_ns: int | None = None
+        chance = random.Random(f"plc {seed}")
+        for slot in register_map.slots.values():
+            self.set_tool(slot.tool, _some_tool(slot, chance))
+        self._power_up()
+
+    def set_tool(self, tool: int, components: Mapping[str, float]) -> None:
+        """Let a person at the HMI give a tool other values."""
+        slot = self._map.slots[tool]
+        self._show(slot.components, components)
+        self.memory.switch(slot.defined, True)
+        self.in_force[tool] = self._stored(slot)
+
+    def select(self, tool: int) -> None:
+        """Let the machine put a tool in force."""
+        if self._map.selected is not None:
+            self.memory.write(self._map.selected.table, self._map.selected.address, [tool])
+
+    def place_flange(self, pose: Mapping[str, float]) -> None:
+        """Let a person drive the head somewhere, mm and degrees by component."""
+        self._show(self._map.flange, pose)
+
+    def permit(self, on: bool) -> None:
+        """Let the machine allow, or not, that offsets are changed."""
+        self.memory.switch(self._map.permit, on)
+
+    def written(self, now_ns: int) -> None:
+        """React to what a client wrote."""
+        commit = self._map.commit
+        if commit.kind is CommitKind.NONE:
+            self._take_over()
+        elif not self.memory.is_on(commit.request):
+            self._answer_at_ns = None
+            for signal in (commit.answer, commit.busy, commit.error):
+                self.memory.switch(signal, False)
+            self._tell_error(0)
+        elif self._idle and not self.silent:
+            self.memory.switch(commit.busy, True)
+            self._answer_at_ns = now_ns + round(self.answer_s * NS_PER_S)
+
+    def advance(self, now_ns: int) -> None:
+        """Answer a request whose time has come."""
+        if self._answer_at_ns is None or now_ns < self._answer_at_ns:
+            return
+        self._answer_at_ns = None
+        commit = self._map.commit
+        self.memory.switch(commit.busy, False)
+        if self.refuse_with is not None:
+            self._tell_error(self.refuse_with)
+            self.memory.switch(commit.error, True)
+            self.refuse_with = None
+            return
+        self._take_over()
+        self.takeovers += 1
+        self.memory.switch(commit.answer, True)
+
+    def next_change(self) -> int | None:
+        """Return when it will answer, if a request is in work."""
+        return self._answer_at_ns
+
+    @property
+    def _idle(self) -> bool:
+        commit = self._map.commit
+        answered = self.memory.is_on(commit.answer) or self.memory.is_on(commit.error)
+        return self._answer_at_ns is None and not answered
+
+    def _power_up(self) -> None:
+        if self._map.probe is not None:
+            number = self._map.probe.number
+            self.memory.write(number.table, number.address, encode(number, self._map.probe.value))
+        commit = self._map.commit
+        for signal in (commit.answer, commit.busy, commit.error):
+            self.memory.switch(signal, False)
+        self.permit(True)
+        self.select(min(self._map.slots))
+        self.place_flange({"x": 300.0, "y": 100.0, "z": -20.0, "u": 0.0})
+
+    def _take_over(self) -> None:
+        self.in_force = {slot.tool: self._stored(slot) for slot in self._map.slots.values()}
+
+    def _tell_error(self, code: int) -> None:
+        word = self._map.commit.error_code
+        if word is not None:
+            self.memory.write(word.table, word.address, [code])
+
+    def _stored(self, slot: Slot) -> Components:
+        return {
+            name: decode(number, self.memory.read(number.table, number.registers))
+            for name, number in slot.components.items()
+        }
+
+    def _show(self, places: Mapping[str, Number], values: Mapping[str, float]) -> None:
+        for name, number in places.items():
+            self.memory.write(number.table, number.address, encode(number, values.get(name, 0.0)))
+
+
+def _some_tool(slot: Slot, chance: random.Random) -> Components:
+    """Return an offset that a nozzle may have, to a hundredth of a millimetre or degree."""
+    most = {name: 90.0 if name in ANGLES else 20.0 for name in slot.components}
+    return {name: round(chance.uniform(-limit, limit), 2) for name, limit in most.items()}
+
+
+def _used(register_map: RegisterMap) -> Iterator[tuple[Table, range]]:
+    commit = register_map.commit
+    numbers = [n for slot in register_map.slots.values() for n in slot.components.values()]
+    numbers += register_map.flange.values()
+    if register_map.probe is not None:
+        numbers.append(register_map.probe.number)
+    yield from ((number.table, number.registers) for number in numbers)
+    single = [
+        commit.request,
+        commit.answer,
+        commit.busy,
+        commit.error,
+        commit.error_code,
+        commit.tool_number,
+        register_map.permit,
+        register_map.selected,
+        *(slot.defined for slot in register_map.slots.values()),
+        *(one.signal for one in register_map.inputs.values()),
+    ]
+    for place in single:
+        if place is not None:
+            yield place.table, range(place.address, place.address + 1)

@@ -1,0 +1,10 @@
+"""The mailbox program of a simulated SoftMotion PLC (design part 7). SIMULATED."""
+
+from robolink_simulators.softmotion.mailbox.exchange import Served as Served
+from robolink_simulators.softmotion.mailbox.faults import PlcFault as PlcFault
+from robolink_simulators.softmotion.mailbox.faults import PlcFaultAction as PlcFaultAction
+from robolink_simulators.softmotion.mailbox.option_text import PlcOptions as PlcOptions
+from robolink_simulators.softmotion.mailbox.options import MailboxOptions as MailboxOptions
+from robolink_simulators.softmotion.mailbox.simulator import (
+    SoftMotionSimulator as SoftMotionSimulator,
+)

@@ -1,0 +1,68 @@
+"""The options of a simulated PLC as text, from a URL or a command line."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from typing import Final
+
+from robolink.errors import ConfigError
+from robolink.messages import tr
+from robolink_simulators.option_values import values_from_text
+from robolink_simulators.softmotion.mailbox.options import MailboxOptions
+from robolink_simulators.softmotion.mailbox.places import require_places
+from robolink_simulators.softmotion.options import GroupOptions, SmcNumbers
+
+_NUMBERS: Final = "numbers."
+_LONGEST_CYCLE_US: Final = 1_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class PlcOptions:
+    """Everything that can be set about a simulated PLC, beside its machine.
+
+    Attributes:
+        group: The axis group's habits.
+        mailbox: The mailbox program and its fieldbus.
+    """
+
+    group: GroupOptions = field(default_factory=GroupOptions)
+    mailbox: MailboxOptions = field(default_factory=MailboxOptions)
+
+
+def option_names() -> tuple[str, ...]:
+    """Return every option; error numbers are written ``numbers.NAME``."""
+    own = [it.name for kind in (MailboxOptions, GroupOptions) for it in fields(kind)]
+    own.remove("numbers")
+    return (*own, *(_NUMBERS + it.name for it in fields(SmcNumbers)))
+
+
+def options_from_text(pairs: Mapping[str, str]) -> PlcOptions:
+    """Return the defaults with ``pairs`` applied.
+
+    Raises:
+        ConfigError: An option is unknown, or a value does not fit it.
+    """
+    for name in pairs:
+        if name not in option_names():
+            raise ConfigError(
+                tr("The PLC simulator has no option {name!r}.", name=name),
+                remedy=tr("Known are: {names}.", names=", ".join(option_names())),
+            )
+    numbers = replace(SmcNumbers(), **values_from_text(SmcNumbers, pairs, prefix=_NUMBERS))
+    group = replace(GroupOptions(), **values_from_text(GroupOptions, pairs), numbers=numbers)
+    mailbox = replace(MailboxOptions(), **values_from_text(MailboxOptions, pairs))
+    for name, value in (
+        ("unit_um", mailbox.unit_um),
+        ("program_cycle_us", mailbox.program_cycle_us),
+        ("cycle_us", group.cycle_us),
+    ):
+        _require_positive(name, value)
+    require_places(mailbox)
+    return PlcOptions(group, mailbox)
+
+
+def _require_positive(name: str, value: float) -> None:
+    if not 0 < value <= _LONGEST_CYCLE_US:
+        raise ConfigError(
+            tr("The simulator option {name} cannot be {value}.", name=name, value=value),
+            remedy=tr("Give a number above 0, up to {most}.", most=_LONGEST_CYCLE_US),
+        )

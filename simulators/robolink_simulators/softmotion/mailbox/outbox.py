@@ -1,0 +1,116 @@
+"""What the mailbox program gives out: the response block and the tool slots (design part 7)."""
+
+from robolink.protocols.mailbox import (
+    RESPONSE,
+    SLOT,
+    SLOTS,
+    Bits,
+    CommandState,
+    ErrorClass,
+    GroupState,
+    Response,
+    WordOrder,
+    Words,
+    encode_response,
+    encode_slot,
+)
+from robolink_simulators.softmotion.coordinates import CoordRef, CoordSystem
+from robolink_simulators.softmotion.group import AxisGroup
+from robolink_simulators.softmotion.mailbox.image import arranged
+from robolink_simulators.softmotion.mailbox.program import MailboxProgram
+from robolink_simulators.softmotion.mailbox.retained import RetainedMemory
+from robolink_simulators.softmotion.mailbox.tool_desk import ToolDesk
+from robolink_simulators.softmotion.mailbox.units import UserUnits
+
+
+class Outbox:
+    """Composes the words that clients read.
+
+    Args:
+        group: The axis group.
+        memory: The retained variables.
+        tools: Knows slot and kinematics.
+        units: Of the mailbox.
+        order: How the program lays values of several words.
+    """
+
+    def __init__(
+        self,
+        group: AxisGroup,
+        memory: RetainedMemory,
+        tools: ToolDesk,
+        units: UserUnits,
+        *,
+        order: WordOrder,
+    ) -> None:
+        self._group = group
+        self._memory = memory
+        self._tools = tools
+        self._units = units
+        self._order = order
+
+    def words(self, program: MailboxProgram, heartbeat: int) -> Words:
+        """Return response and slots, one behind the other."""
+        response = self.response(program, heartbeat)
+        slots = (word for number in SLOTS for word in self.slot(number))
+        return (*response, *slots)
+
+    def response(self, program: MailboxProgram, heartbeat: int) -> Words:
+        """Return the response block."""
+        whole = encode_response(self._response(program, heartbeat))
+        return arranged(RESPONSE, whole, self._order)
+
+    def slot(self, number: int) -> Words:
+        """Return a tool slot."""
+        return arranged(SLOT, encode_slot(self._memory.slot(number)), self._order)
+
+    def _response(self, program: MailboxProgram, heartbeat: int) -> Response:
+        group, jobs = self._group, program.jobs
+        job = jobs.acknowledged
+        tcp = group.read_actual_position(CoordSystem.MCS).values
+        kinds = group.kinematics.kinds
+        return Response(
+            ack_head=job.command.sequence if job else 0,
+            state=job.state if job else CommandState.EMPTY,
+            error_class=job.error_class if job else ErrorClass.NONE,
+            raw_error=(job.raw if job else 0) or self._group_error(),
+            opcode_echo=job.command.opcode if job else 0,
+            group_state=GroupState(group.state.value),
+            bits=self._bits(program),
+            plc_heartbeat=heartbeat,
+            boot_id=self._memory.boot_id,
+            tool_slot=self._tools.selected,
+            answer=program.answer,
+            tcp=self._units.given(CoordRef(*tcp)),
+            axes=self._units.given_axes(group.values, kinds),
+            kinematics=self._tools.kinematics_code,
+            axis_count=len(kinds),
+            capabilities=program.capabilities,
+            unit_um=self._units.unit_um,
+            rejected=program.inbox.rejected,
+            active_movement=jobs.active_movement,
+            queue_length=len(jobs.movements),
+            finished=jobs.ends,
+            ack_owner=job.command.owner if job else 0,
+        )
+
+    def _group_error(self) -> int:
+        error = self._group.status().error
+        return error.number if error else 0
+
+    def _bits(self, program: MailboxProgram) -> Bits:
+        status, job = self._group.status(), program.jobs.acknowledged
+        shown = {
+            Bits.POWERED: status.powered,
+            Bits.TOOL_KNOWN: self._tools.tool_known,
+            Bits.BUSY: job is not None and not job.state.final,
+            Bits.JOGGING: status.jogging,
+            Bits.SIMULATED: True,
+            Bits.OWNED: program.ownership.holder != 0,
+            Bits.INTERRUPTED: status.interrupted_movement != 0,
+            Bits.PERMITTED: program.permitted,
+        }
+        bits = Bits(0)
+        for bit, on in shown.items():
+            bits |= bit if on else Bits(0)
+        return bits

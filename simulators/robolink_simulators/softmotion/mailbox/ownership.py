@@ -1,0 +1,93 @@
+"""Who may command the mailbox (design part 7)."""
+
+from typing import Final
+
+from robolink.protocols.mailbox import (
+    OPCODES,
+    Answer,
+    Command,
+    ErrorClass,
+    Opcode,
+    next_number,
+)
+from robolink.timing import NS_PER_S
+from robolink_simulators.softmotion.mailbox.complaints import Rejected
+from robolink_simulators.softmotion.mailbox.retained import RetainedMemory
+
+SILENCE_NS: Final = 10 * NS_PER_S
+"""After this long without a sign of its owner a mailbox may be taken, if nothing moves."""
+
+_RELEASE: Final = 1
+"""Operand i0 of a stop that lets the group go."""
+
+
+class Ownership:
+    """The owner's token; a PLC start clears it, and keeps the epoch.
+
+    Args:
+        memory: Keeps the epoch.
+
+    Attributes:
+        holder: Token of the owner, 0 for nobody.
+    """
+
+    def __init__(self, memory: RetainedMemory) -> None:
+        self._memory = memory
+        self._heard_ns = 0
+        self.holder = 0
+
+    def answer(self) -> Answer:
+        """Return what 30005 answers, taken or not."""
+        return Answer.of_owner(self.holder, self._memory.epoch)
+
+    def heard(self, now_ns: int) -> None:
+        """Note a sign of the owner."""
+        self._heard_ns = now_ns
+
+    def owns(self, command: Command) -> bool:
+        """Tell whether a command comes from the owner, in its present epoch."""
+        return self.holder != 0 and (command.owner, command.epoch) == (
+            self.holder,
+            self._memory.epoch,
+        )
+
+    def require(self, command: Command) -> None:
+        """Refuse a command that only the owner may send, if another sent it.
+
+        Raises:
+            Rejected: NOT_OWNER, or STALE_EPOCH.
+        """
+        releases = command.opcode == Opcode.STOP and command.operands[0] == _RELEASE
+        if not (OPCODES[Opcode(command.opcode)].needs_owner or releases):
+            return
+        if self.holder == 0 or command.owner != self.holder:
+            raise Rejected(ErrorClass.NOT_OWNER)
+        if command.epoch != self._memory.epoch:
+            raise Rejected(ErrorClass.STALE_EPOCH)
+
+    def carry_out(self, command: Command, now_ns: int, *, moving: bool) -> None:
+        """Let a client take the mailbox, or give it back.
+
+        The owner itself may take it again, under a new epoch (assumed).
+
+        Raises:
+            Rejected: Another one holds it, or an operand is wrong.
+        """
+        take, insists, *_ = command.operands
+        if {take, insists} - {0, 1} or not command.owner:
+            raise Rejected(ErrorClass.OPERAND)
+        if take:
+            self._take(command.owner, now_ns, insists=bool(insists), moving=moving)
+        elif self.owns(command):
+            self.holder = 0
+        else:
+            stale = command.owner == self.holder
+            raise Rejected(ErrorClass.STALE_EPOCH if stale else ErrorClass.NOT_OWNER)
+
+    def _take(self, owner: int, now_ns: int, *, insists: bool, moving: bool) -> None:
+        silent = now_ns - self._heard_ns >= SILENCE_NS and not moving
+        if self.holder not in (0, owner) and not silent and not insists:
+            raise Rejected(ErrorClass.NOT_OWNER)
+        self.holder = owner
+        self._memory.epoch = next_number(self._memory.epoch)
+        self._heard_ns = now_ns

@@ -1,0 +1,131 @@
+"""What a person or the rest of the machine does to a simulated PLC, past the wire."""
+
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+
+from robolink.errors import ConfigError
+from robolink.messages import tr
+from robolink_simulators.softmotion.coordinates import CoordRef
+from robolink_simulators.softmotion.mailbox.plc import Plc
+from robolink_simulators.softmotion.smc_errors import Refused
+
+_LAG_ERROR = 16
+"""SMC_ERROR: lag error (softmotion.md 1.4)."""
+
+
+class PlcPanel:
+    """Buttons, drives, the machine's own program. Any thread may act.
+
+    Args:
+        plc: The controller.
+        acting: Surrounds each act: keeps other threads out, gives the present time, and tells
+            hosts afterwards to look.
+    """
+
+    def __init__(self, plc: Plc, acting: Callable[[], AbstractContextManager[int]]) -> None:
+        self._plc = plc
+        self._acting = acting
+
+    def press_estop(self) -> None:
+        """Press the emergency stop: the drives lose their power."""
+        with self._acting():
+            self._plc.estop_pressed = True
+            self._plc.group.power(on=False)
+
+    def release_estop(self) -> None:
+        """Release it: the machine's program switches the drives on again."""
+        with self._acting():
+            self._plc.estop_pressed = False
+            self._plc.group.power(on=True)
+
+    def give_permit(self) -> None:
+        """Let the machine permit changes (``xPermit``)."""
+        with self._acting():
+            self._plc.program.permitted = True
+
+    def withdraw_permit(self) -> None:
+        """Let the machine permit them no longer; what moves goes on (assumed)."""
+        with self._acting():
+            self._plc.program.permitted = False
+
+    def fail_axis(self, number: int = 0, error_number: int = _LAG_ERROR) -> None:
+        """Let a drive fail.
+
+        Raises:
+            ConfigError: There is no such axis.
+        """
+        with self._acting():
+            self._require_axis(number)
+            self._plc.group.fail_axis(number, error_number)
+
+    def move_axis(self, number: int, target: float) -> None:
+        """Let the machine's own program move one axis by itself; degrees or mm.
+
+        Raises:
+            ConfigError: There is no such axis, or its drive refuses.
+        """
+        with self._acting():
+            self._require_axis(number)
+            error = self._plc.group.move_axis(number, target).outputs.error
+            if error is not None:
+                raise ConfigError(
+                    tr("Axis {number} does not move: {cause}.", number=number, cause=error.text),
+                    remedy=tr("Look at the state of the group and of the drive."),
+                )
+
+    def set_tool(self, tool: CoordRef) -> None:
+        """Let the machine's own program set a tool, which the mailbox then does not know.
+
+        Raises:
+            ConfigError: The group refuses it.
+        """
+        with self._acting():
+            error = self._plc.group.set_tool(tool).outputs.error
+            if error is not None:
+                raise ConfigError(
+                    tr("The tool cannot be set: {cause}.", cause=error.text),
+                    remedy=tr("Look at the state of the group and at its kinematics."),
+                )
+
+    def switch_input(self, number: int, on: bool) -> None:
+        """Switch an input by hand.
+
+        Raises:
+            ConfigError: There is no such input.
+        """
+        with self._acting():
+            try:
+                self._plc.group.inputs.switch(number, on)
+            except Refused as refused:
+                raise ConfigError(
+                    tr("There is no input {number}.", number=number),
+                    remedy=tr("Inputs are 0 to 31."),
+                ) from refused
+
+    def zero_inputs(self) -> None:
+        """Let the fieldbus zero what clients have written, as its watchdog does."""
+        with self._acting():
+            self._plc.program.inbox.zero()
+
+    def freeze(self) -> None:
+        """Let the mailbox program stand still, its heartbeat too; what moves goes on."""
+        with self._acting() as now_ns:
+            self._plc.freeze(now_ns)
+
+    def thaw(self) -> None:
+        """Let the mailbox program go on."""
+        with self._acting():
+            self._plc.thaw()
+
+    def restart(self) -> None:
+        """Start the PLC anew; what is retained stays."""
+        with self._acting() as now_ns:
+            self._plc.start(now_ns)
+
+    def _require_axis(self, number: int) -> None:
+        count = len(self._plc.group.axes)
+        if not 0 <= number < count:
+            raise ConfigError(
+                tr("There is no axis {number}.", number=number),
+                remedy=tr("Axes are 0 to {last}.", last=count - 1),
+            )

@@ -1,0 +1,136 @@
+"""A PLC: the axis group, its retained memory, and the mailbox program from start to start."""
+
+from collections.abc import Mapping
+from typing import Final
+
+from robolink.protocols.mailbox import RESPONSE_WORDS, SLOT_WORDS, WordOrder, Words, next_number
+from robolink_simulators.softmotion.catalogue import MachineModel
+from robolink_simulators.softmotion.condition import GroupState
+from robolink_simulators.softmotion.coordinates import CoordRef
+from robolink_simulators.softmotion.group import AxisGroup
+from robolink_simulators.softmotion.mailbox.option_text import PlcOptions
+from robolink_simulators.softmotion.mailbox.outbox import Outbox
+from robolink_simulators.softmotion.mailbox.program import MailboxProgram
+from robolink_simulators.softmotion.mailbox.retained import RetainedMemory
+from robolink_simulators.softmotion.mailbox.tool_desk import ToolDesk
+from robolink_simulators.softmotion.mailbox.units import UserUnits
+
+_PRESET_SLOT: Final = 1
+
+
+class Plc:
+    """The controller, without its fieldbus. Time is given, never taken.
+
+    Args:
+        model: Kinematics and drives.
+        parameters: Those of the kinematics.
+        options: The PLC's habits.
+
+    Attributes:
+        group: The axis group.
+        memory: The retained variables.
+        tools: Slots and the tool in force.
+        program: The mailbox program since the last start.
+        starts: PLC starts so far.
+        estop_pressed: Whether the drives are kept without power.
+    """
+
+    def __init__(
+        self, model: MachineModel, parameters: Mapping[str, float], options: PlcOptions
+    ) -> None:
+        self._options = options
+        self._kinematics = model.kinematics
+        self.group = AxisGroup(model.kinematics, model.limits, options.group)
+        self.memory = RetainedMemory()
+        self._units = UserUnits(options.mailbox.unit_um)
+        self.tools = ToolDesk(self.group, self.memory, self._units, parameters)
+        self._outbox = Outbox(
+            self.group,
+            self.memory,
+            self.tools,
+            self._units,
+            order=WordOrder[options.mailbox.word_order.upper()],
+        )
+        self.starts = 0
+        self.estop_pressed = False
+        self._start_ns = 0
+        self._frozen: Words | None = None
+        self.program = self._new_program()
+
+    @property
+    def frozen(self) -> bool:
+        """Whether the mailbox program stands still."""
+        return self._frozen is not None
+
+    def start(self, now_ns: int) -> None:
+        """Start the PLC: movements end, the tool is gone, nobody owns the mailbox.
+
+        The machine's program switches the drives on. With the profile ``tools`` it also
+        enables the group, because no client can (assumed).
+        """
+        self.group.restart(self._kinematics)
+        self.memory.boot_id = next_number(self.memory.boot_id)
+        self.starts += 1
+        self._start_ns, self._frozen = now_ns, None
+        self.tools.forget()
+        permitted = self.program.permitted
+        self.program = self._new_program()
+        self.program.permitted = permitted
+        self.group.power(on=not self.estop_pressed)
+        if self._options.mailbox.profile == "tools":
+            self.group.enable()
+
+    def make_ready(self, tool: CoordRef) -> None:
+        """Enable the group and select slot 1 with a tool, as somebody did earlier today."""
+        if self.group.state is GroupState.DISABLED:
+            self.group.enable()
+        self.tools.preset(_PRESET_SLOT, tool)
+
+    def freeze(self, now_ns: int) -> None:
+        """Stop the mailbox program; what moves goes on."""
+        self._frozen = self.output(now_ns)
+
+    def thaw(self) -> None:
+        """Let the mailbox program go on."""
+        self._frozen = None
+
+    def advance(self, now_ns: int) -> None:
+        """Let simulated time reach ``now_ns``, which is at most :meth:`next_change`."""
+        self.group.advance(now_ns)
+        if not self.frozen:
+            self.program.run(now_ns)
+
+    def next_change(self, now_ns: int) -> int | None:
+        """Return when :meth:`advance` will next do something by itself, if ever."""
+        changes = [self.group.next_change()]
+        if not self.frozen:
+            changes.append(self.program.next_change(now_ns))
+        return min((change for change in changes if change is not None), default=None)
+
+    def output(self, now_ns: int) -> Words:
+        """Return response and slots, one behind the other."""
+        return self._frozen or self._outbox.words(self.program, self._heartbeat(now_ns))
+
+    def response(self, now_ns: int) -> Words:
+        """Return the response block."""
+        if self._frozen is not None:
+            return self._frozen[:RESPONSE_WORDS]
+        return self._outbox.response(self.program, self._heartbeat(now_ns))
+
+    def read(self, first: int, count: int, now_ns: int) -> Words:
+        """Return words of response and slots."""
+        slot, offset = divmod(first - RESPONSE_WORDS, SLOT_WORDS)
+        if first + count <= RESPONSE_WORDS:
+            return self.response(now_ns)[first : first + count]
+        if slot >= 0 and offset + count <= SLOT_WORDS:
+            return self._outbox.slot(slot + 1)[offset : offset + count]
+        return self.output(now_ns)[first : first + count]
+
+    def _heartbeat(self, now_ns: int) -> int:
+        cycle_ns = self._options.group.cycle_us * 1000
+        return (now_ns - self._start_ns) // cycle_ns & 0xFFFF
+
+    def _new_program(self) -> MailboxProgram:
+        return MailboxProgram(
+            self.group, self.memory, self.tools, self._units, options=self._options.mailbox
+        )

@@ -1,0 +1,196 @@
+"""The mailbox program of a PLC: what it does with a command, and meanwhile (design part 7).
+
+Theory of operation. Clients write words. In the next cycle of its task the program looks at
+them: a whole new command is accepted, once, and handed to one of the desks, which call the
+blocks of the axis group. Between the cycles it follows what the group does, as if its task ran
+in step with every change, so that nothing of that depends on the period.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+from robolink.protocols.mailbox import (
+    OPCODES,
+    Answer,
+    Command,
+    CommandState,
+    ErrorClass,
+    Finished,
+    Opcode,
+    Profile,
+    WordOrder,
+    opcodes_of,
+)
+from robolink_simulators.softmotion.blocks import Execution
+from robolink_simulators.softmotion.group import AxisGroup
+from robolink_simulators.softmotion.mailbox.client_watch import ClientWatch
+from robolink_simulators.softmotion.mailbox.complaints import Rejected
+from robolink_simulators.softmotion.mailbox.inbox import Inbox
+from robolink_simulators.softmotion.mailbox.jobs import Job, Jobs
+from robolink_simulators.softmotion.mailbox.motion_desk import MotionDesk
+from robolink_simulators.softmotion.mailbox.options import MailboxOptions
+from robolink_simulators.softmotion.mailbox.ownership import Ownership
+from robolink_simulators.softmotion.mailbox.retained import RetainedMemory
+from robolink_simulators.softmotion.mailbox.signal_desk import SignalDesk
+from robolink_simulators.softmotion.mailbox.told import Handler, Told, done
+from robolink_simulators.softmotion.mailbox.tool_desk import ToolDesk
+from robolink_simulators.softmotion.mailbox.units import UserUnits
+
+_ANYTIME: Final = frozenset({Opcode.STOP, Opcode.HALT})
+_ANSWERED: Final = frozenset(
+    {
+        Opcode.SELECT_TOOL,
+        Opcode.READ_TOOL,
+        Opcode.OWNERSHIP,
+        Opcode.READ_INPUT,
+        Opcode.MOVE_UNTIL_INPUT,
+    }
+)
+
+
+class MailboxProgram:
+    """One mailbox for one axis group, from one PLC start to the next.
+
+    Args:
+        group: The axis group.
+        memory: The retained variables.
+        tools: Serves the opcodes about tools.
+        units: Of the mailbox.
+        options: How the project is set up.
+
+    Attributes:
+        inbox: What clients have written.
+        jobs: The commands that were accepted.
+        ownership: Who may command.
+        permitted: The machine's own permit (``xPermit``).
+        capabilities: What the program can be told.
+    """
+
+    def __init__(
+        self,
+        group: AxisGroup,
+        memory: RetainedMemory,
+        tools: ToolDesk,
+        units: UserUnits,
+        *,
+        options: MailboxOptions,
+    ) -> None:
+        profile = Profile(options.profile)
+        self.capabilities = profile.capabilities
+        self.inbox = Inbox(WordOrder[options.word_order.upper()])
+        self.jobs = Jobs(group)
+        self.ownership = Ownership(memory)
+        self.permitted = True
+        self._group = group
+        self._memory = memory
+        self._tools = tools
+        self._motion = MotionDesk(group, units, self.jobs)
+        self._watch = ClientWatch()
+        self._cycle_ns = options.program_cycle_us * 1000
+        self._look_ns: int | None = None
+        self._answer = Answer()
+        self._handlers = self._handlers_of(profile)
+
+    @property
+    def answer(self) -> Answer:
+        """The answer words: the acknowledged command's own, or else the set tool."""
+        job = self.jobs.acknowledged
+        if job is None or job.command.opcode not in _ANSWERED:
+            return self._tools.set_tool()
+        return self._motion.latched(job) or self._answer
+
+    def write(self, first: int, words: Sequence[int], now_ns: int) -> None:
+        """Take what a client writes; it is looked at in the next cycle."""
+        self.inbox.write(first, words)
+        if self._look_ns is None:
+            self._look_ns = (now_ns // self._cycle_ns + 1) * self._cycle_ns
+
+    def run(self, now_ns: int) -> None:
+        """Do what is due now."""
+        self._follow()
+        if self._look_ns is not None and now_ns >= self._look_ns:
+            self._look_ns = None
+            self._note_beat(now_ns)
+            command = self.inbox.new_command()
+            if command is not None:
+                self._accept(command, now_ns)
+        self._supervise(now_ns)
+        self._follow()
+
+    def next_change(self, now_ns: int) -> int | None:
+        """Return when :meth:`run` will next do something by itself, if ever."""
+        deadline_ns = self._watch.deadline_ns
+        if deadline_ns is not None and deadline_ns <= now_ns:
+            deadline_ns = now_ns + self._cycle_ns  # a halt was refused: try again
+        changes = (self._look_ns, deadline_ns)
+        return min((change for change in changes if change is not None), default=None)
+
+    def _follow(self) -> None:
+        self._motion.follow()
+        self.jobs.follow()
+
+    def _accept(self, command: Command, now_ns: int) -> None:
+        if self.ownership.owns(command):
+            self.ownership.heard(now_ns)
+        try:
+            self._require_admitted(command)
+            if self.jobs.in_work and command.opcode not in _ANYTIME:
+                self.inbox.hold_back(command)
+                self.jobs.note(Finished(command.sequence, CommandState.ERROR, ErrorClass.BUSY))
+                return
+            told = self._carried_out(command, now_ns)
+            job = Job(command, told.execution)
+        except Rejected as rejected:
+            told = Told(Execution())
+            job = Job(command, told.execution)
+            job.reject(rejected.error_class, rejected.raw)
+        named = self.ownership.answer() if command.opcode == Opcode.OWNERSHIP else Answer()
+        self._answer = told.answer or named
+        self.inbox.accept(command)
+        self.jobs.add(job)
+
+    def _require_admitted(self, command: Command) -> None:
+        """Refuse what is refused whatever the opcode demands, in the order of docs/mailbox.md."""
+        refusal = command.refusal()
+        if refusal:
+            raise Rejected(refusal)
+        if command.opcode not in self._handlers and command.opcode != Opcode.OWNERSHIP:
+            raise Rejected(ErrorClass.UNKNOWN_OPCODE)
+        if command.boot_id not in (0, self._memory.boot_id):
+            raise Rejected(ErrorClass.OTHER_BOOT)
+        self.ownership.require(command)
+        if not self.permitted and OPCODES[Opcode(command.opcode)].needs_permit:
+            raise Rejected(ErrorClass.NOT_PERMITTED)
+
+    def _carried_out(self, command: Command, now_ns: int) -> Told:
+        if command.opcode == Opcode.OWNERSHIP:
+            moving = not self._group.motion.resting or any(
+                axis.moving_alone for axis in self._group.axes
+            )
+            self.ownership.carry_out(command, now_ns, moving=moving)
+            return done()
+        return self._handlers[command.opcode](command)
+
+    def _note_beat(self, now_ns: int) -> None:
+        heard = self._watch.note(self.inbox.heartbeat, self._memory.epoch, now_ns)
+        if heard and self.ownership.holder:
+            self.ownership.heard(now_ns)
+
+    def _supervise(self, now_ns: int) -> None:
+        """Halt what moves when its client has fallen silent; the tool stays."""
+        moving = self.jobs.moving
+        self._watch.watch(moving=bool(moving), now_ns=now_ns)
+        deadline_ns = self._watch.deadline_ns
+        if deadline_ns is None or now_ns < deadline_ns:
+            return
+        for job in moving:
+            job.cause = ErrorClass.HEARTBEAT_LOST
+        self._group.halt()
+        self._follow()
+        self._watch.watch(moving=bool(self.jobs.moving), now_ns=now_ns)
+
+    def _handlers_of(self, profile: Profile) -> Mapping[int, Handler]:
+        handlers: dict[int, Handler] = {**self._tools.opcodes, **self._motion.opcodes}
+        handlers |= SignalDesk(self._group).opcodes
+        held = opcodes_of(profile)
+        return {opcode: handler for opcode, handler in handlers.items() if opcode in held}

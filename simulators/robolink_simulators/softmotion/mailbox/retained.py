@@ -1,0 +1,143 @@
+"""What a PLC keeps over a restart: the tool slots, and two counters."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, Final
+
+from robolink.durable_files import sync_folder, write_whole
+from robolink.errors import ConfigError
+from robolink.messages import tr
+from robolink.protocols.mailbox import SLOTS, Six, Slot, encode_slot, next_number
+
+SCHEMA: Final = "robolink/plc-state/1"
+
+
+class RetainedMemory:
+    """The retained variables of the mailbox program (design part 7).
+
+    Attributes:
+        boot_id: Counts PLC starts; 0 before the first.
+        epoch: Counts owners.
+    """
+
+    def __init__(self) -> None:
+        self.boot_id = 0
+        self.epoch = 0
+        self._slots = dict.fromkeys(SLOTS, Slot())
+
+    def slot(self, number: int) -> Slot:
+        """Return what a slot holds."""
+        return self._slots[number]
+
+    def defined(self) -> dict[int, Slot]:
+        """Return the slots that hold a tool."""
+        return {number: slot for number, slot in self._slots.items() if slot.defined}
+
+    def define(self, number: int, tool: Six, name: str) -> None:
+        """Put a tool into a slot.
+
+        Raises:
+            BlockError: The name is no printable ASCII.
+        """
+        slot = Slot(next_number(self._slots[number].counter), defined=True, tool=tool, name=name)
+        encode_slot(slot)
+        self._slots[number] = slot
+
+    def clear(self, number: int) -> None:
+        """Empty a slot; an empty one is not changed, nor counted."""
+        slot = self._slots[number]
+        if slot.defined:
+            self._slots[number] = Slot(next_number(slot.counter))
+
+    def to_state(self) -> dict[str, object]:
+        """Return all of it, ready for JSON."""
+        slots = {str(number): asdict(slot) for number, slot in self._slots.items() if slot.counter}
+        return {"boot_id": self.boot_id, "epoch": self.epoch, "slots": slots}
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Take over what :meth:`to_state` gave.
+
+        Raises:
+            KeyError, TypeError, ValueError: It is no such state.
+        """
+        slots = {int(number): _slot(held) for number, held in state["slots"].items()}
+        if not slots.keys() <= self._slots.keys():
+            raise ValueError(sorted(slots))
+        self._slots.update(slots)
+        self.boot_id, self.epoch = int(state["boot_id"]), int(state["epoch"])
+
+
+def _slot(held: Mapping[str, Any]) -> Slot:
+    x, y, z, a, b, c = map(float, held["tool"])
+    tool = (x, y, z, a, b, c)
+    slot = Slot(int(held["counter"]), bool(held["defined"]), tool, str(held["name"]))
+    encode_slot(slot)
+    return slot
+
+
+class RetainedFile:
+    """Keeps retained memory in a file.
+
+    Args:
+        path: Where; ``None`` keeps nothing.
+        memory: What.
+        machine: Name of the kinematics, which the file must fit.
+    """
+
+    def __init__(self, path: Path | None, memory: RetainedMemory, machine: str) -> None:
+        self._path = path
+        self._memory = memory
+        self._machine = machine
+        self._written: dict[str, object] | None = None
+
+    def restore(self) -> bool:
+        """Fill the memory from the file; False when there is none.
+
+        Raises:
+            ConfigError: The file cannot be read or is not of this machine.
+        """
+        if self._path is None or not self._path.exists():
+            return False
+        try:
+            document = json.loads(self._path.read_text(encoding="utf-8"))
+            if document["schema"] != SCHEMA or document["machine"] != self._machine:
+                raise ValueError(document["machine"])
+            self._memory.restore(document["memory"])
+        except (OSError, AttributeError, KeyError, TypeError, ValueError) as error:
+            raise ConfigError(
+                tr(
+                    "{path} is no saved state of a simulated PLC with {machine}.",
+                    path=self._path,
+                    machine=self._machine,
+                ),
+                remedy=tr("Name another file, or delete this one to start afresh."),
+            ) from error
+        return True
+
+    def save_changes(self) -> None:
+        """Write the file if something changed since it was written last.
+
+        Raises:
+            ConfigError: It cannot be written.
+        """
+        if self._path is None:
+            return
+        state = self._memory.to_state()
+        if state == self._written:
+            return
+        self._written = state
+        document = {"schema": SCHEMA, "machine": self._machine, "memory": state}
+        try:
+            write_whole(self._path, json.dumps(document).encode())
+            sync_folder(self._path.parent)
+        except OSError as error:
+            raise ConfigError(
+                tr(
+                    "The simulator cannot save its state in {path}: {cause}.",
+                    path=self._path,
+                    cause=error.strerror or error,
+                ),
+                remedy=tr("Name a file in a folder that can be written."),
+            ) from error

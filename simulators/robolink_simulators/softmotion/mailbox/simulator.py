@@ -1,0 +1,242 @@
+"""A simulated PLC with a mailbox as a device: words come and go, time passes.
+
+Theory of operation. The device is given every instant at which something can change, in
+order. It owns no thread and no clock: hosts hold :attr:`SoftMotionSimulator.lock`, hand it
+what clients read and write, and the time. Several hosts may serve one PLC; they share the
+words that clients write.
+"""
+
+import threading
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Final
+
+from robolink.protocols.mailbox import COMMAND, Opcode, Words
+from robolink_simulators.softmotion.catalogue import machine_named
+from robolink_simulators.softmotion.coordinates import CoordRef
+from robolink_simulators.softmotion.mailbox.exchange import (
+    Served,
+    WireFaults,
+    shown_read,
+    shown_write,
+)
+from robolink_simulators.softmotion.mailbox.faults import PlcFault, PlcFaultAction
+from robolink_simulators.softmotion.mailbox.mishaps import Mishaps
+from robolink_simulators.softmotion.mailbox.option_text import PlcOptions
+from robolink_simulators.softmotion.mailbox.panel import PlcPanel
+from robolink_simulators.softmotion.mailbox.plc import Plc
+from robolink_simulators.softmotion.mailbox.retained import RetainedFile
+from robolink_simulators.softmotion.world import SoftMotionWorld
+
+DEFAULT_KINEMATICS: Final = "Kin_Scara3_Z"
+
+_LOG_LINES: Final = 2000
+_TORN_S: Final = 0.02
+"""Between the halves of a torn write for which no other time is given."""
+
+RequestHook = Callable[[int, str], None]
+"""Called with the running number of a request and a text."""
+
+
+class SoftMotionSimulator:
+    """One PLC, its mailbox, and the world around its robot.
+
+    Args:
+        kinematics: Name of the kinematics, with ``+Kin_CAxis`` where that is coupled.
+        seed: Decides the world and every scatter; the same seed gives the same run.
+        parameters: Of the kinematics and its drives.
+        options: The PLC's habits.
+        state_path: File that keeps what retained memory keeps.
+        faults: What is planned to go wrong.
+
+    At first the machine stands ready: enabled, slot 1 defined and selected. With a state file
+    of an earlier run it has just been switched on: without a tool and, in the profile
+    ``full``, disabled.
+
+    Attributes:
+        lock: Held by whoever touches the simulator while a host serves it.
+        url: Where the first host serves it, empty when none does.
+        seed: What decides the world and every scatter.
+        durable: Whether its slots outlive the process.
+        options: The PLC's habits.
+        plc: The controller.
+        panel: What a person, or the machine's own program, can do.
+        world: The truth, and the person at the machine.
+        faults: What is planned to go wrong.
+        exchanges: Requests answered.
+        log: The last (now_ns, ">" or "<", text).
+        on_request: Called with a request before it is carried out. What it raises goes to
+            the host; the request is carried out all the same.
+        on_reply: Called before the answer leaves.
+        watchers: Called after each act at the panel, so that a host looks.
+        present_ns: Tells the present time to such acts; a host sets it.
+
+    Raises:
+        ConfigError: No such kinematics or parameter, or a state file that does not fit.
+    """
+
+    def __init__(
+        self,
+        kinematics: str = DEFAULT_KINEMATICS,
+        *,
+        seed: int = 1,
+        parameters: Mapping[str, float] | None = None,
+        options: PlcOptions | None = None,
+        state_path: Path | None = None,
+        faults: Iterable[PlcFault] = (),
+    ) -> None:
+        self.lock = threading.RLock()
+        self.url = ""
+        self.seed = seed
+        self.durable = state_path is not None
+        self.options = options or PlcOptions()
+        self.exchanges = 0
+        self.log: deque[tuple[int, str, str]] = deque(maxlen=_LOG_LINES)
+        self.on_request: RequestHook | None = None
+        self.on_reply: RequestHook | None = None
+        self.watchers: list[Callable[[], None]] = []
+        self.present_ns: Callable[[], int] | None = None
+        self._now_ns = 0
+        self._heard_ns = 0
+        self._stepping = False
+        self._requests = 0
+        self.faults = WireFaults(faults, seed)
+        given = dict(parameters or {})
+        self.plc = Plc(machine_named(kinematics, given), given, self.options)
+        self.world = SoftMotionWorld.seeded(self.plc.group, seed)
+        self.panel = PlcPanel(self.plc, self.acting)
+        self._mishaps = Mishaps(self.panel)
+        self._file = RetainedFile(state_path, self.plc.memory, kinematics)
+        switched_on = self._file.restore()
+        self.plc.start(0)
+        if not switched_on:
+            self._make_ready()
+        self._file.save_changes()
+
+    @property
+    def now_ns(self) -> int:
+        """The instant last given."""
+        return self._now_ns
+
+    def truth(self) -> dict[str, Any]:
+        """Return where the tips and the pin really are, and what the PLC holds."""
+        stored = self.plc.memory.defined()
+        return {
+            **self.world.truth(),
+            "stored": {str(number): list(slot.tool) for number, slot in stored.items()},
+            "selected_tool": self.plc.tools.selected,
+        }
+
+    @contextmanager
+    def acting(self) -> Iterator[int]:
+        """Surround an act that comes past the wire; gives the present time."""
+        with self.lock:
+            # A planned act happens at its own instant, in the middle of an advance.
+            if self.present_ns is not None and not self._stepping:
+                self.advance(self.present_ns())
+            yield self._now_ns
+            self._file.save_changes()
+        for watcher in tuple(self.watchers):
+            watcher()
+
+    def advance(self, now_ns: int) -> None:
+        """Let simulated time reach ``now_ns``, stopping wherever something changes."""
+        while (change := self.next_change()) is not None and self._now_ns < change < now_ns:
+            self._step(change)
+        self._step(max(now_ns, self._now_ns))
+
+    def next_change(self) -> int | None:
+        """Return when :meth:`advance` will next do something by itself, if ever."""
+        changes = (self.plc.next_change(self._now_ns), self._mishaps.next_change())
+        return min((change for change in changes if change is not None), default=None)
+
+    def read(self, first: int, count: int, now_ns: int) -> Served:
+        """Serve a client that reads words of response and slots."""
+        shown = shown_read(first, count)
+        return self._serve(shown, now_ns, lambda _: self.plc.read(first, count, self._now_ns))
+
+    def write(self, first: int, words: Sequence[int], now_ns: int) -> Served:
+        """Serve a client that writes words of the command block."""
+        shown = shown_write(first, words, _opcode_name(words))
+        return self._serve(shown, now_ns, lambda faults: self._take(first, words, faults))
+
+    def snapshot(self, now_ns: int) -> Served:
+        """Serve a client that has the response copied to where it reads it later."""
+        return self._serve("snapshot", now_ns, lambda _: self.plc.response(self._now_ns))
+
+    def read_copy(self, words: Words, now_ns: int) -> Served:
+        """Serve a client that reads a copy of the response that was made before."""
+        return self._serve(shown_read(0, len(words)), now_ns, lambda _: words)
+
+    def hear(self, now_ns: int) -> None:
+        """Note a valid request; after too long a silence what clients wrote is zeroed."""
+        self.advance(now_ns)
+        watchdog_ns = self.options.mailbox.watchdog_ms * 1_000_000
+        if watchdog_ns and now_ns - self._heard_ns > watchdog_ns:
+            self.plc.program.inbox.zero()
+        self._heard_ns = now_ns
+
+    def _make_ready(self) -> None:
+        x_mm, y_mm, z_mm, *_ = self.world.stored.components()
+        self.plc.make_ready(CoordRef(x_mm, y_mm, z_mm))
+
+    def _serve(
+        self, shown: str, now_ns: int, carry_out: Callable[[Sequence[PlcFault]], Words]
+    ) -> Served:
+        self.hear(now_ns)
+        self._requests += 1
+        number = self._requests
+        self.log.append((self._now_ns, ">", shown))
+        faults = self.faults.take(shown)
+        if any(fault.action is PlcFaultAction.DISCONNECT_BEFORE for fault in faults):
+            return Served(answered=False, cut=True)
+        self._mishaps.strike(faults, self._now_ns)
+        try:
+            if self.on_request is not None:
+                self.on_request(number, shown)
+        finally:
+            words = carry_out(faults)
+            self._file.save_changes()
+        self.exchanges += 1
+        self.log.append((self._now_ns, "<", shown))
+        if self.on_reply is not None:
+            self.on_reply(number, shown)
+        return self.faults.leaving(words, faults)
+
+    def _take(self, first: int, words: Sequence[int], faults: Sequence[PlcFault]) -> Words:
+        words = self.faults.arriving(words, faults)
+        torn = next((it for it in faults if it.action is PlcFaultAction.TEAR_WRITE), None)
+        if any(fault.action is PlcFaultAction.IGNORE_WRITE for fault in faults):
+            return ()
+        if torn is not None:
+            middle = len(words) // 2 if torn.position is None else torn.position
+            words, late = words[:middle], words[middle:]
+            late_s = torn.seconds or _TORN_S
+            self._mishaps.plan(self._now_ns, late_s, lambda: self._store(first + middle, late))
+        self._store(first, words)
+        return ()
+
+    def _store(self, first: int, words: Words) -> None:
+        self.plc.program.write(first, words, self._now_ns)
+
+    def _step(self, now_ns: int) -> None:
+        self._now_ns = now_ns
+        self._stepping = True
+        try:
+            self.plc.advance(now_ns)
+            self._mishaps.carry_out(now_ns)
+            self._file.save_changes()
+        finally:
+            self._stepping = False
+
+
+def _opcode_name(words: Sequence[int]) -> str:
+    place = COMMAND["opcode"].word
+    if len(words) <= place:
+        return ""
+    try:
+        return Opcode(words[place]).name
+    except ValueError:
+        return str(words[place])

@@ -1,0 +1,237 @@
+"""The tool table of a PLC with a map keeps the promises of every tool table, over a socket."""
+
+import socket
+import threading
+from pathlib import Path
+
+import pytest
+from robolink_simulators.clock import ScaledClock
+from robolink_simulators.faults import Fault, FaultAction
+from robolink_simulators.plc import PlcSimulator, serve_plc
+
+import robolink
+from robolink import ANY, ToolOffset
+from robolink.errors import (
+    BusyError,
+    ConfigError,
+    ConnectError,
+    OutcomeUnknownError,
+    ReadBackError,
+    RemoteProtocolError,
+    ReservedToolError,
+    ToolChangedError,
+    ToolIndexError,
+    TransportTimeoutError,
+)
+from robolink.model import Verdict
+from robolink.nozzle_change import ChangePlan, GivenPoses, NozzleChange, ToolPlan
+from robolink.register_maps import confirm, load_map
+from robolink.runner import Question
+from robolink.transaction import recover
+
+MAPS = Path("examples/plc-maps")
+NAMES = ("commit-bit", "level-handshake", "no-handshake")
+NEW = ToolOffset(11.25, -3.125)
+
+
+class Served:
+    """A simulated PLC on a socket; its time passes ten times as fast as ours."""
+
+    def __init__(self, name):
+        self.path = MAPS / f"{name}.toml"
+        self.map = load_map(self.path)
+        self.plc = PlcSimulator(self.map, seed=7)
+
+    def __enter__(self):
+        self.host = serve_plc(self.plc, self.path, clock=ScaledClock(10.0))
+        self.url = self.host.url
+        identity = self.url.partition("&map=")[0]
+        confirm(identity, self.map, by="test", compared="1.x")
+        return self
+
+    def __exit__(self, *_details):
+        self.host.close()
+
+    def connect(self, **options):
+        return robolink.connect(self.url, **options)
+
+
+@pytest.fixture(params=NAMES)
+def served(request):
+    with Served(request.param) as served:
+        yield served
+
+
+@pytest.fixture
+def controller(served):
+    with served.connect() as controller:
+        yield controller
+
+
+def test_the_map_says_which_tools_there_are_and_the_flange_reads_as_zero(controller):
+    assert list(controller.tools.indices()) == [1, 2]
+    assert list(controller.tools.read_all()) == [1, 2]
+    assert controller.tools.read(0) == ToolOffset()
+
+
+def test_a_listing_and_single_reads_agree(controller):
+    listed = controller.tools.read_all()
+    assert all(listed[tool] == controller.tools.read(tool) for tool in (1, 2))
+
+
+def test_a_write_is_read_back_and_receipted(served, controller):
+    before = controller.tools.read(1)
+    receipt = controller.tools.write(1, NEW, expected=before)
+    assert (receipt.before, receipt.requested, receipt.skipped) == (before, NEW, False)
+    assert receipt.read_back == NEW
+    assert served.plc.program.in_force[1]["x"] == NEW.x_mm
+
+
+def test_an_equal_value_is_not_written_again_whatever_was_expected(served, controller):
+    controller.tools.write(1, NEW, expected=ANY)
+    written = len(served.plc.writes)
+    assert controller.tools.write(1, NEW, expected=ToolOffset(9, 9)).skipped
+    assert len(served.plc.writes) == written
+
+
+def test_a_write_is_refused_when_another_value_is_stored(controller):
+    controller.tools.write(1, NEW, expected=ANY)
+    with pytest.raises(ToolChangedError, match=r"holds X 11\.250"):
+        controller.tools.write(1, ToolOffset(1), expected=ToolOffset(5))
+    assert controller.tools.read(1) == NEW
+
+
+def test_an_unconditional_write_says_so(controller):
+    assert controller.tools.write(1, NEW, expected=ANY).unconditional
+
+
+@pytest.mark.parametrize("tool", [3, -1, 100, True])
+def test_a_tool_that_the_map_lacks_is_refused_before_anything_is_sent(controller, tool):
+    sent = controller.exchanges
+    with pytest.raises(ToolIndexError):
+        controller.tools.write(tool, NEW, expected=ANY)
+    assert controller.exchanges == sent
+
+
+def test_tool_0_is_never_written(controller):
+    sent = controller.exchanges
+    with pytest.raises(ReservedToolError):
+        controller.tools.write(0, NEW, expected=ANY)
+    with pytest.raises(ReservedToolError):
+        controller.tools.clear(0, expected=ANY)
+    assert controller.exchanges == sent
+
+
+def test_a_second_thread_is_told_at_once_that_a_procedure_is_under_way(controller):
+    found = []
+
+    def intrude():
+        try:
+            controller.tools.write(1, NEW, expected=ANY)
+        except BusyError as error:
+            found.append(error)
+
+    with controller.preserved("a procedure"):
+        thread = threading.Thread(target=intrude)
+        thread.start()
+        thread.join()
+    assert len(found) == 1
+
+
+def test_a_preview_is_what_is_sent_first_and_sends_nothing(served, controller):
+    (first, *_) = controller.tools.preview_write(1, NEW)
+    address = next(iter(served.map.slots[1].span))
+    assert f"(address {address})" in first
+    assert served.plc.writes == []
+    controller.tools.write(1, NEW, expected=ANY)
+    assert controller.tools.preview_write(1, NEW) == ()
+
+
+def test_a_write_that_is_acknowledged_and_not_done_is_noticed(served, controller):
+    first = f"fc16 {served.map.slots[1].span.start}"
+    served.plc.faults.add(Fault(FaultAction.IGNORE_WRITE, match=first))
+    with pytest.raises(ReadBackError, match="reads back as"):
+        controller.tools.write(1, NEW, expected=ANY)
+
+
+@pytest.mark.parametrize(
+    "action", [FaultAction.DROP_REPLY, FaultAction.DISCONNECT, FaultAction.DISCONNECT_BEFORE]
+)
+def test_a_lost_answer_is_not_sent_again_and_settled_by_the_next_connection(served, action):
+    first = f"fc16 {served.map.slots[1].span.start}"
+    with served.connect(timeout_s=0.3) as controller:
+        before = controller.tools.read(1)
+        served.plc.faults.add(Fault(action, match=first))
+        with pytest.raises(OutcomeUnknownError):
+            controller.tools.write(1, NEW, expected=before)
+    assert served.plc.writes.count(first) <= 1
+    with served.connect() as controller:
+        recovery = recover(controller)
+        (finding,) = (*recovery.settled, *recovery.left)
+        if action is FaultAction.DISCONNECT_BEFORE:
+            assert finding.verdict is Verdict.NOT_APPLIED
+            assert controller.tools.read(1) == before
+        elif served.map.slots[1].contiguous:
+            assert controller.tools.read(1) == NEW
+            assert served.plc.program.in_force[1]["x"] == NEW.x_mm
+        else:
+            assert finding.verdict is Verdict.CONFLICT
+
+
+def test_a_calibration_takes_its_poses_from_a_person(served):
+    class Person:
+        def tell(self, text):
+            pass
+
+        def ask(self, question, kind):
+            assert kind is Question.YES_NO
+
+        def poll(self, wait_s):
+            return "y"
+
+    with served.connect() as controller:
+        stored = controller.tools.read(1)
+        poses = (
+            robolink.Pose(300 - stored.x_mm - 0.2, 100 - stored.y_mm, -20, 0),
+            robolink.Pose(300 + stored.x_mm + 0.2, 100 + stored.y_mm, -20, 180),
+        )
+        plan = ChangePlan((ToolPlan(1, GivenPoses(lambda: poses)),), ask_before_write=False)
+        report = NozzleChange(controller, plan, operator=Person()).run(write=True)
+        assert controller.tools.read(1).x_mm == pytest.approx(stored.x_mm + 0.2, abs=0.001)
+        assert controller.tools.read(1).z_mm == stored.z_mm
+    assert len(report.tools) == 1
+
+
+def test_a_wrong_unit_a_missing_map_and_a_closed_port_are_clear_errors():
+    with Served("commit-bit") as served:
+        with pytest.raises(TransportTimeoutError, match="unit 9"):
+            robolink.connect(served.url.replace("unit=1", "unit=9"))
+        bare = served.url.partition("?")[0]
+        with pytest.raises(ConfigError, match="map is missing"):
+            robolink.connect(bare)
+        with pytest.raises(ConfigError, match="cannot be read"):
+            robolink.connect(f"{bare}?map=missing.toml")
+        with pytest.raises(ConfigError, match="no option 'units'"):
+            robolink.connect(f"{served.url}&units=1")
+        with pytest.raises(ConfigError, match="cannot be recorded"):
+            robolink.connect(served.url, trace=lambda *_: None)
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    with pytest.raises(ConnectError):
+        robolink.connect(f"plc+modbus-tcp://127.0.0.1:{port}?map={MAPS / 'commit-bit.toml'}")
+
+
+def test_a_map_of_another_machine_is_found_out_when_connecting(tmp_path):
+    text = (MAPS / "commit-bit.toml").read_text(encoding="utf-8")
+    shifted = tmp_path / "shifted.toml"
+    shifted.write_text(text.replace("address = 20\n", "address = 21\n"), encoding="utf-8")
+    turned = tmp_path / "turned.toml"
+    turned.write_text(text.replace('"low_first"', '"high_first"'), encoding="utf-8")
+    with Served("commit-bit") as served:
+        url = served.url.partition("&map=")[0]
+        with pytest.raises(RemoteProtocolError, match="off by"):
+            robolink.connect(f"{url}&map={shifted}")
+        with pytest.raises(RemoteProtocolError, match='word_order = "low_first"'):
+            robolink.connect(f"{url}&map={turned}")
+    assert served.plc.writes == []

@@ -1,0 +1,219 @@
+"""The conformance behaviours of softmotion.md part 7, seen through the wire.
+
+Numbers 6 and 9 need kinematics that are not simulated.
+"""
+
+import pytest
+from robolink_simulators.hosting.modbus import serve_modbus_tcp
+from robolink_simulators.softmotion.mailbox import (
+    MailboxOptions,
+    PlcOptions,
+    SoftMotionSimulator,
+)
+
+from robolink.errors import ConfigError
+from robolink.protocols.mailbox import (
+    RESPONSE,
+    Bits,
+    CommandState,
+    ErrorClass,
+    GroupState,
+    Kinematics,
+    Opcode,
+    WordOrder,
+    find_word_order,
+    frames_match,
+)
+from robolink.transport import open_mailbox_link
+from tests.unit._mailbox_client import (
+    ACS,
+    FACTORS,
+    LINE,
+    MCS,
+    NO_TOOL,
+    MailboxClient,
+    linked,
+    owning,
+    shifted,
+)
+
+UP = (0.0, 0.0, 50.0, 0.0, 0.0, 0.0)
+
+
+@pytest.fixture(params=["sim", "modbus-tcp"])
+def client(request):
+    """A client that owns the mailbox of a SCARA without an orientation axis."""
+    simulator = SoftMotionSimulator("Kin_Scara2_Z")
+    if request.param == "sim":
+        yield owning(simulator)[0]
+        return
+    with serve_modbus_tcp(simulator) as host:
+        link = open_mailbox_link(host.url)
+        client = MailboxClient(link)
+        client.take()
+        yield client
+        link.close()
+
+
+def put(client, tool, slot=2):
+    """Write a slot and select it: the way in which a client sets a tool."""
+    client.done(Opcode.WRITE_TOOL, slot, pose=tool, name="probe")
+    return client.tell(Opcode.SELECT_TOOL, slot)
+
+
+def set_tool(client):
+    return client.done(Opcode.READ_TOOL).answer.pose
+
+
+def test_1_no_tool_can_be_set_in_disabled(client):
+    client.done(Opcode.SELECT_TOOL, 0)
+    client.done(Opcode.DISABLE)
+    now = put(client, UP)
+    assert (now.state, now.error_class) == (CommandState.ERROR, ErrorClass.DISABLED)
+    assert now.raw_error == 11000
+    assert now.group_state == GroupState.DISABLED
+    assert set_tool(client) == NO_TOOL
+
+
+def test_2_no_tool_can_be_set_in_errorstop_and_the_old_one_survives_the_reset():
+    client, simulator = owning(kinematics="Kin_Scara2_Z")
+    before = set_tool(client)
+    simulator.panel.fail_axis(0)
+    assert client.now().group_state == GroupState.ERRORSTOP
+    now = put(client, UP)
+    assert (now.state, now.error_class) == (CommandState.ERROR, ErrorClass.ERRORSTOP)
+    client.done(Opcode.RESET)
+    assert set_tool(client) == before
+    assert client.now().group_state == GroupState.STANDBY
+
+
+def test_3_a_shift_that_the_kinematics_cannot_carry_leaves_the_old_tool(client):
+    old = (0.0, 0.0, 20.0, 0.0, 0.0, 0.0)
+    assert put(client, old).state == CommandState.DONE
+    client.done(Opcode.WRITE_TOOL, 3, pose=(10.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+    assert client.refused(Opcode.SELECT_TOOL, 3) == ErrorClass.TOOL_INCOMPATIBLE
+    now = client.now()
+    assert (now.tool_slot, now.group_state) == (2, GroupState.STANDBY)
+    assert set_tool(client) == old
+
+
+def test_4_a_shift_along_z_fits_with_any_rotation(client):
+    tool = (0.0, 0.0, -35.0, 10.0, 20.0, 30.0)
+    assert put(client, tool).state == CommandState.DONE
+    assert frames_match(set_tool(client), tool, tolerance=1e-9)
+
+
+def test_5_a_polar_robot_carries_shifts_along_z_alone():
+    client, _ = owning(kinematics="Kin_Polar_Z")
+    assert put(client, (0.0, 1.0, 0.0, 0.0, 0.0, 0.0)).error_class == ErrorClass.TOOL_INCOMPATIBLE
+    assert put(client, (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)).state == CommandState.DONE
+
+
+@pytest.mark.parametrize("kinematics", ["Kin_Gantry3", "Kin_Scara3_Z", "Kin_Scara2_Z+Kin_CAxis"])
+def test_7_where_the_orientation_is_known_any_tool_fits(kinematics):
+    client, _ = owning(kinematics=kinematics)
+    tool = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
+    assert put(client, tool).state == CommandState.DONE
+    assert frames_match(set_tool(client), tool, tolerance=1e-9)
+
+
+def test_8_setting_the_kinematics_takes_the_tool_off_even_the_same_kinematics(client):
+    assert set_tool(client) != NO_TOOL
+    now = client.done(Opcode.SET_KINEMATICS, Kinematics.SCARA2_Z, 0)
+    assert (now.tool_slot, now.answer.pose) == (0, NO_TOOL)
+    assert set_tool(client) == NO_TOOL
+    assert client.slot(1).defined
+
+
+def test_10_enabling_twice_and_disabling_twice_are_errors(client):
+    assert client.refused(Opcode.ENABLE) == ErrorClass.WRONG_STATE
+    now = client.now()
+    assert (now.group_state, now.raw_error) == (GroupState.STANDBY, 11000)
+    client.done(Opcode.DISABLE)
+    assert client.refused(Opcode.DISABLE) == ErrorClass.DISABLED
+    assert client.now().group_state == GroupState.DISABLED
+
+
+def test_11_a_reset_with_nothing_to_reset_is_an_error(client):
+    assert client.refused(Opcode.RESET) == ErrorClass.NOTHING_TO_RESET
+    now = client.now()
+    assert (now.group_state, now.raw_error) == (GroupState.STANDBY, 120)
+
+
+def test_12_a_movement_is_done_in_one_cycle_and_the_group_in_standby_in_the_next():
+    client, simulator = owning()
+    sequence = client.move(z=5.0).ack_head
+    seen: list[tuple[int, int]] = []
+    while not seen or seen[-1][1] != GroupState.STANDBY:
+        clock = client.link.clock
+        clock.advance_to((clock.now_ns() // 4_000_000 + 1) * 4_000_000)
+        with simulator.lock:
+            simulator.advance(clock.now_ns())
+            words = simulator.plc.response(clock.now_ns())
+        seen.append((words[2], words[7]))
+        if len(seen) % 50 == 0:
+            client.beat()
+    assert seen[-2:] == [(CommandState.DONE, GroupState.MOVING), (10, GroupState.STANDBY)]
+    assert client.now().finished[0] == (sequence, CommandState.DONE, ErrorClass.NONE)
+
+
+def test_13_a_stop_holds_until_it_is_released(client):
+    client.move(z=-5.0)
+    client.done(Opcode.STOP)
+    assert client.now().group_state == GroupState.STOPPING
+    client.wait(0.2)
+    assert client.now().group_state == GroupState.STOPPING
+    assert client.move(z=5.0).error_class == ErrorClass.STOPPING
+    assert client.refused(Opcode.JOG, 1, 0, MCS, dynamics=LINE) == ErrorClass.STOPPING
+    client.done(Opcode.STOP, 1)
+    assert client.now().group_state == GroupState.STANDBY
+
+
+def test_14_an_axis_moved_by_itself_breaks_a_movement_and_nothing_else():
+    client, simulator = owning()
+    simulator.panel.move_axis(0, 35.0)
+    assert client.now().group_state == GroupState.STANDBY
+    client.wait(2.0)
+    sequence = client.move(z=20.0).ack_head
+    with pytest.raises(ConfigError, match="alone"):
+        simulator.panel.move_axis(0, 34.0)
+    assert client.end_of(sequence) == (
+        sequence,
+        CommandState.ABORTED,
+        ErrorClass.INTERRUPTED_BY_AXIS,
+    )
+    assert client.now().group_state == GroupState.ERRORSTOP
+
+
+def test_15_jogging_a_turn_keeps_the_tcp_and_both_buttons_do_nothing():
+    # About Z: no simulated kinematics can turn its flange about X.
+    client, _ = owning(kinematics="Kin_Gantry3+Kin_CAxis")
+    before = client.now()
+    client.tell(Opcode.JOG, 1 << 5, 0, MCS, dynamics=FACTORS)
+    client.wait(0.1)
+    assert client.now().bits & Bits.JOGGING
+    client.done(Opcode.JOG, 0, 0, MCS)
+    client.wait(0.3)
+    after = client.now()
+    assert after.tcp[:3] == pytest.approx(before.tcp[:3], abs=1e-6)
+    assert sum(after.tcp[3:]) - sum(before.tcp[3:]) > 5
+    assert after.axes[:2] != pytest.approx(before.axes[:2], abs=0.1)
+    client.done(Opcode.JOG, 1, 1, MCS, dynamics=LINE)
+    client.wait(0.1)
+    assert client.now().tcp == pytest.approx(after.tcp, abs=1e-9)
+
+
+@pytest.mark.parametrize("order", ["high_first", "pairs_swapped", "halves_swapped"])
+def test_16_the_probe_tells_another_word_order(order):
+    options = PlcOptions(mailbox=MailboxOptions(word_order=order))
+    client = linked(SoftMotionSimulator(options=options))
+    words = client.link.read_response()
+    assert find_word_order(words[RESPONSE.at("probe")]) is WordOrder[order.upper()]
+
+
+def test_a_direct_movement_in_axis_space_ends_at_its_target(client):
+    axes = client.now().axes
+    target = shifted(axes, 5.0, -5.0, 10.0)
+    now = client.tell(Opcode.MOVE_DIRECT, 0, 0, ACS, 0, pose=target, dynamics=FACTORS)
+    assert client.end_of(now.ack_head).state == CommandState.DONE
+    assert client.now().axes == pytest.approx(target, abs=1e-9)

@@ -1,0 +1,101 @@
+"""The simulated PLC answers what real Modbus clients send, and survives what they should not."""
+
+from pathlib import Path
+
+import pytest
+from pymodbus.framer import FramerSocket
+from pymodbus.pdu import DecodePDU
+from pymodbus.pdu.bit_message import ReadCoilsRequest, WriteSingleCoilRequest
+from pymodbus.pdu.register_message import (
+    ReadHoldingRegistersRequest,
+    ReadInputRegistersRequest,
+    WriteMultipleRegistersRequest,
+    WriteSingleRegisterRequest,
+)
+from robolink_simulators.plc import PlcSimulator
+
+from robolink.register_maps import load_map
+
+MAP = Path("examples/plc-maps/commit-bit.toml")
+
+
+@pytest.fixture
+def plc():
+    return PlcSimulator(load_map(MAP), unit=1)
+
+
+def ask(link, pdu, unit=1, now_ns=0):
+    framer = FramerSocket(DecodePDU(is_server=False))
+    payload = bytes([pdu.function_code]) + pdu.encode()
+    link.receive(framer.encode(payload, unit, 7), now_ns)
+    frame = link.outgoing()
+    assert frame[:2] == b"\x00\x07"
+    return framer.decoder.decode(frame[7:])
+
+
+def test_what_is_written_reads_back(plc):
+    link = plc.connect(0)
+    ask(link, WriteMultipleRegistersRequest(address=100, registers=[1, 2, 3]))
+    ask(link, WriteSingleRegisterRequest(address=103, registers=[4]))
+    ask(link, WriteSingleCoilRequest(address=2000, bits=[True]))
+    found = ask(link, ReadHoldingRegistersRequest(address=100, count=4))
+    assert found.registers == [1, 2, 3, 4]
+    assert ask(link, ReadCoilsRequest(address=2000, count=1)).bits[0] is True
+    assert plc.writes == ["fc16 100", "fc6 103", "fc5 2000"]
+
+
+def test_the_probe_is_there_in_the_order_of_the_map(plc):
+    found = ask(plc.connect(0), ReadInputRegistersRequest(address=20, count=2))
+    assert found.registers == [0x8794, 0x4145]
+
+
+@pytest.mark.parametrize(
+    ("pdu", "unit", "code"),
+    [
+        (ReadHoldingRegistersRequest(address=100, count=1), 2, 11),
+        (ReadHoldingRegistersRequest(address=60000, count=1), 1, 2),
+        (WriteMultipleRegistersRequest(address=60000, registers=[1]), 1, 2),
+    ],
+)
+def test_what_it_does_not_have_is_refused(plc, pdu, unit, code):
+    answer = ask(plc.connect(0), pdu, unit)
+    assert answer.isError()
+    assert answer.exception_code == code
+    assert plc.writes == []
+
+
+def test_an_unknown_function_is_refused(plc):
+    link = plc.connect(0)
+    link.receive(bytes.fromhex("0007 0000 0003 01 2b 0e"), 0)
+    assert link.outgoing()[7:] == bytes.fromhex("ab 01")
+
+
+def test_a_stream_that_is_no_modbus_ends_the_connection_and_not_the_plc(plc):
+    link = plc.connect(0)
+    link.receive(bytes(16), 0)
+    assert link.closed
+    assert ask(plc.connect(0), ReadHoldingRegistersRequest(address=100, count=1)).registers
+
+
+def test_a_request_in_pieces_is_answered_once_it_is_whole(plc):
+    link = plc.connect(0)
+    frame = bytes.fromhex("0007 0000 0006 01 03 0064 0001")
+    for byte in frame[:-1]:
+        link.receive(bytes([byte]), 0)
+        assert link.outgoing() == b""
+    link.receive(frame[-1:], 0)
+    assert len(link.outgoing()) == 11
+
+
+def test_the_program_answers_after_its_time_and_takes_over_once(plc):
+    link = plc.connect(0)
+    ask(link, WriteMultipleRegistersRequest(address=100, registers=[0, 0x3F80]))
+    before = plc.program.in_force[1]["x"]
+    ask(link, WriteSingleCoilRequest(address=2000, bits=[True]))
+    assert plc.program.in_force[1]["x"] == before
+    due = plc.next_change()
+    plc.advance(due)
+    assert plc.program.in_force[1]["x"] == 1.0
+    ask(link, WriteSingleCoilRequest(address=2000, bits=[True]), now_ns=due)
+    plc.advance(due + 10**9)
+    assert plc.program.takeovers == 1

@@ -25,6 +25,7 @@ from robolink.runner import Operator
 from robolink.transaction import earlier_corrections
 from robolink_cli._calibration_views import doubts, report_payload, show_proposal, show_report
 from robolink_cli._impacting import ImpactRequest, impact_payload, judge, show_impact
+from robolink_cli._notices import note_change
 from robolink_cli._operator import AssistedOperator, terminal
 from robolink_cli._render import note
 from robolink_cli._reporting import Draft
@@ -156,7 +157,7 @@ class LiveCalibration:
             NotReadyError: The state forbids it.
         """
         self._controller.require_settled(tr("calibrate tool {tool}", tool=self.tool))
-        self._controller.tools.read(self.tool)
+        note_change(self._controller, self.tool, self._controller.tools.read(self.tool))
         back_up_first(self._controller)
 
     def dry_run(self) -> dict[str, object]:

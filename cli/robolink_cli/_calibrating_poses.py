@@ -26,6 +26,7 @@ from robolink_cli._calibration_views import doubts, report_payload
 from robolink_cli._consent import agree, on_terminal
 from robolink_cli._context import CliContext, open_controller
 from robolink_cli._impacting import ImpactRequest, impact_payload, show_impact
+from robolink_cli._notices import note_change
 from robolink_cli._operator import terminal
 from robolink_cli._pose_source import PoseSource
 from robolink_cli._render import note, say
@@ -58,10 +59,12 @@ class _PosesListener(CalibrationListener):
         plan: PosesPlan,
         given: GivenPoses,
         *,
+        controller: Controller,
         impact: ImpactRequest | None,
         yes: bool,
     ) -> None:
         super().__init__(draft, impact)
+        self._controller = controller
         self._plan = plan
         self._given = given
         self._yes = yes
@@ -78,6 +81,7 @@ class _PosesListener(CalibrationListener):
 
     def proposed(self, proposals: Sequence[Proposal]) -> None:
         (proposal,) = proposals
+        note_change(self._controller, proposal.tool, proposal.before)
         self.propose(proposal, source=self._given.sentence, warnings=self._doubts(proposal))
         if "small_rotation" in proposal.result.warnings:
             say(tr("  the poses differ little in U; half a turn would be best"))
@@ -130,7 +134,7 @@ def calibrate_from_poses(
             plausible_mm=plan.gate.limit_mm,
             sentence=source.sentence(plan.taught_tool),
         )
-        listener = _PosesListener(draft, plan, given, impact=impact, yes=yes)
+        listener = _PosesListener(draft, plan, given, controller=controller, impact=impact, yes=yes)
         listener.read_points(controller)
         if dry_run:
             payload = _dry_run(controller, plan, given, listener, quiet=context.json)

@@ -3,9 +3,10 @@
 from typing import TYPE_CHECKING
 
 from robolink.messages import tr
+from robolink_cli._render import note
 
 if TYPE_CHECKING:
-    from robolink.model import Marker
+    from robolink.model import Controller, Marker, ToolOffset
 
 
 def marker_notice(marker: "Marker", url: str) -> str:
@@ -28,6 +29,15 @@ def marker_notice(marker: "Marker", url: str) -> str:
         request=marker.request,
         url=url,
     )
+
+
+def note_change(controller: "Controller", tool: int, now: "ToolOffset | None") -> None:
+    """Say when a tool does not hold what was last proved to be in it, and the usual causes."""
+    from robolink.transaction import changed_since
+
+    change = changed_since(controller, tool, now)
+    if change is not None:
+        note(change.sentence)
 
 
 def _unfinished(marker: "Marker", url: str) -> str:

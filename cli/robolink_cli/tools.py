@@ -8,6 +8,7 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_cli._consent import agree, dry_run_option, published_option, yes_option
 from robolink_cli._context import CliContext, controller_options, open_controller
+from robolink_cli._notices import note_change
 from robolink_cli._render import note, say
 
 
@@ -57,6 +58,8 @@ def get(context: CliContext, number: int | None, mode: str | None) -> None:
         return
     with open_controller(context) as controller:
         offset, selected = controller.tools.read(number), controller.tools.selected()
+        if number:
+            note_change(controller, number, offset)
     value = offset_payload(offset)
     payload: dict[str, object] = {
         "tool": number,
@@ -114,6 +117,7 @@ def set_tool(
     with open_controller(context, changes=not dry_run) as controller:
         controller.tools.require_writable(number)
         before = controller.tools.read(number)
+        note_change(controller, number, before)
         wanted = replace(before or ToolOffset(), **changes)
         kept = [name for name in units.values() if name not in changes]
         shown = offset_payload(before), offset_payload(wanted)

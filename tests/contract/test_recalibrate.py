@@ -385,3 +385,31 @@ def test_an_emergency_stop_during_a_recipe_repeats_nothing(cell, nth):
     assert cell.run("resolve", "--yes").code == 0
     assert cell.tool_1 == OLD_TIP
     cell.check_settings_are_those_of_before()
+
+
+@pytest.mark.parametrize(
+    "command", [("tool", "get", "1"), ("tool", "set", "1", "--x", "12.3", "--yes")]
+)
+def test_whoever_looks_at_a_tool_is_told_that_somebody_else_changed_it(cell, command):
+    assert cell.run("tool", "set", "1", "--x", "12.1", "--yes").code == 0
+    assert "mm away" not in cell.run("tool", "get", "1").err
+    cell.simulator.machine.tools.set(1, ToolOffset(12.6, -3.5, -20))
+    shown = cell.run(*command)
+    assert shown.code == 0, shown.err
+    assert "That is 0.500 mm away" in shown.err
+    assert "it was left with X 12.100" in shown.err
+
+
+def test_a_raw_statement_is_for_engineers_and_on_record(cell, tmp_path, monkeypatch):
+    (tmp_path / "robolink.toml").write_text(
+        f'[cells.a]\nurl = "{cell.url}"\n[cells.a.people]\nanna = "engineer"\nben = "operator"\n'
+    )
+    monkeypatch.chdir(tmp_path)
+    raw = ("execute-raw", "Print TLDef(1)", "--yes", "-c", "a")
+    assert cell.run(*raw, "--operator", "ben").code == 9
+    done = cell.run(*raw, "--operator", "anna")
+    assert (done.code, done.out.strip()) == (0, "-1"), done.err
+    (entry,) = journal(cell, EntryKind.RAW)
+    assert (entry.signature.operator, entry.signature.role) == ("anna", "engineer")
+    assert entry.details["request"] == "Print TLDef(1)"
+    assert cell.run("execute-raw", "Tool 9", "--yes", "-c", "a", "--operator", "anna").code == 5

@@ -1,0 +1,118 @@
+"""Our driver for mapped PLCs against a PLC that a C program on libmodbus plays."""
+
+import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+from robolink_simulators.hosting._serial_cable import SerialCable
+
+import robolink
+from robolink import ToolOffset
+from robolink.errors import RejectedError
+from robolink.transaction import Wanted, change_tools
+
+MAP = Path("examples/plc-maps/commit-bit.toml").absolute()
+OLD = {1: ToolOffset(12.0, -3.5, -20.0, 15.0), 2: ToolOffset(-12.0, -3.5, -21.0)}
+NEW = {1: ToolOffset(12.25, -3.125, -20.0, 15.5), 2: ToolOffset(-11.75, -3.5, -21.5)}
+TOO_FAR = ToolOffset(60.0, -3.5, -20.0)
+
+
+@dataclass
+class MappedPlc:
+    """A PLC in a process of its own; ``in_force`` is complete when that has ended."""
+
+    url: str
+    process: subprocess.Popen[str]
+    in_force: list[list[float]] = field(default_factory=list)
+
+    def end(self) -> None:
+        """End the process and collect what it took over, each time."""
+        self.process.kill()
+        printed, _ = self.process.communicate(timeout=5)
+        takeovers = [line for line in printed.splitlines() if line.startswith("in force ")]
+        self.in_force = [[float(text) for text in line.split()[2:]] for line in takeovers]
+
+
+@contextmanager
+def started(program: Path, *arguments: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """Start the program, and return it with its first line."""
+    command = [str(program), *arguments]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout is not None
+            yield process, process.stdout.readline().strip()
+        finally:
+            process.kill()
+
+
+@pytest.fixture
+def tcp_plc(programs):
+    """The PLC on a loopback port."""
+    with started(programs / "mapped_plc", "tcp") as (process, line):
+        port = line.removeprefix("port ")
+        yield MappedPlc(f"plc+modbus-tcp://127.0.0.1:{port}?map={MAP}", process)
+
+
+@pytest.fixture
+def rtu_plc(programs):
+    """The PLC on a serial cable."""
+    cable = SerialCable()
+    try:
+        with started(programs / "mapped_plc", "rtu", cable.far) as (process, line):
+            assert line == "ready"
+            options = f"baud=115200&parity=none&map={MAP}"
+            yield MappedPlc(f"plc+modbus-rtu://{cable.near}?{options}", process)
+    finally:
+        cable.close()
+
+
+@pytest.fixture(params=["tcp", "rtu"])
+def plc(request):
+    """The PLC, both ways."""
+    return request.getfixturevalue(f"{request.param}_plc")
+
+
+def values(*tools: ToolOffset) -> list[float]:
+    """Return what the PLC prints about tools."""
+    return [value for t in tools for value in (t.x_mm, t.y_mm, t.z_mm, t.u_deg)]
+
+
+def test_tools_and_signals_are_read(plc):
+    with robolink.connect(plc.url) as controller:
+        assert controller.tools.read_all() == OLD
+        assert controller.tools.selected() == 1
+        status = controller.status()
+    assert (status.remote, status.ready, status.fault) == (True, True, False)
+
+
+def test_a_tool_is_written_taken_over_and_read_back(plc):
+    with robolink.connect(plc.url) as controller:
+        receipt = controller.tools.write(1, NEW[1], expected=OLD[1])
+        assert (receipt.before, receipt.read_back) == (OLD[1], NEW[1])
+    with robolink.connect(plc.url) as controller:
+        assert controller.tools.read_all() == {1: NEW[1], 2: OLD[2]}
+    plc.end()
+    assert plc.in_force == [values(NEW[1], OLD[2])]
+
+
+def test_two_tools_change_together(plc):
+    with robolink.connect(plc.url) as controller:
+        change_tools(controller, [Wanted(tool, NEW[tool], OLD[tool]) for tool in OLD])
+        assert controller.tools.read_all() == NEW
+    plc.end()
+    assert plc.in_force == [values(NEW[1], OLD[2]), values(NEW[1], NEW[2])]
+
+
+def test_a_refused_value_is_named_and_all_tools_are_as_before(plc):
+    wanted = [Wanted(1, NEW[1], OLD[1]), Wanted(2, TOO_FAR, OLD[2])]
+    with robolink.connect(plc.url) as controller:
+        with pytest.raises(RejectedError, match="7, the offset is outside the limits"):
+            change_tools(controller, wanted)
+        assert controller.tools.read_all() == OLD
+        assert controller.status().ready
+    plc.end()
+    assert plc.in_force[0] == values(NEW[1], OLD[2])
+    assert plc.in_force[-1] == values(OLD[1], OLD[2])

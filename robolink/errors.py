@@ -171,6 +171,7 @@ class NotReadyReason(StrEnum):
     HIGH_POWER = "high_power"
     WRONG_TOOL = "wrong_tool"
     NO_REMOTE_TIMEOUT = "no_remote_timeout"
+    EDGE_PASSED = "edge_passed"
 
 
 class NotReadyError(ControllerError):

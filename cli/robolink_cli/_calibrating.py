@@ -195,9 +195,7 @@ def planned_steps(controller: Controller, plan: ChangePlan) -> list[dict[str, ob
     group = controller.groups[0]
     steps: list[dict[str, object]] = []
     for step in preview(controller, plan):
-        requests: list[str] = []
-        if step.target is not None and step.profile is not None:
-            requests = list(group.requests_for(step.target, step.profile))
+        requests = list(step.requests(group))
         target = pose_payload(step.target) if step.target else None
         steps.append(
             {"text": step.text, "target": target, "requests": requests, "refusal": step.refusal}

@@ -18,9 +18,14 @@ from robolink.calibration._poses import two_of as two_of
 from robolink.calibration._result import CalibrationResult as CalibrationResult
 from robolink.calibration._result import Drift as Drift
 from robolink.calibration._result import VerifyResult as VerifyResult
+from robolink.calibration._stations import BeamStation as BeamStation
+from robolink.calibration._stations import CrossingPlan as CrossingPlan
+from robolink.calibration._stations import ProbePlan as ProbePlan
+from robolink.calibration._stations import TouchStation as TouchStation
 from robolink.calibration._steps import Ask as Ask
 from robolink.calibration._steps import Move as Move
 from robolink.calibration._steps import Procedure as Procedure
+from robolink.calibration._steps import Seek as Seek
 from robolink.calibration._steps import Step as Step
 from robolink.calibration._tolerance import PLANAR_TOLERANCE as PLANAR_TOLERANCE
 from robolink.calibration._tolerance import TOUCH_TOLERANCE as TOUCH_TOLERANCE
@@ -50,6 +55,10 @@ if TYPE_CHECKING:
     from robolink.calibration._camera_model import require_same_camera as require_same_camera
     from robolink.calibration._crossed_beams import BeamsResult as BeamsResult
     from robolink.calibration._crossed_beams import solve_crossed_beams as solve_crossed_beams
+    from robolink.calibration._crossing import cross_beams as cross_beams
+    from robolink.calibration._crossing import toward_zero as toward_zero
+    from robolink.calibration._crossing import trace_beams as trace_beams
+    from robolink.calibration._crossing import verify_by_crossing as verify_by_crossing
     from robolink.calibration._joint import JointResult as JointResult
     from robolink.calibration._joint import JointTouch as JointTouch
     from robolink.calibration._joint import ToolDifference as ToolDifference
@@ -83,6 +92,8 @@ if TYPE_CHECKING:
     from robolink.calibration._suggest import PosePlan as PosePlan
     from robolink.calibration._suggest import precise_enough as precise_enough
     from robolink.calibration._suggest import suggest_poses as suggest_poses
+    from robolink.calibration._touching_off import touch_off as touch_off
+    from robolink.calibration._touching_off import verify_by_touching as verify_by_touching
     from robolink.calibration._update_guard import NEEDLE_LIMIT_MM as NEEDLE_LIMIT_MM
     from robolink.calibration._update_guard import Correction as Correction
     from robolink.calibration._update_guard import require_shrinking as require_shrinking
@@ -109,6 +120,10 @@ _LOADED_LATER = {
     "require_same_camera": "_camera_model",
     "BeamsResult": "_crossed_beams",
     "solve_crossed_beams": "_crossed_beams",
+    "cross_beams": "_crossing",
+    "toward_zero": "_crossing",
+    "trace_beams": "_crossing",
+    "verify_by_crossing": "_crossing",
     "JointResult": "_joint",
     "JointTouch": "_joint",
     "ToolDifference": "_joint",
@@ -142,6 +157,8 @@ _LOADED_LATER = {
     "PosePlan": "_suggest",
     "precise_enough": "_suggest",
     "suggest_poses": "_suggest",
+    "touch_off": "_touching_off",
+    "verify_by_touching": "_touching_off",
     "Correction": "_update_guard",
     "require_shrinking": "_update_guard",
     "NEEDLE_LIMIT_MM": "_update_guard",

@@ -75,7 +75,7 @@ def solve_crossed_beams(
         offset=keep_unmeasured(stored, x_mm=float(fit.x[0]), y_mm=float(fit.x[1])),
         measured=("x_mm", "y_mm"),
         kept=_KEPT,
-        reference_point_mm=_where_they_cross(beams),
+        reference_point_mm=where_they_cross(beams),
         sigma_gain=math.sqrt(float(fit.unit_covariance.diagonal()[:2].max())),
         warnings=warnings,
         inputs=tuple(crossing.entry for crossing in crossings),
@@ -141,7 +141,8 @@ def _vectors(
     )
 
 
-def _where_they_cross(beams: tuple[Beam, Beam]) -> tuple[float, float]:
+def where_they_cross(beams: tuple[Beam, Beam]) -> tuple[float, float]:
+    """Return X and Y of the point where two beams cross, base, mm."""
     normals = np.array([beam.normal for beam in beams])
     x, y = np.linalg.solve(normals, [beam.distance_mm for beam in beams]).tolist()
     return x, y

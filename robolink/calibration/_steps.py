@@ -9,7 +9,7 @@ from collections.abc import Generator
 from dataclasses import dataclass
 from typing import TypeVar
 
-from robolink.model import Path, Pose
+from robolink.model import InputEdge, Path, Pose
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +28,22 @@ class Ask:
     instruction: str
 
 
-Step = Move | Ask
+@dataclass(frozen=True, slots=True)
+class Seek:
+    """Drive the frame in force straight on until an input switches; answered with the pose then.
+
+    When the input shows the edge already, or not on the way, whoever runs the procedure throws
+    CalibrationError ``edge_passed`` or ``no_edge`` into it. The frame is then where it was, or
+    at ``target``.
+    """
+
+    target: Pose
+    edge: InputEdge
+    speed_mm_s: float
+    purpose: str
+
+
+Step = Move | Ask | Seek
 
 T = TypeVar("T")
 Procedure = Generator[Step, Pose, T]

@@ -41,3 +41,5 @@ from robolink.model._tools import ToolTable as ToolTable
 from robolink.model._tools import describe_offset as describe_offset
 from robolink.model._tools import plain_offset as plain_offset
 from robolink.model._tools import read_offset as read_offset
+from robolink.model._until_input import InputEdge as InputEdge
+from robolink.model._until_input import MotionUntilInput as MotionUntilInput

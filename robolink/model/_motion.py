@@ -9,6 +9,7 @@ from typing import Protocol
 from robolink.errors import LimitError
 from robolink.messages import tr
 from robolink.model._geometry import Pose
+from robolink.model._until_input import InputEdge, MotionUntilInput
 
 
 class Path(StrEnum):
@@ -131,6 +132,23 @@ class MotionGroup(Protocol):
             NotReadyError: The state, the motors or the tool in force forbid it.
             OutcomeUnknownError: An earlier command on this controller is unresolved.
         """
+
+    def move_until_input(
+        self, target: Pose, edge: InputEdge, *, speed_mm_s: float, box: WorkBox
+    ) -> MotionUntilInput:
+        """Start one straight movement during which the controller watches an input.
+
+        Sent at most once, and not at all when the input shows already what is waited for.
+
+        Raises:
+            ConfigError: There is no such input or speed.
+            LimitError, NotReadyError, OutcomeUnknownError: As :meth:`move_to`.
+        """
+
+    def requests_until(
+        self, target: Pose, edge: InputEdge, *, speed_mm_s: float
+    ) -> tuple[str, ...]:
+        """Return what :meth:`move_until_input` would send besides its reads."""
 
     def requests_for(self, target: Pose, profile: MotionProfile) -> tuple[str, ...]:
         """Return what :meth:`move_to` would send besides its reads, as it stands on the wire."""

@@ -1,5 +1,6 @@
 """Durable markers of what was begun and not proved finished."""
 
+import os
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
@@ -20,9 +21,7 @@ class MarkerKind(StrEnum):
 
 def new_operation() -> str:
     """Return a unique id for a command or a tool change."""
-    from uuid import uuid4  # here, because --help needs none
-
-    return uuid4().hex
+    return os.urandom(16).hex()
 
 
 @dataclass(frozen=True, slots=True)

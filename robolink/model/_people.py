@@ -42,4 +42,5 @@ def require_engineer(outcomes: OutcomeLog, act: str, **details: object) -> None:
                 "Nothing was sent. One whom the cell file calls an engineer may, with --operator."
             ),
         )
-    outcomes.append(NewEntry(EntryKind.DECISION, verdict=act, details={**details, "engineer": True}))
+    said = {**details, "engineer": True}
+    outcomes.append(NewEntry(EntryKind.DECISION, verdict=act, details=said))

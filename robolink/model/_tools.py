@@ -2,13 +2,16 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from enum import Enum
 from typing import Final, Literal, Protocol
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model._geometry import angle_difference_deg
+
+
+_COMPONENTS: Final = ("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,11 +32,10 @@ class ToolOffset:
     w_deg: float = 0.0
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
+        for name, value in zip(_COMPONENTS, self.components(), strict=True):
             if not isinstance(value, (int, float)) or not math.isfinite(value):
                 raise ConfigError(
-                    tr("{name} is not a number: {value!r}.", name=field.name, value=value),
+                    tr("{name} is not a number: {value!r}.", name=name, value=value),
                     remedy=tr("Give a finite decimal number."),
                 )
 
@@ -43,15 +45,18 @@ class ToolOffset:
 
     def rounded(self, decimals: int) -> "ToolOffset":
         """Return the value that a controller printing ``decimals`` places can hold."""
-        return ToolOffset(*(round(value, decimals) + 0.0 for value in self.components()))
+        return ToolOffset(*[round(value, decimals) + 0.0 for value in self.components()])
 
     def matches(self, other: "ToolOffset", tolerance: float) -> bool:
         """Tell whether every component agrees within ``tolerance`` (mm, degrees).
 
         Angles are compared modulo 360: a controller may store 270 as -90.
         """
-        lengths = zip(self.components()[:3], other.components()[:3], strict=True)
-        angles = zip(self.components()[3:], other.components()[3:], strict=True)
+        ours, theirs = self.components(), other.components()
+        if ours == theirs:
+            return True
+        lengths = zip(ours[:3], theirs[:3], strict=True)
+        angles = zip(ours[3:], theirs[3:], strict=True)
         slack = tolerance * (1 + 1e-9)
         return all(abs(a - b) <= slack for a, b in lengths) and all(
             abs(angle_difference_deg(a, b)) <= slack for a, b in angles

@@ -2,6 +2,7 @@
 
 from robolink.nozzle_change._change import Earlier as Earlier
 from robolink.nozzle_change._change import NozzleChange as NozzleChange
+from robolink.nozzle_change._crossed_beams import CrossedBeams as CrossedBeams
 from robolink.nozzle_change._flange import flange_pose as flange_pose
 from robolink.nozzle_change._gate import Gate as Gate
 from robolink.nozzle_change._given_poses import GivenPoses as GivenPoses
@@ -21,4 +22,5 @@ from robolink.nozzle_change._proposal import ToolReport as ToolReport
 from robolink.nozzle_change._source import Bench as Bench
 from robolink.nozzle_change._source import MovingSource as MovingSource
 from robolink.nozzle_change._source import TipSource as TipSource
+from robolink.nozzle_change._touch_probe import TouchProbe as TouchProbe
 from robolink.nozzle_change._touching import PinAndPerson as PinAndPerson

@@ -1,4 +1,4 @@
-"""Where the flange is when a tip is somewhere."""
+"""Where the flange is when a tip is somewhere, and a tip seen from another one."""
 
 from dataclasses import replace
 
@@ -21,3 +21,9 @@ def flange_pose(tip: Pose, offset: ToolOffset) -> Pose:
         u_deg=u_deg,
         tool=0,
     )
+
+
+def seen_from(written: ToolOffset, tip: ToolOffset) -> ToolOffset:
+    """Return where a tip is, seen from the frame of a written offset of a four-axis robot."""
+    dx, dy = rotate_xy(tip.x_mm - written.x_mm, tip.y_mm - written.y_mm, -written.u_deg)
+    return ToolOffset(dx, dy, tip.z_mm - written.z_mm)

@@ -4,10 +4,10 @@ from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass
 from functools import partial
 
-from robolink.calibration import Ask, Move, Procedure, travel
+from robolink.calibration import Ask, Move, Procedure, Seek, travel
 from robolink.errors import CalibrationError, LimitError
 from robolink.messages import tr
-from robolink.model import Controller, MotionProfile, Pose, ToolOffset
+from robolink.model import Controller, InputEdge, MotionGroup, MotionProfile, Path, Pose, ToolOffset
 from robolink.nozzle_change._flange import flange_pose
 from robolink.nozzle_change._plan import ChangePlan
 from robolink.nozzle_change._source import MovingSource
@@ -22,13 +22,23 @@ class PlannedStep:
         text: What is done.
         target: Where the flange goes, ``None`` for a step of the person.
         profile: How it goes there.
+        edge: The input that ends the step on the way, ``None`` for none.
         refusal: Why the limits forbid it, empty when they do not.
     """
 
     text: str
     target: Pose | None = None
     profile: MotionProfile | None = None
+    edge: InputEdge | None = None
     refusal: str = ""
+
+    def requests(self, group: MotionGroup) -> tuple[str, ...]:
+        """Return what the step would send besides its reads, as it stands on the wire."""
+        if self.target is None or self.profile is None:
+            return ()
+        if self.edge is None:
+            return group.requests_for(self.target, self.profile)
+        return group.requests_until(self.target, self.edge, speed_mm_s=self.profile.speed_mm_s)
 
 
 def preview(controller: Controller, plan: ChangePlan) -> tuple[PlannedStep, ...]:
@@ -74,8 +84,8 @@ def _journey(target: Pose | None, purpose: str, here: Pose) -> Procedure[object]
     return None
 
 
-def _measurement(source: MovingSource, stored: ToolOffset | None, _here: Pose) -> Procedure[object]:
-    return (yield from source.procedure(stored))
+def _measurement(source: MovingSource, stored: ToolOffset | None, here: Pose) -> Procedure[object]:
+    return (yield from source.procedure(stored, here))
 
 
 def _follow(
@@ -87,7 +97,7 @@ def _follow(
         while True:
             if isinstance(step, Ask):
                 yield PlannedStep(step.instruction)
-            elif isinstance(step, Move):
+            else:
                 here = step.target
                 yield _planned(step, settings)
             step = procedure.send(here)
@@ -96,11 +106,15 @@ def _follow(
         return here
 
 
-def _planned(step: Move, settings: RunSettings) -> PlannedStep:
-    profile = MotionProfile(step.path, settings.speed_percent, settings.speed_mm_s)
+def _planned(step: Move | Seek, settings: RunSettings) -> PlannedStep:
+    if isinstance(step, Move):
+        profile = MotionProfile(step.path, settings.speed_percent, settings.speed_mm_s)
+        edge = None
+    else:
+        profile, edge = MotionProfile(Path.STRAIGHT, speed_mm_s=step.speed_mm_s), step.edge
     try:
         settings.box.check(step.target)
         refusal = ""
     except LimitError as error:
         refusal = str(error)
-    return PlannedStep(step.purpose, step.target, profile, refusal)
+    return PlannedStep(step.purpose, step.target, profile, edge, refusal)

@@ -58,7 +58,8 @@ class Bench:
     def runner(self, tip: ToolOffset | None = None) -> Runner:
         """Return a runner for the flange, or for a tip at an offset from it."""
         group = self.controller.groups[0]
-        start = group.pose() if self.start is None else self.start
+        # Where nothing moves there is nothing to limit, and perhaps no pose to be read.
+        start = Pose(0.0, 0.0, 0.0, 0.0) if self.start is None else self.start
         return Runner(
             self.controller, group, self.operator, self._settings(start, tip), on_step=self._on_step
         )
@@ -88,8 +89,13 @@ class TipSource(Protocol):
 class MovingSource(TipSource, Protocol):
     """Measures a tip by moving the robot, and so can turn about the new tip as well."""
 
-    def procedure(self, stored: ToolOffset | None) -> Procedure[CalibrationResult]:
-        """Return the steps of a measurement, for a look at them before anything moves."""
+    def procedure(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:
+        """Return the steps of a measurement, for a look at them before anything moves.
+
+        Args:
+            stored: The offset stored now.
+            here: Where the flange is at its start.
+        """
 
     def verify(
         self,

@@ -13,7 +13,7 @@ from robolink.calibration import (
     verify_by_turning,
 )
 from robolink.messages import tr
-from robolink.model import ToolOffset
+from robolink.model import Pose, ToolOffset
 from robolink.nozzle_change._source import Bench
 
 
@@ -53,9 +53,9 @@ class PinAndPerson:
     def measure(self, bench: Bench, tool: int, stored: ToolOffset | None) -> CalibrationResult:  # noqa: ARG002 - the flange is what moves
         """Touch and solve; see :class:`~robolink.nozzle_change.MovingSource`."""
         bench.controller.tools.select(0)
-        return bench.run(self.procedure(stored))
+        return bench.run(self.procedure(stored, bench.controller.groups[0].pose()))
 
-    def procedure(self, stored: ToolOffset | None) -> Procedure[CalibrationResult]:
+    def procedure(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:  # noqa: ARG002 - the person brings the tip to the pin
         """Return the steps of a measurement; see :class:`~robolink.nozzle_change.MovingSource`."""
         if not self.turns_deg:
             return two_pose(self.touch, stored=stored, sigma_mm=self.sigma_mm)

@@ -18,8 +18,11 @@ if TYPE_CHECKING:
     from robolink.recipe._recipe import Recipe as Recipe
     from robolink.recipe._run import RecipeRun as RecipeRun
     from robolink.recipe._schema import json_schema as json_schema
+    from robolink.recipe._sources import BeamLine as BeamLine
+    from robolink.recipe._sources import BeamsSource as BeamsSource
     from robolink.recipe._sources import OperatorSource as OperatorSource
     from robolink.recipe._sources import PointsSource as PointsSource
+    from robolink.recipe._sources import TouchSource as TouchSource
     from robolink.recipe._tables import Box as Box
     from robolink.recipe._tables import FlangePose as FlangePose
     from robolink.recipe._tables import Output as Output
@@ -39,8 +42,11 @@ _LOADED_LATER = {
     "HeightRule": "_recipe",
     "Recipe": "_recipe",
     "json_schema": "_schema",
+    "BeamLine": "_sources",
+    "BeamsSource": "_sources",
     "OperatorSource": "_sources",
     "PointsSource": "_sources",
+    "TouchSource": "_sources",
     "Box": "_tables",
     "FlangePose": "_tables",
     "Output": "_tables",

@@ -9,7 +9,7 @@ from robolink.config import Problem
 from robolink.messages import tr
 from robolink.model import angle_difference_deg
 from robolink.recipe._draft import Draft
-from robolink.recipe._sources import OperatorSource
+from robolink.recipe._sources import BeamsSource, OperatorSource, TouchSource
 
 _SAME_ANGLE_DEG: Final = 1e-9
 
@@ -78,8 +78,12 @@ def station(draft: Draft) -> Iterator[Problem]:
 def height(draft: Draft) -> Iterator[Problem]:
     """Check that Z can be measured where it is to be."""
     if draft.z != "measured":
+        if isinstance(draft.source, TouchSource) and draft.z is not None:
+            yield Problem("z", tr('must be "measured": a touch tells Z and nothing else'))
         return
-    if draft.source is not None and not draft.source.moves:
+    if isinstance(draft.source, BeamsSource):
+        yield Problem("z", tr('cannot be "measured" with beams; write "typed" or "kept"'))
+    elif draft.source is not None and not draft.source.moves:
         yield Problem(
             "z",
             tr('cannot be "measured" from taught points; write "typed" or "kept"'),

@@ -6,6 +6,7 @@ from itertools import combinations
 from robolink.config import Problem
 from robolink.messages import tr
 from robolink.recipe._draft import Draft
+from robolink.recipe._sources import PointsSource
 from robolink.recipe._tables import Box, FlangePose, Tool
 
 
@@ -26,7 +27,7 @@ def points(draft: Draft) -> Iterator[Problem]:
     owners: dict[int, int] = {}
     for place, tool in _tools(draft):
         where = f"{place}.points"
-        if source.moves:
+        if not isinstance(source, PointsSource):
             if tool.points is not None:
                 yield Problem(where, tr('means nothing without kind = "points" in [source]'))
         elif tool.points is None:

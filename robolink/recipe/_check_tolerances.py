@@ -8,7 +8,7 @@ from robolink.config import Problem
 from robolink.messages import tr
 from robolink.model import Pose
 from robolink.recipe._draft import Draft
-from robolink.recipe._sources import OperatorSource
+from robolink.recipe._sources import AnySource, BeamsSource, OperatorSource, TouchSource
 
 
 def residuals(draft: Draft) -> Iterator[Problem]:
@@ -16,16 +16,10 @@ def residuals(draft: Draft) -> Iterator[Problem]:
     limits = draft.tolerances
     if limits is None:
         return
-    if draft.source is not None and draft.source.method == "two_pose":
+    if draft.source is not None and draft.source.agrees_always:
         for key in ("rms_mm", "max_mm"):
             if getattr(limits, key) is not None:
-                yield Problem(
-                    f"tolerances.{key}",
-                    tr(
-                        "cannot be judged: two poses always agree, so they leave no residual; "
-                        'use method = "n_angle", or interval_mm with sigma_mm'
-                    ),
-                )
+                yield Problem(f"tolerances.{key}", _without_residual(draft.source))
     if limits.rms_mm is not None and limits.max_mm is not None and limits.max_mm < limits.rms_mm:
         yield Problem(
             "tolerances.max_mm", tr("must be at least rms_mm: no rms exceeds the largest")
@@ -38,12 +32,12 @@ def intervals(draft: Draft) -> Iterator[Problem]:
     if limits is None or source is None or limits.interval_mm is None:
         return
     if limits.sigma_mm is None:
-        if source.method == "two_pose":
+        if source.agrees_always:
             yield Problem(
                 "tolerances.sigma_mm",
                 tr(
-                    "is missing: two poses leave no residual, so interval_mm can be judged only "
-                    "from a stated standard deviation"
+                    "is missing: the measurement leaves no residual, so interval_mm can be judged "
+                    "only from a stated standard deviation"
                 ),
             )
     elif isinstance(source, OperatorSource) and source.touches_deg:
@@ -74,3 +68,20 @@ def refusals(draft: Draft) -> Iterator[Problem]:
     refusal = draft.refusal
     if refusal is not None and refusal.action == "stop" and refusal.attempts is not None:
         yield Problem("refusal.attempts", tr('means nothing without action = "measure_again"'))
+
+
+def _without_residual(source: AnySource) -> str:
+    if isinstance(source, BeamsSource):
+        return tr(
+            "cannot be judged: crossings that are not repeated always agree, so they leave no "
+            "residual; use repeats = 2, or interval_mm with sigma_mm"
+        )
+    if isinstance(source, TouchSource):
+        return tr(
+            "cannot be judged: two touches always agree, so they leave no residual; give four "
+            "speeds_mm_s, or interval_mm with sigma_mm"
+        )
+    return tr(
+        "cannot be judged: two poses always agree, so they leave no residual; "
+        'use method = "n_angle", or interval_mm with sigma_mm'
+    )

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator
 from typing import Final
 
 from robolink.config import Problem
+from robolink.recipe._check_beams import beams, beams_height
 from robolink.recipe._check_measuring import (
     angles,
     clearance,
@@ -13,11 +14,16 @@ from robolink.recipe._check_measuring import (
 from robolink.recipe._check_moments import answers, moments
 from robolink.recipe._check_places import points, room, standstill, tool_numbers
 from robolink.recipe._check_tolerances import intervals, refusals, residuals, verification
+from robolink.recipe._check_touch import surface, touches
 from robolink.recipe._draft import Draft
 
 _CHECKS: Final[tuple[Callable[[Draft], Iterator[Problem]], ...]] = (
     angles,
     clearance,
+    beams,
+    beams_height,
+    surface,
+    touches,
     station,
     height,
     tool_numbers,

@@ -5,7 +5,7 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 from robolink.recipe._recipe import Basis, HeightRule
-from robolink.recipe._sources import OperatorSource, PointsSource
+from robolink.recipe._sources import AnySource
 from robolink.recipe._tables import (
     Box,
     Output,
@@ -30,7 +30,7 @@ class Draft:
     basis: Basis | None = None
     z: HeightRule | None = None
     verify: bool | None = None
-    source: OperatorSource | PointsSource | None = None
+    source: AnySource | None = None
     station: Station | None = None
     poses: Poses | None = None
     tools: tuple[Tool, ...] | None = None

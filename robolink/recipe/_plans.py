@@ -1,23 +1,25 @@
 """From a recipe to the plan of a nozzle change."""
 
-from robolink.calibration import TouchPlan
+from robolink.calibration import BeamStation, CrossingPlan, ProbePlan, TouchPlan, TouchStation
 from robolink.errors import ConfigError, LimitError
 from robolink.messages import tr
 from robolink.model import Controller, Pose
 from robolink.nozzle_change import (
     ChangePlan,
+    CrossedBeams,
     Gate,
     GivenPoses,
     Limits,
     PinAndPerson,
     TipSource,
     ToolPlan,
+    TouchProbe,
     preview,
     taught_poses,
 )
 from robolink.recipe._recipe import Recipe
-from robolink.recipe._sources import OperatorSource, PointsSource
-from robolink.recipe._tables import Tool
+from robolink.recipe._sources import BeamsSource, OperatorSource, PointsSource, TouchSource
+from robolink.recipe._tables import Station, Tool
 
 
 def plan_of(
@@ -98,7 +100,53 @@ def _source(recipe: Recipe, controller: Controller, tool: Tool) -> TipSource:
             lift_mm=source.lift_mm, clearance_mm=source.clearance_mm, turn_deg=source.turn_deg
         )
         return PinAndPerson(touch, turns_deg=source.turns_deg, sigma_mm=tolerances.sigma_mm)
+    if isinstance(source, BeamsSource):
+        return _from_beams(source, tolerances.sigma_mm)
+    if isinstance(source, TouchSource):
+        return _from_touch(source, recipe.station, tolerances.sigma_mm)
     return _from_points(source, controller, tool, recipe)
+
+
+def _from_beams(source: BeamsSource, sigma_mm: float | None) -> TipSource:
+    from robolink.calibration import Beam  # numpy, which recipes without beams do without
+
+    first, second = source.beams
+    station = BeamStation(
+        (
+            Beam(first.x_mm, first.y_mm, first.direction_deg),
+            Beam(second.x_mm, second.y_mm, second.direction_deg),
+        ),
+        source.z_mm,
+        (first.input, second.input),
+        off_when_broken=source.off_when_broken,
+    )
+    plan = CrossingPlan(
+        search_mm=source.search_mm,
+        aside_mm=source.aside_mm,
+        dip_mm=source.dip_mm,
+        lift_mm=source.lift_mm,
+        speed_mm_s=source.crossing_mm_s,
+        repeats=source.repeats,
+        shaft_mm=source.shaft_mm,
+        max_lean_deg=source.max_lean_deg,
+    )
+    return CrossedBeams(station, plan, turn_deg=source.turn_deg, sigma_mm=sigma_mm)
+
+
+def _from_touch(source: TouchSource, place: Station, sigma_mm: float | None) -> TipSource:
+    x_mm, y_mm, z_mm = place.x_mm, place.y_mm, place.z_mm
+    assert x_mm is not None  # noqa: S101 - the recipe was checked
+    assert y_mm is not None  # noqa: S101
+    assert z_mm is not None  # noqa: S101
+    station = TouchStation(x_mm, y_mm, z_mm, source.input, off_when_touched=source.off_when_touched)
+    plan = ProbePlan(
+        clearance_mm=source.clearance_mm,
+        beyond_mm=source.beyond_mm,
+        back_off_mm=source.back_off_mm,
+        lift_mm=source.lift_mm,
+        speeds_mm_s=source.speeds_mm_s,
+    )
+    return TouchProbe(station, plan, sigma_mm=sigma_mm)
 
 
 def _from_points(

@@ -12,8 +12,13 @@ from robolink.recipe._reference import Reference, reference_details
 
 
 def contact_z_mm(proposal: Proposal) -> float:
-    """Return the height of the flange when the tip touched the pin, mean of all touches, mm."""
-    return fmean(pose.z_mm for pose in proposal.result.inputs)
+    """Return the height of the flange when the tip touched, mean of all touches, mm."""
+    from robolink.calibration import ZTouchResult  # numpy, late
+
+    result = proposal.result
+    if isinstance(result, ZTouchResult):
+        return result.flange_z_mm
+    return fmean(pose.z_mm for pose in result.inputs)
 
 
 def proposed(
@@ -35,7 +40,7 @@ def proposed(
     """
     tip = measured.result.offset
     offset, notes = tip, list[str]()
-    height = contact_z_mm(measured) if recipe.source.moves else None
+    height = contact_z_mm(measured) if recipe.source.touches else None
     if recipe.basis == "difference" and reference is not None:
         offset = _moved(reference, tip)
         notes.append(
@@ -51,7 +56,7 @@ def proposed(
         notes.append(tr("Z was typed"))
     elif recipe.z == "measured" and height is not None:
         offset = replace(offset, z_mm=_height(recipe, offset, height, reference))
-        notes.append(tr("Z was measured on the pin"))
+        notes.append(tr("Z was measured by touching"))
     station = recipe.station.id
     stored = measured.before or ToolOffset()
     return Proposal(

@@ -60,11 +60,12 @@ class Station(Table):
     id: Line
     """Id of the pin or gauge; it goes on record with every measurement."""
     x_mm: float | None = None
-    """X of the pin's end, base, mm; for the record. Only together with y_mm."""
+    """X of the pin's end, for the record, or of where the surface is touched; base, mm."""
     y_mm: float | None = None
-    """Y of the pin's end, base, mm; for the record."""
+    """Y of the pin's end, for the record, or of where the surface is touched; base, mm."""
     z_mm: float | None = None
-    """Z of the pin's end, base, mm; z = "measured" needs it when basis is "absolute"."""
+    """Z of the pin's end or of the surface, base, mm; z = "measured" needs it when basis is
+    "absolute", and source "touch" always."""
     note: Note = ""
     """For people."""
 
@@ -121,7 +122,7 @@ class Tolerances(Table):
     interval_mm: Length | None = None
     """Largest half width of the 95 % interval of X or Y, mm; "two_pose" needs sigma_mm for it."""
     sigma_mm: Length | None = None
-    """Standard deviation of one coordinate of one touch, mm, where it is known."""
+    """Standard deviation of one coordinate of one touch, or of one crossing, mm, where known."""
     jump_mm: Length = 2.0
     """Largest change against the stored offset that a nozzle change explains, mm."""
     drift_mm: Length = 0.2

@@ -93,7 +93,7 @@ def _connect_error(error: OSError, url: LinkUrl, timeout_s: float) -> ConnectErr
         what = tr("{identity} refuses connections.", identity=url.identity)
         remedy = tr(
             "The machine is there, but nothing listens on this port: check the port number and "
-            "that remote control over the network is enabled in the controller."
+            "that the controller serves the network: remote control, or its Modbus server."
         )
     elif isinstance(error, TimeoutError):
         what = tr(

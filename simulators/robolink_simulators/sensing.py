@@ -2,39 +2,52 @@
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Final, Protocol
 
 from robolink_simulators.workplace import XyzMm
+
+Lean = tuple[float, float]
+"""By how much a bent nozzle's shaft lies beside its tip, X and Y in mm per mm above the tip."""
+
+UPRIGHT: Final[Lean] = (0.0, 0.0)
 
 
 class TipSwitch(Protocol):
     """Something that is on or off, depending on where a tip is."""
 
-    def trips(self, tip_mm: XyzMm) -> bool:
+    def trips(self, tip_mm: XyzMm, lean: Lean = UPRIGHT) -> bool:
         """Tell whether a nozzle with its tip there switches it on."""
 
 
 @dataclass(frozen=True, slots=True)
 class LightBeam:
-    """A level light beam; the nozzle stands upright above its tip (assumed).
+    """A light beam, level or nearly so, that the nozzle's shaft breaks.
 
     Attributes:
         through_mm: A point of the beam.
         heading_deg: Its direction, counter-clockwise from X.
         nozzle_radius_mm: Half the thickness of what breaks it.
+        radius_mm: Half the thickness of the beam itself.
+        tilt_deg: By how much it rises along its heading.
     """
 
     through_mm: XyzMm
     heading_deg: float
     nozzle_radius_mm: float = 0.25
+    radius_mm: float = 0.0
+    tilt_deg: float = 0.0
 
-    def trips(self, tip_mm: XyzMm) -> bool:
+    def trips(self, tip_mm: XyzMm, lean: Lean = UPRIGHT) -> bool:
         """Tell whether the nozzle breaks the beam."""
         x, y, z = self.through_mm
         heading = math.radians(self.heading_deg)
+        along_x, along_y = math.cos(heading), math.sin(heading)
         dx, dy = tip_mm[0] - x, tip_mm[1] - y
-        beside_mm = abs(dy * math.cos(heading) - dx * math.sin(heading))
-        return tip_mm[2] <= z and beside_mm <= self.nozzle_radius_mm
+        above_mm = z + (dx * along_x + dy * along_y) * math.tan(math.radians(self.tilt_deg))
+        above_mm -= tip_mm[2]
+        dx, dy = dx + lean[0] * above_mm, dy + lean[1] * above_mm
+        beside_mm = abs(dy * along_x - dx * along_y)
+        return above_mm >= 0 and beside_mm <= self.nozzle_radius_mm + self.radius_mm
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +60,6 @@ class TouchPlate:
 
     z_mm: float
 
-    def trips(self, tip_mm: XyzMm) -> bool:
+    def trips(self, tip_mm: XyzMm, lean: Lean = UPRIGHT) -> bool:  # noqa: ARG002 - the tip touches
         """Tell whether the tip touches it, or is below it."""
         return tip_mm[2] <= self.z_mm

@@ -11,6 +11,8 @@ from robolink.model import Pose, ToolOffset
 from robolink_simulators.epson.kinematics import Joints, inverse, tip_of
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.points import Point
+from robolink_simulators.epson.tip_input import Nozzle, TipInput
+from robolink_simulators.sensing import UPRIGHT, Lean, TipSwitch
 from robolink_simulators.workplace import MOUNTED_TOOL as MOUNTED_TOOL
 from robolink_simulators.workplace import Look as Look
 from robolink_simulators.workplace import Operator, Workplace, XyzMm, exchanged, pin_beside
@@ -33,6 +35,7 @@ class World(Workplace):
 
     Attributes:
         operator: The person at the cell.
+        leans: By how much the nozzle of a tool is bent; upright where none is named.
     """
 
     def __init__(
@@ -55,6 +58,8 @@ class World(Workplace):
             replaced=STORED,
         )
         self.machine = machine
+        self.leans: dict[int, Lean] = {}
+        self._seed = seed
         self.operator = PendantOperator(self, pendant_live=pendant_live, now_ns=now_ns, seed=seed)
 
     @classmethod
@@ -84,6 +89,34 @@ class World(Workplace):
         tip = tip_of(machine.arm.flange(), tips[MOUNTED_TOOL])
         pin_mm = pin_beside((tip.x_mm, tip.y_mm, tip.z_mm), rng)
         return cls(machine, tips, pin_mm, seed=seed, pendant_live=pendant_live, now_ns=now_ns)
+
+    def connect(
+        self,
+        number: int,
+        switch: TipSwitch,
+        tool: int = MOUNTED_TOOL,
+        *,
+        latency_s: float = 0.0,
+        noise_mm: float = 0.0,
+    ) -> None:
+        """Let a beam or a plate that the tip meets switch an input of the controller.
+
+        Args:
+            number: The input.
+            switch: What the tip meets.
+            tool: Whose tip.
+            latency_s: How late the input follows.
+            noise_mm: Standard deviation, per axis, of where it switches.
+        """
+        sense = TipInput(
+            switch,
+            self.machine.arm,
+            lambda: Nozzle(self.tips.get(tool), self.leans.get(tool, UPRIGHT)),
+            latency_s=latency_s,
+            noise_mm=noise_mm,
+            rng=random.Random(f"input {number} {self._seed}"),
+        )
+        self.machine.inputs.connect(number, sense)
 
     def truth(self) -> dict[str, Any]:
         """Return all of it, ready for JSON."""

@@ -6,11 +6,18 @@ from typing import Any
 import pytest
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.options import EpsonOptions
+from robolink_simulators.sensing import TouchPlate
 
 from robolink import ANY, ToolOffset
-from robolink.errors import ControllerFaultError, RejectedError, UndefinedToolError
-from robolink.model import MotionOutcome, MotionProfile, Path, WorkBox
+from robolink.errors import (
+    ControllerFaultError,
+    NotReadyError,
+    RejectedError,
+    UndefinedToolError,
+)
+from robolink.model import InputEdge, MotionOutcome, MotionProfile, Path, WorkBox
 from robolink.protocols import spel
+from tests.contract.conftest import served
 
 HABITS: list[dict[str, Any]] = [
     {},
@@ -38,6 +45,7 @@ HABITS: list[dict[str, Any]] = [
     {"rc_plus": 5},
     {"rc_plus": 8},
     {"real_pos_noise_mm": 0.0},
+    {"till_already_met": "starts"},
     {"angle_wrap": True},
     {"requests_end_with_segment": True},
 ]
@@ -111,6 +119,25 @@ def test_an_abort_and_a_failed_statement_are_understood_with_every_habit(serve, 
         if controller.status().fault:
             controller.reset_fault()
         assert controller.tools.write(1, ToolOffset(12), expected=ANY).read_back
+
+
+@pytest.mark.moves
+def test_a_movement_until_an_input_is_understood_with_every_habit(habit):
+    simulator = EpsonSimulator(seed=11, options=EpsonOptions(**habit))
+    touch_mm = simulator.machine.tip().z_mm - 1.0
+    simulator.world.connect(3, TouchPlate(simulator.world.tip_mm()[2] - 1.0))
+    with served("sim", simulator) as cell, cell.connect() as controller:
+        controller.motors(True)
+        group = controller.groups[0]
+        here = group.pose()
+        for run_on in (False, True):
+            edge = InputEdge(3, run_on=run_on)
+            below = replace(here, z_mm=here.z_mm - 2)
+            motion = group.move_until_input(below, edge, speed_mm_s=5, box=WorkBox())
+            assert motion.wait(timeout_s=60).z_mm == pytest.approx(touch_mm, abs=0.1)
+            with pytest.raises(NotReadyError):
+                group.move_until_input(below, edge, speed_mm_s=5, box=WorkBox())
+            group.move_to(here, MotionProfile(Path.STRAIGHT), box=WorkBox()).wait(timeout_s=60)
 
 
 def test_the_listing_with_four_columns_means_no_v_and_no_w():

@@ -21,6 +21,9 @@ HEADINGS = {
     "Recipe": "The top of the file",
     "OperatorSource": '`[source]` with `kind = "operator"`',
     "PointsSource": '`[source]` with `kind = "points"`',
+    "BeamsSource": '`[source]` with `kind = "beams"`',
+    "BeamLine": "`[[source.beams]]`",
+    "TouchSource": '`[source]` with `kind = "touch"`',
     "Station": "`[station]`",
     "Poses": "`[poses]`",
     "FlangePose": "`[poses]`",
@@ -43,7 +46,7 @@ def spelled(value, *, required):
     if required:
         yield "required"
     for number in (value.get("default"), value.get("minimum"), value.get("maximum")):
-        if isinstance(number, (int, float)):
+        if isinstance(number, (int, float)) and not isinstance(number, bool):
             yield f"{number:g}"
     for name in ("minItems", "maxItems", "maxLength"):
         if name in value:

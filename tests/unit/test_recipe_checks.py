@@ -31,6 +31,26 @@ kind = "points"
 number = 3
 points = [1, 2]
 """
+BEAMS = (
+    PIN.replace('"operator"', '"beams"\nz_mm = -60')
+    + """\
+[[source.beams]]
+input = 3
+x_mm = 300
+y_mm = 80
+direction_deg = 3
+[[source.beams]]
+input = 4
+x_mm = 300
+y_mm = 80
+direction_deg = 88
+"""
+)
+TOUCH = (
+    PIN.replace('"operator"', '"touch"\ninput = 5')
+    .replace('"kept"', '"measured"')
+    .replace('id = "PIN"', 'id = "PLATE"\nx_mm = 300\ny_mm = 80\nz_mm = -90')
+)
 ANGLES = PIN.replace('"operator"', '"operator"\nmethod = "n_angle"')
 
 
@@ -50,7 +70,9 @@ def with_(text, header, *lines):
     return f"{text}{header}\n{body}\n"
 
 
-@pytest.mark.parametrize("text", [PIN, POINTS, with_(ANGLES, "[source]", "count = 3")])
+@pytest.mark.parametrize(
+    "text", [PIN, POINTS, BEAMS, TOUCH, with_(ANGLES, "[source]", "count = 3")]
+)
 def test_the_recipes_that_are_varied_here_are_right(text):
     assert problems(text) == {}
 
@@ -96,6 +118,74 @@ def test_the_angles_are_those_of_the_method(text, where, what):
     found = problems(text)
     assert list(found) == [where]
     assert found[where].startswith(what)
+
+
+@pytest.mark.parametrize(
+    ("text", "where", "what"),
+    [
+        (BEAMS.replace("= 88", "= 15"), "source.beams", "must cross at 20 degrees"),
+        (with_(BEAMS, "[source]", "aside_mm = 2"), "source.aside_mm", "must be larger than"),
+        (
+            with_(BEAMS, "[box]", "down_mm = 5", "up_mm = 5"),
+            "source.lift_mm",
+            "must leave room",
+        ),
+        (BEAMS.replace('z = "kept"', 'z = "measured"'), "z", 'cannot be "measured" with beams'),
+        (
+            with_(with_(BEAMS, "[source]", "repeats = 1"), "[tolerances]", "rms_mm = 0.1"),
+            "tolerances.rms_mm",
+            "cannot be judged: crossings",
+        ),
+        (
+            with_(with_(BEAMS, "[source]", "repeats = 1"), "[tolerances]", "interval_mm = 0.1"),
+            "tolerances.sigma_mm",
+            "is missing: the measurement leaves no residual",
+        ),
+        (BEAMS + "points = [1, 2]\n", "source.beams#2.points", "is not known"),
+        (BEAMS.replace("input = 4", "input = -4"), "source.beams#2.input", "must be at least 0"),
+    ],
+)
+def test_the_beams_can_be_crossed_one_at_a_time_and_judged(text, where, what):
+    found = problems(text)
+    assert list(found) == [where]
+    assert found[where].startswith(what)
+
+
+def test_a_second_angle_leaves_residuals_too():
+    turned = with_(BEAMS, "[source]", "repeats = 1", "turn_deg = 180")
+    assert problems(with_(turned, "[tolerances]", "rms_mm = 0.1", "interval_mm = 0.1")) == {}
+
+
+@pytest.mark.parametrize(
+    ("text", "where", "what"),
+    [
+        (TOUCH.replace('"measured"', '"kept"'), "z", 'must be "measured"'),
+        (TOUCH.replace("z_mm = -90\n", ""), "station.z_mm", "is missing"),
+        (
+            TOUCH.replace("z_mm = -90\n", "").replace("absolute", "difference"),
+            "station.z_mm",
+            "is missing",
+        ),
+        (TOUCH.replace("x_mm = 300\ny_mm = 80\n", ""), "station.x_mm", "is missing: with kind"),
+        (TOUCH.replace("x_mm = 300\n", ""), "station.x_mm", "is missing: give x_mm and y_mm"),
+        (with_(TOUCH, "[source]", "speeds_mm_s = [2, 2]"), "source.speeds_mm_s", "must differ"),
+        (with_(TOUCH, "[source]", "lift_mm = 2"), "source.clearance_mm", "must be smaller"),
+        (
+            with_(with_(TOUCH, "[source]", "speeds_mm_s = [2, 1]"), "[tolerances]", "rms_mm = 1"),
+            "tolerances.rms_mm",
+            "cannot be judged: two touches",
+        ),
+    ],
+)
+def test_a_touch_has_a_surface_and_two_speeds(text, where, what):
+    found = problems(text)
+    assert list(found) == [where]
+    assert found[where].startswith(what)
+
+
+def test_a_tool_has_no_points_where_beams_measure_it():
+    found = problems(BEAMS.replace("number = 3", "number = 3\npoints = [1, 2]"))
+    assert list(found) == ["tools#1.points"]
 
 
 @pytest.mark.parametrize("angles", ["0, 120, 240", "0, -15, 15", "0, 170, 340"])

@@ -5,6 +5,7 @@ import hashlib
 import subprocess
 import sys
 import tomllib
+from dataclasses import fields
 from pathlib import Path
 from typing import get_args
 
@@ -12,15 +13,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robolink.calibration import TouchPlan
+from robolink.calibration import CrossingPlan, ProbePlan, TouchPlan
 from robolink.errors import ConfigError
 from robolink.nozzle_change import Gate, Limits, Moment
 from robolink.recipe import (
+    BeamsSource,
     OperatorSource,
     Output,
     PointsSource,
     Prompt,
     Recipe,
+    TouchSource,
     check_recipe,
     load_recipe,
 )
@@ -65,11 +68,14 @@ def test_every_example_loads(path):
 
 def test_the_examples_are_those_that_the_page_describes():
     assert [path.name for path in EXAMPLES] == [
+        "needle-beams.toml",
         "pendant-points.toml",
         "scara-pin.toml",
         "two-nozzles.toml",
     ]
-    points, pin, nozzles = (load_recipe(path).recipe for path in EXAMPLES)
+    beams, points, pin, nozzles = (load_recipe(path).recipe for path in EXAMPLES)
+    assert isinstance(beams.source, BeamsSource)
+    assert ([beam.input for beam in beams.source.beams], beams.attempts) == ([3, 4], 2)
     assert isinstance(points.source, PointsSource)
     assert (points.basis, points.verifies, points.tools[0].points) == (
         "difference",
@@ -103,13 +109,29 @@ def test_what_is_left_out_is_as_in_a_calibration_by_hand():
     assert (recipe.verifies, recipe.attempts, source.turns_deg) == (True, 1, ())
 
 
+def test_what_is_left_out_about_beams_is_as_in_the_library():
+    beams = load_recipe(EXAMPLES[0]).recipe.source
+    assert isinstance(beams, BeamsSource)
+    plan = CrossingPlan()
+    told = {name: field.default for name, field in BeamsSource.model_fields.items()}
+    own = {f"{field.name}": getattr(plan, field.name) for field in fields(plan)}
+    own["crossing_mm_s"] = own.pop("speed_mm_s")
+    assert own.items() <= told.items()
+
+
+def test_what_is_left_out_about_touches_is_as_in_the_library():
+    told = {name: field.default for name, field in TouchSource.model_fields.items()}
+    plan = ProbePlan()
+    assert {field.name: getattr(plan, field.name) for field in fields(plan)}.items() <= told.items()
+
+
 def test_an_output_can_be_switched_at_every_moment_of_a_nozzle_change():
     assert get_args(Output.model_fields["at"].annotation) == tuple(Moment)
     assert {*get_args(Prompt.model_fields["at"].annotation)} < {*Moment}
 
 
 def test_a_pose_of_the_flange_is_a_pose_in_tool_0():
-    pose = load_recipe(EXAMPLES[1]).recipe.poses.safe
+    pose = load_recipe(EXAMPLES[2]).recipe.poses.safe
     assert pose is not None
     assert pose.pose.coordinates() == (158.6, 495.4, -40.0, 0.0, 0.0, 0.0)
     assert pose.pose.tool == 0
@@ -149,8 +171,16 @@ def test_a_missing_basis_says_what_both_mean(problems):
 @pytest.mark.parametrize(
     ("lines", "where", "what"),
     [
-        ('[source]\nkind = "camera"', "source.kind", 'must be one of "operator", "points"'),
-        ("[source]\nlift_mm = 5", "source.kind", 'must be one of "operator", "points"'),
+        (
+            '[source]\nkind = "camera"',
+            "source.kind",
+            'must be one of "beams", "operator", "points", "touch"',
+        ),
+        (
+            "[source]\nlift_mm = 5",
+            "source.kind",
+            'must be one of "beams", "operator", "points", "touch"',
+        ),
         ('[source]\nkind = "operator"\nlift_mm = 0.5', "source.lift_mm", "must be at least 1"),
         ('[source]\nkind = "operator"\nturn_deg = 350', "source.turn_deg", "must be at most 330"),
         ('[source]\nkind = "operator"\ncount = 2', "source.count", "must be at least 3"),

@@ -8,9 +8,10 @@ from hypothesis import strategies as st
 from robolink_simulators.epson.arm import REST, Arm
 from robolink_simulators.epson.kinematics import Joints, forward, tip_of
 from robolink_simulators.epson.parameters import MotionParameters
+from robolink_simulators.epson.ramps import Ramp
 from robolink_simulators.epson.refusals import OutOfReach, Refusal
 from robolink_simulators.epson.robots import find_robot
-from robolink_simulators.epson.trajectory import JointPace, LinePace, Ramp
+from robolink_simulators.epson.trajectory import JointPace, LinePace
 
 from robolink.model import Hand, Pose, ToolOffset
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from robolink.controllers.softmotion import InputEdge, Jog
+from robolink.controllers.softmotion import Jog
 from robolink.errors import (
     BusyError,
     ConfigError,
@@ -17,7 +17,7 @@ from robolink.errors import (
     OutcomeUnknownError,
     RejectedError,
 )
-from robolink.model import MotionOutcome, MotionProfile, Path, Pose, Verdict, WorkBox
+from robolink.model import InputEdge, MotionOutcome, MotionProfile, Path, Pose, Verdict, WorkBox
 from robolink.protocols.mailbox import (
     Bits,
     BufferMode,
@@ -336,16 +336,24 @@ def test_a_touch_gives_the_position_latched_at_the_edge(cell, plc, group):
 
 
 def test_a_touch_without_an_edge_gives_nothing(cell, plc, group):
-    motion = group.move_until_input(TARGET, InputEdge(3), speed_mm_s=2, box=ANYWHERE)
+    motion = group.move_until_input(TARGET, InputEdge(4), speed_mm_s=2, box=ANYWHERE)
     assert motion.wait(timeout_s=5) is None
     assert cell.open_requests() == []
 
 
 def test_a_touch_that_is_stopped_is_no_measurement(cell, plc, group):
-    motion = group.move_until_input(TARGET, InputEdge(3), speed_mm_s=2, box=ANYWHERE)
+    motion = group.move_until_input(TARGET, InputEdge(4), speed_mm_s=2, box=ANYWHERE)
     cell.link.before("read_head", plc.end_all)
     with pytest.raises(ControllerFaultError, match="stopped before the input"):
         motion.wait(timeout_s=5)
+
+
+def test_a_touch_is_not_begun_when_its_input_has_switched_before(cell, plc, group):
+    with pytest.raises(NotReadyError, match="Input 3 is on") as refusal:
+        group.move_until_input(TARGET, InputEdge(3), speed_mm_s=2, box=ANYWHERE)
+    assert refusal.value.reason is NotReadyReason.EDGE_PASSED
+    assert Opcode.MOVE_UNTIL_INPUT not in plc.opcodes()
+    assert cell.open_requests() == []
 
 
 def test_an_input_number_below_one_is_refused(cell, group):

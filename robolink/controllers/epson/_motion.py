@@ -1,15 +1,24 @@
 """The robot arm of an EPSON controller: where it is, and how it is told to go elsewhere."""
 
+from collections.abc import Callable
+
+from robolink.controllers._edge_ahead import require_edge_ahead
 from robolink.controllers._guarded import MarkerDesk, ProcedureLock
 from robolink.controllers.epson._as_sent import executes
 from robolink.controllers.epson._movement import EpsonMotion, MovementParts, request_abort
+from robolink.controllers.epson._position import read_position
 from robolink.controllers.epson._robot import RobotFacts
 from robolink.controllers.epson._session import EpsonSession
 from robolink.controllers.epson._settings import Settings
+from robolink.controllers.epson._until import (
+    EpsonMotionUntilInput,
+    read_input,
+    statement_until,
+)
 from robolink.controllers.epson._window import CommandWindow
 from robolink.errors import NotReadyError, NotReadyReason
 from robolink.messages import tr
-from robolink.model import MarkerKind, MotionProfile, MotionTerms, Path, Pose, WorkBox
+from robolink.model import InputEdge, MarkerKind, MotionProfile, MotionTerms, Path, Pose, WorkBox
 from robolink.protocols import spel
 
 
@@ -51,13 +60,7 @@ class EpsonGroup:
         """Read the measured position of the tool in force (RealPos)."""
         window = self._parts.window
         window.require_ready("Print RealPos")
-        tool = spel.parse_integer(window.printed(spel.print_selected_tool()))
-        point = spel.parse_point(window.printed(spel.print_real_position()))
-        x_mm, y_mm, z_mm, u_deg, *rest = point.coordinates
-        v_deg, w_deg = rest or (0.0, 0.0)
-        return Pose(
-            x_mm, y_mm, z_mm, u_deg, v_deg, w_deg, hand=point.hand, local=point.local, tool=tool
-        )
+        return read_position(window, spel.print_real_position())
 
     def motors_on(self) -> bool:
         """Read whether the motors are on."""
@@ -71,23 +74,30 @@ class EpsonGroup:
     def move_to(self, target: Pose, profile: MotionProfile, *, box: WorkBox) -> EpsonMotion:
         """Start one movement; see :class:`robolink.model.MotionGroup`."""
         box.check(target)
-        session, window, desk = self._parts.session, self._parts.window, self._parts.desk
-        statement = self._statement_for(target, profile)
-        with self._lock.held(statement):
-            desk.require_settled(statement)
-            self._require_supervision(statement)
-            window.require_ready(statement)
-            self._require_motors(statement)
-            self._require_tool(target, statement)
-            self._settings.slow_down(profile)
-            try:
-                with session.uninterrupted():
-                    self._current = self._started(target, statement)
-            except KeyboardInterrupt:
-                # Nobody will be given this motion to wait on.
-                self.abort_unfinished()
-                raise
-            return self._current
+        return self._start(target, profile, self._statement_for(target, profile))
+
+    def move_until_input(
+        self, target: Pose, edge: InputEdge, *, speed_mm_s: float, box: WorkBox
+    ) -> EpsonMotionUntilInput:
+        """Start a straight movement until an input switches; see the model."""
+        box.check(target)
+        session, window = self._parts.session, self._parts.window
+        statement = self._statement_until(target, edge)
+
+        def look_at_input() -> None:
+            on = read_input(window, edge.number)
+            require_edge_ahead(edge, on, controller=session.identity, request=statement)
+
+        profile = MotionProfile(Path.STRAIGHT, speed_mm_s=speed_mm_s)
+        motion = self._start(target, profile, statement, last_look=look_at_input)
+        return EpsonMotionUntilInput(motion, edge, window, identity=session.identity)
+
+    def requests_until(
+        self, target: Pose, edge: InputEdge, *, speed_mm_s: float
+    ) -> tuple[str, ...]:
+        """Return what :meth:`move_until_input` would send besides its reads."""
+        profile = MotionProfile(Path.STRAIGHT, speed_mm_s=speed_mm_s)
+        return executes((*self._settings.statements(profile), self._statement_until(target, edge)))
 
     def requests_for(self, target: Pose, profile: MotionProfile) -> tuple[str, ...]:
         """Return what :meth:`move_to` would send besides its reads, as it stands on the wire."""
@@ -118,6 +128,32 @@ class EpsonGroup:
         if self._current is not None and not self._current.settled:
             self._current.abort()
 
+    def _start(
+        self,
+        target: Pose,
+        profile: MotionProfile,
+        statement: spel.Statement,
+        *,
+        last_look: Callable[[], None] = lambda: None,
+    ) -> EpsonMotion:
+        session, window, desk = self._parts.session, self._parts.window, self._parts.desk
+        with self._lock.held(statement):
+            desk.require_settled(statement)
+            self._require_supervision(statement)
+            window.require_ready(statement)
+            self._require_motors(statement)
+            self._require_tool(target, statement)
+            self._settings.slow_down(profile)
+            last_look()
+            try:
+                with session.uninterrupted():
+                    self._current = self._started(target, statement)
+            except KeyboardInterrupt:
+                # Nobody will be given this motion to wait on.
+                self.abort_unfinished()
+                raise
+            return self._current
+
     def _started(self, target: Pose, statement: spel.Statement) -> EpsonMotion:
         session, desk = self._parts.session, self._parts.desk
         details = {"target": list(target.coordinates())}
@@ -129,6 +165,9 @@ class EpsonGroup:
     def _statement_for(self, target: Pose, profile: MotionProfile) -> spel.Statement:
         build = spel.move if profile.path is Path.STRAIGHT else spel.go
         return build(target, six_axes=self._robot.read().six_axes)
+
+    def _statement_until(self, target: Pose, edge: InputEdge) -> spel.Statement:
+        return statement_until(target, edge, six_axes=self._robot.read().six_axes)
 
     def _require_supervision(self, statement: str) -> None:
         # With a remote time-out of 0 the robot may keep moving when this PC is gone

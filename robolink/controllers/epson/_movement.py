@@ -52,6 +52,11 @@ class EpsonMotion:
         return self._target
 
     @property
+    def statement(self) -> str:
+        """What was sent."""
+        return self._pending.statement
+
+    @property
     def settled(self) -> bool:
         """Whether its end was seen and taken."""
         return self._parts.session.pending is not self._pending

@@ -4,6 +4,5 @@ from robolink.controllers.softmotion._controller import (
     SoftMotionController as SoftMotionController,
 )
 from robolink.controllers.softmotion._facts import MailboxFacts as MailboxFacts
-from robolink.controllers.softmotion._group import InputEdge as InputEdge
 from robolink.controllers.softmotion._jog import Jog as Jog
 from robolink.controllers.softmotion._open import open_softmotion as open_softmotion

@@ -11,6 +11,12 @@ _RAMP_S: Final = 0.5
 """In this time a straight movement reaches its speed, and in this time its acceleration: SoftMotion
 wants all four numbers above 0, and a tip near a pin gains nothing from a harder start."""
 
+_PAST_AN_EDGE_MM: Final = 0.05
+"""A tip that is stopped by an input comes to rest within this, the PLC's cycle apart."""
+
+_EDGE_RAMP_S: Final = 0.02
+"""In this time such a movement reaches its deceleration."""
+
 _UM_PER_MM: Final = 1000.0
 
 
@@ -42,6 +48,17 @@ def straight(speed_mm_s: float, *, unit_um: float) -> Four:
     velocity = speed_mm_s * _UM_PER_MM / unit_um
     acceleration = velocity / _RAMP_S
     return (velocity, acceleration, acceleration, acceleration / _RAMP_S)
+
+
+def up_to_an_edge(speed_mm_s: float, *, unit_um: float) -> Four:
+    """Return the numbers of a movement that an input stops, the tip perhaps in contact.
+
+    Raises:
+        ConfigError: The speed is not above 0, or not finite.
+    """
+    velocity, *_ = straight(speed_mm_s, unit_um=unit_um)
+    deceleration = velocity * speed_mm_s / (2 * _PAST_AN_EDGE_MM)
+    return (velocity, deceleration, deceleration, deceleration / _EDGE_RAMP_S)
 
 
 def dynamics_of(profile: MotionProfile, *, unit_um: float) -> Four:

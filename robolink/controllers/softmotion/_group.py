@@ -1,18 +1,22 @@
 """The axis group behind one mailbox: where its tip is, and how it is told to move."""
 
 import math
-from dataclasses import dataclass
 
+from robolink.controllers._edge_ahead import require_edge_ahead
 from robolink.controllers.softmotion._answers import describe
 from robolink.controllers.softmotion._condition import require_still
-from robolink.controllers.softmotion._dynamics import dynamics_of, straight
+from robolink.controllers.softmotion._dynamics import dynamics_of, up_to_an_edge
+from robolink.controllers.softmotion._io import SoftMotionIo
 from robolink.controllers.softmotion._jog import Jog, JogWatch
 from robolink.controllers.softmotion._mailbox import Mailbox
-from robolink.controllers.softmotion._movement import MotionUntilInput, SoftMotionMotion
+from robolink.controllers.softmotion._movement import (
+    SoftMotionMotion,
+    SoftMotionMotionUntilInput,
+)
 from robolink.controllers.softmotion._starting import MovementStarter
 from robolink.errors import ConfigError, ReadBackError, RejectedError
 from robolink.messages import tr
-from robolink.model import MotionProfile, MotionTerms, Path, Pose, WorkBox
+from robolink.model import InputEdge, MotionProfile, MotionTerms, Path, Pose, WorkBox
 from robolink.protocols.mailbox import (
     BufferMode,
     Command,
@@ -23,21 +27,6 @@ from robolink.protocols.mailbox import (
     Six,
     to_frame,
 )
-
-
-@dataclass(frozen=True, slots=True)
-class InputEdge:
-    """What a movement waits for.
-
-    Attributes:
-        number: The PLC's input, 1 or more.
-        falling: Whether it is to go off, not on.
-        run_on: Whether the movement goes on to its target after the edge.
-    """
-
-    number: int
-    falling: bool = False
-    run_on: bool = False
 
 
 class SoftMotionGroup:
@@ -104,26 +93,19 @@ class SoftMotionGroup:
 
     def move_until_input(
         self, target: Pose, edge: InputEdge, *, speed_mm_s: float, box: WorkBox
-    ) -> MotionUntilInput:
-        """Start a straight movement during which the PLC watches an input (opcode 30008).
-
-        Raises like :meth:`move_to`.
-        """
+    ) -> SoftMotionMotionUntilInput:
+        """Start a straight movement until an input switches (opcode 30008); see the model."""
         box.check(target)
-        if edge.number < 1:
-            raise ConfigError(
-                tr("There is no input {number}.", number=edge.number),
-                remedy=tr("The PLC's inputs count from 1."),
-            )
-        signed = -edge.number if edge.falling else edge.number
-        draft = Command(
-            0,
-            Opcode.MOVE_UNTIL_INPUT,
-            operands=(signed, int(edge.run_on), CoordinateSystem.MCS, BufferMode.BUFFERED),
-            pose=self._frame(target),
-            dynamics=straight(speed_mm_s, unit_um=self._mailbox.unit_um),
-        )
-        return MotionUntilInput(self._starter.start(target, draft), self._mailbox)
+        draft = self._until_draft(target, edge, speed_mm_s)
+        on = SoftMotionIo(self._mailbox).read_input(edge.number)
+        require_edge_ahead(edge, on, controller=self._mailbox.identity, request=describe(draft))
+        return SoftMotionMotionUntilInput(self._starter.start(target, draft), self._mailbox)
+
+    def requests_until(
+        self, target: Pose, edge: InputEdge, *, speed_mm_s: float
+    ) -> tuple[str, ...]:
+        """Return what :meth:`move_until_input` would send besides its reads, in words."""
+        return (describe(self._until_draft(target, edge, speed_mm_s)),)
 
     def jog(self, jog: Jog, *, duration_s: float, box: WorkBox) -> Pose:
         """Jog for a time, bring the group to rest, and return where the tip is then.
@@ -181,6 +163,21 @@ class SoftMotionGroup:
             operands=(0, 0, CoordinateSystem.MCS, BufferMode.BUFFERED),
             pose=self._frame(target),
             dynamics=dynamics_of(profile, unit_um=self._mailbox.unit_um),
+        )
+
+    def _until_draft(self, target: Pose, edge: InputEdge, speed_mm_s: float) -> Command:
+        if edge.number < 1:
+            raise ConfigError(
+                tr("There is no input {number}.", number=edge.number),
+                remedy=tr("The PLC's inputs count from 1."),
+            )
+        signed = -edge.number if edge.falling else edge.number
+        return Command(
+            0,
+            Opcode.MOVE_UNTIL_INPUT,
+            operands=(signed, int(edge.run_on), CoordinateSystem.MCS, BufferMode.BUFFERED),
+            pose=self._frame(target),
+            dynamics=up_to_an_edge(speed_mm_s, unit_um=self._mailbox.unit_um),
         )
 
     def _frame(self, target: Pose) -> Six:

@@ -3,6 +3,7 @@
 from contextlib import suppress
 
 from robolink.controllers.softmotion._answers import describe, ended_badly
+from robolink.controllers.softmotion._condition import is_moving
 from robolink.controllers.softmotion._mailbox import Mailbox
 from robolink.controllers.softmotion._orders import is_own
 from robolink.errors import (
@@ -16,6 +17,9 @@ from robolink.messages import tr
 from robolink.model import Marker, MotionOutcome, Pose
 from robolink.protocols.mailbox import Command, CommandState, ErrorClass, Finished, Opcode
 from robolink.timing import Deadline
+
+_REST_S = 1.0
+"""Longest time between the end of a movement and the rest of its group."""
 
 _HALT_S = 10.0
 """Longest time in which a halt brings a group to rest."""
@@ -77,10 +81,13 @@ class SoftMotionMotion:
                     )
                 )
             self._take_end()
+        self._await_rest()
 
     def await_end(self, timeout_s: float) -> Finished:
         """Wait for the end, whatever it is; raises like :meth:`wait` but for how it ended."""
         mailbox = self._mailbox
+        if self._end is not None:
+            return self._end
         try:
             with mailbox.desk.doubt(self._request):
                 ended = self._watch(Deadline.after(mailbox.wire.clock, timeout_s))
@@ -99,7 +106,9 @@ class SoftMotionMotion:
                 controller=mailbox.identity,
                 request=self._request,
             )
-        return self._take_end()
+        end = self._take_end()
+        self._await_rest()
+        return end
 
     def _stopped(self, end: Finished) -> MotionOutcome:
         if end.state == CommandState.ABORTED and (
@@ -135,6 +144,18 @@ class SoftMotionMotion:
                 self._end = end
         return self._end
 
+    def _await_rest(self) -> None:
+        """Let the group come to rest unless more is under way.
+
+        It counts as moving for a cycle longer than its last movement (softmotion.md 2.2), and
+        a program that watches an input may call that movement done while it still brakes.
+        """
+        wire, snapshots = self._mailbox.wire, self._mailbox.snapshots
+        deadline = Deadline.after(wire.clock, _REST_S)
+        now = snapshots.take()
+        while is_moving(now) and not wire.rides.unfinished and not deadline.expired:
+            now = snapshots.news(now, wait_s=deadline.remaining_s())
+
     def _vanished(self) -> RemoteProtocolError:
         return RemoteProtocolError(
             tr("The PLC shows neither {request!r} nor how it ended.", request=self._request),
@@ -143,7 +164,7 @@ class SoftMotionMotion:
         )
 
 
-class MotionUntilInput:
+class SoftMotionMotionUntilInput:
     """A straight movement until an input switches (opcode 30008). Wait on it."""
 
     def __init__(self, motion: SoftMotionMotion, mailbox: Mailbox) -> None:

@@ -44,6 +44,12 @@ from robolink.protocols.spel._statements import select_tool as select_tool
 from robolink.protocols.spel._statements import set_tool as set_tool
 from robolink.protocols.spel._statements import speed as speed
 from robolink.protocols.spel._statements import speed_s as speed_s
+from robolink.protocols.spel._until import move_find as move_find
+from robolink.protocols.spel._until import move_till as move_till
+from robolink.protocols.spel._until import print_found_position as print_found_position
+from robolink.protocols.spel._until import print_input as print_input
+from robolink.protocols.spel._until import print_position_found as print_position_found
+from robolink.protocols.spel._until import print_till_on as print_till_on
 from robolink.protocols.spel._where import PrintedWhere as PrintedWhere
 from robolink.protocols.spel._where import format_where as format_where
 from robolink.protocols.spel._where import parse_where as parse_where

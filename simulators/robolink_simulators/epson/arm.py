@@ -29,6 +29,8 @@ REST = Joints(45.0, 60.0, 0.0, -105.0)
 _LOOK_BACK_NS = 1_000_000
 _STILL = 1e-9
 
+_Ways = tuple[float, float, float, float]
+
 
 @dataclass(frozen=True, slots=True)
 class _Travel:
@@ -44,6 +46,17 @@ class _Travel:
         ends = [self.start_ns + total for total in accumulate(leg.duration_ns for leg in self.legs)]
         instants = {t for end in (*ends, now_ns) for t in (end - _LOOK_BACK_NS, end)}
         return sorted(t for t in instants if since_ns < t <= now_ns)
+
+    def braked(self, now_ns: int) -> "_Travel":
+        """Return the same travel, left at ``now_ns`` to come to rest."""
+        began_ns, kept = self.start_ns, list[Leg]()
+        for leg in self.legs:
+            if now_ns < began_ns + leg.duration_ns:
+                kept.append(leg.braked(now_ns - began_ns))
+                break
+            kept.append(leg)
+            began_ns += leg.duration_ns
+        return _Travel(self.start_ns, tuple(kept))
 
     def joints_at(self, now_ns: int) -> Joints:
         elapsed_ns = max(0, now_ns - self.start_ns)
@@ -92,10 +105,7 @@ class Arm:
     @property
     def true_joints(self) -> Joints:
         """Where the joints really are: commanded, less the backlash. No noise."""
-        half = self.backlash_deg / 2
-        plays = (half, half, 0.0, half)
-        trails = zip(self._joints.values(), plays, self._turned, strict=True)
-        return Joints(*(value - play * turned for value, play, turned in trails))
+        return self._trailing(self._joints, self._turned)
 
     def flange(self) -> Pose:
         """Return the commanded flange pose."""
@@ -104,6 +114,13 @@ class Arm:
     def true_flange(self) -> Pose:
         """Return the flange pose that a pin, a camera or a light beam meets."""
         return forward(self.model, self.true_joints)
+
+    def true_flange_at(self, now_ns: int) -> Pose:
+        """Return where the flange will really be, or was, in the motion under way."""
+        if self._travel is None:
+            return self.true_flange()
+        before, then = (self._travel.joints_at(t) for t in (now_ns - _LOOK_BACK_NS, now_ns))
+        return forward(self.model, self._trailing(then, self._ways(before, then)))
 
     def real_position(self, rng: random.Random, noise_mm: float) -> Pose:
         """Return the flange pose as RealPos measures it.
@@ -160,6 +177,13 @@ class Arm:
         """Return when the motion under way ends, ``None`` at rest."""
         return None if self._travel is None else self._travel.end_ns
 
+    def brake(self, now_ns: int) -> int:
+        """Come to rest with the motion's own deceleration; return when that is."""
+        if self._travel is None:
+            return now_ns
+        self._travel = self._travel.braked(now_ns)
+        return self._travel.end_ns
+
     def halt(self, now_ns: int) -> None:
         """Stop where the arm is."""
         self.advance(now_ns)
@@ -176,10 +200,20 @@ class Arm:
         self._take_up(joints)
 
     def _take_up(self, joints: Joints) -> None:
-        changes = zip(self._joints.values(), joints.values(), self._turned, strict=True)
-        turned = [_sign(after - before) or way for before, after, way in changes]
-        self._turned = (turned[0], turned[1], turned[2], turned[3])
+        self._turned = self._ways(self._joints, joints)
         self._joints = joints
+
+    def _ways(self, before: Joints, after: Joints) -> _Ways:
+        """Return which way each joint has turned last, having gone from one to the other."""
+        changes = zip(before.values(), after.values(), self._turned, strict=True)
+        j1, j2, j3, j4 = (_sign(new - old) or way for old, new, way in changes)
+        return j1, j2, j3, j4
+
+    def _trailing(self, joints: Joints, ways: _Ways) -> Joints:
+        half = self.backlash_deg / 2
+        plays = (half, half, 0.0, half)
+        trails = zip(joints.values(), plays, ways, strict=True)
+        return Joints(*(value - play * way for value, play, way in trails))
 
 
 def _sign(value: float) -> float:

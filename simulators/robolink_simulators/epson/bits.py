@@ -41,8 +41,7 @@ class BitBank:
         Raises:
             Refusal: There is no such port.
         """
-        self._check(port * 8)
-        return sum(bit << i for i, bit in enumerate(self._bits[port * 8 : port * 8 + 8]))
+        return sum(self.get(port * 8 + i) << i for i in range(8))
 
     def set_byte(self, port: int, value: int) -> None:
         """Switch eight bits.

@@ -5,6 +5,7 @@ import random
 from robolink.model import Pose, ToolOffset
 from robolink_simulators.epson.arm import REST, Arm
 from robolink_simulators.epson.bits import IO_BITS, MEMORY_BITS, BitBank
+from robolink_simulators.epson.input_bits import InputBits
 from robolink_simulators.epson.kinematics import Joints, flange_of, inverse, tip_of
 from robolink_simulators.epson.parameters import MotionParameters
 from robolink_simulators.epson.points import LocalTable, Point, PointTable
@@ -29,10 +30,12 @@ class Machine:
         tools: Tool definitions and the tool in force.
         points: P0 to P999.
         locals: Local coordinate systems.
-        inputs: Input bits; the world sets them.
+        inputs: Input bits; the world sets them, or connects them to what the tip meets.
         outputs: Output bits.
         memory: Memory bits.
         parameters: Speeds, accelerations, LimZ.
+        till_met: Whether the last motion was stopped by its Till.
+        found: Where the last Find met its condition, the selected tool's tip.
         motors_on: Whether the motors are on.
         power_high: Whether power is high; low after anything that resets the parameters.
         robot_number: The robot in force; this controller has one.
@@ -53,10 +56,12 @@ class Machine:
         self.tools = ToolMemory()
         self.points = PointTable()
         self.locals = LocalTable()
-        self.inputs = BitBank(IO_BITS)
+        self.inputs = InputBits(IO_BITS)
         self.outputs = BitBank(IO_BITS)
         self.memory = BitBank(MEMORY_BITS)
         self.parameters = MotionParameters()
+        self.till_met = False
+        self.found: Point | None = None
         self.motors_on = False
         self.power_high = False
         self.robot_number = 1

@@ -69,6 +69,8 @@ class EpsonOptions:
         rc_plus: Command set: 5, 7 or 8.
         real_pos_noise_mm: Standard deviation of RealPos against the commanded position [R:
             2 um seen].
+        till_already_met: What a motion does whose Till holds from the start: it stays, or
+            starts and stops at once [open, spel.md 15].
         angle_wrap: Whether a stored tool angle is brought into -180..180 [U].
         numbers: Error numbers in use.
     """
@@ -100,5 +102,6 @@ class EpsonOptions:
     extended_queries: bool = True
     rc_plus: Literal[5, 7, 8] = 7
     real_pos_noise_mm: float = 0.002
+    till_already_met: Literal["stays", "starts"] = "stays"
     angle_wrap: bool = False
     numbers: SpelNumbers = SpelNumbers()

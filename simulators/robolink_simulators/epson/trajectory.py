@@ -6,12 +6,13 @@ in ``FULL_SPEED_AFTER_S``. Real controllers smooth the corners; nothing here dep
 """
 
 import math
-from dataclasses import dataclass
-from typing import Final, Protocol, Self
+from dataclasses import dataclass, replace
+from typing import Final, Protocol
 
 from robolink.model import Hand, Pose, ToolOffset
 from robolink.timing import NS_PER_S
 from robolink_simulators.epson.kinematics import Joints, check_ranges, flange_of, solve
+from robolink_simulators.epson.ramps import BrakedRamp, Ramp, TimeLaw
 from robolink_simulators.epson.refusals import Refusal, RefusalKind
 from robolink_simulators.epson.robots import ScaraModel
 
@@ -22,40 +23,6 @@ _STILL = 1e-9
 _CHECK_EVERY_MM = 2.0
 _CHECK_EVERY_DEG = 2.0
 _MOST_CHECKS = 2000
-
-
-@dataclass(frozen=True, slots=True)
-class Ramp:
-    """A trapezoid of speed over a path whose length is 1."""
-
-    rise_s: float
-    cruise_s: float
-    fall_s: float
-    peak_per_s: float
-
-    @classmethod
-    def fastest(cls, rate_per_s: float, rise_per_s2: float, fall_per_s2: float) -> Self:
-        """Return the quickest ramp within the given speed and accelerations."""
-        slack = 1 / rise_per_s2 + 1 / fall_per_s2
-        peak = min(rate_per_s, math.sqrt(2 / slack))
-        cruise = max(0.0, 1 - peak * peak * slack / 2) / peak
-        return cls(peak / rise_per_s2, cruise, peak / fall_per_s2, peak)
-
-    @property
-    def duration_s(self) -> float:
-        """How long the whole path takes."""
-        return self.rise_s + self.cruise_s + self.fall_s
-
-    def share_at(self, time_s: float) -> float:
-        """Return the share of the path covered after ``time_s``, 0 to 1."""
-        if time_s >= self.duration_s:
-            return 1.0
-        if time_s <= self.rise_s:
-            return self.peak_per_s * time_s * time_s / (2 * self.rise_s)
-        left_s = self.duration_s - time_s
-        if left_s < self.fall_s:
-            return 1 - self.peak_per_s * left_s * left_s / (2 * self.fall_s)
-        return self.peak_per_s * (time_s - self.rise_s / 2)
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,13 +56,20 @@ class Leg(Protocol):
     def joints_at(self, elapsed_ns: int) -> Joints:
         """Return the joints that long after its start; its end from the duration on."""
 
+    def braked(self, elapsed_ns: int) -> "Leg":
+        """Return the same leg, left that long after its start to come to rest."""
 
-def _duration_ns(ramp: Ramp | None) -> int:
+
+def _duration_ns(ramp: TimeLaw | None) -> int:
     return 0 if ramp is None else math.ceil(ramp.duration_s * NS_PER_S)
 
 
-def _share(ramp: Ramp | None, elapsed_ns: int) -> float:
+def _share(ramp: TimeLaw | None, elapsed_ns: int) -> float:
     return 1.0 if ramp is None else ramp.share_at(elapsed_ns / NS_PER_S)
+
+
+def _braked(ramp: TimeLaw | None, elapsed_ns: int) -> TimeLaw | None:
+    return BrakedRamp(ramp, elapsed_ns / NS_PER_S) if isinstance(ramp, Ramp) else ramp
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +78,7 @@ class JointLeg:
 
     start: Joints
     end: Joints
-    ramp: Ramp | None
+    ramp: TimeLaw | None
 
     @property
     def duration_ns(self) -> int:
@@ -113,11 +87,15 @@ class JointLeg:
 
     def joints_at(self, elapsed_ns: int) -> Joints:
         """Return the joints that long after the start."""
-        if elapsed_ns >= self.duration_ns:
-            return self.end
         share = _share(self.ramp, elapsed_ns)
+        if share >= 1:
+            return self.end
         pairs = zip(self.start.values(), self.end.values(), strict=True)
         return Joints(*(a + (b - a) * share for a, b in pairs))
+
+    def braked(self, elapsed_ns: int) -> "JointLeg":
+        """Return the same leg, left to come to rest."""
+        return replace(self, ramp=_braked(self.ramp, elapsed_ns))
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,7 +107,7 @@ class LineLeg:
     end: Pose
     offset: ToolOffset | None
     hand: Hand
-    ramp: Ramp | None
+    ramp: TimeLaw | None
 
     @property
     def duration_ns(self) -> int:
@@ -139,6 +117,10 @@ class LineLeg:
     def joints_at(self, elapsed_ns: int) -> Joints:
         """Return the joints that long after the start."""
         return self.joints_after(_share(self.ramp, min(elapsed_ns, self.duration_ns)))
+
+    def braked(self, elapsed_ns: int) -> "LineLeg":
+        """Return the same leg, left to come to rest."""
+        return replace(self, ramp=_braked(self.ramp, elapsed_ns))
 
     def joints_after(self, share: float) -> Joints:
         """Return the joints after a share of the line."""

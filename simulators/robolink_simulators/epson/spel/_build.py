@@ -23,6 +23,7 @@ from robolink_simulators.epson.spel._tree import (
     Statement,
     StoredPoint,
     Unary,
+    Until,
 )
 
 Items = tuple[Expression, ...]
@@ -72,7 +73,9 @@ class TreeBuilder(Transformer[Token, tuple[Statement, ...]]):
         """Build a motion and join its options, which stand in any order."""
         words = frozenset[str]().union(*(option.words for option in options))
         limz = next((option.limz for option in options if option.limz is not None), None)
-        return Motion(verb.lower(), target, MotionOptions(words, limz))
+        untils = [option.until for option in options if option.until is not None]
+        until = untils[0] if untils else None
+        return Motion(verb.lower(), target, MotionOptions(words, limz, until))
 
     def plain_option(self, word: Token) -> MotionOptions:
         """Build CP, ROT, LJM or an arch number."""
@@ -81,6 +84,11 @@ class TreeBuilder(Transformer[Token, tuple[Statement, ...]]):
     def limz_option(self, word: Token, value: Expression | None) -> MotionOptions:
         """Build LimZ with or without a height."""
         return MotionOptions(frozenset({word.lower()}), value)
+
+    def until_option(self, word: Token, condition: Expression | None) -> MotionOptions:
+        """Build Till or Find with or without a condition."""
+        until = Until(word.lower(), condition)
+        return MotionOptions(frozenset({until.word}), until=until)
 
     def assign_point(self, word: Token, value: Expression | Coordinates) -> AssignPoint:
         """Build ``P1 = ...``."""

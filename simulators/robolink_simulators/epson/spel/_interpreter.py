@@ -20,6 +20,7 @@ from robolink_simulators.epson.spel._tree import (
     Print,
     Statement,
 )
+from robolink_simulators.epson.spel._until import Watch
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +47,8 @@ class Execution:
         self._evaluator = evaluator
         self._pending = list(reversed(statements))
         self._busy_until_ns = now_ns
+        self._seen_ns = now_ns
+        self._watch: Watch | None = None
         self._done = False
 
     @property
@@ -56,17 +59,28 @@ class Execution:
     def advance(self, now_ns: int) -> None:
         """Let simulated time reach ``now_ns``; each statement starts when the last one ends."""
         arm = self._evaluator.session.machine.arm
-        while not self._done and now_ns >= self._busy_until_ns:
-            arm.advance(self._busy_until_ns)
-            if not self._pending:
+        while not self._done and now_ns >= (change_ns := self._change_ns):
+            arm.advance(change_ns)
+            watch, self._watch = self._watch, None
+            if watch is not None and watch.edge_after(self._seen_ns) == change_ns:
+                self._meet(watch, change_ns)
+            elif self._pending:
+                self._run(self._pending.pop())
+            else:
                 self._done = True
-                break
-            self._run(self._pending.pop())
+            self._seen_ns = change_ns
         arm.advance(now_ns)
+        self._seen_ns = max(self._seen_ns, now_ns)
 
     def next_change(self) -> int | None:
-        """Return when the statement under way ends, ``None`` when all have."""
-        return None if self._done else self._busy_until_ns
+        """Return when something happens next, ``None`` when all statements have ended."""
+        return None if self._done else self._change_ns
+
+    @property
+    def _change_ns(self) -> int:
+        """When the condition of the motion under way is met, or the statement ends."""
+        edge_ns = None if self._watch is None else self._watch.edge_after(self._seen_ns)
+        return self._busy_until_ns if edge_ns is None else min(edge_ns, self._busy_until_ns)
 
     def abort(self, now_ns: int) -> None:
         """Stop the line and the motion where it is; how a real one ends is unverified."""
@@ -102,6 +116,31 @@ class Execution:
             self.output += outcome.output
             self._busy_until_ns += outcome.duration_ns
 
+    def _begin(self, motion: Motion) -> Outcome:
+        machine, start_ns = self._evaluator.session.machine, self._busy_until_ns
+        legs, until = plan(self._evaluator, motion), motion.options.until
+        machine.till_met = False
+        watch = None if until is None else Watch(self._evaluator, until)
+        if watch is not None and not watch.stops:
+            machine.found = None
+        if watch is not None and self._stays(watch, start_ns):
+            watch.meet(start_ns)
+            return Outcome()
+        end_ns = machine.arm.start(legs, start_ns)
+        if watch is not None:
+            watch.foresee(start_ns, end_ns)
+        self._watch = watch
+        return Outcome(duration_ns=end_ns - start_ns)
+
+    def _stays(self, watch: Watch, start_ns: int) -> bool:
+        stays = self._evaluator.session.options.till_already_met == "stays"
+        return watch.holds(start_ns) and watch.stops and stays
+
+    def _meet(self, watch: Watch, instant_ns: int) -> None:
+        rest_ns = watch.meet(instant_ns)
+        if rest_ns is not None:
+            self._busy_until_ns = rest_ns
+
     def _outcome(self, statement: Statement) -> Outcome:
         evaluator = self._evaluator
         machine = evaluator.session.machine
@@ -113,9 +152,7 @@ class Execution:
             case Command():
                 return run_command(evaluator, statement)
             case Motion():
-                legs = plan(evaluator, statement)
-                end_ns = machine.arm.start(legs, self._busy_until_ns)
-                return Outcome(duration_ns=end_ns - self._busy_until_ns)
+                return self._begin(statement)
             case AssignPoint(number, value):
                 point = evaluator.point_of(value)
                 machine.points.store(evaluator.integer(number), point)

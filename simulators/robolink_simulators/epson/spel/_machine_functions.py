@@ -74,6 +74,8 @@ MACHINE_FUNCTIONS: Final[dict[str, tuple[range, MachineFunction]]] = {
     "out": (range(1, 2), lambda s, a: s.machine.outputs.get_byte(as_integer(a[0]))),
     "agl": (range(1, 2), lambda s, a: _item(s.machine.arm.joints.values(), a)),
     "pls": (range(1, 2), _pulses),
+    "tillon": (range(1), lambda s, _: s.machine.till_met),
+    "posfound": (range(1), lambda s, _: s.machine.found is not None),
     "motor": (range(1), lambda s, _: int(s.machine.motors_on)),
     "power": (range(1), lambda s, _: int(s.machine.power_high)),
     "speed": (range(2), lambda s, a: _item(s.machine.parameters.speed, a)),
@@ -138,6 +140,13 @@ def _real_position(session: Session, _: Arguments) -> Point:
     return Point.at(session.machine.real_tip(session.rng, noise_mm))
 
 
+def _found_position(session: Session, _: Arguments) -> Point:
+    if session.machine.found is None:
+        # What FindPos gives before anything was found is not documented: an error here.
+        raise Refusal(RefusalKind.POINT_UNDEFINED, "No Find has met its condition")
+    return session.machine.found
+
+
 def _tool_point(session: Session, arguments: Arguments) -> Point:
     tool = as_integer(arguments[0])
     offset = session.machine.tools.get(tool)
@@ -158,6 +167,7 @@ POINT_FUNCTIONS: Final[dict[str, tuple[range, PointFunction]]] = {
     "here": (range(1), _here),
     "curpos": (range(1), _here),
     "realpos": (range(1), _real_position),
+    "findpos": (range(1), _found_position),
     "tlset": (range(1, 2), _tool_point),
     "local": (range(1, 2), _local_point),
 }

@@ -21,15 +21,16 @@ _SAME_DEG = 0.001
 
 # CP blends into the next motion; here every motion ends at rest (assumed simplification).
 # LJM leaves a SCARA's point unchanged (documented). C0 to C7 all rise to LimZ, as C7 does.
-_LINE_WORDS: Final = frozenset({"cp", "rot"})
+_UNTIL_WORDS: Final = frozenset({"till", "find"})
+_LINE_WORDS: Final = frozenset({"cp", "rot"}) | _UNTIL_WORDS
 _WORDS: Final = {
-    "go": frozenset({"cp", "ljm"}),
-    "tgo": frozenset({"cp"}),
-    "bgo": frozenset({"cp"}),
+    "go": frozenset({"cp", "ljm"}) | _UNTIL_WORDS,
+    "tgo": frozenset({"cp"}) | _UNTIL_WORDS,
+    "bgo": frozenset({"cp"}) | _UNTIL_WORDS,
     "move": _LINE_WORDS,
     "tmove": _LINE_WORDS,
     "bmove": _LINE_WORDS,
-    "jump": frozenset({"cp", "limz", *(f"c{arch}" for arch in range(8))}),
+    "jump": frozenset({"cp", "limz", *(f"c{arch}" for arch in range(8))}) | _UNTIL_WORDS,
 }
 
 
@@ -45,6 +46,8 @@ def plan(evaluator: Evaluator, motion: Motion) -> list[Leg]:
     wrong = motion.options.words - _WORDS[motion.verb]
     if wrong:
         raise Refusal(RefusalKind.SYNTAX, f"{motion.verb} knows no {', '.join(sorted(wrong))}")
+    if motion.options.words >= _UNTIL_WORDS:
+        raise Refusal(RefusalKind.SYNTAX, "A motion takes one of Till and Find")
     point = evaluator.point(motion.target)
     if not machine.motors_on:
         raise Refusal(RefusalKind.MOTORS_OFF, "Motors are off")

@@ -108,11 +108,20 @@ class Command:
 
 
 @dataclass(frozen=True, slots=True)
+class Until:
+    """``Till`` or ``Find`` behind a motion; without a condition it is the stored one."""
+
+    word: str
+    condition: Expression | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class MotionOptions:
     """The words behind a motion's target."""
 
     words: frozenset[str] = frozenset()
     limz: Expression | None = None
+    until: Until | None = None
 
 
 @dataclass(frozen=True, slots=True)

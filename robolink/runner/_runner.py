@@ -1,24 +1,18 @@
-"""Executes a procedure on a motion group, with a person at the reference point.
+"""Takes the steps of a procedure on one motion group."""
 
-The runner owns what a procedure must not know: limits, deadlines, the clock, and the watch
-over the controller while a person is asked. Remote control cuts an idle client off after the
-remote time-out (60 s by default, epson.md 1.1), and a person may take half an hour; so the
-prompt is polled, and the status is read between polls. That also shows an emergency stop or
-an open guard at once.
-"""
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TypeVar
 
-import re
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from enum import Enum
-from typing import Protocol, TypeVar
-
-from robolink.calibration import Ask, Move, Procedure, Step
+from robolink.calibration import Ask, Procedure, Seek, Step
 from robolink.errors import (
+    CalibrationError,
     ConfigError,
     ControllerFaultError,
     DeclinedError,
-    LimitError,
+    NotReadyError,
+    NotReadyReason,
 )
 from robolink.messages import tr
 from robolink.model import (
@@ -29,63 +23,15 @@ from robolink.model import (
     MotionProfile,
     Path,
     Pose,
-    WorkBox,
 )
+from robolink.runner._jog_steps import jog_target
+from robolink.runner._operator import Operator, Question
+from robolink.runner._settings import RunSettings
 
 POLL_S = 1.0
 """Longest time between two status reads while a person is asked (design: at most 5 s)."""
 
 T = TypeVar("T")
-
-_STEP = re.compile(r"([xyzu])([+-][0-9]{1,4}(?:\.[0-9]{1,3})?)", re.ASCII)
-
-_DECIMAL = re.compile(r"[+-]?[0-9]{1,5}(?:\.[0-9]{1,6})?", re.ASCII)
-
-
-class Question(Enum):
-    """What kind of answer is wanted."""
-
-    PLACE = "place"
-    """Jog steps until the tip is on the reference point, then an empty line."""
-
-    YES_NO = "yes/no"
-
-    TEXT = "text"
-    """A line of text that is not empty; ``q`` alone ends."""
-
-
-class Operator(Protocol):
-    """The person at the cell, or whoever stands in for one."""
-
-    def tell(self, text: str) -> None:
-        """Show something that needs no answer."""
-
-    def ask(self, question: str, kind: Question) -> None:
-        """Show what is to be done or decided; :meth:`poll` fetches the answer."""
-
-    def poll(self, wait_s: float) -> str | None:
-        """Return the next line of the answer, ``None`` if none came within ``wait_s``."""
-
-
-@dataclass(frozen=True, slots=True)
-class RunSettings:
-    """Limits of a run.
-
-    Attributes:
-        box: Where targets may lie, in coordinates of the frame that moves.
-        speed_percent: For joint moves, in low power.
-        speed_mm_s: For straight moves, in low power.
-        max_jog_mm: Largest single step that a person may type.
-        max_jog_deg: The same for U.
-        motion_timeout_s: Longest duration of one movement before it is aborted.
-    """
-
-    box: WorkBox
-    speed_percent: int = 5
-    speed_mm_s: float = 20.0
-    max_jog_mm: float = 5.0
-    max_jog_deg: float = 5.0
-    motion_timeout_s: float = 120.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,7 +79,12 @@ class Runner:
         try:
             step = next(procedure)
             while True:
-                pose = self._take(step)
+                try:
+                    pose = self._take(step)
+                except CalibrationError as error:
+                    # The procedure may draw the tip back before it gives up.
+                    step = procedure.throw(error)
+                    continue
                 if self._on_step is not None:
                     self._on_step(StepDone(step, pose))
                 step = procedure.send(pose)
@@ -171,10 +122,30 @@ class Runner:
         return self.move(target, path)
 
     def _take(self, step: Step) -> Pose:
-        if isinstance(step, Move):
-            self._operator.tell(step.purpose)
-            return self.move(step.target, step.path)
-        return self._ask(step)
+        if isinstance(step, Ask):
+            return self._ask(step)
+        self._operator.tell(step.purpose)
+        if isinstance(step, Seek):
+            return self._seek(step)
+        return self.move(step.target, step.path)
+
+    def _seek(self, step: Seek) -> Pose:
+        settings = self._settings
+        with _as_measurement():
+            motion = self._group.move_until_input(
+                step.target, step.edge, speed_mm_s=step.speed_mm_s, box=settings.box
+            )
+        found = motion.wait(timeout_s=settings.motion_timeout_s)
+        if found is None:
+            raise CalibrationError(
+                "no_edge",
+                tr("Input {number} did not switch on the way.", number=step.edge.number),
+                remedy=tr(
+                    "Check the number of the input, that the sensor sees the tip, and that it is "
+                    "where the station says."
+                ),
+            )
+        return found
 
     def _ask(self, step: Ask) -> Pose:
         self._operator.ask(step.instruction, Question.PLACE)
@@ -241,69 +212,6 @@ def ask_for_pose(instruction: str) -> Procedure[Pose]:
     return (yield Ask(instruction))
 
 
-def jog_target(here: Pose, steps: str, settings: RunSettings) -> tuple[Pose, Path]:
-    """Return where typed ``steps`` lead from ``here``, and how to go there.
-
-    Raises:
-        ConfigError: The text is not a list of steps.
-        LimitError: A step is too large.
-    """
-    deltas = parse_steps(steps)
-    for axis, delta in deltas.items():
-        limit = settings.max_jog_deg if axis == "u" else settings.max_jog_mm
-        if abs(delta) > limit:
-            raise LimitError(
-                tr("{axis}{delta:+g} is too large for one step.", axis=axis, delta=delta),
-                remedy=tr("Steps of up to {limit:g} are allowed; take several.", limit=limit),
-            )
-    target = replace(
-        here,
-        x_mm=here.x_mm + deltas.get("x", 0.0),
-        y_mm=here.y_mm + deltas.get("y", 0.0),
-        z_mm=here.z_mm + deltas.get("z", 0.0),
-        u_deg=here.u_deg + deltas.get("u", 0.0),
-    )
-    # A straight move that only turns is an error in SPEL+ without ROT (spel.md 7.1).
-    return target, Path.JOINT if "u" in deltas else Path.STRAIGHT
-
-
-def parse_decimal(text: str) -> float:
-    """Read a decimal number that a person typed: ``-120.35``.
-
-    Raises:
-        ConfigError: It is anything else.
-    """
-    if not _DECIMAL.fullmatch(text.strip()):
-        raise ConfigError(
-            tr("{text!r} is not a decimal number.", text=text),
-            remedy=tr("Type for example -120.35."),
-        )
-    return float(text)
-
-
-def parse_steps(text: str) -> dict[str, float]:
-    """Read jog steps like ``x+0.1 y-0.05 u+5``: axis, sign, decimal number.
-
-    Raises:
-        ConfigError: Anything else, or an axis twice.
-    """
-    deltas: dict[str, float] = {}
-    for word in text.lower().split():
-        match = _STEP.fullmatch(word)
-        if match is None or match[1] in deltas:
-            raise ConfigError(
-                tr("{word!r} is not a jog step.", word=word),
-                remedy=tr(
-                    "Type an axis x, y, z or u, a sign and a number, for example x+0.1 z-0.5; "
-                    "ENTER when the tip is on the pin, q to end."
-                ),
-            )
-        deltas[match[1]] = float(match[2])
-    if not deltas:
-        raise ConfigError(tr("No jog step was given."), remedy=tr("For example: x+0.1 z-0.5"))
-    return deltas
-
-
 def _ended_by(status: ControllerStatus) -> str:
     if status.serious_fault:
         return tr("The controller reported a serious error")
@@ -314,3 +222,14 @@ def _ended_by(status: ControllerStatus) -> str:
     if status.fault:
         return tr("The controller went into error {code:04d}", code=status.code)
     return ""
+
+
+@contextmanager
+def _as_measurement() -> Iterator[None]:
+    """Let an input that has switched too early count as a bad measurement."""
+    try:
+        yield
+    except NotReadyError as error:
+        if error.reason is not NotReadyReason.EDGE_PASSED:
+            raise
+        raise CalibrationError("edge_passed", error.what, remedy=error.remedy) from error

@@ -1,0 +1,163 @@
+"""The drive through two crossed beams, and what it says about the tip. No person takes part.
+
+Each beam is crossed both ways, entry and exit each time: half way between both edges the tip
+is in the beam whatever their thickness, and both ways together are free of latency, braking
+and backlash (calibration.md 2).
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
+
+from robolink.calibration._beam_drive import BeamDrive
+from robolink.calibration._beams import Beam, Crossing, find_beams
+from robolink.calibration._crossed_beams import BeamsResult, solve_crossed_beams
+from robolink.calibration._result import Drift, VerifyResult
+from robolink.calibration._stations import BeamStation, CrossingPlan
+from robolink.calibration._steps import Procedure
+from robolink.calibration._touch import NO_OFFSET
+from robolink.errors import CalibrationError
+from robolink.messages import tr
+from robolink.model import Pose, ToolOffset, rotate_xy
+
+REFERENCE_ASIDES_MM: Final = (-12.0, -6.0, 6.0, 12.0)
+"""Places along a beam that tell its direction well enough, in a sensor of 30 mm."""
+
+
+def cross_beams(
+    station: BeamStation,
+    plan: CrossingPlan,
+    *,
+    here: Pose,
+    stored: ToolOffset | None,
+    turn_deg: float = 0.0,
+    sigma_mm: float | None = None,
+) -> Procedure[BeamsResult]:
+    """Measure X and Y of a tip with two beams. Runs in Tool 0, from above the beams.
+
+    Args:
+        station: Where the beams are.
+        plan: How they are crossed.
+        here: Where the flange is; its U is that of the measurement.
+        stored: The offset stored now; the tip is expected there.
+        turn_deg: Measure again with U turned by this, toward zero. Only the directions of the
+            beams are relied on then, not their places, and the offset is absolute.
+        sigma_mm: Standard deviation of one crossing's middle, where it is known.
+
+    Raises:
+        CalibrationError: ``no_edge``, ``edge_passed``, ``bent_needle``, and those of
+            :func:`solve_crossed_beams`.
+    """
+    drive = BeamDrive(station, plan, here, stored or NO_OFFSET)
+    shallow = yield from drive.from_above(here)
+    deep, turned = list[Crossing](), list[Crossing]()
+    if plan.shaft_mm:
+        deep = yield from replace(drive.once(), deeper_mm=plan.shaft_mm).run()
+    above = yield from drive.lifted()
+    if turn_deg:
+        other = replace(drive, frame=replace(here, u_deg=toward_zero(here.u_deg, turn_deg)))
+        turned = yield from other.from_above(above)
+        yield from other.lifted()
+    if deep:
+        _require_straight(shallow, deep, station, plan)
+    return solve_crossed_beams(
+        [*shallow, *turned],
+        station.beams,
+        stored=stored,
+        sigma_mm=sigma_mm,
+        beams_may_have_moved=bool(turn_deg),
+    )
+
+
+def trace_beams(
+    guess: BeamStation,
+    plan: CrossingPlan,
+    *,
+    here: Pose,
+    tip: ToolOffset,
+    asides_mm: Sequence[float] = REFERENCE_ASIDES_MM,
+) -> Procedure[tuple[Beam, Beam]]:
+    """Find where both beams are, with a reference pin whose tip is known. Runs in Tool 0.
+
+    Args:
+        guess: Where they are to within ``search_mm`` of the plan, at every place of a crossing.
+        plan: How they are crossed.
+        here: Where the flange is.
+        tip: The pin's offset.
+        asides_mm: Where along each beam it is crossed, both ways, from where they meet; two
+            places or more, and none so near to it that the pin breaks both.
+
+    Raises:
+        CalibrationError: ``no_edge``, ``edge_passed``, and those of :func:`find_beams`.
+    """
+    crossings = []
+    for aside_mm in asides_mm:
+        drive = BeamDrive(guess, replace(plan, aside_mm=aside_mm), here, tip).once()
+        crossings += yield from drive.from_above(here)
+        here = yield from drive.lifted()
+    return find_beams(crossings, (tip.x_mm, tip.y_mm))
+
+
+def verify_by_crossing(
+    station: BeamStation,
+    plan: CrossingPlan,
+    *,
+    here: Pose,
+    angles_deg: Sequence[float],
+    tolerance_mm: float,
+    aside: ToolOffset = NO_OFFSET,
+) -> Procedure[VerifyResult]:
+    """Turn about the new tip and cross the beams there again. Runs in the new tool.
+
+    Args:
+        station: Where the beams are.
+        plan: How they are crossed.
+        here: Where the frame of the new tool is.
+        angles_deg: Its angles U at which the tip is measured.
+        tolerance_mm: Largest drift that passes.
+        aside: Where the tip is expected, seen from the frame in force; not 0 where a difference
+            to a reference was written.
+
+    The drift at an angle is how far from the place of the reference record the tip is found
+    there. It ends lifted.
+
+    Raises:
+        CalibrationError: As :func:`cross_beams`.
+    """
+    drifts = []
+    for angle_deg in angles_deg:
+        drive = BeamDrive(station, plan, replace(here, u_deg=angle_deg), aside).once()
+        crossings = yield from drive.from_above(here)
+        here = yield from drive.lifted()
+        found = solve_crossed_beams(crossings, station.beams).offset
+        dx, dy = rotate_xy(aside.x_mm - found.x_mm, aside.y_mm - found.y_mm, angle_deg)
+        drifts.append(Drift(angle_deg, dx, dy))
+    return VerifyResult(tuple(drifts), tolerance_mm)
+
+
+def toward_zero(u_deg: float, turn_deg: float) -> float:
+    """Return U after a turn that keeps it inside the joint's range: toward zero."""
+    return u_deg - turn_deg if u_deg > 0 else u_deg + turn_deg
+
+
+def _require_straight(
+    shallow: Sequence[Crossing],
+    deep: Sequence[Crossing],
+    station: BeamStation,
+    plan: CrossingPlan,
+) -> None:
+    """Refuse a needle whose shaft is not above its tip."""
+    tip, shaft = (solve_crossed_beams(c, station.beams).offset for c in (shallow, deep))
+    beside_mm = math.hypot(shaft.x_mm - tip.x_mm, shaft.y_mm - tip.y_mm)
+    lean_deg = math.degrees(math.atan2(beside_mm, plan.shaft_mm))
+    if lean_deg > plan.max_lean_deg:
+        raise CalibrationError(
+            "bent_needle",
+            tr(
+                "The needle leans by {lean:.1f} degrees; {limit:.1f} are allowed.",
+                lean=lean_deg,
+                limit=plan.max_lean_deg,
+            ),
+            remedy=tr("Change it, and look whether it is seated straight."),
+        )

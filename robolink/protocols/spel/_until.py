@@ -1,0 +1,65 @@
+"""Straight moves that an input ends or marks, and what they leave to be read (spel.md 7.1).
+
+``Till`` brings the robot to rest at the edge; ``TillOn`` tells whether it did. ``Find`` lets it
+go on and keeps the position at the edge in ``FindPos``; ``PosFound`` tells whether there is
+one. A move takes one of the two. ``Sw(n) = On`` and ``Off`` are the documented inline forms.
+"""
+
+from robolink.messages import tr
+from robolink.model import Pose
+from robolink.protocols.spel._statements import Statement, check_range, move
+
+_LAST_INPUT = 0xFFFF
+"""Two bytes carry a bit number (epson.md 2.2); which exist depends on the hardware."""
+
+
+def move_till(target: Pose, bit: int, *, on: bool, six_axes: bool) -> Statement:
+    """``Move XY(...) Till Sw(3) = On``: stop where the input switches.
+
+    Raises:
+        LocalProtocolError: As :func:`move`, or no such input.
+    """
+    return _move_with("Till", target, bit, on=on, six_axes=six_axes)
+
+
+def move_find(target: Pose, bit: int, *, on: bool, six_axes: bool) -> Statement:
+    """``Move XY(...) Find Sw(3) = On``: note where the input switches, and go on.
+
+    Raises:
+        LocalProtocolError: As :func:`move`, or no such input.
+    """
+    return _move_with("Find", target, bit, on=on, six_axes=six_axes)
+
+
+def print_input(bit: int) -> Statement:
+    """1 when an input is on, else 0 (spel.md 8).
+
+    Raises:
+        LocalProtocolError: ``bit`` is not 0 to 65535.
+    """
+    return Statement(f"Print Sw({_input(bit)})")
+
+
+def print_till_on() -> Statement:
+    """Whether the last move was stopped by its ``Till``, a Boolean (spel.md 7.1, p. 831)."""
+    return Statement("Print TillOn")
+
+
+def print_position_found() -> Statement:
+    """Whether the last ``Find`` met its condition, a Boolean (spel.md 7.1)."""
+    return Statement("Print PosFound")
+
+
+def print_found_position() -> Statement:
+    """Where the last ``Find`` met its condition, as a point (spel.md 5.3, p. 328)."""
+    return Statement("Print FindPos")
+
+
+def _move_with(word: str, target: Pose, bit: int, *, on: bool, six_axes: bool) -> Statement:
+    state = "On" if on else "Off"
+    return Statement(f"{move(target, six_axes=six_axes)} {word} Sw({_input(bit)}) = {state}")
+
+
+def _input(bit: int) -> int:
+    check_range(tr("An input"), bit, 0, _LAST_INPUT)
+    return bit

@@ -1,0 +1,19 @@
+"""Executes a procedure on a motion group, with a person at the reference point.
+
+The runner owns what a procedure must not know: limits, deadlines, the clock, and the watch
+over the controller while a person is asked. Remote control cuts an idle client off after the
+remote time-out (60 s by default, epson.md 1.1), and a person may take half an hour; so the
+prompt is polled, and the status is read between polls. That also shows an emergency stop or
+an open guard at once.
+"""
+
+from robolink.runner._jog_steps import jog_target as jog_target
+from robolink.runner._jog_steps import parse_decimal as parse_decimal
+from robolink.runner._jog_steps import parse_steps as parse_steps
+from robolink.runner._operator import Operator as Operator
+from robolink.runner._operator import Question as Question
+from robolink.runner._runner import POLL_S as POLL_S
+from robolink.runner._runner import Runner as Runner
+from robolink.runner._runner import StepDone as StepDone
+from robolink.runner._runner import ask_for_pose as ask_for_pose
+from robolink.runner._settings import RunSettings as RunSettings

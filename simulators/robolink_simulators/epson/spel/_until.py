@@ -1,0 +1,80 @@
+"""``Till`` and ``Find``: motions that a condition ends or marks (spel.md 7.1).
+
+The instant at which an input that follows the robot meets the condition is known when the
+motion starts, because the motion is; an input that is switched by hand is seen at once. Till
+brakes with the motion's own deceleration (documented).
+"""
+
+from typing import Final
+
+from robolink_simulators.epson.points import Point
+from robolink_simulators.epson.spel._evaluate import Evaluator
+from robolink_simulators.epson.spel._tree import Binary, Expression, Literal, Name, Until
+from robolink_simulators.epson.spel._values import truth
+
+AT_POWER_ON: Final = Binary("=", Name("sw", (Literal(0),)), Name("on"))
+"""The condition of a bare Till or Find (spel.md 6.3): ``Sw(0) = On``."""
+
+_SAMPLE_NS: Final = 1_000_000
+"""A condition that holds for less is not seen (assumed: controllers sample their inputs)."""
+
+
+class Watch:
+    """The condition of one motion.
+
+    Args:
+        evaluator: What evaluates it.
+        until: What the motion says.
+    """
+
+    def __init__(self, evaluator: Evaluator, until: Until) -> None:
+        self.stops = until.word == "till"
+        self._evaluator = evaluator
+        self._condition: Expression = until.condition or AT_POWER_ON
+        self._edge_ns: int | None = None
+
+    def holds(self, instant_ns: int) -> bool:
+        """Tell whether the condition holds at an instant of the motion under way.
+
+        Raises:
+            Refusal: It cannot be evaluated.
+        """
+        with self._evaluator.session.machine.inputs.as_at(instant_ns):
+            return truth(self._evaluator.value(self._condition))
+
+    def foresee(self, start_ns: int, end_ns: int) -> None:
+        """Find out when the motion that has just been started meets the condition."""
+        if not self._evaluator.session.machine.inputs.connected:
+            return
+        before_ns = start_ns
+        while before_ns < end_ns:
+            after_ns = min(before_ns + _SAMPLE_NS, end_ns)
+            if self.holds(after_ns):
+                self._edge_ns = self._between(before_ns, after_ns)
+                return
+            before_ns = after_ns
+
+    def edge_after(self, seen_ns: int) -> int | None:
+        """Return when the condition is met, as far as that is known at ``seen_ns``."""
+        if self.holds(seen_ns):
+            return seen_ns + 1  # switched by hand just now
+        return self._edge_ns
+
+    def meet(self, instant_ns: int) -> int | None:
+        """Stop, or note the place; return when the robot rests if it stops."""
+        machine = self._evaluator.session.machine
+        if self.stops:
+            machine.till_met = True
+            return machine.arm.brake(instant_ns)
+        machine.found = Point.at(machine.tip())
+        return None
+
+    def _between(self, before_ns: int, after_ns: int) -> int:
+        """Return the first instant at which the condition holds, to the nanosecond."""
+        while after_ns - before_ns > 1:
+            middle_ns = (before_ns + after_ns) // 2
+            if self.holds(middle_ns):
+                after_ns = middle_ns
+            else:
+                before_ns = middle_ns
+        return after_ns

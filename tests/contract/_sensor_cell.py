@@ -1,0 +1,229 @@
+"""A simulated cell with two crossed beams and a touch plate, and a change of its nozzle."""
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from itertools import count
+from typing import Any
+
+from robolink_simulators.clock import ManualClock
+from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.hosting import plc_in_process
+from robolink_simulators.hosting.in_process import register, unregister
+from robolink_simulators.sensing import UPRIGHT, LightBeam, TipSwitch, TouchPlate
+from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
+from robolink_simulators.workplace import XyzMm
+
+import robolink
+from robolink.calibration import Ask, Beam, BeamStation, Move, Seek, TouchStation
+from robolink.model import Controller, InputEdge, Pose, ToolOffset
+from robolink.nozzle_change import (
+    ChangePlan,
+    Gate,
+    Listener,
+    NozzleChange,
+    PlannedStep,
+    TipSource,
+    ToolPlan,
+    preview,
+)
+from robolink.runner import Question, StepDone
+
+TOOL = 1
+HEADINGS = (3.0, 88.0)
+BEAM_INPUTS = (3, 4)
+PLATE_INPUT = 5
+
+_names = count()
+
+
+class NobodyThere:
+    """An operator who is told things and never has to do any."""
+
+    def tell(self, text: str) -> None:
+        """Hear a line."""
+
+    def ask(self, question: str, kind: Question) -> None:
+        """Nobody answers."""
+        raise AssertionError(f"{kind}: {question}")
+
+    def poll(self, wait_s: float) -> str | None:
+        """Nobody types."""
+        raise AssertionError(f"nobody was asked, for {wait_s} s")
+
+
+@dataclass(frozen=True)
+class EitherOf:
+    """Several sensors on one input."""
+
+    switches: tuple[TipSwitch, ...]
+
+    def trips(self, tip_mm: XyzMm, lean: tuple[float, float] = UPRIGHT) -> bool:
+        """Tell whether any of them trips."""
+        return any(switch.trips(tip_mm, lean) for switch in self.switches)
+
+
+@dataclass(frozen=True)
+class Inverted:
+    """A sensor whose input goes off when it trips."""
+
+    switch: TipSwitch
+
+    def trips(self, tip_mm: XyzMm, lean: tuple[float, float] = UPRIGHT) -> bool:
+        """Tell whether it does not trip."""
+        return not self.switch.trips(tip_mm, lean)
+
+
+@dataclass(frozen=True)
+class Taken:
+    """A step in which nobody was asked, and the pose after it."""
+
+    step: Move | Seek
+    pose: Pose
+
+    @property
+    def edge(self) -> InputEdge | None:
+        """What it sought."""
+        return self.step.edge if isinstance(self.step, Seek) else None
+
+
+@dataclass
+class Followed(Listener):
+    """A listener that keeps the steps."""
+
+    steps: list[Taken] = field(default_factory=list)
+
+    def step(self, tool: int, done: StepDone) -> None:
+        """Keep a step."""
+        assert tool == TOOL
+        assert not isinstance(done.step, Ask)
+        self.steps.append(Taken(done.step, done.pose))
+
+    @property
+    def edges(self) -> list[Taken]:
+        """Those that sought an edge."""
+        return [taken for taken in self.steps if taken.edge is not None]
+
+
+@dataclass
+class SensorCell:
+    """What is in the cell, and the truth about it.
+
+    Attributes:
+        place_mm: Where the beams cross.
+        plate: Where the plate is touched.
+    """
+
+    simulator: Any
+    url: str
+    clock: ManualClock
+
+    def __post_init__(self) -> None:
+        x_mm, y_mm, z_mm = self.simulator.world.tip_mm()
+        self.place_mm: XyzMm = (x_mm + 4.0, y_mm - 4.0, z_mm - 6.0)
+        self.plate = TouchStation(x_mm - 5.0, y_mm + 5.0, z_mm - 7.0, PLATE_INPUT)
+
+    @property
+    def station(self) -> BeamStation:
+        """The reference record of the beams."""
+        x_mm, y_mm, z_mm = self.place_mm
+        first, second = (Beam(x_mm, y_mm, heading) for heading in HEADINGS)
+        return BeamStation((first, second), z_mm, BEAM_INPUTS)
+
+    def beams(self, **shape: float) -> tuple[LightBeam, LightBeam]:
+        """Return the beams as they really are."""
+        first, second = (LightBeam(self.place_mm, heading, **shape) for heading in HEADINGS)
+        return first, second
+
+    def mount_beams(self, beams: tuple[TipSwitch, TipSwitch], **wiring: float) -> None:
+        """Connect two sensors to the inputs of the beams."""
+        for number, beam in zip(BEAM_INPUTS, beams, strict=True):
+            self.simulator.world.connect(number, beam, **wiring)
+
+    def mount_plate(self, **wiring: float) -> None:
+        """Connect a plate to its input."""
+        self.simulator.world.connect(PLATE_INPUT, TouchPlate(self.plate.z_mm), **wiring)
+
+    @property
+    def truth(self) -> ToolOffset:
+        """Where the tip of the mounted nozzle really is."""
+        tip: ToolOffset = self.simulator.world.tips[TOOL]
+        return tip
+
+    @property
+    def stored(self) -> ToolOffset | None:
+        """What the controller holds."""
+        offset: ToolOffset | None = self.simulator.machine.tools.get(TOOL)
+        return offset
+
+    @property
+    def tip_z_mm(self) -> float:
+        """How high the tip is now."""
+        height_mm: float = self.simulator.world.tip_mm()[2]
+        return height_mm
+
+    def change(self, source: TipSource, listener: Listener | None = None, **plan: Any) -> Any:
+        """Return a change of the nozzle that asks nobody."""
+        one = ToolPlan(TOOL, source, Gate(**plan))
+        return lambda controller, write=True: (
+            NozzleChange(
+                controller,
+                ChangePlan((one,), ask_before_write=False),
+                operator=NobodyThere(),
+                listener=listener,
+            )
+            .run(write=write)
+            .tools[0]
+        )
+
+    def foresee(self, controller: Controller, source: TipSource) -> tuple[PlannedStep, ...]:
+        """Return the steps of a measurement as they are foreseen."""
+        return preview(controller, ChangePlan((ToolPlan(TOOL, source),)))
+
+    @contextmanager
+    def connected(self) -> Iterator[Controller]:
+        """Connect."""
+        with robolink.connect(self.url) as controller:
+            yield controller
+
+    def run(self, source: TipSource, listener: Listener | None = None, **options: Any) -> Any:
+        """Change the nozzle and return the report about the tool."""
+        write = options.pop("write", True)
+        with self.connected() as controller:
+            return self.change(source, listener, **options)(controller, write=write)
+
+
+@contextmanager
+def sensor_cell(seed: int = 3) -> Iterator[SensorCell]:
+    """Set a cell up around an EPSON controller."""
+    clock, name = ManualClock(), f"sensors-{next(_names)}"
+    simulator = EpsonSimulator(seed=seed)
+    url = register(name, simulator, clock=clock)
+    try:
+        yield SensorCell(simulator, url, clock)
+    finally:
+        unregister(name)
+
+
+@contextmanager
+def plc_sensor_cell(seed: int = 3) -> Iterator[SensorCell]:
+    """Set a cell up around a PLC."""
+    clock, name = ManualClock(), f"sensors-{next(_names)}"
+    simulator = SoftMotionSimulator(seed=seed)
+    url = plc_in_process.register(name, simulator, clock=clock)
+    try:
+        yield SensorCell(simulator, url, clock)
+    finally:
+        plc_in_process.unregister(name)
+
+
+def miss_mm(found: ToolOffset, true: ToolOffset) -> float:
+    """Return by how much an offset is wrong in the plane."""
+    return math.hypot(found.x_mm - true.x_mm, found.y_mm - true.y_mm)
+
+
+def shifted(beam: LightBeam, dx_mm: float) -> LightBeam:
+    """Return a beam that was moved."""
+    x_mm, y_mm, z_mm = beam.through_mm
+    return replace(beam, through_mm=(x_mm + dx_mm, y_mm, z_mm))

@@ -1,0 +1,99 @@
+"""A nozzle change on a touch plate, from the mounted nozzle to the proved length."""
+
+from dataclasses import replace
+
+import pytest
+
+from robolink.calibration import ProbePlan
+from robolink.errors import CalibrationError, VerifyError
+from robolink.nozzle_change import TouchProbe
+from tests.contract._sensor_cell import TOOL, Followed, sensor_cell
+
+FASTEST_MM_S = max(ProbePlan().speeds_mm_s)
+BRAKING_MM = FASTEST_MM_S**2 / (2 * 200.0)
+BARELY_MM = 0.015
+
+
+@pytest.fixture
+def cell():
+    with sensor_cell() as cell:
+        yield cell
+
+
+@pytest.mark.parametrize("latency_s", [0.0, 0.02])
+def test_a_change_ends_with_the_true_length_written_and_proved(cell, latency_s):
+    cell.mount_plate(latency_s=latency_s)
+    report = cell.run(TouchProbe(cell.plate))
+    assert cell.stored.z_mm == pytest.approx(cell.truth.z_mm, abs=BARELY_MM)
+    assert cell.stored.x_mm == report.proposal.before.x_mm
+    assert report.proposal.result.latency_s == pytest.approx(latency_s, abs=0.012)
+    assert abs(report.verification.drifts[0].dz_mm) < 2 * BARELY_MM
+
+
+def test_the_interval_holds_the_true_length(cell):
+    cell.mount_plate(noise_mm=0.005)
+    result = cell.run(TouchProbe(cell.plate), write=False).proposal.result
+    (half,) = result.half_width95
+    assert abs(result.offset.z_mm - cell.truth.z_mm) <= half < 0.2
+
+
+def test_the_tip_stops_at_the_touch_and_retreats_before_anything_else(cell):
+    cell.mount_plate()
+    followed = Followed()
+    cell.run(TouchProbe(cell.plate), followed, write=False)
+    touch_mm = cell.plate.z_mm - cell.truth.z_mm
+    assert len(followed.edges) == len(ProbePlan().speeds_mm_s)
+    for done in followed.edges:
+        assert done.pose.z_mm > touch_mm - BRAKING_MM - 0.01
+        after = followed.steps[followed.steps.index(done) + 1]
+        assert after.pose.z_mm > done.pose.z_mm + 0.9
+        assert after.step.target.coordinates()[:2] == done.pose.coordinates()[:2]
+
+
+def test_a_plate_that_was_moved_is_not_noticed_by_touching_it_alone(cell):
+    cell.mount_plate()
+    higher = replace(cell.plate, z_mm=cell.plate.z_mm + 0.4)
+    report = cell.run(TouchProbe(higher))
+    assert cell.stored.z_mm == pytest.approx(cell.truth.z_mm + 0.4, abs=BARELY_MM)
+    assert report.verification.passed
+
+
+def test_a_nozzle_that_slips_after_the_write_fails_the_proof(cell):
+    cell.mount_plate()
+    before = cell.stored
+    longer = replace(cell.truth, z_mm=cell.truth.z_mm - 0.5)
+
+    class Slips(Followed):
+        def wrote(self, receipt):
+            cell.simulator.world.tips[TOOL] = longer
+
+    with pytest.raises(VerifyError, match=r"drifts 0\.(49|50)"):
+        cell.run(TouchProbe(cell.plate), Slips())
+    assert cell.stored == before
+
+
+def refused(cell, code, listener=None):
+    before = cell.stored
+    with pytest.raises(CalibrationError) as refusal:
+        cell.run(TouchProbe(cell.plate), listener)
+    assert refusal.value.code == code
+    assert refusal.value.remedy
+    assert cell.stored == before
+    assert cell.simulator.machine.tools.selected == TOOL
+    assert cell.tip_z_mm > cell.plate.z_mm + 9.0
+
+
+def test_a_surface_that_is_not_there_is_sought_so_far_and_no_further(cell):
+    lowest = cell.plate.z_mm - ProbePlan().beyond_mm - cell.stored.z_mm
+    followed = Followed()
+    refused(cell, "no_edge", followed)
+    assert not followed.edges
+    targets = [done.step.target.z_mm for done in followed.steps]
+    assert min(targets) > lowest
+
+
+def test_a_plate_that_is_on_from_the_start_is_refused_before_the_tip_comes_near(cell):
+    cell.simulator.machine.inputs.set(cell.plate.input, True)
+    followed = Followed()
+    refused(cell, "edge_passed", followed)
+    assert min(done.pose.z_mm for done in followed.steps) > cell.plate.z_mm - cell.stored.z_mm + 2

@@ -108,7 +108,6 @@ def test_nothing_that_moves_stops_or_switches_is_done():
             lambda: group.move_to(None, None, box=None),
             lambda: controller.io.set_output(1, True),
             group.pose,
-            controller.tools.selected,
             lambda: controller.tools.select(0),
         )
         for act in acts:
@@ -116,6 +115,11 @@ def test_nothing_that_moves_stops_or_switches_is_done():
                 act()
             assert refused.value.remedy
     assert bench.plc.writes == []
+
+
+def test_a_map_that_does_not_name_the_tool_in_force_does_not_tell_it():
+    with Bench(NO_HANDSHAKE, identity=URL).connect() as controller:
+        assert controller.tools.selected() is None
 
 
 LIST = """Name;Register;Type;Unit;Scale

@@ -67,16 +67,21 @@ class Mailbox:
         """Hold Ctrl-C back over exchanges that belong together."""
         return self.wire.uninterrupted()
 
-    def prepare(self, draft: Command, request: str) -> Response:
+    def prepare(self, draft: Command, request: str, *, now: Response | None = None) -> Response:
         """Make sure that a command may be sent: the permit is there and the mailbox ours.
 
         It is done before a marker is begun: what fails here was never sent.
+
+        Args:
+            draft: The command.
+            request: The same in words.
+            now: A snapshot that was taken just now; by default another one is taken.
 
         Raises:
             NotReadyError: The machine does not permit it.
             LeaseHeldError, LeaseLostError: Another client owns the mailbox.
         """
-        now = self.snapshots.take()
+        now = now or self.snapshots.take()
         facts = OPCODES[Opcode(draft.opcode)]
         if facts.needs_permit:
             require_permit(now, controller=self.identity, request=request)

@@ -22,7 +22,10 @@ from robolink.protocols.mailbox import BlockError, Response, Slot, decode_slot
 from robolink.timing import Deadline
 
 POLL_S: Final = 0.02
-"""Between two looks at the head of the response block."""
+"""Longest pause between two looks at the head of the response block."""
+
+_FIRST_POLL_S: Final = 0.001
+"""The first pause; each is twice the one before. Most commands end within a PLC cycle or two."""
 
 LOOK_S: Final = 0.3
 """Longest time between two snapshots while something is awaited."""
@@ -100,13 +103,14 @@ class Snapshots:
         """
         known = (since.ack_head, since.state, since.error_class, since.group_state)
         clock = self._wire.clock
-        until = Deadline.after(clock, wait_s)
+        until, pause_s = Deadline.after(clock, wait_s), _FIRST_POLL_S
         while True:
             head = self._wire.read_head()
             self._pulse.note(head.heartbeat, clock.now_ns())
             if head[:4] != known or until.expired:
                 break
-            clock.sleep(POLL_S)
+            clock.sleep(pause_s)
+            pause_s = min(2 * pause_s, POLL_S)
         now = self.take()
         if self._pulse.frozen(clock.now_ns()):
             raise self._wire.ended(

@@ -27,6 +27,7 @@ from robolink.protocols.mailbox import (
     Opcode,
     ReadMode,
     Response,
+    Slot,
 )
 
 
@@ -70,8 +71,7 @@ class SoftMotionToolTable:
         self._check_index(tool)
         if tool == 0:
             return ToolOffset()
-        slot = self._mailbox.snapshots.slot(tool)
-        return self._mailbox.from_plc(slot.tool) if slot.defined else None
+        return self._value(self._mailbox.snapshots.slot(tool))
 
     def name(self, tool: int) -> str:
         """Read the name of a slot, empty when it has none."""
@@ -99,12 +99,15 @@ class SoftMotionToolTable:
     def write(self, tool: int, offset: ToolOffset, *, expected: Expected) -> ToolReceipt:
         """Write and read back; see :class:`robolink.model.ToolTable`."""
         self.require_writable(tool)
-        return self._set(tool, offset, expected, self._write_draft(tool, offset))
+        stored = self._mailbox.snapshots.slot(tool)
+        draft = self._write_draft(tool, offset, stored)
+        return self._set(tool, offset, expected, draft, stored=stored)
 
     def clear(self, tool: int, *, expected: Expected) -> ToolReceipt:
         """Empty a slot that is not selected; see :class:`robolink.model.ToolTable`."""
         self.require_writable(tool)
-        return self._set(tool, None, expected, _clear_draft(tool))
+        stored = self._mailbox.snapshots.slot(tool)
+        return self._set(tool, None, expected, _clear_draft(tool), stored=stored)
 
     def preview_write(self, tool: int, offset: ToolOffset) -> tuple[str, ...]:
         """Return what :meth:`write` would send, in words; reads only.
@@ -112,9 +115,10 @@ class SoftMotionToolTable:
         Empty when the value is stored already.
         """
         self.require_writable(tool)
-        if self.same(self.read(tool), offset):
+        stored = self._mailbox.snapshots.slot(tool)
+        if self.same(self._value(stored), offset):
             return ()
-        return (describe(self._write_draft(tool, offset)),)
+        return (describe(self._write_draft(tool, offset, stored)),)
 
     def preview_clear(self, tool: int) -> tuple[str, ...]:
         """Return what :meth:`clear` would send, in words."""
@@ -164,17 +168,23 @@ class SoftMotionToolTable:
             self._require_in_force(offset, request)
 
     def _set(
-        self, tool: int, requested: ToolOffset | None, expected: Expected, draft: Command
+        self,
+        tool: int,
+        requested: ToolOffset | None,
+        expected: Expected,
+        draft: Command,
+        *,
+        stored: Slot,
     ) -> ToolReceipt:
         mailbox, request = self._mailbox, describe(draft)
         with mailbox.lock.held(request):
             now = mailbox.snapshots.take()
             require_still(now, controller=mailbox.identity, request=request)
             in_force = now.tool_slot == tool
-            if not self.same(self.read(tool), requested):
+            if not self.same(self._value(stored), requested):
                 if in_force:
                     self._require_changeable(tool, requested, now, request)
-                mailbox.prepare(draft, request)
+                mailbox.prepare(draft, request, now=now)
             write = ToolWrite(
                 tool,
                 requested,
@@ -187,8 +197,11 @@ class SoftMotionToolTable:
                 self._require_in_force(requested, request)
             return receipt
 
-    def _write_draft(self, tool: int, offset: ToolOffset) -> Command:
-        name = self.name(tool)
+    def _value(self, slot: Slot) -> ToolOffset | None:
+        return self._mailbox.from_plc(slot.tool) if slot.defined else None
+
+    def _write_draft(self, tool: int, offset: ToolOffset, stored: Slot) -> Command:
+        name = stored.name
         if not (name.isascii() and name.isprintable() and name):
             name = f"Tool {tool}"
         pose = self._mailbox.to_plc(offset)

@@ -21,6 +21,7 @@ def not_tried() -> tuple[Fact, ...]:
         (tr("a statement whose client vanishes"), moving, "execute_on_disconnect"),
         (tr("Logout while a task runs"), moving, "logout_while_running"),
         (tr("refusal while only monitoring"), monitoring, "monitoring_refusal"),
+        (tr("Move ... Till whose input is on already"), moving, "till_already_met"),
         (tr("remote time-out while only monitoring"), minutes, "monitoring_timeout"),
         (tr("a second client"), disturbing, "second_client"),
         (tr("Reset switches outputs off"), setup, "reset_outputs_off"),

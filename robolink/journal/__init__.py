@@ -6,6 +6,7 @@ and 8). Importing this package loads no database code; opening a journal does.
 
 from robolink.journal._journal import Journal as Journal
 from robolink.journal._log import JournalOutcomeLog as JournalOutcomeLog
+from robolink.journal._opening import close_files as close_files
 from robolink.journal._opening import memory_journal as memory_journal
 from robolink.journal._opening import open_journal as open_journal
 from robolink.journal._places import default_location as default_location

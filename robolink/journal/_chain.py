@@ -10,7 +10,10 @@ from robolink.messages import tr
 FIRST: Final = ""
 """What the first entry holds in place of the hash of the one before."""
 
-_ENCODER: Final = json.JSONEncoder(sort_keys=True, separators=(",", ":"), allow_nan=False)
+# What holds itself is not looked for: it ends in a RecursionError all the same.
+_ENCODER: Final = json.JSONEncoder(
+    sort_keys=True, separators=(",", ":"), allow_nan=False, check_circular=False
+)
 
 
 def canonical(value: object) -> str:
@@ -19,19 +22,23 @@ def canonical(value: object) -> str:
     Raises:
         TypeError: It holds something that JSON does not know.
         ValueError: It holds a number that is not finite.
+        RecursionError: It holds itself.
     """
     return _ENCODER.encode(value)
 
 
 def storable(text: str) -> str:
     """Return ``text`` as every database stores it: valid Unicode without NUL."""
+    if text.isascii() and "\0" not in text:
+        return text
     return text.encode("utf-8", "backslashreplace").decode().replace("\0", "\\x00")
 
 
 def digest(row: Mapping[str, object]) -> str:
     """Return the SHA-256 of a stored entry, over every field but the hash itself."""
-    fields = {name: value for name, value in row.items() if name != "hash"}
-    return sha256(canonical(fields).encode()).hexdigest()
+    if "hash" in row:
+        row = {name: value for name, value in row.items() if name != "hash"}
+    return sha256(canonical(row).encode()).hexdigest()
 
 
 class ChainCheck:

@@ -8,18 +8,22 @@ from pathlib import Path
 from typing import Any, Final
 from urllib.parse import quote
 
-from sqlalchemy import Engine, create_engine, event
-from sqlalchemy.pool import NullPool, StaticPool
+from sqlalchemy import Engine, create_engine, event, text
+from sqlalchemy.pool import NullPool, Pool, StaticPool
 
 from robolink.durable_files import make_folder, sync_folder
 from robolink.errors import JournalError
 from robolink.journal._places import Place
+from robolink.journal._prepared import Prepared
 from robolink.messages import tr
 
 BUSY_S: Final = 3.0
 """How long a write waits for another program that writes."""
 
 _SCHEMA_LOCK: Final = 0x726F626F  # any number that no other user of the database takes
+
+_BEGIN: Final = "BEGIN IMMEDIATE"
+_BEGIN_WRITING: Final = Prepared(text(_BEGIN))
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +39,7 @@ class Backend:
 
     engine: Engine
     last_resort: Engine | None = None
-    begin_writing: str = ""
+    begin_writing: Prepared | None = None
     begin_migrating: str = ""
 
 
@@ -49,7 +53,7 @@ def backend_of(place: Place, *, read_only: bool) -> Backend:
     if place.url:
         return _postgresql(place, read_only=read_only)
     if place.path is None:
-        return _sqlite(create_engine("sqlite://", creator=_memory, poolclass=StaticPool))
+        return _sqlite(_engine(_memory, StaticPool))
     if read_only:
         _require_file(place)
         return Backend(
@@ -62,7 +66,12 @@ def backend_of(place: Place, *, read_only: bool) -> Backend:
 
 
 def _sqlite(engine: Engine) -> Backend:
-    return Backend(engine, begin_writing="BEGIN IMMEDIATE", begin_migrating="BEGIN IMMEDIATE")
+    return Backend(engine, begin_writing=_BEGIN_WRITING, begin_migrating=_BEGIN)
+
+
+def _engine(connect: Callable[[], sqlite3.Connection], pool: type[Pool]) -> Engine:
+    # The parameters of prepared statements have names.
+    return create_engine("sqlite://", creator=connect, poolclass=pool, paramstyle="named")
 
 
 def _file_engine(uri: str, prepare: Callable[[sqlite3.Connection], None] | None = None) -> Engine:
@@ -76,7 +85,7 @@ def _file_engine(uri: str, prepare: Callable[[sqlite3.Connection], None] | None 
             raise
         return connection
 
-    return create_engine("sqlite://", creator=connect, poolclass=NullPool)
+    return _engine(connect, NullPool)
 
 
 def _connect(uri: str) -> sqlite3.Connection:

@@ -9,7 +9,7 @@ from typing import Any, Final, TypeAlias
 from sqlalchemy import Connection, Select, bindparam, func, insert, select, update
 
 from robolink.journal._chain import canonical, digest, storable
-from robolink.journal._prepared import Prepared
+from robolink.journal._prepared import Prepared, Runner
 from robolink.journal._records import Filter
 from robolink.journal._tables import ENTRIES, HEAD, IN_A_CHANGE
 from robolink.model import EntryKind, NewEntry, Signature
@@ -33,8 +33,9 @@ _COUNT: Final = select(func.count()).select_from(ENTRIES)
 class EntryRows:
     """The append-only record over one connection."""
 
-    def __init__(self, connection: Connection) -> None:
+    def __init__(self, connection: Connection, runner: Runner) -> None:
         self._connection = connection
+        self._runner = runner
         self._head: _Head | None = None  # a guess: others add entries too
 
     def append(
@@ -51,6 +52,7 @@ class EntryRows:
         Raises:
             TypeError: Details are no plain JSON.
             ValueError: Details hold a number that is not finite.
+            RecursionError: Details hold themselves.
         """
         if not entries:
             return
@@ -60,7 +62,7 @@ class EntryRows:
             head = self._locked_head()
             rows = _chained(head, _common(controller, signature), change, entries)
             self._move_head(head, rows[-1])
-        _INSERT.run_many(self._connection, rows)
+        self._runner.run_many(_INSERT, rows)
 
     def page(
         self, wanted: Filter, *, before: int | None, after: int | None, limit: int
@@ -95,13 +97,14 @@ class EntryRows:
         self._head = (last["number"], last["hash"])
         values = {"number": last["number"], "hash": last["hash"]}
         seen = {"of_number": head[0], "of_hash": head[1]}
-        return _MOVE_HEAD.run(self._connection, {**values, **seen}).rowcount == 1
+        return self._runner.run(_MOVE_HEAD, {**values, **seen}) == 1
 
 
 def _chained(
     head: _Head, common: Mapping[str, Any], change: str, entries: Sequence[NewEntry]
 ) -> list[dict[str, Any]]:
     number, previous = head
+    common = {**common, "at": datetime.now(UTC).isoformat(timespec="milliseconds")}
     rows = []
     for entry in entries:
         number += 1
@@ -139,8 +142,7 @@ def _common(controller: str, signature: Signature) -> dict[str, Any]:
 def _fields(entry: NewEntry, change: str) -> dict[str, Any]:
     proves = entry.kind in _PROVING and "value" in entry.details
     return {
-        "at": datetime.now(UTC).isoformat(timespec="milliseconds"),
-        "kind": str(entry.kind),
+        "kind": entry.kind.value,
         "change": storable(entry.change or change),
         "operation": storable(entry.operation),
         "tool": entry.tool,

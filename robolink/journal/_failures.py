@@ -1,10 +1,8 @@
 """Errors of the database, turned into errors that say what to do."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Final
 
-from sqlalchemy.exc import DBAPIError, SQLAlchemyError
+from sqlalchemy.exc import DBAPIError
 
 from robolink.errors import JournalError
 from robolink.messages import tr
@@ -38,22 +36,14 @@ _POSTGRESQL: Final = {
 }
 
 
-@contextmanager
-def failures(name: str, consequence: str = "") -> Iterator[None]:
-    """Turn an error of the database inside the block into :class:`JournalError`.
+def journal_error(error: Exception, name: str, consequence: str) -> JournalError:
+    """Return what a person is told about an error of the database.
 
     Args:
+        error: As the driver, SQLAlchemy or the system raised it.
         name: Which journal, as a person is told.
         consequence: What it means for the controller, one sentence.
     """
-    try:
-        yield
-    except (SQLAlchemyError, OSError) as error:
-        raise journal_error(error, name, consequence) from error
-
-
-def journal_error(error: Exception, name: str, consequence: str) -> JournalError:
-    """Return what a person is told about an error of the database."""
     raw = (error.orig if isinstance(error, DBAPIError) else None) or error
     cause, remedy = _sentences(_reason(raw), " ".join(str(raw).split()))
     return JournalError(

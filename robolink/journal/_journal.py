@@ -40,6 +40,11 @@ class Journal:
         self.read_only = read_only
         self._store = store
 
+    @property
+    def durable(self) -> bool:
+        """Whether it outlives this process."""
+        return self._store.durable
+
     def log(
         self,
         identity: str,

@@ -4,11 +4,10 @@ from collections.abc import Mapping
 from dataclasses import fields
 from typing import Final
 
-from sqlalchemy import BindParameter, Connection, bindparam, insert, select, update
-from sqlalchemy.exc import IntegrityError
+from sqlalchemy import BindParameter, bindparam, insert, select, update
 
 from robolink.journal._chain import storable
-from robolink.journal._prepared import Prepared
+from robolink.journal._prepared import UNLESS_THERE, Prepared, Runner
 from robolink.journal._sightings import FREE, Sighting
 from robolink.journal._tables import LEASES
 
@@ -33,28 +32,28 @@ _TAKE: Final = Prepared(
     .values(epoch=LEASES.c.epoch + 1, **_CLAIM)
 )
 _END: Final = Prepared(update(LEASES).where(_OF).values(epoch=LEASES.c.epoch + 1, token=FREE))
-_INSERT: Final = Prepared(insert(LEASES))
+_INSERT: Final = Prepared(insert(LEASES), UNLESS_THERE)
 
 
 class LeaseRows:
     """Who may change which controller, over one connection."""
 
-    def __init__(self, connection: Connection) -> None:
-        self._connection = connection
+    def __init__(self, runner: Runner) -> None:
+        self._runner = runner
 
     def sight(self, controller: str) -> Sighting:
         """Return the lease as it is now; one that never was held is free."""
-        row = _SELECT.run(self._connection, {"of_controller": storable(controller)}).first()
-        return Sighting() if row is None else Sighting(*row)
+        rows = self._runner.rows(_SELECT, {"of_controller": storable(controller)})
+        return Sighting(*rows[0]) if rows else Sighting()
 
     def renew(self, controller: str, epoch: int, token: str, now_ns: int) -> bool:
         """Count one more beat; return whether the lease still is this holder's."""
         values = {**_own(controller, epoch, token), "now_ns": now_ns}
-        return _RENEW.run(self._connection, values).rowcount == 1
+        return self._runner.run(_RENEW, values) == 1
 
     def release(self, controller: str, epoch: int, token: str) -> None:
         """Free the lease; one that was lost is left alone."""
-        _RELEASE.run(self._connection, _own(controller, epoch, token))
+        self._runner.run(_RELEASE, _own(controller, epoch, token))
 
     def take(self, controller: str, seen: Sighting, claim: Mapping[str, object]) -> int:
         """Take the lease if it still is as it was seen.
@@ -63,19 +62,14 @@ class LeaseRows:
             The new epoch, or 0 when it changed meanwhile.
         """
         if seen.epoch == 0:
-            first = {"controller": storable(controller), "epoch": 1, "beat": 0}
-            try:
-                with self._connection.begin_nested():
-                    _INSERT.run(self._connection, {**first, **claim})
-            except IntegrityError:
-                return 0
-            return 1
+            first = {"controller": storable(controller), "epoch": 1, "beat": 0, **claim}
+            return self._runner.run(_INSERT, first)
         values = {**_own(controller, seen.epoch, seen.token), "of_beat": seen.beat, **claim}
-        return seen.epoch + 1 if _TAKE.run(self._connection, values).rowcount else 0
+        return seen.epoch + 1 if self._runner.run(_TAKE, values) else 0
 
     def end(self, controller: str) -> None:
         """Free the lease whoever holds it, so that he notices."""
-        _END.run(self._connection, {"of_controller": storable(controller)})
+        self._runner.run(_END, {"of_controller": storable(controller)})
 
 
 def _own(controller: str, epoch: int, token: str) -> dict[str, object]:

@@ -6,7 +6,7 @@ nothing. Whether a holder still lives is judged by what is certain first: a proc
 ended is gone; else he counts as silent when his beats stood still for :data:`LEASE_S`.
 """
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Final
 
@@ -181,11 +181,10 @@ class Lease:
             return tables.leases.sight(self._controller)
 
     def _claim(self, purpose: str, operator: str, now_ns: int) -> dict[str, object]:
-        holder = replace(self._holder, operator=operator or self._holder.operator)
         return {
             "token": self._token,
-            "holder": _holder_text(holder),
-            "boot": storable(holder.boot),
+            "holder": _holder_text(self._holder, operator or self._holder.operator),
+            "boot": storable(self._holder.boot),
             "beat_ns": now_ns,
             "taken_at": wall_label(),
             "purpose": storable(purpose),
@@ -215,5 +214,5 @@ class Lease:
 
 
 @lru_cache(maxsize=64)
-def _holder_text(holder: Holder) -> str:
-    return canonical(asdict(holder))
+def _holder_text(holder: Holder, operator: str) -> str:
+    return canonical({**asdict(holder), "operator": operator})

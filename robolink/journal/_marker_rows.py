@@ -1,16 +1,28 @@
 """Statements about markers."""
 
 import json
-from typing import Any, Final
+from typing import Final, NamedTuple
 
-from sqlalchemy import BindParameter, Connection, Row, bindparam, delete, insert, select, update
+from sqlalchemy import BindParameter, bindparam, delete, insert, select, update
 
 from robolink.errors import JournalError
 from robolink.journal._chain import canonical, storable
-from robolink.journal._prepared import Prepared
+from robolink.journal._prepared import UNLESS_THERE, Prepared, Runner
 from robolink.journal._tables import MARKERS
 from robolink.messages import tr
 from robolink.model import Marker, MarkerKind
+
+
+class _Stored(NamedTuple):
+    """A marker as it is stored."""
+
+    controller: str
+    operation: str
+    kind: str
+    request: str
+    begun_at: str
+    details: str
+
 
 _SAME: Final = (
     MARKERS.c.controller == bindparam("of_controller"),
@@ -23,19 +35,18 @@ _NAMES: Final[dict[str, BindParameter[object]]] = {
     name: bindparam(f"of_{name}") for name in ("controller", "operation")
 }
 _UPDATE: Final = Prepared(update(MARKERS).where(*_SAME).values(**_STATE))
-_INSERT: Final = Prepared(insert(MARKERS).values(**_NAMES, **_STATE))
+_INSERT: Final = Prepared(insert(MARKERS).values(**_NAMES, **_STATE), UNLESS_THERE)
 _DELETE: Final = Prepared(delete(MARKERS).where(*_SAME))
-_SELECT: Final = Prepared(
-    select(MARKERS).where(MARKERS.c.controller == bindparam("of_controller")).order_by(MARKERS.c.id)
-)
-_SELECT_ALL: Final = select(MARKERS).order_by(MARKERS.c.id)
+_LISTING: Final = select(*(MARKERS.c[name] for name in _Stored._fields)).order_by(MARKERS.c.id)
+_SELECT: Final = Prepared(_LISTING.where(MARKERS.c.controller == bindparam("of_controller")))
+_SELECT_ALL: Final = Prepared(_LISTING)
 
 
 class MarkerRows:
     """What is not settled, over one connection."""
 
-    def __init__(self, connection: Connection) -> None:
-        self._connection = connection
+    def __init__(self, runner: Runner) -> None:
+        self._runner = runner
 
     def put(self, controller: str, marker: Marker) -> bool:
         """Store a marker in place of an earlier one of its operation.
@@ -50,27 +61,27 @@ class MarkerRows:
             "begun_at": storable(marker.begun_at),
             "details": canonical(marker.details),
         }
-        if _UPDATE.run(self._connection, values).rowcount:
-            return False
-        _INSERT.run(self._connection, values)
-        return True
+        if self._runner.run(_INSERT, values):
+            return True
+        self._runner.run(_UPDATE, values)
+        return False
 
     def remove(self, controller: str, operation: str) -> bool:
         """Forget a marker; return whether it was there."""
-        return _DELETE.run(self._connection, _same(controller, operation)).rowcount == 1
+        return self._runner.run(_DELETE, _same(controller, operation)) == 1
 
     def of(self, controller: str) -> tuple[Marker, ...]:
         """Return the markers of a controller, oldest first."""
-        rows = _SELECT.run(self._connection, {"of_controller": storable(controller)})
-        return tuple(_marker(row) for row in rows)
+        rows = self._runner.rows(_SELECT, {"of_controller": storable(controller)})
+        return tuple([_marker(_Stored(*row)) for row in rows])
 
     def of_all(self) -> tuple[tuple[str, Marker], ...]:
         """Return every marker with the identity of its controller, oldest first."""
-        rows = self._connection.execute(_SELECT_ALL)
-        return tuple((row.controller, _marker(row)) for row in rows)
+        found = [_Stored(*row) for row in self._runner.rows(_SELECT_ALL)]
+        return tuple([(row.controller, _marker(row)) for row in found])
 
 
-def _marker(row: Row[Any]) -> Marker:
+def _marker(row: _Stored) -> Marker:
     try:
         kind, details = MarkerKind(row.kind), json.loads(row.details)
         if not isinstance(details, dict):

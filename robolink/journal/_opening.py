@@ -43,6 +43,14 @@ def memory_journal(identity: str) -> Journal:
         return known
 
 
+def close_files() -> None:
+    """Close the journals of this process that outlive it; each opens again at its next use."""
+    with _lock:
+        for journal in _opened.values():
+            if journal.durable:
+                journal.close()
+
+
 def _open(place: Place, *, read_only: bool) -> Journal:
     from robolink.journal._store import Store  # here, because it loads SQLAlchemy
 

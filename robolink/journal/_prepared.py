@@ -1,10 +1,27 @@
-"""Statements that are compiled once: a commit should cost what the disk takes, not the text."""
+"""Statements that are compiled once: a commit should cost what the disk takes, not the text.
+
+SQLAlchemy words them for each database, and its connection still begins and ends the
+transaction. In between they go to the driver's own cursor: wrapping each result for one row
+costs several times what SQLite takes for the statement itself.
+"""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Final, TypeAlias
 
-from sqlalchemy import Connection, CursorResult
+from sqlalchemy import Connection, Dialect
+from sqlalchemy.engine.interfaces import DBAPIModule
+from sqlalchemy.exc import DBAPIError
 from sqlalchemy.sql.elements import ClauseElement
+
+Values: TypeAlias = Mapping[str, object]
+
+Words: TypeAlias = tuple[str, Values]
+"""The text of a statement and the values that never change."""
+
+NOTHING: Final[Values] = {}
+
+UNLESS_THERE: Final = " ON CONFLICT DO NOTHING"
+"""Ends an insert that leaves alone what is there; both databases say it alike."""
 
 
 class Prepared:
@@ -12,36 +29,76 @@ class Prepared:
 
     Args:
         statement: An insert without values takes all its columns.
+        ending: What follows it.
     """
 
-    def __init__(self, statement: ClauseElement) -> None:
+    def __init__(self, statement: ClauseElement, ending: str = "") -> None:
         self._statement = statement
-        self._texts: dict[str, tuple[str, Sequence[str] | None, dict[str, Any]]] = {}
+        self._ending = ending
+        self._words: dict[str, Words] = {}
 
-    def run_many(self, connection: Connection, rows: Sequence[Mapping[str, object]]) -> None:
-        """Run it for each row."""
-        text, order, constants = self._compiled(connection)
-        given = [{**constants, **row} for row in rows]
-        if order is None:
-            connection.exec_driver_sql(text, given)
-        else:
-            connection.exec_driver_sql(
-                text, [tuple([row[name] for name in order]) for row in given]
-            )
-
-    def run(self, connection: Connection, values: Mapping[str, object]) -> CursorResult[Any]:
-        """Run it with ``values`` by the names of its parameters."""
-        text, order, constants = self._compiled(connection)
-        given = {**constants, **values}
-        if order is None:
-            return connection.exec_driver_sql(text, given)
-        return connection.exec_driver_sql(text, tuple([given[name] for name in order]))
-
-    def _compiled(self, connection: Connection) -> tuple[str, Sequence[str] | None, dict[str, Any]]:
-        name = connection.dialect.name
-        known = self._texts.get(name)
+    def words(self, dialect: Dialect) -> Words:
+        """Return it as a database is told; its parameters have names."""
+        known = self._words.get(dialect.name)
         if known is None:
-            compiled: Any = self._statement.compile(dialect=connection.dialect)
-            known = (compiled.string, compiled.positiontup, dict(compiled.params))
-            self._texts[name] = known
+            compiled: Any = self._statement.compile(dialect=dialect)
+            known = (compiled.string + self._ending, dict(compiled.params))
+            self._words[dialect.name] = known
         return known
+
+
+class Runner:
+    """Runs prepared statements over one connection, inside its transaction."""
+
+    def __init__(self, connection: Connection) -> None:
+        self._connection = connection
+        self._dialect = connection.dialect
+        self._cursor = connection.connection.cursor()
+
+    def run(self, statement: Prepared, values: Values = NOTHING) -> int:
+        """Run it with ``values`` by the names of its parameters.
+
+        Returns:
+            How many rows it changed.
+
+        Raises:
+            DBAPIError: The database refuses.
+        """
+        text, constants = statement.words(self._dialect)
+        try:
+            self._cursor.execute(text, {**constants, **values})
+        except self._dialect.loaded_dbapi.Error as error:
+            raise self._refused(text, error) from error
+        return self._cursor.rowcount
+
+    def run_many(self, statement: Prepared, rows: Sequence[Values]) -> None:
+        """Run it for each row.
+
+        Raises:
+            DBAPIError: The database refuses.
+        """
+        text, constants = statement.words(self._dialect)
+        try:
+            self._cursor.executemany(text, [{**constants, **row} for row in rows])
+        except self._dialect.loaded_dbapi.Error as error:
+            raise self._refused(text, error) from error
+
+    def rows(self, statement: Prepared, values: Values = NOTHING) -> Sequence[Sequence[Any]]:
+        """Return all that it finds.
+
+        Raises:
+            DBAPIError: The database refuses.
+        """
+        text, constants = statement.words(self._dialect)
+        try:
+            self._cursor.execute(text, {**constants, **values})
+            # To the end: a result left open would keep SQLite at what it reads.
+            return self._cursor.fetchall()
+        except self._dialect.loaded_dbapi.Error as error:
+            raise self._refused(text, error) from error
+
+    def _refused(self, text: str, error: DBAPIModule.Error) -> DBAPIError:
+        """Return the error as SQLAlchemy raises it, the connection given up if it is lost."""
+        if self._dialect.is_disconnect(error, self._connection.connection, self._cursor):
+            self._connection.invalidate(error)
+        return DBAPIError(text, None, error)

@@ -6,15 +6,17 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from sqlalchemy import Connection, Engine
+from sqlalchemy.exc import SQLAlchemyError
 
 from robolink.errors import JournalError
 from robolink.journal import _migrations
 from robolink.journal._engines import Backend, backend_of
 from robolink.journal._entry_rows import EntryRows
-from robolink.journal._failures import failures, journal_error
+from robolink.journal._failures import journal_error
 from robolink.journal._lease_rows import LeaseRows
 from robolink.journal._marker_rows import MarkerRows
 from robolink.journal._places import Place
+from robolink.journal._prepared import Runner
 from robolink.messages import tr
 
 
@@ -23,6 +25,7 @@ class Tables:
 
     Attributes:
         connection: The connection.
+        runner: Runs prepared statements over it.
         entries: The append-only record.
         markers: What is not settled.
         leases: Who may change which controller.
@@ -31,9 +34,10 @@ class Tables:
 
     def __init__(self, connection: Connection, *, newer: bool) -> None:
         self.connection = connection
-        self.entries = EntryRows(connection)
-        self.markers = MarkerRows(connection)
-        self.leases = LeaseRows(connection)
+        self.runner = Runner(connection)
+        self.entries = EntryRows(connection, self.runner)
+        self.markers = MarkerRows(self.runner)
+        self.leases = LeaseRows(self.runner)
         self.newer = newer
 
 
@@ -73,8 +77,8 @@ class Store:
                 remedy=tr("Open it for writing to add to it."),
             )
         with self._use(consequence) as (backend, tables), tables.connection.begin():
-            if backend.begin_writing:
-                tables.connection.exec_driver_sql(backend.begin_writing)
+            if backend.begin_writing is not None:
+                tables.runner.run(backend.begin_writing)
             yield tables
 
     @contextmanager
@@ -111,11 +115,13 @@ class Store:
     def _use(self, consequence: str) -> Iterator[tuple[Backend, Tables]]:
         with self._lock:
             try:
-                with failures(self._place.name, consequence):
-                    yield self._connected()
+                yield self._connected()
             except JournalError:
                 self._drop()
                 raise
+            except (SQLAlchemyError, OSError) as error:
+                self._drop()
+                raise journal_error(error, self._place.name, consequence) from error
 
     def _connected(self) -> tuple[Backend, Tables]:
         if self._backend is None:

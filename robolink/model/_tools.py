@@ -10,7 +10,6 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model._geometry import angle_difference_deg
 
-
 _COMPONENTS: Final = ("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
 
 

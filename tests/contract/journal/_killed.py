@@ -14,6 +14,7 @@ from itertools import count
 from sqlalchemy import Engine, event
 
 from robolink.journal import EntryKind, JournalOutcomeLog, NewEntry, open_journal
+from robolink.journal._prepared import Runner
 from tests.contract.journal._acts import marker
 
 STEPS: tuple[Callable[[JournalOutcomeLog], None], ...] = (
@@ -29,7 +30,7 @@ def kill_at(number: int) -> None:
     """Let this process die before its statement or its commit of that number."""
     left = number
 
-    def step(*_arguments: object) -> None:
+    def step(*_told: object) -> None:
         nonlocal left
         left -= 1
         if left == 0:
@@ -37,6 +38,17 @@ def kill_at(number: int) -> None:
 
     event.listen(Engine, "before_cursor_execute", step)
     event.listen(Engine, "commit", step)
+    # Prepared statements go past SQLAlchemy, so it tells nobody of them.
+    for name in ("run", "run_many", "rows"):
+        setattr(Runner, name, _after(step, getattr(Runner, name)))
+
+
+def _after(step: Callable[[], None], run: Callable[..., object]) -> Callable[..., object]:
+    def stepped(*arguments: object) -> object:
+        step()
+        return run(*arguments)
+
+    return stepped
 
 
 def run_once(number: int, acknowledge: int, location: str) -> None:

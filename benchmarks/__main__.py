@@ -2,6 +2,7 @@
 
 from benchmarks.exchange import measure_exchange
 from benchmarks.journal import measure_journal
+from benchmarks.mailbox import measure_mailbox
 from benchmarks.nozzle_change import measure_nozzle_change
 from benchmarks.solvers import measure_solvers
 from benchmarks.start_up import measure_start_up
@@ -15,6 +16,7 @@ def main() -> None:
         [
             *measure_exchange(),
             *measure_transaction(),
+            *measure_mailbox(),
             *measure_journal(),
             *measure_nozzle_change(),
             *measure_start_up(),

@@ -16,7 +16,7 @@ import signal
 import socket
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from statistics import median
 from time import perf_counter_ns
 from urllib.parse import urlsplit
@@ -60,9 +60,11 @@ def _compare(
 
 
 @contextlib.contextmanager
-def served_simulator(cpu: int | None) -> Iterator[str]:
+def served_simulator(
+    cpu: int | None, serving: Sequence[str] = ("epson", "--tcp", "127.0.0.1:0")
+) -> Iterator[str]:
     """Serve a simulator in a process of its own, on the CPU ``cpu``; gives its URL."""
-    command = [sys.executable, "-m", "robolink_cli", "sim", "epson", "--tcp", "127.0.0.1:0"]
+    command = [sys.executable, "-m", "robolink_cli", "sim", *serving]
     process = subprocess.Popen([*command, "--json"], stdout=subprocess.PIPE, text=True)
     try:
         if cpu is not None:

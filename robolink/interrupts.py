@@ -5,8 +5,9 @@ be taken for the answer to the next question. So while a session is open, SIGINT
 a handler that raises KeyboardInterrupt as usual, except inside an exchange: there it is held
 back until the exchange, which a deadline bounds, has ended.
 
-The handler is swapped once per session and not once per exchange, because two calls of
-``signal.signal`` would cost more than everything else that the driver does in one.
+The handler is swapped when the first session opens and not once per exchange, because two calls
+of ``signal.signal`` would cost more than everything else that the driver does in one. All
+sessions of a process share it: a program may hold an EPSON robot and a PLC at a time.
 """
 
 import signal
@@ -14,12 +15,54 @@ import threading
 from types import FrameType, TracebackType
 
 
+class _Handler:
+    """The one SIGINT handler of this process, for all gates.
+
+    Attributes:
+        gates: How many gates are open.
+        depth: How many times the main thread is inside one.
+        held: Whether SIGINT came while it was.
+    """
+
+    def __init__(self) -> None:
+        self.gates = 0
+        self.depth = 0
+        self.held = False
+
+    def install(self) -> bool:
+        """Watch SIGINT for one gate more; False where that is not possible."""
+        if threading.current_thread() is not threading.main_thread():
+            return False
+        current = signal.getsignal(signal.SIGINT)
+        if current is signal.default_int_handler:
+            signal.signal(signal.SIGINT, self._interrupted)
+        elif current != self._interrupted:
+            return False  # the program has a handler of its own
+        self.gates += 1
+        return True
+
+    def remove(self) -> None:
+        """Watch for one gate less; the last one gives SIGINT back."""
+        self.gates -= 1
+        if self.gates == 0 and signal.getsignal(signal.SIGINT) == self._interrupted:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+
+    def _interrupted(self, number: int, frame: FrameType | None) -> None:
+        if self.depth:
+            self.held = True
+        else:
+            signal.default_int_handler(number, frame)
+
+
+_handler = _Handler()
+
+
 class InterruptGate:
     """Holds back SIGINT while the main thread is inside the gate; a context manager.
 
-    It may be entered inside itself, because some operations are several exchanges: a write
-    is not done before it has been read back, and a movement is not under way before whoever
-    could abort it knows of it. The outermost end lets Ctrl-C out.
+    It may be entered inside itself, and inside another one, because some operations are several
+    exchanges: a write is not done before it has been read back, and a movement is not under way
+    before whoever could abort it knows of it. The outermost end lets Ctrl-C out.
 
     It stands aside where it is not needed: outside the main thread, where Python delivers no
     signals, and where the program has a SIGINT handler of its own.
@@ -28,27 +71,22 @@ class InterruptGate:
     def __init__(self) -> None:
         self._open = False
         self._depth = 0
-        self._held = False
 
     def open(self) -> None:
-        """Start to watch SIGINT, if this is the main thread and nobody else does."""
-        if (
-            threading.current_thread() is threading.main_thread()
-            and signal.getsignal(signal.SIGINT) is signal.default_int_handler
-        ):
-            signal.signal(signal.SIGINT, self._interrupted)
-            self._open = True
+        """Start to watch SIGINT, if this is the main thread and the program does not."""
+        if not self._open:
+            self._open = _handler.install()
 
     def close(self) -> None:
-        """Give SIGINT back. Idempotent; from another thread the handler just stays harmless."""
+        """Stop watching. Idempotent; from another thread the handler just stays harmless."""
         if self._open and threading.current_thread() is threading.main_thread():
-            if signal.getsignal(signal.SIGINT) == self._interrupted:
-                signal.signal(signal.SIGINT, signal.default_int_handler)
             self._open = False
+            _handler.remove()
 
     def __enter__(self) -> None:
         if self._open and threading.get_ident() == _MAIN:
             self._depth += 1
+            _handler.depth += 1
 
     def __exit__(
         self,
@@ -58,15 +96,10 @@ class InterruptGate:
     ) -> None:
         if self._depth and threading.get_ident() == _MAIN:
             self._depth -= 1
-            if self._held and not self._depth:
-                self._held = False
+            _handler.depth -= 1
+            if _handler.held and not _handler.depth:
+                _handler.held = False
                 raise KeyboardInterrupt
-
-    def _interrupted(self, number: int, frame: FrameType | None) -> None:
-        if self._depth:
-            self._held = True
-        else:
-            signal.default_int_handler(number, frame)
 
 
 _MAIN = threading.main_thread().ident

@@ -50,6 +50,7 @@ def test_a_joint_move_turns_the_tool(controller):
     assert motion.wait(timeout_s=60) is MotionOutcome.ARRIVED
     assert group.pose().u_deg == pytest.approx(target.u_deg, abs=0.05)
 
+
 def test_power_is_low_and_the_speed_is_set_before_a_move(cell):
     with cell.connect() as controller:
         controller.motors(True)
@@ -84,6 +85,7 @@ def test_a_remote_timeout_of_never_forbids_motion(cell):
         with pytest.raises(NotReadyError) as caught:
             group.move_to(target, STRAIGHT, box=EVERYWHERE)
     assert caught.value.reason == "no_remote_timeout"
+
 
 def test_motors_off_are_named_and_nothing_moves(cell):
     with cell.connect() as controller:
@@ -126,6 +128,7 @@ def test_a_move_that_takes_too_long_is_aborted_and_its_end_is_seen(controller):
     assert controller.outcomes.open_markers() == ()
     assert group.pose().z_mm < target.z_mm - 1
 
+
 @pytest.mark.parametrize("danger", ["press_estop", "open_guard"])
 def test_an_emergency_stop_or_an_open_guard_ends_the_move_and_nothing_is_resent(cell, danger):
     with cell.connect() as controller:
@@ -141,6 +144,7 @@ def test_an_emergency_stop_or_an_open_guard_ends_the_move_and_nothing_is_resent(
         assert controller.outcomes.open_markers() == ()
         with pytest.raises(NotReadyError):
             group.move_to(target, STRAIGHT, box=EVERYWHERE)
+
 
 def test_after_release_and_reset_the_robot_can_move_again(cell):
     with cell.connect() as controller:
@@ -178,6 +182,7 @@ def test_they_are_put_back_when_the_procedure_dies(controller, error):
     assert controller.tools.selected() == selected
     assert controller.outcomes.open_markers() == ()
 
+
 def test_what_cannot_be_put_back_is_named_by_the_message_and_the_marker(cell):
     with cell.connect() as controller:
         controller.motors(True)
@@ -196,6 +201,7 @@ def test_what_cannot_be_put_back_is_named_by_the_message_and_the_marker(cell):
         assert marker.details["tool"] == selected
         assert marker.details["now"] == 0
 
+
 def test_a_tool_written_while_it_is_selected_moves_nothing(cell):
     with cell.connect() as controller:
         moved = cell.simulator.machine.arm.moves_started
@@ -203,4 +209,3 @@ def test_a_tool_written_while_it_is_selected_moves_nothing(cell):
         before = controller.tools.read(tool)
         controller.tools.write(tool, ToolOffset(13, -3, -20), expected=before)
         assert cell.simulator.machine.arm.moves_started == moved
-

@@ -4,12 +4,13 @@ import contextlib
 import io
 import re
 import threading
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from queue import SimpleQueue
-from typing import Any
+from typing import Any, ClassVar
 
 import pytest
 from robolink_cli import main
@@ -17,6 +18,7 @@ from robolink_simulators.clock import ManualClock, ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.options import EpsonOptions
 from robolink_simulators.hosting.tcp import serve_tcp
+from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 import robolink
 from robolink.journal import Journal, open_journal
@@ -43,35 +45,45 @@ class WireStep:
 Step = WireStep | CommitStep
 
 
-class ChangeCell:
-    """A controller that holds ``OLD`` in tools 1 and 2, of which 1 is selected."""
+class ChangeCell(ABC):
+    """A controller that holds ``OLD`` in tools 1 and 2, of which 1 is selected.
 
-    def __init__(self, simulator: EpsonSimulator, url: str, folder: Path) -> None:
+    Attributes:
+        matters: What requests begin with that take ownership, select or write.
+    """
+
+    matters: ClassVar[re.Pattern[str]]
+
+    def __init__(
+        self, simulator: EpsonSimulator | SoftMotionSimulator, url: str, folder: Path
+    ) -> None:
         self.simulator = simulator
         self.url = url
         self.folder = folder
         self.journal: Journal = open_journal(str(folder / "journal.db"))
 
     @property
+    @abstractmethod
     def tools(self) -> dict[int, ToolOffset | None]:
         """What is stored in both, past the wire."""
-        return {tool: self.simulator.machine.tools.get(tool) for tool in OLD}
+
+    @property
+    @abstractmethod
+    def selected(self) -> int:
+        """Which tool is selected, past the wire."""
+
+    @abstractmethod
+    def writes(self) -> list[int]:
+        """Return the tools that were written so far, in order."""
+
+    @abstractmethod
+    def values_written(self) -> list[ToolOffset]:
+        """Return what tool 1 was written as so far, in order."""
 
     @property
     def requests(self) -> list[str]:
         """What came in so far."""
         return [text for _, direction, text in self.simulator.log if direction == ">"]
-
-    def writes(self) -> list[int]:
-        """Return the tools that were written so far, in order."""
-        found = [match.group(1) for match in map(_WRITE.match, self.requests) if match]
-        assert len(found) == self.simulator.machine.flash_writes
-        return [int(tool) for tool in found]
-
-    def values_written(self) -> list[ToolOffset]:
-        """Return what tool 1 was written as so far, in order."""
-        texts = [text.partition("XY(")[2].partition(")")[0] for text in self.requests]
-        return [ToolOffset(*map(float, text.split(","))) for text in texts if text]
 
     def steps_of(self, program: str) -> list[Step]:
         """Run a program undisturbed and return all its instants."""
@@ -124,7 +136,7 @@ class ChangeCell:
 
     def check_the_selected_tool_is_right_or_named(self) -> None:
         """Whoever looks is told which tool the cell's own one is."""
-        if self.simulator.machine.tools.selected != 1:
+        if self.selected != 1:
             markers = [marker for _, marker in self.journal.open_markers()]
             (named,) = [marker for marker in markers if marker.kind is MarkerKind.SELECTION]
             assert named.details["tool"] == 1
@@ -132,7 +144,7 @@ class ChangeCell:
     def check_all_is_settled(self) -> None:
         """Nothing is open, the record says what is true, and the cell's own tool is selected."""
         assert self.journal.open_markers() == ()
-        assert self.simulator.machine.tools.selected == 1
+        assert self.selected == 1
         self.check_what_was_acknowledged_is_there()
         outcomes = self.journal.log(self.url, clock=ManualClock())
         with robolink.connect(self.url, outcomes=outcomes) as controller:
@@ -168,10 +180,41 @@ class ChangeCell:
         return client
 
 
+class EpsonChangeCell(ChangeCell):
+    """An EPSON controller."""
+
+    matters = re.compile(r'\$(Log|Execute,"(Tool \d|TLSet ))')
+
+    def __init__(self, simulator: EpsonSimulator, url: str, folder: Path) -> None:
+        super().__init__(simulator, url, folder)
+        self._machine = simulator.machine
+
+    @property
+    def tools(self) -> dict[int, ToolOffset | None]:
+        """What is stored in both, past the wire."""
+        return {tool: self._machine.tools.get(tool) for tool in OLD}
+
+    @property
+    def selected(self) -> int:
+        """Which tool is selected, past the wire."""
+        return self._machine.tools.selected
+
+    def writes(self) -> list[int]:
+        """Return the tools that were written so far, in order."""
+        found = [match.group(1) for match in map(_WRITE.match, self.requests) if match]
+        assert len(found) == self._machine.flash_writes
+        return [int(tool) for tool in found]
+
+    def values_written(self) -> list[ToolOffset]:
+        """Return what tool 1 was written as so far, in order."""
+        texts = [text.partition("XY(")[2].partition(")")[0] for text in self.requests]
+        return [ToolOffset(*map(float, text.split(","))) for text in texts if text]
+
+
 @contextmanager
 def change_cell(
     folder: Path, kind: type[EpsonSimulator] = EpsonSimulator, **habits: Any
-) -> Iterator[ChangeCell]:
+) -> Iterator[EpsonChangeCell]:
     """Serve a cell with a journal of its own."""
     folder.mkdir(parents=True)
     options = EpsonOptions(**{"remote_timeout_s": 0, "login_timeout_s": 0, **habits})
@@ -180,7 +223,7 @@ def change_cell(
         simulator.machine.tools.set(tool, offset)
     simulator.machine.tools.flash_writes = 0
     with serve_tcp(simulator, clock=ScaledClock(200.0)) as host:
-        cell = ChangeCell(simulator, host.url, folder)
+        cell = EpsonChangeCell(simulator, host.url, folder)
         try:
             yield cell
         finally:

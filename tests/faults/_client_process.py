@@ -21,6 +21,7 @@ _FORKS.set_forkserver_preload(
         "robolink_cli._calibrating",
         "robolink_cli._password",
         "robolink.transport._tcp",
+        "robolink.transport._modbus_open",
         "robolink.journal._store",
         "robolink.controllers",
         "robolink.transaction",

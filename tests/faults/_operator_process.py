@@ -7,7 +7,7 @@ transaction of the journal. What lies between two of them cannot be seen by the 
 import os
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
@@ -18,11 +18,13 @@ from robolink_simulators.clock import ManualClock
 
 import robolink
 from robolink.controllers.epson._session import EpsonSession
+from robolink.controllers.softmotion._wire import MailboxWire
 from robolink.errors import RobolinkError
 from robolink.journal import JournalOutcomeLog, open_journal
 from robolink.journal._store import Store, Tables
 from robolink.model import Signature, ToolOffset
 from robolink.protocols.epson_text import Refusal, Reply
+from robolink.protocols.mailbox import COMMAND, Opcode
 from robolink.protocols.spel import Statement
 from robolink.timing import NS_PER_S
 from robolink.transaction import Wanted, change_tools
@@ -152,6 +154,7 @@ def _operate(
 
 def _wait_at_each_step(line: Connection, outcomes: JournalOutcomeLog) -> None:
     execute, read, write = EpsonSession.execute, Store.read, Store.write
+    read_slot, write_block = MailboxWire.read_slot, MailboxWire.write
 
     def wait(kind: StepKind) -> None:
         line.send(Waiting(kind, outcomes._lease._epoch))
@@ -163,6 +166,15 @@ def _wait_at_each_step(line: Connection, outcomes: JournalOutcomeLog) -> None:
         elif statement.startswith("TLSet"):
             wait("tool write")
         return execute(session, statement)
+
+    def slot_read(wire: MailboxWire, slot: int) -> tuple[int, ...]:
+        wait("tool read")
+        return read_slot(wire, slot)
+
+    def block_written(wire: MailboxWire, words: Sequence[int]) -> None:
+        if words[COMMAND["opcode"].word] == Opcode.WRITE_TOOL:
+            wait("tool write")
+        write_block(wire, words)
 
     @contextmanager
     def reading(store: Store, consequence: str = "") -> Iterator[Tables]:
@@ -177,4 +189,6 @@ def _wait_at_each_step(line: Connection, outcomes: JournalOutcomeLog) -> None:
             yield tables
 
     EpsonSession.execute = executed  # type: ignore[method-assign, assignment]
+    MailboxWire.read_slot = slot_read  # type: ignore[method-assign, assignment]
+    MailboxWire.write = block_written  # type: ignore[method-assign, assignment]
     Store.read, Store.write = reading, writing  # type: ignore[method-assign, assignment]

@@ -20,8 +20,8 @@ MOMENTS: Final[tuple[Moment, Moment]] = (
 SHARES: Final = 8
 """Into so many tests the steps are dealt, so that several workers can share them."""
 
-_EVERY = 24
-"""Of all other exchanges, every 24th makes the sample."""
+_EVERY = 48
+"""Of all other exchanges, every 48th makes the sample."""
 
 _MATTERS = re.compile(r'\$(Log|Execute,"(Tool \d|TLSet \d|Move |Go ))')
 """Logs in or out, selects, writes or moves."""

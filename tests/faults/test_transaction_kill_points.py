@@ -8,22 +8,21 @@ a sample is taken: every transaction, and the exchanges that log in or out, sele
 ``ROBOLINK_ALL_KILL_POINTS=1`` takes all. ``pytest -s`` shows how many.
 """
 
-import os
-import re
 from itertools import dropwhile
 
 import pytest
 
-from robolink.model import ToolOffset
 from tests.faults._change_cell import ChangeCell, Step, WireStep, change_cell
-from tests.faults._change_process import NEW, OLD, CommitStep
+from tests.faults._change_process import NEW, OLD
+from tests.faults._kill_points import (
+    NOTHING_LEFT,
+    check_killed_change,
+    check_recovered,
+    chosen,
+)
 from tests.faults._steps import MOMENTS
 
 pytestmark = pytest.mark.timeout(600)
-
-_MATTERS = re.compile(r'\$(Log|Execute,"(Tool \d|TLSet ))')
-
-NOTHING_LEFT = "Nothing is unsettled on this controller."
 
 CHANGES = ("one tool", "two tools", "two tools, verified")
 
@@ -39,39 +38,6 @@ LEFT = {
 }
 
 
-def chosen(steps: list[Step]) -> list[Step]:
-    if os.environ.get("ROBOLINK_ALL_KILL_POINTS") == "1":
-        return steps
-    return [step for step in steps if isinstance(step, CommitStep) or _MATTERS.match(step.request)]
-
-
-def right_values(program: str, cell: ChangeCell, written: list[int]) -> dict[int, ToolOffset]:
-    """Return what the tools must hold after a recovery."""
-    whole = len(written) == (1 if program == "one tool" else 2)
-    kept = whole and (program != "two tools, verified" or cell.verified())
-    return {tool: NEW[tool] if kept and tool in written else OLD[tool] for tool in OLD}
-
-
-def check_recovered(cell: ChangeCell, program: str, written: list[int]) -> None:
-    right = right_values(program, cell, written)
-    assert cell.tools == right
-    put_back = cell.writes()[len(written) :]
-    # One write puts one tool back; a tool that is right already is not written.
-    assert sorted(put_back) == [tool for tool in sorted(written) if right[tool] == OLD[tool]]
-    cell.check_all_is_settled()
-
-
-def check_killed_change(cell: ChangeCell, program: str, step: Step) -> None:
-    cell.kill(program, step)
-    written = cell.writes()
-    assert len(set(written)) == len(written)
-    cell.check_what_was_acknowledged_is_there()
-    cell.check_the_selected_tool_is_right_or_named()
-    cell.recover()
-    assert NOTHING_LEFT in cell.recover()
-    check_recovered(cell, program, written)
-
-
 @pytest.mark.parametrize("program", CHANGES)
 def test_a_change_killed_at_each_step_is_recovered_as_a_whole(tmp_path, program):
     with change_cell(tmp_path / "whole") as cell:
@@ -79,7 +45,7 @@ def test_a_change_killed_at_each_step_is_recovered_as_a_whole(tmp_path, program)
         right = {tool: NEW[tool] if tool in cell.writes() else OLD[tool] for tool in OLD}
         assert cell.tools == right
         assert NOTHING_LEFT in cell.recover()
-    steps = chosen(all_steps)
+    steps = chosen(cell, all_steps)
     for number, step in enumerate(steps):
         with change_cell(tmp_path / str(number)) as cell:
             try:
@@ -119,7 +85,7 @@ def test_a_recovery_killed_at_each_step_may_be_run_again(tmp_path, left):
         written = leave(cell, left, change_steps)
         all_steps = cell.steps_of("recover")
         check_recovered(cell, program, written)
-    steps = chosen(all_steps)
+    steps = chosen(cell, all_steps)
     for number, step in enumerate(steps):
         with change_cell(tmp_path / str(number)) as cell:
             try:

@@ -1,6 +1,7 @@
 """A link to a PLC mailbox that can be made to fail, and a record beside it."""
 
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from typing import Any, TypeVar
 
 from robolink_simulators.clock import ManualClock
@@ -131,6 +132,7 @@ class Cell:
     """
 
     def __init__(self) -> None:
+        self._open = ExitStack()
         self.plc = Plc(ManualClock())
         self.link = PlcLink(self.plc)
         self.outcomes = memory_journal(self.link.identity).log(
@@ -145,7 +147,14 @@ class Cell:
 
     def met(self) -> SoftMotionController:
         """Meet the mailbox over the present link."""
-        return open_softmotion(self.link, outcomes=self.outcomes, timeout_s=0.5)
+        controller = open_softmotion(self.link, outcomes=self.outcomes, timeout_s=0.5)
+        # Without a word to the PLC: whatever the test planned for it is over.
+        self._open.callback(controller._mailbox.wire.close)
+        return controller
+
+    def close(self) -> None:
+        """Close what was opened here."""
+        self._open.close()
 
     def open_requests(self) -> list[str]:
         """Return what is unsettled."""

@@ -68,3 +68,18 @@ def test_a_handler_of_the_program_is_left_alone():
     finally:
         signal.signal(signal.SIGINT, before)
     assert seen == ["theirs"]
+
+
+def test_two_sessions_of_one_program_hold_it_back_alike(gate):
+    other = InterruptGate()
+    other.open()
+    for outer, inner in ((gate, other), (other, gate)):
+        reached = []
+        with pytest.raises(KeyboardInterrupt), outer:
+            with inner:
+                signal.raise_signal(signal.SIGINT)
+            reached.append("inner end")
+        assert reached
+    other.close()
+    with pytest.raises(KeyboardInterrupt), gate:
+        signal.raise_signal(signal.SIGINT)

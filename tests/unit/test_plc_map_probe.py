@@ -42,13 +42,17 @@ def controller_with(**changes):
     ],
 )
 def test_a_wrong_probe_is_diagnosed(changes, hint):
-    with pytest.raises(RemoteProtocolError, match=hint) as refused:
-        controller_with(**changes).require_probe()
+    with (
+        controller_with(**changes) as controller,
+        pytest.raises(RemoteProtocolError, match=hint) as refused,
+    ):
+        controller.require_probe()
     assert "Nothing was written" in refused.value.remedy
 
 
 def test_the_right_probe_passes():
-    controller_with().require_probe()
+    with controller_with() as controller:
+        controller.require_probe()
 
 
 def test_a_confirmation_holds_for_one_file_at_one_plc():

@@ -1,6 +1,7 @@
 """Meeting a PLC mailbox: version, probe, heartbeat, whole snapshots (design part 7)."""
 
 import re
+from collections.abc import Iterator
 from dataclasses import replace
 
 import pytest
@@ -17,8 +18,10 @@ from tests.unit._softmotion_driver_cell import Cell
 
 
 @pytest.fixture
-def cell() -> Cell:
-    return Cell()
+def cell() -> Iterator[Cell]:
+    cell = Cell()
+    yield cell
+    cell.close()
 
 
 def resealed(words):

@@ -1,6 +1,7 @@
 """Movements of an axis group: marked, sent once, kept alive by whoever waits (design part 7)."""
 
 import threading
+from collections.abc import Iterator
 from dataclasses import replace
 
 import pytest
@@ -36,8 +37,10 @@ STRAIGHT = MotionProfile(Path.STRAIGHT, speed_mm_s=20.0)
 
 
 @pytest.fixture
-def cell() -> Cell:
-    return Cell()
+def cell() -> Iterator[Cell]:
+    cell = Cell()
+    yield cell
+    cell.close()
 
 
 @pytest.fixture

@@ -1,5 +1,6 @@
 """Commands to a PLC mailbox: whose answer counts, and when a block is written again."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import pytest
@@ -27,8 +28,10 @@ from tests.unit._softmotion_driver_plc import STRANGER
 
 
 @pytest.fixture
-def cell() -> Cell:
-    return Cell()
+def cell() -> Iterator[Cell]:
+    cell = Cell()
+    yield cell
+    cell.close()
 
 
 @pytest.fixture

@@ -1,5 +1,7 @@
 """A PLC behind the interfaces that procedures and tool changes use, and behind its URL."""
 
+from collections.abc import Iterator
+
 import pytest
 
 from robolink.controllers import _connect, connect
@@ -37,8 +39,10 @@ class Nobody:
 
 
 @pytest.fixture
-def cell() -> Cell:
-    return Cell()
+def cell() -> Iterator[Cell]:
+    cell = Cell()
+    yield cell
+    cell.close()
 
 
 @pytest.fixture

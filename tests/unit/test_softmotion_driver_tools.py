@@ -1,5 +1,6 @@
 """The tool slots of a PLC: compare-and-set, read back from slot and axis group (design part 4)."""
 
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
 
@@ -41,8 +42,10 @@ NEW = ToolOffset(1.7, -2.1, 40.3, 20.0, 30.0, -40.0)
 
 
 @pytest.fixture
-def cell() -> Cell:
-    return Cell()
+def cell() -> Iterator[Cell]:
+    cell = Cell()
+    yield cell
+    cell.close()
 
 
 @pytest.fixture
@@ -305,7 +308,7 @@ def test_a_link_that_dies_at_any_read_never_hides_a_write(cell, plc, controller,
 
 
 def test_a_slot_that_cannot_be_read_back_leaves_the_write_in_doubt(cell, controller):
-    cell.link.lose_answer("read_slot", nth=4)
+    cell.link.lose_answer("read_slot", nth=2)
     with pytest.raises(OutcomeUnknownError):
         controller.tools.write(3, NEW, expected=OLD)
     assert len(cell.open_requests()) == 1

@@ -40,8 +40,6 @@ class EpsonToolTable:
         self._desk = desk
         self._lock = lock
         self._robot = robot
-        # Seen defined in this session. Only a person who turns the key to Teach could change
-        # that meanwhile, so it is not asked again before each read.
         self._writer = ToolWriter(
             desk,
             same=self.same,

@@ -24,7 +24,7 @@ from robolink.timing import Deadline
 POLL_S: Final = 0.02
 """Longest pause between two looks at the head of the response block."""
 
-_FIRST_POLL_S: Final = 0.001
+_FIRST_POLL_S: Final = 0.0005
 """The first pause; each is twice the one before. Most commands end within a PLC cycle or two."""
 
 LOOK_S: Final = 0.3

@@ -5,6 +5,7 @@ and selecting one, or writing the selected one, calls SMC_GroupSetTool (design p
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from robolink.controllers._tool_writing import ToolWrite
 from robolink.controllers.softmotion._answers import describe
@@ -99,15 +100,12 @@ class SoftMotionToolTable:
     def write(self, tool: int, offset: ToolOffset, *, expected: Expected) -> ToolReceipt:
         """Write and read back; see :class:`robolink.model.ToolTable`."""
         self.require_writable(tool)
-        stored = self._mailbox.snapshots.slot(tool)
-        draft = self._write_draft(tool, offset, stored)
-        return self._set(tool, offset, expected, draft, stored=stored)
+        return self._set(tool, offset, expected, self._write_draft(tool, offset))
 
     def clear(self, tool: int, *, expected: Expected) -> ToolReceipt:
         """Empty a slot that is not selected; see :class:`robolink.model.ToolTable`."""
         self.require_writable(tool)
-        stored = self._mailbox.snapshots.slot(tool)
-        return self._set(tool, None, expected, _clear_draft(tool), stored=stored)
+        return self._set(tool, None, expected, _clear_draft(tool))
 
     def preview_write(self, tool: int, offset: ToolOffset) -> tuple[str, ...]:
         """Return what :meth:`write` would send, in words; reads only.
@@ -115,10 +113,9 @@ class SoftMotionToolTable:
         Empty when the value is stored already.
         """
         self.require_writable(tool)
-        stored = self._mailbox.snapshots.slot(tool)
-        if self.same(self._value(stored), offset):
+        if self.same(self.read(tool), offset):
             return ()
-        return (describe(self._write_draft(tool, offset, stored)),)
+        return (describe(self._write_draft(tool, offset)),)
 
     def preview_clear(self, tool: int) -> tuple[str, ...]:
         """Return what :meth:`clear` would send, in words."""
@@ -168,29 +165,29 @@ class SoftMotionToolTable:
             self._require_in_force(offset, request)
 
     def _set(
-        self,
-        tool: int,
-        requested: ToolOffset | None,
-        expected: Expected,
-        draft: Command,
-        *,
-        stored: Slot,
+        self, tool: int, requested: ToolOffset | None, expected: Expected, draft: Command
     ) -> ToolReceipt:
         mailbox, request = self._mailbox, describe(draft)
         with mailbox.lock.held(request):
+            # What is read before the mailbox is ours may be changed by its owner until then.
+            owned = bool(mailbox.wire.epoch)
+            slot = mailbox.snapshots.slot(tool)
+            stored = self._value(slot)
             now = mailbox.snapshots.take()
             require_still(now, controller=mailbox.identity, request=request)
             in_force = now.tool_slot == tool
-            if not self.same(self._value(stored), requested):
+            if not self.same(stored, requested):
                 if in_force:
                     self._require_changeable(tool, requested, now, request)
                 mailbox.prepare(draft, request, now=now)
+            named = draft if requested is None else replace(draft, name=_name(tool, slot))
             write = ToolWrite(
                 tool,
                 requested,
                 request,
-                send=lambda: mailbox.orders.carry_out(draft),
-                read=lambda: self.read(tool),
+                send=lambda: mailbox.orders.carry_out(named),
+                read=lambda: stored if owned else self.read(tool),
+                read_back=lambda: self.read(tool),
             )
             receipt = mailbox.writer.change(write, expected)
             if in_force and not receipt.skipped:
@@ -200,12 +197,9 @@ class SoftMotionToolTable:
     def _value(self, slot: Slot) -> ToolOffset | None:
         return self._mailbox.from_plc(slot.tool) if slot.defined else None
 
-    def _write_draft(self, tool: int, offset: ToolOffset, stored: Slot) -> Command:
-        name = stored.name
-        if not (name.isascii() and name.isprintable() and name):
-            name = f"Tool {tool}"
+    def _write_draft(self, tool: int, offset: ToolOffset) -> Command:
         pose = self._mailbox.to_plc(offset)
-        return Command(0, Opcode.WRITE_TOOL, operands=(tool, 0, 0, 0), pose=pose, name=name)
+        return Command(0, Opcode.WRITE_TOOL, operands=(tool, 0, 0, 0), pose=pose)
 
     def _require_changeable(
         self, tool: int, requested: ToolOffset | None, now: Response, request: str
@@ -251,6 +245,12 @@ class SoftMotionToolTable:
                 tr("There is no tool {tool}.", tool=tool),
                 remedy=tr("The mailbox has tools 0 to 15."),
             )
+
+
+def _name(tool: int, slot: Slot) -> str:
+    """Return the name that a slot keeps, or gets when it has none that can be written."""
+    name = slot.name
+    return name if name and name.isascii() and name.isprintable() else f"Tool {tool}"
 
 
 def _clear_draft(tool: int) -> Command:

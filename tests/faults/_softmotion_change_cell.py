@@ -1,0 +1,101 @@
+"""A PLC served over Modbus TCP with two tools, to be changed by programs that are killed."""
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Final
+
+from robolink_simulators.clock import ScaledClock
+from robolink_simulators.hosting.modbus import serve_modbus_tcp
+from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
+from robolink_simulators.softmotion.mailbox.plc import Plc
+
+from robolink.model import ToolOffset
+from robolink.protocols.mailbox import Six, from_frame, to_frame
+from tests.faults._change_cell import ChangeCell
+from tests.faults._change_process import OLD
+
+_UNIT_UM: Final = 1000.0
+_SPEED: Final = 2000.0
+"""Simulated seconds in a second: a mailbox whose owner was killed is free after 5 ms."""
+
+
+class PlcChangeCell(ChangeCell):
+    """A SoftMotion PLC; counts what its slots really became, past the wire.
+
+    Attributes:
+        executed: Slot and tool of each write that the PLC carried out.
+    """
+
+    matters = re.compile("write_command ")
+
+    def __init__(self, simulator: SoftMotionSimulator, url: str, folder: Path) -> None:
+        super().__init__(simulator, url, folder)
+        self._plc = simulator.plc
+        self._acting = simulator.acting
+        self.executed: list[tuple[int, Six]] = []
+        define = self._plc.memory.define
+        define(2, to_frame(OLD[2].components(), unit_um=_UNIT_UM), "nozzle")
+
+        def counted(number: int, tool: Six, name: str) -> None:
+            self.executed.append((number, tool))
+            define(number, tool, name)
+
+        self._plc.memory.define = counted  # type: ignore[method-assign]
+
+    @property
+    def tools(self) -> dict[int, ToolOffset | None]:
+        """What is stored in both, past the wire."""
+        defined = self._now().memory.defined()
+        return {tool: _offset(defined[tool].tool) if tool in defined else None for tool in OLD}
+
+    @property
+    def selected(self) -> int:
+        """Which slot is selected, past the wire."""
+        return self._now().tools.selected
+
+    @property
+    def owner(self) -> int:
+        """Token of the client that owns the mailbox, 0 for nobody."""
+        return self._now().program.ownership.holder
+
+    def writes(self) -> list[int]:
+        """Return the slots that were written so far, in order."""
+        self._now()
+        sent = [text for text in self.requests if text.startswith("write_command WRITE_TOOL")]
+        assert len(sent) == len(self.executed)
+        return [slot for slot, _ in self.executed]
+
+    def values_written(self) -> list[ToolOffset]:
+        """Return what slot 1 was written as so far, in order."""
+        self._now()
+        return [_offset(tool) for slot, tool in self.executed if slot == 1]
+
+    def _now(self) -> Plc:
+        """Return the PLC when it has looked at all that was written."""
+        with self._acting():
+            return self._plc
+
+
+@contextmanager
+def plc_change_cell(folder: Path, clock: ScaledClock | None = None) -> Iterator[PlcChangeCell]:
+    """Serve a PLC that holds ``OLD``, with a journal of its own.
+
+    Args:
+        folder: Where the journal is kept.
+        clock: The simulated time; by default so fast that nobody owns the mailbox for long.
+    """
+    folder.mkdir(parents=True)
+    simulator = SoftMotionSimulator(seed=1)
+    with serve_modbus_tcp(simulator, clock=clock or ScaledClock(_SPEED)) as host:
+        cell = PlcChangeCell(simulator, host.url, folder)
+        assert cell.tools == OLD
+        try:
+            yield cell
+        finally:
+            cell.journal.close()
+
+
+def _offset(tool: Six) -> ToolOffset:
+    return ToolOffset(*from_frame(tool, unit_um=_UNIT_UM))

@@ -1,0 +1,273 @@
+"""What a PLC, its field bus or another client does wrong, over real links.
+
+Each is a clear error, and the PLC's own counters show that nothing was carried out twice.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+
+import pytest
+from robolink_simulators.hosting.canopen_node import CanPlace, serve_canopen
+from robolink_simulators.hosting.modbus import serve_modbus_rtu
+from robolink_simulators.softmotion.mailbox import (
+    MailboxOptions,
+    PlcFault,
+    PlcFaultAction,
+    PlcOptions,
+    SoftMotionSimulator,
+)
+
+import robolink
+from robolink.errors import (
+    ConnectError,
+    ControllerFaultError,
+    LeaseHeldError,
+    LeaseLostError,
+    NotReadyError,
+    OutcomeUnknownError,
+    RejectedError,
+    RemoteProtocolError,
+)
+from robolink.journal import memory_journal
+from robolink.model import ToolOffset, Verdict, WorkBox
+from robolink.protocols.mailbox import ErrorClass, decode_response, encode_response
+from robolink.transaction import recover
+from tests.contract._softmotion_cell import (
+    OWNER_SILENCE_S,
+    SLOW,
+    PlcCell,
+    above,
+    served,
+)
+
+SCRATCH = 15
+NEW = ToolOffset(11.25, -3.125, -20.5, 12.0)
+ANYWHERE = WorkBox()
+TIMEOUT_S = 0.4
+
+
+@contextmanager
+def plc_with(*faults: PlcFault, **options: object) -> Iterator[PlcCell]:
+    """Serve a PLC with habits and planned faults over Modbus TCP."""
+    mailbox = replace(MailboxOptions(), **options)  # type: ignore[arg-type]
+    simulator = SoftMotionSimulator(options=PlcOptions(mailbox=mailbox), faults=faults)
+    with served("modbus-tcp", simulator) as cell:
+        yield cell
+
+
+@pytest.fixture
+def cell():
+    with plc_with() as cell:
+        yield cell
+
+
+def check_nothing_was_written(cell):
+    requests = [text for _, _, text in cell.simulator.log]
+    assert requests
+    assert all(text.startswith("read") for text in requests)
+
+
+def lift(controller):
+    """Begin a movement that takes long."""
+    group = controller.groups[0]
+    return group.move_to(above(group.pose(), 20.0), SLOW, box=ANYWHERE)
+
+
+@pytest.mark.parametrize(
+    ("order", "meaning"),
+    [
+        ("high_first", "high word first"),
+        ("pairs_swapped", "words swapped in pairs"),
+        ("halves_swapped", "halves swapped"),
+    ],
+)
+def test_another_word_order_is_named_and_nothing_is_written(order, meaning):
+    with plc_with(word_order=order) as cell:
+        with pytest.raises(RemoteProtocolError, match=r"\+0 registers") as refusal:
+            cell.connect()
+        assert meaning in refusal.value.what
+        assert "Nothing was written" in refusal.value.remedy
+        check_nothing_was_written(cell)
+
+
+def test_a_shifted_map_is_named_with_its_shift_and_nothing_is_written():
+    with plc_with(response=3, slots=500) as cell:
+        cell.url = cell.url.replace("response=3", "response=0")
+        with pytest.raises(RemoteProtocolError, match=r"\+3 registers") as refusal:
+            cell.connect()
+        assert "correct the response address in the URL" in refusal.value.remedy
+        check_nothing_was_written(cell)
+
+
+def test_a_unit_that_is_not_there_is_named():
+    simulator = SoftMotionSimulator()
+    with serve_modbus_rtu(simulator, unit=7) as host:
+        url = host.url.replace("unit=7", "unit=8")
+        with pytest.raises(ConnectError, match="Unit 8 does not answer") as refusal:
+            robolink.connect(url, timeout_s=TIMEOUT_S)
+    assert refusal.value.remedy
+    assert simulator.exchanges == 0
+
+
+def test_a_layout_of_another_major_version_is_refused_and_nothing_is_written(cell):
+    response = cell.simulator.plc.response
+    cell.simulator.plc.response = lambda now_ns: encode_response(
+        replace(decode_response(response(now_ns)), version=0x0200)
+    )
+    with pytest.raises(RemoteProtocolError, match="another major version") as refusal:
+        cell.connect()
+    assert "plc export" in refusal.value.remedy
+    check_nothing_was_written(cell)
+
+
+def test_a_mailbox_that_stands_still_is_not_met(cell):
+    cell.simulator.panel.freeze()
+    with pytest.raises(ConnectError, match="stands still") as refusal:
+        cell.connect()
+    assert "not called in the motion task" in refusal.value.remedy
+    check_nothing_was_written(cell)
+
+
+def test_a_heartbeat_that_freezes_during_a_movement_leaves_it_unknown_and_blocks_the_next(cell):
+    with cell.connect() as controller:
+        motion = lift(controller)
+        cell.simulator.panel.freeze()
+        with pytest.raises(OutcomeUnknownError, match=r"heartbeat .* stands still") as unknown:
+            motion.wait(timeout_s=30)
+    assert "motion is blocked" in unknown.value.remedy
+    cell.simulator.panel.thaw()
+    with cell.connect() as controller, pytest.raises(OutcomeUnknownError, match="MOVE_LINEAR"):
+        lift(controller)
+    assert cell.movements_started == 1
+
+
+def test_a_watchdog_that_zeroes_a_command_before_the_plc_saw_it_leaves_it_not_applied():
+    fault = PlcFault(PlcFaultAction.ZERO_INPUTS, match="write_command WRITE_TOOL")
+    with plc_with(fault, program_cycle_us=20_000) as cell:
+        with cell.connect(timeout_s=TIMEOUT_S) as controller:
+            with pytest.raises(OutcomeUnknownError, match="was not acknowledged") as unknown:
+                controller.tools.write(SCRATCH, NEW, expected=None)
+        assert "not sent again" in unknown.value.remedy
+        with cell.connect() as controller:
+            (finding,) = recover(controller).settled
+        assert finding.verdict is Verdict.NOT_APPLIED
+        assert cell.commands.count("WRITE_TOOL") == 1
+        assert cell.slot_changes(SCRATCH) == 0
+
+
+def test_a_watchdog_that_zeroes_an_accepted_command_does_not_end_it():
+    fault = PlcFault(PlcFaultAction.ZERO_INPUTS, match="write_command MOVE_LINEAR", seconds=0.02)
+    with plc_with(fault) as cell, cell.connect() as controller:
+        group = controller.groups[0]
+        target = above(group.pose(), 0.3)
+        group.move_to(target, SLOW, box=ANYWHERE).wait(timeout_s=10)
+        assert group.pose().z_mm == pytest.approx(target.z_mm, abs=1e-6)
+        assert cell.commands.count("MOVE_LINEAR") == 1
+        assert cell.movements_started == 1
+
+
+@pytest.mark.parametrize(
+    ("seconds", "held", "verdict"),
+    [(0.0, None, Verdict.NOT_APPLIED), (0.03, NEW, Verdict.DONE)],
+    ids=["before it is executed", "afterwards"],
+)
+def test_a_start_of_the_plc_in_the_middle_of_a_write_leaves_it_for_recover(seconds, held, verdict):
+    fault = PlcFault(PlcFaultAction.RESTART, match="write_command WRITE_TOOL", seconds=seconds)
+    delay = PlcFault(PlcFaultAction.DELAY, match="write_command WRITE_TOOL", seconds=0.1)
+    with plc_with(fault, delay, program_cycle_us=20_000) as cell:
+        with cell.connect() as controller:
+            with pytest.raises(OutcomeUnknownError, match="WRITE_TOOL"):
+                controller.tools.write(SCRATCH, NEW, expected=None)
+        with cell.connect() as controller:
+            assert controller.tools.selected() == 0
+            (finding,) = recover(controller).settled
+            assert finding.verdict is verdict
+            assert controller.tools.same(controller.tools.read(SCRATCH), held)
+        assert cell.commands.count("WRITE_TOOL") == 1
+
+
+def test_a_start_of_the_plc_in_the_middle_of_a_movement_moves_nothing_afterwards(cell):
+    with cell.connect() as controller:
+        motion = lift(controller)
+        cell.simulator.panel.restart()
+        with pytest.raises(OutcomeUnknownError, match="MOVE_LINEAR"):
+            motion.wait(timeout_s=30)
+    with cell.connect() as controller:
+        assert not controller.status().running
+        with pytest.raises(OutcomeUnknownError):
+            lift(controller)
+        (finding,) = recover(controller).left
+        assert finding.verdict is Verdict.LOOK
+    assert cell.commands.count("MOVE_LINEAR") == 1
+
+
+def test_an_owner_that_died_is_named_and_displaced_after_its_silence(cell):
+    cell.simulator.faults.add(PlcFault(PlcFaultAction.DISCONNECT, match="write_command WRITE"))
+    with cell.connect() as dead, pytest.raises(OutcomeUnknownError):
+        dead.tools.write(SCRATCH, NEW, expected=None)
+    with cell.connect() as next_one:
+        with pytest.raises(LeaseHeldError, match="owns the mailbox") as refusal:
+            next_one.tools.write(3, NEW, expected=None)
+        assert f"{cell.owner:08X}" in refusal.value.what
+        assert "10 s after its last sign" in refusal.value.remedy
+        cell.clock.advance(OWNER_SILENCE_S)
+        next_one.tools.write(3, NEW, expected=None)
+    assert (cell.slot_changes(SCRATCH), cell.slot_changes(3)) == (1, 1)
+
+
+def test_an_owner_that_falls_silent_while_it_moves_is_halted_and_not_displaced(cell):
+    with cell.connect() as controller:
+        motion = lift(controller)
+        cell.clock.advance(0.6)
+        with cell.connect() as other, pytest.raises(LeaseHeldError):
+            other.take()
+        with pytest.raises(ControllerFaultError, match="goes on only while someone waits"):
+            motion.wait(timeout_s=10)
+    assert cell.movements_started == 1
+
+
+def test_a_second_client_is_told_who_owns_the_mailbox_and_may_insist(cell):
+    with cell.connect() as first, cell.connect() as second:
+        first.take()
+        with pytest.raises(LeaseHeldError, match=f"Client {cell.owner:08X} owns the mailbox"):
+            second.tools.select(0)
+        second.take(insist=True)
+        with pytest.raises(RejectedError) as refusal:
+            first.tools.write(SCRATCH, NEW, expected=None)
+        assert refusal.value.code == ErrorClass.NOT_OWNER
+        assert "Connect again when the other client has ended" in refusal.value.remedy
+        with pytest.raises(LeaseLostError, match="another client took the mailbox"):
+            first.tools.write(SCRATCH, NEW, expected=None)
+        second.tools.write(SCRATCH, NEW, expected=None)
+    assert cell.slot_changes(SCRATCH) == 1
+
+
+def test_a_missing_permit_is_named_whether_it_is_seen_before_or_only_by_the_plc():
+    fault = PlcFault(PlcFaultAction.WITHDRAW_PERMIT, match="write_command WRITE_TOOL")
+    with plc_with(fault) as cell, cell.connect() as controller:
+        with pytest.raises(RejectedError, match="permit") as refusal:
+            controller.tools.write(SCRATCH, NEW, expected=None)
+        assert refusal.value.code == ErrorClass.NOT_PERMITTED
+        assert "xPermit" in refusal.value.remedy
+        with pytest.raises(NotReadyError, match="does not permit it now") as held_back:
+            controller.tools.write(SCRATCH, NEW, expected=None)
+        assert "service state" in held_back.value.remedy
+        with pytest.raises(NotReadyError, match="does not permit it now"):
+            lift(controller)
+        assert (cell.slot_changes(SCRATCH), cell.movements_started) == (0, 0)
+        assert cell.open_requests == []
+
+
+def test_a_can_node_whose_heartbeat_is_lost_leaves_the_movement_unknown(tmp_path):
+    simulator = SoftMotionSimulator()
+    with serve_canopen(simulator, CanPlace("virtual", tmp_path.name)) as host:
+        outcomes = memory_journal(tmp_path.name).log(host.url)
+        with robolink.connect(host.url, outcomes=outcomes) as controller:
+            motion = lift(controller)
+            host.close()
+            with pytest.raises(OutcomeUnknownError, match=r"MOVE_LINEAR.*heartbeat") as unknown:
+                motion.wait(timeout_s=30)
+    assert "motion is blocked" in unknown.value.remedy
+    assert [marker.request for marker in outcomes.open_markers()] == [unknown.value.request]
+    assert simulator.plc.group.movements_started == 1

@@ -1,0 +1,98 @@
+"""Two operators on one PLC: the lease of a shared journal, the ownership, and the comparison.
+
+Two PCs that share no journal are kept apart by the PLC alone (faults_and_speed.md F46, F47).
+"""
+
+import pytest
+from robolink_simulators.clock import ScaledClock
+
+from robolink.model import ToolOffset
+from tests.contract._softmotion_cell import OWNER_SILENCE_S, SkippingClock
+from tests.faults._change_process import OLD
+from tests.faults._operator_process import OperatorProcess, StepKind
+from tests.faults._softmotion_change_cell import plc_change_cell
+
+ANNS, BOBS = ToolOffset(12.1, -3.4, -20.0), ToolOffset(12.2, -3.3, -20.0)
+
+
+@pytest.fixture
+def clock():
+    return SkippingClock()
+
+
+@pytest.fixture
+def cell(tmp_path, clock):
+    with plc_change_cell(tmp_path / "cell", ScaledClock(base=clock)) as cell:
+        yield cell
+
+
+@pytest.fixture
+def other_pc(tmp_path):
+    folder = tmp_path / "other PC"
+    folder.mkdir()
+    return folder
+
+
+def about_to(cell, kind: StepKind):
+    """Return Ann, who owns the mailbox and stands before a step."""
+    ann = OperatorProcess(cell.url, cell.folder, "Ann", {1: ANNS})
+    while not cell.owner:
+        ann.step()
+    ann.advance_to(kind)
+    return ann
+
+
+def bob(cell, folder):
+    return OperatorProcess(cell.url, folder, "Bob", {1: BOBS}, stepwise=False).end()
+
+
+def test_who_shares_the_journal_is_told_who_has_the_lease(cell):
+    ann = about_to(cell, "tool write")
+    refused = bob(cell, cell.folder)
+    assert refused.how == "LeaseHeldError"
+    assert "Ann" in refused.said
+    assert "WRITE_TOOL 1 (12.1 -3.4 -20" in refused.said
+    assert "Nothing was sent. Wait until it has finished" in refused.said
+    assert ann.end().how == "done"
+    assert cell.values_written() == [ANNS]
+
+
+def test_who_shares_no_journal_is_told_which_client_owns_the_mailbox(cell, other_pc):
+    ann = about_to(cell, "journal write")
+    refused = bob(cell, other_pc)
+    assert refused.how == "LeaseHeldError"
+    assert f"Client {cell.owner:08X} owns the mailbox" in refused.said
+    assert "10 s after its last sign the mailbox is free" in refused.said
+    assert ann.end().how == "done"
+    assert cell.values_written() == [ANNS]
+
+
+@pytest.mark.parametrize("frozen_before", ["journal write", "tool write"])
+def test_a_frozen_owner_whose_mailbox_was_taken_writes_nothing_when_it_comes_back(
+    cell, clock, other_pc, frozen_before
+):
+    ann = about_to(cell, frozen_before)
+    ann.freeze()
+    clock.advance(OWNER_SILENCE_S)
+    assert bob(cell, other_pc).how == "done"
+    ann.thaw()
+    refused = ann.end()
+    # Her block went out, and the PLC refused it. If her first look shows his acknowledgement
+    # still, the write is unknown to her (design part 7).
+    assert refused.how in {"RejectedError", "OutcomeUnknownError"}
+    assert "another client" in refused.said
+    assert cell.values_written() == [BOBS]
+    assert cell.tools[1] == BOBS
+
+
+def test_who_compared_before_the_other_wrote_is_told_what_is_there_now(cell, other_pc):
+    late = OperatorProcess(cell.url, other_pc, "Bob", {1: BOBS})
+    late.advance_to("tool read")
+    late.step()
+    early = OperatorProcess(cell.url, cell.folder, "Ann", {1: ANNS}, stepwise=False)
+    assert early.end().how == "done"
+    refused = late.end()
+    assert refused.how == "ToolChangedError"
+    assert "12.1" in refused.said
+    assert cell.values_written() == [ANNS]
+    assert cell.tools == {**OLD, 1: ANNS}

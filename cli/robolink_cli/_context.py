@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import wraps
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -42,6 +43,8 @@ class CliContext(NamedTuple):
         cell: What the cell files say, when a cell was named instead of a URL.
         record: File to which the dialogue with the controller is appended.
         operator: Badge or name of the person.
+        nozzle: Id of the nozzle or needle that is mounted.
+        lot: Its lot.
     """
 
     url: str | None = None
@@ -51,6 +54,12 @@ class CliContext(NamedTuple):
     cell: "Cell | None" = None
     record: str | None = None
     operator: str | None = None
+    nozzle: str = ""
+    lot: str = ""
+
+    def with_nozzle(self, nozzle: str | None, lot: str | None) -> "CliContext":
+        """Return the same with what is mounted, for the record."""
+        return self._replace(nozzle=nozzle or "", lot=lot or "")
 
     @property
     def json(self) -> bool:
@@ -130,7 +139,11 @@ def open_controller(
     url = context.require_url()
     named = context.cell.name if context.cell else url
     password = password_of(context)
-    signature = signature_of(context.operator, context.cell, changes=changes)
+    signature = replace(
+        signature_of(context.operator, context.cell, changes=changes),
+        nozzle=context.nozzle,
+        lot=context.lot,
+    )
     with (
         recording(context.record, url.partition("?")[0]) as trace,
         robolink.connect(

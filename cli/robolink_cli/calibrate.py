@@ -11,6 +11,7 @@ from robolink_cli._cell import with_cell_limits
 from robolink_cli._consent import agree_to_motion, dry_run_option, motion_question, yes_option
 from robolink_cli._context import CliContext, controller_options, open_controller
 from robolink_cli._impacting import ImpactRequest, impact_options, impact_request
+from robolink_cli._people import nozzle_options
 from robolink_cli._pose_source import pose_source, pose_source_options, refuse_motion_options
 from robolink_cli._reporting import ReportRequest, report_options, report_request, reporting
 
@@ -95,6 +96,7 @@ def calibrate() -> None:
 @pose_source_options
 @impact_options
 @report_options
+@nozzle_options
 @controller_options
 @dry_run_option
 @yes_option
@@ -113,6 +115,8 @@ def two_pose(
     typed: tuple[str, ...],
     path: Path | None,
     taught_tool: int | None,
+    nozzle: str | None,
+    lot: str | None,
     **limits: Any,  # noqa: ANN401 - click passes the options by name
 ) -> None:
     """Touch one pin at two angles of U, half a turn apart.
@@ -133,6 +137,7 @@ def two_pose(
     )
     judged = impact_request(impact, impact_pts, names=("--impact", "--impact-pts"))
     page = report_request(report_path, force=force)
+    context = context.with_nozzle(nozzle, lot)
     source = pose_source(points=points, typed=typed, path=path, taught_tool=taught_tool)
     if source is None:
         if dry_run:

@@ -413,3 +413,11 @@ def test_a_raw_statement_is_for_engineers_and_on_record(cell, tmp_path, monkeypa
     assert (entry.signature.operator, entry.signature.role) == ("anna", "engineer")
     assert entry.details["request"] == "Print TLDef(1)"
     assert cell.run("execute-raw", "Tool 9", "--yes", "-c", "a", "--operator", "anna").code == 5
+
+
+def test_a_calibration_without_a_recipe_names_nozzle_and_lot_too(cell):
+    done = cell.run(*cell.calibration, "--nozzle", "N-9", "--lot", "L-3", "--operator", "anna")
+    assert done.code == 0, done.err
+    (entry,) = journal(cell, EntryKind.DONE)
+    signature = entry.signature
+    assert (signature.nozzle, signature.lot, signature.operator) == ("N-9", "L-3", "anna")

@@ -13,4 +13,4 @@ from robolink.config._cells import load_cells as load_cells
 from robolink.config._files import ConfigFile as ConfigFile
 from robolink.config._files import Source as Source
 from robolink.config._files import config_files as config_files
-from robolink.config._problems import Problem as Problem
+from robolink.toml_files import Problem as Problem

@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from robolink.config._files import config_files, read_document
-from robolink.config._problems import Problem, dotted, problems_of, refusal
+from robolink.config._problems import dotted, problems_of, refusal
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink.toml_files import Problem
 
 if TYPE_CHECKING:
     from robolink.config._settings import CellSettings

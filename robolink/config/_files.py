@@ -1,13 +1,13 @@
 """Which files say what the cells are, and how one is read."""
 
 import os
-import tomllib
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink.toml_files import NotTomlError, parse_toml
 
 _NAME = "robolink.toml"
 
@@ -60,15 +60,10 @@ def read_document(path: Path) -> dict[str, object]:
         ConfigError: It cannot be read, or is no TOML.
     """
     try:
-        # Editors on Windows put a byte order mark in front, which TOML does not know.
-        return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+        return parse_toml(path.read_bytes())
     except OSError as error:
         cause = error.strerror or str(error)
-    except UnicodeError:
-        cause = tr("it is not UTF-8 text")
-    except RecursionError:
-        cause = tr("it is nested too deeply")
-    except tomllib.TOMLDecodeError as error:
+    except NotTomlError as error:
         cause = str(error)
     raise ConfigError(
         tr("The cell file {path} cannot be read: {cause}.", path=path, cause=cause),

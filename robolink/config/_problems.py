@@ -3,35 +3,19 @@
 import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink.toml_files import Problem
 
 if TYPE_CHECKING:
     from pydantic import ValidationError
 
 _BARE_KEY = re.compile("[A-Za-z0-9_-]+")
 _SECRET = re.compile("pass|pwd|secret|token|credential|^pin$", re.IGNORECASE)
-
-
-@dataclass(frozen=True, slots=True)
-class Problem:
-    """One thing that is wrong.
-
-    Attributes:
-        where: Path of the key inside the file; empty for the file as a whole.
-        what: What is wrong with it. Never the value: it might be a password.
-    """
-
-    where: str
-    what: str
-
-    def __str__(self) -> str:
-        return f"{self.where}: {self.what}" if self.where else self.what
 
 
 def dotted(keys: Iterable[object]) -> str:

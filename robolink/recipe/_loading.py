@@ -1,14 +1,13 @@
 """From a file to a recipe, or to everything that is wrong in it."""
 
 import hashlib
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from robolink.config import Problem
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink.toml_files import NotTomlError, Problem, parse_toml
 
 if TYPE_CHECKING:
     from robolink.recipe._recipe import Recipe
@@ -87,13 +86,8 @@ def _content(path: Path) -> bytes:
 
 def _document(path: Path, content: bytes) -> dict[str, object]:
     try:
-        # Editors on Windows put a byte order mark in front, which TOML does not know.
-        return tomllib.loads(content.decode("utf-8-sig"))
-    except UnicodeError as error:
-        raise _unreadable(path, tr("it is not UTF-8 text")) from error
-    except RecursionError as error:
-        raise _unreadable(path, tr("it is nested too deeply")) from error
-    except ValueError as error:  # TOML, or a number with thousands of digits
+        return parse_toml(content)
+    except NotTomlError as error:
         raise _unreadable(path, str(error)) from error
 
 

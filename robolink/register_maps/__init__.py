@@ -28,4 +28,4 @@ from robolink.register_maps._places import Signal as Signal
 from robolink.register_maps._places import Table as Table
 from robolink.register_maps._places import Word as Word
 from robolink.register_maps._places import describe_place as describe_place
-from robolink.register_maps._problems import MapProblem as MapProblem
+from robolink.toml_files import Problem as Problem

@@ -9,8 +9,8 @@ from robolink.messages import tr
 from robolink.register_maps._map import CommitKind, RegisterMap, Slot, span_of
 from robolink.register_maps._numbers import Number
 from robolink.register_maps._places import LAST_ADDRESS, Signal, Table, Word, describe_place
-from robolink.register_maps._problems import MapProblem
 from robolink.register_maps._tables import CommitBitKeys, LevelKeys, MapFile
+from robolink.toml_files import Problem
 
 _MOST_READ: Final = 125
 """Registers that one request reads (softmotion.md 4.3)."""
@@ -38,7 +38,7 @@ class _Claim:
         return (self.bit, self.on) == (other.bit, other.on)
 
 
-def problems_together(file: MapFile, found: RegisterMap) -> list[MapProblem]:
+def problems_together(file: MapFile, found: RegisterMap) -> list[Problem]:
     """Return what is wrong with the places of a map as a whole."""
     return [
         *_twice(file),
@@ -54,7 +54,7 @@ def problems_together(file: MapFile, found: RegisterMap) -> list[MapProblem]:
     ]
 
 
-def _twice(file: MapFile) -> Iterator[MapProblem]:
+def _twice(file: MapFile) -> Iterator[Problem]:
     numbered = (
         ("tools", [t.number for t in file.tools]),
         ("inputs", [i.number for i in file.inputs]),
@@ -63,16 +63,16 @@ def _twice(file: MapFile) -> Iterator[MapProblem]:
         for position, number in enumerate(numbers, start=1):
             if number in numbers[: position - 1]:
                 what = tr("{number} stands twice", number=number)
-                yield MapProblem(f"{key}#{position}.number", what)
+                yield Problem(f"{key}#{position}.number", what)
 
 
-def _slot(position: int, slot: Slot, found: RegisterMap) -> Iterator[MapProblem]:
+def _slot(position: int, slot: Slot, found: RegisterMap) -> Iterator[Problem]:
     where = f"tools#{position}"
     unreadable = list(_unreadable(where, slot.components))
     if unreadable:
         yield from unreadable
     elif found.commit.kind is CommitKind.NONE and slot.table.writable and not slot.contiguous:
-        yield MapProblem(
+        yield Problem(
             where,
             tr(
                 "has gaps between its registers: without a handshake they must follow one another, "
@@ -81,12 +81,12 @@ def _slot(position: int, slot: Slot, found: RegisterMap) -> Iterator[MapProblem]
         )
 
 
-def _unreadable(where: str, components: Mapping[str, Number]) -> Iterator[MapProblem]:
+def _unreadable(where: str, components: Mapping[str, Number]) -> Iterator[Problem]:
     """Find out whether one request reads all components."""
     if len({number.table for number in components.values()}) > 1:
-        yield MapProblem(where, tr("has components in two tables; one request must read them all"))
+        yield Problem(where, tr("has components in two tables; one request must read them all"))
     elif components and len(span_of(components)) > _MOST_READ:
-        yield MapProblem(
+        yield Problem(
             where,
             tr(
                 "stretches over {count} registers; one request reads at most {most}",
@@ -96,18 +96,18 @@ def _unreadable(where: str, components: Mapping[str, Number]) -> Iterator[MapPro
         )
 
 
-def _signals(file: MapFile, found: RegisterMap) -> Iterator[MapProblem]:
+def _signals(file: MapFile, found: RegisterMap) -> Iterator[Problem]:
     for where, signal in _all_signals(file, found):
         if signal.table.holds_bits and (signal.bit is not None or {signal.on, signal.off} - {0, 1}):
-            yield MapProblem(where, tr("is a single bit: take bit out, and let on be 0 or 1"))
+            yield Problem(where, tr("is a single bit: take bit out, and let on be 0 or 1"))
         elif signal.bit is not None and signal.on > 1:
-            yield MapProblem(f"{where}.on", tr("must be 0 or 1 for one bit of a register"))
+            yield Problem(f"{where}.on", tr("must be 0 or 1 for one bit of a register"))
     request = found.commit.request
     if request is None:
         return
     where = "commit.trigger" if found.commit.kind is CommitKind.COMMIT_BIT else "commit.request"
     if not request.writable:
-        yield MapProblem(
+        yield Problem(
             where,
             tr(
                 "must be a coil or a whole holding register: one bit of a register cannot be "
@@ -115,13 +115,13 @@ def _signals(file: MapFile, found: RegisterMap) -> Iterator[MapProblem]:
             ),
         )
     elif request.on == request.off:
-        yield MapProblem(where, tr("reads the same on and off"))
+        yield Problem(where, tr("reads the same on and off"))
     number = found.commit.tool_number
     if number is not None and not number.table.writable:
-        yield MapProblem("commit.tool_number", tr("must be a holding register"))
+        yield Problem("commit.tool_number", tr("must be a holding register"))
 
 
-def _probe(found: RegisterMap) -> Iterator[MapProblem]:
+def _probe(found: RegisterMap) -> Iterator[Problem]:
     if found.probe is None:
         return
     try:
@@ -129,21 +129,21 @@ def _probe(found: RegisterMap) -> Iterator[MapProblem]:
     except OverflowError:
         words = ()
     if len(set(words)) < len(words) or not any(words):
-        yield MapProblem(
+        yield Problem(
             "probe.value",
             tr("does not tell the word order: take a number with no two words alike, as 12.3456"),
         )
 
 
-def _places(file: MapFile, found: RegisterMap) -> Iterator[MapProblem]:
+def _places(file: MapFile, found: RegisterMap) -> Iterator[Problem]:
     claims = list(_claims(file, found))
     for claim in claims:
         if claim.addresses.stop - 1 > LAST_ADDRESS:
-            yield MapProblem(claim.where, tr("ends behind address {last}", last=LAST_ADDRESS))
+            yield Problem(claim.where, tr("ends behind address {last}", last=LAST_ADDRESS))
     for first, second in combinations(claims, 2):
         if first.clashes(second):
             address = max(first.addresses.start, second.addresses.start)
-            yield MapProblem(
+            yield Problem(
                 second.where,
                 tr(
                     "overlaps {other} at {place}",

@@ -1,13 +1,13 @@
 """From a file to a map, or to everything that is wrong in it."""
 
 import hashlib
-import tomllib
 from pathlib import Path
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.register_maps._map import RegisterMap
-from robolink.register_maps._problems import MapProblem, problems_of, refusal
+from robolink.register_maps._problems import problems_of, refusal
+from robolink.toml_files import NotTomlError, Problem, parse_toml
 
 
 def load_map(path: Path) -> RegisterMap:
@@ -23,7 +23,7 @@ def load_map(path: Path) -> RegisterMap:
     return register_map
 
 
-def check_map(path: Path) -> tuple[MapProblem, ...]:
+def check_map(path: Path) -> tuple[Problem, ...]:
     """Return everything that is wrong in a map; nothing when it is right.
 
     Raises:
@@ -32,7 +32,7 @@ def check_map(path: Path) -> tuple[MapProblem, ...]:
     return tuple(_checked(path)[1])
 
 
-def _checked(path: Path) -> tuple[RegisterMap | None, list[MapProblem]]:
+def _checked(path: Path) -> tuple[RegisterMap | None, list[Problem]]:
     from pydantic import ValidationError
 
     from robolink.register_maps._checks import problems_together
@@ -60,13 +60,8 @@ def _content(path: Path) -> bytes:
 
 def _document(path: Path, content: bytes) -> dict[str, object]:
     try:
-        # Editors on Windows put a byte order mark in front, which TOML does not know.
-        return tomllib.loads(content.decode("utf-8-sig"))
-    except UnicodeError as error:
-        raise _unreadable(path, tr("it is not UTF-8 text")) from error
-    except RecursionError as error:
-        raise _unreadable(path, tr("it is nested too deeply")) from error
-    except ValueError as error:  # TOML, or a number with thousands of digits
+        return parse_toml(content)
+    except NotTomlError as error:
         raise _unreadable(path, str(error)) from error
 
 

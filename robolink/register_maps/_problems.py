@@ -4,13 +4,13 @@ Tables of a list are counted from 1, as people do, hence the sign.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink.toml_files import Problem
 
 if TYPE_CHECKING:
     from pydantic import ValidationError
@@ -19,31 +19,15 @@ _COMMIT_DEPTH: Final = 2
 """How deep pydantic's location goes before the kind of commit stands in it."""
 
 
-@dataclass(frozen=True, slots=True)
-class MapProblem:
-    """One thing that is wrong.
-
-    Attributes:
-        where: Path of the key inside the file; empty for the file as a whole.
-        what: What is wrong with it.
-    """
-
-    where: str
-    what: str
-
-    def __str__(self) -> str:
-        return f"{self.where}: {self.what}" if self.where else self.what
-
-
-def problems_of(error: "ValidationError") -> list[MapProblem]:
+def problems_of(error: "ValidationError") -> list[Problem]:
     """Return everything that pydantic objects to."""
     return [
-        MapProblem(_path(detail["loc"]), _sentence(detail))
+        Problem(_path(detail["loc"]), _sentence(detail))
         for detail in error.errors(include_url=False, include_input=False)
     ]
 
 
-def refusal(path: Path, problems: Sequence[MapProblem]) -> ConfigError:
+def refusal(path: Path, problems: Sequence[Problem]) -> ConfigError:
     """Return the error that tells all problems of one map at once."""
     lines = "\n".join(f"    {problem}" for problem in problems)
     return ConfigError(

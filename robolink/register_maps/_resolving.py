@@ -18,7 +18,6 @@ from robolink.register_maps._map import (
 )
 from robolink.register_maps._numbers import Number, NumberType
 from robolink.register_maps._places import Signal, Table, Word
-from robolink.register_maps._problems import MapProblem
 from robolink.register_maps._tables import (
     CommitBitKeys,
     FlangeKeys,
@@ -30,6 +29,7 @@ from robolink.register_maps._tables import (
     ToolKeys,
     WordKeys,
 )
+from robolink.toml_files import Problem
 
 _LENGTHS: Final = {"mm": 1.0, "um": 0.001, "m": 1000.0, "inch": 25.4}
 _ANGLES: Final = {"deg": 1.0, "rad": math.degrees(1.0)}
@@ -43,7 +43,7 @@ class Resolving:
     """
 
     def __init__(self, file: MapFile) -> None:
-        self.problems: list[MapProblem] = []
+        self.problems: list[Problem] = []
         self._file = file
 
     def resolve(self, sha256: str) -> RegisterMap | None:
@@ -143,7 +143,7 @@ class Resolving:
         return units[unit]
 
     def _tell(self, where: str, what: str) -> None:
-        self.problems.append(MapProblem(where, what))
+        self.problems.append(Problem(where, what))
 
 
 def _commit(keys: CommitBitKeys | LevelKeys | NoneKeys) -> Commit:

@@ -1,15 +1,16 @@
 """Statements that are compiled once: a commit should cost what the disk takes, not the text.
 
-SQLAlchemy words them for each database, and its connection still begins and ends the
-transaction. In between they go to the driver's own cursor: wrapping each result for one row
-costs several times what SQLite takes for the statement itself.
+SQLAlchemy words them for each database and makes the connection. They go to the driver's own
+cursor: wrapping each transaction and each result for one row costs several times what SQLite
+takes for the statement itself.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any, Final, TypeAlias
 
 from sqlalchemy import Connection, Dialect
-from sqlalchemy.engine.interfaces import DBAPIModule
+from sqlalchemy.engine.interfaces import DBAPICursor, DBAPIModule
 from sqlalchemy.exc import DBAPIError
 from sqlalchemy.sql.elements import ClauseElement
 
@@ -48,12 +49,57 @@ class Prepared:
 
 
 class Runner:
-    """Runs prepared statements over one connection, inside its transaction."""
+    """Runs prepared statements over one connection, and begins and ends its transactions."""
 
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
         self._dialect = connection.dialect
-        self._cursor = connection.connection.cursor()
+        driver: Any = connection.connection.dbapi_connection
+        self._driver = driver
+        self._cursor: DBAPICursor = driver.cursor()
+
+    @contextmanager
+    def transaction(self, begin: "Prepared | None") -> Iterator[None]:
+        """Make a block durable as a whole; an exception undoes all of it.
+
+        Args:
+            begin: Statement that takes the write lock; ``None`` where the driver begins.
+
+        Raises:
+            DBAPIError: The database refuses; nothing is stored.
+        """
+        if begin is not None:
+            self.run(begin)
+        try:
+            yield
+        except BaseException:
+            self.roll_back()
+            raise
+        self.commit()
+
+    @contextmanager
+    def reading(self) -> Iterator[None]:
+        """Leave nothing open that a block has read."""
+        try:
+            yield
+        finally:
+            self.roll_back()
+
+    def commit(self) -> None:
+        """Make durable what was done since the last end.
+
+        Raises:
+            DBAPIError: The database refuses.
+        """
+        self._end(self._connection.commit, self._driver.commit)
+
+    def roll_back(self) -> None:
+        """Undo what was done since the last end.
+
+        Raises:
+            DBAPIError: The database refuses.
+        """
+        self._end(self._connection.rollback, self._driver.rollback)
 
     def run(self, statement: Prepared, values: Values = NOTHING) -> int:
         """Run it with ``values`` by the names of its parameters.
@@ -97,8 +143,20 @@ class Runner:
         except self._dialect.loaded_dbapi.Error as error:
             raise self._refused(text, error) from error
 
+    def _end(self, known: Callable[[], None], bare: Callable[[], None]) -> None:
+        """End the transaction, by SQLAlchemy if it was asked something and so knows of one."""
+        if self._connection.invalidated:
+            return  # what it had begun ended with it
+        if self._connection.in_transaction():
+            known()
+            return
+        try:
+            bare()
+        except self._dialect.loaded_dbapi.Error as error:
+            raise self._refused("", error) from error
+
     def _refused(self, text: str, error: DBAPIModule.Error) -> DBAPIError:
         """Return the error as SQLAlchemy raises it, the connection given up if it is lost."""
-        if self._dialect.is_disconnect(error, self._connection.connection, self._cursor):
+        if self._dialect.is_disconnect(error, self._driver, self._cursor):
             self._connection.invalidate(error)
         return DBAPIError(text, None, error)

@@ -76,9 +76,10 @@ class Store:
                 tr("The journal {name} was opened for reading only.", name=self._place.name),
                 remedy=tr("Open it for writing to add to it."),
             )
-        with self._use(consequence) as (backend, tables), tables.connection.begin():
-            if backend.begin_writing is not None:
-                tables.runner.run(backend.begin_writing)
+        with (
+            self._use(consequence) as (backend, tables),
+            tables.runner.transaction(backend.begin_writing),
+        ):
             yield tables
 
     @contextmanager
@@ -91,7 +92,7 @@ class Store:
         Raises:
             JournalError: It cannot be read.
         """
-        with self._use(consequence) as (_, tables), tables.connection.begin():
+        with self._use(consequence) as (_, tables), tables.runner.reading():
             yield tables
 
     def open(self) -> None:

@@ -161,7 +161,7 @@ def _wait_at_each_step(line: Connection, outcomes: JournalOutcomeLog) -> None:
         line.recv()
 
     def executed(session: EpsonSession, statement: Statement) -> Reply | Refusal:
-        if statement.startswith("Print TLSet"):
+        if statement == "TLSet" or statement.startswith("Print TLSet"):
             wait("tool read")
         elif statement.startswith("TLSet"):
             wait("tool write")

@@ -1,9 +1,9 @@
-"""How often an EPSON controller is asked whether a tool is defined, and what that may miss."""
+"""What an EPSON controller is asked before a tool is written, and what that may miss."""
 
 import pytest
 from robolink_simulators.epson.options import EpsonOptions
 
-from robolink.errors import ToolChangedError
+from robolink.errors import NotReadyError, ToolChangedError
 from tests.unit._transaction_cell import NEW, OLD, OTHER, tool_cell
 
 
@@ -27,17 +27,63 @@ def asked(cell):
     return [text for text in texts if text.startswith(("$Get", "Print TL", "TL"))]
 
 
-def test_a_write_takes_five_exchanges(cell, controller):
+WRITTEN = ["TLSet 1, XY(12.250, -3.250, -20.000, 0.000)", "Print TLSet(1)"]
+ONE_BY_ONE = ["Print TLDef(1)", "Print TLSet(1)"]
+
+
+def test_a_write_of_what_was_expected_takes_three_exchanges(cell, controller):
     controller.tools.write(2, NEW[2], expected=OLD[2])  # asks which robot it is, once
     cell.simulator.log.clear()
     controller.tools.write(1, NEW[1], expected=OLD[1])
-    assert asked(cell) == [
-        "$GetStatus",
-        "Print TLDef(1)",
-        "Print TLSet(1)",
-        "TLSet 1, XY(12.250, -3.250, -20.000, 0.000)",
-        "Print TLSet(1)",
-    ]
+    assert asked(cell) == ["TLSet", *WRITTEN]
+
+
+def test_the_first_write_of_a_session_looks_at_the_state_before_it_sends_anything(cell, controller):
+    controller.tools.write(1, NEW[1], expected=OLD[1])
+    assert asked(cell)[0] == "$GetStatus"
+
+
+def test_a_state_that_changed_since_is_named_although_it_was_not_looked_at(cell, controller):
+    controller.tools.write(2, NEW[2], expected=OLD[2])
+    cell.simulator.panel.open_guard()
+    written = cell.simulator.machine.flash_writes
+    cell.simulator.log.clear()
+    for _ in range(2):
+        with pytest.raises(NotReadyError, match="guard"):
+            controller.tools.write(1, NEW[1], expected=OLD[1])
+    assert asked(cell) == ["TLSet", "$GetStatus", "$GetStatus", "$GetStatus"]
+    assert cell.simulator.machine.flash_writes == written
+
+
+@pytest.mark.parametrize("layout", ["padded", "four"])
+def test_the_list_is_believed_however_wide_its_columns_are(layout):
+    with tool_cell(EpsonOptions(tool_listing=layout)) as cell, cell.connected() as controller:
+        controller.tools.write(2, NEW[2], expected=OLD[2])
+        cell.simulator.log.clear()
+        controller.tools.write(1, NEW[1], expected=OLD[1])
+        assert asked(cell) == ["TLSet", *WRITTEN]
+
+
+@pytest.mark.parametrize(
+    "listing", ["Tool 1: 12, -4, -20, 0", "1: 12.000 -3.500 -20.000 0.000", "Werkzeug?"]
+)
+def test_a_list_that_does_not_confirm_what_was_expected_is_not_believed(
+    cell, controller, monkeypatch, listing
+):
+    controller.tools.write(2, NEW[2], expected=OLD[2])
+    monkeypatch.setattr(controller.tools, "_listing", lambda: listing)
+    cell.simulator.log.clear()
+    controller.tools.write(1, NEW[1], expected=OLD[1])
+    assert asked(cell) == [*ONE_BY_ONE, *WRITTEN]
+
+
+def test_what_is_stored_already_is_asked_for_by_itself_before_the_write_is_left_out(
+    cell, controller
+):
+    controller.tools.write(2, NEW[2], expected=OLD[2])
+    cell.simulator.log.clear()
+    assert controller.tools.write(1, OLD[1], expected=OLD[1]).skipped
+    assert asked(cell) == ["TLSet", *ONE_BY_ONE]
 
 
 def test_a_tool_that_was_cleared_here_is_asked_for_again(cell, controller):

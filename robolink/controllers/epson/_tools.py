@@ -1,6 +1,7 @@
 """The tool table of an EPSON controller: TLSet, TLClr, Tool (epson.md 3.1)."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 
 from robolink.controllers._guarded import MarkerDesk, ProcedureLock
 from robolink.controllers._tool_writing import ToolWrite, ToolWriter
@@ -10,6 +11,7 @@ from robolink.controllers.epson._robot import RobotFacts
 from robolink.controllers.epson._window import CommandWindow
 from robolink.errors import (
     ReadBackError,
+    RemoteProtocolError,
     ReservedToolError,
     ToolError,
     ToolIndexError,
@@ -60,8 +62,7 @@ class EpsonToolTable:
     def read_all(self) -> dict[int, ToolOffset | None]:
         """Read all fifteen from one TLSet listing; it is empty when none is defined."""
         self._window.require_ready("TLSet")
-        listing = self._window.printed(spel.list_tools(), may_be_nothing=True)
-        listed = spel.parse_tool_listing(listing)
+        listed = spel.parse_tool_listing(self._listing())
         return {tool: listed.get(tool) for tool in self.indices()}
 
     def read(self, tool: int) -> ToolOffset | None:
@@ -75,8 +76,8 @@ class EpsonToolTable:
         self.require_writable(tool)
         requested = offset.rounded(DECIMALS)
         with self._lock.held(f"TLSet {tool}"):
-            self._window.require_ready(f"TLSet {tool}")
-            six_axes = self._robot.read().six_axes
+            with self._window.proving_ready(f"TLSet {tool}"):
+                six_axes = self._robot.read().six_axes
             self._check_axes(requested, six_axes=six_axes)
             statement = spel.set_tool(tool, requested, six_axes=six_axes)
             return self._set(tool, requested, expected, statement)
@@ -106,7 +107,6 @@ class EpsonToolTable:
         """Clear and read back; see :class:`robolink.model.ToolTable`."""
         self.require_writable(tool)
         with self._lock.held(f"TLClr {tool}"):
-            self._window.require_ready(f"TLClr {tool}")
             return self._set(tool, None, expected, spel.clear_tool(tool))
 
     def selected(self) -> int:
@@ -152,11 +152,32 @@ class EpsonToolTable:
             requested,
             statement,
             send=lambda: self._window.command(statement),
-            read=lambda: self._read(tool),
+            read=lambda: self._before(tool, requested, expected),
             # A tool that was set just now is defined.
-            read_back=None if requested is None else lambda: self._printed(tool),
+            read_back=lambda: self._read(tool) if requested is None else self._printed(tool),
         )
         return self._writer.change(write, expected)
+
+    def _before(
+        self, tool: int, requested: ToolOffset | None, expected: Expected
+    ) -> ToolOffset | None:
+        """Read what a write replaces.
+
+        The list of all tools takes one question, and whatever is in it is defined. How it looks
+        is not documented, so it is believed only where it confirms what was expected to the last
+        digit; and not on six axes, where it may leave V and W out.
+        """
+        with self._window.proving_ready(f"TLSet {tool}"):
+            if isinstance(expected, ToolOffset) and not self._robot.read().six_axes:
+                listing = self._listing()
+                with suppress(RemoteProtocolError):
+                    listed = spel.parse_tool_listing(listing).get(tool)
+                    if self.same(listed, expected) and not self.same(listed, requested):
+                        return listed
+            return self._read(tool)
+
+    def _listing(self) -> str:
+        return self._window.printed(spel.list_tools(), may_be_nothing=True)
 
     def _read(self, tool: int) -> ToolOffset | None:
         if tool == 0:

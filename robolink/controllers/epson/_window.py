@@ -1,6 +1,7 @@
 """Statements run through Execute, as if typed in the controller's command window."""
 
-from contextlib import AbstractContextManager
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager
 from functools import lru_cache
 
 from robolink.controllers.epson._answers import (
@@ -29,6 +30,7 @@ class CommandWindow:
 
     def __init__(self, session: EpsonSession) -> None:
         self._session = session
+        self._was_ready = False
 
     def uninterrupted(self) -> AbstractContextManager[None]:
         """Hold Ctrl-C back over statements that belong together; it is raised at their end."""
@@ -44,9 +46,31 @@ class CommandWindow:
         Raises:
             NotReadyError: Names the condition.
         """
+        self._was_ready = False
         status = self.status()
         require_ready(status, controller=self._session.identity, request=request)
+        self._was_ready = True
         return status
+
+    @contextmanager
+    def proving_ready(self, request: str) -> Iterator[None]:
+        """Hold ``request`` back unless the queries of a block are answered.
+
+        Execute needs what :meth:`require_ready` looks for (epson.md 1.2), so an answer proves
+        it, and later than the flags could. So they are read first only until they once were
+        right: nothing is sent to a controller that was not seen ready. They are read again when
+        a query is refused, to name what is missing.
+
+        Raises:
+            NotReadyError: Names the condition.
+        """
+        if not self._was_ready:
+            self.require_ready(request)
+        try:
+            yield
+        except (RejectedError, ControllerFaultError):
+            self.require_ready(request)
+            raise
 
     def command(self, statement: Statement) -> None:
         """Run a statement that prints nothing.
@@ -92,6 +116,7 @@ class CommandWindow:
         self, statement: Statement, answer: Reply | Refusal
     ) -> RejectedError | ControllerFaultError:
         """Find out why ``statement`` did not run."""
+        self._was_ready = False
         controller = self._session.identity
         code = answer.code if isinstance(answer, Refusal) else 0
         # 20 says that a condition is missing; the flags say which (epson.md 1.6).

@@ -39,7 +39,7 @@ def kill_at(number: int) -> None:
     event.listen(Engine, "before_cursor_execute", step)
     event.listen(Engine, "commit", step)
     # Prepared statements go past SQLAlchemy, so it tells nobody of them.
-    for name in ("run", "run_many", "rows"):
+    for name in ("run", "run_many", "rows", "commit"):
         setattr(Runner, name, _after(step, getattr(Runner, name)))
 
 

@@ -122,6 +122,7 @@ class Draft:
             "source": source,
             "warnings": warnings,
             "poses": result.inputs,
+            "fit": result,
             "impact": impact,
         }
 

@@ -1,11 +1,14 @@
 """The offset before and after, what is doubtful about it, and the poses behind it."""
 
+import math
 from collections.abc import Iterator, Sequence
 from typing import Final
 from xml.etree.ElementTree import Element
 
+from robolink.calibration import CalibrationResult
 from robolink.messages import tr
 from robolink.model import Pose, ToolOffset, angle_difference_deg
+from robolink.report._certainty import how_sure
 from robolink.report._markup import element, figure
 from robolink.report._values import Report
 
@@ -24,8 +27,12 @@ def offsets(report: Report) -> Iterator[Element]:
         rows.append(_change(report.before, report.after))
     if report.determined:
         rows.append(_origins(report, measured=measured))
+    if report.fit is not None and report.fit.half_width95:
+        rows.append(_interval(report.fit))
     yield element("h2", tr("Offset"))
     yield table(("", *_AXES), rows)
+    if report.fit is not None:
+        yield element("p", how_sure(report.fit), class_="small")
     if measured and set(report.determined) != set(_NAMES):
         yield element("p", tr("What is kept was not measured."), class_="small")
 
@@ -43,12 +50,12 @@ def poses(report: Report) -> Iterator[Element]:
         # What does not determine Z was never asked for a height; typed poses have none.
         heights = report.record is not None or "z_mm" in report.determined
         yield element("h2", tr("Poses of the flange that it was computed from"))
-        yield _poses(report.poses, report.residuals_mm, heights=heights)
+        yield _poses(report.poses, report.fit, heights=heights)
     for attempt in report.attempts:
         if attempt.poses:
             yield element("h2", tr("Poses of a measurement that was refused"))
             yield element("p", attempt.why, class_="lead")
-            yield _poses(attempt.poses, (), heights=True)
+            yield _poses(attempt.poses, None, heights=True)
 
 
 def table(columns: tuple[str, ...], rows: list[Element], **attributes: object) -> Element:
@@ -86,17 +93,43 @@ def _origins(report: Report, *, measured: bool) -> Element:
     return element("tr", element("td", tr("where from")), *cells, class_="origin")
 
 
-def _poses(poses: Sequence[Pose], residuals_mm: Sequence[float], *, heights: bool) -> Element:
+def _interval(fit: CalibrationResult) -> Element:
+    """Return the row of half the 95 % interval of what was measured."""
+    halves = dict(zip(fit.measured, fit.half_width95, strict=True))
+    cells = [
+        element("td", "\u00b1 ", figure(halves[name], 4)) if name in halves else element("td")
+        for name in _NAMES
+    ]
+    return element("tr", element("td", tr("95 % interval")), *cells)
+
+
+def _poses(poses: Sequence[Pose], fit: CalibrationResult | None, *, heights: bool) -> Element:
     names = ["x_mm", "y_mm", *(["z_mm"] if heights else []), "u_deg"]
     names += [name for name in ("v_deg", "w_deg") if any(getattr(pose, name) for pose in poses)]
     columns = ["", *(_AXES[_NAMES.index(name)] for name in names), tr("hand")]
+    residuals = fit.residuals_mm if fit else ()
     rows = []
-    for number, pose in enumerate(poses, start=1):
+    for number, pose in enumerate(poses):
         cells = [element("td", figure(getattr(pose, name))) for name in names]
         cells.append(element("td", str(pose.hand) if pose.hand else "-"))
-        if residuals_mm:
-            cells.append(element("td", figure(residuals_mm[number - 1])))
-        rows.append(element("tr", element("td", str(number)), *cells))
-    if residuals_mm:
-        columns.append(tr("residual mm"))
+        if residuals:
+            cells += _residual(residuals[number] if number < len(residuals) else ())
+        left_out = fit is not None and number in fit.rejected
+        kind = "left-out" if left_out else None
+        name = tr("{number} (left out)", number=number + 1) if left_out else str(number + 1)
+        rows.append(element("tr", element("td", name), *cells, class_=kind))
+    if residuals:
+        columns += [tr("residual X, Y mm"), tr("length mm")]
+        if any(len(residual) > 2 for residual in residuals):
+            columns[-2] = tr("residual X, Y, Z mm")
     return table(tuple(columns), rows)
+
+
+def _residual(residual: Sequence[float]) -> list[Element]:
+    """Return the cells of a residual in base axes; a pose of another fit has none."""
+    if not residual:
+        return [element("td", "-"), element("td", "-")]
+    numbers: list[Element | str] = []
+    for value in residual:
+        numbers += [figure(value), " "]
+    return [element("td", *numbers[:-1]), element("td", figure(math.hypot(*residual)))]

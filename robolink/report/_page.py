@@ -5,9 +5,11 @@ from importlib.resources import files
 from xml.etree.ElementTree import Element
 
 from robolink.messages import tr
+from robolink.report._fit_picture import fit
 from robolink.report._markup import document, element
 from robolink.report._offset_sections import doubts, offsets, poses
 from robolink.report._point_sections import points
+from robolink.report._pose_plan import pose_plan
 from robolink.report._record_sections import evidence, judgements
 from robolink.report._summary import facts, heading
 from robolink.report._tip_picture import tip
@@ -58,7 +60,9 @@ def _of_tool(report: Report, *, alone: bool) -> Iterator[Element]:
     yield from offsets(report)
     yield from tip(report)
     yield from judgements(report)
+    yield from fit(report)
     yield from poses(report)
+    yield from pose_plan(report)
     yield from verification(report)
     if report.record is None or report.impact is not None:
         yield from points(report)

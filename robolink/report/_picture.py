@@ -41,7 +41,7 @@ def draw(impact: Impact) -> Picture:
     marks = _Marks(plane, factor, impact.largest)
     drawn = [marks.draw(entry) for entry in _largest_last(impact)]
     names, unnamed = marks.names(impact)
-    content = [*_grid(plane), *drawn, *names]
+    content = [*grid(plane), *drawn, *names]
     height = plane.height + _TOP + _BELOW
     svg = element(
         "svg",
@@ -108,7 +108,8 @@ def _largest_last(impact: Impact) -> list[PointImpact]:
     return sorted(impact.entries, key=lambda entry: entry is impact.largest)
 
 
-def _grid(plane: Plane) -> list[Element]:
+def grid(plane: Plane) -> list[Element]:
+    """Return paper, grid lines and axes of a plane."""
     width, height = WIDTH, plane.height
     parts = [element("rect", width=f"{width:g}", height=f"{height:.1f}", class_="paper")]
     for x_mm in plane.grid_x_mm():

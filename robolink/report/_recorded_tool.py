@@ -1,6 +1,5 @@
 """What the journal says about one tool of a change."""
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
@@ -9,13 +8,12 @@ from robolink.messages import tr
 from robolink.model import (
     ControllerFacts,
     EntryKind,
-    Hand,
-    Pose,
     Recorded,
     ToolOffset,
     describe_offset,
     read_offset,
 )
+from robolink.report._recorded_fit import recorded_fit, recorded_pose
 from robolink.report._values import Attempt, Judgement, Outcome, Record, Report
 
 _ENDS: Final = {
@@ -59,8 +57,8 @@ def report_of_tool(
         method=calibration.get("method"),
         determined=tuple(calibration.get("measured", ())),
         warnings=(*calibration.get("notes", ()), *map(_doubt, calibration.get("warnings", ()))),
-        poses=tuple(_pose(pose) for pose in calibration.get("poses", ())),
-        residuals_mm=tuple(math.hypot(*r) for r in calibration.get("residuals_mm", ())),
+        poses=tuple(map(recorded_pose, calibration.get("poses", ()))),
+        fit=None if measured is None else recorded_fit(calibration),
         attempts=tuple(_attempts(entries)),
         verification=_verification(_last(entries, EntryKind.VERIFY)),
         judgements=judgements,
@@ -148,7 +146,7 @@ def _doubt(code: str) -> str:
 
 def _attempts(entries: Sequence[Recorded]) -> list[Attempt]:
     return [
-        Attempt(entry.verdict, tuple(_pose(pose) for pose in _list(entry.details.get("poses"))))
+        Attempt(entry.verdict, tuple(map(recorded_pose, _list(entry.details.get("poses")))))
         for entry in entries
         if entry.kind is EntryKind.REFUSED
     ]
@@ -160,11 +158,6 @@ def _verification(entry: Recorded | None) -> VerifyResult | None:
     details: Mapping[str, Any] = entry.details
     drifts = tuple(Drift(**drift) for drift in details["drifts"])
     return VerifyResult(drifts, details["tolerance_mm"], tuple(details["warnings"]))
-
-
-def _pose(pose: Mapping[str, Any]) -> Pose:
-    hand = pose.get("hand")
-    return Pose(**{**pose, "hand": Hand(hand) if hand else None})
 
 
 def _list(value: object) -> list[Any]:

@@ -44,6 +44,18 @@ def circle(centre: Place, radius: float, class_: str | None = None) -> Element:
     return element("circle", cx=f"{x:.2f}", cy=f"{y:.2f}", r=f"{radius:g}", class_=class_)
 
 
+def ellipse(centre: Place, long: float, short: float, turn_deg: float, *, class_: str) -> Element:
+    """Return an ellipse by its half axes; the long one is turned counter-clockwise from X."""
+    x, y = centre
+    return element(
+        "ellipse",
+        rx=f"{long:.2f}",
+        ry=f"{short:.2f}",
+        transform=f"translate({x:.2f} {y:.2f}) rotate({-turn_deg:.2f})",
+        class_=class_,
+    )
+
+
 def words(text: str, x: float, y: float, **attributes: object) -> Element:
     """Return a line of text with its foot at (x, y)."""
     return element("text", text, x=f"{x:.2f}", y=f"{y:.2f}", **attributes)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from enum import StrEnum
 
-from robolink.calibration import Impact, VerifyResult
+from robolink.calibration import CalibrationResult, Impact, VerifyResult
 from robolink.model import ControllerFacts, Pose, Recorded, Signature, ToolOffset
 
 
@@ -91,11 +91,11 @@ class Report:
         determined: Names of the components that were measured or typed; the others are kept.
         warnings: Doubts, as sentences.
         poses: The flange poses that went in.
+        fit: What the measurement came to, ``None`` when nothing was measured.
         impact: Where taught points lead afterwards, ``None`` when none were named.
         verification: Drift about the new tip, ``None`` when nothing was turned.
         compared: Whether ``before`` and ``after`` are known; a measurement that was refused
             early comes to nothing.
-        residuals_mm: How far each pose is from agreement, where that is known.
         attempts: Measurements that were refused.
         judgements: What was judged on the way.
         record: What the journal adds, ``None`` for a report that is made on the way.
@@ -115,10 +115,10 @@ class Report:
     determined: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
     poses: tuple[Pose, ...] = ()
+    fit: CalibrationResult | None = None
     impact: Impact | None = None
     verification: VerifyResult | None = None
     compared: bool = True
-    residuals_mm: tuple[float, ...] = ()
     attempts: tuple[Attempt, ...] = ()
     judgements: tuple[Judgement, ...] = ()
     record: Record | None = None

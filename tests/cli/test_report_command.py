@@ -137,7 +137,7 @@ def test_the_page_says_who_when_with_what_and_what_came_of_it(run, recorded, sim
         "before 12.000 -3.500 -20.000",
         "change 0.300 -0.200 0.000",
         "calibration change up to 2 mm measured: X 12.300; rms 0.050 mm",
-        "1 153.217 501.272 -83.500 0.000 right 0.050",
+        "1 153.217 501.272 -83.500 0.000 right 0.030 0.040 0.050",
         "1 1.250 2.000 3.000 4.000 -",
         "The poses lie too close.",
         "A person typed Z.",
@@ -148,7 +148,7 @@ def test_the_page_says_who_when_with_what_and_what_came_of_it(run, recorded, sim
         *(found.hash for found in open_journal().entries()),
     ):
         assert words in text
-    assert (tmp_path / "page.html").read_text(encoding="utf-8").count("<svg") == 1
+    assert (tmp_path / "page.html").read_text(encoding="utf-8").count("<svg") == 2
 
 
 def test_several_tools_stand_on_one_page(run, recorded, tmp_path):

@@ -1,0 +1,21 @@
+"""Where the interval comes from, in a sentence."""
+
+from robolink.calibration import CalibrationResult
+from robolink.messages import tr
+
+
+def how_sure(fit: CalibrationResult) -> str:
+    """Return what the interval of a measurement rests on, or why there is none."""
+    if not fit.half_width95:
+        return tr("No interval: nothing here tells how large the errors are.")
+    if fit.sigma_stated and fit.sigma_mm is not None:
+        return tr(
+            "The interval rests on a stated standard deviation of {sigma:g} mm of one placement.",
+            sigma=fit.sigma_mm,
+        )
+    if fit.dof is None:
+        return tr("The interval rests on the scatter of the poses.")
+    return tr(
+        "The interval rests on the scatter of the poses: Student's t, degrees of freedom: {dof}.",
+        dof=fit.dof,
+    )

@@ -95,8 +95,8 @@ def test_a_serial_frame_of_a_function_never_asked_for_is_refused(function):
         RtuFraming().take(bytearray(rtu(bytes([function, 0, 0, 0, 0]))))
 
 
-@pytest.mark.parametrize("payload", [b"\x04\x06\x00\x01", b"\x04"])
-def test_a_tcp_answer_shorter_than_it_says_is_refused(payload):
+@pytest.mark.parametrize("payload", [b"\x04\x06\x00\x01", b"\x04", b"\x04\x03\x00\x01\x02"])
+def test_a_tcp_answer_of_another_length_than_it_says_is_refused(payload):
     with pytest.raises(FrameError):
         TcpFraming().take(bytearray(tcp(payload)))
 

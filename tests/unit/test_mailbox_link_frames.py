@@ -9,13 +9,8 @@ from hypothesis import strategies as st
 from pymodbus.framer import FramerRTU, FramerSocket
 from pymodbus.pdu import DecodePDU
 
-from robolink.transport._modbus_frames import (
-    Area,
-    FrameError,
-    ModbusRequest,
-    RtuFraming,
-    TcpFraming,
-)
+from robolink.transport._modbus_frames import FrameError, RtuFraming, TcpFraming
+from robolink.transport._modbus_messages import Area, ModbusRequest
 
 READ = ModbusRequest(unit=5, function=4, area=Area.INPUT, address=0, count=3)
 WRITE = ModbusRequest(unit=5, function=16, area=Area.HOLDING, address=7, count=2, values=(1, 2))

@@ -6,6 +6,7 @@ import click
 
 from robolink.messages import tr
 from robolink_cli._context import json_option
+from robolink_cli._sim_options import allow_remote_option, seed_option
 
 
 @click.command("plc")
@@ -32,10 +33,8 @@ from robolink_cli._context import json_option
     show_default=True,
     help="The unit identifier that answers.",
 )
-@click.option(
-    "--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Other tools."
-)
-@click.option("--allow-remote", is_flag=True, help="Listen where other machines can reach it, too.")
+@seed_option
+@allow_remote_option
 @json_option
 def sim_plc(*, map_file: Path, address: str, unit: int, seed: int, allow_remote: bool) -> None:
     """Serve a simulated PLC with the registers of any map until Ctrl-C."""

@@ -2,9 +2,12 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Final, TypeVar
 
 import click
+
+DEFAULT_ADDRESS: Final = "127.0.0.1:5020"
+"""Where Modbus TCP is served when no bus is named."""
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -38,6 +41,21 @@ def simulation_options(function: F) -> F:
     for option in reversed(options):
         function = option(function)
     return function
+
+
+def modbus_options(function: F) -> F:
+    """Add ``--modbus-tcp`` and ``--modbus-rtu``."""
+    function = click.option(
+        "--modbus-rtu",
+        type=click.Choice(["pty"]),
+        help="Serve Modbus RTU on a pseudo terminal, whose path is printed.",
+    )(function)
+    return click.option(
+        "--modbus-tcp",
+        metavar="HOST:PORT",
+        help="Serve Modbus TCP there; port 0 takes a free one. Without any bus: "
+        f"{DEFAULT_ADDRESS}.",
+    )(function)
 
 
 def seed_option(function: F) -> F:

@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from robolink_cli._context import json_option
-from robolink_cli._sim_options import simulation_options
+from robolink_cli._sim_options import modbus_options, simulation_options
 from robolink_cli._sim_plc import sim_plc
 
 
@@ -87,16 +87,7 @@ def epson(
 
 
 @sim.command()
-@click.option(
-    "--modbus-tcp",
-    metavar="HOST:PORT",
-    help="Serve Modbus TCP there; port 0 takes a free one. Without any bus: 127.0.0.1:5020.",
-)
-@click.option(
-    "--modbus-rtu",
-    type=click.Choice(["pty"]),
-    help="Serve Modbus RTU on a pseudo terminal, whose path is printed.",
-)
+@modbus_options
 @click.option(
     "--can",
     metavar="INTERFACE:CHANNEL",

@@ -12,11 +12,11 @@ from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_cli._serving import Termination, announce, host_and_port
+from robolink_cli._sim_options import DEFAULT_ADDRESS
 
 if TYPE_CHECKING:
     from robolink_simulators.hosting.canopen_node import CanPlace
 
-DEFAULT_ADDRESS: Final = "127.0.0.1:5020"
 _PTY: Final = "pty"
 _MULTICAST: Final = "udp_multicast"
 

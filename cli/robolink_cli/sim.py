@@ -5,6 +5,7 @@ from pathlib import Path
 import click
 
 from robolink_cli._context import json_option
+from robolink_cli._sim_options import modbus_options, simulation_options
 from robolink_cli._sim_plc import sim_plc
 
 
@@ -28,36 +29,9 @@ sim.add_command(sim_plc)
 )
 @click.option("--robot", default="T6-602S", show_default=True, help="Model of the robot.")
 @click.option(
-    "--seed",
-    type=click.IntRange(min=0),
-    default=1,
-    show_default=True,
-    help="Another cell, another tip.",
-)
-@click.option(
     "--password-env",
     metavar="VAR",
     help="Environment variable that holds the password clients must give.",
-)
-@click.option(
-    "--state",
-    type=click.Path(dir_okay=False, path_type=Path),
-    help="File that keeps the tools over a restart, as the controller's flash does.",
-)
-@click.option(
-    "--speed",
-    type=click.FloatRange(min=0.01, max=1000),
-    default=1.0,
-    show_default=True,
-    metavar="FACTOR",
-    help="How many times faster than real the simulated time passes.",
-)
-@click.option(
-    "--option",
-    "options",
-    multiple=True,
-    metavar="NAME=VALUE",
-    help="A habit of the controller; a wrong name lists them all. May be repeated.",
 )
 @click.option(
     "--profile",
@@ -69,7 +43,7 @@ sim.add_command(sim_plc)
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
     help="Serve a dialogue that --record has written, in place of a simulator.",
 )
-@click.option("--allow-remote", is_flag=True, help="Listen where other machines can reach it, too.")
+@simulation_options
 @json_option
 def epson(
     *,
@@ -113,16 +87,7 @@ def epson(
 
 
 @sim.command()
-@click.option(
-    "--modbus-tcp",
-    metavar="HOST:PORT",
-    help="Serve Modbus TCP there; port 0 takes a free one. Without any bus: 127.0.0.1:5020.",
-)
-@click.option(
-    "--modbus-rtu",
-    type=click.Choice(["pty"]),
-    help="Serve Modbus RTU on a pseudo terminal, whose path is printed.",
-)
+@modbus_options
 @click.option(
     "--can",
     metavar="INTERFACE:CHANNEL",
@@ -148,34 +113,7 @@ def epson(
     metavar="NAME=VALUE",
     help="A parameter of the kinematics or a drive, for example dArmLength1=250. May be repeated.",
 )
-@click.option(
-    "--seed",
-    type=click.IntRange(min=0),
-    default=1,
-    show_default=True,
-    help="Another cell, another tip.",
-)
-@click.option(
-    "--state",
-    type=click.Path(dir_okay=False, path_type=Path),
-    help="File that keeps the tool slots over a restart, as retained memory does.",
-)
-@click.option(
-    "--speed",
-    type=click.FloatRange(min=0.01, max=1000),
-    default=1.0,
-    show_default=True,
-    metavar="FACTOR",
-    help="How many times faster than real the simulated time passes.",
-)
-@click.option(
-    "--option",
-    "options",
-    multiple=True,
-    metavar="NAME=VALUE",
-    help="A habit of the PLC; a wrong name lists them all. May be repeated.",
-)
-@click.option("--allow-remote", is_flag=True, help="Listen where other machines can reach it, too.")
+@simulation_options
 @json_option
 def softmotion(
     *,

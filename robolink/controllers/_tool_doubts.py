@@ -1,4 +1,4 @@
-"""Judges the open marker of a tool write by reading the tool."""
+"""Judges the open markers of tools, written or selected, by what is there now."""
 
 from robolink.messages import tr
 from robolink.model import (
@@ -51,6 +51,38 @@ def examine_write(tools: ToolTable, marker: Marker) -> Finding:
             requested=describe_offset(requested),
         )
     return Finding(marker, verdict, sentence, entries=(_entry(marker, tool, verdict, now),))
+
+
+def examine_select(tools: ToolTable, marker: Marker) -> Finding:
+    """Return what became of one selection."""
+    now, wanted = tools.selected(), int(str(marker.details["select"]))
+    verdict = Verdict.DONE if now == wanted else Verdict.NOT_APPLIED
+    return Finding(marker, verdict, tr("Tool {now} is selected now.", now=now))
+
+
+def judge_selection(
+    marker: Marker, *, now: int, before: int, restored: bool, action: str
+) -> Finding:
+    """Return whether a procedure that ended early has put the cell's own tool back.
+
+    Args:
+        marker: Of the procedure.
+        now: The tool that is selected.
+        before: The tool that was selected when the procedure began.
+        restored: Whether all is as it was then.
+        action: What settling would do about it, without a full stop.
+    """
+    if restored:
+        sentence = tr("Tool {tool} is selected, as it was before.", tool=now)
+        return Finding(marker, Verdict.DONE, sentence)
+    sentence = tr(
+        "Tool {now} is selected; before {reason!r} it was tool {before}.",
+        now=now,
+        reason=marker.request,
+        before=before,
+    )
+    entry = NewEntry(EntryKind.SELECTION, tool=before, verdict=Verdict.NOT_RESTORED)
+    return Finding(marker, Verdict.NOT_RESTORED, sentence, action, (entry,))
 
 
 def _entry(marker: Marker, tool: int, verdict: Verdict, now: ToolOffset | None) -> NewEntry:

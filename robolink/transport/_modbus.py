@@ -18,7 +18,7 @@ from robolink.messages import tr
 from robolink.timing import Clock, Deadline
 from robolink.transport._base import Transport
 from robolink.transport._modbus_errors import refused
-from robolink.transport._modbus_frames import (
+from robolink.transport._modbus_messages import (
     MOST_BITS_READ,
     MOST_REGISTERS_READ,
     MOST_REGISTERS_WRITTEN,

@@ -16,7 +16,7 @@ from robolink.errors import (
     TransportTimeoutError,
 )
 from robolink.messages import tr
-from robolink.transport._modbus_frames import ModbusRequest
+from robolink.transport._modbus_messages import ModbusRequest
 
 _GATEWAY_NO_PATH: Final = 0x0A
 _GATEWAY_NO_ANSWER: Final = 0x0B

@@ -20,7 +20,7 @@ from robolink.transport._mailbox_link import (
     require_words,
 )
 from robolink.transport._modbus import ModbusClient
-from robolink.transport._modbus_frames import Area
+from robolink.transport._modbus_messages import Area
 from robolink.transport._modbus_open import Probe, open_client
 from robolink.transport._url import LinkUrl
 from robolink.transport._url_options import UrlOptions

@@ -8,7 +8,7 @@ from robolink.messages import tr
 from robolink.timing import Clock, Deadline, SystemClock
 from robolink.transport._dial import dial
 from robolink.transport._modbus import ModbusClient
-from robolink.transport._modbus_frames import Area
+from robolink.transport._modbus_messages import Area
 from robolink.transport._modbus_rtu import RtuExchange, RtuLine
 from robolink.transport._modbus_tcp import TcpExchange
 from robolink.transport._serial import SerialSettings, open_serial

@@ -16,14 +16,8 @@ from robolink.messages import tr
 from robolink.timing import NS_PER_S, Deadline
 from robolink.transport import _modbus_errors as errors
 from robolink.transport._base import Transport
-from robolink.transport._modbus_frames import (
-    WRITE_COIL,
-    Area,
-    FrameError,
-    ModbusReply,
-    ModbusRequest,
-    RtuFraming,
-)
+from robolink.transport._modbus_frames import FrameError, RtuFraming
+from robolink.transport._modbus_messages import WRITE_COIL, Area, ModbusReply, ModbusRequest
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,8 @@ from robolink.errors import TransportTimeoutError
 from robolink.timing import Deadline
 from robolink.transport import _modbus_errors as errors
 from robolink.transport._base import Transport
-from robolink.transport._modbus_frames import FrameError, ModbusReply, ModbusRequest, TcpFraming
+from robolink.transport._modbus_frames import FrameError, TcpFraming
+from robolink.transport._modbus_messages import ModbusReply, ModbusRequest
 
 
 class TcpExchange:

@@ -178,8 +178,9 @@ def test_status_and_dry_run_read_only(shown, serve):
     assert plc.writes == []
 
 
-def test_the_simulator_is_served_by_its_command(state_folder):
-    given = ["sim", "plc", "--map", str(MAPS / "commit-bit.toml"), "--modbus-tcp", "127.0.0.1:0"]
+def test_the_simulator_is_served_by_its_command_on_both_buses(state_folder):
+    buses = ["--modbus-tcp", "127.0.0.1:0", "--modbus-rtu", "pty"]
+    given = ["sim", "plc", "--map", str(MAPS / "commit-bit.toml"), *buses]
     with subprocess.Popen(
         [sys.executable, "-m", "robolink_cli", *given, "--json"],
         stdout=subprocess.PIPE,
@@ -189,7 +190,17 @@ def test_the_simulator_is_served_by_its_command(state_folder):
         assert process.stdout is not None
         try:
             served = document(process.stdout.readline(), "sim")
-            assert main.run(["-c", served["url"], "plc", "check-map"]) == 0
+            assert list(served["urls"]) == ["modbus-tcp", "modbus-rtu"]
+            assert served["url"] == served["urls"]["modbus-tcp"]
+            for url in served["urls"].values():
+                assert main.run(["-c", url, "plc", "check-map"]) == 0
         finally:
             process.terminate()
     assert process.returncode == 0
+
+
+def test_a_unit_that_no_serial_line_has_is_refused(shown):
+    given = ("--map", str(MAPS / "commit-bit.toml"), "--modbus-rtu", "pty", "--unit", "255")
+    code, _, err = shown("sim", "plc", *given)
+    assert code == 2
+    assert "no unit 255 on a serial line" in err

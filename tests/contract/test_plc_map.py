@@ -1,4 +1,4 @@
-"""The tool table of a PLC with a map keeps the promises of every tool table, over a socket."""
+"""The tool table of a PLC with a map keeps the promises of every tool table, on each wire."""
 
 import socket
 import threading
@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from robolink_simulators.clock import ScaledClock
 from robolink_simulators.faults import Fault, FaultAction
-from robolink_simulators.plc import PlcSimulator, serve_plc
+from robolink_simulators.plc import PlcSimulator, serve_plc, serve_plc_line
 
 import robolink
 from robolink import ANY, ToolOffset
@@ -30,23 +30,32 @@ from robolink.runner import Question
 from robolink.transaction import recover
 
 MAPS = Path("examples/plc-maps")
-NAMES = ("commit-bit", "level-handshake", "no-handshake")
+# The first map has coils, discrete inputs and both kinds of registers, so it is on both wires.
+CELLS = (
+    ("commit-bit", "modbus-tcp"),
+    ("level-handshake", "modbus-tcp"),
+    ("no-handshake", "modbus-tcp"),
+    ("commit-bit", "modbus-rtu"),
+)
 NEW = ToolOffset(11.25, -3.125)
 
 
 class Served:
-    """A simulated PLC on a socket; its time passes ten times as fast as ours."""
+    """A simulated PLC on a wire; its time passes ten times as fast as ours."""
 
-    def __init__(self, name):
+    def __init__(self, name, wire="modbus-tcp"):
         self.path = MAPS / f"{name}.toml"
         self.map = load_map(self.path)
         self.plc = PlcSimulator(self.map, seed=7)
+        on_line = wire == "modbus-rtu"
+        self.serve = serve_plc_line if on_line else serve_plc
+        self.patience_s = 0.8 if on_line else 0.3  # a line has to fall silent first
 
     def __enter__(self):
-        self.host = serve_plc(self.plc, self.path, clock=ScaledClock(10.0))
+        self.host = self.serve(self.plc, self.path, clock=ScaledClock(10.0))
         self.url = self.host.url
-        identity = self.url.partition("&map=")[0]
-        confirm(identity, self.map, by="test", compared="1.x")
+        with self.connect() as controller:
+            confirm(controller.identity, self.map, by="test", compared="1.x")
         return self
 
     def __exit__(self, *_details):
@@ -56,9 +65,9 @@ class Served:
         return robolink.connect(self.url, **options)
 
 
-@pytest.fixture(params=NAMES)
+@pytest.fixture(params=CELLS, ids="-".join)
 def served(request):
-    with Served(request.param) as served:
+    with Served(*request.param) as served:
         yield served
 
 
@@ -159,7 +168,7 @@ def test_a_write_that_is_acknowledged_and_not_done_is_noticed(served, controller
 )
 def test_a_lost_answer_is_not_sent_again_and_settled_by_the_next_connection(served, action):
     first = f"fc16 {served.map.slots[1].span.start}"
-    with served.connect(timeout_s=0.3) as controller:
+    with served.connect(timeout_s=served.patience_s) as controller:
         before = controller.tools.read(1)
         served.plc.faults.add(Fault(action, match=first))
         with pytest.raises(OutcomeUnknownError):
@@ -220,6 +229,17 @@ def test_a_wrong_unit_a_missing_map_and_a_closed_port_are_clear_errors():
         port = probe.getsockname()[1]
     with pytest.raises(ConnectError):
         robolink.connect(f"plc+modbus-tcp://127.0.0.1:{port}?map={MAPS / 'commit-bit.toml'}")
+
+
+def test_on_a_serial_line_a_unit_that_is_not_there_is_silent_and_a_closed_line_is_told():
+    with Served("commit-bit", "modbus-rtu") as served:
+        other = served.url.replace("?", "?unit=9&")
+        with pytest.raises(ConnectError, match="Unit 9 does not answer"):
+            robolink.connect(other, timeout_s=0.2)
+        with served.connect() as controller:
+            assert controller.tools.read(1) is not None
+    with pytest.raises(ConnectError):
+        robolink.connect(served.url)
 
 
 def test_a_map_of_another_machine_is_found_out_when_connecting(tmp_path):

@@ -3,17 +3,25 @@
 Numbers 6 and 9 need kinematics that are not simulated.
 """
 
+import math
+import re
+from contextlib import ExitStack
+from dataclasses import dataclass
+
 import pytest
+from robolink_simulators.clock import ManualClock, ScaledClock
 from robolink_simulators.hosting.modbus import serve_modbus_tcp
+from robolink_simulators.softmotion.frames import axis_and_angle, zyz
 from robolink_simulators.softmotion.mailbox import (
     MailboxOptions,
     PlcOptions,
     SoftMotionSimulator,
 )
 
-from robolink.errors import ConfigError
+import robolink
+from robolink.errors import ConfigError, RemoteProtocolError
+from robolink.journal import memory_journal
 from robolink.protocols.mailbox import (
-    RESPONSE,
     Bits,
     CommandState,
     ErrorClass,
@@ -21,7 +29,6 @@ from robolink.protocols.mailbox import (
     Kinematics,
     Opcode,
     WordOrder,
-    find_word_order,
     frames_match,
 )
 from robolink.transport import open_mailbox_link
@@ -32,7 +39,6 @@ from tests.unit._mailbox_client import (
     MCS,
     NO_TOOL,
     MailboxClient,
-    linked,
     owning,
     shifted,
 )
@@ -41,18 +47,28 @@ UP = (0.0, 0.0, 50.0, 0.0, 0.0, 0.0)
 
 
 @pytest.fixture(params=["sim", "modbus-tcp"])
-def client(request):
+def machine(request):
+    """Makes a client that owns the mailbox of a new machine, by the name of its kinematics."""
+    with ExitStack() as served:
+
+        def made(kinematics):
+            simulator = SoftMotionSimulator(kinematics)
+            if request.param == "sim":
+                return owning(simulator)[0]
+            clock = ManualClock()
+            host = served.enter_context(serve_modbus_tcp(simulator, clock=ScaledClock(base=clock)))
+            client = MailboxClient(open_mailbox_link(host.url, clock=clock))
+            served.callback(client.link.close)
+            client.take()
+            return client
+
+        yield made
+
+
+@pytest.fixture
+def client(machine):
     """A client that owns the mailbox of a SCARA without an orientation axis."""
-    simulator = SoftMotionSimulator("Kin_Scara2_Z")
-    if request.param == "sim":
-        yield owning(simulator)[0]
-        return
-    with serve_modbus_tcp(simulator) as host:
-        link = open_mailbox_link(host.url)
-        client = MailboxClient(link)
-        client.take()
-        yield client
-        link.close()
+    return machine("Kin_Scara2_Z")
 
 
 def put(client, tool, slot=2):
@@ -109,7 +125,9 @@ def test_5_a_polar_robot_carries_shifts_along_z_alone():
     assert put(client, (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)).state == CommandState.DONE
 
 
-@pytest.mark.parametrize("kinematics", ["Kin_Gantry3", "Kin_Scara3_Z", "Kin_Scara2_Z+Kin_CAxis"])
+@pytest.mark.parametrize(
+    "kinematics", ["Kin_Gantry3", "Kin_5Axes", "Kin_Scara3_Z", "Kin_Scara2_Z+Kin_CAxis"]
+)
 def test_7_where_the_orientation_is_known_any_tool_fits(kinematics):
     client, _ = owning(kinematics=kinematics)
     tool = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
@@ -185,30 +203,90 @@ def test_14_an_axis_moved_by_itself_breaks_a_movement_and_nothing_else():
     assert client.now().group_state == GroupState.ERRORSTOP
 
 
-def test_15_jogging_a_turn_keeps_the_tcp_and_both_buttons_do_nothing():
-    # About Z: no simulated kinematics can turn its flange about X.
-    client, _ = owning(kinematics="Kin_Gantry3+Kin_CAxis")
-    before = client.now()
-    client.tell(Opcode.JOG, 1 << 5, 0, MCS, dynamics=FACTORS)
+@dataclass(frozen=True, slots=True)
+class Turn:
+    """A machine that can turn its TCP about one axis of MCS, from where the two are parallel.
+
+    Attributes:
+        button: Which of A, B and C is jogged.
+        axis: What that turns about.
+        wrist: The turn and the inclination of a Kin_5Axes at the start.
+        tool: ZYZ angles that make up for them.
+    """
+
+    button: int
+    axis: tuple[float, float, float]
+    wrist: tuple[float, float]
+    tool: tuple[float, float, float]
+
+
+# An inclination leans about the Y axis of the wrist, which the turn brings to the X axis of MCS.
+TURNS = {
+    "A": Turn(3, (1.0, 0.0, 0.0), (90.0, 0.0), (-90.0, 0.0, 0.0)),
+    "B": Turn(4, (0.0, 1.0, 0.0), (0.0, 0.0), (0.0, 0.0, 0.0)),
+    "C": Turn(5, (0.0, 0.0, 1.0), (0.0, 0.0), (0.0, 0.0, 0.0)),
+}
+
+
+@pytest.fixture(params=TURNS)
+def turn(request):
+    """One of the three ways to turn a TCP."""
+    return TURNS[request.param]
+
+
+@pytest.fixture
+def parallel(machine, turn):
+    """A client of a machine with a long tool, whose TCP stands parallel to MCS."""
+    client = machine("Kin_5Axes")
+    axes = (*client.now().axes[:3], *turn.wrist, 0.0)
+    now = client.tell(Opcode.MOVE_DIRECT, 0, 0, ACS, 0, pose=axes, dynamics=FACTORS)
+    assert client.end_of(now.ack_head).state == CommandState.DONE
+    assert put(client, (30.0, 20.0, -40.0, *turn.tool)).state == CommandState.DONE
+    return client
+
+
+def jog(client, forward, backward):
+    """Press buttons for a tenth of a second and wait until everything rests."""
+    client.tell(Opcode.JOG, forward, backward, MCS, dynamics=FACTORS)
     client.wait(0.1)
-    assert client.now().bits & Bits.JOGGING
+    jogging = bool(client.now().bits & Bits.JOGGING)
     client.done(Opcode.JOG, 0, 0, MCS)
     client.wait(0.3)
-    after = client.now()
+    return jogging
+
+
+def test_15_jogging_a_turn_goes_about_an_axis_of_mcs_and_keeps_the_tcp(parallel, turn):
+    before = parallel.now()
+    assert axis_and_angle(zyz(*before.tcp[3:]))[1] == pytest.approx(0, abs=1e-6)
+    assert jog(parallel, 1 << turn.button, 0)
+    after = parallel.now()
+    assert after.group_state == GroupState.STANDBY
     assert after.tcp[:3] == pytest.approx(before.tcp[:3], abs=1e-6)
-    assert sum(after.tcp[3:]) - sum(before.tcp[3:]) > 5
-    assert after.axes[:2] != pytest.approx(before.axes[:2], abs=0.1)
-    client.done(Opcode.JOG, 1, 1, MCS, dynamics=LINE)
-    client.wait(0.1)
-    assert client.now().tcp == pytest.approx(after.tcp, abs=1e-9)
+    axis, angle_deg = axis_and_angle(zyz(*after.tcp[3:]))
+    assert axis == pytest.approx(turn.axis, abs=1e-6)
+    assert 5 < angle_deg < 60
+    # The flange goes round the tip of the long tool.
+    assert math.dist(after.axes[:3], before.axes[:3]) > 1
+
+
+def test_15_with_both_buttons_pressed_nothing_turns(parallel, turn):
+    before = parallel.now()
+    assert not jog(parallel, 1 << turn.button, 1 << turn.button)
+    assert parallel.now().tcp == pytest.approx(before.tcp, abs=1e-9)
+    assert parallel.now().axes == before.axes
 
 
 @pytest.mark.parametrize("order", ["high_first", "pairs_swapped", "halves_swapped"])
-def test_16_the_probe_tells_another_word_order(order):
+def test_16_another_word_order_is_named_and_nothing_is_written(order):
     options = PlcOptions(mailbox=MailboxOptions(word_order=order))
-    client = linked(SoftMotionSimulator(options=options))
-    words = client.link.read_response()
-    assert find_word_order(words[RESPONSE.at("probe")]) is WordOrder[order.upper()]
+    simulator = SoftMotionSimulator(options=options)
+    meaning = re.escape(WordOrder[order.upper()].meaning)
+    with (
+        serve_modbus_tcp(simulator) as host,
+        pytest.raises(RemoteProtocolError, match=rf"\+0 registers.*{meaning}"),
+    ):
+        robolink.connect(host.url, outcomes=memory_journal(host.url).log(host.url))
+    assert {text for _, _, text in simulator.log} == {"read_response"}
 
 
 def test_a_direct_movement_in_axis_space_ends_at_its_target(client):

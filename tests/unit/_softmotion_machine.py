@@ -22,7 +22,7 @@ def standing(kinematics="Kin_Scara3_Z", at=None, options=None):
     """Return a group in Standby."""
     model = machine_named(kinematics)
     group = AxisGroup(model.kinematics, model.limits, options or GroupOptions())
-    group.place(at or (30.0, 45.0, 15.0, -20.0)[: len(group.axes)])
+    group.place(at or (30.0, 45.0, 15.0, -20.0, 10.0)[: len(group.axes)])
     group.power(on=True)
     assert group.enable().outputs.done
     return group

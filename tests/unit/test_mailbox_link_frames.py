@@ -9,13 +9,8 @@ from hypothesis import strategies as st
 from pymodbus.framer import FramerRTU, FramerSocket
 from pymodbus.pdu import DecodePDU
 
-from robolink.transport._modbus_frames import (
-    Area,
-    FrameError,
-    ModbusRequest,
-    RtuFraming,
-    TcpFraming,
-)
+from robolink.transport._modbus_frames import FrameError, RtuFraming, TcpFraming
+from robolink.transport._modbus_messages import Area, ModbusRequest
 
 READ = ModbusRequest(unit=5, function=4, area=Area.INPUT, address=0, count=3)
 WRITE = ModbusRequest(unit=5, function=16, area=Area.HOLDING, address=7, count=2, values=(1, 2))
@@ -95,8 +90,8 @@ def test_a_serial_frame_of_a_function_never_asked_for_is_refused(function):
         RtuFraming().take(bytearray(rtu(bytes([function, 0, 0, 0, 0]))))
 
 
-@pytest.mark.parametrize("payload", [b"\x04\x06\x00\x01", b"\x04"])
-def test_a_tcp_answer_shorter_than_it_says_is_refused(payload):
+@pytest.mark.parametrize("payload", [b"\x04\x06\x00\x01", b"\x04", b"\x04\x03\x00\x01\x02"])
+def test_a_tcp_answer_of_another_length_than_it_says_is_refused(payload):
     with pytest.raises(FrameError):
         TcpFraming().take(bytearray(tcp(payload)))
 

@@ -6,7 +6,7 @@ import pytest
 
 from robolink.errors import ConfigError, RemoteProtocolError, TransportTimeoutError
 from robolink.transport._modbus import ModbusClient
-from robolink.transport._modbus_frames import Area
+from robolink.transport._modbus_messages import Area
 from robolink.transport._modbus_rtu import RtuExchange, RtuLine
 from tests.unit._scripted_modbus import IDENTITY, ScriptedLine, rtu, words
 

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from pymodbus.framer import FramerSocket
+from pymodbus.framer import FramerRTU, FramerSocket
 from pymodbus.pdu import DecodePDU
 from pymodbus.pdu.bit_message import ReadCoilsRequest, WriteSingleCoilRequest
 from pymodbus.pdu.register_message import (
@@ -13,6 +13,7 @@ from pymodbus.pdu.register_message import (
     WriteSingleRegisterRequest,
 )
 from robolink_simulators.plc import PlcSimulator
+from robolink_simulators.plc.frames import LineFrames
 
 from robolink.register_maps import load_map
 
@@ -99,3 +100,35 @@ def test_the_program_answers_after_its_time_and_takes_over_once(plc):
     ask(link, WriteSingleCoilRequest(address=2000, bits=[True]), now_ns=due)
     plc.advance(due + 10**9)
     assert plc.program.takeovers == 1
+
+
+def on_line(pdu, unit=1):
+    """Return the frame of a request on a serial line."""
+    payload = bytes([pdu.function_code]) + pdu.encode()
+    return FramerRTU(DecodePDU(is_server=False)).encode(payload, unit, 0)
+
+
+@pytest.mark.parametrize("pieces", [1, 3, 13])
+def test_on_a_serial_line_a_request_may_come_in_pieces(plc, pieces):
+    link = plc.connect(0, LineFrames())
+    frame = on_line(WriteMultipleRegistersRequest(address=100, registers=[7, 8]))
+    step = -(-len(frame) // pieces)
+    for start in range(0, len(frame), step):
+        assert link.outgoing() == b""
+        link.receive(frame[start : start + step], 0)
+    assert link.outgoing()[:6] == bytes.fromhex("01 10 0064 0002")
+    assert plc.writes == ["fc16 100"]
+
+
+def test_on_a_serial_line_what_is_damaged_or_for_another_unit_is_not_answered(plc):
+    link = plc.connect(0, LineFrames())
+    damaged = bytearray(on_line(WriteMultipleRegistersRequest(address=100, registers=[7])))
+    damaged[8] ^= 1
+    link.receive(bytes(damaged), 0)
+    link.receive(on_line(WriteSingleRegisterRequest(address=100, registers=[7]), unit=2), 0)
+    link.receive(on_line(WriteSingleRegisterRequest(address=100, registers=[7]), unit=0), 0)
+    assert (link.outgoing(), plc.writes) == (b"", [])
+    link.receive(on_line(ReadHoldingRegistersRequest(address=100, count=1)), 0)
+    assert link.outgoing()[:3] == bytes.fromhex("01 03 02")
+    link.receive(on_line(ReadHoldingRegistersRequest(address=60000, count=1)), 0)
+    assert link.outgoing()[:3] == bytes.fromhex("01 83 02")

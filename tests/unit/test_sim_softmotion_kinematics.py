@@ -4,7 +4,19 @@ from hypothesis import strategies as st
 from robolink_simulators.softmotion import CoordRef, ErrorKind, Refused, machine_named
 from robolink_simulators.softmotion.catalogue import NAMES, parameter_names
 from robolink_simulators.softmotion.coupled import CAxis, Coupled, scara3_z
-from robolink_simulators.softmotion.frames import NO_TURN, ORIGIN, X_AXIS, Frame, about, zyz
+from robolink_simulators.softmotion.five_axes import FiveAxes
+from robolink_simulators.softmotion.frames import (
+    NO_TURN,
+    ORIGIN,
+    X_AXIS,
+    Y_AXIS,
+    Frame,
+    about,
+    axis_and_angle,
+    product,
+    transposed,
+    zyz,
+)
 from robolink_simulators.softmotion.kinematics import ANY_CONFIGURATION, Configuration
 from robolink_simulators.softmotion.orientation import Freedom, OrientationSpace, about_z, yaw_deg
 from robolink_simulators.softmotion.paths import axes_for_tcp
@@ -31,6 +43,7 @@ def test_the_worked_scara_of_the_reference_comes_out():
         (PolarZ(), (0, 0, 0)),
         (Gantry3(), (0, 0, 0)),
         (Coupled(Gantry3()), (0, 0, 0)),
+        (FiveAxes(80), (0, 0, -80)),
     ],
 )
 def test_with_all_axes_at_zero_the_flange_stands_where_documented(kinematics, at_zero_mm):
@@ -51,7 +64,8 @@ def test_axes_found_for_a_flange_pose_bring_the_flange_there(name, data):
     back = model.kinematics.flange(found)
     assert back.shift_mm == pytest.approx(flange.shift_mm, abs=1e-4)
     if model.kinematics.orientation_image(NO_TURN) == OrientationSpace.known(NO_TURN):
-        assert yaw_deg((back.inverse() @ flange).rotation) == pytest.approx(0, abs=1e-4)
+        for row, same in zip(back.rotation, flange.rotation, strict=True):
+            assert row == pytest.approx(same, abs=1e-6)
 
 
 @pytest.mark.parametrize("elbow_right", [True, False])
@@ -95,6 +109,36 @@ def test_a_c_axis_refuses_an_orientation_that_points_the_other_way(name):
         machine_named(name).kinematics.orientation_image(about(X_AXIS, 180))
 
 
+def test_an_inclination_moves_the_tool_of_five_axes_to_positive_x():
+    """The sign that the vendor's page gives; the tool points along -Z."""
+    leaning = FiveAxes(100).flange((10.0, 20.0, 30.0, 0.0, 30.0))
+    assert leaning.shift_mm == pytest.approx((60.0, 20.0, 30.0 - 86.602540), abs=1e-6)
+    turned = FiveAxes(100).flange((10.0, 20.0, 30.0, 90.0, 30.0))
+    assert turned.shift_mm == pytest.approx((10.0, 70.0, 30.0 - 86.602540), abs=1e-6)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    wanted=st.tuples(st.floats(-180, 180), st.floats(1, 179), st.floats(-180, 180)),
+    beside=st.tuples(st.floats(-180, 180), st.floats(-180, 180)),
+)
+def test_five_axes_take_up_the_closest_orientation_there_is(wanted, beside):
+    rotation = zyz(*wanted)
+    try:
+        image = FiveAxes().orientation_image(rotation)
+    except Refused:
+        return
+    closest_deg = axis_and_angle(product(transposed(image.rotation), rotation))[1]
+    other = FiveAxes().flange((0.0, 0.0, 0.0, *beside)).rotation
+    assert closest_deg <= axis_and_angle(product(transposed(other), rotation))[1] + 1e-6
+
+
+def test_five_axes_refuse_an_orientation_that_every_inclination_is_equally_far_from():
+    with pytest.raises(Refused):
+        FiveAxes().orientation_image(about(X_AXIS, 90))
+    assert FiveAxes().orientation_image(about(Y_AXIS, 90)).rotation[0][2] == pytest.approx(1)
+
+
 def test_a_tilted_orientation_is_projected_and_the_position_kept():
     kinematics = scara3_z()
     near = (30.0, 45.0, 15.0, -20.0)
@@ -133,6 +177,8 @@ def test_parameters_go_by_the_names_of_the_blocks():
     assert yaw_deg(flange.rotation) == pytest.approx(90.0)
     assert model.limits[2].low == -120.0
     assert model.kinematics.name == "Kin_Scara2_Z+Kin_CAxis"
+    short = machine_named("Kin_5Axes", {"dToolLength": 0.0}).kinematics
+    assert short.flange((1.0, 2.0, 3.0, 40.0, 50.0)).shift_mm == pytest.approx((1.0, 2.0, 3.0))
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -152,6 +198,8 @@ def test_every_kinematics_of_the_catalogue_takes_every_parameter_it_names(name):
     [
         ("Kin_Delta", {}),
         ("Kin_Scara3_Z+Kin_CAxis", {}),
+        ("Kin_5Axes+Kin_CAxis", {}),
+        ("Kin_5Axes", {"dArmLength1": 300.0}),
         ("Kin_Gantry3", {"dArmLength1": 300.0}),
         ("Kin_Gantry3", {"a3_low": 0.0}),
         ("Kin_Scara2_Z", {"dArmLength1": 0.0}),

@@ -23,8 +23,8 @@ from robolink.protocols.mailbox import (
     GroupState,
     Opcode,
 )
-from tests.unit._softmotion_driver_cell import Cell
-from tests.unit._softmotion_driver_plc import STRANGER
+from tests.unit._softmotion_driver_cell import Cell, PlcLink
+from tests.unit._softmotion_driver_plc import MS, STRANGER
 
 
 @pytest.fixture
@@ -198,6 +198,25 @@ def test_a_command_that_a_stop_ends_is_not_taken_as_done(cell, plc, controller):
     cell.link.before("read_head", stop_it)
     with pytest.raises(ControllerFaultError, match="ended before it was done"):
         controller.motors(False)
+
+
+@pytest.mark.parametrize(("lasts_ms", "looks"), [(4, 5), (40, 18), (250, 30), (2000, 210)])
+def test_an_end_is_noticed_soon_and_a_long_wait_costs_few_questions(
+    cell, plc, controller, lasts_ms, looks
+):
+    asked_ns = []
+
+    def read_head():
+        asked_ns.append(plc.clock.now_ns())
+        ended = asked_ns[-1] - asked_ns[0] >= lasts_ms * MS
+        plc.now = replace(plc.now, state=CommandState.DONE if ended else CommandState.ACTIVE)
+        return PlcLink.read_head(cell.link)
+
+    cell.link.read_head = read_head
+    controller.io.read_input(3)
+    late_ms = (asked_ns[-1] - asked_ns[0]) / MS - lasts_ms
+    assert late_ms <= min(lasts_ms / 4, 20)
+    assert looks * 0.8 <= len(asked_ns) <= looks
 
 
 def test_enabling_is_proved_and_not_repeated(plc, controller):

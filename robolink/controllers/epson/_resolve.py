@@ -5,14 +5,14 @@ is looked at; the cell's own tool is selected again when a person says so.
 """
 
 from robolink.controllers._guarded import MarkerDesk
-from robolink.controllers._tool_doubts import examine_write
+from robolink.controllers._tool_doubts import examine_select, examine_write, judge_selection
 from robolink.controllers.epson._motion import EpsonGroup
 from robolink.controllers.epson._preserve import InForce, Preserver
 from robolink.controllers.epson._tools import EpsonToolTable
 from robolink.controllers.epson._value_doubts import ValueDoubts
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink.model import EntryKind, Finding, Marker, MarkerKind, NewEntry, Verdict
+from robolink.model import Finding, Marker, MarkerKind, Verdict
 from robolink.protocols import spel
 
 
@@ -42,7 +42,7 @@ class EpsonResolver:
         if marker.kind is MarkerKind.SELECTION:
             return self._examine_selection(marker)
         if "select" in details:
-            return self._examine_select(marker)
+            return examine_select(self._tools, marker)
         if "raw" in details:
             return _examine_raw(marker)
         if "item" in details:
@@ -61,11 +61,6 @@ class EpsonResolver:
         else:
             self._desk.clear(finding.marker, *finding.entries)
 
-    def _examine_select(self, marker: Marker) -> Finding:
-        now, wanted = self._tools.selected(), int(str(marker.details["select"]))
-        verdict = Verdict.DONE if now == wanted else Verdict.NOT_APPLIED
-        return Finding(marker, verdict, tr("Tool {now} is selected now.", now=now))
-
     def _examine_move(self, marker: Marker) -> Finding:
         pose = self._group.pose()
         sentence = tr(
@@ -82,20 +77,13 @@ class EpsonResolver:
 
     def _examine_selection(self, marker: Marker) -> Finding:
         before, now = InForce.from_marker(marker), self._tools.selected()
-        if now == before.tool and self._group.settings.read() == before.settings:
-            sentence = tr("Tool {tool} is selected, as it was before.", tool=now)
-            return Finding(marker, Verdict.DONE, sentence)
-        sentence = tr(
-            "Tool {now} is selected; before {reason!r} it was tool {before}.",
-            now=now,
-            reason=marker.request,
-            before=before.tool,
-        )
+        restored = now == before.tool and self._group.settings.read() == before.settings
         action = tr(
             "select tool {tool} again, with the power mode and speed of then", tool=before.tool
         )
-        entry = NewEntry(EntryKind.SELECTION, tool=before.tool, verdict=Verdict.NOT_RESTORED)
-        return Finding(marker, Verdict.NOT_RESTORED, sentence, action, (entry,))
+        return judge_selection(
+            marker, now=now, before=before.tool, restored=restored, action=action
+        )
 
 
 def _examine_raw(marker: Marker) -> Finding:

@@ -4,14 +4,14 @@ Nothing is sent again. What was being written is read; a robot that was told to 
 at; the cell's own tool is selected again when a person says so.
 """
 
-from robolink.controllers._tool_doubts import examine_write
+from robolink.controllers._tool_doubts import examine_select, examine_write, judge_selection
 from robolink.controllers.softmotion._group import SoftMotionGroup
 from robolink.controllers.softmotion._mailbox import Mailbox
 from robolink.controllers.softmotion._preserve import Preserver, tool_before
 from robolink.controllers.softmotion._tools import SoftMotionToolTable
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink.model import EntryKind, Finding, Marker, MarkerKind, NewEntry, Verdict
+from robolink.model import Finding, Marker, MarkerKind, Verdict
 
 
 class SoftMotionResolver:
@@ -38,7 +38,7 @@ class SoftMotionResolver:
         if marker.kind is MarkerKind.SELECTION:
             return self._examine_selection(marker)
         if "select" in details:
-            return self._examine_select(marker)
+            return examine_select(self._tools, marker)
         if "kinematics" in details:
             return self._examine_kinematics(marker)
         if "output" in details:
@@ -56,11 +56,6 @@ class SoftMotionResolver:
             self._preserver.restore(finding.marker)
         else:
             self._mailbox.desk.clear(finding.marker, *finding.entries)
-
-    def _examine_select(self, marker: Marker) -> Finding:
-        now, wanted = self._tools.selected(), marker.details["select"]
-        verdict = Verdict.DONE if now == wanted else Verdict.NOT_APPLIED
-        return Finding(marker, verdict, tr("Tool {now} is selected now.", now=now))
 
     def _examine_kinematics(self, marker: Marker) -> Finding:
         now = self._mailbox.snapshots.take().kinematics
@@ -84,18 +79,10 @@ class SoftMotionResolver:
 
     def _examine_selection(self, marker: Marker) -> Finding:
         before, now = tool_before(marker), self._tools.selected()
-        if now == before:
-            sentence = tr("Tool {tool} is selected, as it was before.", tool=now)
-            return Finding(marker, Verdict.DONE, sentence)
-        sentence = tr(
-            "Tool {now} is selected; before {reason!r} it was tool {before}.",
-            now=now,
-            reason=marker.request,
-            before=before,
-        )
         action = tr("select tool {tool} again", tool=before)
-        entry = NewEntry(EntryKind.SELECTION, tool=before, verdict=Verdict.NOT_RESTORED)
-        return Finding(marker, Verdict.NOT_RESTORED, sentence, action, (entry,))
+        return judge_selection(
+            marker, now=now, before=before, restored=now == before, action=action
+        )
 
 
 def _examine_output(marker: Marker) -> Finding:

@@ -19,13 +19,17 @@ from robolink.errors import (
 )
 from robolink.messages import tr
 from robolink.protocols.mailbox import BlockError, Response, Slot, decode_slot
-from robolink.timing import Deadline
+from robolink.timing import NS_PER_S, Deadline
 
 POLL_S: Final = 0.02
-"""Longest pause between two looks at the head of the response block."""
+"""Longest time from one look at the head of the response block to the next."""
 
-_FIRST_POLL_S: Final = 0.0005
-"""The first pause; each is twice the one before. Most commands end within a PLC cycle or two."""
+_SHORTEST_POLL_S: Final = 0.0005
+_POLLS_PER_WAIT: Final = 4
+"""Looks come as often as this in the time waited so far, so each wait gets little longer by them.
+
+Most commands end within a PLC cycle or two; where a question takes as long itself, the next one
+follows at once."""
 
 LOOK_S: Final = 0.3
 """Longest time between two snapshots while something is awaited."""
@@ -103,14 +107,17 @@ class Snapshots:
         """
         known = (since.ack_head, since.state, since.error_class, since.group_state)
         clock = self._wire.clock
-        until, pause_s = Deadline.after(clock, wait_s), _FIRST_POLL_S
+        begun_ns = looked_ns = clock.now_ns()
         while True:
             head = self._wire.read_head()
-            self._pulse.note(head.heartbeat, clock.now_ns())
-            if head[:4] != known or until.expired:
+            now_ns = clock.now_ns()
+            self._pulse.note(head.heartbeat, now_ns)
+            waited_s = (now_ns - begun_ns) / NS_PER_S
+            if head[:4] != known or waited_s >= wait_s:
                 break
-            clock.sleep(pause_s)
-            pause_s = min(2 * pause_s, POLL_S)
+            period_s = min(max(waited_s / _POLLS_PER_WAIT, _SHORTEST_POLL_S), POLL_S)
+            clock.sleep(period_s - (now_ns - looked_ns) / NS_PER_S)
+            looked_ns = clock.now_ns()
         now = self.take()
         if self._pulse.frozen(clock.now_ns()):
             raise self._wire.ended(

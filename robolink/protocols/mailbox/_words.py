@@ -1,6 +1,5 @@
 """Checksums and counters of the mailbox (design part 7)."""
 
-import struct
 from collections.abc import Sequence
 from typing import Final
 
@@ -13,14 +12,18 @@ def _crc_of_byte(value: int) -> int:
     return value
 
 
-_CRC_OF_BYTE: Final = tuple(map(_crc_of_byte, range(256)))
+# A word is as wide as the checksum, so it displaces all of it: what its two bytes leave behind
+# are looked up and joined.
+_CRC_OF_HIGH: Final = tuple(map(_crc_of_byte, range(256)))
+_CRC_OF_LOW: Final = tuple(crc >> 8 ^ _CRC_OF_HIGH[crc & 0xFF] for crc in _CRC_OF_HIGH)
 
 
 def crc16(words: Sequence[int]) -> int:
     """Return CRC-16/MODBUS over the bytes of ``words``, the low byte of each first."""
     crc = 0xFFFF
-    for byte in struct.pack(f"<{len(words)}H", *words):
-        crc = crc >> 8 ^ _CRC_OF_BYTE[(crc ^ byte) & 0xFF]
+    for word in words:
+        crc ^= word
+        crc = _CRC_OF_LOW[crc & 0xFF] ^ _CRC_OF_HIGH[crc >> 8]
     return crc
 
 

@@ -5,6 +5,12 @@ import select
 import threading
 from typing import Final
 
+from robolink.errors import ConnectError
+from robolink.messages import tr
+
+PTY_LINE: Final = {"baud": "115200", "parity": "none"}
+"""A pseudo terminal knows no parity and refuses to be set to one."""
+
 _CHUNK_BYTES: Final = 4096
 
 
@@ -45,3 +51,11 @@ class SerialCable:
             for end in ready:
                 data = os.read(end, _CHUNK_BYTES)
                 os.write(other if end == one else one, data)
+
+
+def no_pseudo_terminal(error: Exception) -> ConnectError:
+    """Return the error of a system that gave no cable."""
+    return ConnectError(
+        tr("The simulator cannot open a pseudo terminal: {cause}.", cause=error),
+        remedy=tr("Use Modbus TCP; pseudo terminals exist on Unix only."),
+    )

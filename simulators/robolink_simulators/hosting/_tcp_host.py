@@ -1,25 +1,20 @@
-"""Serves a device on a TCP port: one thread, one selector, loopback unless told otherwise."""
+"""Serves a device on a TCP port, loopback unless told otherwise."""
 
-import contextlib
 import selectors
 import socket
-import threading
 from contextlib import AbstractContextManager
-from types import TracebackType
-from typing import Final, Self
 
 from robolink.errors import ConnectError
 from robolink.messages import tr
 from robolink_simulators.clock import ScaledClock
 from robolink_simulators.hosting._connection import Connection
 from robolink_simulators.hosting._loopback import require_loopback
+from robolink_simulators.hosting._wire_host import WireHost
 from robolink_simulators.wire import WireDevice
 
-_LONGEST_SLEEP_S: Final = 3600.0
 
-
-class TcpHost:
-    """A listening port, its connections and the thread that serves them.
+class TcpHost(WireHost):
+    """A listening port and its connections.
 
     Args:
         device: What to serve.
@@ -40,22 +35,13 @@ class TcpHost:
         lock: AbstractContextManager[object],
         allow_remote: bool = False,
     ) -> None:
-        self._device = device
-        self._clock = clock
-        self._lock = lock
         self._listener = _listening(address, allow_remote=allow_remote)
         self._scheme = scheme
-        self._stopping = False
         self._connections: dict[int, Connection] = {}
-        self._alarm, self._waker = socket.socketpair()
-        self._waker.setblocking(False)
-        self._alarm.setblocking(False)
-        self._selector = selectors.DefaultSelector()
-        self._selector.register(self._listener, selectors.EVENT_READ, self._accept)
-        self._selector.register(self._alarm, selectors.EVENT_READ, self._drain_alarm)
         self._address = self._listener.getsockname()[:2]
-        self._thread = threading.Thread(target=self._run, name=f"{scheme} host", daemon=True)
-        self._thread.start()
+        super().__init__(device, clock=clock, lock=lock)
+        self.selector.register(self._listener, selectors.EVENT_READ, self._accept)
+        self.start()
 
     @property
     def url(self) -> str:
@@ -72,76 +58,27 @@ class TcpHost:
         """How many clients are connected."""
         return len(self._connections)
 
-    def wake(self) -> None:
-        """Make the thread look at the device again; any thread may call it."""
-        # A full pipe wakes it as well, and a closed one has nobody to wake.
-        with contextlib.suppress(OSError):
-            self._waker.send(b"\0")
+    def flush(self) -> None:
+        """See :meth:`WireHost.flush`."""
+        for number, connection in tuple(self._connections.items()):
+            connection.flush()
+            if connection.finished:
+                del self._connections[number]
 
-    def close(self) -> None:
-        """Stop serving and close every connection. Idempotent."""
-        self._stopping = True
-        self.wake()
-        if self._thread is not threading.current_thread():
-            self._thread.join()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
-
-    def _run(self) -> None:
-        try:
-            while not self._stopping:
-                ready = self._selector.select(self._patience_s())
-                with self._lock:
-                    now_ns = self._clock.now_ns()
-                    for key, events in ready:
-                        key.data(events, now_ns)
-                    self._device.advance(now_ns)
-                    self._flush()
-        finally:
-            self._shut()
-
-    def _patience_s(self) -> float:
-        with self._lock:
-            change = self._device.next_change()
-        return _LONGEST_SLEEP_S if change is None else self._clock.real_seconds(change)
+    def shut(self, now_ns: int) -> None:
+        """See :meth:`WireHost.shut`."""
+        for connection in self._connections.values():
+            connection.drop(now_ns)
+        self._connections.clear()
+        self._listener.close()
 
     def _accept(self, _events: int, now_ns: int) -> None:
         try:
             client, _ = self._listener.accept()
         except OSError:
             return  # it left before it was let in
-        connection = Connection(client, self._device.connect(now_ns), self._selector)
+        connection = Connection(client, self._device.connect(now_ns), self.selector)
         self._connections[client.fileno()] = connection
-
-    def _drain_alarm(self, _events: int, _now_ns: int) -> None:
-        with contextlib.suppress(BlockingIOError):
-            while self._alarm.recv(4096):
-                pass
-
-    def _flush(self) -> None:
-        for number, connection in tuple(self._connections.items()):
-            connection.flush()
-            if connection.finished:
-                del self._connections[number]
-
-    def _shut(self) -> None:
-        with self._lock:
-            now_ns = self._clock.now_ns()
-            for connection in self._connections.values():
-                connection.drop(now_ns)
-            self._connections.clear()
-        self._selector.close()
-        for end in (self._listener, self._alarm, self._waker):
-            end.close()
 
 
 def _listening(address: tuple[str, int], *, allow_remote: bool) -> socket.socket:

@@ -10,13 +10,15 @@ from robolink_simulators.clock import ScaledClock
 from robolink_simulators.hosting._loopback import require_loopback
 from robolink_simulators.hosting._modbus_server import ModbusServerThread, SerialPort
 from robolink_simulators.hosting._plc_registers import PlcRegisters
-from robolink_simulators.hosting._serial_cable import SerialCable
+from robolink_simulators.hosting._serial_cable import (
+    PTY_LINE,
+    SerialCable,
+    no_pseudo_terminal,
+)
 from robolink_simulators.softmotion.mailbox.options import MailboxOptions
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 
 _DEFAULT_UNIT: Final = 1
-_PTY_LINE: Final = {"baud": "115200", "parity": "none"}
-"""A pseudo terminal knows no parity and refuses to be set to one."""
 
 
 class ModbusHost:
@@ -130,11 +132,8 @@ def serve_modbus_rtu(
         port = SerialPort(cable.far, unit)
         server = ModbusServerThread(PlcRegisters(simulator, clock), clock, port)
     except (ImportError, AttributeError, OSError) as error:
-        raise ConnectError(
-            tr("The simulator cannot open a pseudo terminal: {cause}.", cause=error),
-            remedy=tr("Use Modbus TCP; pseudo terminals exist on Unix only."),
-        ) from error
-    options = {**_PTY_LINE, **_client_options(simulator.options.mailbox)}
+        raise no_pseudo_terminal(error) from error
+    options = {**PTY_LINE, **_client_options(simulator.options.mailbox)}
     if unit != _DEFAULT_UNIT:
         options["unit"] = str(unit)
     url = f"softmotion+modbus-rtu://{cable.near}{_query(options)}"

@@ -10,6 +10,7 @@ from robolink_simulators.plc.frames import (
     NO_SUCH_UNIT,
     Frames,
     Request,
+    TcpFrames,
 )
 from robolink_simulators.plc.link import PlcLink
 from robolink_simulators.plc.memory import OutsideError
@@ -30,7 +31,8 @@ class PlcSimulator:
 
     Args:
         register_map: The map to serve.
-        unit: The unit identifier; another one is answered with exception 11.
+        unit: The unit identifier; another one is answered with exception 11 over TCP, and not
+            at all on a serial line.
         seed: Other tools.
     """
 
@@ -44,10 +46,10 @@ class PlcSimulator:
         self.now_ns = 0
         self._links: list[PlcLink] = []
 
-    def connect(self, now_ns: int) -> PlcLink:
-        """Accept one client."""
+    def connect(self, now_ns: int, frames: Frames | None = None) -> PlcLink:
+        """Accept one client, over TCP unless its frames are named."""
         self.advance(now_ns)
-        link = PlcLink(self)
+        link = PlcLink(self, frames or TcpFrames())
         self._links = [*(other for other in self._links if not other.drained), link]
         return link
 
@@ -63,6 +65,8 @@ class PlcSimulator:
 
     def serve(self, request: Request, frames: Frames) -> list[Departure]:
         """Carry a request out and return what leaves for it, when."""
+        if frames.shared and request.unit != self.unit:
+            return []
         met = self.faults.take(request.words)
         actions = {fault.action for fault in met}
         if FaultAction.DISCONNECT_BEFORE in actions:

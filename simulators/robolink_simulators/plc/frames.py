@@ -1,14 +1,15 @@
-"""Modbus TCP frames and numbers in registers, by pymodbus: the only module here that knows it.
+"""Modbus frames and numbers in registers, by pymodbus: the only module here that knows it.
 
 The driver encodes numbers itself, so that each proves the other.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
 from pymodbus.client.mixin import ModbusClientMixin
-from pymodbus.framer import FramerSocket
+from pymodbus.framer import FramerRTU, FramerSocket
 from pymodbus.pdu import DecodePDU, ExceptionResponse, ModbusPDU
 from pymodbus.pdu.bit_message import (
     ReadCoilsResponse,
@@ -48,7 +49,7 @@ class Request:
     """What a client asks.
 
     Attributes:
-        number: Of the transaction.
+        number: Of the transaction; 0 on a serial line.
         unit: Who is asked.
         function: Function code.
         table: Which table, ``None`` for a function that this server does not have.
@@ -71,40 +72,30 @@ class Request:
         return f"fc{self.function} {self.address}"
 
 
-class Frames:
-    """Takes requests off a stream, and packs answers."""
+class Frames(ABC):
+    """Takes requests off a stream, and packs answers.
 
-    def __init__(self) -> None:
-        self._framer = FramerSocket(DecodePDU(is_server=True))
+    Attributes:
+        shared: Whether others hear the same stream, and answer what is for them.
+    """
+
+    shared: bool
+
+    def __init__(self, framer: FramerSocket | FramerRTU) -> None:
+        self._framer = framer
         self._buffer = b""
 
     def feed(self, data: bytes) -> None:
         """Add what a client sent."""
         self._buffer += data
 
+    @abstractmethod
     def take(self) -> Request | None:
         """Return the next request, ``None`` while there is no whole one.
 
         Raises:
-            ValueError: What came is no frame.
+            ValueError: What came is no frame, and the stream cannot be used any more.
         """
-        if len(self._buffer) <= _HEADER:
-            return None
-        end = 6 + int.from_bytes(self._buffer[4:6], "big")
-        if end <= _HEADER:
-            raise ValueError(self._buffer.hex(" "))
-        if len(self._buffer) < end:
-            return None
-        frame, self._buffer = self._buffer[:end], self._buffer[end:]
-        number, unit, function = int.from_bytes(frame[:2], "big"), frame[6], frame[_HEADER]
-        pdu = self._framer.decoder.decode(frame[_HEADER:])
-        if pdu is None or function not in _READ | _WRITE:
-            return Request(number, unit, function, None)
-        if function in _READ:
-            return Request(number, unit, function, _READ[function], pdu.address, pdu.count)
-        values = pdu.bits[:1] if function == _WRITE_COIL else pdu.registers
-        written = tuple(int(value) for value in values)
-        return Request(number, unit, function, _WRITE[function], pdu.address, len(written), written)
 
     def answer(self, request: Request, found: Sequence[int] = ()) -> bytes:
         """Return the frame of an answer; ``found`` is what was read."""
@@ -114,9 +105,78 @@ class Frames:
         """Return the frame of an exception."""
         return self._packed(request, ExceptionResponse(request.function, code))
 
+    def _cut(self, end: int) -> bytes:
+        frame, self._buffer = self._buffer[:end], self._buffer[end:]
+        return frame
+
+    def _request(self, number: int, unit: int, payload: bytes) -> Request:
+        function = payload[0]
+        pdu = self._framer.decoder.decode(payload)
+        if pdu is None or function not in _READ | _WRITE:
+            return Request(number, unit, function, None)
+        if function in _READ:
+            return Request(number, unit, function, _READ[function], pdu.address, pdu.count)
+        values = pdu.bits[:1] if function == _WRITE_COIL else pdu.registers
+        written = tuple(int(value) for value in values)
+        return Request(number, unit, function, _WRITE[function], pdu.address, len(written), written)
+
     def _packed(self, request: Request, pdu: ModbusPDU) -> bytes:
         payload = bytes([pdu.function_code]) + pdu.encode()
         return self._framer.encode(payload, request.unit, request.number)
+
+
+class TcpFrames(Frames):
+    """Frames with a header, on a connection of their own."""
+
+    shared = False
+
+    def __init__(self) -> None:
+        super().__init__(FramerSocket(DecodePDU(is_server=True)))
+
+    def take(self) -> Request | None:
+        """See :meth:`Frames.take`."""
+        if len(self._buffer) <= _HEADER:
+            return None
+        end = 6 + int.from_bytes(self._buffer[4:6], "big")
+        if end <= _HEADER:
+            raise ValueError(self._buffer.hex(" "))
+        if len(self._buffer) < end:
+            return None
+        frame = self._cut(end)
+        return self._request(int.from_bytes(frame[:2], "big"), frame[6], frame[_HEADER:])
+
+
+class LineFrames(Frames):
+    """Frames with a checksum on a serial line.
+
+    What is no frame is dropped, with all that came with it: the client has to wait for silence
+    before it asks again.
+    """
+
+    shared = True
+
+    def __init__(self) -> None:
+        super().__init__(FramerRTU(DecodePDU(is_server=True)))
+
+    def take(self) -> Request | None:
+        """See :meth:`Frames.take`; raises nothing."""
+        if len(self._buffer) < FramerRTU.MIN_SIZE:
+            return None
+        end = self._end()
+        if end == 0 or len(self._buffer) < end:
+            return None
+        frame = self._cut(end)
+        if not FramerRTU.check_CRC(frame[:-2], int.from_bytes(frame[-2:], "big")):
+            self._buffer = b""
+            return None
+        return self._request(0, frame[0], frame[1:-2])
+
+    def _end(self) -> int:
+        """Return where the frame ends, which its function says; 0 while that is not known."""
+        kind = self._framer.decoder.lookupPduClass(self._buffer)
+        if kind is None or self._buffer[1] not in _READ | _WRITE:
+            return len(self._buffer)
+        return kind.calculateRtuFrameSize(self._buffer)
 
 
 def encode(number: Number, value: float) -> list[int]:

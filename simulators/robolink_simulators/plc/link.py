@@ -21,11 +21,16 @@ class Served(Protocol):
 
 
 class PlcLink:
-    """Implements :class:`~robolink_simulators.wire.DeviceLink`."""
+    """Implements :class:`~robolink_simulators.wire.DeviceLink`.
 
-    def __init__(self, plc: Served) -> None:
+    Args:
+        plc: Who serves.
+        frames: How requests and answers are wrapped.
+    """
+
+    def __init__(self, plc: Served, frames: Frames) -> None:
         self._plc = plc
-        self._frames = Frames()
+        self._frames = frames
         self._outbox: deque[tuple[int, bytes | None]] = deque()
         self._over = False
 

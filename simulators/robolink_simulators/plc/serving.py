@@ -1,11 +1,21 @@
-"""Serves the simulated PLC on a TCP port, loopback unless told otherwise."""
+"""Serves the simulated PLC on a TCP port, loopback unless told otherwise, or on a line."""
 
 from pathlib import Path
-from urllib.parse import quote
+from typing import Final
+from urllib.parse import quote, urlencode
 
+from robolink.errors import ConfigError
+from robolink.messages import tr
 from robolink_simulators.clock import ScaledClock
+from robolink_simulators.hosting._line_host import LineHost
+from robolink_simulators.hosting._serial_cable import PTY_LINE, no_pseudo_terminal
 from robolink_simulators.hosting._tcp_host import TcpHost
 from robolink_simulators.plc.device import PlcSimulator
+from robolink_simulators.plc.frames import LineFrames
+from robolink_simulators.plc.link import PlcLink
+
+_DEFAULT_UNIT: Final = 1
+_UNITS_ON_A_LINE: Final = range(1, 248)
 
 
 class PlcHost(TcpHost):
@@ -20,7 +30,7 @@ class PlcHost(TcpHost):
         *,
         allow_remote: bool,
     ) -> None:
-        self._options = f"?unit={simulator.unit}&map={quote(str(map_file.absolute()))}"
+        self._options = f"?unit={simulator.unit}&{_map_option(map_file)}"
         super().__init__(
             simulator,
             "plc+modbus-tcp",
@@ -34,6 +44,35 @@ class PlcHost(TcpHost):
     def url(self) -> str:
         """Where clients connect to, with the unit and the map."""
         return super().url + self._options
+
+
+class PlcLineHost(LineHost):
+    """A PLC on a serial line that knows its URL.
+
+    Attributes:
+        url: Where clients connect to, with the unit and the map.
+    """
+
+    def __init__(self, simulator: PlcSimulator, map_file: Path, clock: ScaledClock) -> None:
+        super().__init__(_OnLine(simulator), clock=clock, lock=simulator.lock)
+        options = dict(PTY_LINE)
+        if simulator.unit != _DEFAULT_UNIT:
+            options["unit"] = str(simulator.unit)
+        self.url = (
+            f"plc+modbus-rtu://{self.cable.near}?{urlencode(options)}&{_map_option(map_file)}"
+        )
+
+
+class _OnLine:
+    """Implements :class:`~robolink_simulators.wire.WireDevice`: the PLC as a line sees it."""
+
+    def __init__(self, simulator: PlcSimulator) -> None:
+        self._simulator = simulator
+        self.advance = simulator.advance
+        self.next_change = simulator.next_change
+
+    def connect(self, now_ns: int) -> PlcLink:
+        return self._simulator.connect(now_ns, LineFrames())
 
 
 def serve_plc(
@@ -61,3 +100,32 @@ def serve_plc(
     """
     clock = clock or ScaledClock()
     return PlcHost(simulator, map_file, (host, port), clock, allow_remote=allow_remote)
+
+
+def serve_plc_line(
+    simulator: PlcSimulator, map_file: Path, *, clock: ScaledClock | None = None
+) -> PlcLineHost:
+    """Serve a simulated PLC over Modbus RTU on a pseudo terminal; close the host.
+
+    Args:
+        simulator: What to serve.
+        map_file: The file of its map, for the URL.
+        clock: The simulated time; real time by default.
+
+    Raises:
+        ConfigError: No unit on a line can have the simulator's number.
+        ConnectError: This system has no pseudo terminals.
+    """
+    if simulator.unit not in _UNITS_ON_A_LINE:
+        raise ConfigError(
+            tr("There is no unit {unit} on a serial line.", unit=simulator.unit),
+            remedy=tr("Give a unit from 1 to 247."),
+        )
+    try:
+        return PlcLineHost(simulator, map_file, clock or ScaledClock())
+    except (ImportError, AttributeError, OSError) as error:
+        raise no_pseudo_terminal(error) from error
+
+
+def _map_option(map_file: Path) -> str:
+    return f"map={quote(str(map_file.absolute()))}"

@@ -1,19 +1,26 @@
 """Machines by the name of their kinematics, with parameters as their blocks name them."""
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields, replace
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, fields, replace
 from typing import Final
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_simulators.softmotion.axes import ASSUMED_LIMITS, AxisLimits
 from robolink_simulators.softmotion.coupled import CAxis, Coupled, scara3_z
-from robolink_simulators.softmotion.kinematics import Kinematics
+from robolink_simulators.softmotion.five_axes import FiveAxes
+from robolink_simulators.softmotion.kinematics import AxisKind, Kinematics
 from robolink_simulators.softmotion.positions import Gantry3, PolarZ, Scara2Z
 
 _COUPLED: Final = "+Kin_CAxis"
+_C_AXIS: Final = 3
+"""Place of a C axis that is coupled to a position kinematics, in the row of axes."""
+
 _C_LIMITS: Final = AxisLimits(-360.0, 360.0, 720.0, 3600.0)
+# The world puts each axis at 60 % of its range: a tool that can lean stands upright there.
+_LEAN_LIMITS: Final = AxisLimits(-90.0, 60.0, 360.0, 1800.0)
+_RADIUS_LIMITS: Final = replace(ASSUMED_LIMITS[AxisKind.LINEAR], low=0.0, high=600.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,19 +38,29 @@ class MachineModel:
 
 @dataclass(frozen=True, slots=True)
 class _Entry:
-    """How a kinematics is made, and its parameters with the values they have by default."""
+    """How a kinematics is made.
+
+    Attributes:
+        make: Makes it.
+        parameters: Their names, and the values that they have by default.
+        arms: How many of them, from the first, are lengths of arms, which are above zero.
+        limits: Of axes that are not like others of their kind.
+    """
 
     make: Callable[..., Kinematics]
     parameters: Mapping[str, float]
+    arms: int = 0
+    limits: Mapping[int, AxisLimits] = field(default_factory=dict)
 
 
 _ARMS: Final = {"dArmLength1": 300.0, "dArmLength2": 200.0}
 
 _ENTRIES: Final = {
-    "Kin_Scara2_Z": _Entry(Scara2Z, _ARMS),
-    "Kin_Scara3_Z": _Entry(scara3_z, {**_ARMS, "dArmLength3": 0.0}),
-    "Kin_Polar_Z": _Entry(PolarZ, {}),
+    "Kin_Scara2_Z": _Entry(Scara2Z, _ARMS, arms=2),
+    "Kin_Scara3_Z": _Entry(scara3_z, {**_ARMS, "dArmLength3": 0.0}, arms=2, limits={2: _C_LIMITS}),
+    "Kin_Polar_Z": _Entry(PolarZ, {}, limits={1: _RADIUS_LIMITS}),
     "Kin_Gantry3": _Entry(Gantry3, {}),
+    "Kin_5Axes": _Entry(FiveAxes, {"dToolLength": 100.0}, limits={3: _C_LIMITS, 4: _LEAN_LIMITS}),
 }
 
 NAMES: Final = (
@@ -54,8 +71,9 @@ NAMES: Final = (
     "Kin_Polar_Z+Kin_CAxis",
     "Kin_Gantry3",
     "Kin_Gantry3+Kin_CAxis",
+    "Kin_5Axes",
 )
-"""Every kinematics that can be simulated. Kin_Scara3_Z is a coupling already."""
+"""Every kinematics that can be simulated. Kin_Scara3_Z and Kin_5Axes are couplings already."""
 
 
 def machine_named(name: str, parameters: Mapping[str, float] | None = None) -> MachineModel:
@@ -63,9 +81,9 @@ def machine_named(name: str, parameters: Mapping[str, float] | None = None) -> M
 
     Args:
         name: One of :data:`NAMES`.
-        parameters: ``dArmLength1`` and the like in mm, ``dOffsetC`` in degrees, and
-            ``a0_low``, ``a0_high``, ``a0_velocity_per_s``, ``a0_acceleration_per_s2`` of each
-            axis in degrees or mm.
+        parameters: ``dArmLength1``, ``dToolLength`` and the like in mm, ``dOffsetC`` in
+            degrees, and ``a0_low``, ``a0_high``, ``a0_velocity_per_s``,
+            ``a0_acceleration_per_s2`` of each axis in degrees or mm.
 
     Raises:
         ConfigError: No such kinematics or parameter, or a value that makes no machine.
@@ -79,7 +97,7 @@ def machine_named(name: str, parameters: Mapping[str, float] | None = None) -> M
     _require_finite(left)
     kinematics = _made(name, left)
     limits = tuple(
-        _limits(axis, _assumed(kinematics, axis), left) for axis in range(len(kinematics.kinds))
+        _limits(axis, assumed, left) for axis, assumed in enumerate(_assumed(name, kinematics))
     )
     if left:
         raise ConfigError(
@@ -99,7 +117,7 @@ def parameter_names(name: str) -> tuple[str, ...]:
     if name.endswith(_COUPLED):
         own.append("dOffsetC")
     axes = range(len(_made(name, {}).kinds))
-    return (*own, *(f"a{axis}_{field.name}" for axis in axes for field in fields(AxisLimits)))
+    return (*own, *(f"a{axis}_{limit.name}" for axis in axes for limit in fields(AxisLimits)))
 
 
 def _require_finite(parameters: Mapping[str, float]) -> None:
@@ -114,31 +132,31 @@ def _require_finite(parameters: Mapping[str, float]) -> None:
 def _made(name: str, left: dict[str, float]) -> Kinematics:
     entry = _ENTRIES[name.removesuffix(_COUPLED)]
     lengths_mm = [left.pop(key, default) for key, default in entry.parameters.items()]
-    if any(length_mm <= 0 for length_mm in lengths_mm[:2]):
+    arms_mm = lengths_mm[: entry.arms]
+    if any(length_mm <= 0 for length_mm in arms_mm):
         raise ConfigError(
-            tr("An arm cannot be {length_mm} mm long.", length_mm=min(lengths_mm)),
+            tr("An arm cannot be {length_mm} mm long.", length_mm=min(arms_mm)),
             remedy=tr("Give the lengths of the arms in mm, above zero."),
         )
     position = entry.make(*lengths_mm)
     if not name.endswith(_COUPLED):
         return position
-    return Coupled(position, CAxis(offset_deg=left.pop("dOffsetC", 0.0)))
+    c_axis = CAxis(offset_deg=left.pop("dOffsetC", 0.0))
+    return Coupled(position, c_axis, c_index=_C_AXIS)
 
 
-def _assumed(kinematics: Kinematics, axis: int) -> AxisLimits:
-    if isinstance(kinematics, Coupled) and axis == kinematics.c_index:
-        return _C_LIMITS
-    limits = ASSUMED_LIMITS[kinematics.kinds[axis]]
-    if kinematics.name.startswith(PolarZ.name) and axis == 1:
-        return replace(limits, low=0.0, high=600.0)
-    return limits
+def _assumed(name: str, kinematics: Kinematics) -> Iterator[AxisLimits]:
+    entry = _ENTRIES[name.removesuffix(_COUPLED)]
+    special = {**entry.limits, **({_C_AXIS: _C_LIMITS} if name.endswith(_COUPLED) else {})}
+    for axis, kind in enumerate(kinematics.kinds):
+        yield special.get(axis, ASSUMED_LIMITS[kind])
 
 
 def _limits(axis: int, assumed: AxisLimits, left: dict[str, float]) -> AxisLimits:
     given = {
-        field.name: left.pop(f"a{axis}_{field.name}")
-        for field in fields(AxisLimits)
-        if f"a{axis}_{field.name}" in left
+        limit.name: left.pop(f"a{axis}_{limit.name}")
+        for limit in fields(AxisLimits)
+        if f"a{axis}_{limit.name}" in left
     }
     limits = replace(assumed, **given)
     usable = limits.low < limits.high and min(limits.velocity_per_s, limits.acceleration_per_s2) > 0

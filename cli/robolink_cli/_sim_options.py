@@ -1,0 +1,76 @@
+"""The options that every command has that serves a simulated controller."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Final, TypeVar
+
+import click
+
+DEFAULT_ADDRESS: Final = "127.0.0.1:5020"
+"""Where Modbus TCP is served when no bus is named."""
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def simulation_options(function: F) -> F:
+    """Add ``--seed``, ``--state``, ``--speed``, ``--option`` and ``--allow-remote``."""
+    options = (
+        seed_option,
+        click.option(
+            "--state",
+            type=click.Path(dir_okay=False, path_type=Path),
+            help="File that keeps the tools over a restart, as flash or retained memory does.",
+        ),
+        click.option(
+            "--speed",
+            type=click.FloatRange(min=0.01, max=1000),
+            default=1.0,
+            show_default=True,
+            metavar="FACTOR",
+            help="How many times faster than real the simulated time passes.",
+        ),
+        click.option(
+            "--option",
+            "options",
+            multiple=True,
+            metavar="NAME=VALUE",
+            help="A habit of the device; a wrong name lists them all. May be repeated.",
+        ),
+        allow_remote_option,
+    )
+    for option in reversed(options):
+        function = option(function)
+    return function
+
+
+def modbus_options(function: F) -> F:
+    """Add ``--modbus-tcp`` and ``--modbus-rtu``."""
+    function = click.option(
+        "--modbus-rtu",
+        type=click.Choice(["pty"]),
+        help="Serve Modbus RTU on a pseudo terminal, whose path is printed.",
+    )(function)
+    return click.option(
+        "--modbus-tcp",
+        metavar="HOST:PORT",
+        help="Serve Modbus TCP there; port 0 takes a free one. Without any bus: "
+        f"{DEFAULT_ADDRESS}.",
+    )(function)
+
+
+def seed_option(function: F) -> F:
+    """Add ``--seed``."""
+    return click.option(
+        "--seed",
+        type=click.IntRange(min=0),
+        default=1,
+        show_default=True,
+        help="Another cell: other tools, another tip.",
+    )(function)
+
+
+def allow_remote_option(function: F) -> F:
+    """Add ``--allow-remote``."""
+    return click.option(
+        "--allow-remote", is_flag=True, help="Listen where other machines can reach it, too."
+    )(function)

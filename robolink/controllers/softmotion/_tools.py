@@ -145,13 +145,13 @@ class SoftMotionToolTable:
             now = mailbox.prepare(draft, request)
             require_still(now, controller=mailbox.identity, request=request)
             require_enabled(now, controller=mailbox.identity, request=request)
-            mailbox.desk.note_selection(tool)
-            found = mailbox.writer.carry_out(
-                request,
-                {"select": tool, "before": before},
-                send=lambda: mailbox.orders.carry_out(draft),
-                read=self.selected,
-            )
+            details = {"select": tool, "before": before}
+
+            def send() -> None:
+                mailbox.orders.carry_out(draft)
+                mailbox.desk.note_selection(tool)
+
+            found = mailbox.writer.carry_out(request, details, send=send, read=self.selected)
             if found != tool:
                 raise ReadBackError(
                     tr(

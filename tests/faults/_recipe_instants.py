@@ -24,10 +24,10 @@ from robolink.journal._store import Store, Tables
 from robolink.runner import Question
 
 Kind = Literal["request", "answer", "wait", "question", "commit"]
-_EVERY: Final = 89
-"""Every 89th instant belongs to the sample,"""
-_TURNS: Final = 6
-"""of which each test takes every sixth."""
+_EVERY: Final = 97
+"""Every 97th instant belongs to the sample,"""
+_TURNS: Final = 9
+"""of which each test takes every ninth."""
 
 
 @dataclass(frozen=True)

@@ -72,6 +72,11 @@ class InterruptGate:
         self._open = False
         self._depth = 0
 
+    @property
+    def interrupted(self) -> bool:
+        """Whether Ctrl-C came inside the gate and waits for its end."""
+        return bool(self._depth) and _handler.held
+
     def open(self) -> None:
         """Start to watch SIGINT, if this is the main thread and the program does not."""
         if not self._open:

@@ -16,7 +16,7 @@ from robolink_cli._cell import (
     link_options,
     require_expected_robot,
 )
-from robolink_cli._notices import marker_notice
+from robolink_cli._notices import note_unsettled
 from robolink_cli._people import signature_of
 from robolink_cli._recording import recording
 from robolink_cli._render import emit_json, json_is_on, note, say
@@ -159,8 +159,7 @@ def open_controller(
         click.get_current_context().meta[WATCHED] = controller
         found = controller.outcomes.open_markers()
         if not quiet:
-            for marker in found:
-                note(marker_notice(marker, named))
+            note_unsettled(controller, found, named)
         if context.cell and not any_robot:
             require_expected_robot(controller, context.cell)
         if found and not quiet and not any_robot:
@@ -170,9 +169,8 @@ def open_controller(
         try:
             yield controller
         finally:
-            for marker in controller.outcomes.open_markers():
-                if marker not in found:
-                    note(marker_notice(marker, named))
+            left = controller.outcomes.open_markers()
+            note_unsettled(controller, [m for m in left if m not in found], named)
 
 
 def password_of(context: CliContext) -> "Secret | None":

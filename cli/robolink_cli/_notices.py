@@ -6,7 +6,28 @@ from robolink.messages import tr
 from robolink_cli._render import note
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from robolink.model import Controller, Marker, ToolOffset
+
+
+def note_unsettled(controller: "Controller", markers: "Sequence[Marker]", url: str) -> None:
+    """Say what was begun and not proved finished, and what to do about each.
+
+    Args:
+        controller: The controller, connected; the link may be gone.
+        markers: What to tell of.
+        url: How a person names the controller.
+    """
+    from robolink.model import MarkerKind
+
+    if not markers:
+        return
+    for marker in markers:
+        if marker.kind is MarkerKind.SELECTION:
+            note(_unfinished(marker, url, _selected_now(controller, marker)))
+        else:
+            note(marker_notice(marker, url))
 
 
 def marker_notice(marker: "Marker", url: str) -> str:
@@ -14,7 +35,7 @@ def marker_notice(marker: "Marker", url: str) -> str:
     from robolink.model import MarkerKind
 
     if marker.kind is MarkerKind.SELECTION:
-        return _unfinished(marker, url)
+        return _unfinished(marker, url, str(marker.details.get("now", "?")))
     if marker.kind is MarkerKind.CHANGE:
         return tr(
             "Not finished since {when}: {request}.\n  'robolink -c {url} recover' settles it.",
@@ -40,8 +61,25 @@ def note_change(controller: "Controller", tool: int, now: "ToolOffset | None") -
         note(change.sentence)
 
 
-def _unfinished(marker: "Marker", url: str) -> str:
-    now, before = marker.details.get("now", "?"), marker.details.get("tool", "?")
+def _selected_now(controller: "Controller", marker: "Marker") -> str:
+    """Return which tool is in force: read, or else as far as the markers know it."""
+    from robolink.errors import RobolinkError
+
+    try:
+        return str(controller.tools.selected())
+    except RobolinkError:
+        # A selection that was sent and not proved: it may be that tool, or still the one of
+        # before.
+        now = str(marker.details.get("now", "?"))
+        for other in controller.outcomes.open_markers():
+            asked = str(other.details.get("select", now))
+            if asked != now:
+                return tr("{asked} or {now}", asked=asked, now=now)
+        return now
+
+
+def _unfinished(marker: "Marker", url: str, now: str) -> str:
+    before = str(marker.details.get("tool", "?"))
     parts = [
         tr("Not finished since {when}: {request}.", when=marker.begun_at, request=marker.request)
     ]

@@ -131,7 +131,11 @@ class MarkerDesk:
         return marker is not None and marker.details.get("change") == self.outcomes.change
 
     def note_selection(self, tool: int) -> None:
-        """Record, in the marker of the procedure under way, which tool is in force now."""
+        """Record, in the marker of the procedure under way, which tool is in force now.
+
+        Called when the controller has accepted the selection: until then the open marker of
+        the selection itself says which other tool it may be.
+        """
         marker = self._procedures.get(MarkerKind.SELECTION)
         if marker is not None:
             noted = replace(marker, details={**marker.details, "now": tool})

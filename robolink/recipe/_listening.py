@@ -148,8 +148,10 @@ class RecipeListener(Listener):
                 tr("{controller} has no outputs.", controller=self._controller.identity),
                 remedy=tr("Take [[outputs]] out of the recipe."),
             )
-        outputs.set_output(output.output, output.on)
-        self.switched[output.output] = output.on
+        # Ctrl-C waits until it is noted too: how the run ended names what it switched.
+        with self._controller.uninterrupted():
+            outputs.set_output(output.output, output.on)
+            self.switched[output.output] = output.on
 
 
 def _meant(asked: Prompt | Output, moment: Moment, tool: int | None) -> bool:

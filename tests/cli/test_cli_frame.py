@@ -9,9 +9,10 @@ import click
 import pytest
 from robolink_cli import main
 from robolink_cli._context import open_controller
-from robolink_cli._notices import marker_notice
+from robolink_cli._notices import marker_notice, note_unsettled
 
 import robolink
+from robolink.errors import NotReadyError, NotReadyReason
 from robolink.model import Marker, MarkerKind
 
 URL = "epson+tcp://192.0.2.1:5000"
@@ -145,15 +146,20 @@ def test_a_missing_controller_is_told_with_an_example(command, capsys):
 class UnfinishedController:
     """A controller on which two things were left open."""
 
-    def __init__(self):
-        self.outcomes = self
+    def __init__(self, *more):
+        self.outcomes = self.tools = self
         self.closed = False
+        self.more = more
+
+    def selected(self):
+        raise NotReadyError("The safety guard is open.", reason=NotReadyReason.GUARD_OPEN)
 
     def open_markers(self):
         when = "2025-01-01T00:00:00+00:00"
         return (
             Marker("a", MarkerKind.SELECTION, "calibrate tool 3", when, {"tool": 3, "now": 0}),
             Marker("b", MarkerKind.SET, "TLSet 3, XY(1,2,3,0)", when),
+            *self.more,
         )
 
     def __enter__(self):
@@ -195,6 +201,13 @@ def test_what_was_left_unfinished_is_said_on_connecting(command, capsys, monkeyp
         assert text in shown.err
     assert "TLSet 3, XY(1,2,3,0)" in shown.err
     assert "motion is blocked" in shown.err
+
+
+def test_a_selection_that_was_not_answered_leaves_two_tools_to_be_named(capsys):
+    sent = Marker("c", MarkerKind.SET, "Tool 3", "2025-01-01T00:00:00+00:00", {"select": 3})
+    controller: Any = UnfinishedController(sent)
+    note_unsettled(controller, controller.open_markers(), URL)
+    assert "Tool 3 or 0 is selected now; it was tool 3 before." in capsys.readouterr().err
 
 
 def test_resolve_is_not_told_to_resolve(command, capsys, monkeypatch):

@@ -77,8 +77,12 @@ class ChangeCell(ABC):
         """Return the tools that were written so far, in order."""
 
     @abstractmethod
-    def values_written(self) -> list[ToolOffset]:
-        """Return what tool 1 was written as so far, in order."""
+    def values_written(self, tool: int = 1) -> list[ToolOffset]:
+        """Return what a tool was written as so far, in order."""
+
+    @abstractmethod
+    def act(self) -> None:
+        """Let the controller act on what came in."""
 
     @property
     def requests(self) -> list[str]:
@@ -205,10 +209,14 @@ class EpsonChangeCell(ChangeCell):
         assert len(found) == self._machine.flash_writes
         return [int(tool) for tool in found]
 
-    def values_written(self) -> list[ToolOffset]:
-        """Return what tool 1 was written as so far, in order."""
-        texts = [text.partition("XY(")[2].partition(")")[0] for text in self.requests]
-        return [ToolOffset(*map(float, text.split(","))) for text in texts if text]
+    def values_written(self, tool: int = 1) -> list[ToolOffset]:
+        """Return what a tool was written as so far, in order."""
+        sent = [text for text in self.requests if text.startswith(f'$Execute,"TLSet {tool}, XY')]
+        texts = [text.partition("XY(")[2].partition(")")[0] for text in sent]
+        return [ToolOffset(*map(float, text.split(","))) for text in texts]
+
+    def act(self) -> None:
+        """Let the controller act on what came in: it has done so at once."""
 
 
 @contextmanager

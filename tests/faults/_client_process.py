@@ -15,7 +15,7 @@ from pathlib import Path
 _FORKS = multiprocessing.get_context("forkserver")
 _FORKS.set_forkserver_preload(
     [
-        "__main__",
+        "_pytest.config",  # which the main module of a test run imports, in each fork anew
         "robolink_cli.main",
         "robolink_cli.calibrate",
         "robolink_cli._calibrating",
@@ -25,6 +25,7 @@ _FORKS.set_forkserver_preload(
         "robolink.journal._store",
         "robolink.controllers",
         "robolink.transaction",
+        "sqlalchemy.dialects.postgresql",
         "sqlalchemy.dialects.sqlite",
         "sqlite3",
         "robolink_simulators.assist",
@@ -34,6 +35,9 @@ _FORKS.set_forkserver_preload(
         "platformdirs",
         "json",
         "uuid",
+        # What else is started from here. It imports this module, which is whole by then.
+        "tests.faults._change_process",
+        "tests.faults._operator_process",
     ]
 )
 

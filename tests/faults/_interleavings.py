@@ -5,17 +5,14 @@ anybody noticing; sleep sets (Godefroid, 1996) leave such orders out. Which step
 shows only on the way: a process that is refused takes fewer.
 """
 
+import random
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Protocol
 
-from tests.faults._operator_process import StepKind, Waiting
+from tests.faults._operator_process import Waiting
 
-_CONFLICTS = {
-    frozenset({"tool read", "tool write"}),
-    frozenset({"tool write"}),
-    frozenset({"journal read", "journal write"}),
-    frozenset({"journal write"}),
-}
+Plan = tuple[tuple[int, ...], frozenset[int]]
+"""Who does the first steps, and who need not go next: it was tried before."""
 
 
 class Run(Protocol):
@@ -34,18 +31,25 @@ class Run(Protocol):
 class Interleavings:
     """Plans runs, one after another, until every order has been seen.
 
+    Args:
+        alike: Whether the two do the same, so that it makes no difference who goes first.
+        most: After so many orders it is enough; ``None`` for all of them. Then the runs are
+            drawn from all over the orders, the same ones each time.
+
     Attributes:
         seen: Orders that were followed to their end.
     """
 
-    def __init__(self) -> None:
-        # Who goes first makes no difference: the two do the same.
-        self._todo: list[tuple[tuple[int, ...], frozenset[int]]] = [((0,), frozenset())]
+    def __init__(self, *, alike: bool = True, most: int | None = None) -> None:
+        self._todo: list[Plan] = [((0,) if alike else (), frozenset())]
+        self._draw = random.Random(1) if most else None
+        self._most = most
         self.seen = 0
 
-    def __iter__(self) -> Iterator[tuple[tuple[int, ...], frozenset[int]]]:
-        while self._todo:
-            yield self._todo.pop()
+    def __iter__(self) -> Iterator[Plan]:
+        while self._todo and self.seen != self._most:
+            last = len(self._todo) - 1
+            yield self._todo.pop(self._draw.randint(0, last) if self._draw else last)
 
     def follow(self, run: Run, beginning: Sequence[int], asleep: frozenset[int]) -> bool:
         """Drive a run to its end along one order, and plan those that branch off.
@@ -65,19 +69,16 @@ class Interleavings:
             first, *others = awake
             for other in others:
                 tried = asleep | {first}
-                still = frozenset(
-                    who for who in tried if apart(waiting[who].kind, waiting[other].kind)
-                )
+                still = frozenset(who for who in tried if apart(waiting[who], waiting[other]))
                 self._todo.append(((*path, other), still))
-            asleep = frozenset(
-                who for who in asleep if apart(waiting[who].kind, waiting[first].kind)
-            )
+            asleep = frozenset(who for who in asleep if apart(waiting[who], waiting[first]))
             run.step(first)
             path += (first,)
         self.seen += 1
         return True
 
 
-def apart(one: StepKind, other: StepKind) -> bool:
+def apart(one: Waiting, other: Waiting) -> bool:
     """Whether two steps may be swapped without anybody noticing."""
-    return frozenset({one, other}) not in _CONFLICTS
+    here, there = one.touches(), other.touches()
+    return not any(here[what] or there[what] for what in here.keys() & there.keys())

@@ -1,13 +1,15 @@
 """An operator in a process of its own, who waits at each step until he is let on.
 
-A step is what two operators share: a read or a write of the tool, a read or a durable
-transaction of the journal. What lies between two of them cannot be seen by the other.
+A step is what two operators share: a read or a write of a tool, a read or a durable transaction
+of the journal; on a PLC each command in the mailbox, a write of a tool among them, and the look
+at what the PLC answers. What lies between two of them cannot be seen by the other.
 """
 
 import os
+import re
 import signal
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
@@ -28,18 +30,51 @@ from robolink.protocols.mailbox import COMMAND, Opcode
 from robolink.protocols.spel import Statement
 from robolink.timing import NS_PER_S
 from robolink.transaction import Wanted, change_tools
+from robolink.transport import MailboxHead
 from tests.faults import _client_process
 
-StepKind = Literal["tool read", "tool write", "journal read", "journal write"]
+StepKind = Literal[
+    "tool read",
+    "tool write",
+    "journal read",
+    "journal write",
+    "mailbox command",
+    "mailbox answer",
+]
+Wait = Callable[..., None]
+"""Waits before a step: its kind, and the tool where it is about one."""
+
+ALL_TOOLS: Final = -1
+"""They are listed at once."""
+
 _PATIENCE_S: Final = 30.0
+_TOOL: Final = re.compile(r"(Print )?TLSet\(?\s*(\d+)")
 
 
 @dataclass(frozen=True)
 class Waiting:
-    """Before which step he stands, and under which epoch; 0 without the lease."""
+    """Before which step he stands.
+
+    Attributes:
+        kind: Of the step.
+        epoch: Under which he has the lease; 0 without it.
+        tool: Which tool is read or written, or :data:`ALL_TOOLS`; 0 for a step of another kind.
+        by_mailbox: Whether a tool is written by a command in a PLC's mailbox.
+    """
 
     kind: StepKind
     epoch: int
+    tool: int = 0
+    by_mailbox: bool = False
+
+    def touches(self) -> dict[str, bool]:
+        """Return what the step reads or changes that the other may see, and whether it changes."""
+        where, _, what = self.kind.partition(" ")
+        tools = range(1, 16) if self.tool == ALL_TOOLS else [self.tool]
+        touched = {f"{where} {tool}": what in ("write", "command") for tool in tools}
+        if self.by_mailbox:
+            touched["mailbox 0"] = True
+        return touched
 
 
 @dataclass(frozen=True)
@@ -153,28 +188,57 @@ def _operate(
 
 
 def _wait_at_each_step(line: Connection, outcomes: JournalOutcomeLog) -> None:
-    execute, read, write = EpsonSession.execute, Store.read, Store.write
-    read_slot, write_block = MailboxWire.read_slot, MailboxWire.write
-
-    def wait(kind: StepKind) -> None:
-        line.send(Waiting(kind, outcomes._lease._epoch))
+    def wait(kind: StepKind, tool: int = 0, *, by_mailbox: bool = False) -> None:
+        line.send(Waiting(kind, outcomes._lease._epoch, tool, by_mailbox))
         line.recv()
 
+    _watch_window(wait)
+    _watch_mailbox(wait)
+    _watch_journal(wait)
+
+
+def _watch_window(wait: Wait) -> None:
+    execute = EpsonSession.execute
+
     def executed(session: EpsonSession, statement: Statement) -> Reply | Refusal:
-        if statement == "TLSet" or statement.startswith("Print TLSet"):
-            wait("tool read")
-        elif statement.startswith("TLSet"):
-            wait("tool write")
+        if statement == "TLSet":
+            wait("tool read", ALL_TOOLS)
+        elif found := _TOOL.match(statement):
+            wait("tool read" if found[1] else "tool write", int(found[2]))
         return execute(session, statement)
 
+    EpsonSession.execute = executed  # type: ignore[method-assign, assignment]
+
+
+def _watch_mailbox(wait: Wait) -> None:
+    write, read_slot, read_head = MailboxWire.write, MailboxWire.read_slot, MailboxWire.read_head
+    unseen: list[MailboxWire] = []
+
     def slot_read(wire: MailboxWire, slot: int) -> tuple[int, ...]:
-        wait("tool read")
+        wait("tool read", slot)
         return read_slot(wire, slot)
 
     def block_written(wire: MailboxWire, words: Sequence[int]) -> None:
         if words[COMMAND["opcode"].word] == Opcode.WRITE_TOOL:
-            wait("tool write")
-        write_block(wire, words)
+            wait("tool write", words[COMMAND["i0"].word], by_mailbox=True)
+        else:
+            wait("mailbox command")
+        write(wire, words)
+        unseen.append(wire)
+
+    def head_read(wire: MailboxWire) -> MailboxHead:
+        if unseen:
+            unseen.clear()
+            wait("mailbox answer")
+        return read_head(wire)
+
+    MailboxWire.write = block_written  # type: ignore[method-assign, assignment]
+    MailboxWire.read_slot = slot_read  # type: ignore[method-assign, assignment]
+    MailboxWire.read_head = head_read  # type: ignore[method-assign, assignment]
+
+
+def _watch_journal(wait: Wait) -> None:
+    read, write = Store.read, Store.write
 
     @contextmanager
     def reading(store: Store, consequence: str = "") -> Iterator[Tables]:
@@ -188,7 +252,4 @@ def _wait_at_each_step(line: Connection, outcomes: JournalOutcomeLog) -> None:
         with write(store, consequence) as tables:
             yield tables
 
-    EpsonSession.execute = executed  # type: ignore[method-assign, assignment]
-    MailboxWire.read_slot = slot_read  # type: ignore[method-assign, assignment]
-    MailboxWire.write = block_written  # type: ignore[method-assign, assignment]
     Store.read, Store.write = reading, writing  # type: ignore[method-assign, assignment]

@@ -1,7 +1,7 @@
 """A PLC served over Modbus TCP with two tools, to be changed by programs that are killed."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
@@ -17,6 +17,9 @@ from tests.faults._change_cell import ChangeCell
 from tests.faults._change_process import OLD
 
 _UNIT_UM: Final = 1000.0
+_CYCLES_S: Final = 0.05
+"""In this time the mailbox program has looked, and what it was told is done."""
+
 _SPEED: Final = 2000.0
 """Simulated seconds in a second: a mailbox whose owner was killed is free after 5 ms."""
 
@@ -26,6 +29,7 @@ class PlcChangeCell(ChangeCell):
 
     Attributes:
         executed: Slot and tool of each write that the PLC carried out.
+        skip: Lets some seconds pass at once, where the clock can do that.
     """
 
     matters = re.compile("write_command ")
@@ -35,6 +39,7 @@ class PlcChangeCell(ChangeCell):
         self._plc = simulator.plc
         self._acting = simulator.acting
         self.executed: list[tuple[int, Six]] = []
+        self.skip: Callable[[float], None] = lambda _seconds: None
         define = self._plc.memory.define
         define(2, to_frame(OLD[2].components(), unit_um=_UNIT_UM), "nozzle")
 
@@ -67,10 +72,15 @@ class PlcChangeCell(ChangeCell):
         assert len(sent) == len(self.executed)
         return [slot for slot, _ in self.executed]
 
-    def values_written(self) -> list[ToolOffset]:
-        """Return what slot 1 was written as so far, in order."""
+    def values_written(self, tool: int = 1) -> list[ToolOffset]:
+        """Return what a slot was written as so far, in order."""
         self._now()
-        return [_offset(tool) for slot, tool in self.executed if slot == 1]
+        return [_offset(value) for slot, value in self.executed if slot == tool]
+
+    def act(self) -> None:
+        """Let the mailbox program come to the cycle in which it looks at what was written."""
+        self.skip(_CYCLES_S)
+        self._now()
 
     def _now(self) -> Plc:
         """Return the PLC when it has looked at all that was written."""

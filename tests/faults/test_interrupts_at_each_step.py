@@ -73,10 +73,17 @@ def test_ctrl_c_at_each_step_leaves_no_tool_selected_that_is_not_the_cell_s_own(
 
 
 class InterruptingLog:
-    """Presses Ctrl-C just after the change number ``at`` of the journal."""
+    """Presses Ctrl-C just after the change number ``at`` of the journal.
 
-    def __init__(self, at: float) -> None:
+    Attributes:
+        changes: How many there were so far.
+        begun: How many movements had begun at Ctrl-C.
+    """
+
+    def __init__(self, at: float, simulator: EpsonSimulator) -> None:
         self.changes = 0
+        self.begun = 0
+        self._simulator = simulator
         self._at = at
         self._log: JournalOutcomeLog = memory_journal(f"interrupted-{at}").log("interrupted")
 
@@ -98,6 +105,7 @@ class InterruptingLog:
     def _changed(self) -> None:
         self.changes += 1
         if self.changes == self._at:
+            self.begun = self._simulator.machine.arm.moves_started
             signal.raise_signal(signal.SIGINT)
 
 
@@ -119,14 +127,16 @@ class Change:
             NozzleChange(robot, plan, operator=operator).run()
 
 
-def test_ctrl_c_while_a_marker_is_written_or_cleared_leaves_none_open():
-    undisturbed = InterruptingLog(math.inf)
+def test_ctrl_c_while_a_marker_is_written_or_cleared_leaves_none_open_and_nothing_moves():
+    whole = Change()
+    undisturbed = InterruptingLog(math.inf, whole.simulator)
     try:
-        Change().run(undisturbed)
+        whole.run(undisturbed)
     finally:
         unregister("interrupted")
     for at in range(1, undisturbed.changes + 1):
-        change, outcomes = Change(), InterruptingLog(at)
+        change = Change()
+        outcomes = InterruptingLog(at, change.simulator)
         with pytest.raises(KeyboardInterrupt):
             try:
                 change.run(outcomes)
@@ -136,6 +146,7 @@ def test_ctrl_c_while_a_marker_is_written_or_cleared_leaves_none_open():
         assert outcomes.open_markers() == (), at
         assert machine.tools.selected == 1, at
         assert not change.simulator.status_flags().running, at
+        assert machine.arm.moves_started == outcomes.begun, at
         kept = "Tool 1 keeps the new value." in change.said
         assert (machine.tools.get(1) == OLD_TIP) is not kept, at
 

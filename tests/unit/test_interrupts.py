@@ -25,6 +25,17 @@ def test_an_interrupt_inside_the_gate_is_raised_at_its_end(gate):
     assert reached
 
 
+def test_whoever_is_inside_the_gate_can_see_that_an_interrupt_waits(gate):
+    assert not gate.interrupted
+    seen = []
+    with pytest.raises(KeyboardInterrupt), gate:
+        seen.append(gate.interrupted)
+        signal.raise_signal(signal.SIGINT)
+        seen.append(gate.interrupted)
+    assert seen == [False, True]
+    assert not gate.interrupted
+
+
 def test_an_interrupt_outside_the_gate_is_raised_at_once(gate):
     with gate:
         pass

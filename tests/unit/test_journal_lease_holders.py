@@ -10,54 +10,34 @@ import pytest
 from robolink_simulators.clock import ManualClock
 
 from robolink.errors import LeaseHeldError
-from robolink.journal import EntryKind, Holder, memory_journal, this_process
 from robolink.journal._sightings import LEASE_S
-from robolink.model import Marker, MarkerKind, new_operation
-
-IDENTITY = "epson+tcp://192.168.0.1:5000"
-HERE = this_process()
-ANNA = replace(HERE, operator="Anna", os_user="anna")
-BERT = replace(HERE, operator="Bert", os_user="bert")
-ELSEWHERE = Holder(os_user="carl", host="pc-2", pid=77, process_start="", boot="another")
-
-
-@pytest.fixture
-def clock():
-    return ManualClock(start_ns=1_000_000_000_000)
+from tests.unit._lease_logs import (
+    ANNA,
+    BERT,
+    ELSEWHERE,
+    HERE,
+    leases_in_memory,
+    marker,
+)
 
 
 @pytest.fixture
-def journal():
-    journal = memory_journal(new_operation())
-    yield journal
-    journal.close()
+def leases():
+    with leases_in_memory() as leases:
+        yield leases
 
 
-@pytest.fixture
-def log(journal, clock):
-    """Make a log of a holder."""
-    return lambda holder, clock=clock: journal.log(IDENTITY, holder=holder, clock=clock)
-
-
-def marker(operation="a"):
-    return Marker(operation, MarkerKind.SET, "TLSet 3, XY(...)", "now", {"tool": 3})
-
-
-def lease_entries(journal):
-    return list(journal.entries(kinds=(EntryKind.LEASE,), newest_first=False))
-
-
-def test_a_process_that_has_ended_is_replaced_at_once(journal, log):
+def test_a_process_that_has_ended_is_replaced_at_once(leases):
     child = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
     start = _start_of(child.pid)
     gone = replace(ANNA, pid=child.pid, process_start=start)
-    log(gone).begin(marker("a"))
+    leases.log(gone).begin(marker("a"))
     with pytest.raises(LeaseHeldError):
-        log(BERT).look()
+        leases.log(BERT).look()
     child.kill()
     child.communicate()
-    log(BERT).begin(marker("b"))
-    (entry,) = lease_entries(journal)
+    leases.log(BERT).begin(marker("b"))
+    (entry,) = leases.entries()
     assert "has ended" in entry.verdict
 
 
@@ -88,14 +68,14 @@ def test_a_number_that_another_process_has_now_proves_that_the_holder_is_gone():
     assert HERE.proves_gone(replace(HERE, pid=2**22 + 1))
 
 
-def test_a_holder_on_another_computer_is_watched_and_replaced_when_silent(journal, log, clock):
-    log(ELSEWHERE, ManualClock(start_ns=5)).begin(marker("a"))
-    bert = log(BERT)
-    began_ns = clock.now_ns()
+def test_a_holder_on_another_computer_is_watched_and_replaced_when_silent(leases):
+    leases.log(ELSEWHERE, ManualClock(start_ns=5)).begin(marker("a"))
+    bert = leases.log(BERT)
+    began_ns = leases.clock.now_ns()
     bert.look()
-    assert clock.now_ns() - began_ns == LEASE_S * 1e9
+    assert leases.clock.now_ns() - began_ns == LEASE_S * 1e9
     bert.begin(marker("b"))
-    (entry,) = lease_entries(journal)
+    (entry,) = leases.entries()
     assert entry.details["holder"]["host"] == "pc-2"
 
 
@@ -111,9 +91,9 @@ class Waiting(ManualClock):
         self._act()
 
 
-def test_a_holder_on_another_computer_that_beats_keeps_the_lease(log):
+def test_a_holder_on_another_computer_that_beats_keeps_the_lease(leases):
     their_clock = ManualClock()
-    carl = log(ELSEWHERE, their_clock)
+    carl = leases.log(ELSEWHERE, their_clock)
     carl.begin(marker("a"))
 
     def beat():
@@ -121,22 +101,22 @@ def test_a_holder_on_another_computer_that_beats_keeps_the_lease(log):
         carl.beat()
 
     with pytest.raises(LeaseHeldError, match="carl") as caught:
-        log(BERT, Waiting(beat)).look()
+        leases.log(BERT, Waiting(beat)).look()
     assert "watched just now" in caught.value.what
 
 
-def test_a_lease_that_is_freed_while_it_is_watched_can_be_taken(journal, log):
-    carl = log(ELSEWHERE)
+def test_a_lease_that_is_freed_while_it_is_watched_can_be_taken(leases):
+    carl = leases.log(ELSEWHERE)
     carl.begin(marker("a"))
-    bert = log(BERT, Waiting(lambda: carl.clear("a")))
+    bert = leases.log(BERT, Waiting(lambda: carl.clear("a")))
     bert.begin(marker("b"))
-    assert lease_entries(journal) == []
+    assert leases.entries() == []
 
 
-def test_a_lease_whose_holder_makes_no_sense_is_watched_like_a_stranger(journal, log, clock):
-    log(ANNA).begin(marker("a"))
-    with journal._store.write() as tables:
+def test_a_lease_whose_holder_makes_no_sense_is_watched_like_a_stranger(leases):
+    leases.log(ANNA).begin(marker("a"))
+    with leases.journal._store.write() as tables:
         tables.connection.exec_driver_sql("UPDATE leases SET holder = 'torn'")
-    began_ns = clock.now_ns()
-    log(BERT).begin(marker("b"))
-    assert clock.now_ns() - began_ns == LEASE_S * 1e9
+    began_ns = leases.clock.now_ns()
+    leases.log(BERT).begin(marker("b"))
+    assert leases.clock.now_ns() - began_ns == LEASE_S * 1e9

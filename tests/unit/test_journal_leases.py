@@ -1,53 +1,23 @@
 """One at a time on a controller: who has the lease, who may take it, who is told of its loss."""
 
-from dataclasses import replace
-
 import pytest
-from robolink_simulators.clock import ManualClock
 
 from robolink.errors import JournalError, LeaseHeldError, LeaseLostError
-from robolink.journal import EntryKind, Holder, memory_journal, this_process
 from robolink.journal._leases import BEAT_S
 from robolink.journal._sightings import LEASE_S
-from robolink.model import Marker, MarkerKind, new_operation
-
-IDENTITY = "epson+tcp://192.168.0.1:5000"
-HERE = this_process()
-ANNA = replace(HERE, operator="Anna", os_user="anna")
-BERT = replace(HERE, operator="Bert", os_user="bert")
-ELSEWHERE = Holder(os_user="carl", host="pc-2", pid=77, process_start="", boot="another")
+from tests.unit._lease_logs import ANNA, BERT, HERE, IDENTITY, leases_in_memory, marker
 
 
 @pytest.fixture
-def clock():
-    return ManualClock(start_ns=1_000_000_000_000)
+def leases():
+    with leases_in_memory() as leases:
+        yield leases
 
 
-@pytest.fixture
-def journal():
-    journal = memory_journal(new_operation())
-    yield journal
-    journal.close()
-
-
-@pytest.fixture
-def log(journal, clock):
-    """Make a log of a holder."""
-    return lambda holder, clock=clock: journal.log(IDENTITY, holder=holder, clock=clock)
-
-
-def marker(operation="a"):
-    return Marker(operation, MarkerKind.SET, "TLSet 3, XY(...)", "now", {"tool": 3})
-
-
-def lease_entries(journal):
-    return list(journal.entries(kinds=(EntryKind.LEASE,), newest_first=False))
-
-
-def test_a_second_holder_is_told_who_has_the_controller(log, clock):
-    anna, bert = log(ANNA), log(BERT)
+def test_a_second_holder_is_told_who_has_the_controller(leases):
+    anna, bert = leases.log(ANNA), leases.log(BERT)
     anna.begin(marker())
-    clock.advance(4)
+    leases.clock.advance(4)
     for use in (bert.look, lambda: bert.begin(marker("b")), lambda: bert.hold("x").__enter__()):
         with pytest.raises(LeaseHeldError) as caught:
             use()
@@ -57,8 +27,8 @@ def test_a_second_holder_is_told_who_has_the_controller(log, clock):
     assert [known.operation for known in anna.open_markers()] == ["a"]
 
 
-def test_the_lease_ends_with_the_last_marker_that_its_log_began(log):
-    anna, bert = log(ANNA), log(BERT)
+def test_the_lease_ends_with_the_last_marker_that_its_log_began(leases):
+    anna, bert = leases.log(ANNA), leases.log(BERT)
     anna.begin(marker("a"))
     anna.begin(marker("b"))
     anna.clear("a")
@@ -70,15 +40,15 @@ def test_the_lease_ends_with_the_last_marker_that_its_log_began(log):
         anna.begin(marker("d"))
 
 
-def test_another_controller_is_another_lease(journal, log, clock):
-    log(ANNA).begin(marker())
-    other = journal.log("epson+tcp://192.168.0.2:5000", holder=BERT, clock=clock)
+def test_another_controller_is_another_lease(leases):
+    leases.log(ANNA).begin(marker())
+    other = leases.journal.log("epson+tcp://192.168.0.2:5000", holder=BERT, clock=leases.clock)
     other.begin(marker())
     assert len(other.open_markers()) == 1
 
 
-def test_who_wrote_between_the_look_and_the_intent_is_noticed(log):
-    anna, bert = log(ANNA), log(BERT)
+def test_who_wrote_between_the_look_and_the_intent_is_noticed(leases):
+    anna, bert = leases.log(ANNA), leases.log(BERT)
     anna.look()
     bert.begin(marker("b"))
     bert.clear("b")
@@ -88,16 +58,16 @@ def test_who_wrote_between_the_look_and_the_intent_is_noticed(log):
     assert anna.open_markers() == ()
 
 
-def test_who_began_between_the_look_and_the_intent_is_named(log):
-    anna, bert = log(ANNA), log(BERT)
+def test_who_began_between_the_look_and_the_intent_is_named(leases):
+    anna, bert = leases.log(ANNA), leases.log(BERT)
     anna.look()
     bert.begin(marker("b"))
     with pytest.raises(LeaseHeldError, match="Bert"):
         anna.begin(marker("a"))
 
 
-def test_the_first_lease_of_a_controller_is_fenced_too(log):
-    anna, bert = log(ANNA), log(BERT)
+def test_the_first_lease_of_a_controller_is_fenced_too(leases):
+    anna, bert = leases.log(ANNA), leases.log(BERT)
     anna.look()
     bert.look()
     bert.begin(marker("b"))
@@ -105,8 +75,8 @@ def test_the_first_lease_of_a_controller_is_fenced_too(log):
         anna.begin(marker("a"))
 
 
-def test_a_new_look_lets_one_try_again(log):
-    anna, bert = log(ANNA), log(BERT)
+def test_a_new_look_lets_one_try_again(leases):
+    anna, bert = leases.log(ANNA), leases.log(BERT)
     anna.look()
     bert.begin(marker("b"))
     bert.clear("b")
@@ -117,16 +87,16 @@ def test_a_new_look_lets_one_try_again(log):
     assert len(anna.open_markers()) == 1
 
 
-def test_a_frozen_holder_is_replaced_and_told_so_when_it_comes_back(journal, log, clock):
-    anna, bert = log(ANNA), log(BERT)
+def test_a_frozen_holder_is_replaced_and_told_so_when_it_comes_back(leases):
+    anna, bert = leases.log(ANNA), leases.log(BERT)
     anna.begin(marker("a"))
-    clock.advance(LEASE_S - 0.1)
+    leases.clock.advance(LEASE_S - 0.1)
     with pytest.raises(LeaseHeldError):
         bert.look()
-    clock.advance(0.2)
+    leases.clock.advance(0.2)
     bert.look()
     bert.begin(marker("b"))
-    (entry,) = lease_entries(journal)
+    (entry,) = leases.entries()
     assert entry.details["holder"]["operator"] == "Anna"
     assert entry.details["epoch"] == 2
     assert "no sign of life" in entry.verdict
@@ -136,10 +106,10 @@ def test_a_frozen_holder_is_replaced_and_told_so_when_it_comes_back(journal, log
     assert [known.operation for known in bert.open_markers()] == ["a", "b"]
 
 
-def test_who_lost_the_lease_stays_out_while_what_it_began_is_open(log, clock):
-    anna, bert = log(ANNA), log(BERT)
+def test_who_lost_the_lease_stays_out_while_what_it_began_is_open(leases):
+    anna, bert = leases.log(ANNA), leases.log(BERT)
     anna.begin(marker("a"))
-    clock.advance(LEASE_S)
+    leases.clock.advance(LEASE_S)
     bert.begin(marker("b"))
     bert.clear("b")
     for _ in range(2):
@@ -152,20 +122,20 @@ def test_who_lost_the_lease_stays_out_while_what_it_began_is_open(log, clock):
     anna.begin(marker("c"))
 
 
-def test_clearing_after_the_lease_was_lost_does_not_free_the_other_s(log, clock):
-    anna, bert = log(ANNA), log(BERT)
+def test_clearing_after_the_lease_was_lost_does_not_free_the_other_s(leases):
+    anna, bert = leases.log(ANNA), leases.log(BERT)
     anna.begin(marker("a"))
-    clock.advance(LEASE_S)
+    leases.clock.advance(LEASE_S)
     bert.begin(marker("b"))
     anna.clear("a")
     with pytest.raises(LeaseHeldError, match="Bert"):
         anna.look()
 
 
-def test_a_holder_that_comes_back_between_look_and_intent_keeps_the_lease(log, clock):
-    anna, bert = log(ANNA), log(BERT)
+def test_a_holder_that_comes_back_between_look_and_intent_keeps_the_lease(leases):
+    anna, bert = leases.log(ANNA), leases.log(BERT)
     anna.begin(marker("a"))
-    clock.advance(LEASE_S)
+    leases.clock.advance(LEASE_S)
     bert.look()
     anna.beat()
     with pytest.raises(LeaseHeldError, match="Anna"):
@@ -173,49 +143,49 @@ def test_a_holder_that_comes_back_between_look_and_intent_keeps_the_lease(log, c
     anna.begin(marker("c"))
 
 
-def test_beats_keep_the_lease_and_cost_a_write_once_a_second(journal, log, clock):
-    anna, bert = log(ANNA), log(BERT)
+def test_beats_keep_the_lease_and_cost_a_write_once_a_second(leases):
+    anna, bert = leases.log(ANNA), leases.log(BERT)
     anna.begin(marker("a"))
-    with journal._store.read() as tables:
+    with leases.journal._store.read() as tables:
         before = tables.leases.sight(IDENTITY).beat
     for _ in range(100):
-        clock.advance(LEASE_S / 50)
+        leases.clock.advance(LEASE_S / 50)
         anna.beat()
-    with journal._store.read() as tables:
+    with leases.journal._store.read() as tables:
         assert tables.leases.sight(IDENTITY).beat - before == round(2 * LEASE_S / BEAT_S)
     with pytest.raises(LeaseHeldError):
         bert.look()
 
 
-def test_a_beat_without_a_lease_or_after_its_loss_raises_nothing(log, clock):
-    anna, bert = log(ANNA), log(BERT)
+def test_a_beat_without_a_lease_or_after_its_loss_raises_nothing(leases):
+    anna, bert = leases.log(ANNA), leases.log(BERT)
     anna.beat()
     anna.begin(marker("a"))
-    clock.advance(LEASE_S)
+    leases.clock.advance(LEASE_S)
     bert.begin(marker("b"))
     anna.beat()
     with pytest.raises(LeaseLostError):
         anna.begin(marker("c"))
 
 
-def test_a_beat_that_cannot_be_stored_raises_nothing(journal, log, clock, monkeypatch):
-    anna = log(ANNA)
+def test_a_beat_that_cannot_be_stored_raises_nothing(leases, monkeypatch):
+    anna = leases.log(ANNA)
     anna.begin(marker("a"))
-    clock.advance(2)
+    leases.clock.advance(2)
 
     def fail(consequence=""):
         raise JournalError("The disk is full.")
 
-    monkeypatch.setattr(journal._store, "write", fail)
+    monkeypatch.setattr(leases.journal._store, "write", fail)
     anna.beat()
 
 
-def test_a_person_may_insist_and_the_other_is_told(journal, log):
-    anna, bert = log(ANNA), log(BERT)
+def test_a_person_may_insist_and_the_other_is_told(leases):
+    anna, bert = leases.log(ANNA), leases.log(BERT)
     anna.begin(marker("a"))
     bert.take_over("Anna has gone home")
     bert.begin(marker("b"))
-    (entry,) = lease_entries(journal)
+    (entry,) = leases.entries()
     assert entry.details["holder"]["operator"] == "Anna"
     assert "Anna has gone home" in entry.verdict
     assert entry.details["epoch"] == 2
@@ -224,28 +194,28 @@ def test_a_person_may_insist_and_the_other_is_told(journal, log):
     assert [known.operation for known in bert.open_markers()] == ["a", "b"]
 
 
-def test_insisting_on_one_s_own_lease_changes_nothing(journal, log):
-    anna = log(ANNA)
+def test_insisting_on_one_s_own_lease_changes_nothing(leases):
+    anna = leases.log(ANNA)
     anna.begin(marker("a"))
     anna.take_over("just so")
-    assert lease_entries(journal) == []
+    assert leases.entries() == []
     anna.begin(marker("b"))
 
 
-def test_insisting_on_a_free_lease_is_recorded_and_fences_who_has_looked(journal, log):
-    anna, bert = log(ANNA), log(BERT)
+def test_insisting_on_a_free_lease_is_recorded_and_fences_who_has_looked(leases):
+    anna, bert = leases.log(ANNA), leases.log(BERT)
     anna.begin(marker("a"))
     anna.clear("a")
     anna.look()
     bert.take_over("to be sure")
-    (entry,) = lease_entries(journal)
+    (entry,) = leases.entries()
     assert "was free" in entry.verdict
     with pytest.raises(LeaseLostError):
         anna.begin(marker("b"))
 
 
-def test_holding_keeps_the_lease_between_two_markers(log):
-    anna, bert = log(ANNA), log(BERT)
+def test_holding_keeps_the_lease_between_two_markers(leases):
+    anna, bert = leases.log(ANNA), leases.log(BERT)
     with anna.hold("recover"):
         anna.begin(marker("a"))
         anna.clear("a")
@@ -254,8 +224,8 @@ def test_holding_keeps_the_lease_between_two_markers(log):
     bert.look()
 
 
-def test_a_marker_that_is_open_after_the_block_keeps_the_lease(log):
-    anna, bert = log(ANNA), log(BERT)
+def test_a_marker_that_is_open_after_the_block_keeps_the_lease(leases):
+    anna, bert = leases.log(ANNA), leases.log(BERT)
     with anna.hold("recover"), anna.hold("more"):
         anna.begin(marker("a"))
     with pytest.raises(LeaseHeldError):
@@ -264,8 +234,8 @@ def test_a_marker_that_is_open_after_the_block_keeps_the_lease(log):
     bert.look()
 
 
-def test_closing_gives_the_lease_up_and_leaves_the_markers(log):
-    anna, bert = log(ANNA), log(BERT)
+def test_closing_gives_the_lease_up_and_leaves_the_markers(leases):
+    anna, bert = leases.log(ANNA), leases.log(BERT)
     anna.begin(marker("a"))
     anna.close()
     bert.begin(marker("b"))

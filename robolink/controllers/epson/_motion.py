@@ -158,6 +158,10 @@ class EpsonGroup:
         session, desk = self._parts.session, self._parts.desk
         details = {"target": list(target.coordinates())}
         marker = desk.begin(MarkerKind.MOVE, statement, details)
+        if session.interrupted:
+            # Ctrl-C came while the marker was stored: nothing begins to move after it.
+            desk.clear(marker)
+            raise KeyboardInterrupt
         with desk.doubt(statement):
             pending = session.start_execute(statement)
         return EpsonMotion(target, pending, marker, parts=self._parts)

@@ -159,6 +159,11 @@ class EpsonSession:
         """Hold Ctrl-C back over exchanges that belong together; it is raised at their end."""
         return self._gate
 
+    @property
+    def interrupted(self) -> bool:
+        """Whether Ctrl-C is held back just now."""
+        return self._gate.interrupted
+
     def finish(self, pending: PendingExecute) -> None:
         """Forget an Execute whose answer was taken."""
         if self._pending is pending:

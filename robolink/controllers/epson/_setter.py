@@ -1,7 +1,8 @@
 """Values that a request of their own sets: outputs, memory bits, variables.
 
 Class SET of design part 4: nothing is sent when the value is there already; a durable marker
-stands before the request leaves; the request is sent once; the value is read back.
+stands before the request leaves; the request is sent once; the value is read back. Ctrl-C
+waits for the end of that.
 """
 
 from collections.abc import Callable
@@ -109,14 +110,15 @@ class ValueSetter:
 
     def _set(self, change: Change[ValueT], request: str, before: ValueT) -> ValueT:
         details = {"item": list(change.item), "before": before, "requested": change.requested}
-        marker = self._desk.begin(MarkerKind.SET, request, details)
-        with self._desk.doubt(request):
-            try:
-                self._session.exchange(change.request.name, *change.request.parameters)
-            except RejectedError as error:
-                if error.code in NOT_EXECUTED:
-                    self._desk.clear(marker)
-                raise
-            found = change.read()
-        self._desk.clear(marker)
+        with self._session.uninterrupted():
+            marker = self._desk.begin(MarkerKind.SET, request, details)
+            with self._desk.doubt(request):
+                try:
+                    self._session.exchange(change.request.name, *change.request.parameters)
+                except RejectedError as error:
+                    if error.code in NOT_EXECUTED:
+                        self._desk.clear(marker)
+                    raise
+                found = change.read()
+            self._desk.clear(marker)
         return found

@@ -124,14 +124,13 @@ class EpsonToolTable:
             if before == tool:
                 return
             self._require_defined(tool)
-            self._desk.note_selection(tool)
             details = {"select": tool, "before": before}
-            found = self._writer.carry_out(
-                statement,
-                details,
-                send=lambda: self._window.command(statement),
-                read=self._selected,
-            )
+
+            def send() -> None:
+                self._window.command(statement)
+                self._desk.note_selection(tool)
+
+            found = self._writer.carry_out(statement, details, send=send, read=self._selected)
             if found != tool:
                 raise ReadBackError(
                     tr(

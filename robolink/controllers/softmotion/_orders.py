@@ -77,7 +77,11 @@ class Orders:
             return end.now
 
     def start(self, draft: Command) -> Command:
-        """Send a movement or a jog and return it as it was accepted; raises like the other."""
+        """Send a movement or a jog and return it as it was accepted; raises like the other.
+
+        Raises:
+            KeyboardInterrupt: Ctrl-C came before a movement was sent; it was not.
+        """
         with self._wire.uninterrupted():
             self._possess(draft)
             command, now = self._send(draft, ride=draft.opcode != Opcode.JOG)
@@ -122,6 +126,8 @@ class Orders:
             self._require_able(draft, before)
             command = self._addressed(draft, before)
             words = self._encode(command)
+            if ride and self._wire.interrupted:
+                raise KeyboardInterrupt  # held back until here: nothing begins to move after it
             if ride:
                 self._wire.rides.begin(command.sequence)
             for _ in range(_WRITES):

@@ -51,8 +51,8 @@ class MovementStarter:
         with mailbox.desk.doubt(request):
             try:
                 command = mailbox.orders.start(draft)
-            except (ControllerError, ConfigError):
-                mailbox.desk.clear(marker)
+            except (ControllerError, ConfigError, KeyboardInterrupt):
+                mailbox.desk.clear(marker)  # it was not sent, or refused
                 raise
         return SoftMotionMotion(target, command, marker, mailbox)
 

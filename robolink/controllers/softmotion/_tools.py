@@ -11,20 +11,19 @@ from robolink.controllers._tool_writing import ToolWrite
 from robolink.controllers.softmotion._answers import describe
 from robolink.controllers.softmotion._condition import require_enabled, require_still
 from robolink.controllers.softmotion._mailbox import Mailbox
+from robolink.controllers.softmotion._tool_proof import GroupTool, WriteProof
 from robolink.errors import (
     ReadBackError,
-    RejectedError,
     ReservedToolError,
     ToolError,
     ToolIndexError,
     UndefinedToolError,
 )
 from robolink.messages import tr
-from robolink.model import Expected, ToolOffset, ToolReceipt, describe_offset
+from robolink.model import Expected, ToolOffset, ToolReceipt
 from robolink.protocols.mailbox import (
     SLOTS,
     Command,
-    ErrorClass,
     Opcode,
     ReadMode,
     Response,
@@ -41,6 +40,7 @@ class SoftMotionToolTable:
 
     def __init__(self, mailbox: Mailbox) -> None:
         self._mailbox = mailbox
+        self._group_tool = GroupTool(mailbox)
 
     def indices(self) -> Sequence[int]:
         """Return 1 to 15; tool 0 is the flange."""
@@ -88,14 +88,7 @@ class SoftMotionToolTable:
         Returns:
             ``None`` when there is no such movement.
         """
-        draft = Command(0, Opcode.READ_TOOL, operands=(mode, 0, 0, 0))
-        try:
-            now = self._mailbox.orders.carry_out(draft)
-        except RejectedError as error:
-            if error.code == ErrorClass.NO_SUCH_MOVEMENT:
-                return None
-            raise
-        return self._mailbox.from_plc(now.answer.pose)
+        return self._group_tool.read(mode)
 
     def write(self, tool: int, offset: ToolOffset, *, expected: Expected) -> ToolReceipt:
         """Write and read back; see :class:`robolink.model.ToolTable`."""
@@ -145,13 +138,13 @@ class SoftMotionToolTable:
             now = mailbox.prepare(draft, request)
             require_still(now, controller=mailbox.identity, request=request)
             require_enabled(now, controller=mailbox.identity, request=request)
-            mailbox.desk.note_selection(tool)
-            found = mailbox.writer.carry_out(
-                request,
-                {"select": tool, "before": before},
-                send=lambda: mailbox.orders.carry_out(draft),
-                read=self.selected,
-            )
+            details = {"select": tool, "before": before}
+
+            def send() -> None:
+                mailbox.orders.carry_out(draft)
+                mailbox.desk.note_selection(tool)
+
+            found = mailbox.writer.carry_out(request, details, send=send, read=self.selected)
             if found != tool:
                 raise ReadBackError(
                     tr(
@@ -162,7 +155,7 @@ class SoftMotionToolTable:
                     remedy=tr("Do not move the robot; look at the PLC's tool selection."),
                     request=request,
                 )
-            self._require_in_force(offset, request)
+            self._group_tool.require(offset, request)
 
     def _set(
         self, tool: int, requested: ToolOffset | None, expected: Expected, draft: Command
@@ -181,18 +174,23 @@ class SoftMotionToolTable:
                     self._require_changeable(tool, requested, now, request)
                 mailbox.prepare(draft, request, now=now)
             named = draft if requested is None else replace(draft, name=_name(tool, slot))
+            proof = WriteProof(
+                lambda: self.read(tool), self._group_tool if in_force else None, requested
+            )
             write = ToolWrite(
                 tool,
                 requested,
                 request,
                 send=lambda: mailbox.orders.carry_out(named),
                 read=lambda: stored if owned else self.read(tool),
-                read_back=lambda: self.read(tool),
+                read_back=proof.read,
             )
-            receipt = mailbox.writer.change(write, expected)
-            if in_force and not receipt.skipped:
-                self._require_in_force(requested, request)
-            return receipt
+            try:
+                return mailbox.writer.change(write, expected)
+            except ReadBackError as error:
+                if proof.group_differs:
+                    raise self._group_tool.differs(requested, proof.found, request) from error
+                raise
 
     def _value(self, slot: Slot) -> ToolOffset | None:
         return self._mailbox.from_plc(slot.tool) if slot.defined else None
@@ -213,21 +211,6 @@ class SoftMotionToolTable:
                 request=request,
             )
         require_enabled(now, controller=self._mailbox.identity, request=request)
-
-    def _require_in_force(self, offset: ToolOffset | None, request: str) -> None:
-        """Prove that the axis group itself has the tool (faults_and_speed.md F43, F44)."""
-        found = self.read_mode(ReadMode.SET)
-        if not self.same(found, offset):
-            raise ReadBackError(
-                tr(
-                    "The slot holds {offset}, but the axis group works with {found}.",
-                    offset=describe_offset(offset),
-                    found=describe_offset(found),
-                ),
-                remedy=tr("Do not move the robot; another program may set the group's tool."),
-                controller=self._mailbox.identity,
-                request=request,
-            )
 
     def _require_defined(self, tool: int) -> ToolOffset:
         offset = self.read(tool)

@@ -71,6 +71,11 @@ class MailboxWire:
         """Hold Ctrl-C back over exchanges that belong together; it is raised at their end."""
         return self._gate
 
+    @property
+    def interrupted(self) -> bool:
+        """Whether Ctrl-C is held back just now."""
+        return self._gate.interrupted
+
     def read_head(self) -> MailboxHead:
         """Read the beginning of the response block, after a beat if one is due."""
         self.beat()

@@ -1,0 +1,65 @@
+"""The runs that are disturbed: recipes, each on a kind of controller."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from tests.faults._epson_recipe_cell import EpsonRecipeCell
+from tests.faults._recipe_cell import Ended, RecipeCell
+from tests.faults._recipe_instants import Instants
+from tests.faults._recipes import EXAMPLES, ON_THE_PLC, TWO_NOZZLES, TWO_ON_THE_PLC
+from tests.faults._softmotion_recipe_cell import PlcRecipeCell
+
+
+@dataclass(frozen=True)
+class Case:
+    """A recipe on a kind of controller.
+
+    Attributes:
+        kind: Of the controller.
+        recipe: The recipe.
+        tools: Those that it changes.
+        answers: Given with the command; without any, a person at a terminal is asked.
+    """
+
+    kind: type[EpsonRecipeCell] | type[PlcRecipeCell]
+    recipe: str
+    tools: tuple[int, ...]
+    answers: tuple[str, ...] = ()
+
+    @contextmanager
+    def cell(self) -> Iterator[RecipeCell]:
+        """Serve a cell on which it may run."""
+        cell = self.kind(self.tools)
+        try:
+            yield cell
+        finally:
+            cell.close()
+
+    def run(self, cell: RecipeCell, folder: Path, instants: Instants) -> Ended:
+        """Run it.
+
+        Args:
+            cell: Where.
+            folder: Where the recipe is written.
+            instants: Sees every instant of it.
+        """
+        path = folder / "recipe.toml"
+        path.write_text(self.recipe)
+        words = ("recalibrate", str(path), "--assist", cell.url, *self.answers)
+        return cell.run(*words, instants=instants, asks=not self.answers)
+
+
+CASES: Final = {
+    "EPSON, one tool": Case(
+        EpsonRecipeCell,
+        (EXAMPLES / "scara-pin.toml").read_text(),
+        (1,),
+        ("--yes", "--nozzle", "N-7"),
+    ),
+    "EPSON, two tools": Case(EpsonRecipeCell, TWO_NOZZLES, (1, 2)),
+    "PLC, one tool": Case(PlcRecipeCell, ON_THE_PLC, (1,), ("--yes",)),
+    "PLC, two tools": Case(PlcRecipeCell, TWO_ON_THE_PLC, (1, 2)),
+}

@@ -1,0 +1,183 @@
+"""A cell in this process on which whole recipes run, and what may be found in it after a mishap."""
+
+import contextlib
+import io
+import re
+import sys
+from abc import ABC, abstractmethod
+from collections import deque
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import count
+from typing import ClassVar
+
+import pytest
+from robolink_cli import main
+from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
+
+from robolink.journal import Journal, memory_journal
+from robolink.model import Marker, ToolOffset
+from tests.faults._recipe_instants import Instants, WatchedClock, questions_and_commits
+
+_names = count()
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How a command ended and what it showed."""
+
+    code: int
+    out: str
+    err: str
+
+
+class _Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+class RecipeCell(ABC):
+    """A controller of some kind with its nozzles changed, tool 1 selected.
+
+    Attributes:
+        disturbances: What may come in between besides Ctrl-C.
+        before: What the tools held.
+        shows_its_tool: Whether it shows which tool is selected in every state.
+        clock: On which everything passes.
+        recipe_tools: The tools that the recipe changes.
+    """
+
+    disturbances: ClassVar[tuple[str, ...]]
+    shows_its_tool: ClassVar[bool]
+    before: Mapping[int, ToolOffset]
+
+    def __init__(
+        self, simulator: EpsonSimulator | SoftMotionSimulator, recipe_tools: Sequence[int]
+    ) -> None:
+        self.recipe_tools = recipe_tools
+        self.clock = WatchedClock()
+        self.name = f"recipes-{next(_names)}"
+        self._hosted = simulator
+        simulator.log = deque()  # all of it, however long a run is
+        self.url = self._register()
+        self.journal: Journal = memory_journal(self.url)
+        self.outputs_before = self.outputs()
+        self.settings_before = self.settings()
+
+    @abstractmethod
+    def _register(self) -> str:
+        """Serve it and return its URL."""
+
+    @abstractmethod
+    def _unregister(self) -> None:
+        """Serve it no more."""
+
+    def close(self) -> None:
+        """Serve it no more, and forget its journal."""
+        self._unregister()
+        self.journal.close()
+
+    @abstractmethod
+    def tools(self) -> dict[int, ToolOffset | None]:
+        """Return what is stored in the tools of the recipe, past the wire."""
+
+    @property
+    @abstractmethod
+    def selected(self) -> int:
+        """Which tool is in force, past the wire."""
+
+    @abstractmethod
+    def settings(self) -> object:
+        """Return what else a procedure must leave as it was."""
+
+    @abstractmethod
+    def outputs(self) -> Mapping[int, bool]:
+        """Return the state of the outputs that recipes switch."""
+
+    @abstractmethod
+    def sent_as(self, number: int, on: bool) -> str:
+        """Return what switches an output, as a person reads it."""
+
+    @property
+    @abstractmethod
+    def moving(self) -> bool:
+        """Whether the robot moves."""
+
+    @abstractmethod
+    def writes(self) -> list[int]:
+        """Return the tools that were written so far, in order, as the controller counts them."""
+
+    @abstractmethod
+    def moves_asked(self) -> int:
+        """Return how many movements were asked for so far."""
+
+    @property
+    @abstractmethod
+    def moves_begun(self) -> int:
+        """How many movements the robot began so far, past the wire."""
+
+    @abstractmethod
+    def strange(self) -> list[str]:
+        """Return what came in that no run of a recipe may ask for."""
+
+    @abstractmethod
+    def stops_asked(self) -> int:
+        """Return how many stops were asked for so far."""
+
+    @abstractmethod
+    def disturb(self, how: str) -> None:
+        """Let something come in between."""
+
+    @abstractmethod
+    def make_ready(self, how: str) -> None:
+        """Undo it, and do at the command line what a person does then."""
+
+    def changed(self) -> set[int]:
+        """Return which tools do not hold what they held before."""
+        return {tool for tool, held in self.tools().items() if held != self.before[tool]}
+
+    def names_output(self, number: int, on: bool, said: str) -> bool:
+        """Whether somebody who reads ``said`` learns how an output is."""
+        left = re.search(r"Outputs stay as the recipe switched them: ([^.]*)\.", said)
+        states = left[1].split(", ") if left else []
+        return f"{number} {'on' if on else 'off'}" in states or self.sent_as(number, on) in said
+
+    def check_motion_is_allowed(self) -> None:
+        """A movement starts again, once it is asked for."""
+        asked = self.moves_asked()
+        for words in (("motors", "on", "--yes"), ("jog", "z+0.5", "--yes")):
+            assert (done := self.run(*words)).code == 0, done.err
+        assert self.moves_asked() == asked + 1
+
+    def requests(self) -> list[str]:
+        """Return what came in so far."""
+        return [text for _, direction, text in self._hosted.log if direction == ">"]
+
+    def open_markers(self) -> tuple[Marker, ...]:
+        """Return what is held for unsettled."""
+        return tuple(marker for _, marker in self.journal.open_markers())
+
+    def run(self, *words: str, instants: Instants | None = None, asks: bool = False) -> Ended:
+        """Run a command.
+
+        Args:
+            words: The command.
+            instants: Sees every instant of it.
+            asks: Whether a person sits at a terminal, and says yes to everything.
+        """
+        seen = Instants() if instants is None else instants
+        out, err = io.StringIO(), (_Terminal if asks else io.StringIO)()
+        simulator = self._hosted
+        with (
+            contextlib.redirect_stdout(out),
+            contextlib.redirect_stderr(err),
+            questions_and_commits(seen),
+            pytest.MonkeyPatch.context() as patch,
+        ):
+            patch.setattr(sys, "stdin", (_Terminal if asks else io.StringIO)())
+            patch.setattr(simulator, "on_request", lambda _, text: seen.pass_by("request", text))
+            patch.setattr(simulator, "on_reply", lambda _, text: seen.pass_by("answer", text))
+            patch.setattr(self.clock, "on_wait", lambda: seen.pass_by("wait"))
+            code = main.run(["-c", self.url, *words])
+        return Ended(code, out.getvalue(), err.getvalue())

@@ -1,0 +1,159 @@
+"""What must be true when a run of a recipe was ended from outside, and after it was put right."""
+
+import re
+from collections import Counter
+from dataclasses import dataclass
+
+from robolink.model import EntryKind, MarkerKind
+from tests.faults._recipe_cell import Ended, RecipeCell
+
+
+@dataclass
+class Disturbance:
+    """One thing that comes in between, once.
+
+    Attributes:
+        asked: How many movements had been asked for by then; -1 while it has not come.
+    """
+
+    cell: RecipeCell
+    how: str
+    asked: int = -1
+
+    @property
+    def came(self) -> bool:
+        """Whether it has come."""
+        return self.asked >= 0
+
+    def __call__(self) -> None:
+        """Let it come."""
+        self.asked = self.cell.moves_asked()
+        self.cell.disturb(self.how)
+
+
+def check_interrupted(cell: RecipeCell, ended: Ended, disturbance: Disturbance) -> None:
+    """Ctrl-C ends a run with everything put back, or with all that was proved kept."""
+    assert ended.code == 130, (ended.code, ended.err)
+    check_nothing_was_repeated(cell, disturbance)
+    assert cell.stops_asked() <= 1
+    assert cell.open_markers() == (), ended.err
+    assert cell.selected == 1
+    assert cell.settings() == cell.settings_before
+    whole = check_all_or_none(cell)
+    check_writes(cell)
+    if whole:
+        numbers = ", ".join(map(str, cell.recipe_tools))
+        said = f"Tool {numbers} keeps the new value|Tool 1 was written and read back"
+        assert re.search(said, ended.err + ended.out), ended.err
+    else:
+        assert cell.changed() == set(), ended.err
+        for tool in set(cell.writes()):
+            assert f"The old value of tool {tool} was written back" in ended.err
+    check_outputs_are_named(cell, ended)
+
+
+def check_stopped(cell: RecipeCell, ended: Ended, disturbance: Disturbance) -> None:
+    """A controller that can be commanded no more is left as it is, and everything is named."""
+    check_nothing_was_repeated(cell, disturbance)
+    assert cell.stops_asked() <= 1
+    check_writes(cell)
+    markers = cell.open_markers()
+    if ended.code == 0:
+        assert markers == ()
+        assert cell.selected == 1
+        assert check_all_or_none(cell)
+    else:
+        assert ended.code in (5, 6), (ended.code, ended.err)
+    for marker in markers:
+        assert marker.request in ended.err, (marker, ended.err)
+    check_the_selected_tool_is_named(cell, ended)
+    if cell.changed() and not kept(cell):
+        assert {marker.kind for marker in markers} & {MarkerKind.CHANGE, MarkerKind.SET}
+        assert "recover" in ended.err
+    check_outputs_are_named(cell, ended)
+
+
+def check_put_right(cell: RecipeCell, disturbance: Disturbance, *, offered: bool) -> None:
+    """After the reset one command settles what reading can, another what takes a person."""
+    found = {marker.kind for marker in cell.open_markers()}
+    cell.make_ready(disturbance.how)
+    if offered:
+        looked = cell.run("status", asks=True)
+        assert looked.code == 0, looked.err
+        assert cell.selected == 1, looked.err
+    recovered = cell.run("recover")
+    assert recovered.code == (6 if cell.open_markers() else 0), recovered.err
+    if recovered.code:
+        assert {marker.kind for marker in cell.open_markers()} <= {MarkerKind.MOVE, MarkerKind.SET}
+        resolved = cell.run("resolve", "--yes")
+        assert resolved.code == 0, resolved.err
+    assert cell.open_markers() == ()
+    assert cell.selected == 1
+    if MarkerKind.SELECTION in found:
+        assert cell.settings() == cell.settings_before
+    if not check_all_or_none(cell):
+        assert cell.changed() == set()
+    check_writes(cell)
+    assert cell.moves_begun <= disturbance.asked
+    cell.check_motion_is_allowed()
+
+
+def check_nothing_was_repeated(cell: RecipeCell, disturbance: Disturbance) -> None:
+    """The robot stands, and began no movement that was asked for after what came in between."""
+    assert not cell.moving, "the robot still moves"
+    assert cell.strange() == []
+    assert cell.moves_begun <= disturbance.asked, "a movement after it"
+    # Whoever has looked before he asks may be overtaken once; the controller refuses then.
+    assert cell.moves_asked() <= disturbance.asked + 1
+
+
+def check_all_or_none(cell: RecipeCell) -> bool:
+    """All tools hold new values and that is on record, or none does and nothing is."""
+    whole = kept(cell)
+    if whole:
+        assert cell.changed() == set(cell.recipe_tools)
+    return whole
+
+
+def check_writes(cell: RecipeCell) -> None:
+    """Each tool was written once at most, and once more where its old value was put back."""
+    for tool, count in Counter(cell.writes()).items():
+        assert count <= (1 if tool in cell.changed() else 2), (tool, count)
+
+
+def kept(cell: RecipeCell) -> bool:
+    """Whether it is on record that every tool keeps what was proved."""
+    done = list(cell.journal.entries(kinds=(EntryKind.DONE,)))
+    proved = {entry.tool for entry in done if entry.verdict == "verified"}
+    assert proved in (set(), set(cell.recipe_tools)), proved
+    assert cell.journal.verify().problems == ()
+    return bool(proved)
+
+
+def check_the_selected_tool_is_named(cell: RecipeCell, ended: Ended) -> None:
+    """Where the cell's own tool is not in force, or may not be, marker and message say so."""
+    markers = [m for m in cell.open_markers() if m.kind is MarkerKind.SELECTION]
+    if not markers:
+        assert cell.selected == 1, ended.err
+        return
+    (marker,) = markers
+    assert marker.details["tool"] == 1
+    now = marker.details["now"]
+    # A selection that was on its way: both are named.
+    asked = {m.details.get("select", now) for m in cell.open_markers()} - {now}
+    assert cell.selected in {now, *asked}, "the markers name another tool"
+    known = [cell.selected] if cell.shows_its_tool else [*asked, now]
+    named = " or ".join(map(str, known))
+    sentence = (
+        "Tool 1 is selected, as before."
+        if named == "1"
+        else f"Tool {named} is selected now; it was tool 1 before."
+    )
+    assert sentence in ended.err, ended.err
+
+
+def check_outputs_are_named(cell: RecipeCell, ended: Ended) -> None:
+    """Outputs stay as they were switched, and the end of the run says how they are."""
+    for number, on in cell.outputs().items():
+        if on is not cell.outputs_before[number]:
+            assert cell.names_output(number, on, ended.err), (number, on, ended.err)

@@ -1,0 +1,157 @@
+"""Every instant of a run at which something can come in between, and how it is brought in.
+
+A run is one process on one clock that stands still until somebody waits, so that its instants
+are the same each time: each exchange (before it is carried out, and before its answer leaves),
+the middle of each wait of the driver (a movement is waited on in such waits), each question to
+the person, and each durable transaction of the journal. Questions and transactions lie between
+exchanges, where Ctrl-C is not held back.
+"""
+
+import os
+import re
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from itertools import groupby
+from typing import Final, Literal
+
+import pytest
+from robolink_cli import _operator
+from robolink_simulators.clock import ManualClock
+
+from robolink.journal._store import Store, Tables
+from robolink.runner import Question
+
+Kind = Literal["request", "answer", "wait", "question", "commit"]
+_EVERY: Final = 97
+"""Every 97th instant belongs to the sample,"""
+_TURNS: Final = 9
+"""of which each test takes every ninth."""
+
+
+@dataclass(frozen=True)
+class Instant:
+    """One of them: the ``number``-th of its kind, and what went on."""
+
+    kind: Kind
+    number: int
+    what: str
+
+    def __str__(self) -> str:
+        return f"{self.kind} {self.number}: {self.what}"
+
+
+class Instants:
+    """Counts the instants of a run, and acts at one of them.
+
+    Attributes:
+        passed: Those that went by.
+
+    Args:
+        at: When to act; ``None`` for never.
+        act: What is done then, once.
+    """
+
+    def __init__(self, at: Instant | None = None, act: Callable[[], None] = lambda: None) -> None:
+        self.passed: list[Instant] = []
+        self._at = at
+        self._act = act
+        self._counts = Counter[Kind]()
+
+    def pass_by(self, kind: Kind, what: str = "") -> None:
+        """Let one go by."""
+        self._counts[kind] += 1
+        self.passed.append(Instant(kind, self._counts[kind], what))
+        at = self._at
+        if at is not None and (at.kind, at.number) == (kind, self._counts[kind]):
+            self._act()
+
+
+class WatchedClock(ManualClock):
+    """A clock that tells when half of a wait is over."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.on_wait: Callable[[], None] = lambda: None
+
+    def sleep(self, seconds: float) -> None:
+        """Let ``seconds`` pass, with a look after half of them."""
+        super().sleep(seconds / 2)
+        self.on_wait()
+        super().sleep(seconds / 2)
+
+    def advance_to(self, now_ns: int) -> None:
+        """Move the time forward to ``now_ns``, with a look halfway."""
+        super().advance_to((self.now_ns() + now_ns) // 2)
+        self.on_wait()
+        super().advance_to(now_ns)
+
+
+class Person:
+    """Agrees to everything that a command asks on its terminal."""
+
+    def __init__(self, instants: Instants) -> None:
+        self.asked: list[str] = []
+        self._instants = instants
+
+    def tell(self, text: str) -> None:
+        """Hear something."""
+
+    def ask(self, question: str, kind: Question) -> None:
+        """Be asked."""
+        self.asked.append(question)
+
+    def poll(self, wait_s: float) -> str:
+        """Say yes."""
+        self._instants.pass_by("question", self.asked[-1])
+        return "y"
+
+
+@contextmanager
+def questions_and_commits(instants: Instants) -> Iterator[Person]:
+    """Let ``instants`` see the questions and the journal; yields who sits at the terminal."""
+    person = Person(instants)
+    poll, write = _operator.AssistedOperator.poll, Store.write
+
+    def polled(operator: _operator.AssistedOperator, wait_s: float) -> str | None:
+        instants.pass_by("question", "the recipe's, or where the tip is")
+        return poll(operator, wait_s)
+
+    @contextmanager
+    def written(store: Store, consequence: str = "") -> Iterator[Tables]:
+        with write(store, consequence) as tables:
+            yield tables
+        instants.pass_by("commit")
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(_operator, "terminal", lambda: person)
+        patch.setattr(_operator.AssistedOperator, "poll", polled)
+        patch.setattr(Store, "write", written)
+        yield person
+
+
+def chosen(instants: Sequence[Instant], matters: re.Pattern[str], turn: int) -> list[Instant]:
+    """Return the instants to act at: all, or without the switch a sample.
+
+    Args:
+        instants: All of one run.
+        matters: What is worth more than one instant in so many.
+        turn: Which of several samples that complement each other.
+    """
+    if os.environ.get("ROBOLINK_ALL_KILL_POINTS") == "1":
+        return list(instants)
+    worth = [i for n, i in enumerate(instants) if n % _EVERY == 0 or matters.match(i.what)]
+    return worth[turn % _TURNS :: _TURNS]
+
+
+def without_inner_polls(instants: Sequence[Instant], polls: re.Pattern[str]) -> list[Instant]:
+    """Return the instants with the first, the middle and the last of each row of polls only.
+
+    While nothing but a movement goes on, polls differ from each other in the time alone.
+    """
+    kept: list[Instant] = []
+    for polling, group in groupby(instants, lambda i: bool(polls.match(f"{i.kind} {i.what}"))):
+        row = list(group)
+        kept += [row[n] for n in sorted({0, len(row) // 2, len(row) - 1})] if polling else row
+    return kept

@@ -1,0 +1,127 @@
+"""A PLC in this process on which whole recipes run."""
+
+import signal
+from collections.abc import Callable, Mapping, Sequence
+from typing import Final
+
+from robolink_simulators.hosting import plc_in_process
+from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
+
+from robolink.model import ToolOffset
+from robolink.protocols.mailbox import Six, from_frame, to_frame
+from tests.faults._recipe_cell import RecipeCell
+
+_UNIT_UM: Final = 1000.0
+_OUTPUTS: Final = (8, 9, 10)
+_MAY: Final = frozenset(
+    {"OWNERSHIP", "SELECT_TOOL", "READ_TOOL", "WRITE_TOOL", "WRITE_OUTPUT"}
+    | {"MOVE_LINEAR", "MOVE_DIRECT", "HALT"}
+)
+"""All that a run of a recipe may tell the PLC."""
+
+
+class PlcRecipeCell(RecipeCell):
+    """A SoftMotion PLC. Each command carries its own speed, so no settings are left to restore."""
+
+    disturbances = ("e-stop", "drive fault", "permit")
+    shows_its_tool = True
+    before = {1: ToolOffset(12.0, -3.5, -20.0), 2: ToolOffset(12.4, -3.7, -20.0)}
+
+    def __init__(self, recipe_tools: Sequence[int]) -> None:
+        self.simulator = simulator = SoftMotionSimulator(seed=1)
+        self._plc = simulator.plc
+        self._written: list[int] = []
+        simulator.world.change_nozzle(2)
+        define = self._plc.memory.define
+        define(2, to_frame(self.before[2].components(), unit_um=_UNIT_UM), "nozzle")
+
+        def counted(number: int, tool: Six, name: str) -> None:
+            self._written.append(number)
+            define(number, tool, name)
+
+        self._plc.memory.define = counted  # type: ignore[method-assign]
+        self._plc.group.outputs.switch(8, on=True)
+        super().__init__(simulator, recipe_tools)
+        assert self.changed() == set()
+
+    def _register(self) -> str:
+        return plc_in_process.register(self.name, self.simulator, clock=self.clock)
+
+    def _unregister(self) -> None:
+        plc_in_process.unregister(self.name)
+
+    def tools(self) -> dict[int, ToolOffset | None]:
+        """Return what is stored in the tools of the recipe, past the wire."""
+        defined = self._plc.memory.defined()
+        return {
+            tool: ToolOffset(*from_frame(defined[tool].tool, unit_um=_UNIT_UM))
+            for tool in self.before
+        }
+
+    @property
+    def selected(self) -> int:
+        """Which tool is in force, past the wire."""
+        return self._plc.tools.selected
+
+    def settings(self) -> object:
+        """Return nothing: there is nothing else to restore."""
+        return None
+
+    def outputs(self) -> Mapping[int, bool]:
+        """Return the state of the outputs that recipes switch."""
+        return {number: self._plc.group.outputs.read(number) for number in _OUTPUTS}
+
+    @property
+    def moving(self) -> bool:
+        """Whether the robot moves."""
+        return not self._plc.group.motion.resting
+
+    def writes(self) -> list[int]:
+        """Return the slots that were written so far, in order, as the PLC counts them."""
+        return list(self._written)
+
+    def moves_asked(self) -> int:
+        """Return how many movements were asked for so far."""
+        return sum(name.startswith("MOVE") for name in self._commands())
+
+    @property
+    def moves_begun(self) -> int:
+        """How many movements the group began so far, past the wire."""
+        return self._plc.group.movements_started
+
+    def strange(self) -> list[str]:
+        """Return what came in that no run of a recipe may ask for."""
+        return [name for name in self._commands() if name not in _MAY]
+
+    def stops_asked(self) -> int:
+        """Return how many stops were asked for so far."""
+        return self._commands().count("HALT")
+
+    def sent_as(self, number: int, on: bool) -> str:
+        """Return what switches an output, as a person reads it."""
+        return f"WRITE_OUTPUT {number} 1" if on else f"WRITE_OUTPUT {number}."
+
+    def disturb(self, how: str) -> None:
+        """Cut the drives' power, let one fail, or withdraw the machine's permit."""
+        panel = self.simulator.panel
+        acts: dict[str, Callable[[], None]] = {
+            "Ctrl-C": lambda: signal.raise_signal(signal.SIGINT),
+            "e-stop": panel.press_estop,
+            "drive fault": panel.fail_axis,
+            "permit": panel.withdraw_permit,
+        }
+        acts[how]()
+
+    def make_ready(self, how: str) -> None:
+        """Undo it, reset, and enable the group."""
+        panel = self.simulator.panel
+        if how == "e-stop":
+            panel.release_estop()
+        if how == "permit":
+            panel.give_permit()
+        for words in (("reset",), ("enable", "--yes")):
+            assert (done := self.run(*words)).code == 0, done.err
+
+    def _commands(self) -> list[str]:
+        sent = "write_command "
+        return [text.split()[1] for text in self.requests() if text.startswith(sent)]

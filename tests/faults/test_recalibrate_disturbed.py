@@ -1,0 +1,100 @@
+"""`robolink recalibrate RECIPE.toml`, disturbed at each instant of its run (F21, F22, F24).
+
+Ctrl-C ends a run with the old values in all tools, or with the new ones once all are proved,
+and with the selected tool, power and speed of before. After an emergency stop, an opened guard,
+a failed drive or a withdrawn permit not everything can be put back: message and marker name what
+is left, and after the reset one more command puts it right. Outputs stay as the recipe switched
+them, and the end of the run names them.
+
+By default a sample is taken. ``ROBOLINK_ALL_KILL_POINTS=1`` takes all, on a PLC without the
+inner ones of rows of polls. ``pytest -s`` shows how many.
+"""
+
+import re
+import signal
+from typing import Final
+
+import pytest
+
+from tests.faults._recipe_cases import CASES, Case
+from tests.faults._recipe_ends import (
+    Disturbance,
+    check_interrupted,
+    check_put_right,
+    check_stopped,
+)
+from tests.faults._recipe_instants import Instant, Instants, chosen, without_inner_polls
+
+pytestmark = pytest.mark.timeout(7200)
+
+CTRL_C: Final = "Ctrl-C"
+TESTS: Final = [
+    (name, how) for name, case in CASES.items() for how in (CTRL_C, *case.kind.disturbances)
+]
+MATTERS: Final = re.compile(
+    r'\$(SetIO|Execute,"(Tool \d|TLSet \d))|write_command (SELECT|WRITE|OWNER)|[A-Z]'
+)
+"""Switches, selects, writes, takes or gives back; or is a question."""
+POLLS: Final = re.compile("wait|(request|answer) (read_head|beat)")
+"""What the driver of a PLC does in a row while something moves."""
+
+SHOWS_LATER: Final = re.compile(r"commit|answer \d+: (read|beat)")
+"""What happens to a controller while the driver stores something, or just after a PLC was read,
+shows with the next exchange, which is an instant of its own."""
+
+
+@pytest.fixture(autouse=True)
+def _ctrl_c_interrupts():
+    # A shell that starts a test run in the background has it ignored.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.fixture(scope="module")
+def instants(tmp_path_factory):
+    """Tells the instants of a whole run of each recipe, which is then as it should be."""
+    known: dict[str, list[Instant]] = {}
+
+    def of(name: str) -> list[Instant]:
+        if name not in known:
+            case, passed = CASES[name], Instants()
+            with case.cell() as cell:
+                ended = case.run(cell, tmp_path_factory.mktemp("whole"), passed)
+                assert ended.code == 0, ended.err
+                assert cell.changed() == set(case.tools)
+                assert (cell.selected, cell.settings()) == (1, cell.settings_before)
+                assert cell.outputs() == cell.outputs_before
+            known[name] = passed.passed
+        return known[name]
+
+    return of
+
+
+def check(case: Case, how: str, at: Instant, folder) -> None:
+    with case.cell() as cell:
+        disturbance = Disturbance(cell, how)
+        ended = case.run(cell, folder, Instants(at, disturbance))
+        assert disturbance.came, "the instant was not reached"
+        if how == CTRL_C:
+            check_interrupted(cell, ended, disturbance)
+        else:
+            check_stopped(cell, ended, disturbance)
+            check_put_right(cell, disturbance, offered=bool(at.number % 2))
+
+
+@pytest.mark.parametrize(("name", "how"), TESTS)
+def test_a_run_that_is_disturbed_leaves_all_or_nothing_and_says_what(tmp_path, instants, name, how):
+    case, whole = CASES[name], instants(name)
+    if name.startswith("PLC"):
+        whole = without_inner_polls(whole, POLLS)
+    if how != CTRL_C:
+        whole = [instant for instant in whole if not SHOWS_LATER.match(str(instant))]
+    steps = chosen(whole, MATTERS, turn=TESTS.index((name, how)))
+    for step in steps:
+        try:
+            check(case, how, step, tmp_path)
+        except AssertionError as error:
+            error.add_note(f"disturbed at {step}")
+            raise
+    print(f"{name}, {how}: {len(steps)} instants of {len(whole)}")  # noqa: T201 - for pytest -s

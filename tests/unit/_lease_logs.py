@@ -1,0 +1,55 @@
+"""The lease of one controller, seen by several holders in one journal in memory."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from typing import Final
+
+from robolink_simulators.clock import ManualClock
+
+from robolink.journal import (
+    EntryKind,
+    Holder,
+    Journal,
+    JournalOutcomeLog,
+    memory_journal,
+    this_process,
+)
+from robolink.model import Marker, MarkerKind, Recorded, new_operation
+
+IDENTITY: Final = "epson+tcp://192.168.0.1:5000"
+HERE: Final = this_process()
+ANNA: Final = replace(HERE, operator="Anna", os_user="anna")
+BERT: Final = replace(HERE, operator="Bert", os_user="bert")
+ELSEWHERE: Final = Holder(os_user="carl", host="pc-2", pid=77, process_start="", boot="another")
+
+
+@dataclass
+class Leases:
+    """A journal and the time that passes for all on this computer."""
+
+    journal: Journal
+    clock: ManualClock = field(default_factory=lambda: ManualClock(start_ns=1_000_000_000_000))
+
+    def log(self, holder: Holder, clock: ManualClock | None = None) -> JournalOutcomeLog:
+        """Return the log of a holder, whose clock may be another."""
+        return self.journal.log(IDENTITY, holder=holder, clock=clock or self.clock)
+
+    def entries(self) -> list[Recorded]:
+        """Return what is on record about leases, oldest first."""
+        return list(self.journal.entries(kinds=(EntryKind.LEASE,), newest_first=False))
+
+
+@contextmanager
+def leases_in_memory() -> Iterator[Leases]:
+    """Keep a journal for the time of a test."""
+    journal = memory_journal(new_operation())
+    try:
+        yield Leases(journal)
+    finally:
+        journal.close()
+
+
+def marker(operation: str = "a") -> Marker:
+    """Return the marker of a tool write."""
+    return Marker(operation, MarkerKind.SET, "TLSet 3, XY(...)", "now", {"tool": 3})

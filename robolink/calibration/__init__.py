@@ -24,9 +24,11 @@ from robolink.calibration._stations import ProbePlan as ProbePlan
 from robolink.calibration._stations import TouchStation as TouchStation
 from robolink.calibration._steps import Ask as Ask
 from robolink.calibration._steps import Move as Move
+from robolink.calibration._steps import Offer as Offer
 from robolink.calibration._steps import Procedure as Procedure
 from robolink.calibration._steps import Seek as Seek
 from robolink.calibration._steps import Step as Step
+from robolink.calibration._steps import Tell as Tell
 from robolink.calibration._tolerance import PLANAR_TOLERANCE as PLANAR_TOLERANCE
 from robolink.calibration._tolerance import TOUCH_TOLERANCE as TOUCH_TOLERANCE
 from robolink.calibration._tolerance import Tolerance as Tolerance

@@ -43,7 +43,7 @@ def two_pose(
     Raises:
         CalibrationError: As :func:`solve_two_pose`.
     """
-    first = yield Ask(tr("Bring the tip onto the pin."))
+    first: Pose = yield Ask(tr("Bring the tip onto the pin."))
     # Toward zero, by the angle as it is counted and not modulo 360: U starts inside the
     # joint's range, and so it stays there.
     turn_deg = -plan.turn_deg if first.u_deg > 0 else plan.turn_deg
@@ -71,7 +71,7 @@ def n_angle(
     """
     from robolink.calibration._n_angle import solve_n_angle  # numpy, not for --help
 
-    first = yield Ask(tr("Bring the tip onto the pin."))
+    first: Pose = yield Ask(tr("Bring the tip onto the pin."))
     touches = [first]
     for turn_deg in turns_deg:
         # Within half a turn of zero: adding up from touch to touch leaves the joint's range.
@@ -133,7 +133,7 @@ def verify_by_turning(
         yield Move(
             raised(place, plan.clearance_mm), Path.STRAIGHT, tr("come down to the clearance")
         )
-        found = yield Ask(tr("Bring the tip back onto the pin; what you jog is the drift."))
+        found: Pose = yield Ask(tr("Bring the tip back onto the pin; what you jog is the drift."))
         drifts.append(Drift(angle, found.x_mm - place.x_mm, found.y_mm - place.y_mm))
         yield Move(raised(found, plan.lift_mm), Path.STRAIGHT, tr("lift off the pin"))
     return VerifyResult(tuple(drifts), tolerance_mm)
@@ -165,7 +165,7 @@ def _touch_again(
     plan: TouchPlan, contact: Pose, u_deg: float, guess: ToolOffset
 ) -> Procedure[Pose]:
     """Lift off, turn to ``u_deg``, come down beside the pin, and let the person touch it."""
-    lifted = yield Move(raised(contact, plan.lift_mm), Path.STRAIGHT, tr("lift off the pin"))
+    lifted: Pose = yield Move(raised(contact, plan.lift_mm), Path.STRAIGHT, tr("lift off the pin"))
     above = replace(_turned(contact, u_deg, guess), z_mm=lifted.z_mm)
     yield Move(above, Path.JOINT, tr("turn in the air"))
     yield Move(
@@ -173,7 +173,7 @@ def _touch_again(
         Path.STRAIGHT,
         tr("come down to the clearance"),
     )
-    touch = yield Ask(tr("Bring the tip onto the pin again, with the tool turned."))
+    touch: Pose = yield Ask(tr("Bring the tip onto the pin again, with the tool turned."))
     yield Move(raised(touch, plan.lift_mm), Path.STRAIGHT, tr("lift off the pin"))
     return touch
 

@@ -37,6 +37,9 @@ class CellSettings(BaseModel):
             the pin it stops.
         max_change_mm: Largest plausible change against the stored offset.
         drift_tolerance_mm: Largest drift about the new tip that passes.
+        rms_tolerance_mm, residual_tolerance_mm: Largest rms of the residuals of a calibration,
+            and largest single one, that is believed.
+        interval_tolerance_mm: Largest half of the 95 % interval of a measured length.
         people: Who works at the cell: badge or name, and ``operator`` or ``engineer``.
         notes: For people.
     """
@@ -57,6 +60,9 @@ class CellSettings(BaseModel):
     clearance_mm: Annotated[float, Field(ge=0.5, le=50)] | None = None
     max_change_mm: Positive | None = None
     drift_tolerance_mm: Positive | None = None
+    rms_tolerance_mm: Positive | None = None
+    residual_tolerance_mm: Positive | None = None
+    interval_tolerance_mm: Positive | None = None
     people: dict[Text, Role] | None = None
     notes: str | None = None
 

@@ -9,6 +9,12 @@ from typing import TYPE_CHECKING
 from robolink.calibration._impact import Impact as Impact
 from robolink.calibration._impact import PointImpact as PointImpact
 from robolink.calibration._impact import impact_on as impact_on
+from robolink.calibration._many_touches import Course as Course
+from robolink.calibration._many_touches import n_angle as n_angle
+from robolink.calibration._many_touches import telling_order as telling_order
+from robolink.calibration._moved_station import StationShift as StationShift
+from robolink.calibration._moved_station import TipShift as TipShift
+from robolink.calibration._moved_station import judge_shifts as judge_shifts
 from robolink.calibration._planar_checks import MIN_ROTATION_DEG as MIN_ROTATION_DEG
 from robolink.calibration._planar_checks import planar_sigma_gain as planar_sigma_gain
 from robolink.calibration._poses import ToolFit as ToolFit
@@ -18,6 +24,7 @@ from robolink.calibration._poses import two_of as two_of
 from robolink.calibration._result import CalibrationResult as CalibrationResult
 from robolink.calibration._result import Drift as Drift
 from robolink.calibration._result import VerifyResult as VerifyResult
+from robolink.calibration._single_touch import one_touch as one_touch
 from robolink.calibration._stations import BeamStation as BeamStation
 from robolink.calibration._stations import CrossingPlan as CrossingPlan
 from robolink.calibration._stations import ProbePlan as ProbePlan
@@ -34,7 +41,6 @@ from robolink.calibration._tolerance import TOUCH_TOLERANCE as TOUCH_TOLERANCE
 from robolink.calibration._tolerance import Tolerance as Tolerance
 from robolink.calibration._touch import TouchPlan as TouchPlan
 from robolink.calibration._touch import contact_pose as contact_pose
-from robolink.calibration._touch import n_angle as n_angle
 from robolink.calibration._touch import raised as raised
 from robolink.calibration._touch import travel as travel
 from robolink.calibration._touch import two_pose as two_pose

@@ -72,6 +72,7 @@ class Recalibration:
                 take_reference=self._take_reference,
                 accepted_change_mm=self._accepted_change_mm,
                 ask_before_write=not self._answers.yes,
+                cell=self._context.cell,
             )
             run.preflight()
             self._start(controller, run)

@@ -9,6 +9,14 @@ from typing import TYPE_CHECKING
 from robolink.calibration._impact import Impact as Impact
 from robolink.calibration._impact import PointImpact as PointImpact
 from robolink.calibration._impact import impact_on as impact_on
+from robolink.calibration._many_touches import Course as Course
+from robolink.calibration._many_touches import n_angle as n_angle
+from robolink.calibration._many_touches import telling_order as telling_order
+from robolink.calibration._moved_station import StationShift as StationShift
+from robolink.calibration._moved_station import TipShift as TipShift
+from robolink.calibration._moved_station import judge_shifts as judge_shifts
+from robolink.calibration._needle_chain import NeedleChain as NeedleChain
+from robolink.calibration._needle_chain import NeedleLimits as NeedleLimits
 from robolink.calibration._planar_checks import MIN_ROTATION_DEG as MIN_ROTATION_DEG
 from robolink.calibration._planar_checks import planar_sigma_gain as planar_sigma_gain
 from robolink.calibration._poses import ToolFit as ToolFit
@@ -18,21 +26,24 @@ from robolink.calibration._poses import two_of as two_of
 from robolink.calibration._result import CalibrationResult as CalibrationResult
 from robolink.calibration._result import Drift as Drift
 from robolink.calibration._result import VerifyResult as VerifyResult
+from robolink.calibration._single_touch import one_touch as one_touch
 from robolink.calibration._stations import BeamStation as BeamStation
 from robolink.calibration._stations import CrossingPlan as CrossingPlan
 from robolink.calibration._stations import ProbePlan as ProbePlan
 from robolink.calibration._stations import TouchStation as TouchStation
 from robolink.calibration._steps import Ask as Ask
 from robolink.calibration._steps import Move as Move
+from robolink.calibration._steps import Offer as Offer
 from robolink.calibration._steps import Procedure as Procedure
 from robolink.calibration._steps import Seek as Seek
 from robolink.calibration._steps import Step as Step
+from robolink.calibration._steps import Tell as Tell
+from robolink.calibration._student import NORMAL_95 as NORMAL_95
 from robolink.calibration._tolerance import PLANAR_TOLERANCE as PLANAR_TOLERANCE
 from robolink.calibration._tolerance import TOUCH_TOLERANCE as TOUCH_TOLERANCE
 from robolink.calibration._tolerance import Tolerance as Tolerance
 from robolink.calibration._touch import TouchPlan as TouchPlan
 from robolink.calibration._touch import contact_pose as contact_pose
-from robolink.calibration._touch import n_angle as n_angle
 from robolink.calibration._touch import raised as raised
 from robolink.calibration._touch import travel as travel
 from robolink.calibration._touch import two_pose as two_pose
@@ -64,9 +75,7 @@ if TYPE_CHECKING:
     from robolink.calibration._joint import ToolDifference as ToolDifference
     from robolink.calibration._joint import solve_joint as solve_joint
     from robolink.calibration._n_angle import solve_n_angle as solve_n_angle
-    from robolink.calibration._needle_change import NeedleChain as NeedleChain
     from robolink.calibration._needle_change import NeedleChangeResult as NeedleChangeResult
-    from robolink.calibration._needle_change import NeedleLimits as NeedleLimits
     from robolink.calibration._needle_change import solve_needle_change as solve_needle_change
     from robolink.calibration._one_touch import Pin as Pin
     from robolink.calibration._one_touch import pin_touched as pin_touched
@@ -129,9 +138,7 @@ _LOADED_LATER = {
     "ToolDifference": "_joint",
     "solve_joint": "_joint",
     "solve_n_angle": "_n_angle",
-    "NeedleChain": "_needle_change",
     "NeedleChangeResult": "_needle_change",
-    "NeedleLimits": "_needle_change",
     "solve_needle_change": "_needle_change",
     "Pin": "_one_touch",
     "pin_touched": "_one_touch",

@@ -1,10 +1,10 @@
 """The nozzle change on paper: every step with its target, before anything moves."""
 
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from robolink.calibration import Ask, Move, Procedure, Seek, travel
+from robolink.calibration import Ask, Move, Offer, Procedure, Seek, Tell, travel
 from robolink.errors import CalibrationError, LimitError
 from robolink.messages import tr
 from robolink.model import Controller, InputEdge, MotionGroup, MotionProfile, Path, Pose, ToolOffset
@@ -48,10 +48,39 @@ def preview(controller: Controller, plan: ChangePlan) -> tuple[PlannedStep, ...]
     """
     if not plan.moves:
         return ()
+    return tuple(_foresee(controller, plan, flange_now(controller)))
+
+
+def foresee(
+    procedure: Procedure[object], *, here: Pose, settings: RunSettings
+) -> tuple[PlannedStep, ...]:
+    """Return the steps of one procedure that begins with the flange at ``here``."""
+    return tuple(_follow(procedure, here, settings))
+
+
+def flange_now(controller: Controller) -> Pose:
+    """Read where the flange is, whatever tool is in force."""
     here = controller.groups[0].pose()
     selected = controller.tools.read(here.tool) if here.tool else None
-    start = flange_pose(here, selected or ToolOffset())
-    return tuple(_foresee(controller, plan, start))
+    return flange_pose(here, selected or ToolOffset())
+
+
+def require_inside(controller: Controller, steps: Sequence[PlannedStep]) -> None:
+    """Refuse steps whose targets lie outside the limits.
+
+    Raises:
+        LimitError: Names the first of them.
+    """
+    for step in steps:
+        if step.refusal:
+            raise LimitError(
+                tr("{step}: {refusal}", step=step.text, refusal=step.refusal),
+                remedy=tr(
+                    "Nothing was moved. The box lies about where the robot stands at the start: "
+                    "bring it nearer, or widen the box."
+                ),
+                controller=controller.identity,
+            )
 
 
 def _foresee(controller: Controller, plan: ChangePlan, start: Pose) -> Iterator[PlannedStep]:
@@ -95,6 +124,10 @@ def _follow(
     try:
         step = next(procedure)
         while True:
+            if isinstance(step, (Tell, Offer)):
+                # What it would say depends on poses that nobody took.
+                step = procedure.send(None)
+                continue
             if isinstance(step, Ask):
                 yield PlannedStep(step.instruction)
             else:

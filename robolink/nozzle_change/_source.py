@@ -21,6 +21,7 @@ class Bench:
 
     Args:
         settings: Limits and speeds for a tip at an offset from the flange.
+        offers: Whether the person is asked about what a procedure offers.
     """
 
     def __init__(
@@ -30,11 +31,13 @@ class Bench:
         *,
         start: Pose | None,
         settings: Callable[[Pose, ToolOffset | None], RunSettings],
+        offers: bool = True,
     ) -> None:
         self.controller = controller
         self.operator = operator
         self.start = start
         self._settings = settings
+        self._offers = offers
         self._on_step: Callable[[StepDone], None] | None = None
 
     @contextmanager
@@ -61,7 +64,12 @@ class Bench:
         # Where nothing moves there is nothing to limit, and perhaps no pose to be read.
         start = Pose(0.0, 0.0, 0.0, 0.0) if self.start is None else self.start
         return Runner(
-            self.controller, group, self.operator, self._settings(start, tip), on_step=self._on_step
+            self.controller,
+            group,
+            self.operator,
+            self._settings(start, tip),
+            on_step=self._on_step,
+            offers=self._offers,
         )
 
 

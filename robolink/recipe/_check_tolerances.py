@@ -8,7 +8,13 @@ from robolink.config import Problem
 from robolink.messages import tr
 from robolink.model import Pose
 from robolink.recipe._draft import Draft
-from robolink.recipe._sources import AnySource, BeamsSource, OperatorSource, TouchSource
+from robolink.recipe._sources import (
+    AnySource,
+    BeamsSource,
+    OneTouchSource,
+    OperatorSource,
+    TouchSource,
+)
 
 
 def residuals(draft: Draft) -> Iterator[Problem]:
@@ -32,7 +38,8 @@ def intervals(draft: Draft) -> Iterator[Problem]:
     if limits is None or source is None or limits.interval_mm is None:
         return
     if limits.sigma_mm is None:
-        if source.agrees_always:
+        # One touch may take it from the calibration before.
+        if source.agrees_always and not isinstance(source, OneTouchSource):
             yield Problem(
                 "tolerances.sigma_mm",
                 tr(
@@ -81,6 +88,8 @@ def _without_residual(source: AnySource) -> str:
             "cannot be judged: two touches always agree, so they leave no residual; give four "
             "speeds_mm_s, or interval_mm with sigma_mm"
         )
+    if isinstance(source, OneTouchSource):
+        return tr("cannot be judged: one touch leaves no residual; use interval_mm")
     return tr(
         "cannot be judged: two poses always agree, so they leave no residual; "
         'use method = "n_angle", or interval_mm with sigma_mm'

@@ -1,24 +1,43 @@
 """From a recipe to the plan of a nozzle change."""
 
-from robolink.calibration import BeamStation, CrossingPlan, ProbePlan, TouchPlan, TouchStation
-from robolink.errors import ConfigError, LimitError
+from robolink.calibration import (
+    BeamStation,
+    Course,
+    CrossingPlan,
+    NeedleLimits,
+    ProbePlan,
+    TouchPlan,
+    TouchStation,
+)
+from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import Controller, Pose
 from robolink.nozzle_change import (
+    Absolute,
     ChangePlan,
     CrossedBeams,
+    Deferred,
     Gate,
     GivenPoses,
     Limits,
+    ManyTouches,
+    OneTouch,
     PinAndPerson,
     TipSource,
     ToolPlan,
     TouchProbe,
-    preview,
+    TwoTouches,
+    difference_from_last,
     taught_poses,
 )
 from robolink.recipe._recipe import Recipe
-from robolink.recipe._sources import BeamsSource, OperatorSource, PointsSource, TouchSource
+from robolink.recipe._sources import (
+    BeamsSource,
+    OneTouchSource,
+    OperatorSource,
+    PointsSource,
+    TouchSource,
+)
 from robolink.recipe._tables import Station, Tool
 
 
@@ -60,6 +79,7 @@ def plan_of(
                 attempts=recipe.attempts,
                 approach=tool.approach.pose if tool.approach else None,
                 retreat=tool.retreat.pose if tool.retreat else None,
+                pin=_pin(recipe),
             )
             for tool in recipe.tools
         ),
@@ -75,31 +95,20 @@ def plan_of(
     )
 
 
-def require_inside(controller: Controller, plan: ChangePlan) -> None:
-    """Refuse a plan whose foreseen targets lie outside its limits; reads only.
-
-    Raises:
-        LimitError: Names the step.
-    """
-    for step in preview(controller, plan):
-        if step.refusal:
-            raise LimitError(
-                tr("{step}: {refusal}", step=step.text, refusal=step.refusal),
-                remedy=tr(
-                    "Nothing was moved. The box lies about where the robot stands at the start: "
-                    "bring it nearer, or widen [box] in the recipe."
-                ),
-                controller=controller.identity,
-            )
-
-
 def _source(recipe: Recipe, controller: Controller, tool: Tool) -> TipSource:
     source, tolerances = recipe.source, recipe.tolerances
     if isinstance(source, OperatorSource):
         touch = TouchPlan(
             lift_mm=source.lift_mm, clearance_mm=source.clearance_mm, turn_deg=source.turn_deg
         )
-        return PinAndPerson(touch, turns_deg=source.turns_deg, sigma_mm=tolerances.sigma_mm)
+        return PinAndPerson(
+            touch,
+            turns_deg=source.turns_deg,
+            sigma_mm=tolerances.sigma_mm,
+            course=Course(source.until_mm, retake=source.retake),
+        )
+    if isinstance(source, OneTouchSource):
+        return _from_one_touch(source, controller, tool, recipe)
     if isinstance(source, BeamsSource):
         return _from_beams(source, tolerances.sigma_mm)
     if isinstance(source, TouchSource):
@@ -107,9 +116,50 @@ def _source(recipe: Recipe, controller: Controller, tool: Tool) -> TipSource:
     return _from_points(source, controller, tool, recipe)
 
 
+def _pin(recipe: Recipe) -> str:
+    """Return the name of the pin whose place is kept, empty where none is touched."""
+    touched = isinstance(recipe.source, (OperatorSource, OneTouchSource))
+    return recipe.station.id if touched else ""
+
+
+def _from_one_touch(
+    source: OneTouchSource, controller: Controller, tool: Tool, recipe: Recipe
+) -> TipSource:
+    touch = TouchPlan(lift_mm=source.lift_mm, clearance_mm=source.clearance_mm)
+    tolerances, station = recipe.tolerances, recipe.station
+    if recipe.basis == "absolute":
+        from robolink.calibration import Pin  # numpy, which other recipes do without
+
+        x_mm, y_mm, z_mm = _place(station)
+        return OneTouch(Absolute(Pin(x_mm, y_mm, z_mm), tolerances.sigma_mm), touch)
+    limits = NeedleLimits(
+        max_change_mm=tolerances.jump_mm,
+        tolerance_mm=tolerances.interval_mm or NeedleLimits().tolerance_mm,
+        max_changes=source.max_changes,
+    )
+
+    def make() -> OneTouch:
+        solver = difference_from_last(
+            controller, tool.number, station.id, sigma_mm=tolerances.sigma_mm, limits=limits
+        )
+        return OneTouch(solver, touch)
+
+    return Deferred(make, sentence=tr("measured on the robot: one pin touched once"))
+
+
+def _place(place: Station) -> tuple[float, float, float]:
+    x_mm, y_mm, z_mm = place.x_mm, place.y_mm, place.z_mm
+    assert x_mm is not None  # noqa: S101 - the recipe was checked and located
+    assert y_mm is not None  # noqa: S101
+    assert z_mm is not None  # noqa: S101
+    return x_mm, y_mm, z_mm
+
+
 def _from_beams(source: BeamsSource, sigma_mm: float | None) -> TipSource:
     from robolink.calibration import Beam  # numpy, which recipes without beams do without
 
+    assert source.beams is not None  # noqa: S101 - the recipe was checked and located
+    assert source.z_mm is not None  # noqa: S101
     first, second = source.beams
     station = BeamStation(
         (
@@ -134,11 +184,7 @@ def _from_beams(source: BeamsSource, sigma_mm: float | None) -> TipSource:
 
 
 def _from_touch(source: TouchSource, place: Station, sigma_mm: float | None) -> TipSource:
-    x_mm, y_mm, z_mm = place.x_mm, place.y_mm, place.z_mm
-    assert x_mm is not None  # noqa: S101 - the recipe was checked
-    assert y_mm is not None  # noqa: S101
-    assert z_mm is not None  # noqa: S101
-    station = TouchStation(x_mm, y_mm, z_mm, source.input, off_when_touched=source.off_when_touched)
+    station = TouchStation(*_place(place), source.input, off_when_touched=source.off_when_touched)
     plan = ProbePlan(
         clearance_mm=source.clearance_mm,
         beyond_mm=source.beyond_mm,
@@ -164,12 +210,13 @@ def _from_points(
         return taught_poses(points, numbers)
 
     names = ", ".join(f"P{number}" for number in numbers)
+    sigma_mm = recipe.tolerances.sigma_mm
+    method = ManyTouches(sigma_mm) if source.method == "n_angle" else TwoTouches(sigma_mm)
     return GivenPoses(
         read,
+        method,
         taught_tool=source.taught_tool,
         plausible_mm=recipe.tolerances.jump_mm,
-        several=source.method == "n_angle",
-        sigma_mm=recipe.tolerances.sigma_mm,
         sentence=tr(
             "points {names} taught on the pendant with tool {tool}",
             names=names,

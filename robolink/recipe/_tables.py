@@ -58,14 +58,15 @@ class Station(Table):
     """Where it is measured."""
 
     id: Line
-    """Id of the pin or gauge; it goes on record with every measurement."""
+    """Name of the pin or gauge; it goes on record with every measurement. What this table does not
+    say about its place comes from the station of that name in the cell file and the journal."""
     x_mm: float | None = None
     """X of the pin's end, for the record, or of where the surface is touched; base, mm."""
     y_mm: float | None = None
     """Y of the pin's end, for the record, or of where the surface is touched; base, mm."""
     z_mm: float | None = None
-    """Z of the pin's end or of the surface, base, mm; z = "measured" needs it when basis is
-    "absolute", and source "touch" always."""
+    """Z of the pin's end or of the surface, base, mm; z = "measured" needs it, from here or from
+    the station's record, when basis is "absolute", and source "touch" always."""
     note: Note = ""
     """For people."""
 

@@ -47,6 +47,7 @@ NEEDS_A_CONTROLLER = {
     "verify-controller": [],
     "jog": ["z+1", "--yes"],
     "calibrate two-pose": ["--tool", "1", *POSES, "--yes"],
+    "calibrate n-angle": ["--tool", "1", *POSES, "--pose", "296.1,87.7,90", "--yes"],
     "impact": ["--tool", "1", "--x", "13", "--points", "1-5"],
 }
 """Command and arguments with which it succeeds on a controller that is ready."""
@@ -73,6 +74,15 @@ BAD = {
     "verify-controller": (["--timeout", "0"], "0"),
     "jog": (["--yes", "x0.1"], "is not a jog step"),
     "calibrate two-pose": (["--tool", "1", "--taught-tool", "0"], "--taught-tool"),
+    "calibrate n-angle": (["--tool", "1", "--angles", "0,90"], "not angles for this method"),
+    "calibrate one-touch": (["--tool", "1"], "Missing option '--station'"),
+    "calibrate beams": (["--tool", "1", "--station", "B"], "no station 'B'"),
+    "calibrate z-touch": (["--tool", "1", "--station", "P", "--speeds", "x"], "no speeds"),
+    "calibrate pivot": (["--tool", "1", "--pose", "1,2,3"], "does not state all"),
+    "calibrate six-point": (["--tool", "0"], "never written"),
+    "station list": (["all"], "unexpected extra argument"),
+    "station show": (["B"], "no station 'B'"),
+    "station learn": (["B", "--tool", "0"], "0 is not in the range"),
     "impact": (["--tool", "1", "--x", "nan", "--points", "1"], "not a number"),
     "status": (["--timeout", "-1"], "-1"),
     "where": (["here"], "unexpected extra argument"),

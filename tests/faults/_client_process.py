@@ -18,7 +18,8 @@ _FORKS.set_forkserver_preload(
         "_pytest.config",  # which the main module of a test run imports, in each fork anew
         "robolink_cli.main",
         "robolink_cli.calibrate",
-        "robolink_cli._calibrating",
+        "robolink_cli.calibrate.two_pose",
+        "robolink_cli.calibrate._live",
         "robolink_cli._password",
         "robolink.transport._tcp",
         "robolink.transport._modbus_open",

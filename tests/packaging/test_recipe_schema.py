@@ -24,6 +24,7 @@ HEADINGS = {
     "BeamsSource": '`[source]` with `kind = "beams"`',
     "BeamLine": "`[[source.beams]]`",
     "TouchSource": '`[source]` with `kind = "touch"`',
+    "OneTouchSource": '`[source]` with `kind = "one_touch"`',
     "Station": "`[station]`",
     "Poses": "`[poses]`",
     "FlangePose": "`[poses]`",

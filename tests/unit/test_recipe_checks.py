@@ -210,9 +210,9 @@ def test_half_a_place_of_the_pin_is_refused():
     assert problems(with_(PIN, "[station]", "y_mm = 1", "x_mm = 1")) == {}
 
 
-def test_a_measured_height_needs_the_height_of_the_pin_unless_it_is_a_difference():
+def test_a_measured_height_may_count_from_the_record_of_the_pin():
     measured = PIN.replace('"kept"', '"measured"')
-    assert list(problems(measured)) == ["station.z_mm"]
+    assert problems(measured) == {}
     assert problems(with_(measured, "[station]", "z_mm = -100")) == {}
     assert problems(measured.replace('"absolute"', '"difference"')) == {}
 

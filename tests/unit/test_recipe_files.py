@@ -69,13 +69,19 @@ def test_every_example_loads(path):
 def test_the_examples_are_those_that_the_page_describes():
     assert [path.name for path in EXAMPLES] == [
         "needle-beams.toml",
+        "needle-one-touch.toml",
         "pendant-points.toml",
         "scara-pin.toml",
         "two-nozzles.toml",
     ]
-    beams, points, pin, nozzles = (load_recipe(path).recipe for path in EXAMPLES)
+    beams, one_touch, points, pin, nozzles = (load_recipe(path).recipe for path in EXAMPLES)
+    assert (one_touch.source.kind, one_touch.z, one_touch.basis) == (
+        "one_touch",
+        "measured",
+        "difference",
+    )
     assert isinstance(beams.source, BeamsSource)
-    assert ([beam.input for beam in beams.source.beams], beams.attempts) == ([3, 4], 2)
+    assert ([beam.input for beam in beams.source.beams or ()], beams.attempts) == ([3, 4], 2)
     assert isinstance(points.source, PointsSource)
     assert (points.basis, points.verifies, points.tools[0].points) == (
         "difference",
@@ -131,7 +137,7 @@ def test_an_output_can_be_switched_at_every_moment_of_a_nozzle_change():
 
 
 def test_a_pose_of_the_flange_is_a_pose_in_tool_0():
-    pose = load_recipe(EXAMPLES[2]).recipe.poses.safe
+    pose = load_recipe(EXAMPLES[3]).recipe.poses.safe
     assert pose is not None
     assert pose.pose.coordinates() == (158.6, 495.4, -40.0, 0.0, 0.0, 0.0)
     assert pose.pose.tool == 0
@@ -174,12 +180,12 @@ def test_a_missing_basis_says_what_both_mean(problems):
         (
             '[source]\nkind = "camera"',
             "source.kind",
-            'must be one of "beams", "operator", "points", "touch"',
+            'must be one of "beams", "one_touch", "operator", "points", "touch"',
         ),
         (
             "[source]\nlift_mm = 5",
             "source.kind",
-            'must be one of "beams", "operator", "points", "touch"',
+            'must be one of "beams", "one_touch", "operator", "points", "touch"',
         ),
         ('[source]\nkind = "operator"\nlift_mm = 0.5', "source.lift_mm", "must be at least 1"),
         ('[source]\nkind = "operator"\nturn_deg = 350', "source.turn_deg", "must be at most 330"),

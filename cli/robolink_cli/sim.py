@@ -17,6 +17,16 @@ def sim() -> None:
 sim.add_command(sim_plc)
 
 
+_world_option = click.option(
+    "--world",
+    "world",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="How imperfect the cell is, and how its camera is built; a wrong name lists all. May be "
+    "repeated.",
+)
+
+
 @sim.command()
 @click.option(
     "--tcp",
@@ -70,6 +80,7 @@ sim.add_command(sim_plc)
     help="Serve a dialogue that --record has written, in place of a simulator.",
 )
 @click.option("--allow-remote", is_flag=True, help="Listen where other machines can reach it, too.")
+@_world_option
 @json_option
 def epson(
     *,
@@ -80,6 +91,7 @@ def epson(
     state: Path | None,
     speed: float,
     options: tuple[str, ...],
+    world: tuple[str, ...],
     profile: Path | None,
     replay: Path | None,
     allow_remote: bool,
@@ -100,6 +112,7 @@ def epson(
         return
     from robolink_simulators.epson import EpsonSimulator
 
+    from robolink_cli._serving import world_from
     from robolink_cli._serving_epson import habits, password_in, serve_epson
 
     simulator = EpsonSimulator(
@@ -108,6 +121,7 @@ def epson(
         password=password_in(password_env),
         options=habits(options, profile),
         state_path=state,
+        world=world_from(world),
     )
     serve_epson(simulator, listen, speed=speed, allow_remote=allow_remote)
 
@@ -176,6 +190,7 @@ def epson(
     help="A habit of the PLC; a wrong name lists them all. May be repeated.",
 )
 @click.option("--allow-remote", is_flag=True, help="Listen where other machines can reach it, too.")
+@_world_option
 @json_option
 def softmotion(
     *,
@@ -190,6 +205,7 @@ def softmotion(
     state: Path | None,
     speed: float,
     options: tuple[str, ...],
+    world: tuple[str, ...],
     allow_remote: bool,
 ) -> None:
     """Serve a simulated SoftMotion PLC with a mailbox until Ctrl-C.
@@ -201,7 +217,7 @@ def softmotion(
     from robolink_simulators.softmotion.mailbox.option_text import options_from_text
     from robolink_simulators.softmotion.mailbox.parameters import parameters_from_text
 
-    from robolink_cli._serving import named_values
+    from robolink_cli._serving import named_values, world_from
     from robolink_cli._serving_softmotion import Buses, serve_plc
 
     simulator = SoftMotionSimulator(
@@ -210,6 +226,7 @@ def softmotion(
         parameters=parameters_from_text(named_values(parameters, "--param dArmLength1=250")),
         options=options_from_text(named_values(options, "--option profile=tools")),
         state_path=state,
+        world=world_from(world),
     )
     buses = Buses(modbus_tcp, modbus_rtu, can, unit=unit, node=node, allow_remote=allow_remote)
     serve_plc(simulator, buses, speed=speed)

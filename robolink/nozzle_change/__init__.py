@@ -1,5 +1,6 @@
 """The nozzle change: measure the new tips, write their offsets, prove them, or undo it."""
 
+from robolink.nozzle_change._camera_to_find import CameraToFind as CameraToFind
 from robolink.nozzle_change._change import Earlier as Earlier
 from robolink.nozzle_change._change import NozzleChange as NozzleChange
 from robolink.nozzle_change._crossed_beams import CrossedBeams as CrossedBeams
@@ -9,6 +10,7 @@ from robolink.nozzle_change._given_poses import GivenPoses as GivenPoses
 from robolink.nozzle_change._given_poses import PointReader as PointReader
 from robolink.nozzle_change._given_poses import PosesFound as PosesFound
 from robolink.nozzle_change._given_poses import taught_poses as taught_poses
+from robolink.nozzle_change._held_board import HeldBoard as HeldBoard
 from robolink.nozzle_change._listener import Listener as Listener
 from robolink.nozzle_change._listener import Moment as Moment
 from robolink.nozzle_change._plan import ChangePlan as ChangePlan
@@ -24,3 +26,4 @@ from robolink.nozzle_change._source import MovingSource as MovingSource
 from robolink.nozzle_change._source import TipSource as TipSource
 from robolink.nozzle_change._touch_probe import TouchProbe as TouchProbe
 from robolink.nozzle_change._touching import PinAndPerson as PinAndPerson
+from robolink.nozzle_change._up_camera import UpCamera as UpCamera

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
-from robolink.calibration import Ask, Seek, travel
+from robolink.calibration import Ask, Look, Seek, travel
 from robolink.errors import CalibrationError, ConfigError, RobolinkError
 from robolink.messages import tr
 from robolink.model import NewEntry, Pose
@@ -74,7 +74,7 @@ class Measuring:
         poses: list[Pose] = []
 
         def on_step(done: StepDone) -> None:
-            if isinstance(done.step, (Ask, Seek)):
+            if isinstance(done.step, (Ask, Seek, Look)):
                 poses.append(done.pose)
             self._listener.step(plan.tool, done)
 

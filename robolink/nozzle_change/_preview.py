@@ -4,10 +4,20 @@ from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass
 from functools import partial
 
-from robolink.calibration import Ask, Move, Procedure, Seek, travel
+from robolink.calibration import Ask, Look, Move, Procedure, Seek, SeenAt, travel
 from robolink.errors import CalibrationError, LimitError
 from robolink.messages import tr
-from robolink.model import Controller, InputEdge, MotionGroup, MotionProfile, Path, Pose, ToolOffset
+from robolink.model import (
+    Controller,
+    InputEdge,
+    MotionGroup,
+    MotionProfile,
+    Path,
+    Pose,
+    Spot,
+    SpotUnit,
+    ToolOffset,
+)
 from robolink.nozzle_change._flange import flange_pose
 from robolink.nozzle_change._plan import ChangePlan
 from robolink.nozzle_change._source import MovingSource
@@ -95,12 +105,16 @@ def _follow(
     try:
         step = next(procedure)
         while True:
+            answer = here
             if isinstance(step, Ask):
                 yield PlannedStep(step.instruction)
+            elif isinstance(step, Look):
+                yield PlannedStep(step.purpose)
+                answer = SeenAt.of(here, Spot(*step.expected_mm), SpotUnit.BASE_MM)
             else:
-                here = step.target
+                answer = here = step.target
                 yield _planned(step, settings)
-            step = procedure.send(here)
+            step = procedure.send(answer)
     except (StopIteration, CalibrationError):
         # The poses are foreseen, so what they would give means nothing.
         return here

@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TypeVar
 
-from robolink.calibration import Ask, Procedure, Seek, Step
+from robolink.calibration import Ask, Look, Procedure, Seek, SeenAt, Step
 from robolink.errors import (
     CalibrationError,
     ConfigError,
@@ -23,10 +23,12 @@ from robolink.model import (
     MotionProfile,
     Path,
     Pose,
+    TipSensor,
 )
 from robolink.runner._jog_steps import jog_target
 from robolink.runner._operator import Operator, Question
 from robolink.runner._settings import RunSettings
+from robolink.sensing import seen_once
 
 POLL_S = 1.0
 """Longest time between two status reads while a person is asked (design: at most 5 s)."""
@@ -51,6 +53,7 @@ class Runner:
         operator: Who is asked.
         settings: Limits and speeds.
         on_step: Told of every step taken.
+        camera: What looks are taken with, ``None`` where there are none.
     """
 
     def __init__(
@@ -61,12 +64,14 @@ class Runner:
         settings: RunSettings,
         *,
         on_step: Callable[[StepDone], None] | None = None,
+        camera: TipSensor | None = None,
     ) -> None:
         self._controller = controller
         self._group = group
         self._operator = operator
         self._settings = settings
         self._on_step = on_step
+        self._camera = camera
 
     def run(self, procedure: Procedure[T]) -> T:
         """Take the procedure's steps until it returns; its result is a proposal.
@@ -125,9 +130,23 @@ class Runner:
         if isinstance(step, Ask):
             return self._ask(step)
         self._operator.tell(step.purpose)
+        if isinstance(step, Look):
+            return self._look(step)
         if isinstance(step, Seek):
             return self._seek(step)
         return self.move(step.target, step.path)
+
+    def _look(self, step: Look) -> SeenAt:
+        camera = self._camera
+        if camera is None:
+            raise ConfigError(
+                tr("A camera is needed, and none was named."),
+                remedy=tr("Name it with --sensor, in the recipe, or in the cell file."),
+            )
+        self._controller.clock.sleep(camera.settle_s)
+        pose = self._group.pose()
+        spot = seen_once(camera, step.mark, pictures=step.pictures)
+        return SeenAt.of(pose, spot, camera.unit)
 
     def _seek(self, step: Seek) -> Pose:
         settings = self._settings

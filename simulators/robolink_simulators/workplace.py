@@ -1,17 +1,20 @@
-"""The place where a simulated robot works, whatever its controller: tips, a pin, a person.
+"""The place where a simulated robot works: tips, a pin, a camera, a board, a person.
 
 Ground truth. The controller knows none of it; only what it stores.
 """
 
+import math
 import random
 from collections.abc import Callable, Hashable
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Final, Protocol
 
-from robolink.model import Pose, ToolOffset
-
-XyzMm = tuple[float, float, float]
-"""X, Y, Z in mm, in the robot's base frame."""
+from robolink.model import TIP, Pose, ToolOffset
+from robolink_simulators.camera import Pixel, UpCamera
+from robolink_simulators.held_board import HeldBoard
+from robolink_simulators.places import XyzMm as XyzMm
+from robolink_simulators.sensing import UPRIGHT, Lean
+from robolink_simulators.world_parameters import WorldParameters
 
 MOUNTED_TOOL: Final = 1
 """The tool number of the nozzle on the arm."""
@@ -35,6 +38,9 @@ class Handled(Protocol):
         What it cannot reach it refuses with the error of its own controller.
         """
 
+    def loosen(self, parameters: WorldParameters) -> None:
+        """Give the axes the play that the parameters say."""
+
 
 class Workplace:
     """What is true around a robot.
@@ -43,9 +49,14 @@ class Workplace:
         robot: Who works here.
         tips: The physical tip of each tool number, seen from the flange.
         pin_mm: Tip of the reference pin.
-        operator_sigma_mm: Standard deviation of what an eye reads, per axis.
-        seed: Decides the next nozzles.
+        seed: Decides the next nozzles, where the camera is, and how a board is held.
         replaced: What the next nozzle differs from where no tip is known yet.
+        parameters: What goes wrong here; see :meth:`set_up`.
+
+    Attributes:
+        leans: By how much the nozzle of a tool is bent; upright where none is named.
+        camera: The up-looking camera.
+        board: The board that the mounted nozzle holds, ``None`` for none.
     """
 
     def __init__(
@@ -54,16 +65,50 @@ class Workplace:
         tips: dict[int, ToolOffset],
         pin_mm: XyzMm,
         *,
-        operator_sigma_mm: float = 0.01,
         seed: int,
         replaced: ToolOffset,
+        parameters: WorldParameters,
     ) -> None:
         self.robot = robot
         self.tips = tips
         self.pin_mm = pin_mm
-        self.operator_sigma_mm = operator_sigma_mm
+        self.leans: dict[int, Lean] = {}
+        self.board: HeldBoard | None = None
+        self._seed = seed
         self._random = random.Random(f"nozzles {seed}")
         self._replaced = replaced
+        rng = random.Random(f"camera {seed}")
+        self.camera = UpCamera(camera_beside(self.tip_mm(), rng), parameters.optics, rng)
+        self.set_up(parameters)
+
+    def set_up(self, parameters: WorldParameters) -> None:
+        """Give the cell other imperfections; nozzles, pin and camera stay where they are."""
+        self.parameters = parameters
+        self.operator_sigma_mm = parameters.eye_sigma_mm
+        self.leans[MOUNTED_TOOL] = parameters.lean
+        self.camera.optics = parameters.optics
+        self.robot.loosen(parameters)
+        if not parameters.board_held:
+            self.board = None
+        elif self.board is None:
+            self.board = HeldBoard.grasped(random.Random(f"board {self._seed}"))
+
+    def lean_of(self, tool: int) -> Lean:
+        """Return by how much a nozzle is bent, in the flange's axes."""
+        return self.leans.get(tool, UPRIGHT)
+
+    def see(self, mark: int = TIP) -> tuple[Pixel, ...]:
+        """Take a picture and return everything in it that looks like the tip, or a fiducial.
+
+        Fiducials look alike: every one in the image is found, whichever is asked for.
+        """
+        nozzle, board = self.tips.get(MOUNTED_TOOL, ToolOffset()), self.board
+        if mark == TIP:
+            # A held board hides the tip of its nozzle.
+            seen = [tip for tool, tip in self.tips.items() if not (board and tool == MOUNTED_TOOL)]
+        else:
+            seen = list(board.fiducials(nozzle)) if board else []
+        return self.camera.picture(self.robot.tip_mm(place) for place in seen)
 
     def tip_mm(self, tool: int = MOUNTED_TOOL) -> XyzMm:
         """Return where a physical tip is now."""
@@ -80,7 +125,20 @@ class Workplace:
             "tips": {str(tool): asdict(tip) for tool, tip in self.tips.items()},
             "pin_mm": list(self.pin_mm),
             "operator_sigma_mm": self.operator_sigma_mm,
+            "camera": {
+                "middle_mm": list(self.camera.middle_mm),
+                "mm_per_px": [list(row) for row in self.camera.optics.mm_per_px],
+                "size_px": list(self.camera.optics.size_px),
+            },
+            "board": self._held(),
+            "parameters": asdict(self.parameters),
         }
+
+    def _held(self) -> dict[str, Any] | None:
+        if self.board is None:
+            return None
+        frame = self.board.frame(self.tips.get(MOUNTED_TOOL, ToolOffset()))
+        return {"frame": asdict(frame), "drawing_mm": [list(at) for at in self.board.drawing_mm]}
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,8 +208,14 @@ class Operator:
         )
 
     def _drawn_error(self) -> Look:
+        rng, parameters = self._random, self._workplace.parameters
         sigma_mm = self._workplace.operator_sigma_mm
-        return Look(*(self._random.gauss(0.0, sigma_mm) for _ in range(3)))
+        dx, dy, dz = (rng.gauss(0.0, sigma_mm) for _ in range(3))
+        if parameters.eye_outlier_share and rng.random() < parameters.eye_outlier_share:
+            way = rng.uniform(0.0, math.tau)
+            dx += parameters.eye_outlier_mm * math.cos(way)
+            dy += parameters.eye_outlier_mm * math.sin(way)
+        return Look(dx, dy, dz)
 
 
 def exchanged(old: ToolOffset, rng: random.Random) -> ToolOffset:
@@ -166,6 +230,17 @@ def pin_beside(tip_mm: XyzMm, rng: random.Random) -> XyzMm:
         round(tip_mm[0] + _signed(rng, 5.0, 9.0), 3),
         round(tip_mm[1] + _signed(rng, 5.0, 9.0), 3),
         round(tip_mm[2] - rng.uniform(3.0, 6.0), 3),
+    )
+
+
+def camera_beside(tip_mm: XyzMm, rng: random.Random) -> XyzMm:
+    """Return where a camera looks: nearer to the robot's base than a tip, and below it."""
+    reach_mm = math.hypot(tip_mm[0], tip_mm[1])
+    inward, beside = rng.uniform(12.0, 18.0) / reach_mm, _signed(rng, 4.0, 8.0) / reach_mm
+    return (
+        round(tip_mm[0] * (1 - inward) - tip_mm[1] * beside, 3),
+        round(tip_mm[1] * (1 - inward) + tip_mm[0] * beside, 3),
+        round(tip_mm[2] - rng.uniform(6.0, 9.0), 3),
     )
 
 

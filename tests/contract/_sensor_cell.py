@@ -16,7 +16,7 @@ from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 from robolink_simulators.workplace import XyzMm
 
 import robolink
-from robolink.calibration import Ask, Beam, BeamStation, Move, Seek, TouchStation
+from robolink.calibration import Ask, Beam, BeamStation, Look, Move, Seek, TouchStation
 from robolink.model import Controller, InputEdge, Pose, ToolOffset
 from robolink.nozzle_change import (
     ChangePlan,
@@ -79,7 +79,7 @@ class Inverted:
 class Taken:
     """A step in which nobody was asked, and the pose after it."""
 
-    step: Move | Seek
+    step: Move | Seek | Look
     pose: Pose
 
     @property

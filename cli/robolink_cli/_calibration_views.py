@@ -1,11 +1,12 @@
 """What a calibration shows and reports."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
-from robolink.calibration import CalibrationResult
 from robolink.messages import tr
-from robolink.nozzle_change import Proposal, ToolReport
-from robolink_cli._render import say
+from robolink.nozzle_change import PlannedStep, Proposal, ToolReport, Verdict
+from robolink_cli._doubts import doubts as doubts
+from robolink_cli._fit_views import fit_sentence, interval_sentence, show_residuals
+from robolink_cli._render import note, say
 from robolink_cli._tables import show_change
 from robolink_cli._views import (
     offset_payload,
@@ -16,7 +17,7 @@ from robolink_cli._views import (
 
 
 def show_proposal(proposal: Proposal) -> None:
-    """Show what was measured next to what is stored."""
+    """Show what was measured next to what is stored, how sure it is, and what is in doubt."""
     show_change(
         proposal.tool,
         offset_payload(proposal.before),
@@ -24,30 +25,29 @@ def show_proposal(proposal: Proposal) -> None:
         after_name=tr("measured") if proposal.measured is None else tr("proposed"),
         unmeasured=proposal.kept,
     )
-    for remark in (*proposal.notes, fit_sentence(proposal.result)):
-        say(f"  {remark}")
+    result = proposal.result
+    for remark in (*proposal.notes, fit_sentence(result), interval_sentence(result)):
+        if remark:
+            say(f"  {remark}")
+    if result.residuals_mm:
+        show_residuals(result)
+    for sentence in doubts(proposal):
+        say(f"  ! {sentence}")
 
 
-def fit_sentence(result: CalibrationResult) -> str:
-    """Return how far the measurement can be trusted, in one sentence."""
-    if result.rms_mm is None:
-        return tr(
-            "two poses leave no residual: each placement error counts {gain:.2f} times",
-            gain=result.sigma_gain,
+def show_verdicts(verdicts: Sequence[Verdict]) -> None:
+    """Show what the limits say about a proposal."""
+    for verdict in verdicts:
+        mark = tr("ok") if verdict.passed else tr("too much")
+        say(
+            tr(
+                "  {name} {found:.3f} mm, {limit:.3f} mm allowed: {mark}",
+                name=verdict.name,
+                found=verdict.found_mm,
+                limit=verdict.limit_mm,
+                mark=mark,
+            )
         )
-    return tr(
-        "{count} poses agree within {rms:.3f} mm rms, {largest:.3f} mm at most",
-        count=len(result.inputs),
-        rms=result.rms_mm,
-        largest=result.max_residual_mm,
-    )
-
-
-def doubts(proposal: Proposal) -> tuple[str, ...]:
-    """Return what a proposal leaves in doubt, as sentences for a report."""
-    if "small_rotation" in proposal.result.warnings:
-        return (tr("The poses differ little in U; half a turn would be best."),)
-    return ()
 
 
 def show_report(report: ToolReport) -> None:
@@ -79,13 +79,40 @@ def show_report(report: ToolReport) -> None:
     )
 
 
+def judged_payload(proposal: Proposal, verdicts: Sequence[Verdict]) -> dict[str, object]:
+    """Return a proposal with what the limits say about it."""
+    judged = [
+        {
+            "code": verdict.code,
+            "found_mm": verdict.found_mm,
+            "limit_mm": verdict.limit_mm,
+            "passed": verdict.passed,
+        }
+        for verdict in verdicts
+    ]
+    return {**proposal_payload(proposal), "verdicts": judged}
+
+
 def report_payload(report: ToolReport) -> dict[str, object]:
     """Return the document of a finished calibration."""
     return {
-        **proposal_payload(report.proposal),
+        **judged_payload(report.proposal, report.verdicts),
         "write": receipt_payload(report.receipt) if report.receipt else None,
         "verification": verification_payload(report.verification),
     }
+
+
+def show_course(steps: Sequence[PlannedStep]) -> None:
+    """Say how a measurement will go, before anybody is asked."""
+    moves = sum(step.target is not None for step in steps)
+    note(
+        tr(
+            "The plan: a person brings the tip to its place {asks} times, in between {moves} "
+            "movements. All targets lie inside the box; --dry-run lists them.",
+            asks=len(steps) - moves,
+            moves=moves,
+        )
+    )
 
 
 def show_plan(payload: Mapping[str, object]) -> None:

@@ -119,4 +119,6 @@ def _checked(path: Path) -> dict[str, Any]:
 
 
 def _shown(value: object) -> str:
+    if isinstance(value, dict):
+        return ", ".join(value)
     return f"{value:g}" if isinstance(value, float) else str(value)

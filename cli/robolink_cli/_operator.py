@@ -3,12 +3,13 @@
 import queue
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cache
 
 from robolink.errors import DeclinedError
 from robolink.messages import tr
-from robolink.runner import Question
+from robolink.runner import Operator, Question
 from robolink_cli._render import note
 
 
@@ -126,3 +127,25 @@ class AssistedOperator:
         limit = self._max_step_mm
         steps = {axis: max(-limit, min(limit, mm)) for axis, mm in wanted.items()}
         return " ".join(f"{axis}{step:+.3f}" for axis, step in steps.items())
+
+
+@contextmanager
+def operator_at(assist_url: str | None, tool: Callable[[], int]) -> Iterator[Operator]:
+    """Yield the person at the terminal, or a simulator's stand-in for one.
+
+    Args:
+        assist_url: The simulator's assist URL, ``None`` for a real person.
+        tool: Tells which tip the stand-in is to look at.
+    """
+    if assist_url is None:
+        yield terminal()
+        return
+    from robolink_simulators.assist import open_eyes
+
+    with open_eyes(assist_url) as eyes:
+
+        def look() -> tuple[float, float, float]:
+            seen = eyes.look(tool())
+            return seen.dx_mm, seen.dy_mm, seen.dz_mm
+
+        yield AssistedOperator(look, note)

@@ -3,19 +3,17 @@
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 import click
-from click.core import ParameterSource
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
 
 if TYPE_CHECKING:
     from robolink.model import Controller, Pose
-
-F = TypeVar("F", bound=Callable[..., Any])
 
 _RANGE: Final = re.compile(r"([0-9]{1,3})(?:-([0-9]{1,3}))?", re.ASCII)
 
@@ -29,24 +27,27 @@ class PoseSource:
         points: Numbers of taught points.
         typed: X and Y in mm and U in degrees, each.
         path: A file of poses.
+        taught_tool: The tool whose tip the poses describe; 0 when they are flange poses.
     """
 
     kind: Literal["points", "typed", "file"]
     points: tuple[int, ...] = ()
     typed: tuple[tuple[float, float, float], ...] = ()
     path: Path | None = None
+    taught_tool: int = 0
 
-    def payload(self, taught_tool: int) -> dict[str, object]:
+    def payload(self) -> dict[str, object]:
         """Return what the document of a calibration says about it."""
-        body: dict[str, object] = {"kind": self.kind, "taught_tool": taught_tool}
+        body: dict[str, object] = {"kind": self.kind, "taught_tool": self.taught_tool}
         if self.kind == "points":
             body["points"] = list(self.points)
         elif self.path is not None:
             body["path"] = str(self.path)
         return body
 
-    def sentence(self, taught_tool: int) -> str:
-        """Return what a report says about it."""
+    @property
+    def sentence(self) -> str:
+        """What a report says about it."""
         if self.kind == "points":
             points = ", ".join(f"P{number}" for number in self.points)
             named = tr("points taught on the pendant, {points}", points=points)
@@ -54,7 +55,7 @@ class PoseSource:
             named = tr("poses of the file {path}", path=self.path)
         else:
             named = tr("typed poses")
-        return tr("{poses}; taught with tool {tool}", poses=named, tool=taught_tool)
+        return tr("{poses}; taught with tool {tool}", poses=named, tool=self.taught_tool)
 
     def poses(self, controller: "Controller") -> "tuple[Pose, ...]":
         """Return the poses; taught points are read from the controller.
@@ -75,27 +76,20 @@ class PoseSource:
         return tuple(Pose(x_mm, y_mm, 0.0, u_deg) for x_mm, y_mm, u_deg in self.typed)
 
 
-def pose_source_options(function: F) -> F:
-    """Add ``--points``, ``--pose``, ``--poses`` and ``--taught-tool``."""
+def pose_source_options(
+    *, points: str, typed: str, path: str
+) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Add ``--points``, ``--pose``, ``--poses`` and ``--taught-tool``, passed on as ``poses``.
+
+    Args:
+        points: What the help says about taught points.
+        typed: The same about typed poses.
+        path: The same about a file of poses.
+    """
     options = (
-        click.option(
-            "--points",
-            metavar="N,N",
-            help=tr("Two points taught on the pendant, for example 901,902. Nothing moves."),
-        ),
-        click.option(
-            "--pose",
-            "typed",
-            metavar="X,Y,U",
-            multiple=True,
-            help=tr("A pose in mm and degrees, for example 287.5,103.25,180; give it twice."),
-        ),
-        click.option(
-            "--poses",
-            "path",
-            type=click.Path(dir_okay=False, path_type=Path),
-            help=tr("A .json or .csv file with the two poses."),
-        ),
+        click.option("--points", metavar="N,N", help=points),
+        click.option("--pose", "typed", metavar="X,Y,U", multiple=True, help=typed),
+        click.option("--poses", "path", type=click.Path(dir_okay=False, path_type=Path), help=path),
         click.option(
             "--taught-tool",
             type=click.IntRange(0, 15),
@@ -103,9 +97,26 @@ def pose_source_options(function: F) -> F:
             help=tr("The tool that was selected when the poses were taught (0, the flange)."),
         ),
     )
-    for option in reversed(options):
-        function = option(function)
-    return function
+
+    def add(function: Callable[..., Any]) -> Callable[..., Any]:
+        @wraps(function)
+        def with_poses(
+            *args: object,
+            points: str | None,
+            typed: tuple[str, ...],
+            path: Path | None,
+            taught_tool: int | None,
+            **others: object,
+        ) -> object:
+            poses = pose_source(points=points, typed=typed, path=path, taught_tool=taught_tool)
+            return function(*args, poses=poses, **others)
+
+        command: Callable[..., Any] = with_poses
+        for option in reversed(options):
+            command = option(command)
+        return command
+
+    return add
 
 
 def pose_source(
@@ -123,33 +134,20 @@ def pose_source(
             tr("{names} exclude each other.", names=", ".join(named)),
             remedy=tr("Give the poses in one way only."),
         )
+    tool = taught_tool or 0
     if points:
-        return PoseSource("points", points=point_numbers(points))
+        return PoseSource("points", points=point_numbers(points), taught_tool=tool)
     if typed:
-        return PoseSource("typed", typed=tuple(_typed_pose(text) for text in typed))
+        poses = tuple(_typed_pose(text) for text in typed)
+        return PoseSource("typed", typed=poses, taught_tool=tool)
     if path is not None:
-        return PoseSource("file", path=path)
+        return PoseSource("file", path=path, taught_tool=tool)
     if taught_tool is not None:
         raise ConfigError(
             tr("--taught-tool belongs to poses that exist already."),
             remedy=tr("Give them with --points, --pose or --poses."),
         )
     return None
-
-
-def refuse_motion_options(context: click.Context, names: tuple[str, ...]) -> None:
-    """Refuse options that say how to move when nothing moves.
-
-    Raises:
-        ConfigError: Names the first that was given.
-    """
-    for parameter in context.command.params:
-        name = str(parameter.name)
-        if name in names and context.get_parameter_source(name) is ParameterSource.COMMANDLINE:
-            raise ConfigError(
-                tr("{option} says how to move, and nothing moves here.", option=parameter.opts[0]),
-                remedy=tr("Leave it out, or measure without --points, --pose and --poses."),
-            )
 
 
 def point_numbers(text: str) -> tuple[int, ...]:

@@ -5,13 +5,14 @@ from collections.abc import Callable
 from robolink.errors import DeclinedError
 from robolink.messages import tr
 from robolink.model import Controller
-from robolink.nozzle_change import ChangeReport
+from robolink.nozzle_change import ChangeReport, preview
 from robolink.recipe import Answers, LoadedRecipe, RecipeRun, require_answers
-from robolink_cli._calibrating import operator_at, planned_steps
 from robolink_cli._calibration_views import report_payload, show_report
 from robolink_cli._consent import agree_to_motion, asked, motion_question, on_terminal
 from robolink_cli._context import CliContext, open_controller
 from robolink_cli._kinds import io_of
+from robolink_cli._operator import operator_at
+from robolink_cli._planned_steps import steps_payload
 from robolink_cli._recipe_events import EventStream, Progress
 from robolink_cli._render import note, say
 from robolink_cli._safekeeping import back_up_first
@@ -157,7 +158,7 @@ class Recalibration:
             "recipe": self._loaded.name,
             "tools": [plan.tool for plan in run.plan.tools],
             "takes_reference": run.takes_reference,
-            "steps": planned_steps(controller, run.plan),
+            "steps": steps_payload(controller, preview(controller, run.plan)),
             "prompts": [{"at": prompt.at, "text": prompt.text} for prompt in recipe.prompts],
             "outputs": [
                 {

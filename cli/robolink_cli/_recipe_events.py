@@ -6,7 +6,7 @@ from contextlib import contextmanager
 
 import click
 
-from robolink.calibration import Ask, VerifyResult
+from robolink.calibration import Ask, Offer, Step, Tell, VerifyResult
 from robolink.errors import CalibrationError
 from robolink.messages import tr
 from robolink.model import ToolReceipt
@@ -74,10 +74,9 @@ class Progress(Listener):
     def step(self, tool: int, done: StepDone) -> None:
         """Tell of one step."""
         self.tool = tool
-        step = done.step
-        text = step.instruction if isinstance(step, Ask) else step.purpose
-        kind = "touch" if isinstance(step, Ask) else "move"
-        self._events.emit("step", tool=tool, kind=kind, text=text, pose=pose_payload(done.pose))
+        kind, text = _in_words(done.step)
+        pose = pose_payload(done.pose) if done.pose else None
+        self._events.emit("step", tool=tool, kind=kind, text=text, pose=pose)
 
     def refused(self, tool: int, error: CalibrationError, *, again: bool) -> None:
         """Tell of a measurement that is not believed."""
@@ -107,6 +106,19 @@ class Progress(Listener):
     def told(self, sentence: str) -> None:
         """Pass on what a person was told."""
         self._events.emit("note", text=sentence)
+
+
+def _in_words(step: Step) -> tuple[str, str]:
+    """Return what kind of step it is, and what it says."""
+    match step:
+        case Ask():
+            return "touch", step.instruction
+        case Tell():
+            return "remark", step.text
+        case Offer():
+            return "offer", step.question
+        case _:
+            return "move", step.purpose
 
 
 def _heading(moment: Moment, tool: int) -> str:

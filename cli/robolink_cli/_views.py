@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from robolink.calibration import VerifyResult
+from robolink.calibration import CalibrationResult, VerifyResult
 from robolink.model import Controller, Finding, Pose, ToolOffset, ToolReceipt
 from robolink.nozzle_change import Proposal
 
@@ -51,6 +51,23 @@ def proposal_payload(proposal: Proposal) -> dict[str, object]:
         "sigma_gain": result.sigma_gain,
         "warnings": list(result.warnings),
         "poses": [pose_payload(pose) for pose in result.inputs],
+        "fit": fit_payload(result),
+    }
+
+
+def fit_payload(result: CalibrationResult) -> dict[str, object]:
+    """Return how sure a measurement is; what nothing tells is ``None`` or empty."""
+    return {
+        "half_width95": dict(zip(result.measured, result.half_width95, strict=False)),
+        "sigma_mm": result.sigma_mm,
+        "sigma_stated": result.sigma_stated,
+        "rms_mm": result.rms_mm,
+        "max_residual_mm": result.max_residual_mm,
+        "residuals_mm": [list(residual) for residual in result.residuals_mm],
+        "rejected": list(result.rejected),
+        "condition_number": result.condition_number,
+        "dof": result.dof,
+        "unobservable": list(result.unobservable),
     }
 
 

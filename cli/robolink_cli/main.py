@@ -67,6 +67,10 @@ COMMANDS: Final = {
         "robolink_cli.recalibrate:recalibrate",
         tr("The scripted nozzle change: run a recipe."),
     ),
+    "station": (
+        "robolink_cli.station:station",
+        tr("The pins, beams and surfaces of a cell: where they are, and how sure."),
+    ),
     "solve": ("robolink_cli.solve:solve", tr("Calculate a tool offset from a file, offline.")),
     "doctor": ("robolink_cli.doctor:doctor", tr("What could get in the way on this computer.")),
     "ports": ("robolink_cli.ports:ports", tr("List the serial ports.")),

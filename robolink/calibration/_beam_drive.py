@@ -60,7 +60,8 @@ class BeamDrive:
     def lifted(self) -> Procedure[Pose]:
         """Lift out of the beams from where :meth:`run` ends."""
         last = replace(self.place(1, -1), z_mm=self.safe_z_mm)
-        return (yield Move(last, Path.STRAIGHT, tr("lift out of the beams")))
+        above: Pose = yield Move(last, Path.STRAIGHT, tr("lift out of the beams"))
+        return above
 
     def run(self) -> Procedure[list[Crossing]]:
         """Cross both beams, both ways; begins and ends at the depth of the beams."""

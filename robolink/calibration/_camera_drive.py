@@ -97,12 +97,10 @@ class CameraDrive:
     def _look(self, place: Place) -> Procedure[SeenAt]:
         purpose = tr("look") if place.mark == TIP else tr("look at fiducial {n}", n=place.mark)
         try:
-            seen = yield Look(purpose, self._middle(place), place.mark, self.plan.pictures)
+            seen: SeenAt = yield Look(purpose, self._middle(place), place.mark, self.plan.pictures)
         except CalibrationError:
             yield from self.lifted(place)
             raise
-        if not isinstance(seen, SeenAt):
-            raise TypeError(f"a look was answered with {seen!r}")
         return seen
 
     def _middle(self, place: Place) -> tuple[float, float]:

@@ -20,8 +20,9 @@ def sought(step: Seek, *, here: Pose, safe_z_mm: float) -> Procedure[Pose]:
         CalibrationError: ``no_edge`` or ``edge_passed``, with the tip drawn back.
     """
     try:
-        return (yield step)
+        found: Pose = yield step
     except CalibrationError as error:
         stands = step.target if error.code == "no_edge" else here
         yield Move(replace(stands, z_mm=safe_z_mm), Path.STRAIGHT, tr("draw the tip back"))
         raise
+    return found

@@ -7,7 +7,7 @@ it numbers, shown before anything moves, and replayed from a record.
 
 from collections.abc import Generator
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from robolink.model import TIP, InputEdge, Path, Pose, Spot, SpotUnit
 
@@ -94,9 +94,28 @@ class SeenAt(Pose):
         )
 
 
-Step = Move | Ask | Seek | Look
+@dataclass(frozen=True, slots=True)
+class Tell:
+    """Let a person know how it goes; answered with ``None``."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Offer:
+    """Offer something that a person may accept; answered with whether they did.
+
+    Where nobody is to be asked, the answer is ``False``: a measurement never depends on it.
+    """
+
+    question: str
+
+
+Step = Move | Ask | Seek | Look | Tell | Offer
 
 T = TypeVar("T")
-Procedure = Generator[Step, Pose, T]
-"""Yields steps, is sent the measured pose after each (:class:`SeenAt` after a look), returns a
-result."""
+Procedure = Generator[Step, Any, T]
+"""Yields steps, is sent what each step is answered with, returns a result.
+
+The type of an answer follows from the step, which a generator's type cannot say.
+"""

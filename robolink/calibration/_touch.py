@@ -12,7 +12,7 @@ from robolink.calibration._result import CalibrationResult, Drift, VerifyResult
 from robolink.calibration._steps import Ask, Move, Procedure
 from robolink.calibration._two_pose import solve_two_pose
 from robolink.messages import tr
-from robolink.model import Path, Pose, ToolOffset, angle_difference_deg, rotate_xy
+from robolink.model import Path, Pose, ToolOffset, rotate_xy
 
 NO_OFFSET: Final = ToolOffset()
 
@@ -43,41 +43,12 @@ def two_pose(
     Raises:
         CalibrationError: As :func:`solve_two_pose`.
     """
-    first = yield Ask(tr("Bring the tip onto the pin."))
+    first: Pose = yield Ask(tr("Bring the tip onto the pin."))
     # Toward zero, by the angle as it is counted and not modulo 360: U starts inside the
     # joint's range, and so it stays there.
     turn_deg = -plan.turn_deg if first.u_deg > 0 else plan.turn_deg
-    second = yield from _touch_again(plan, first, first.u_deg + turn_deg, stored or ToolOffset())
+    second = yield from touch_again(plan, first, first.u_deg + turn_deg, stored or ToolOffset())
     return solve_two_pose(first, second, stored=stored, sigma_mm=sigma_mm)
-
-
-def n_angle(
-    plan: TouchPlan,
-    *,
-    turns_deg: Sequence[float],
-    stored: ToolOffset | None,
-    sigma_mm: float | None = None,
-) -> Procedure[CalibrationResult]:
-    """Measure a tip on a pin at several angles. Runs in Tool 0.
-
-    Args:
-        plan: Lift and clearance.
-        turns_deg: Angles of the further touches, counted from the first one.
-        stored: The offset stored now; the approaches use it.
-        sigma_mm: Standard deviation of one coordinate of one touch, where it is known.
-
-    Raises:
-        CalibrationError: As :func:`solve_n_angle`.
-    """
-    from robolink.calibration._n_angle import solve_n_angle  # numpy, not for --help
-
-    first = yield Ask(tr("Bring the tip onto the pin."))
-    touches = [first]
-    for turn_deg in turns_deg:
-        # Within half a turn of zero: adding up from touch to touch leaves the joint's range.
-        u_deg = angle_difference_deg(first.u_deg + turn_deg, 0.0)
-        touches.append((yield from _touch_again(plan, touches[-1], u_deg, stored or ToolOffset())))
-    return solve_n_angle(touches, stored=stored, sigma_mm=sigma_mm)
 
 
 def travel(target: Pose, *, here: Pose, purpose: str) -> Procedure[None]:
@@ -133,7 +104,7 @@ def verify_by_turning(
         yield Move(
             raised(place, plan.clearance_mm), Path.STRAIGHT, tr("come down to the clearance")
         )
-        found = yield Ask(tr("Bring the tip back onto the pin; what you jog is the drift."))
+        found: Pose = yield Ask(tr("Bring the tip back onto the pin; what you jog is the drift."))
         drifts.append(Drift(angle, found.x_mm - place.x_mm, found.y_mm - place.y_mm))
         yield Move(raised(found, plan.lift_mm), Path.STRAIGHT, tr("lift off the pin"))
     return VerifyResult(tuple(drifts), tolerance_mm)
@@ -145,7 +116,7 @@ def contact_pose(result: CalibrationResult, *, tool: int) -> Pose:
     Height and angle are those of the last pose, seen through the proposed offset.
     """
     last = result.inputs[-1]
-    x_mm, y_mm = result.reference_point_mm
+    x_mm, y_mm = result.reference_point_mm[:2]
     return replace(
         last,
         x_mm=x_mm,
@@ -161,11 +132,9 @@ def raised(pose: Pose, by_mm: float) -> Pose:
     return replace(pose, z_mm=pose.z_mm + by_mm)
 
 
-def _touch_again(
-    plan: TouchPlan, contact: Pose, u_deg: float, guess: ToolOffset
-) -> Procedure[Pose]:
+def touch_again(plan: TouchPlan, contact: Pose, u_deg: float, guess: ToolOffset) -> Procedure[Pose]:
     """Lift off, turn to ``u_deg``, come down beside the pin, and let the person touch it."""
-    lifted = yield Move(raised(contact, plan.lift_mm), Path.STRAIGHT, tr("lift off the pin"))
+    lifted: Pose = yield Move(raised(contact, plan.lift_mm), Path.STRAIGHT, tr("lift off the pin"))
     above = replace(_turned(contact, u_deg, guess), z_mm=lifted.z_mm)
     yield Move(above, Path.JOINT, tr("turn in the air"))
     yield Move(
@@ -173,7 +142,7 @@ def _touch_again(
         Path.STRAIGHT,
         tr("come down to the clearance"),
     )
-    touch = yield Ask(tr("Bring the tip onto the pin again, with the tool turned."))
+    touch: Pose = yield Ask(tr("Bring the tip onto the pin again, with the tool turned."))
     yield Move(raised(touch, plan.lift_mm), Path.STRAIGHT, tr("lift off the pin"))
     return touch
 

@@ -15,6 +15,9 @@ from robolink.toml_files import Problem
 if TYPE_CHECKING:
     from robolink.config._settings import CellSettings
 
+_Said = dict[str, tuple[Path, object]]
+"""What files say about a cell: each value with the file that said it."""
+
 _CELL_NAME = re.compile(r"[^\s+:/\\]+")
 
 
@@ -64,13 +67,15 @@ def load_cells() -> dict[str, Cell]:
     Raises:
         ConfigError: A file is wrong, or a cell has no URL in any of them.
     """
-    said: dict[str, dict[str, tuple[Path, object]]] = {}
+    said: dict[str, _Said] = {}
     for file in config_files():
         if file.present:
             for name, values in _checked(file.path).items():
                 nearer = said.setdefault(name, {})
                 if "url" not in nearer:
-                    said[name] = {key: (file.path, value) for key, value in values.items()} | nearer
+                    said[name] = _together(
+                        {key: (file.path, value) for key, value in values.items()}, nearer
+                    )
     return {name: _cell(name, values) for name, values in said.items()}
 
 
@@ -83,6 +88,7 @@ def check_file(path: Path) -> tuple[Problem, ...]:
     from pydantic import ValidationError
 
     from robolink.config._settings import CellFile, CellSettings
+    from robolink.config._station_settings import station_keys
 
     document = read_document(path)
     cells = document.get("cells")
@@ -98,7 +104,7 @@ def check_file(path: Path) -> tuple[Problem, ...]:
         CellFile.model_validate(document)
     except ValidationError as error:
         known = {1: ["cells"], 3: list(CellSettings.model_fields)}
-        return (*names, *problems_of(error, known))
+        return (*names, *problems_of(error, known, station_keys()))
     return tuple(names)
 
 
@@ -113,6 +119,16 @@ def cell_names() -> list[str]:
                 continue
             names |= dict.fromkeys(cells if isinstance(cells, dict) else ())
     return list(names)
+
+
+def _together(farther: _Said, nearer: _Said) -> _Said:
+    """Return what two files say together: the nearer one wins, station by station."""
+    both = farther | nearer
+    if "stations" in farther and "stations" in nearer:
+        (_, old), (path, new) = farther["stations"], nearer["stations"]
+        assert isinstance(old, dict) and isinstance(new, dict)  # noqa: S101, PT018 - both were checked
+        both["stations"] = (path, old | new)
+    return both
 
 
 def _checked(path: Path) -> dict[str, dict[str, object]]:

@@ -5,6 +5,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from robolink.errors import ConfigError
@@ -15,6 +16,9 @@ if TYPE_CHECKING:
     from pydantic import ValidationError
 
 _BARE_KEY = re.compile("[A-Za-z0-9_-]+")
+_KIND = 4
+"""Where in a path the kind of a station stands: cells, NAME, stations, ID, kind."""
+
 _SECRET = re.compile("pass|pwd|secret|token|credential|^pin$", re.IGNORECASE)
 
 
@@ -27,18 +31,28 @@ def dotted(keys: Iterable[object]) -> str:
     )
 
 
-def problems_of(error: "ValidationError", known: Mapping[int, Sequence[str]]) -> list[Problem]:
+def problems_of(
+    error: "ValidationError",
+    known: Mapping[int, Sequence[str]],
+    kinds: Mapping[str, Sequence[str]] = MappingProxyType({}),
+) -> list[Problem]:
     """Return everything that pydantic objects to.
 
     Args:
         error: What it raised.
         known: The keys that are known at each depth, for a better guess at what was meant.
+        kinds: The same for stations, by their kind.
     """
     details = error.errors(include_url=False, include_input=False)
-    return [
-        Problem(dotted(detail["loc"]), _sentence(detail, known.get(len(detail["loc"]), ())))
-        for detail in details
-    ]
+    problems = []
+    for detail in details:
+        path, names = list(detail["loc"]), known.get(len(detail["loc"]), ())
+        # Behind the name of a station pydantic puts its kind, which stands in no file.
+        if len(path) > _KIND and path[2] == "stations":
+            names = kinds.get(str(path.pop(_KIND)), ())
+        counted = [part + 1 if isinstance(part, int) else part for part in path]
+        problems.append(Problem(dotted(counted), _sentence(detail, names, kinds)))
+    return problems
 
 
 def refusal(path: Path, problems: Sequence[Problem]) -> ConfigError:
@@ -57,7 +71,11 @@ def refusal(path: Path, problems: Sequence[Problem]) -> ConfigError:
     )
 
 
-def _sentence(detail: Any, known: Sequence[str]) -> str:  # noqa: ANN401 - pydantic's own form
+def _sentence(
+    detail: Any,  # noqa: ANN401 - pydantic's own form
+    known: Sequence[str],
+    kinds: Iterable[str],
+) -> str:
     limits = detail.get("ctx", {})
     match detail["type"]:
         case "extra_forbidden":
@@ -68,6 +86,14 @@ def _sentence(detail: Any, known: Sequence[str]) -> str:  # noqa: ANN401 - pydan
             return tr("must be a text in quotes")
         case "model_type" | "dict_type":
             return tr("must be a table")
+        case "missing":
+            return tr("is missing")
+        case "union_tag_invalid" | "union_tag_not_found":
+            return tr("needs a kind: {kinds}", kinds=", ".join(kinds))
+        case "bool_type":
+            return tr("must be true or false")
+        case "too_short" | "too_long":
+            return tr("must hold {count}", count=limits.get("min_length") or limits["max_length"])
         case "greater_than":
             return tr("must be more than {limit:g}", limit=limits["gt"])
         case "greater_than_equal":

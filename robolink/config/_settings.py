@@ -2,18 +2,15 @@
 
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
+from pydantic import BaseModel, Field, ValidationInfo, field_validator
 
+from robolink.config._station_settings import STRICT, StationSettings
 from robolink.messages import tr
 from robolink.model import Role
 from robolink.transport import parse_url
 
 Text = Annotated[str, Field(min_length=1)]
 Positive = Annotated[float, Field(gt=0)]
-
-_STRICT = ConfigDict(
-    extra="forbid", frozen=True, strict=True, allow_inf_nan=False, hide_input_in_errors=True
-)
 
 
 class CellSettings(BaseModel):
@@ -37,11 +34,15 @@ class CellSettings(BaseModel):
             the pin it stops.
         max_change_mm: Largest plausible change against the stored offset.
         drift_tolerance_mm: Largest drift about the new tip that passes.
+        rms_tolerance_mm, residual_tolerance_mm: Largest rms of the residuals of a calibration,
+            and largest single one, that is believed.
+        interval_tolerance_mm: Largest half of the 95 % interval of a measured length.
         people: Who works at the cell: badge or name, and ``operator`` or ``engineer``.
+        stations: Pins, beams and surfaces that stand there, by name.
         notes: For people.
     """
 
-    model_config = _STRICT
+    model_config = STRICT
 
     url: Text | None = None
     robot: Text | None = None
@@ -57,7 +58,11 @@ class CellSettings(BaseModel):
     clearance_mm: Annotated[float, Field(ge=0.5, le=50)] | None = None
     max_change_mm: Positive | None = None
     drift_tolerance_mm: Positive | None = None
+    rms_tolerance_mm: Positive | None = None
+    residual_tolerance_mm: Positive | None = None
+    interval_tolerance_mm: Positive | None = None
     people: dict[Text, Role] | None = None
+    stations: dict[Text, StationSettings] | None = None
     notes: str | None = None
 
     @field_validator("people", mode="before")
@@ -113,6 +118,6 @@ def _role(name: str, role: object) -> Role:
 class CellFile(BaseModel):
     """One whole ``robolink.toml``."""
 
-    model_config = _STRICT
+    model_config = STRICT
 
     cells: dict[str, CellSettings] = Field(default_factory=dict)

@@ -24,6 +24,7 @@ class EntryKind(StrEnum):
     SELECTION = "selection"
     RAW = "raw statement"
     LEASE = "lease"
+    STATION = "station"
 
 
 @dataclass(frozen=True, slots=True)

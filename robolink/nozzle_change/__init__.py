@@ -16,8 +16,12 @@ from robolink.nozzle_change._listener import Moment as Moment
 from robolink.nozzle_change._plan import ChangePlan as ChangePlan
 from robolink.nozzle_change._plan import Limits as Limits
 from robolink.nozzle_change._plan import ToolPlan as ToolPlan
+from robolink.nozzle_change._pose_methods import ManyTouches as ManyTouches
+from robolink.nozzle_change._pose_methods import PoseMethod as PoseMethod
+from robolink.nozzle_change._pose_methods import TwoTouches as TwoTouches
 from robolink.nozzle_change._preview import PlannedStep as PlannedStep
 from robolink.nozzle_change._preview import preview as preview
+from robolink.nozzle_change._preview import require_inside as require_inside
 from robolink.nozzle_change._proposal import ChangeReport as ChangeReport
 from robolink.nozzle_change._proposal import Proposal as Proposal
 from robolink.nozzle_change._proposal import ToolReport as ToolReport
@@ -27,3 +31,4 @@ from robolink.nozzle_change._source import TipSource as TipSource
 from robolink.nozzle_change._touch_probe import TouchProbe as TouchProbe
 from robolink.nozzle_change._touching import PinAndPerson as PinAndPerson
 from robolink.nozzle_change._up_camera import UpCamera as UpCamera
+from robolink.nozzle_change._verdict import Verdict as Verdict

@@ -95,7 +95,10 @@ class NozzleChange:
             self._ask(bench)
             reports = self._write(bench, proposals)
         else:
-            reports = tuple(ToolReport(proposal, None, None) for _, proposal in proposals)
+            reports = tuple(
+                ToolReport(proposal, None, None, one.gate.verdicts(proposal))
+                for one, proposal in proposals
+            )
         measuring.go_to(plan.safe, tr("go to the safe pose"))
         listener.moment(Moment.END, bench)
         return ChangeReport(self._controller.outcomes.change, reports)
@@ -106,7 +109,13 @@ class NozzleChange:
             self._controller.tools.select(0)
             start = self._controller.groups[0].pose()
         settings = self._plan.limits.settings
-        return Bench(self._controller, self._operator, start=start, settings=settings)
+        return Bench(
+            self._controller,
+            self._operator,
+            start=start,
+            settings=settings,
+            offers=self._plan.ask_before_write,
+        )
 
     def _judge(self, proposals: Proposals) -> None:
         for plan, proposal in proposals:
@@ -154,7 +163,12 @@ class NozzleChange:
             for receipt in receipts:
                 self._listener.wrote(receipt)
             reports = tuple(
-                ToolReport(proposal, receipt, self._verify(bench, plan, proposal, receipt))
+                ToolReport(
+                    proposal,
+                    receipt,
+                    self._verify(bench, plan, proposal, receipt),
+                    plan.gate.verdicts(proposal),
+                )
                 for (plan, proposal), receipt in zip(proposals, receipts, strict=True)
             )
             change.keep(tr("verified") if verify else tr("not verified"))

@@ -23,6 +23,30 @@ def flange_pose(tip: Pose, offset: ToolOffset) -> Pose:
     )
 
 
+def tilted_flange_pose(tip: Pose, offset: ToolOffset) -> Pose:
+    """Return where the flange is when a six-axis robot's tool is at ``tip``.
+
+    The tool's orientation is the flange's followed by the offset's own: ``R_tip = R R_tool``,
+    ``tip = flange + R t`` (epson.md 3.1).
+    """
+    from robolink.calibration import rotation_of, uvw_deg  # numpy, which four axes do without
+
+    own = rotation_of(Pose(0.0, 0.0, 0.0, offset.u_deg, offset.v_deg, offset.w_deg))
+    turned = rotation_of(tip) @ own.T
+    dx, dy, dz = (turned @ offset.components()[:3]).tolist()
+    u_deg, v_deg, w_deg = uvw_deg(turned)
+    return replace(
+        tip,
+        x_mm=tip.x_mm - dx,
+        y_mm=tip.y_mm - dy,
+        z_mm=tip.z_mm - dz,
+        u_deg=u_deg,
+        v_deg=v_deg,
+        w_deg=w_deg,
+        tool=0,
+    )
+
+
 def seen_from(written: ToolOffset, tip: ToolOffset) -> ToolOffset:
     """Return where a tip is, seen from the frame of a written offset of a four-axis robot."""
     dx, dy = rotate_xy(tip.x_mm - written.x_mm, tip.y_mm - written.y_mm, -written.u_deg)

@@ -7,6 +7,7 @@ from robolink.calibration import CalibrationResult, require_shrinking
 from robolink.errors import CalibrationError
 from robolink.messages import tr
 from robolink.nozzle_change._proposal import Proposal
+from robolink.nozzle_change._verdict import Verdict
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,15 +41,15 @@ class Gate:
         Raises:
             CalibrationError: ``large_rms``, ``large_residual`` or ``large_interval``.
         """
-        for code, name, found, limit in self._fit_limits(result):
-            if limit is not None and found is not None and found > limit:
+        for verdict in self._of_fit(result):
+            if not verdict.passed:
                 raise CalibrationError(
-                    code,
+                    verdict.code,
                     tr(
                         "{name} is {found:.3f} mm; {limit:.3f} mm are allowed.",
-                        name=name,
-                        found=found,
-                        limit=limit,
+                        name=verdict.name,
+                        found=verdict.found_mm,
+                        limit=verdict.limit_mm,
                     ),
                     remedy=tr("Clean pin and tip, check that the nozzle sits firmly, and repeat."),
                 )
@@ -83,6 +84,14 @@ class Gate:
                 remedy=remedy,
             )
 
+    def verdicts(self, proposal: Proposal) -> tuple[Verdict, ...]:
+        """Return what each limit says; nothing about what is not judged or not known."""
+        fit = self._of_fit(proposal.result)
+        if proposal.change_mm is None:
+            return tuple(fit)
+        change = Verdict("implausible_change", tr("The change"), proposal.change_mm, self.limit_mm)
+        return (*fit, change)
+
     def jumps(self, proposal: Proposal) -> bool:
         """Tell whether the change is larger than a nozzle change explains."""
         change = proposal.change_mm
@@ -102,10 +111,10 @@ class Gate:
         if self.interval_mm is not None:
             yield tr("95 % interval up to +-{limit:g} mm", limit=self.interval_mm)
 
-    def _fit_limits(
-        self, result: CalibrationResult
-    ) -> tuple[tuple[str, str, float | None, float | None], ...]:
-        return (
+    def _of_fit(self, result: CalibrationResult) -> Iterator[Verdict]:
+        widths = zip(result.measured, result.half_width95, strict=False)
+        largest = max((half for name, half in widths if name.endswith("_mm")), default=None)
+        for code, name, found_mm, limit_mm in (
             ("large_rms", tr("The rms residual"), result.rms_mm, self.rms_mm),
             (
                 "large_residual",
@@ -113,10 +122,7 @@ class Gate:
                 result.max_residual_mm,
                 self.max_residual_mm,
             ),
-            (
-                "large_interval",
-                tr("Half the 95 % interval"),
-                max(result.half_width95, default=None),
-                self.interval_mm,
-            ),
-        )
+            ("large_interval", tr("Half the 95 % interval"), largest, self.interval_mm),
+        ):
+            if found_mm is not None and limit_mm is not None:
+                yield Verdict(code, name, found_mm, limit_mm)

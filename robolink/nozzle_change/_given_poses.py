@@ -13,14 +13,13 @@ from robolink.calibration import (
     CalibrationResult,
     ToolFit,
     better_fit,
-    solve_two_pose,
     tool_fits,
-    two_of,
 )
 from robolink.errors import CalibrationError, UndefinedToolError
 from robolink.messages import tr
 from robolink.model import Controller, Pose, ToolOffset
-from robolink.nozzle_change._flange import flange_pose
+from robolink.nozzle_change._flange import flange_pose, tilted_flange_pose
+from robolink.nozzle_change._pose_methods import PoseMethod, TwoTouches
 from robolink.nozzle_change._source import Bench
 
 
@@ -70,29 +69,26 @@ class GivenPoses:
         found: What the poses said, after :meth:`measure`.
 
     Args:
-        poses: Brings the poses, mm and degrees; two, or with ``several`` three and more.
+        poses: Brings the poses, mm and degrees.
+        method: How they are solved.
         taught_tool: The tool whose tip they describe; 0 when they are flange poses.
         plausible_mm: Largest change that needs no explanation by another tool.
-        several: Whether they are solved as touches at many angles.
-        sigma_mm: Standard deviation of one coordinate of one placement, where it is known.
         sentence: Where they come from, for a report.
     """
 
     def __init__(
         self,
         poses: Callable[[], Sequence[Pose]],
+        method: PoseMethod | None = None,
         *,
         taught_tool: int = 0,
         plausible_mm: float = 2.0,
-        several: bool = False,
-        sigma_mm: float | None = None,
         sentence: str = "",
     ) -> None:
         self._poses = poses
+        self._method = TwoTouches() if method is None else method
         self._taught_tool = taught_tool
         self._plausible_mm = plausible_mm
-        self._several = several
-        self._sigma_mm = sigma_mm
         self._sentence = sentence
         self.found: PosesFound | None = None
 
@@ -115,16 +111,12 @@ class GivenPoses:
     def find(self, controller: Controller, tool: int, stored: ToolOffset | None) -> PosesFound:
         """Solve the poses and ask which tool they fit. Moves and writes nothing."""
         poses = self._poses()
-        if not self._several:
-            poses = two_of(poses)
         taught = _require_defined(controller, self._taught_tool)
-        flange = [flange_pose(pose, taught) for pose in poses]
-        if self._several:
-            from robolink.calibration import solve_n_angle  # numpy, which a look does without
-
-            result = solve_n_angle(flange, stored=stored, sigma_mm=self._sigma_mm)
-        else:
-            result = solve_two_pose(*flange, stored=stored, sigma_mm=self._sigma_mm)
+        if not self._method.upright:
+            flange = [tilted_flange_pose(pose, taught) for pose in poses]
+            return PosesFound(self._method.solve(flange, stored), (), None)
+        _require_upright(self._taught_tool, taught)
+        result = self._method.solve([flange_pose(pose, taught) for pose in poses], stored)
         # The listing may lack V and W; what is compared and written comes from single reads.
         listed = {number: o for number, o in controller.tools.read_all().items() if o is not None}
         fits = tool_fits(result, taught=self._taught_tool, stored=listed, calibrated=tool)
@@ -144,7 +136,7 @@ class GivenPoses:
                 taught=self._taught_tool,
             )
         return tr(
-            "Check that both poses touched the same point and with which tool they were taught "
+            "Check that all poses touched the same point and with which tool they were taught "
             "(--taught-tool). If the change is real, allow it with --max-change."
         )
 
@@ -157,10 +149,13 @@ def _require_defined(controller: Controller, tool: int) -> ToolOffset:
             remedy=tr("Name the tool that was selected on the pendant with --taught-tool."),
             controller=controller.identity,
         )
+    return offset
+
+
+def _require_upright(tool: int, offset: ToolOffset) -> None:
     if offset.v_deg or offset.w_deg:
         raise CalibrationError(
             "tilted_pose",
             tr("Tool {tool} is tilted (V or W is not 0).", tool=tool),
             remedy=tr("Teach the poses with Tool 0."),
         )
-    return offset

@@ -3,14 +3,14 @@
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
-from robolink.calibration import Ask, Look, Seek, travel
+from robolink.calibration import Ask, Look, Offer, Seek, travel
 from robolink.errors import CalibrationError, ConfigError, RobolinkError
 from robolink.messages import tr
 from robolink.model import NewEntry, Pose
 from robolink.nozzle_change._listener import Listener, Moment
 from robolink.nozzle_change._plan import ToolPlan
 from robolink.nozzle_change._proposal import Proposal
-from robolink.nozzle_change._records import calibration_entry, refusal_entry
+from robolink.nozzle_change._records import calibration_entry, decision_entry, refusal_entry
 from robolink.nozzle_change._source import Bench
 from robolink.runner import StepDone
 
@@ -72,10 +72,15 @@ class Measuring:
     def _watched(self, plan: ToolPlan) -> Iterator[None]:
         """Tell of each step; when the measurement ends early, keep its poses on record."""
         poses: list[Pose] = []
+        log = self._bench.controller.outcomes
 
         def on_step(done: StepDone) -> None:
-            if isinstance(done.step, (Ask, Seek, Look)):
+            if done.pose is not None and isinstance(done.step, (Ask, Seek, Look)):
                 poses.append(done.pose)
+            if isinstance(done.step, Offer):
+                answer = tr("accepted") if done.accepted else tr("declined")
+                details = {"question": done.step.question, "tool": plan.tool}
+                log.append(decision_entry(answer, **details))
             self._listener.step(plan.tool, done)
 
         with self._bench.telling(on_step):

@@ -88,7 +88,8 @@ class ChangePlan:
     Attributes:
         tools: The tools, in the order in which they are measured.
         limits: Where and how fast the robot may go.
-        ask_before_write: Whether a person accepts the proposals before anything is written.
+        ask_before_write: Whether a person accepts the proposals before anything is written, and
+            is asked about what a measurement offers, such as a pose to be taken again.
         safe: Flange pose to which the robot goes first and last.
     """
 

@@ -1,10 +1,10 @@
 """The nozzle change on paper: every step with its target, before anything moves."""
 
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from robolink.calibration import Ask, Look, Move, Procedure, Seek, SeenAt, travel
+from robolink.calibration import Ask, Look, Move, Offer, Procedure, Seek, SeenAt, Tell, travel
 from robolink.errors import CalibrationError, LimitError
 from robolink.messages import tr
 from robolink.model import (
@@ -64,6 +64,24 @@ def preview(controller: Controller, plan: ChangePlan) -> tuple[PlannedStep, ...]
     return tuple(_foresee(controller, plan, start))
 
 
+def require_inside(controller: Controller, steps: Sequence[PlannedStep]) -> None:
+    """Refuse steps whose targets lie outside the limits.
+
+    Raises:
+        LimitError: Names the first of them.
+    """
+    for step in steps:
+        if step.refusal:
+            raise LimitError(
+                tr("{step}: {refusal}", step=step.text, refusal=step.refusal),
+                remedy=tr(
+                    "Nothing was moved. The box lies about where the robot stands at the start: "
+                    "bring it nearer, or widen the box."
+                ),
+                controller=controller.identity,
+            )
+
+
 def _foresee(controller: Controller, plan: ChangePlan, start: Pose) -> Iterator[PlannedStep]:
     settings = plan.limits.settings(start, None)
     here = start
@@ -105,6 +123,10 @@ def _follow(
     try:
         step = next(procedure)
         while True:
+            if isinstance(step, (Tell, Offer)):
+                # What it would say depends on poses that nobody took.
+                step = procedure.send(None)
+                continue
             answer = here
             if isinstance(step, Ask):
                 yield PlannedStep(step.instruction)

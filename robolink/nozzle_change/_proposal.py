@@ -7,6 +7,7 @@ from typing import Literal
 
 from robolink.calibration import CalibrationResult, VerifyResult
 from robolink.model import ToolOffset, ToolReceipt
+from robolink.nozzle_change._verdict import Verdict
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,11 +68,13 @@ class ToolReport:
         proposal: What was proposed.
         receipt: What was written, ``None`` when only a reference was taken.
         verification: How the test about the new tip ended, ``None`` without one.
+        verdicts: What the limits said about the proposal.
     """
 
     proposal: Proposal
     receipt: ToolReceipt | None
     verification: VerifyResult | None
+    verdicts: tuple[Verdict, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

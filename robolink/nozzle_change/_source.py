@@ -21,6 +21,7 @@ class Bench:
 
     Args:
         settings: Limits and speeds for a tip at an offset from the flange.
+        offers: Whether the person is asked about what a procedure offers.
     """
 
     def __init__(
@@ -30,11 +31,13 @@ class Bench:
         *,
         start: Pose | None,
         settings: Callable[[Pose, ToolOffset | None], RunSettings],
+        offers: bool = True,
     ) -> None:
         self.controller = controller
         self.operator = operator
         self.start = start
         self._settings = settings
+        self._offers = offers
         self._on_step: Callable[[StepDone], None] | None = None
 
     @contextmanager
@@ -74,6 +77,7 @@ class Bench:
             self._settings(start, tip),
             on_step=self._on_step,
             camera=camera,
+            offers=self._offers,
         )
 
 

@@ -1,7 +1,7 @@
 """From a recipe to the plan of a nozzle change."""
 
 from robolink.calibration import BeamStation, CrossingPlan, ProbePlan, TouchPlan, TouchStation
-from robolink.errors import ConfigError, LimitError
+from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import Controller, Pose
 from robolink.nozzle_change import (
@@ -10,11 +10,12 @@ from robolink.nozzle_change import (
     Gate,
     GivenPoses,
     Limits,
+    ManyTouches,
     PinAndPerson,
     TipSource,
     ToolPlan,
     TouchProbe,
-    preview,
+    TwoTouches,
     taught_poses,
 )
 from robolink.recipe._recipe import Recipe
@@ -73,24 +74,6 @@ def plan_of(
         ask_before_write=ask_before_write,
         safe=safe.pose if safe else None,
     )
-
-
-def require_inside(controller: Controller, plan: ChangePlan) -> None:
-    """Refuse a plan whose foreseen targets lie outside its limits; reads only.
-
-    Raises:
-        LimitError: Names the step.
-    """
-    for step in preview(controller, plan):
-        if step.refusal:
-            raise LimitError(
-                tr("{step}: {refusal}", step=step.text, refusal=step.refusal),
-                remedy=tr(
-                    "Nothing was moved. The box lies about where the robot stands at the start: "
-                    "bring it nearer, or widen [box] in the recipe."
-                ),
-                controller=controller.identity,
-            )
 
 
 def _source(recipe: Recipe, controller: Controller, tool: Tool) -> TipSource:
@@ -164,12 +147,13 @@ def _from_points(
         return taught_poses(points, numbers)
 
     names = ", ".join(f"P{number}" for number in numbers)
+    sigma_mm = recipe.tolerances.sigma_mm
+    method = ManyTouches(sigma_mm) if source.method == "n_angle" else TwoTouches(sigma_mm)
     return GivenPoses(
         read,
+        method,
         taught_tool=source.taught_tool,
         plausible_mm=recipe.tolerances.jump_mm,
-        several=source.method == "n_angle",
-        sigma_mm=recipe.tolerances.sigma_mm,
         sentence=tr(
             "points {names} taught on the pendant with tool {tool}",
             names=names,

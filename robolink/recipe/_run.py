@@ -6,11 +6,18 @@ from functools import partial
 from robolink.errors import NotAllowedError, RobolinkError
 from robolink.messages import tr
 from robolink.model import Controller, Role
-from robolink.nozzle_change import ChangePlan, ChangeReport, Listener, NozzleChange
+from robolink.nozzle_change import (
+    ChangePlan,
+    ChangeReport,
+    Listener,
+    NozzleChange,
+    preview,
+    require_inside,
+)
 from robolink.recipe._answers import Answers
 from robolink.recipe._listening import RecipeListener
 from robolink.recipe._loading import LoadedRecipe
-from robolink.recipe._plans import plan_of, require_inside
+from robolink.recipe._plans import plan_of
 from robolink.recipe._reference import Reference, find_reference
 from robolink.runner import Operator
 from robolink.transaction import ChangedSince, changed_since, earlier_corrections
@@ -89,7 +96,7 @@ class RecipeRun:
                     self._references[tool] = reference
             # One without a reference makes all of them wait: all are written, or none.
             self.takes_reference = len(self._references) < len(stored)
-        require_inside(controller, self.plan)
+        require_inside(controller, preview(controller, self.plan))
 
     def run(self) -> ChangeReport:
         """Carry it out, after :meth:`preflight`.

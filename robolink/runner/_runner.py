@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TypeVar
 
-from robolink.calibration import Ask, Look, Procedure, Seek, SeenAt, Step
+from robolink.calibration import Ask, Look, Move, Offer, Procedure, Seek, SeenAt, Step, Tell
 from robolink.errors import (
     CalibrationError,
     ConfigError,
@@ -38,10 +38,17 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True)
 class StepDone:
-    """A step that was taken and the pose after it."""
+    """A step that was taken.
+
+    Attributes:
+        step: Which one.
+        pose: Where the frame was after it, ``None`` for a step that only concerns a person.
+        accepted: Whether an offer was accepted, ``None`` for other steps.
+    """
 
     step: Step
-    pose: Pose
+    pose: Pose | None = None
+    accepted: bool | None = None
 
 
 class Runner:
@@ -54,6 +61,7 @@ class Runner:
         settings: Limits and speeds.
         on_step: Told of every step taken.
         camera: What looks are taken with, ``None`` where there are none.
+        offers: Whether the person is asked about offers; else each is declined unasked.
     """
 
     def __init__(
@@ -65,6 +73,7 @@ class Runner:
         *,
         on_step: Callable[[StepDone], None] | None = None,
         camera: TipSensor | None = None,
+        offers: bool = True,
     ) -> None:
         self._controller = controller
         self._group = group
@@ -72,6 +81,7 @@ class Runner:
         self._settings = settings
         self._on_step = on_step
         self._camera = camera
+        self._offers = offers
 
     def run(self, procedure: Procedure[T]) -> T:
         """Take the procedure's steps until it returns; its result is a proposal.
@@ -85,14 +95,14 @@ class Runner:
             step = next(procedure)
             while True:
                 try:
-                    pose = self._take(step)
+                    done = self._take(step)
                 except CalibrationError as error:
                     # The procedure may draw the tip back before it gives up.
                     step = procedure.throw(error)
                     continue
                 if self._on_step is not None:
-                    self._on_step(StepDone(step, pose))
-                step = procedure.send(pose)
+                    self._on_step(done)
+                step = procedure.send(done.pose if done.accepted is None else done.accepted)
         except StopIteration as finished:
             result: T = finished.value
             return result
@@ -126,7 +136,15 @@ class Runner:
         target, path = jog_target(self._group.pose(), steps, self._settings)
         return self.move(target, path)
 
-    def _take(self, step: Step) -> Pose:
+    def _take(self, step: Step) -> StepDone:
+        if isinstance(step, Tell):
+            self._operator.tell(step.text)
+            return StepDone(step)
+        if isinstance(step, Offer):
+            return StepDone(step, accepted=self._offers and self.confirm(step.question))
+        return StepDone(step, self._moved(step))
+
+    def _moved(self, step: Ask | Move | Seek | Look) -> Pose:
         if isinstance(step, Ask):
             return self._ask(step)
         self._operator.tell(step.purpose)
@@ -228,7 +246,8 @@ class Runner:
 
 def ask_for_pose(instruction: str) -> Procedure[Pose]:
     """Let a person bring the tool somewhere; returns the pose there."""
-    return (yield Ask(instruction))
+    pose: Pose = yield Ask(instruction)
+    return pose
 
 
 def _ended_by(status: ControllerStatus) -> str:

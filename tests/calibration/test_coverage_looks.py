@@ -19,7 +19,7 @@ TRIALS = 1000
 def seen(mark, u_deg):
     """Return a mark in the middle of a camera that was moved."""
     flange = touching(mark, u_deg)
-    dx, dy = rotate_xy(*mark, u_deg)
+    dx, dy = rotate_xy(mark[0], mark[1], u_deg)
     return Sighting(flange, flange.x_mm + dx + OFF_MM[0], flange.y_mm + dy + OFF_MM[1])
 
 
@@ -44,7 +44,7 @@ def test_a_tip(angles_deg, stated):
 def test_a_board_at_two_angles_that_do_not_balance(stated):
     marks = [
         (HELD.x_mm + dx, HELD.y_mm + dy)
-        for dx, dy in (rotate_xy(*place, HELD.u_deg) for place in DRAWING)
+        for dx, dy in (rotate_xy(place[0], place[1], HELD.u_deg) for place in DRAWING)
     ]
     exact = [seen(mark, u_deg) for u_deg in (0.0, 120.0) for mark in marks]
     sigma, truth = SIGMA_MM if stated else None, (HELD.x_mm, HELD.y_mm, HELD.u_deg)

@@ -3,7 +3,8 @@
 import json
 
 import pytest
-from robolink_cli import calibrate, jog, main
+from robolink_cli import jog, main
+from robolink_cli.calibrate import _options
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.in_process import register, unregister
 
@@ -160,7 +161,7 @@ def test_calibrate_takes_its_limits_from_the_cell(cell, simulator, monkeypatch, 
         plans.append(plan)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("robolink_cli._calibrating.LiveCalibration", remember)
+    monkeypatch.setattr("robolink_cli.calibrate._live.LiveCalibration", remember)
     assert main.run(["-c", "a", "calibrate", "two-pose", "--tool", "1", *options]) == 130
     (plan,) = plans
     (one,) = plan.tools
@@ -201,6 +202,6 @@ def test_what_was_left_unfinished_is_resolved_by_the_cell_s_name(cell, simulator
         log.clear("a")
 
 
-@pytest.mark.parametrize("module", [calibrate, jog])
+@pytest.mark.parametrize("module", [_options, jog])
 def test_each_limit_of_a_command_is_a_key_of_the_cell_file(module):
     assert set(module._CELL_KEYS.values()) <= set(CellSettings.model_fields)

@@ -5,7 +5,8 @@ import os
 import sys
 
 import pytest
-from robolink_cli import _calibrating_poses, main
+from robolink_cli import main
+from robolink_cli.calibrate import _given
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.points import Point
 
@@ -137,8 +138,8 @@ def test_on_a_terminal_a_no_writes_nothing(command, simulator, monkeypatch):
         asked.append(question)
         raise robolink.errors.DeclinedError("You said no.")
 
-    monkeypatch.setattr(_calibrating_poses, "on_terminal", lambda: True)
-    monkeypatch.setattr(_calibrating_poses, "agree", decline)
+    monkeypatch.setattr(_given, "on_terminal", lambda: True)
+    monkeypatch.setattr(_given, "agree", decline)
     assert command(*calibrate("--points", "901,902"))[0] == 9
     assert asked == ["Write this to tool 1?"]
     assert stored(simulator) == STORED
@@ -239,7 +240,7 @@ def test_a_tool_changed_meanwhile_is_not_overwritten(command, simulator, monkeyp
     def change(tool, *, yes):
         simulator.machine.tools.set(1, ToolOffset(1, 2, 3))
 
-    monkeypatch.setattr(_calibrating_poses, "_agree_to_write", change)
+    monkeypatch.setattr(_given, "_agree_to_write", change)
     code, _, err = command(*calibrate("--points", "901,902", "--yes"))
     assert code == 5
     assert "nothing was written" in err

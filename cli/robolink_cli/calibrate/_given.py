@@ -1,7 +1,6 @@
 """A calibration from poses that exist already: nothing moves, no tool is selected."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import partial
 
 from robolink.calibration import ToolFit
@@ -11,43 +10,28 @@ from robolink.model import Controller
 from robolink.nozzle_change import (
     Bench,
     ChangePlan,
-    Gate,
     GivenPoses,
     Listener,
     Moment,
     NozzleChange,
+    PoseMethod,
     Proposal,
     ToolPlan,
     ToolReport,
 )
 from robolink.transaction import earlier_corrections
-from robolink_cli._calibrating import CalibrationListener
-from robolink_cli._calibration_views import doubts, report_payload
+from robolink_cli._calibration_views import doubts, judged_payload, report_payload
 from robolink_cli._consent import agree, on_terminal
 from robolink_cli._context import CliContext, open_controller
-from robolink_cli._impacting import ImpactRequest, impact_payload, show_impact
+from robolink_cli._impacting import impact_payload, show_impact
 from robolink_cli._notices import note_change
 from robolink_cli._operator import terminal
 from robolink_cli._pose_source import PoseSource
 from robolink_cli._render import note, say
-from robolink_cli._reporting import Draft, ReportRequest, reporting
+from robolink_cli._reporting import Draft, reporting
 from robolink_cli._safekeeping import back_up_first
-from robolink_cli._views import proposal_payload
-
-
-@dataclass(frozen=True, slots=True)
-class PosesPlan:
-    """What to find out from poses that exist.
-
-    Attributes:
-        tool: Number of the tool whose nozzle was changed.
-        taught_tool: The tool whose tip the poses describe; 0 when they are flange poses.
-        gate: What is believed.
-    """
-
-    tool: int
-    taught_tool: int
-    gate: Gate
+from robolink_cli.calibrate._frame import Frame
+from robolink_cli.calibrate._listener import CalibrationListener
 
 
 class _PosesListener(CalibrationListener):
@@ -56,18 +40,17 @@ class _PosesListener(CalibrationListener):
     def __init__(
         self,
         draft: Draft,
-        plan: PosesPlan,
+        frame: Frame,
         given: GivenPoses,
         *,
         controller: Controller,
-        impact: ImpactRequest | None,
-        yes: bool,
+        taught_tool: int,
     ) -> None:
-        super().__init__(draft, impact)
+        super().__init__(draft, frame.gate, frame.impact)
         self._controller = controller
-        self._plan = plan
+        self._frame = frame
         self._given = given
-        self._yes = yes
+        self._taught_tool = taught_tool
 
     @property
     def better(self) -> ToolFit | None:
@@ -83,16 +66,14 @@ class _PosesListener(CalibrationListener):
         (proposal,) = proposals
         note_change(self._controller, proposal.tool, proposal.before)
         self.propose(proposal, source=self._given.sentence, warnings=self._doubts(proposal))
-        if "small_rotation" in proposal.result.warnings:
-            say(tr("  the poses differ little in U; half a turn would be best"))
         if self.better is not None:
-            _warn_of_other_tool(self._plan, self.better, proposal.change_mm)
+            self._warn_of_other_tool(self.better, proposal.change_mm)
         if self.impact is not None:
-            show_impact(self._plan.tool, self.impact)
+            show_impact(proposal.tool, self.impact)
 
     def moment(self, moment: Moment, bench: Bench, tool: int | None = None) -> None:  # noqa: ARG002 - one tool only
         if moment is Moment.BEFORE_WRITE:
-            _agree_to_write(self._plan.tool, yes=self._yes)
+            _agree_to_write(self._frame.tool, yes=self._frame.yes)
             back_up_first(bench.controller)
 
     def _doubts(self, proposal: Proposal) -> tuple[str, ...]:
@@ -102,21 +83,28 @@ class _PosesListener(CalibrationListener):
         other = tr(
             "These poses fit tool {better} much better than tool {taught}.",
             better=self.better.tool,
-            taught=self._plan.taught_tool,
+            taught=self._taught_tool,
         )
         return (*known, other)
 
+    def _warn_of_other_tool(self, better: ToolFit, change_mm: float | None) -> None:
+        note(
+            tr(
+                "Warning: these poses fit tool {better} much better than tool {taught}.\n"
+                "  Taught with tool {better}, tool {tool} would have changed by {small:.3f} mm; "
+                "taught with tool {taught}, by {large:.3f} mm.\n"
+                "  If tool {better} was selected on the pendant, write nothing and give "
+                "--taught-tool {better}.",
+                better=better.tool,
+                taught=self._taught_tool,
+                tool=self._frame.tool,
+                small=better.change_mm,
+                large=change_mm,
+            )
+        )
 
-def calibrate_from_poses(
-    context: CliContext,
-    plan: PosesPlan,
-    source: PoseSource,
-    *,
-    impact: ImpactRequest | None,
-    report: ReportRequest | None,
-    dry_run: bool,
-    yes: bool,
-) -> None:
+
+def calibrate_from_poses(frame: Frame, source: PoseSource, method: PoseMethod) -> None:
     """Propose, ask, write and read back.
 
     Raises:
@@ -124,36 +112,40 @@ def calibrate_from_poses(
         DeclinedError: A person said no, or nobody could be asked.
         ToolChangedError: The tool was changed meanwhile; nothing was written.
     """
+    context = frame.context
     with (
-        open_controller(context, changes=not dry_run) as controller,
-        reporting(report, controller) as draft,
+        open_controller(context, changes=not frame.dry_run) as controller,
+        reporting(frame.report, controller) as draft,
     ):
         given = GivenPoses(
             lambda: source.poses(controller),
-            taught_tool=plan.taught_tool,
-            plausible_mm=plan.gate.limit_mm,
-            sentence=source.sentence(plan.taught_tool),
+            method,
+            taught_tool=source.taught_tool,
+            plausible_mm=frame.gate.limit_mm,
+            sentence=source.sentence,
         )
-        listener = _PosesListener(draft, plan, given, controller=controller, impact=impact, yes=yes)
+        listener = _PosesListener(
+            draft, frame, given, controller=controller, taught_tool=source.taught_tool
+        )
         listener.read_points(controller)
-        if dry_run:
-            payload = _dry_run(controller, plan, given, listener, quiet=context.json)
+        if frame.dry_run:
+            payload = _dry_run(controller, frame, given, listener)
         else:
-            done = _carry_out(controller, plan, given, listener)
+            done = _carry_out(controller, frame, given, listener)
             payload = report_payload(done)
             # Now, because Ctrl-C may come before the logout is answered.
             _show_end(done)
-    extra = _extra(plan, source, listener) | {"report": draft.saved}
-    if dry_run:
+    extra = _extra(source, listener) | {"report": draft.saved}
+    if frame.dry_run:
         _show_dry_run(context, {**payload, **extra})
     else:
         context.emit("calibration", {**payload, **extra}, lambda: None)
 
 
 def _carry_out(
-    controller: Controller, plan: PosesPlan, given: GivenPoses, listener: Listener
+    controller: Controller, frame: Frame, given: GivenPoses, listener: Listener
 ) -> ToolReport:
-    one = ToolPlan(plan.tool, given, plan.gate, verify=False)
+    one = ToolPlan(frame.tool, given, frame.gate, verify=False)
     change = NozzleChange(
         controller,
         ChangePlan((one,), ask_before_write=False),
@@ -166,49 +158,29 @@ def _carry_out(
 
 
 def _dry_run(
-    controller: Controller,
-    plan: PosesPlan,
-    given: GivenPoses,
-    listener: Listener,
-    *,
-    quiet: bool,
+    controller: Controller, frame: Frame, given: GivenPoses, listener: Listener
 ) -> dict[str, object]:
     """Propose and judge; return the document with what would be sent."""
-    before = controller.tools.read(plan.tool)
-    given.found = given.find(controller, plan.tool, before)
-    proposal = Proposal(plan.tool, before, given.found.result)
-    if not quiet:
+    before = controller.tools.read(frame.tool)
+    given.found = given.find(controller, frame.tool, before)
+    proposal = Proposal(frame.tool, before, given.found.result)
+    if not frame.context.json:
         listener.proposed([proposal])
-    plan.gate.judge_change(proposal, remedy=given.remedy)
-    requests = list(controller.tools.preview_write(plan.tool, proposal.offset))
-    return {"dry_run": True, "requests": requests, **proposal_payload(proposal)}
+    frame.gate.judge_fit(proposal.result)
+    frame.gate.judge_change(proposal, remedy=given.remedy)
+    requests = list(controller.tools.preview_write(frame.tool, proposal.offset))
+    judged = judged_payload(proposal, frame.gate.verdicts(proposal))
+    return {"dry_run": True, "requests": requests, **judged}
 
 
-def _extra(plan: PosesPlan, source: PoseSource, listener: _PosesListener) -> dict[str, object]:
+def _extra(source: PoseSource, listener: _PosesListener) -> dict[str, object]:
     better, impact = listener.better, listener.impact
     return {
-        "source": source.payload(plan.taught_tool),
+        "source": source.payload(),
         "tool_fits": [{"tool": fit.tool, "change_mm": fit.change_mm} for fit in listener.fits],
         "better_tool": None if better is None else better.tool,
         "impact": impact_payload(impact) if impact else None,
     }
-
-
-def _warn_of_other_tool(plan: PosesPlan, better: ToolFit, change_mm: float | None) -> None:
-    note(
-        tr(
-            "Warning: these poses fit tool {better} much better than tool {taught}.\n"
-            "  Taught with tool {better}, tool {tool} would have changed by {small:.3f} mm; "
-            "taught with tool {taught}, by {large:.3f} mm.\n"
-            "  If tool {better} was selected on the pendant, write nothing and give "
-            "--taught-tool {better}.",
-            better=better.tool,
-            taught=plan.taught_tool,
-            tool=plan.tool,
-            small=better.change_mm,
-            large=change_mm,
-        )
-    )
 
 
 def _show_dry_run(context: CliContext, payload: dict[str, object]) -> None:

@@ -1,0 +1,29 @@
+"""The named doubts of a measurement, as sentences."""
+
+from collections.abc import Callable, Mapping
+from typing import Final
+
+from robolink.messages import tr
+from robolink.nozzle_change import Proposal
+
+
+def doubts(proposal: Proposal) -> tuple[str, ...]:
+    """Return what a proposal leaves in doubt, as sentences."""
+    known = (_SENTENCES.get(code) for code in dict.fromkeys(proposal.result.warnings))
+    return tuple(sentence() for sentence in known if sentence is not None)
+
+
+# Called late, because the language is chosen when a command runs.
+_SENTENCES: Final[Mapping[str, Callable[[], str]]] = {
+    "small_rotation": lambda: tr("The poses differ little in U; half a turn would be best."),
+    "few_poses": lambda: tr("Few poses: four or more tell errors of placement from each other."),
+    "large_rms": lambda: tr("The residuals are large for this method."),
+    "large_residual": lambda: tr("One pose is far off; take it again."),
+    "sigma_too_small": lambda: tr(
+        "The poses scatter more than the stated standard deviation says."
+    ),
+    "full_calibration_due": lambda: tr(
+        "A full calibration is due: the differences since the last one add up."
+    ),
+}
+"""Doubts that a caller says in other words are left out."""

@@ -1,0 +1,56 @@
+"""How sure a measurement is, in words and as a table."""
+
+from robolink.calibration import CalibrationResult
+from robolink.messages import tr
+from robolink_cli._render import table
+from robolink_cli._views import number
+
+
+def fit_sentence(result: CalibrationResult) -> str:
+    """Return how well the poses agree, in one sentence; empty where a sensor measured once."""
+    if result.rms_mm is None:
+        if result.method == "two_pose":
+            return tr(
+                "two poses leave no residual: each placement error counts {gain:.2f} times",
+                gain=result.sigma_gain,
+            )
+        return tr("nothing is left over that could tell how well it agrees with itself")
+    return tr(
+        "{count} poses agree within {rms:.3f} mm rms, {largest:.3f} mm at most",
+        count=len(result.inputs) - len(result.rejected),
+        rms=result.rms_mm,
+        largest=result.max_residual_mm,
+    )
+
+
+def interval_sentence(result: CalibrationResult) -> str:
+    """Return the 95 % interval of each measured component; empty when nothing tells it."""
+    if not result.half_width95:
+        return ""
+    parts = (
+        f"{name[0].upper()} +-{half:.3f}"
+        for name, half in zip(result.measured, result.half_width95, strict=True)
+    )
+    if result.sigma_stated:
+        basis = tr("from the stated standard deviation")
+    else:
+        basis = tr("from the residuals")
+    return tr("95 % interval: {parts}, {basis}", parts="  ".join(parts), basis=basis)
+
+
+def show_residuals(result: CalibrationResult) -> None:
+    """Show the residual of every pose."""
+    rows = [
+        [
+            str(index + 1),
+            number(pose.u_deg),
+            *(number(part) for part in (*residual, 0.0)[:3]),
+            number(distance),
+            tr("left out") if index in result.rejected else "",
+        ]
+        for index, (pose, residual, distance) in enumerate(
+            zip(result.inputs, result.residuals_mm, result.residual_distances_mm, strict=False)
+        )
+    ]
+    columns = (tr("pose"), "U deg", "dX mm", "dY mm", "dZ mm", tr("distance mm"), "")
+    table(tr("residuals"), columns, rows)

@@ -1,0 +1,166 @@
+"""The frame in which every method calibrates: what was asked for, and the two ways it goes."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import click
+
+from robolink.errors import ConfigError, ReservedToolError, ToolIndexError
+from robolink.messages import tr
+from robolink_cli._context import CliContext
+from robolink_cli._impacting import ImpactRequest, impact_request
+from robolink_cli._motion_options import refuse_motion_options
+from robolink_cli._pose_source import PoseSource
+from robolink_cli._reporting import ReportRequest, report_request
+
+if TYPE_CHECKING:
+    from robolink.config import Cell
+    from robolink.model import Controller
+    from robolink.nozzle_change import ChangePlan, Gate, Limits, PoseMethod, TipSource
+
+USUAL_CHANGE_MM: Final = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """One calibration of one tool, whatever the method.
+
+    Attributes:
+        context: What the command was told about controller, person and nozzle.
+        tool: Number of the tool.
+        gate: What a measurement must be like to be believed.
+        limits: Where and how fast the robot may go.
+        verify: Whether to prove the new tip after the write.
+        assist: A simulator's stand-in for the person.
+        impact: Taught points on which the change is judged.
+        report: Where a page about it is wanted.
+        dry_run: Whether it is only looked at.
+        yes: Whether questions are answered beforehand.
+    """
+
+    context: CliContext
+    tool: int
+    gate: "Gate"
+    limits: "Limits"
+    verify: bool
+    assist: str | None
+    impact: ImpactRequest | None
+    report: ReportRequest | None
+    dry_run: bool
+    yes: bool
+
+    def measure(self, source: "Callable[[Controller], TipSource]") -> None:
+        """Let the robot measure, then propose, ask, write and verify.
+
+        Args:
+            source: Makes the source for a controller that is connected; it may read there.
+        """
+        from robolink_cli.calibrate._live import calibrate_live
+
+        if self.dry_run:
+            _refuse_to_show_nothing(self.impact, self.report)
+        calibrate_live(self, source)
+
+    def solve(self, poses: PoseSource, method: "PoseMethod") -> None:
+        """Take poses that exist already, then propose, ask and write. Nothing moves."""
+        from robolink_cli.calibrate._given import calibrate_from_poses
+
+        refuse_motion_options(click.get_current_context())
+        calibrate_from_poses(self, poses, method)
+
+    def plan(self, source: "TipSource") -> "ChangePlan":
+        """Return what is to be done with the measurements of ``source``."""
+        from robolink.nozzle_change import ChangePlan, ToolPlan
+
+        one = ToolPlan(self.tool, source, self.gate, verify=self.verify)
+        return ChangePlan((one,), limits=self.limits, ask_before_write=not self.yes)
+
+
+def frame_from(
+    context: CliContext,
+    *,
+    tool: int,
+    speed_mm_s: float,
+    box_mm: float,
+    max_change_mm: float,
+    rms_mm: float | None,
+    residual_mm: float | None,
+    interval_mm: float | None,
+    tolerance_mm: float,
+    no_verify: bool,
+    assist: str | None,
+    impact: str | None,
+    impact_pts: Path | None,
+    report_path: Path | None,
+    force: bool,
+    nozzle: str | None,
+    lot: str | None,
+    dry_run: bool,
+    yes: bool,
+) -> Frame:
+    """Return the frame that the options of a command describe.
+
+    A larger ``max_change_mm`` than the cell's own takes an engineer.
+
+    Raises:
+        ReservedToolError, ToolIndexError: There is no such tool to calibrate.
+        ConfigError: Options exclude each other, or the report cannot be written.
+    """
+    from robolink.nozzle_change import Gate, Limits
+
+    _require_tool(tool)
+    gate = Gate(
+        max_change_mm=min(max_change_mm, jump_limit_mm(context.cell)),
+        accepted_change_mm=max_change_mm,
+        rms_mm=rms_mm,
+        max_residual_mm=residual_mm,
+        interval_mm=interval_mm,
+        drift_tolerance_mm=tolerance_mm,
+    )
+    return Frame(
+        context.with_nozzle(nozzle, lot),
+        tool,
+        gate,
+        Limits(box_mm=box_mm, speed_mm_s=speed_mm_s),
+        verify=not no_verify,
+        assist=assist,
+        impact=impact_request(impact, impact_pts, names=("--impact", "--impact-pts")),
+        report=report_request(report_path, force=force),
+        dry_run=dry_run,
+        yes=yes,
+    )
+
+
+def jump_limit_mm(cell: "Cell | None") -> float:
+    """Return the largest change that takes no engineer: the cell's, or the usual one."""
+    limit = cell.settings.max_change_mm if cell else None
+    return USUAL_CHANGE_MM if limit is None else limit
+
+
+def _require_tool(tool: int) -> None:
+    if tool == 0:
+        raise ReservedToolError(
+            tr("Tool 0 is the flange itself and is never written."),
+            remedy=tr("Choose a tool from 1 to 15."),
+        )
+    if not 1 <= tool <= 15:
+        raise ToolIndexError(
+            tr("There is no tool {tool}.", tool=tool),
+            remedy=tr("Choose a tool from 1 to 15."),
+        )
+
+
+def _refuse_to_show_nothing(impact: ImpactRequest | None, report: ReportRequest | None) -> None:
+    """Refuse to show in a dry run what only a measurement can give."""
+    if impact is not None:
+        raise ConfigError(
+            tr("A dry run measures nothing, so there is no impact to show."),
+            remedy=tr("Leave --impact out, or use 'robolink impact' with an offset."),
+        )
+    if report is not None:
+        raise ConfigError(
+            tr("A dry run measures nothing, so there is nothing to report."),
+            remedy=tr("Leave --report out, or use 'robolink impact' with an offset."),
+        )

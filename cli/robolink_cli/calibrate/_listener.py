@@ -1,0 +1,43 @@
+"""Shows a calibration as it goes, and collects it for a report."""
+
+from robolink.calibration import Impact, VerifyResult
+from robolink.model import Controller, Pose, ToolReceipt
+from robolink.nozzle_change import Gate, Listener, Proposal
+from robolink_cli._calibration_views import show_proposal, show_verdicts
+from robolink_cli._impacting import ImpactRequest, judge
+from robolink_cli._reporting import Draft
+
+
+class CalibrationListener(Listener):
+    """Shows a calibration as it goes, and collects it for a report.
+
+    Attributes:
+        impact: What the change means for taught points, once it was proposed.
+    """
+
+    def __init__(self, draft: Draft, gate: Gate, impact: ImpactRequest | None) -> None:
+        self._draft = draft
+        self._gate = gate
+        self._request = impact
+        self._points: dict[int, Pose | None] | None = None
+        self.impact: Impact | None = None
+
+    def read_points(self, controller: Controller) -> None:
+        """Read the taught points on which the change is to be judged."""
+        if self._request is not None:
+            self._points = self._request.read(controller)
+
+    def wrote(self, receipt: ToolReceipt) -> None:
+        """Note it for the report."""
+        self._draft.note_result(receipt)
+
+    def verified(self, tool: int, result: VerifyResult) -> None:  # noqa: ARG002 - one tool only
+        """Note it for the report."""
+        self._draft.note_result(result)
+
+    def propose(self, proposal: Proposal, *, source: str, warnings: tuple[str, ...]) -> None:
+        """Show the proposal, the verdict, and what it means for taught points."""
+        self.impact = judge(self._points, old=proposal.before, new=proposal.offset)
+        self._draft.propose(proposal, source=source, warnings=warnings, impact=self.impact)
+        show_proposal(proposal)
+        show_verdicts(self._gate.verdicts(proposal))

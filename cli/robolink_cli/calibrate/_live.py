@@ -1,0 +1,163 @@
+"""A calibration in which the robot moves: plan, consent, measurement, proposal, write, proof."""
+
+from collections.abc import Callable, Sequence
+from functools import partial
+
+from robolink.messages import tr
+from robolink.model import Controller
+from robolink.nozzle_change import (
+    ChangePlan,
+    NozzleChange,
+    Proposal,
+    TipSource,
+    ToolReport,
+    preview,
+    require_inside,
+)
+from robolink.transaction import earlier_corrections
+from robolink_cli._calibration_views import (
+    doubts,
+    report_payload,
+    show_course,
+    show_plan,
+    show_report,
+)
+from robolink_cli._consent import agree_to_motion, motion_question
+from robolink_cli._context import open_controller
+from robolink_cli._impacting import ImpactRequest, impact_payload, show_impact
+from robolink_cli._notices import note_change
+from robolink_cli._operator import operator_at
+from robolink_cli._planned_steps import steps_payload
+from robolink_cli._reporting import Draft, reporting
+from robolink_cli._safekeeping import back_up_first
+from robolink_cli.calibrate._frame import Frame
+from robolink_cli.calibrate._listener import CalibrationListener
+
+
+class _LiveListener(CalibrationListener):
+    def __init__(self, draft: Draft, plan: ChangePlan, impact: ImpactRequest | None) -> None:
+        super().__init__(draft, plan.tools[0].gate, impact)
+        self._source = plan.tools[0].source
+
+    def proposed(self, proposals: Sequence[Proposal]) -> None:
+        (proposal,) = proposals
+        self.propose(proposal, source=self._source.sentence, warnings=doubts(proposal))
+        if self.impact is not None:
+            show_impact(proposal.tool, self.impact)
+
+
+class LiveCalibration:
+    """One calibration of one tool by the robot, as a command runs it."""
+
+    def __init__(
+        self,
+        controller: Controller,
+        plan: ChangePlan,
+        *,
+        draft: Draft,
+        assist_url: str | None = None,
+        impact: ImpactRequest | None = None,
+    ) -> None:
+        self._controller = controller
+        self._plan = plan
+        self._assist_url = assist_url
+        self._listener = _LiveListener(draft, plan, impact)
+        self._report: ToolReport | None = None
+
+    @property
+    def tool(self) -> int:
+        """Number of the tool."""
+        return self._plan.tools[0].tool
+
+    def require_writable(self) -> None:
+        """Refuse before anything moves what would be refused at the write; back up first.
+
+        Raises:
+            ConfigError: The backup before the first write cannot be stored.
+            OutcomeUnknownError: Something earlier is unsettled.
+            NotReadyError: The state forbids it.
+        """
+        self._controller.require_settled(tr("calibrate tool {tool}", tool=self.tool))
+        note_change(self._controller, self.tool, self._controller.tools.read(self.tool))
+        back_up_first(self._controller)
+
+    def dry_run(self) -> dict[str, object]:
+        """Return the foreseen steps with their requests and limit checks; reads only."""
+        steps = steps_payload(self._controller, preview(self._controller, self._plan))
+        return {"dry_run": True, "tool": self.tool, "steps": steps}
+
+    def check_limits(self) -> None:
+        """Show how it will go, and refuse a course that leads outside the limits; reads only.
+
+        Raises:
+            LimitError: Names the step.
+        """
+        steps = preview(self._controller, self._plan)
+        require_inside(self._controller, steps)
+        show_course(steps)
+
+    def run(self) -> dict[str, object]:
+        """Measure, propose, write, verify; return the document of the whole."""
+        self._listener.read_points(self._controller)
+        with operator_at(self._assist_url, lambda: self.tool) as operator:
+            change = NozzleChange(
+                self._controller,
+                self._plan,
+                operator=operator,
+                listener=self._listener,
+                earlier=partial(earlier_corrections, self._controller),
+            )
+            (self._report,) = change.run().tools
+        impact = self._listener.impact
+        return {
+            **report_payload(self._report),
+            "source": {"kind": "live"},
+            "impact": impact_payload(impact) if impact else None,
+        }
+
+    def show_end(self) -> None:
+        """Say how it ended."""
+        if self._report is not None:
+            show_report(self._report)
+
+
+def calibrate_live(frame: Frame, source: Callable[[Controller], TipSource]) -> None:
+    """Let the robot take the measurements, then propose, write and verify.
+
+    Raises:
+        CalibrationError: A measurement is not trusted; nothing was written.
+        DeclinedError: A person said no, or nobody could be asked.
+        LimitError: The foreseen course leads outside the limits; nothing was moved.
+        VerifyError: The tip drifts too far; the old value was put back.
+    """
+    context = frame.context
+    with (
+        open_controller(context, changes=not frame.dry_run) as controller,
+        reporting(frame.report, controller) as draft,
+    ):
+        live = LiveCalibration(
+            controller,
+            frame.plan(source(controller)),
+            draft=draft,
+            assist_url=frame.assist,
+            impact=frame.impact,
+        )
+        if frame.dry_run:
+            payload = live.dry_run()
+            context.emit("dry-run", payload, lambda: show_plan(payload))
+            return
+        live.require_writable()
+        live.check_limits()
+        agree_to_motion(
+            motion_question(
+                controller,
+                tr("to measure tool {tool}", tool=live.tool),
+                speed_mm_s=frame.limits.speed_mm_s,
+                box_mm=frame.limits.box_mm,
+            ),
+            yes=frame.yes,
+        )
+        payload = live.run()
+        # Now, because Ctrl-C may come before the logout is answered.
+        live.show_end()
+    context.emit("calibration", {**payload, "report": draft.saved}, lambda: None)

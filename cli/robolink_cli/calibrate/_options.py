@@ -1,0 +1,164 @@
+"""The options that every method of ``calibrate`` has, and those of all that touch a pin."""
+
+from collections.abc import Callable
+from functools import wraps
+from typing import Any, Final
+
+import click
+
+from robolink.messages import tr
+from robolink_cli._cell import with_cell_limits
+from robolink_cli._consent import dry_run_option, yes_option
+from robolink_cli._context import CliContext, controller_options
+from robolink_cli._impacting import impact_options
+from robolink_cli._motion_options import motion_option
+from robolink_cli._people import nozzle_options
+from robolink_cli._reporting import report_options
+from robolink_cli.calibrate._frame import USUAL_CHANGE_MM, frame_from
+
+_CELL_KEYS: Final = {
+    "lift_mm": "lift_mm",
+    "clearance_mm": "clearance_mm",
+    "speed_mm_s": "speed_mm_s",
+    "box_mm": "box_mm",
+    "max_change_mm": "max_change_mm",
+    "tolerance_mm": "drift_tolerance_mm",
+    "rms_mm": "rms_tolerance_mm",
+    "residual_mm": "residual_tolerance_mm",
+    "interval_mm": "interval_tolerance_mm",
+}
+"""Option to key in the cell file."""
+
+_LENGTH: Final = click.FloatRange(min=0, min_open=True)
+
+
+def calibration_options(function: Callable[..., None]) -> Callable[..., int | None]:
+    """Add the options of the frame; the method is passed a :class:`Frame` and its own options.
+
+    Limits that nobody typed are taken from the cell, for the method's own options too.
+    """
+
+    @wraps(function)
+    def framed(context: CliContext, **given: Any) -> None:  # noqa: ANN401 - click passes the options by name
+        options = with_cell_limits(
+            context.cell, given, {o: k for o, k in _CELL_KEYS.items() if o in given}
+        )
+        frame = frame_from(context, **{name: options.pop(name) for name in _FRAME})
+        function(frame, **options)
+
+    command: Callable[..., Any] = framed
+    command = yes_option(dry_run_option(controller_options(command)))
+    command = impact_options(report_options(nozzle_options(command)))
+    for option in reversed(_own_options()):
+        command = option(command)
+    return command
+
+
+def touch_options(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Add ``--lift`` and ``--clearance``."""
+    below = motion_option(
+        "--clearance",
+        "clearance_mm",
+        type=click.FloatRange(0.5, 50),
+        default=2.0,
+        show_default=True,
+        help=tr("How far above the pin the tip stops; the rest is yours."),
+    )
+    above = motion_option(
+        "--lift", "lift_mm", type=click.FloatRange(1, 100), default=10.0, show_default=True
+    )
+    command: Callable[..., Any] = above(below(function))
+    return command
+
+
+_FRAME: Final = (
+    "tool",
+    "speed_mm_s",
+    "box_mm",
+    "max_change_mm",
+    "rms_mm",
+    "residual_mm",
+    "interval_mm",
+    "tolerance_mm",
+    "no_verify",
+    "assist",
+    "impact",
+    "impact_pts",
+    "report_path",
+    "force",
+    "nozzle",
+    "lot",
+    "dry_run",
+    "yes",
+)
+"""Options that the frame takes; the others are the method's own."""
+
+
+def _own_options() -> tuple[Callable[[Callable[..., Any]], Callable[..., Any]], ...]:
+    return (
+        click.option("--tool", type=int, required=True, help=tr("Number of the tool, 1 to 15.")),
+        motion_option(
+            "--speed",
+            "speed_mm_s",
+            type=click.FloatRange(1, 100),
+            default=20.0,
+            metavar="MM_S",
+            help=tr("Speed of straight moves, in Power Low."),
+        ),
+        motion_option(
+            "--box",
+            "box_mm",
+            type=click.FloatRange(min=1),
+            default=150.0,
+            show_default=True,
+            help=tr("How far, sideways, the flange may go from where it is."),
+        ),
+        click.option(
+            "--max-change",
+            "max_change_mm",
+            type=_LENGTH,
+            default=USUAL_CHANGE_MM,
+            show_default=True,
+            help=tr(
+                "Largest plausible change against the stored offset; more than the cell allows "
+                "takes an engineer."
+            ),
+        ),
+        click.option(
+            "--max-rms",
+            "rms_mm",
+            type=_LENGTH,
+            metavar="MM",
+            help=tr("Largest rms of the residuals that is believed."),
+        ),
+        click.option(
+            "--max-residual",
+            "residual_mm",
+            type=_LENGTH,
+            metavar="MM",
+            help=tr("Largest residual of one pose that is believed."),
+        ),
+        click.option(
+            "--max-interval",
+            "interval_mm",
+            type=_LENGTH,
+            metavar="MM",
+            help=tr("Largest half of a 95 % interval that is believed."),
+        ),
+        motion_option(
+            "--tolerance",
+            "tolerance_mm",
+            type=_LENGTH,
+            default=0.2,
+            show_default=True,
+            help=tr("Largest drift about the new tip that passes."),
+        ),
+        motion_option(
+            "--no-verify", is_flag=True, help=tr("Do not turn about the new tip afterwards.")
+        ),
+        motion_option(
+            "--assist",
+            metavar="URL",
+            help=tr("A simulator's assist or sim URL: its operator brings the tip onto the pin."),
+        ),
+    )

@@ -1,0 +1,104 @@
+"""What one ``[cells.NAME.stations.ID]`` table may say, by the kind of station."""
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Text = Annotated[str, Field(min_length=1, max_length=200)]
+Positive = Annotated[float, Field(gt=0)]
+InputNumber = Annotated[int, Field(ge=0, le=0xFFFF)]
+Angle = Annotated[float, Field(ge=-360, le=360)]
+
+STRICT = ConfigDict(
+    extra="forbid", frozen=True, strict=True, allow_inf_nan=False, hide_input_in_errors=True
+)
+
+
+class _Station(BaseModel):
+    """What all kinds of stations have in common.
+
+    Attributes:
+        x_mm, y_mm, z_mm: Where it is, base; once it is learnt, the journal knows better.
+        sigma_mm: Standard deviation of each of them.
+        gauge: Id of the gauge or pin that stands there, as on its certificate.
+        check_every_days: After so many days it has to be learnt again.
+        notes: For people.
+    """
+
+    model_config = STRICT
+
+    x_mm: float | None = None
+    y_mm: float | None = None
+    z_mm: float | None = None
+    sigma_mm: Positive | None = None
+    gauge: Text | None = None
+    check_every_days: Positive | None = None
+    notes: str | None = None
+
+
+class PinSettings(_Station):
+    """A pin that a person brings a tip onto."""
+
+    kind: Literal["pin"]
+
+
+class BeamLineSettings(BaseModel):
+    """One light beam.
+
+    Attributes:
+        input: Number of the input that it switches.
+        x_mm, y_mm: A point of it, base.
+        direction_deg: Its direction in the base, counter-clockwise from X.
+    """
+
+    model_config = STRICT
+
+    input: InputNumber
+    x_mm: float
+    y_mm: float
+    direction_deg: Angle
+
+
+class BeamsSettings(_Station):
+    """Two crossed light beams; ``z_mm`` is their height.
+
+    Attributes:
+        beams: The two beams, as they are to within a millimetre or two.
+        off_when_broken: Whether an input goes off, not on, while its beam is broken.
+    """
+
+    kind: Literal["beams"]
+    z_mm: float
+    beams: Annotated[tuple[BeamLineSettings, ...], Field(strict=False, min_length=2, max_length=2)]
+    off_when_broken: bool = False
+
+
+class TouchSettings(_Station):
+    """A level surface that switches an input when a tip touches it.
+
+    Attributes:
+        input: The input that it switches.
+        off_when_touched: Whether that goes off, not on, at a touch.
+    """
+
+    kind: Literal["touch"]
+    x_mm: float
+    y_mm: float
+    z_mm: float
+    input: InputNumber
+    off_when_touched: bool = False
+
+
+StationSettings = Annotated[
+    PinSettings | BeamsSettings | TouchSettings, Field(discriminator="kind")
+]
+"""More kinds join this union."""
+
+
+def station_keys() -> dict[str, list[str]]:
+    """Return the keys of each kind of station."""
+    return {
+        "pin": list(PinSettings.model_fields),
+        "beams": list(BeamsSettings.model_fields),
+        "touch": list(TouchSettings.model_fields),
+    }

@@ -1,0 +1,117 @@
+"""The stations of a cell: what the cell file declares, with what the journal has learnt since."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+
+from robolink.config import Cell
+from robolink.errors import ConfigError
+from robolink.messages import tr
+from robolink.model import Recorded
+from robolink.stations._records import station_of
+from robolink.stations._station import Station, StationKind
+
+_PLACE = ("x_mm", "y_mm", "z_mm", "sigma_mm", "gauge", "check_every_days", "kind", "notes")
+
+
+def find_stations(cell: Cell | None, entries: Iterable[Recorded]) -> dict[str, Station]:
+    """Return all stations by name.
+
+    What a measurement found replaces what the cell file says about the same place; what the
+    measurement cannot know, such as a gauge or how often it is to be checked, stays.
+
+    Args:
+        cell: The cell, if one was named.
+        entries: What is on record about the stations of its controller, newest first.
+    """
+    stations = _declared(cell)
+    learnt: dict[str, Station] = {}
+    for entry in entries:
+        station = station_of(entry)
+        if station is not None:
+            learnt.setdefault(station.id, station)
+    for name, newest in learnt.items():
+        declared = stations.get(name)
+        if declared is None:
+            stations[name] = newest
+        elif declared.kind is newest.kind:
+            stations[name] = _together(declared, newest)
+    return stations
+
+
+def find_station(
+    cell: Cell | None,
+    entries: Iterable[Recorded],
+    name: str,
+    *,
+    kind: StationKind | None = None,
+) -> Station:
+    """Return one station.
+
+    Args:
+        cell: The cell, if one was named.
+        entries: What is on record about the stations of its controller, newest first.
+        name: Its name.
+        kind: What it has to be.
+
+    Raises:
+        ConfigError: There is none of that name, or it is something else.
+    """
+    stations = find_stations(cell, entries)
+    found = stations.get(name)
+    if found is None:
+        known = ", ".join(sorted(stations)) or tr("none")
+        raise ConfigError(
+            tr("There is no station {name!r} here.", name=name),
+            remedy=tr(
+                "These are known: {known}. Declare it in the cell file as "
+                "[cells.NAME.stations.ID], or learn it with 'robolink station learn'.",
+                known=known,
+            ),
+        )
+    if kind is not None and found.kind is not kind:
+        raise ConfigError(
+            tr(
+                "Station {name} is of kind {found}; {wanted} is needed here.",
+                name=name,
+                found=found.kind.value,
+                wanted=kind.value,
+            ),
+            remedy=tr("'robolink station list' shows the stations and their kinds."),
+        )
+    return found
+
+
+def _declared(cell: Cell | None) -> dict[str, Station]:
+    settings: Mapping[str, object] = (cell.settings.stations or {}) if cell else {}
+    return {name: _station(name, said) for name, said in settings.items()}
+
+
+def _station(name: str, said: object) -> Station:
+    values = said.model_dump(exclude_none=True, mode="json")  # type: ignore[attr-defined]
+    return Station(
+        id=name,
+        kind=StationKind(values["kind"]),
+        x_mm=values.get("x_mm"),
+        y_mm=values.get("y_mm"),
+        z_mm=values.get("z_mm"),
+        sigma_mm=values.get("sigma_mm"),
+        how=tr("stated in the cell file"),
+        gauge=values.get("gauge", ""),
+        check_every_days=values.get("check_every_days"),
+        declared=True,
+        details={key: value for key, value in values.items() if key not in _PLACE},
+    )
+
+
+def _together(declared: Station, learnt: Station) -> Station:
+    """Return what a measurement found, with what only the cell file says."""
+    return replace(
+        learnt,
+        x_mm=declared.x_mm if learnt.x_mm is None else learnt.x_mm,
+        y_mm=declared.y_mm if learnt.y_mm is None else learnt.y_mm,
+        z_mm=declared.z_mm if learnt.z_mm is None else learnt.z_mm,
+        gauge=learnt.gauge or declared.gauge,
+        check_every_days=declared.check_every_days,
+        declared=True,
+        details={**declared.details, **learnt.details},
+    )

@@ -25,6 +25,7 @@ from robolink.calibration._moved_station import StationShift as StationShift
 from robolink.calibration._moved_station import TipShift as TipShift
 from robolink.calibration._moved_station import judge_shifts as judge_shifts
 from robolink.calibration._planar_checks import MIN_ROTATION_DEG as MIN_ROTATION_DEG
+from robolink.calibration._planar_checks import angle_spread_deg as angle_spread_deg
 from robolink.calibration._planar_checks import planar_sigma_gain as planar_sigma_gain
 from robolink.calibration._poses import ToolFit as ToolFit
 from robolink.calibration._poses import better_fit as better_fit

@@ -44,13 +44,21 @@ class CameraStation:
         """
         if seen.unit is SpotUnit.BASE_MM:
             return seen.spot.x, seen.spot.y
+        return self.require_model().base_mm(seen.spot.x, seen.spot.y)
+
+    def require_model(self) -> CameraModel:
+        """Return what the pixels mean.
+
+        Raises:
+            CalibrationError: ``camera_not_calibrated``.
+        """
         if self.model is None:
             raise CalibrationError(
                 "camera_not_calibrated",
                 tr("The camera answers in pixels, and nothing says what they mean."),
                 remedy=tr("Calibrate it first: robolink calibrate camera-affine."),
             )
-        return self.model.base_mm(seen.spot.x, seen.spot.y)
+        return self.model
 
     def sighting(self, seen: SeenAt) -> Sighting:
         """Return a look as what was seen in the base.

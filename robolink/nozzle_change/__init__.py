@@ -16,6 +16,7 @@ from robolink.nozzle_change._listener import Moment as Moment
 from robolink.nozzle_change._plan import ChangePlan as ChangePlan
 from robolink.nozzle_change._plan import Limits as Limits
 from robolink.nozzle_change._plan import ToolPlan as ToolPlan
+from robolink.nozzle_change._plan import require_ready as require_ready
 from robolink.nozzle_change._pose_methods import ManyTouches as ManyTouches
 from robolink.nozzle_change._pose_methods import PoseMethod as PoseMethod
 from robolink.nozzle_change._pose_methods import TwoTouches as TwoTouches
@@ -26,6 +27,7 @@ from robolink.nozzle_change._proposal import ChangeReport as ChangeReport
 from robolink.nozzle_change._proposal import Proposal as Proposal
 from robolink.nozzle_change._proposal import ToolReport as ToolReport
 from robolink.nozzle_change._source import Bench as Bench
+from robolink.nozzle_change._source import Equipped as Equipped
 from robolink.nozzle_change._source import MovingSource as MovingSource
 from robolink.nozzle_change._source import TipSource as TipSource
 from robolink.nozzle_change._touch_probe import TouchProbe as TouchProbe

@@ -9,13 +9,11 @@ from robolink.calibration import (
     Procedure,
     VerifyResult,
 )
-from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink.model import Pose, SpotUnit, ToolOffset
+from robolink.model import Pose, ToolOffset
 from robolink.nozzle_change._flange import seen_from
-from robolink.nozzle_change._looks import angles_between
+from robolink.nozzle_change._looks import angles_between, pixel_camera
 from robolink.nozzle_change._source import Bench
-from robolink.sensing import open_sensor
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,18 +50,14 @@ class CameraToFind:
             "If the change is real, allow it with --max-change."
         )
 
-    def measure(self, bench: Bench, tool: int, stored: ToolOffset | None) -> CalibrationResult:  # noqa: ARG002 - the flange is what moves
-        """Look and solve; see :class:`~robolink.nozzle_change.MovingSource`.
+    def require_ready(self) -> None:
+        """Find out whether the camera is there; see :class:`~robolink.nozzle_change.Equipped`."""
+        with pixel_camera(self.sensor):
+            pass
 
-        Raises:
-            ConfigError: The camera answers in millimetres, so there is nothing to find.
-        """
-        with open_sensor(self.sensor) as camera:
-            if camera.unit is not SpotUnit.PIXEL:
-                raise ConfigError(
-                    tr("{camera} answers in millimetres already.", camera=camera.identity),
-                    remedy=tr("Use it as a calibrated camera: robolink calibrate camera."),
-                )
+    def measure(self, bench: Bench, tool: int, stored: ToolOffset | None) -> CalibrationResult:  # noqa: ARG002 - the flange is what moves
+        """Look and solve; see :class:`~robolink.nozzle_change.MovingSource`."""
+        with pixel_camera(self.sensor) as camera:
             bench.controller.tools.select(0)
             here = bench.controller.groups[0].pose()
             return bench.run(self.procedure(stored, here), camera=camera)
@@ -91,7 +85,7 @@ class CameraToFind:
         if not isinstance(result, CameraCalibration):
             raise TypeError(f"no camera was found by {result.method}")
         measured_deg = [pose.u_deg + result.offset.u_deg for pose in result.inputs]
-        with open_sensor(self.sensor) as camera:
+        with pixel_camera(self.sensor) as camera:
             bench.controller.tools.select(tool)
             procedure = verify_by_looking(
                 replace(self.station, model=result.camera),

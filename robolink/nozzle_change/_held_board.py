@@ -14,9 +14,8 @@ from robolink.calibration import (
 from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
 from robolink.nozzle_change._flange import seen_from
-from robolink.nozzle_change._looks import angles_between, camera_error_of
+from robolink.nozzle_change._looks import angles_between, calibrated_camera, camera_error_of
 from robolink.nozzle_change._source import Bench
-from robolink.sensing import open_sensor
 
 _TWO_ANGLES = LookPlan(turns_deg=TWO_ANGLES_DEG)
 
@@ -56,9 +55,14 @@ class HeldBoard:
             "change is real, allow it with --max-change."
         )
 
+    def require_ready(self) -> None:
+        """Find out whether the camera is there; see :class:`~robolink.nozzle_change.Equipped`."""
+        with calibrated_camera(self.sensor, self.station):
+            pass
+
     def measure(self, bench: Bench, tool: int, stored: ToolOffset | None) -> CalibrationResult:  # noqa: ARG002 - the flange is what moves
         """Look and solve; see :class:`~robolink.nozzle_change.MovingSource`."""
-        with open_sensor(self.sensor) as camera:
+        with calibrated_camera(self.sensor, self.station) as camera:
             bench.controller.tools.select(0)
             here = bench.controller.groups[0].pose()
             return bench.run(self.procedure(stored, here), camera=camera)
@@ -91,7 +95,7 @@ class HeldBoard:
         # The tool's own U turned with the board, so the joint stands where it stood.
         measured_deg = [pose.u_deg + result.offset.u_deg for pose in result.inputs]
         turned = replace(seen_from(result.offset, tip), u_deg=tip.u_deg - result.offset.u_deg)
-        with open_sensor(self.sensor) as camera:
+        with calibrated_camera(self.sensor, self.station) as camera:
             bench.controller.tools.select(tool)
             procedure = verify_board(
                 self.station,

@@ -131,3 +131,17 @@ class MovingSource(TipSource, Protocol):
             tip: Where the tip was found, which differs from it where a difference was written.
             tolerance_mm: Largest drift that passes.
         """
+
+
+@runtime_checkable
+class Equipped(Protocol):
+    """A source that needs equipment besides the robot."""
+
+    def require_ready(self) -> None:
+        """Find out whether the equipment is there and can be used, before anything moves.
+
+        Raises:
+            CalibrationError: ``sensor_not_found``, ``camera_not_calibrated``.
+            ConfigError: It cannot be used in this way.
+            ConnectError: It does not answer.
+        """

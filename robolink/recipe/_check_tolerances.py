@@ -8,7 +8,13 @@ from robolink.config import Problem
 from robolink.messages import tr
 from robolink.model import Pose
 from robolink.recipe._draft import Draft
-from robolink.recipe._sources import AnySource, BeamsSource, OperatorSource, TouchSource
+from robolink.recipe._sources import (
+    AnySource,
+    BeamsSource,
+    CameraSource,
+    OperatorSource,
+    TouchSource,
+)
 
 
 def residuals(draft: Draft) -> Iterator[Problem]:
@@ -80,6 +86,11 @@ def _without_residual(source: AnySource) -> str:
         return tr(
             "cannot be judged: two touches always agree, so they leave no residual; give four "
             "speeds_mm_s, or interval_mm with sigma_mm"
+        )
+    if isinstance(source, CameraSource):
+        return tr(
+            "cannot be judged: looks at one or two angles always agree, so they leave no residual; "
+            "give three turns_deg or more, or interval_mm with sigma_mm"
         )
     return tr(
         "cannot be judged: two poses always agree, so they leave no residual; "

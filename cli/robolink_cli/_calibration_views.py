@@ -105,14 +105,17 @@ def report_payload(report: ToolReport) -> dict[str, object]:
 def show_course(steps: Sequence[PlannedStep]) -> None:
     """Say how a measurement will go, before anybody is asked."""
     moves = sum(step.target is not None for step in steps)
-    note(
-        tr(
-            "The plan: a person brings the tip to its place {asks} times, in between {moves} "
-            "movements. All targets lie inside the box; --dry-run lists them.",
-            asks=len(steps) - moves,
+    asks = len(steps) - moves
+    if asks:
+        plan = tr(
+            "The plan: {asks} times a person brings the tip onto the pin, with {moves} movements "
+            "of the robot in between.",
+            asks=asks,
             moves=moves,
         )
-    )
+    else:
+        plan = tr("The plan: {moves} movements of the robot; nobody touches anything.", moves=moves)
+    note(tr("{plan} All targets lie inside the box; --dry-run lists them.", plan=plan))
 
 
 def show_plan(payload: Mapping[str, object]) -> None:

@@ -45,6 +45,7 @@ class CliContext(NamedTuple):
         operator: Badge or name of the person.
         nozzle: Id of the nozzle or needle that is mounted.
         lot: Its lot.
+        station: Name of the station where it is measured.
     """
 
     url: str | None = None
@@ -56,6 +57,7 @@ class CliContext(NamedTuple):
     operator: str | None = None
     nozzle: str = ""
     lot: str = ""
+    station: str = ""
 
     def with_nozzle(self, nozzle: str | None, lot: str | None) -> "CliContext":
         """Return the same with what is mounted, for the record."""
@@ -143,6 +145,7 @@ def open_controller(
         signature_of(context.operator, context.cell, changes=changes),
         nozzle=context.nozzle,
         lot=context.lot,
+        station=context.station,
     )
     with (
         recording(context.record, url.partition("?")[0]) as trace,

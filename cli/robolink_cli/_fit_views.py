@@ -17,7 +17,7 @@ def fit_sentence(result: CalibrationResult) -> str:
         return tr("nothing is left over that could tell how well it agrees with itself")
     return tr(
         "{count} poses agree within {rms:.3f} mm rms, {largest:.3f} mm at most",
-        count=len(result.inputs) - len(result.rejected),
+        count=len(result.residuals_mm) - len(result.rejected),
         rms=result.rms_mm,
         largest=result.max_residual_mm,
     )
@@ -40,17 +40,19 @@ def interval_sentence(result: CalibrationResult) -> str:
 
 def show_residuals(result: CalibrationResult) -> None:
     """Show the residual of every pose."""
-    rows = [
-        [
-            str(index + 1),
-            number(pose.u_deg),
-            *(number(part) for part in (*residual, 0.0)[:3]),
-            number(distance),
-            tr("left out") if index in result.rejected else "",
-        ]
-        for index, (pose, residual, distance) in enumerate(
-            zip(result.inputs, result.residuals_mm, result.residual_distances_mm, strict=False)
+    rows = []
+    for index, residual in enumerate(result.residuals_mm):
+        pose = result.inputs[index] if index < len(result.inputs) else None
+        # A single component is a height.
+        parts = (0.0, 0.0, *residual) if len(residual) == 1 else (*residual, 0.0)[:3]
+        rows.append(
+            [
+                str(index + 1),
+                number(pose.u_deg if pose else None),
+                *map(number, parts),
+                number(result.residual_distances_mm[index]),
+                tr("left out") if index in result.rejected else "",
+            ]
         )
-    ]
     columns = (tr("pose"), "U deg", "dX mm", "dY mm", "dZ mm", tr("distance mm"), "")
     table(tr("residuals"), columns, rows)

@@ -1,7 +1,7 @@
 """Where poses come from when nothing moves, and the options that say so."""
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import wraps
 from pathlib import Path
@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 
 _RANGE: Final = re.compile(r"([0-9]{1,3})(?:-([0-9]{1,3}))?", re.ASCII)
 
+_STATED: Final = {3: set[str](), 4: {"z_mm"}, 6: {"z_mm", "v_deg", "w_deg"}}
+"""What a typed pose states besides X, Y and U, by how many numbers it has."""
+
 
 @dataclass(frozen=True, slots=True)
 class PoseSource:
@@ -25,14 +28,14 @@ class PoseSource:
     Attributes:
         kind: Which one.
         points: Numbers of taught points.
-        typed: X and Y in mm and U in degrees, each.
+        typed: Three numbers each, X, Y, U; or four, X, Y, Z, U; or six, X, Y, Z, U, V, W.
         path: A file of poses.
         taught_tool: The tool whose tip the poses describe; 0 when they are flange poses.
     """
 
     kind: Literal["points", "typed", "file"]
     points: tuple[int, ...] = ()
-    typed: tuple[tuple[float, float, float], ...] = ()
+    typed: tuple[tuple[float, ...], ...] = ()
     path: Path | None = None
     taught_tool: int = 0
 
@@ -57,14 +60,17 @@ class PoseSource:
             named = tr("typed poses")
         return tr("{poses}; taught with tool {tool}", poses=named, tool=self.taught_tool)
 
-    def poses(self, controller: "Controller") -> "tuple[Pose, ...]":
+    def poses(self, controller: "Controller", needs: Sequence[str] = ()) -> "tuple[Pose, ...]":
         """Return the poses; taught points are read from the controller.
+
+        Args:
+            controller: The controller, connected.
+            needs: What every pose must state besides X, Y and U.
 
         Raises:
             CalibrationError: ``undefined_point``, or ``non_finite`` in a file.
-            ConfigError: The file cannot be used.
+            ConfigError: The file cannot be used, or a pose does not state what is needed.
         """
-        from robolink.model import Pose
         from robolink.nozzle_change import taught_poses
         from robolink.pose_files import read_poses
         from robolink_cli._kinds import points_of
@@ -72,8 +78,8 @@ class PoseSource:
         if self.kind == "points":
             return taught_poses(points_of(controller), self.points)
         if self.path is not None:
-            return read_poses(self.path)
-        return tuple(Pose(x_mm, y_mm, 0.0, u_deg) for x_mm, y_mm, u_deg in self.typed)
+            return read_poses(self.path, needs=needs)
+        return tuple(_typed_as_pose(numbers, needs) for numbers in self.typed)
 
 
 def pose_source_options(
@@ -88,7 +94,7 @@ def pose_source_options(
     """
     options = (
         click.option("--points", metavar="N,N", help=points),
-        click.option("--pose", "typed", metavar="X,Y,U", multiple=True, help=typed),
+        click.option("--pose", "typed", metavar="X,Y,..", multiple=True, help=typed),
         click.option("--poses", "path", type=click.Path(dir_okay=False, path_type=Path), help=path),
         click.option(
             "--taught-tool",
@@ -169,12 +175,39 @@ def point_numbers(text: str) -> tuple[int, ...]:
     return tuple(numbers)
 
 
-def _typed_pose(text: str) -> tuple[float, float, float]:
+def _typed_pose(text: str) -> tuple[float, ...]:
     try:
-        x_mm, y_mm, u_deg = (float(part) for part in text.split(","))
+        numbers = tuple(float(part) for part in text.split(","))
     except ValueError as error:
+        raise _no_pose(text) from error
+    if len(numbers) not in _STATED:
+        raise _no_pose(text)
+    return numbers
+
+
+def _typed_as_pose(numbers: tuple[float, ...], needs: Sequence[str]) -> "Pose":
+    from robolink.model import Pose
+
+    x_mm, y_mm, z_mm, u_deg, v_deg, w_deg = {
+        3: (*numbers[:2], 0.0, *numbers[2:], 0.0, 0.0),
+        4: (*numbers, 0.0, 0.0),
+        6: numbers,
+    }[len(numbers)]
+    stated = _STATED[len(numbers)]
+    if not set(needs) <= stated:
+        form = "X,Y,Z,U,V,W" if "v_deg" in needs else "X,Y,Z,U"
         raise ConfigError(
-            tr("{text!r} is not a pose.", text=text),
-            remedy=tr("Write X,Y,U in mm and degrees, for example 287.5,103.25,180."),
-        ) from error
-    return x_mm, y_mm, u_deg
+            tr("A typed pose does not state all that is needed here."),
+            remedy=tr("Write {form}, in mm and degrees.", form=form),
+        )
+    return Pose(x_mm, y_mm, z_mm, u_deg, v_deg, w_deg)
+
+
+def _no_pose(text: str) -> ConfigError:
+    return ConfigError(
+        tr("{text!r} is not a pose.", text=text),
+        remedy=tr(
+            "Write X,Y,U in mm and degrees, for example 287.5,103.25,180; or X,Y,Z,U; or "
+            "X,Y,Z,U,V,W."
+        ),
+    )

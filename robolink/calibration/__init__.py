@@ -24,6 +24,8 @@ from robolink.calibration._many_touches import telling_order as telling_order
 from robolink.calibration._moved_station import StationShift as StationShift
 from robolink.calibration._moved_station import TipShift as TipShift
 from robolink.calibration._moved_station import judge_shifts as judge_shifts
+from robolink.calibration._needle_chain import NeedleChain as NeedleChain
+from robolink.calibration._needle_chain import NeedleLimits as NeedleLimits
 from robolink.calibration._planar_checks import MIN_ROTATION_DEG as MIN_ROTATION_DEG
 from robolink.calibration._planar_checks import angle_spread_deg as angle_spread_deg
 from robolink.calibration._planar_checks import planar_sigma_gain as planar_sigma_gain
@@ -89,9 +91,7 @@ if TYPE_CHECKING:
     from robolink.calibration._looking_again import verify_board as verify_board
     from robolink.calibration._looking_again import verify_by_looking as verify_by_looking
     from robolink.calibration._n_angle import solve_n_angle as solve_n_angle
-    from robolink.calibration._needle_change import NeedleChain as NeedleChain
     from robolink.calibration._needle_change import NeedleChangeResult as NeedleChangeResult
-    from robolink.calibration._needle_change import NeedleLimits as NeedleLimits
     from robolink.calibration._needle_change import solve_needle_change as solve_needle_change
     from robolink.calibration._one_touch import Pin as Pin
     from robolink.calibration._one_touch import pin_touched as pin_touched
@@ -158,9 +158,7 @@ _LOADED_LATER = {
     "verify_board": "_looking_again",
     "verify_by_looking": "_looking_again",
     "solve_n_angle": "_n_angle",
-    "NeedleChain": "_needle_change",
     "NeedleChangeResult": "_needle_change",
-    "NeedleLimits": "_needle_change",
     "solve_needle_change": "_needle_change",
     "Pin": "_one_touch",
     "pin_touched": "_one_touch",

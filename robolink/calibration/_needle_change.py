@@ -10,47 +10,15 @@ from dataclasses import dataclass
 
 from robolink.calibration._checks import check_poses, keep_unmeasured
 from robolink.calibration._finite import require_finite
+from robolink.calibration._needle_chain import NeedleChain, NeedleLimits
 from robolink.calibration._result import CalibrationResult
 from robolink.calibration._scatter import Scatter, require_positive
-from robolink.calibration._update_guard import NEEDLE_LIMIT_MM
 from robolink.errors import CalibrationError
 from robolink.messages import tr
 from robolink.model import Pose, ToolOffset, rotate_xy
 
 Point = tuple[float, ...]
 """(x, y) or (x, y, z) in the base, mm."""
-
-
-@dataclass(frozen=True, slots=True)
-class NeedleChain:
-    """What has happened since the last full calibration.
-
-    Attributes:
-        sigma_mm: Standard deviation of each measured length that the offset carries now.
-        changes: How many differences were added to it.
-    """
-
-    sigma_mm: float
-    changes: int = 0
-
-    def after(self, difference_sigma_mm: float) -> "NeedleChain":
-        """Return the chain with one more difference."""
-        return NeedleChain(math.hypot(self.sigma_mm, difference_sigma_mm), self.changes + 1)
-
-
-@dataclass(frozen=True, slots=True)
-class NeedleLimits:
-    """How far differences are trusted.
-
-    Attributes:
-        max_change_mm: Largest shift that is believed.
-        tolerance_mm: Half the 95 % interval that the process can bear.
-        max_changes: Differences after which a full calibration is due in any case.
-    """
-
-    max_change_mm: float = NEEDLE_LIMIT_MM
-    tolerance_mm: float = 0.1
-    max_changes: int = 20
 
 
 USUAL_LIMITS = NeedleLimits()

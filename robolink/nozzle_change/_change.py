@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 
 from robolink.calibration import VerifyResult
-from robolink.errors import DeclinedError, VerifyError
+from robolink.errors import CalibrationError, DeclinedError, VerifyError
 from robolink.messages import tr
 from robolink.model import Controller, ToolReceipt, new_operation, require_engineer
 from robolink.nozzle_change._listener import Listener, Moment
@@ -19,13 +19,12 @@ from robolink.nozzle_change._plan import ChangePlan, ToolPlan
 from robolink.nozzle_change._proposal import ChangeReport, Proposal, ToolReport
 from robolink.nozzle_change._records import decision_entry, refusal_entry, verification_entry
 from robolink.nozzle_change._source import Bench
+from robolink.nozzle_change._station_check import Proposals, check_stations, stations_found
 from robolink.runner import Operator
 from robolink.transaction import ToolChange, Wanted
 
 Earlier = Callable[[int], Sequence[float]]
 """Returns the lengths of a tool's corrections since its nozzle was mounted, oldest first."""
-
-Proposals = Sequence[tuple[ToolPlan, Proposal]]
 
 
 class NozzleChange:
@@ -87,7 +86,8 @@ class NozzleChange:
         measuring = Measuring(bench, listener)
         measuring.go_to(plan.safe, tr("go to the safe pose"))
         listener.moment(Moment.START, bench)
-        proposals = [(one, measuring.propose(one)) for one in plan.tools]
+        proposals: Proposals = [(one, measuring.propose(one)) for one in plan.tools]
+        proposals = self._checked(proposals)
         listener.proposed([proposal for _, proposal in proposals])
         self._judge(proposals)
         if write:
@@ -116,6 +116,15 @@ class NozzleChange:
             settings=settings,
             offers=self._plan.ask_before_write,
         )
+
+    def _checked(self, proposals: Proposals) -> Proposals:
+        """Return the proposals with what the stations make doubtful; a refusal goes on record."""
+        try:
+            return check_stations(self._controller, proposals)
+        except CalibrationError as error:
+            for plan, _ in proposals:
+                self._controller.outcomes.append(refusal_entry(plan.tool, plan.gate, error))
+            raise
 
     def _judge(self, proposals: Proposals) -> None:
         for plan, proposal in proposals:
@@ -172,6 +181,7 @@ class NozzleChange:
                 for (plan, proposal), receipt in zip(proposals, receipts, strict=True)
             )
             change.keep(tr("verified") if verify else tr("not verified"))
+        self._controller.outcomes.append(*stations_found(proposals))
         return reports
 
     def _verify(

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 from robolink.model import Pose, ToolOffset, WorkBox, plain_offset
 from robolink.nozzle_change._gate import Gate
+from robolink.nozzle_change._pin_record import touch_details
 from robolink.nozzle_change._proposal import Proposal
 from robolink.nozzle_change._source import Equipped, MovingSource, TipSource
 from robolink.nozzle_change._touching import PinAndPerson
@@ -60,6 +61,7 @@ class ToolPlan:
         attempts: How often it is measured before a refusal ends the change.
         approach: Flange pose from which it is measured, ``None`` for wherever the robot is.
         retreat: Flange pose to which the robot goes afterwards.
+        pin: Name of the station where a pin is touched; empty for none, or none that is kept.
     """
 
     tool: int
@@ -69,11 +71,13 @@ class ToolPlan:
     attempts: int = 1
     approach: Pose | None = None
     retreat: Pose | None = None
+    pin: str = ""
 
     def details(self, proposal: Proposal) -> dict[str, object]:
         """Return what the journal keeps about the value beside it, plain JSON."""
         own = {"tip": plain_offset(proposal.tip), "method": proposal.result.method}
-        return {**own, **proposal.kept_record}
+        touch = {"touch": touch_details(self.pin, proposal)} if self.pin else {}
+        return {**own, **touch, **proposal.kept_record}
 
     @property
     def moving(self) -> MovingSource | None:

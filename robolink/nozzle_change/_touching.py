@@ -1,9 +1,12 @@
 """A pin in the cell, and a person who brings the tip onto it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 from robolink.calibration import (
     CalibrationResult,
+    Course,
     Procedure,
     TouchPlan,
     VerifyResult,
@@ -26,11 +29,13 @@ class PinAndPerson:
         turns_deg: Angles of the further touches against the first one; empty for the one of
             ``touch``, which needs no more than two poses.
         sigma_mm: Standard deviation of one coordinate of one placement, where it is known.
+        course: When a measurement with many touches ends, and whether a pose is offered again.
     """
 
     touch: TouchPlan = field(default_factory=TouchPlan)
     turns_deg: tuple[float, ...] = ()
     sigma_mm: float | None = None
+    course: Course = field(default_factory=Course)
 
     @property
     def sentence(self) -> str:
@@ -53,13 +58,25 @@ class PinAndPerson:
     def measure(self, bench: Bench, tool: int, stored: ToolOffset | None) -> CalibrationResult:  # noqa: ARG002 - the flange is what moves
         """Touch and solve; see :class:`~robolink.nozzle_change.MovingSource`."""
         bench.controller.tools.select(0)
-        return bench.run(self.procedure(stored, bench.controller.groups[0].pose()))
+        return bench.run(self._steps(stored, self.course))
 
     def procedure(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:  # noqa: ARG002 - the person brings the tip to the pin
-        """Return the steps of a measurement; see :class:`~robolink.nozzle_change.MovingSource`."""
+        """Return the steps of a measurement; see :class:`~robolink.nozzle_change.MovingSource`.
+
+        All of them: when it ends early depends on touches that nobody has made yet.
+        """
+        return self._steps(stored, Course())
+
+    def _steps(self, stored: ToolOffset | None, course: Course) -> Procedure[CalibrationResult]:
         if not self.turns_deg:
             return two_pose(self.touch, stored=stored, sigma_mm=self.sigma_mm)
-        return n_angle(self.touch, turns_deg=self.turns_deg, stored=stored, sigma_mm=self.sigma_mm)
+        return n_angle(
+            self.touch,
+            turns_deg=self.turns_deg,
+            stored=stored,
+            sigma_mm=self.sigma_mm,
+            course=course,
+        )
 
     def verify(
         self,
@@ -71,14 +88,21 @@ class PinAndPerson:
         tolerance_mm: float,
     ) -> VerifyResult:
         """Turn about the new tip; see :class:`~robolink.nozzle_change.MovingSource`."""
-        first, *others = (pose.u_deg + result.offset.u_deg for pose in result.inputs)
+        angles = [pose.u_deg + result.offset.u_deg for pose in result.inputs]
         bench.controller.tools.select(tool)
         procedure = verify_by_turning(
             self.touch,
             contact=contact_pose(result, tool=tool),
-            angles_deg=((first + others[-1]) / 2, first),
+            angles_deg=(_middle_of_largest_gap(angles), angles[0]),
             tolerance_mm=tolerance_mm,
             written=result.offset,
             tip=tip,
         )
         return bench.run(procedure, tip=result.offset)
+
+
+def _middle_of_largest_gap(angles_deg: Sequence[float]) -> float:
+    """Return an angle between those that were measured, as far from any of them as there is one."""
+    gaps = pairwise(sorted(angles_deg))
+    low, high = max(gaps, key=lambda gap: gap[1] - gap[0])
+    return (low + high) / 2

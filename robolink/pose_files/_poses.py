@@ -5,7 +5,8 @@ JSON, a list of objects::
     [{"x_mm": 287.5, "y_mm": 103.25, "u_deg": 0.0},
      {"x_mm": 312.5, "y_mm": 96.75, "u_deg": 180.0, "z_mm": -20.0, "hand": "right"}]
 
-CSV with a header line, columns in any order; ``z_mm`` and ``hand`` may be left out::
+CSV with a header line, columns in any order; ``z_mm``, ``v_deg``, ``w_deg`` and ``hand`` may be
+left out where the method does without them::
 
     x_mm,y_mm,u_deg,hand
     287.5,103.25,0,right
@@ -15,7 +16,7 @@ CSV with a header line, columns in any order; ``z_mm`` and ``hand`` may be left 
 import csv
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from robolink.errors import CalibrationError
@@ -24,11 +25,15 @@ from robolink.model import Hand, Pose
 from robolink.pose_files._reading import read_text, unusable
 
 _REQUIRED = ("x_mm", "y_mm", "u_deg")
-_KNOWN = frozenset({*_REQUIRED, "z_mm", "hand"})
+_KNOWN = frozenset({*_REQUIRED, "z_mm", "v_deg", "w_deg", "hand"})
 
 
-def read_poses(path: Path) -> tuple[Pose, ...]:
+def read_poses(path: Path, *, needs: Sequence[str] = ()) -> tuple[Pose, ...]:
     """Read poses in mm and degrees from a ``.json`` or ``.csv`` file.
+
+    Args:
+        path: The file.
+        needs: What every pose must state besides ``x_mm``, ``y_mm`` and ``u_deg``.
 
     Raises:
         ConfigError: The file cannot be read, or is not laid out as above.
@@ -39,7 +44,8 @@ def read_poses(path: Path) -> tuple[Pose, ...]:
     if reader is None:
         raise unusable(path, tr("its name ends neither in .json nor in .csv"))
     rows = reader(path, read_text(path, encoding="utf-8-sig"))
-    return tuple(_pose(path, number, row) for number, row in enumerate(rows, start=1))
+    required = (*_REQUIRED, *needs)
+    return tuple(_pose(path, number, row, required) for number, row in enumerate(rows, start=1))
 
 
 def _json_rows(path: Path, text: str) -> list[Mapping[str, object]]:
@@ -63,7 +69,10 @@ def _csv_rows(path: Path, text: str) -> list[Mapping[str, object]]:
     if len(set(names)) != len(names) or not set(_REQUIRED) <= set(names) <= _KNOWN:
         raise unusable(
             path,
-            tr("its first line has to name x_mm,y_mm,u_deg, and z_mm and hand if you have them"),
+            tr(
+                "its first line has to name x_mm,y_mm,u_deg, and z_mm, v_deg, w_deg and hand if "
+                "you have them"
+            ),
         )
     rows: list[Mapping[str, object]] = []
     for cells in body:
@@ -75,8 +84,8 @@ def _csv_rows(path: Path, text: str) -> list[Mapping[str, object]]:
     return rows
 
 
-def _pose(path: Path, number: int, row: Mapping[str, object]) -> Pose:
-    missing = [name for name in _REQUIRED if name not in row]
+def _pose(path: Path, number: int, row: Mapping[str, object], required: Sequence[str]) -> Pose:
+    missing = [name for name in required if name not in row]
     unknown = sorted(set(row) - _KNOWN)
     if missing:
         raise unusable(
@@ -91,6 +100,8 @@ def _pose(path: Path, number: int, row: Mapping[str, object]) -> Pose:
         _number(number, row, "y_mm"),
         _number(number, {"z_mm": 0.0, **row}, "z_mm"),
         _number(number, row, "u_deg"),
+        _number(number, {"v_deg": 0.0, **row}, "v_deg"),
+        _number(number, {"w_deg": 0.0, **row}, "w_deg"),
         hand=_hand(path, number, row.get("hand")),
     )
 

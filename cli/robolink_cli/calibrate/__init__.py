@@ -16,6 +16,30 @@ METHODS: Final = {
         "robolink_cli.calibrate.two_pose:two_pose",
         tr("Touch one pin at two angles of U, half a turn apart."),
     ),
+    "n-angle": (
+        "robolink_cli.calibrate.n_angle:n_angle",
+        tr("Touch one pin at several angles of U; the touches check each other."),
+    ),
+    "one-touch": (
+        "robolink_cli.calibrate.one_touch:one_touch",
+        tr("Touch a known pin once: X, Y and Z, for a change of the needle."),
+    ),
+    "beams": (
+        "robolink_cli.calibrate.beams:beams",
+        tr("Drive the tip through two crossed light beams: X and Y."),
+    ),
+    "z-touch": (
+        "robolink_cli.calibrate.z_touch:z_touch",
+        tr("Touch a surface that switches an input: Z."),
+    ),
+    "pivot": (
+        "robolink_cli.calibrate.pivot:pivot",
+        tr("Tilted touches of one pin, taught on the pendant: X, Y and Z, on six axes."),
+    ),
+    "six-point": (
+        "robolink_cli.calibrate.six_point:six_point",
+        tr("A pivot and two ways along the tool's axes: all six components."),
+    ),
 }
 """Name, where it is, one-line help; in the order of the help page."""
 

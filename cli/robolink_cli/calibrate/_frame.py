@@ -1,7 +1,7 @@
 """The frame in which every method calibrates: what was asked for, and the two ways it goes."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -38,6 +38,8 @@ class Frame:
         report: Where a page about it is wanted.
         dry_run: Whether it is only looked at.
         yes: Whether questions are answered beforehand.
+        pin: Name of the pin that is touched; empty where nobody named one.
+        finds_pin: Whether the method finds the pin itself, so that it need not be known.
     """
 
     context: CliContext
@@ -50,6 +52,21 @@ class Frame:
     report: ReportRequest | None
     dry_run: bool
     yes: bool
+    pin: str = ""
+    finds_pin: bool = True
+
+    def at(self, station: str) -> "Frame":
+        """Return the same at a station of that name, which goes on record."""
+        return replace(self, context=self.context._replace(station=station))
+
+    def at_pin(self, station: str | None, *, finds_pin: bool = True) -> "Frame":
+        """Return the same at a pin, whose place is kept for one touch later.
+
+        Args:
+            station: Its name, ``None`` when nobody named it.
+            finds_pin: Whether the method finds the pin itself.
+        """
+        return replace(self.at(station or ""), pin=station or "", finds_pin=finds_pin)
 
     def measure(self, source: "Callable[[Controller], TipSource]") -> None:
         """Let the robot measure, then propose, ask, write and verify.
@@ -63,8 +80,13 @@ class Frame:
             _refuse_to_show_nothing(self.impact, self.report)
         calibrate_live(self, source)
 
-    def solve(self, poses: PoseSource, method: "PoseMethod") -> None:
-        """Take poses that exist already, then propose, ask and write. Nothing moves."""
+    def solve(self, poses: PoseSource, method: "Callable[[Controller], PoseMethod]") -> None:
+        """Take poses that exist already, then propose, ask and write. Nothing moves.
+
+        Args:
+            poses: Where they come from.
+            method: Makes the method for a controller that is connected; it may read there.
+        """
         from robolink_cli.calibrate._given import calibrate_from_poses
 
         refuse_motion_options(click.get_current_context())
@@ -74,7 +96,7 @@ class Frame:
         """Return what is to be done with the measurements of ``source``."""
         from robolink.nozzle_change import ChangePlan, ToolPlan
 
-        one = ToolPlan(self.tool, source, self.gate, verify=self.verify)
+        one = ToolPlan(self.tool, source, self.gate, verify=self.verify, pin=self.pin)
         return ChangePlan((one,), limits=self.limits, ask_before_write=not self.yes)
 
 

@@ -1,6 +1,6 @@
 """A calibration from poses that exist already: nothing moves, no tool is selected."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 
 from robolink.calibration import ToolFit
@@ -32,6 +32,7 @@ from robolink_cli._reporting import Draft, reporting
 from robolink_cli._safekeeping import back_up_first
 from robolink_cli.calibrate._frame import Frame
 from robolink_cli.calibrate._listener import CalibrationListener
+from robolink_cli.calibrate._pins import remark_on_pin
 
 
 class _PosesListener(CalibrationListener):
@@ -104,7 +105,9 @@ class _PosesListener(CalibrationListener):
         )
 
 
-def calibrate_from_poses(frame: Frame, source: PoseSource, method: PoseMethod) -> None:
+def calibrate_from_poses(
+    frame: Frame, source: PoseSource, method_for: Callable[[Controller], PoseMethod]
+) -> None:
     """Propose, ask, write and read back.
 
     Raises:
@@ -117,8 +120,12 @@ def calibrate_from_poses(frame: Frame, source: PoseSource, method: PoseMethod) -
         open_controller(context, changes=not frame.dry_run) as controller,
         reporting(frame.report, controller) as draft,
     ):
+        remark_on_pin(frame, controller)
+        method = method_for(controller)
+        # A pin that is kept needs its height.
+        needs = {*method.needs, "z_mm"} if frame.pin else {*method.needs}
         given = GivenPoses(
-            lambda: source.poses(controller),
+            lambda: source.poses(controller, sorted(needs)),
             method,
             taught_tool=source.taught_tool,
             plausible_mm=frame.gate.limit_mm,
@@ -145,7 +152,7 @@ def calibrate_from_poses(frame: Frame, source: PoseSource, method: PoseMethod) -
 def _carry_out(
     controller: Controller, frame: Frame, given: GivenPoses, listener: Listener
 ) -> ToolReport:
-    one = ToolPlan(frame.tool, given, frame.gate, verify=False)
+    one = ToolPlan(frame.tool, given, frame.gate, verify=False, pin=frame.pin)
     change = NozzleChange(
         controller,
         ChangePlan((one,), ask_before_write=False),

@@ -33,6 +33,7 @@ from robolink_cli._reporting import Draft, reporting
 from robolink_cli._safekeeping import back_up_first
 from robolink_cli.calibrate._frame import Frame
 from robolink_cli.calibrate._listener import CalibrationListener
+from robolink_cli.calibrate._pins import remark_on_pin
 
 
 class _LiveListener(CalibrationListener):
@@ -138,6 +139,7 @@ def calibrate_live(frame: Frame, source: Callable[[Controller], TipSource]) -> N
         open_controller(context, changes=not frame.dry_run) as controller,
         reporting(frame.report, controller) as draft,
     ):
+        remark_on_pin(frame, controller)
         live = LiveCalibration(
             controller,
             frame.plan(source(controller)),

@@ -71,6 +71,28 @@ def touch_options(function: Callable[..., Any]) -> Callable[..., Any]:
     return command
 
 
+def pin_option(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Add ``--station`` for a pin."""
+    command: Callable[..., Any] = click.option(
+        "--station",
+        metavar="ID",
+        help=tr("Name of the pin; where it is found is kept, for one touch later."),
+    )(function)
+    return command
+
+
+def sigma_option(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Add ``--sigma``."""
+    command: Callable[..., Any] = click.option(
+        "--sigma",
+        "sigma_mm",
+        type=_LENGTH,
+        metavar="MM",
+        help=tr("Standard deviation of one coordinate of one measurement, where it is known."),
+    )(function)
+    return command
+
+
 _FRAME: Final = (
     "tool",
     "speed_mm_s",

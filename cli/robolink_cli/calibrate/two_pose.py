@@ -6,12 +6,19 @@ from robolink.messages import tr
 from robolink_cli._motion_options import motion_option
 from robolink_cli._pose_source import PoseSource, pose_source_options
 from robolink_cli.calibrate._frame import Frame
-from robolink_cli.calibrate._options import calibration_options, touch_options
+from robolink_cli.calibrate._options import (
+    calibration_options,
+    pin_option,
+    sigma_option,
+    touch_options,
+)
 
 
 @click.command("two-pose")
 @motion_option("--turn", "turn_deg", type=float, default=180.0, metavar="DEG", show_default=True)
 @touch_options
+@sigma_option
+@pin_option
 @pose_source_options(
     points=tr("Two points taught on the pendant, for example 901,902. Nothing moves."),
     typed=tr("A pose in mm and degrees, for example 287.5,103.25,180; give it twice."),
@@ -19,7 +26,14 @@ from robolink_cli.calibrate._options import calibration_options, touch_options
 )
 @calibration_options
 def two_pose(
-    frame: Frame, *, turn_deg: float, lift_mm: float, clearance_mm: float, poses: PoseSource | None
+    frame: Frame,
+    *,
+    turn_deg: float,
+    lift_mm: float,
+    clearance_mm: float,
+    sigma_mm: float | None,
+    station: str | None,
+    poses: PoseSource | None,
 ) -> None:
     """Touch one pin at two angles of U, half a turn apart.
 
@@ -32,8 +46,9 @@ def two_pose(
     from robolink.nozzle_change import PinAndPerson, TwoTouches
     from robolink_cli.calibrate._touch_plan import touch_plan
 
+    frame = frame.at_pin(station)
     touch = touch_plan(lift_mm, clearance_mm, turn_deg=turn_deg)
     if poses is not None:
-        frame.solve(poses, TwoTouches())
+        frame.solve(poses, lambda _controller: TwoTouches(sigma_mm))
         return
-    frame.measure(lambda _controller: PinAndPerson(touch))
+    frame.measure(lambda _controller: PinAndPerson(touch, sigma_mm=sigma_mm))

@@ -1,0 +1,101 @@
+"""calibrate z-touch: the robot touches a surface that switches an input."""
+
+from typing import TYPE_CHECKING
+
+import click
+
+from robolink.errors import ConfigError
+from robolink.messages import tr
+from robolink_cli._motion_options import motion_option
+from robolink_cli.calibrate._frame import Frame
+from robolink_cli.calibrate._options import calibration_options, sigma_option
+
+if TYPE_CHECKING:
+    from robolink.model import Controller
+    from robolink.nozzle_change import TipSource
+
+
+@click.command("z-touch")
+@click.option("--station", metavar="ID", required=True, help=tr("Name of the surface."))
+@motion_option(
+    "--speeds",
+    default="2,1,2,1",
+    metavar="2,1,..",
+    show_default=True,
+    help=tr("Speed of each touch, mm/s; two that differ tell the latency of the trigger."),
+)
+@motion_option(
+    "--clearance",
+    "clearance_mm",
+    type=click.FloatRange(0.5, 20),
+    default=3.0,
+    show_default=True,
+    help=tr("How far above the expected touch the tip begins to seek it."),
+)
+@motion_option(
+    "--beyond",
+    "beyond_mm",
+    type=click.FloatRange(0.1, 10),
+    default=2.0,
+    show_default=True,
+    help=tr("How far below it the search ends; a new tip may be shorter by less."),
+)
+@motion_option("--lift", "lift_mm", type=click.FloatRange(1, 100), default=10.0, show_default=True)
+@sigma_option
+@calibration_options
+def z_touch(
+    frame: Frame,
+    *,
+    station: str,
+    speeds: str,
+    clearance_mm: float,
+    beyond_mm: float,
+    lift_mm: float,
+    sigma_mm: float | None,
+) -> None:
+    """Touch a surface that switches an input: Z; nobody touches anything.
+
+    X and Y are kept. The tip stops at the touch and retreats; two speeds tell the latency.
+    """
+    from robolink.calibration import ProbePlan
+
+    if clearance_mm >= lift_mm:
+        raise ConfigError(
+            tr("The clearance must be smaller than the lift."),
+            remedy=tr("For example --lift 10 --clearance 2."),
+        )
+    plan = ProbePlan(
+        clearance_mm=clearance_mm,
+        beyond_mm=beyond_mm,
+        lift_mm=lift_mm,
+        speeds_mm_s=_speeds(speeds),
+    )
+    frame = frame.at(station)
+
+    def source(controller: "Controller") -> "TipSource":
+        from robolink.nozzle_change import TouchProbe
+        from robolink.stations import StationKind, touch_station
+        from robolink_cli.calibrate._pins import station_at
+
+        place = touch_station(station_at(frame, controller, StationKind.TOUCH))
+        return TouchProbe(place, plan, sigma_mm=sigma_mm)
+
+    frame.measure(source)
+
+
+def _speeds(text: str) -> tuple[float, ...]:
+    """Read speeds in mm/s.
+
+    Raises:
+        ConfigError: They are no speeds from 0.1 to 10, or fewer than two.
+    """
+    try:
+        speeds = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        speeds = ()
+    if len(speeds) < 2 or not all(0.1 <= speed <= 10 for speed in speeds):
+        raise ConfigError(
+            tr("{text!r} are no speeds for touches.", text=text),
+            remedy=tr("Write two or more from 0.1 to 10 mm/s, for example 2,1,2,1."),
+        )
+    return speeds

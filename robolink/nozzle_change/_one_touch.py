@@ -1,0 +1,205 @@
+"""A pin whose place is known, touched once by a person: X, Y and Z of the new tip."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, ClassVar
+
+from robolink.calibration import (
+    CalibrationResult,
+    NeedleLimits,
+    Procedure,
+    TouchPlan,
+    VerifyResult,
+    contact_pose,
+    one_touch,
+    verify_by_turning,
+)
+from robolink.errors import CalibrationError, ConfigError
+from robolink.messages import tr
+from robolink.model import Pose, ToolOffset, rotate_xy
+from robolink.nozzle_change._pin_record import LastTouch
+from robolink.nozzle_change._source import Bench
+
+if TYPE_CHECKING:
+    from robolink.calibration import Pin
+
+HALF_A_TURN_DEG = 180.0
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """Solves one touch as the difference from the last one of the same tool.
+
+    Attributes:
+        last: The last touch.
+        sigma_mm: Standard deviation of one coordinate of one touch.
+        limits: When a shift is not believed, and when a full calibration is due.
+    """
+
+    upright: ClassVar[bool] = True
+    needs: ClassVar[tuple[str, ...]] = ("z_mm",)
+
+    last: LastTouch
+    sigma_mm: float
+    limits: "NeedleLimits"
+
+    @property
+    def place_mm(self) -> tuple[float, float, float]:
+        """Where the pin is, base."""
+        return self.last.place_mm
+
+    @property
+    def u_deg(self) -> float | None:
+        """U at which the pin was touched before."""
+        return self.last.u_deg
+
+    @property
+    def sentence(self) -> str:
+        """How the touch is used, for a report."""
+        return tr("the difference from the last touch, of {at}", at=self.last.at)
+
+    def solve(self, flange: Sequence[Pose], stored: ToolOffset | None) -> CalibrationResult:
+        """Solve exactly one touch; see :class:`~robolink.nozzle_change.PoseMethod`."""
+        from robolink.calibration import solve_needle_change  # numpy, which a look does without
+
+        touch = one_of(flange)
+        old = self.last.value if stored is None else stored
+        dx, dy = rotate_xy(old.x_mm, old.y_mm, touch.u_deg)
+        before_mm = (touch.x_mm + dx, touch.y_mm + dy, touch.z_mm + old.z_mm)
+        found = solve_needle_change(
+            touch,
+            before_mm,
+            self.place_mm,
+            stored=old,
+            chain=self.last.chain,
+            sigma_mm=self.sigma_mm,
+            limits=self.limits,
+        )
+        return replace(found, method="one_touch")
+
+
+@dataclass(frozen=True, slots=True)
+class Absolute:
+    """Solves one touch against a pin whose place is known.
+
+    Attributes:
+        pin: Where it is.
+        sigma_mm: Standard deviation of one coordinate of one touch, where it is known.
+    """
+
+    upright: ClassVar[bool] = False
+    needs: ClassVar[tuple[str, ...]] = ("z_mm",)
+
+    pin: "Pin"
+    sigma_mm: float | None = None
+
+    @property
+    def place_mm(self) -> tuple[float, float, float]:
+        """Where the pin is, base."""
+        return self.pin.x_mm, self.pin.y_mm, self.pin.z_mm
+
+    @property
+    def u_deg(self) -> float | None:
+        """No U is better than another."""
+        return None
+
+    @property
+    def sentence(self) -> str:
+        """How the touch is used, for a report."""
+        return tr("the place of the pin")
+
+    def solve(self, flange: Sequence[Pose], stored: ToolOffset | None) -> CalibrationResult:
+        """Solve exactly one touch; see :class:`~robolink.nozzle_change.PoseMethod`."""
+        from robolink.calibration import solve_one_touch  # numpy, which a look does without
+
+        return solve_one_touch(one_of(flange), self.pin, stored=stored, sigma_mm=self.sigma_mm)
+
+
+@dataclass(frozen=True, slots=True)
+class OneTouch:
+    """Measures X, Y and Z by one touch of a pin whose place is known.
+
+    Attributes:
+        solver: How the touch is used.
+        touch: Lift and clearance; the clearance has to be more than a new tip may be longer.
+    """
+
+    solver: Difference | Absolute
+    touch: TouchPlan = field(default_factory=lambda: TouchPlan(clearance_mm=5.0))
+
+    @property
+    def sentence(self) -> str:
+        """What it does, for a report."""
+        return tr(
+            "measured on the robot: one pin touched once, against {how}", how=self.solver.sentence
+        )
+
+    @property
+    def remedy(self) -> str:
+        """What to do when a measurement makes the tip jump."""
+        return tr(
+            "Look whether the pin was bumped and whether the nozzle sits firmly. If the change is "
+            "real, make a full calibration."
+        )
+
+    def measure(self, bench: Bench, tool: int, stored: ToolOffset | None) -> CalibrationResult:  # noqa: ARG002 - the flange is what moves
+        """Touch and solve; see :class:`~robolink.nozzle_change.MovingSource`."""
+        bench.controller.tools.select(0)
+        return bench.run(self.procedure(stored, bench.controller.groups[0].pose()))
+
+    def procedure(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:
+        """Return the steps of a measurement; see :class:`~robolink.nozzle_change.MovingSource`."""
+        u_deg = self.solver.u_deg
+        return one_touch(
+            self.touch,
+            here=here,
+            pin_mm=self.solver.place_mm,
+            u_deg=here.u_deg if u_deg is None else u_deg,
+            stored=stored,
+            solve=lambda touch: self.solver.solve([touch], stored),
+        )
+
+    def verify(
+        self,
+        bench: Bench,
+        tool: int,
+        result: CalibrationResult,
+        *,
+        tip: ToolOffset,
+        tolerance_mm: float,
+    ) -> VerifyResult:
+        """Turn half a turn about the new tip; see :class:`~robolink.nozzle_change.MovingSource`."""
+        from robolink.calibration import toward_zero  # numpy, which a look does without
+
+        bench.controller.tools.select(tool)
+        measured_deg = result.inputs[-1].u_deg + result.offset.u_deg
+        procedure = verify_by_turning(
+            self.touch,
+            contact=contact_pose(result, tool=tool),
+            angles_deg=(toward_zero(measured_deg, HALF_A_TURN_DEG),),
+            tolerance_mm=tolerance_mm,
+            written=result.offset,
+            tip=tip,
+        )
+        return bench.run(procedure, tip=result.offset)
+
+
+def one_of(poses: Sequence[Pose]) -> Pose:
+    """Return the pose that the method takes.
+
+    Raises:
+        CalibrationError: ``too_few_poses``.
+        ConfigError: There is more than one.
+    """
+    if not poses:
+        raise CalibrationError(
+            "too_few_poses",
+            tr("No pose was given; the method needs one."),
+            remedy=tr("Touch the pin once."),
+        )
+    if len(poses) > 1:
+        raise ConfigError(
+            tr("{count} poses were given; the method takes one.", count=len(poses)),
+            remedy=tr("Give one, or use the method n-angle."),
+        )
+    return poses[0]

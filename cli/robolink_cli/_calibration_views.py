@@ -105,7 +105,7 @@ def report_payload(report: ToolReport) -> dict[str, object]:
 def show_course(steps: Sequence[PlannedStep]) -> None:
     """Say how a measurement will go, before anybody is asked."""
     moves = sum(step.target is not None for step in steps)
-    asks = len(steps) - moves
+    asks = sum(step.by_person for step in steps)
     if asks:
         plan = tr(
             "The plan: {asks} times a person brings the tip onto the pin, with {moves} movements "

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from robolink.calibration._camera_station import CameraStation, LookPlan
-from robolink.calibration._steps import Look, Move, Procedure, SeenAt
+from robolink.calibration._steps import Look, Move, Procedure, SeenAt, Tell
 from robolink.errors import CalibrationError
 from robolink.messages import tr
-from robolink.model import TIP, Path, Pose, ToolOffset, rotate_xy
+from robolink.model import TIP, Path, Pose, SpotUnit, ToolOffset, rotate_xy
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +67,11 @@ class CameraDrive:
 
     def lifted(self, place: Place) -> Procedure[None]:
         """Lift off the camera from where :meth:`looks` ended."""
-        yield Move(self._above(self.pose(place)), Path.STRAIGHT, tr("lift off the camera"))
+        yield Move(self.above(place), Path.STRAIGHT, tr("lift off the camera"))
+
+    def above(self, place: Place) -> Pose:
+        """Return where :meth:`lifted` ends."""
+        return self._above(self.pose(place))
 
     def pose(self, place: Place) -> Pose:
         """Return where the frame is with a mark before the camera, as far as that is known."""
@@ -101,7 +105,18 @@ class CameraDrive:
         except CalibrationError:
             yield from self.lifted(place)
             raise
+        yield Tell(self._told(seen, self._middle(place)))
         return seen
+
+    def _told(self, seen: SeenAt, middle_mm: tuple[float, float]) -> str:
+        if seen.unit is SpotUnit.PIXEL and self.station.model is None:
+            return tr("seen at pixel {x:.1f}, {y:.1f}", x=seen.spot.x, y=seen.spot.y)
+        x_mm, y_mm = self.station.base_mm(seen)
+        return tr(
+            "seen X {dx:+.3f} Y {dy:+.3f} mm from where it is expected",
+            dx=x_mm - middle_mm[0],
+            dy=y_mm - middle_mm[1],
+        )
 
     def _middle(self, place: Place) -> tuple[float, float]:
         return self.station.x_mm + place.aside_mm[0], self.station.y_mm + place.aside_mm[1]

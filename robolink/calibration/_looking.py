@@ -16,7 +16,8 @@ from robolink.calibration._camera_round import CameraRound, as_round, solve_came
 from robolink.calibration._camera_station import CameraStation, LookPlan, PatternPlan
 from robolink.calibration._held_board import BoardDrawing
 from robolink.calibration._planar_checks import MIN_ROTATION_DEG, angle_spread_deg
-from robolink.calibration._steps import Procedure
+from robolink.calibration._retaking import settled
+from robolink.calibration._steps import Procedure, SeenAt
 from robolink.calibration._touch import NO_OFFSET
 from robolink.calibration._turning import toward_zero
 from robolink.errors import CalibrationError
@@ -33,6 +34,7 @@ def look_at_tip(
     here: Pose,
     stored: ToolOffset | None,
     sigma_mm: float | None = None,
+    retake: bool = False,
 ) -> Procedure[CameraRound]:
     """Measure X and Y of a tip with a calibrated camera. Runs in Tool 0.
 
@@ -42,6 +44,7 @@ def look_at_tip(
         here: Where the flange is; its U is where the angles count from.
         stored: The offset stored now; the tip is expected there.
         sigma_mm: Standard deviation of one coordinate of one look, where it is known.
+        retake: Offer to take the look again that fits worst.
 
     Raises:
         CalibrationError: ``tip_not_seen``, ``several_tips_seen``, ``camera_not_calibrated``, and
@@ -56,9 +59,12 @@ def look_at_tip(
         here, centred = drive.pose(found), True
     places = [Place(u_deg, tip) for u_deg in angles_deg]
     seen = yield from drive.looks(places, here, before_camera=centred)
-    yield from drive.lifted(places[-1])
-    sightings = [station.sighting(look) for look in seen]
-    return solve_camera_round(sightings, stored=stored, sigma_mm=sigma_mm)
+
+    def solve(looks: Sequence[SeenAt]) -> CameraRound:
+        sightings = [station.sighting(look) for look in looks]
+        return solve_camera_round(sightings, stored=stored, sigma_mm=sigma_mm)
+
+    return (yield from settled(drive, places, seen, solve, retake=retake))
 
 
 def find_camera(
@@ -68,6 +74,7 @@ def find_camera(
     here: Pose,
     stored: ToolOffset | None,
     sigma_mm: float | None = None,
+    retake: bool = False,
 ) -> Procedure[CameraCalibration]:
     """Measure X and Y of a tip, and the camera with it. Runs in Tool 0.
 
@@ -81,6 +88,7 @@ def find_camera(
         here: Where the flange is; its U is that of the corners.
         stored: The offset stored now; the tip is expected there.
         sigma_mm: Standard deviation of one coordinate of one look, where it is known.
+        retake: Offer to take the look again that fits worst.
 
     Raises:
         CalibrationError: ``rank_deficient`` and ``insufficient_rotation`` before anything moves
@@ -94,9 +102,14 @@ def find_camera(
         Place(toward_zero(here.u_deg, turn), tip, aside_mm=(dx, dy)) for dx, dy, turn in plan.places
     ]
     seen = yield from drive.looks(places, here)
-    yield from drive.lifted(places[-1])
-    sightings = [PixelSighting(look, look.spot.x, look.spot.y) for look in seen]
-    return solve_camera_affine(sightings, stored=stored, sigma_mm=sigma_mm, before=station.model)
+
+    def solve(looks: Sequence[SeenAt]) -> CameraCalibration:
+        sightings = [PixelSighting(look, look.spot.x, look.spot.y) for look in looks]
+        return solve_camera_affine(
+            sightings, stored=stored, sigma_mm=sigma_mm, before=station.model
+        )
+
+    return (yield from settled(drive, places, seen, solve, retake=retake))
 
 
 def look_at_board(
@@ -107,6 +120,7 @@ def look_at_board(
     here: Pose,
     stored: ToolOffset | None,
     sigma_mm: float | None = None,
+    retake: bool = False,
 ) -> Procedure[CameraRound]:
     """Measure X, Y and U of a held board by its fiducials. Runs in Tool 0.
 
@@ -120,6 +134,7 @@ def look_at_board(
         here: Where the flange is.
         stored: The tool of the board, as far as it is known; the fiducials are expected by it.
         sigma_mm: Standard deviation of one coordinate of one look, where it is known.
+        retake: Offer to take the look again that fits worst.
 
     Raises:
         CalibrationError: ``fiducial_not_seen``, ``several_fiducials_seen``,
@@ -139,9 +154,13 @@ def look_at_board(
         here, centred = drive.pose(found[-1]), True
     places = board.places(tool, angles_deg)
     seen = yield from drive.looks(places, here, before_camera=centred)
-    yield from drive.lifted(places[-1])
-    sightings = [station.sighting(look) for look in seen]
-    return _board_tool(sightings, [place.mark for place in places], board, stored, sigma_mm)
+
+    def solve(looks: Sequence[SeenAt]) -> CameraRound:
+        sightings = [station.sighting(look) for look in looks]
+        marks = [place.mark for place in places]
+        return _board_tool(sightings, marks, board, stored, sigma_mm)
+
+    return (yield from settled(drive, places, seen, solve, retake=retake))
 
 
 def _board_tool(

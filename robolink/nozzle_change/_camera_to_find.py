@@ -14,6 +14,7 @@ from robolink.model import Pose, ToolOffset
 from robolink.nozzle_change._flange import seen_from
 from robolink.nozzle_change._looks import angles_between, pixel_camera
 from robolink.nozzle_change._source import Bench
+from robolink.stations import Found, StationKind
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,12 +27,16 @@ class CameraToFind:
             that changed is refused.
         plan: The pattern.
         sigma_mm: Standard deviation of one coordinate of one look, where it is known.
+        retake: Offer to take the look again that fits worst.
+        name: Name of the station, under which the camera is kept on record; empty for not.
     """
 
     sensor: str
     station: CameraStation
     plan: PatternPlan = field(default_factory=PatternPlan)
     sigma_mm: float | None = None
+    retake: bool = False
+    name: str = ""
 
     @property
     def sentence(self) -> str:
@@ -48,6 +53,29 @@ class CameraToFind:
         return tr(
             "Look at the pictures: is it the tip that was found in all of them, and is it clean? "
             "If the change is real, allow it with --max-change."
+        )
+
+    def found(self, result: CalibrationResult, tool: int) -> Found | None:
+        """Return what a kept measurement says about the camera, ``None`` without a name."""
+        from robolink.calibration import CameraCalibration  # numpy, which a look does without
+
+        if not self.name or not isinstance(result, CameraCalibration):
+            return None
+        model = result.camera
+        return Found(
+            id=self.name,
+            kind=StationKind.CAMERA,
+            x_mm=self.station.x_mm,
+            y_mm=self.station.y_mm,
+            z_mm=self.station.z_mm,
+            sigma_mm=result.sigma_mm,
+            how=tr("{method} with tool {tool}", method=result.method, tool=tool),
+            tool=tool,
+            details={
+                "seen_by": self.sensor,
+                "mm_per_px": [list(row) for row in model.mm_per_px],
+                "origin_mm": list(model.origin_mm),
+            },
         )
 
     def require_ready(self) -> None:
@@ -67,7 +95,12 @@ class CameraToFind:
         from robolink.calibration import find_camera  # numpy, which a look does without
 
         return find_camera(
-            self.station, self.plan, here=here, stored=stored, sigma_mm=self.sigma_mm
+            self.station,
+            self.plan,
+            here=here,
+            stored=stored,
+            sigma_mm=self.sigma_mm,
+            retake=self.retake,
         )
 
     def verify(

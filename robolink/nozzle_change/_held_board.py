@@ -30,6 +30,7 @@ class HeldBoard:
         board: Where the fiducials are on the board.
         plan: How they are brought before the camera.
         sigma_mm: Standard deviation of one coordinate of one look, where it is known.
+        retake: Offer to take the look again that fits worst.
     """
 
     sensor: str
@@ -37,6 +38,7 @@ class HeldBoard:
     board: BoardDrawing
     plan: LookPlan = field(default=_TWO_ANGLES)
     sigma_mm: float | None = None
+    retake: bool = False
 
     @property
     def sentence(self) -> str:
@@ -78,6 +80,7 @@ class HeldBoard:
             here=here,
             stored=stored,
             sigma_mm=self.sigma_mm,
+            retake=self.retake,
         )
 
     def verify(

@@ -30,10 +30,11 @@ class PlannedStep:
 
     Attributes:
         text: What is done.
-        target: Where the flange goes, ``None`` for a step of the person.
+        target: Where the flange goes, ``None`` for a step that moves nothing.
         profile: How it goes there.
         edge: The input that ends the step on the way, ``None`` for none.
         refusal: Why the limits forbid it, empty when they do not.
+        by_person: Whether a person has to do it.
     """
 
     text: str
@@ -41,6 +42,7 @@ class PlannedStep:
     profile: MotionProfile | None = None
     edge: InputEdge | None = None
     refusal: str = ""
+    by_person: bool = False
 
     def requests(self, group: MotionGroup) -> tuple[str, ...]:
         """Return what the step would send besides its reads, as it stands on the wire."""
@@ -129,7 +131,7 @@ def _follow(
                 continue
             answer = here
             if isinstance(step, Ask):
-                yield PlannedStep(step.instruction)
+                yield PlannedStep(step.instruction, by_person=True)
             elif isinstance(step, Look):
                 yield PlannedStep(step.purpose)
                 answer = SeenAt.of(here, Spot(*step.expected_mm), SpotUnit.BASE_MM)

@@ -25,12 +25,14 @@ class UpCamera:
         station: Where it is, and what its pixels mean.
         plan: How the tip is brought before it.
         sigma_mm: Standard deviation of one coordinate of one look, where it is known.
+        retake: Offer to take the look again that fits worst.
     """
 
     sensor: str
     station: CameraStation
     plan: LookPlan = field(default_factory=LookPlan)
     sigma_mm: float | None = None
+    retake: bool = False
 
     @property
     def sentence(self) -> str:
@@ -66,7 +68,12 @@ class UpCamera:
         from robolink.calibration import look_at_tip  # numpy, which a look does without
 
         return look_at_tip(
-            self.station, self.plan, here=here, stored=stored, sigma_mm=self.sigma_mm
+            self.station,
+            self.plan,
+            here=here,
+            stored=stored,
+            sigma_mm=self.sigma_mm,
+            retake=self.retake,
         )
 
     def verify(

@@ -12,8 +12,10 @@ from robolink.calibration import (
     Look,
     LookPlan,
     Move,
+    Offer,
     PatternPlan,
     SeenAt,
+    Tell,
     find_camera,
     look_at_board,
     look_at_tip,
@@ -41,16 +43,27 @@ class IdealCell:
     Attributes:
         frame: Where the frame is.
         steps: The steps taken.
+        told, offers: What a person heard; the first offer is accepted.
+        wrong: By how many pixels which looks are wrong.
     """
 
     def __init__(self, marks, *, here=HERE, off_mm=OFF_MM, blind=None, unit=SpotUnit.PIXEL):
         self.marks, self.frame, self.off_mm = marks, here, off_mm
         self.blind, self.unit, self.steps = blind, unit, []
+        self.told, self.offers, self.wrong = [], [], {}
 
     def run(self, procedure):
         try:
             step = next(procedure)
             while True:
+                if isinstance(step, Tell):
+                    self.told.append(step.text)
+                    step = procedure.send(None)
+                    continue
+                if isinstance(step, Offer):
+                    self.offers.append(step.question)
+                    step = procedure.send(len(self.offers) == 1)
+                    continue
                 self.steps.append(step)
                 try:
                     answer = self._take(step)
@@ -71,7 +84,9 @@ class IdealCell:
             return self.frame
         if len(self.looks) == self.blind:
             raise CalibrationError("tip_not_seen", "nothing there", remedy="look")
-        return SeenAt.of(self.frame, self._spot(self.marks[step.mark]), self.unit)
+        spot = self._spot(self.marks[step.mark])
+        spot = replace(spot, x=spot.x + self.wrong.get(len(self.looks), 0.0))
+        return SeenAt.of(self.frame, spot, self.unit)
 
     def _spot(self, mark):
         dx, dy = rotate_xy(mark.x_mm, mark.y_mm, self.frame.u_deg)
@@ -140,6 +155,18 @@ def test_after_the_first_look_the_tip_is_brought_to_the_middle():
     result = cell.run(look_at_tip(STATION, LookPlan(), here=HERE, stored=STORED))
     for seen in result.inputs:
         assert STATION.base_mm(seen) == pytest.approx((STATION.x_mm, STATION.y_mm))
+
+
+def test_the_look_that_fits_worst_is_offered_and_taken_again():
+    cell = tip_cell()
+    cell.wrong = {3: 20.0}
+    result = cell.run(look_at_tip(STATION, LookPlan(), here=HERE, stored=STORED, retake=True))
+    assert cell.offers[0].startswith("Look 2, at U 60.0, fits worst: it is 0.2")
+    assert len(cell.offers) == 2
+    assert len(cell.looks) == 1 + 4 + 1
+    assert miss(result.offset, TIP) < 1e-9
+    assert cell.told[0] == "seen X +0.310 Y +0.346 mm from where it is expected"
+    assert cell.frame.z_mm == STATION.z_mm - STORED.z_mm + LookPlan().lift_mm
 
 
 def test_a_camera_of_unknown_pose_is_found_with_the_tip():

@@ -30,6 +30,11 @@ class CameraRound(CalibrationResult):
 
     camera_error_mm: tuple[float, float] | None = None
 
+    def details(self) -> dict[str, object]:
+        """Return what the camera is off by."""
+        error_mm = self.camera_error_mm
+        return {"camera_error_mm": None if error_mm is None else list(error_mm)}
+
 
 def solve_camera_round(
     sightings: Sequence[Sighting],

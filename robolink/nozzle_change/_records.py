@@ -95,6 +95,7 @@ def _result(result: CalibrationResult) -> dict[str, object]:
         "sigma_gain": result.sigma_gain,
         "condition_number": result.condition_number,
         "warnings": list(result.warnings),
+        **result.details(),
     }
 
 

@@ -20,8 +20,8 @@ from robolink_simulators.clock import ScaledClock
 from robolink_simulators.epson.refusals import Refusal
 from robolink_simulators.hosting import in_process, plc_in_process
 from robolink_simulators.hosting._tcp_host import TcpHost
+from robolink_simulators.person import Look
 from robolink_simulators.softmotion.smc_errors import Refused
-from robolink_simulators.workplace import Look
 
 _MAX_LINE: Final = 65536
 _SCHEME: Final = "assist+tcp"

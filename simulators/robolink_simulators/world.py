@@ -12,10 +12,11 @@ from robolink_simulators.epson.kinematics import Joints, inverse, tip_of
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.points import Point
 from robolink_simulators.epson.tip_input import Nozzle, TipInput
+from robolink_simulators.person import Look as Look
+from robolink_simulators.person import Operator
 from robolink_simulators.sensing import TipSwitch
 from robolink_simulators.workplace import MOUNTED_TOOL as MOUNTED_TOOL
-from robolink_simulators.workplace import Look as Look
-from robolink_simulators.workplace import Operator, Workplace, XyzMm, exchanged, pin_beside
+from robolink_simulators.workplace import Workplace, XyzMm, exchanged, pin_beside
 from robolink_simulators.world_parameters import WorldParameters
 
 STORED: Final = ToolOffset(12.0, -3.5, -20.0)

@@ -7,6 +7,7 @@ from typing import Final
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
+from robolink_simulators.person import Operator
 from robolink_simulators.sensing import Lean, Shake, TipSwitch
 from robolink_simulators.softmotion.condition import GroupState
 from robolink_simulators.softmotion.frames import (
@@ -24,7 +25,6 @@ from robolink_simulators.softmotion.kinematics import AxisKind, AxisValues
 from robolink_simulators.softmotion.smc_errors import ErrorKind, Refused
 from robolink_simulators.workplace import (
     MOUNTED_TOOL,
-    Operator,
     Workplace,
     XyzMm,
     exchanged,

@@ -76,6 +76,7 @@ class Recalibration:
                 accepted_change_mm=self._accepted_change_mm,
                 ask_before_write=not self._answers.yes,
                 sensor=self._sensor,
+                cell=self._context.cell,
             )
             run.preflight()
             self._start(controller, run)

@@ -4,6 +4,7 @@ from robolink.nozzle_change._camera_to_find import CameraToFind as CameraToFind
 from robolink.nozzle_change._change import Earlier as Earlier
 from robolink.nozzle_change._change import NozzleChange as NozzleChange
 from robolink.nozzle_change._crossed_beams import CrossedBeams as CrossedBeams
+from robolink.nozzle_change._deferred import Deferred as Deferred
 from robolink.nozzle_change._flange import flange_pose as flange_pose
 from robolink.nozzle_change._gate import Gate as Gate
 from robolink.nozzle_change._given_poses import GivenPoses as GivenPoses
@@ -16,6 +17,7 @@ from robolink.nozzle_change._listener import Moment as Moment
 from robolink.nozzle_change._one_touch import Absolute as Absolute
 from robolink.nozzle_change._one_touch import Difference as Difference
 from robolink.nozzle_change._one_touch import OneTouch as OneTouch
+from robolink.nozzle_change._one_touch import difference_from_last as difference_from_last
 from robolink.nozzle_change._pin_record import LastTouch as LastTouch
 from robolink.nozzle_change._pin_record import find_last_touch as find_last_touch
 from robolink.nozzle_change._plan import ChangePlan as ChangePlan

@@ -1,5 +1,6 @@
 """A pin whose place is known, touched once by a person: X, Y and Z of the new tip."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, ClassVar
@@ -16,12 +17,12 @@ from robolink.calibration import (
 )
 from robolink.errors import CalibrationError, ConfigError
 from robolink.messages import tr
-from robolink.model import Pose, ToolOffset, rotate_xy
-from robolink.nozzle_change._pin_record import LastTouch
+from robolink.model import Controller, Pose, ToolOffset, rotate_xy
+from robolink.nozzle_change._pin_record import LastTouch, find_last_touch
 from robolink.nozzle_change._source import Bench
 
 if TYPE_CHECKING:
-    from robolink.calibration import Pin
+    from robolink.calibration import NeedleChangeResult, Pin
 
 HALF_A_TURN_DEG = 180.0
 
@@ -75,7 +76,16 @@ class Difference:
             sigma_mm=self.sigma_mm,
             limits=self.limits,
         )
-        return replace(found, method="one_touch")
+        result = replace(found, method="one_touch")
+        if result.full_calibration_due or not self._one_more(result):
+            return result
+        return replace(result, warnings=("full_calibration_due",), full_calibration_due=True)
+
+    def _one_more(self, result: "NeedleChangeResult") -> bool:
+        """Tell whether the next difference would already be one too many."""
+        later = result.chain.after(math.sqrt(2) * self.sigma_mm)
+        half95_mm = result.half_width95[0] * later.sigma_mm / result.chain.sigma_mm
+        return half95_mm > self.limits.tolerance_mm
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,6 +192,38 @@ class OneTouch:
             tip=tip,
         )
         return bench.run(procedure, tip=result.offset)
+
+
+def difference_from_last(
+    controller: Controller,
+    tool: int,
+    station: str,
+    *,
+    sigma_mm: float | None,
+    limits: NeedleLimits,
+) -> Difference:
+    """Return how one touch of a tool is solved against its last one on a pin.
+
+    Args:
+        controller: The controller, connected.
+        tool: Number of the tool.
+        station: Name of the pin.
+        sigma_mm: Standard deviation of one coordinate of one touch; ``None`` for what the last
+            calibration found.
+        limits: When a shift is not believed, and when a full calibration is due.
+
+    Raises:
+        CalibrationError: ``no_last_touch`` or ``reference_outdated``.
+        ConfigError: Nothing tells how well a touch repeats.
+    """
+    last = find_last_touch(controller, tool, station)
+    sigma = sigma_mm or last.touch_sigma_mm
+    if sigma is None:
+        raise ConfigError(
+            tr("Nothing tells how well a touch repeats: the last calibration left no residual."),
+            remedy=tr("Give --sigma MM (in a recipe sigma_mm), or calibrate with n-angle once."),
+        )
+    return Difference(last, sigma, limits)
 
 
 def one_of(poses: Sequence[Pose]) -> Pose:

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from robolink.recipe._sources import BeamLine as BeamLine
     from robolink.recipe._sources import BeamsSource as BeamsSource
     from robolink.recipe._sources import CameraSource as CameraSource
+    from robolink.recipe._sources import OneTouchSource as OneTouchSource
     from robolink.recipe._sources import OperatorSource as OperatorSource
     from robolink.recipe._sources import PointsSource as PointsSource
     from robolink.recipe._sources import TouchSource as TouchSource
@@ -46,6 +47,7 @@ _LOADED_LATER = {
     "BeamLine": "_sources",
     "BeamsSource": "_sources",
     "CameraSource": "_sources",
+    "OneTouchSource": "_sources",
     "OperatorSource": "_sources",
     "PointsSource": "_sources",
     "TouchSource": "_sources",

@@ -7,7 +7,7 @@ from robolink.config import Problem
 from robolink.messages import tr
 from robolink.model import angle_difference_deg
 from robolink.recipe._draft import Draft
-from robolink.recipe._sources import BeamsSource
+from robolink.recipe._sources import BeamLine, BeamsSource
 
 _LEAST_ANGLE_DEG: Final = 20.0
 """Beams that cross at less leave one direction badly known, as the solver says too."""
@@ -18,13 +18,11 @@ def beams(draft: Draft) -> Iterator[Problem]:
     source = draft.source
     if not isinstance(source, BeamsSource):
         return
-    first, second = source.beams
-    between_deg = abs(angle_difference_deg(first.direction_deg, second.direction_deg))
-    if min(between_deg, 180.0 - between_deg) < _LEAST_ANGLE_DEG:
-        yield Problem(
-            "source.beams",
-            tr("must cross at {limit:g} degrees or more", limit=_LEAST_ANGLE_DEG),
-        )
+    if (source.beams is None) != (source.z_mm is None):
+        absent = "beams" if source.beams is None else "z_mm"
+        yield Problem(f"source.{absent}", tr("is missing: give beams and z_mm, or neither"))
+    if source.beams is not None:
+        yield from _crossing(source.beams)
     if source.aside_mm <= source.search_mm:
         yield Problem(
             "source.aside_mm",
@@ -33,6 +31,16 @@ def beams(draft: Draft) -> Iterator[Problem]:
                 "beam at a time",
                 search=source.search_mm,
             ),
+        )
+
+
+def _crossing(lines: tuple[BeamLine, ...]) -> Iterator[Problem]:
+    first, second = lines
+    between_deg = abs(angle_difference_deg(first.direction_deg, second.direction_deg))
+    if min(between_deg, 180.0 - between_deg) < _LEAST_ANGLE_DEG:
+        yield Problem(
+            "source.beams",
+            tr("must cross at {limit:g} degrees or more", limit=_LEAST_ANGLE_DEG),
         )
 
 

@@ -14,6 +14,8 @@ def camera_place(draft: Draft) -> Iterator[Problem]:
     place = draft.station
     if place is None or not isinstance(draft.source, CameraSource):
         return
+    if place.x_mm is None and place.y_mm is None and place.z_mm is None:
+        return  # all of it comes from the station's record
     if place.x_mm is None and place.y_mm is None:
         yield Problem(
             "station.x_mm", tr('is missing: with kind = "camera" it is where the camera looks')

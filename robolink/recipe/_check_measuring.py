@@ -9,7 +9,13 @@ from robolink.config import Problem
 from robolink.messages import tr
 from robolink.model import angle_difference_deg
 from robolink.recipe._draft import Draft
-from robolink.recipe._sources import BeamsSource, CameraSource, OperatorSource, TouchSource
+from robolink.recipe._sources import (
+    BeamsSource,
+    CameraSource,
+    OneTouchSource,
+    OperatorSource,
+    TouchSource,
+)
 
 _SAME_ANGLE_DEG: Final = 1e-9
 
@@ -19,7 +25,8 @@ def angles(draft: Draft) -> Iterator[Problem]:
     source = draft.source
     if not isinstance(source, OperatorSource):
         return
-    others = {"two_pose": ("angles_deg", "count"), "n_angle": ("turn_deg",)}[source.method]
+    many = ("angles_deg", "count", "until_mm", "retake")
+    others = {"two_pose": many, "n_angle": ("turn_deg",)}[source.method]
     for key in others:
         if key in source.model_fields_set:
             yield Problem(
@@ -54,7 +61,7 @@ def _many_angles(source: OperatorSource) -> Iterator[Problem]:
 def clearance(draft: Draft) -> Iterator[Problem]:
     """Check that the tip stops on its way down to the pin, and that the lift has room."""
     source = draft.source
-    if not isinstance(source, OperatorSource):
+    if not isinstance(source, (OperatorSource, OneTouchSource)):
         return
     if source.clearance_mm >= source.lift_mm:
         yield Problem(
@@ -89,9 +96,4 @@ def height(draft: Draft) -> Iterator[Problem]:
         yield Problem(
             "z",
             tr('cannot be "measured" from taught points; write "typed" or "kept"'),
-        )
-    elif draft.basis == "absolute" and draft.station is not None and draft.station.z_mm is None:
-        yield Problem(
-            "station.z_mm",
-            tr('is missing: with basis = "absolute", a measured Z is counted from the pin\'s end'),
         )

@@ -12,6 +12,7 @@ from robolink.recipe._sources import (
     AnySource,
     BeamsSource,
     CameraSource,
+    OneTouchSource,
     OperatorSource,
     TouchSource,
 )
@@ -38,7 +39,8 @@ def intervals(draft: Draft) -> Iterator[Problem]:
     if limits is None or source is None or limits.interval_mm is None:
         return
     if limits.sigma_mm is None:
-        if source.agrees_always:
+        # One touch may take it from the calibration before.
+        if source.agrees_always and not isinstance(source, OneTouchSource):
             yield Problem(
                 "tolerances.sigma_mm",
                 tr(
@@ -92,6 +94,8 @@ def _without_residual(source: AnySource) -> str:
             "cannot be judged: looks at one or two angles always agree, so they leave no residual; "
             "give three turns_deg or more, or interval_mm with sigma_mm"
         )
+    if isinstance(source, OneTouchSource):
+        return tr("cannot be judged: one touch leaves no residual; use interval_mm")
     return tr(
         "cannot be judged: two poses always agree, so they leave no residual; "
         'use method = "n_angle", or interval_mm with sigma_mm'

@@ -17,10 +17,11 @@ def surface(draft: Draft) -> Iterator[Problem]:
     place = draft.station
     if place is None or not isinstance(draft.source, TouchSource):
         return
+    if place.x_mm is None and place.y_mm is None and place.z_mm is None:
+        return  # all of it comes from the station's record
     if place.x_mm is None and place.y_mm is None:
         yield Problem("station.x_mm", tr('is missing: with kind = "touch" it is where to touch'))
-    # With z = "measured" and basis = "absolute" its absence is told there.
-    if place.z_mm is None and draft.basis != "absolute":
+    if place.z_mm is None:
         yield Problem("station.z_mm", tr('is missing: with kind = "touch" it is the surface'))
 
 

@@ -3,8 +3,10 @@
 from robolink.calibration import (
     BeamStation,
     CameraStation,
+    Course,
     CrossingPlan,
     LookPlan,
+    NeedleLimits,
     ProbePlan,
     TouchPlan,
     TouchStation,
@@ -13,24 +15,29 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import Controller, Pose
 from robolink.nozzle_change import (
+    Absolute,
     ChangePlan,
     CrossedBeams,
+    Deferred,
     Gate,
     GivenPoses,
     Limits,
     ManyTouches,
+    OneTouch,
     PinAndPerson,
     TipSource,
     ToolPlan,
     TouchProbe,
     TwoTouches,
     UpCamera,
+    difference_from_last,
     taught_poses,
 )
 from robolink.recipe._recipe import Recipe
 from robolink.recipe._sources import (
     BeamsSource,
     CameraSource,
+    OneTouchSource,
     OperatorSource,
     PointsSource,
     TouchSource,
@@ -78,6 +85,7 @@ def plan_of(
                 attempts=recipe.attempts,
                 approach=tool.approach.pose if tool.approach else None,
                 retreat=tool.retreat.pose if tool.retreat else None,
+                pin=_pin(recipe),
             )
             for tool in recipe.tools
         ),
@@ -99,7 +107,14 @@ def _source(recipe: Recipe, controller: Controller, tool: Tool, sensor: str | No
         touch = TouchPlan(
             lift_mm=source.lift_mm, clearance_mm=source.clearance_mm, turn_deg=source.turn_deg
         )
-        return PinAndPerson(touch, turns_deg=source.turns_deg, sigma_mm=tolerances.sigma_mm)
+        return PinAndPerson(
+            touch,
+            turns_deg=source.turns_deg,
+            sigma_mm=tolerances.sigma_mm,
+            course=Course(source.until_mm, retake=source.retake),
+        )
+    if isinstance(source, OneTouchSource):
+        return _from_one_touch(source, controller, tool, recipe)
     if isinstance(source, BeamsSource):
         return _from_beams(source, tolerances.sigma_mm)
     if isinstance(source, TouchSource):
@@ -109,9 +124,50 @@ def _source(recipe: Recipe, controller: Controller, tool: Tool, sensor: str | No
     return _from_points(source, controller, tool, recipe)
 
 
+def _pin(recipe: Recipe) -> str:
+    """Return the name of the pin whose place is kept, empty where none is touched."""
+    touched = isinstance(recipe.source, (OperatorSource, OneTouchSource))
+    return recipe.station.id if touched else ""
+
+
+def _from_one_touch(
+    source: OneTouchSource, controller: Controller, tool: Tool, recipe: Recipe
+) -> TipSource:
+    touch = TouchPlan(lift_mm=source.lift_mm, clearance_mm=source.clearance_mm)
+    tolerances, station = recipe.tolerances, recipe.station
+    if recipe.basis == "absolute":
+        from robolink.calibration import Pin  # numpy, which other recipes do without
+
+        x_mm, y_mm, z_mm = _place(station)
+        return OneTouch(Absolute(Pin(x_mm, y_mm, z_mm), tolerances.sigma_mm), touch)
+    limits = NeedleLimits(
+        max_change_mm=tolerances.jump_mm,
+        tolerance_mm=tolerances.interval_mm or NeedleLimits().tolerance_mm,
+        max_changes=source.max_changes,
+    )
+
+    def make() -> OneTouch:
+        solver = difference_from_last(
+            controller, tool.number, station.id, sigma_mm=tolerances.sigma_mm, limits=limits
+        )
+        return OneTouch(solver, touch)
+
+    return Deferred(make, sentence=tr("measured on the robot: one pin touched once"))
+
+
+def _place(place: Station) -> tuple[float, float, float]:
+    x_mm, y_mm, z_mm = place.x_mm, place.y_mm, place.z_mm
+    assert x_mm is not None  # noqa: S101 - the recipe was checked and located
+    assert y_mm is not None  # noqa: S101
+    assert z_mm is not None  # noqa: S101
+    return x_mm, y_mm, z_mm
+
+
 def _from_beams(source: BeamsSource, sigma_mm: float | None) -> TipSource:
     from robolink.calibration import Beam  # numpy, which recipes without beams do without
 
+    assert source.beams is not None  # noqa: S101 - the recipe was checked and located
+    assert source.z_mm is not None  # noqa: S101
     first, second = source.beams
     station = BeamStation(
         (
@@ -163,14 +219,6 @@ def _from_camera(
         beside_mm=source.beside_mm,
     )
     return UpCamera(sensor, CameraStation(*_place(place), source.model), plan, sigma_mm=sigma_mm)
-
-
-def _place(place: Station) -> tuple[float, float, float]:
-    x_mm, y_mm, z_mm = place.x_mm, place.y_mm, place.z_mm
-    assert x_mm is not None  # noqa: S101 - the recipe was checked
-    assert y_mm is not None  # noqa: S101
-    assert z_mm is not None  # noqa: S101
-    return x_mm, y_mm, z_mm
 
 
 def _from_points(

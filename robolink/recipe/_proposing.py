@@ -54,6 +54,9 @@ def proposed(
     if recipe.z == "typed" and typed_z_mm is not None:
         offset = replace(offset, z_mm=typed_z_mm)
         notes.append(tr("Z was typed"))
+    elif recipe.z == "kept" and "z_mm" in measured.result.measured:
+        offset = replace(offset, z_mm=(measured.before or ToolOffset()).z_mm)
+        notes.append(tr("Z was measured, and is kept as it was"))
     elif recipe.z == "measured" and height is not None:
         offset = replace(offset, z_mm=_height(recipe, offset, height, reference))
         notes.append(tr("Z was measured by touching"))

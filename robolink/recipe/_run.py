@@ -3,9 +3,10 @@
 from dataclasses import replace
 from functools import partial
 
-from robolink.errors import NotAllowedError, RobolinkError
+from robolink.config import Cell
+from robolink.errors import ConfigError, NotAllowedError, RobolinkError
 from robolink.messages import tr
-from robolink.model import Controller, Role
+from robolink.model import Controller, EntryKind, Role
 from robolink.nozzle_change import (
     ChangePlan,
     ChangeReport,
@@ -18,9 +19,12 @@ from robolink.nozzle_change import (
 from robolink.recipe._answers import Answers
 from robolink.recipe._listening import RecipeListener
 from robolink.recipe._loading import LoadedRecipe
+from robolink.recipe._locating import located
 from robolink.recipe._plans import plan_of
 from robolink.recipe._reference import Reference, find_reference
+from robolink.recipe._sources import OneTouchSource
 from robolink.runner import Operator
+from robolink.stations import find_stations
 from robolink.transaction import ChangedSince, changed_since, earlier_corrections
 
 
@@ -44,6 +48,11 @@ class RecipeRun:
         accepted_change_mm: A larger jump than the recipe's that an engineer accepts this time.
         ask_before_write: Whether a person accepts the proposals.
         sensor: The camera, in place of the recipe's.
+        cell: The cell, whose file may say where stations are.
+
+    Raises:
+        ConfigError: Neither the recipe nor the station's record says where the station is, or the
+            recipe takes no reference.
     """
 
     def __init__(
@@ -58,20 +67,26 @@ class RecipeRun:
         accepted_change_mm: float | None = None,
         ask_before_write: bool = True,
         sensor: str | None = None,
+        cell: Cell | None = None,
     ) -> None:
         self._controller = controller
-        self._loaded = loaded
+        self._loaded, self._remark = _located(loaded, controller, cell)
         self._operator = operator
         self._answers = answers
         self._audience = audience
         self._references: dict[int, Reference] = {}
         self.plan: ChangePlan = plan_of(
-            loaded.recipe,
+            self._loaded.recipe,
             controller,
             ask_before_write=ask_before_write,
             accepted_change_mm=accepted_change_mm,
             sensor=sensor,
         )
+        if take_reference and isinstance(loaded.recipe.source, OneTouchSource):
+            raise ConfigError(
+                tr("This recipe takes no reference: the last calibration on the pin is one."),
+                remedy=tr("Make a full calibration there with the nozzle of before."),
+            )
         self.takes_reference = take_reference
         self.changed: tuple[ChangedSince, ...] = ()
 
@@ -79,7 +94,7 @@ class RecipeRun:
         """Find out, reading only, whatever would end the run later.
 
         Raises:
-            CalibrationError: ``reference_outdated``, ``sensor_not_found``.
+            CalibrationError: ``reference_outdated``, ``no_last_touch`` or ``sensor_not_found``.
             ConnectError: A camera is not there.
             LimitError: A foreseen target lies outside the box.
             NotAllowedError: A jump is accepted by somebody who is no engineer.
@@ -94,7 +109,10 @@ class RecipeRun:
         stored = {tool.number: controller.tools.read(tool.number) for tool in recipe.tools}
         found = (changed_since(controller, tool, now) for tool, now in stored.items())
         self.changed = tuple(change for change in found if change is not None)
-        if recipe.basis == "difference" and not self.takes_reference:
+        if self._remark:
+            self._operator.tell(tr("Warning: {remark}", remark=self._remark))
+        by_reference = not isinstance(recipe.source, OneTouchSource)
+        if recipe.basis == "difference" and by_reference and not self.takes_reference:
             for tool in stored:
                 reference = find_reference(controller, tool, recipe.station.id)
                 if reference is not None:
@@ -167,3 +185,14 @@ def _switched(listener: RecipeListener) -> str:
         f"{number} {tr('on') if on else tr('off')}" for number, on in listener.switched.items()
     )
     return tr("Outputs stay as the recipe switched them: {states}.", states=states)
+
+
+def _located(
+    loaded: LoadedRecipe, controller: Controller, cell: Cell | None
+) -> tuple[LoadedRecipe, str]:
+    """Return the recipe with the place of its station, and what is to be said about that."""
+    entries = controller.outcomes.recorded(kinds=(EntryKind.STATION,))
+    stations = find_stations(cell, entries)
+    station = stations.get(loaded.recipe.station.id)
+    recipe = located(loaded.recipe, stations)
+    return replace(loaded, recipe=recipe), station.remark() if station else ""

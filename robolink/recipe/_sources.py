@@ -4,11 +4,11 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from robolink.calibration import HALF_ROUND_DEG, MIN_ROTATION_DEG, CameraModel
-from robolink.recipe._tables import Table
+from robolink.calibration import MIN_ROTATION_DEG, telling_order
+from robolink.recipe._camera_source import CameraSource as CameraSource
+from robolink.recipe._tables import Angle, Length, Table
 
 Method = Literal["two_pose", "n_angle"]
-Angle = Annotated[float, Field(ge=-360, le=360)]
 InputNumber = Annotated[int, Field(ge=0, le=0xFFFF)]
 TouchSpeed = Annotated[float, Field(ge=0.1, le=10)]
 
@@ -35,6 +35,10 @@ class OperatorSource(Table):
     """How far the tip is lifted before it turns, mm."""
     clearance_mm: Annotated[float, Field(ge=0.5, le=50)] = 2.0
     """How far above the pin it comes down again, mm; the rest is the person's."""
+    until_mm: Length | None = None
+    """"n_angle" ends early when half the 95 % interval of X and of Y is at most this, mm."""
+    retake: bool = False
+    """Whether "n_angle" offers to take the pose again that fits worst."""
 
     @property
     def touches_deg(self) -> tuple[float, ...]:
@@ -49,7 +53,11 @@ class OperatorSource(Table):
     @property
     def turns_deg(self) -> tuple[float, ...]:
         """Angles of the further touches of "n_angle" against the first; empty for "two_pose"."""
-        return () if self.method == "two_pose" else self.touches_deg[1:]
+        if self.method == "two_pose":
+            return ()
+        turns = self.touches_deg[1:]
+        # Angles that the person wrote are taken in the person's order.
+        return telling_order(turns) if self.angles_deg is None and self.until_mm else turns
 
     @property
     def agrees_always(self) -> bool:
@@ -97,10 +105,12 @@ class BeamsSource(Table):
 
     kind: Literal["beams"]
     """The robot drives the tip through two crossed light beams; nobody touches anything."""
-    beams: Annotated[tuple[BeamLine, ...], Field(strict=False, min_length=2, max_length=2)]
-    """The two beams."""
-    z_mm: float
-    """Height of the beams in the base, where they cross, mm."""
+    beams: (
+        Annotated[tuple[BeamLine, ...], Field(strict=False, min_length=2, max_length=2)] | None
+    ) = None
+    """The two beams; without them, those of the station's record."""
+    z_mm: float | None = None
+    """Height of the beams in the base, where they cross, mm; goes with beams."""
     off_when_broken: bool = False
     """Whether an input goes off, not on, while its beam is broken."""
     turn_deg: Annotated[float, Field(ge=0, le=360 - MIN_ROTATION_DEG)] = 0.0
@@ -166,52 +176,29 @@ class TouchSource(Table):
         return len(self.speeds_mm_s) == 2
 
 
-Pair = Annotated[tuple[float, ...], Field(strict=False, min_length=2, max_length=2)]
-
-
-class CameraSource(Table):
-    """The robot brings the tip before a calibrated, up-looking camera."""
+class OneTouchSource(Table):
+    """A person touches a pin once that an earlier calibration found; the robot moves."""
 
     moves: ClassVar[bool] = True
     touches: ClassVar[bool] = False
 
-    kind: Literal["camera"]
-    """The robot brings the tip before an up-looking camera; nobody touches anything."""
-    sensor: Annotated[str, Field(min_length=1)] | None = None
-    """Name or URL of the camera; without it --sensor says which."""
-    mm_per_px: (
-        Annotated[tuple[Pair, ...], Field(strict=False, min_length=2, max_length=2)] | None
-    ) = None
-    """What a pixel is in the base, mm: [[x along the image's first axis, x along its second],
-    [y, y]]; as "calibrate camera-affine" found it. Not for a camera that answers in mm."""
-    origin_mm: Pair | None = None
-    """Base point that is seen at pixel (0, 0), mm; likewise."""
-    turns_deg: Annotated[tuple[Angle, ...], Field(strict=False, min_length=1, max_length=24)] = (
-        HALF_ROUND_DEG
-    )
-    """U of each look, degrees, counted toward zero from where the tool stands."""
-    pictures: Annotated[int, Field(ge=1, le=25)] = 3
-    """How many pictures are taken at each; the median counts."""
+    kind: Literal["one_touch"]
+    """A person touches a pin once that an earlier calibration found; the robot moves."""
     lift_mm: Annotated[float, Field(ge=1, le=100)] = 10.0
-    """How far the tip is lifted before it turns, mm."""
-    beside_mm: Annotated[float, Field(ge=0, le=10)] = 1.0
-    """From how far beside every place is approached, always from the same side, mm."""
+    """How far above the pin the tip comes and goes, and turns, mm."""
+    clearance_mm: Annotated[float, Field(ge=0.5, le=50)] = 5.0
+    """How far above the pin the old tip would stop, mm: more than the new one may be longer."""
+    max_changes: Annotated[int, Field(ge=1, le=1000)] = 20
+    """Differences after which a full calibration is due in any case."""
 
     @property
     def agrees_always(self) -> bool:
         """Whether the measurement leaves no residual."""
-        return len(self.turns_deg) < 3
-
-    @property
-    def model(self) -> CameraModel | None:
-        """What its pixels mean, ``None`` where that is not said."""
-        if self.mm_per_px is None or self.origin_mm is None:
-            return None
-        (a, b), (c, d) = self.mm_per_px
-        x_mm, y_mm = self.origin_mm
-        return CameraModel(((a, b), (c, d)), (x_mm, y_mm))
+        return True
 
 
-AnySource = OperatorSource | PointsSource | BeamsSource | TouchSource | CameraSource
+AnySource = (
+    OperatorSource | PointsSource | BeamsSource | TouchSource | OneTouchSource | CameraSource
+)
 Source = Annotated[AnySource, Field(discriminator="kind")]
 """More kinds join this union."""

@@ -18,6 +18,7 @@ Note = Annotated[str, Field(max_length=5000, pattern=r"^[^\x00-\x08\x0b-\x1f\x7f
 Length = Annotated[float, Field(ge=0.001)]
 """No limit is finer than the last digit that a controller prints, mm (design part 4)."""
 
+Angle = Annotated[float, Field(ge=-360, le=360)]
 ToolNumber = Annotated[int, Field(ge=1, le=15)]
 OutputNumber = Annotated[int, Field(ge=0, le=0xFFFF)]
 PointNumber = Annotated[int, Field(ge=0, le=999)]
@@ -58,14 +59,15 @@ class Station(Table):
     """Where it is measured."""
 
     id: Line
-    """Id of the pin or gauge; it goes on record with every measurement."""
+    """Name of the pin or gauge; it goes on record with every measurement. What this table does not
+    say about its place comes from the station of that name in the cell file and the journal."""
     x_mm: float | None = None
     """X of the pin's end, for the record, or of where the surface is touched; base, mm."""
     y_mm: float | None = None
     """Y of the pin's end, for the record, or of where the surface is touched; base, mm."""
     z_mm: float | None = None
-    """Z of the pin's end or of the surface, base, mm; z = "measured" needs it when basis is
-    "absolute", and source "touch" always."""
+    """Z of the pin's end or of the surface, base, mm; z = "measured" needs it, from here or from
+    the station's record, when basis is "absolute", and source "touch" always."""
     note: Note = ""
     """For people."""
 

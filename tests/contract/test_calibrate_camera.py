@@ -118,6 +118,20 @@ def test_a_board_is_measured_by_its_fiducials(desk):
     assert "look at fiducial 4" in messages
 
 
+RECIPE = """
+schema = "robolink/recipe/1"
+name = "All else is on record"
+basis = "absolute"
+z = "kept"
+[source]
+kind = "camera"
+[station]
+id = "CAM"
+[[tools]]
+number = 1
+"""
+
+
 def test_a_served_cell_keeps_its_camera_on_record_under_the_name_in_the_cell_file(
     tmp_path, monkeypatch
 ):
@@ -149,6 +163,10 @@ sensor = "{cell.assist_url}"
         assert "mm per px" in shown.out
         cell.simulator.world.change_nozzle()
         done = cell.run("-c", "line3", "calibrate", "camera", *usual)
+        assert done.code == 0, done.err
+        cell.simulator.world.change_nozzle()
+        (tmp_path / "nozzle.toml").write_text(RECIPE)
+        done = cell.run("-c", "line3", "recalibrate", "nozzle.toml", "--yes")
         assert done.code == 0, done.err
         true = cell.simulator.world.tips[1]
         found = cell.tool_1

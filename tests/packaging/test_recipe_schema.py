@@ -25,6 +25,7 @@ HEADINGS = {
     "BeamLine": "`[[source.beams]]`",
     "TouchSource": '`[source]` with `kind = "touch"`',
     "CameraSource": '`[source]` with `kind = "camera"`',
+    "OneTouchSource": '`[source]` with `kind = "one_touch"`',
     "Station": "`[station]`",
     "Poses": "`[poses]`",
     "FlangePose": "`[poses]`",

@@ -241,6 +241,10 @@ def test_a_camera_has_a_place_and_a_meaning_and_is_judged(text, where, what):
     assert found[where].startswith(what)
 
 
+def test_the_place_of_a_camera_may_be_left_to_its_record():
+    assert problems(CAMERA.replace("x_mm = 300\ny_mm = 80\nz_mm = -60\n", "")) == {}
+
+
 def test_a_camera_that_answers_in_millimetres_needs_no_meaning():
     bare = CAMERA.replace("mm_per_px = ", "# ").replace("origin_mm = ", "# ")
     assert problems(bare) == problems(with_(bare, "[source]", ONE_LOOK)) == {}
@@ -273,9 +277,9 @@ def test_half_a_place_of_the_pin_is_refused():
     assert problems(with_(PIN, "[station]", "y_mm = 1", "x_mm = 1")) == {}
 
 
-def test_a_measured_height_needs_the_height_of_the_pin_unless_it_is_a_difference():
+def test_a_measured_height_may_count_from_the_record_of_the_pin():
     measured = PIN.replace('"kept"', '"measured"')
-    assert list(problems(measured)) == ["station.z_mm"]
+    assert problems(measured) == {}
     assert problems(with_(measured, "[station]", "z_mm = -100")) == {}
     assert problems(measured.replace('"absolute"', '"difference"')) == {}
 

@@ -76,19 +76,27 @@ def test_the_examples_are_those_that_the_page_describes():
     assert [path.name for path in EXAMPLES] == [
         "gantry-touch-probe.toml",
         "needle-beams.toml",
+        "needle-one-touch.toml",
         "pendant-points.toml",
         "pick-nozzle-camera.toml",
         "scara-pin.toml",
         "two-nozzles.toml",
     ]
-    gantry, beams, points, camera, pin, nozzles = (load_recipe(path).recipe for path in EXAMPLES)
+    gantry, beams, one_touch, points, camera, pin, nozzles = (
+        load_recipe(path).recipe for path in EXAMPLES
+    )
     assert isinstance(gantry.source, TouchSource)
     assert (gantry.z, gantry.source.proof_turn_deg) == ("measured", 0.0)
     assert isinstance(camera.source, CameraSource)
     assert camera.source.model is not None
     assert camera.source.model.mirrored
+    assert (one_touch.source.kind, one_touch.z, one_touch.basis) == (
+        "one_touch",
+        "measured",
+        "difference",
+    )
     assert isinstance(beams.source, BeamsSource)
-    assert ([beam.input for beam in beams.source.beams], beams.attempts) == ([3, 4], 2)
+    assert ([beam.input for beam in beams.source.beams or ()], beams.attempts) == ([3, 4], 2)
     assert isinstance(points.source, PointsSource)
     assert (points.basis, points.verifies, points.tools[0].points) == (
         "difference",
@@ -194,12 +202,12 @@ def test_a_missing_basis_says_what_both_mean(problems):
         (
             '[source]\nkind = "laser"',
             "source.kind",
-            'must be one of "beams", "camera", "operator", "points", "touch"',
+            'must be one of "beams", "camera", "one_touch", "operator", "points", "touch"',
         ),
         (
             "[source]\nlift_mm = 5",
             "source.kind",
-            'must be one of "beams", "camera", "operator", "points", "touch"',
+            'must be one of "beams", "camera", "one_touch", "operator", "points", "touch"',
         ),
         ('[source]\nkind = "operator"\nlift_mm = 0.5', "source.lift_mm", "must be at least 1"),
         ('[source]\nkind = "operator"\nturn_deg = 350', "source.turn_deg", "must be at most 330"),

@@ -4,7 +4,6 @@ from typing import TYPE_CHECKING
 
 import click
 
-from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_cli._motion_options import motion_option
 from robolink_cli._pose_source import PoseSource, pose_source_options
@@ -98,25 +97,14 @@ def _difference(
         ConfigError: Nothing tells how well a touch repeats, or the station is no pin.
     """
     from robolink.calibration import NeedleLimits
-    from robolink.nozzle_change import Difference, find_last_touch
+    from robolink.nozzle_change import difference_from_last
     from robolink.stations import StationKind
     from robolink_cli.calibrate._pins import station_at
 
     station_at(frame, controller, StationKind.PIN)
-    last = find_last_touch(controller, frame.tool, frame.pin)
-    usual = NeedleLimits()
-    sigma = sigma_mm or last.touch_sigma_mm
-    if sigma is None:
-        raise ConfigError(
-            tr("Nothing tells how well a touch repeats: the last calibration left no residual."),
-            remedy=tr("Give --sigma MM, or calibrate with n-angle once."),
-        )
-    return Difference(
-        last,
-        sigma,
-        NeedleLimits(
-            max_change_mm=frame.gate.limit_mm,
-            tolerance_mm=frame.gate.interval_mm or usual.tolerance_mm,
-            max_changes=max_changes,
-        ),
+    limits = NeedleLimits(
+        max_change_mm=frame.gate.limit_mm,
+        tolerance_mm=frame.gate.interval_mm or NeedleLimits().tolerance_mm,
+        max_changes=max_changes,
     )
+    return difference_from_last(controller, frame.tool, frame.pin, sigma_mm=sigma_mm, limits=limits)

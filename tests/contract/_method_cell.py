@@ -1,0 +1,138 @@
+"""A cell of each controller kind in which every calibration method can be run from commands."""
+
+import contextlib
+import io
+import json
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from robolink_cli import main
+from robolink_simulators.clock import ManualClock
+
+from robolink.journal import EntryKind, memory_journal
+from robolink.model import Recorded, ToolOffset
+from tests.contract._sensor_cell import SensorCell, plc_sensor_cell, sensor_cell
+
+KINDS = ("epson", "plc")
+
+CELL = """
+[cells.a]
+url = "{url}"
+remote_timeout_s = 60.0
+remote_timeout_confirmed_by = "K. Sato, at the controller"
+
+[cells.a.stations.PIN-07]
+kind = "pin"
+gauge = "G-123"
+
+[cells.a.stations.BEAMS-02]
+kind = "beams"
+z_mm = {beams[2]}
+beams = [
+    {{ input = 3, x_mm = {beams[0]}, y_mm = {beams[1]}, direction_deg = 3.0 }},
+    {{ input = 4, x_mm = {beams[0]}, y_mm = {beams[1]}, direction_deg = 88.0 }},
+]
+
+[cells.a.stations.PLATE]
+kind = "touch"
+x_mm = {plate.x_mm}
+y_mm = {plate.y_mm}
+z_mm = {plate.z_mm}
+input = {plate.input}
+"""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a command ended and what it showed."""
+
+    code: int
+    out: str
+    err: str
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """The JSON document."""
+        found: dict[str, Any] = json.loads(self.out)
+        return found
+
+
+class MethodCell:
+    """A cell, and commands that are run on it."""
+
+    def __init__(self, cell: SensorCell) -> None:
+        self.cell = cell
+        self.world = cell.simulator.world
+
+    @property
+    def clock(self) -> ManualClock:
+        """The simulated time."""
+        return self.cell.clock
+
+    @property
+    def truth(self) -> ToolOffset:
+        """Where the tip really is."""
+        return self.cell.truth
+
+    @property
+    def stored(self) -> ToolOffset | None:
+        """What the controller holds in tool 1, past the wire."""
+        return self.held(1)
+
+    def held(self, tool: int) -> ToolOffset | None:
+        """Return what the controller holds, past the wire."""
+        with self.cell.connected() as controller:
+            return controller.tools.read(tool)
+
+    def mount(self) -> None:
+        """Put the sensors up."""
+        self.cell.mount_beams(self.cell.beams())
+        self.cell.mount_plate()
+
+    def run(self, *words: str) -> Outcome:
+        """Run a command on the cell."""
+        out, err = io.StringIO(), io.StringIO()
+        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+            code = main.run(["-c", "a", *words])
+        return Outcome(code, out.getvalue(), err.getvalue())
+
+    def calibrate(self, method: str, *more: str, tool: int = 1) -> Outcome:
+        """Calibrate with the simulated person, who says yes to everything; with the document."""
+        assist = ("--assist", self.cell.url, "--yes", "--json", "--speed", "100")
+        return self.run("calibrate", method, "--tool", str(tool), *assist, *more)
+
+    def recorded(self, *kinds: EntryKind) -> list[Recorded]:
+        """Return what is on record, newest first."""
+        return list(memory_journal(self.cell.url).entries(kinds=kinds))
+
+    def bump_pin(self, dx_mm: float, dy_mm: float) -> None:
+        """Move the pin."""
+        x_mm, y_mm, z_mm = self.world.pin_mm
+        self.world.pin_mm = (x_mm + dx_mm, y_mm + dy_mm, z_mm)
+
+    def lengthen(self, by_mm: float, dx_mm: float = 0.0, dy_mm: float = 0.0, tool: int = 1) -> None:
+        """Mount another needle."""
+        tip = self.world.tips[tool]
+        self.world.tips[tool] = replace(
+            tip, x_mm=tip.x_mm + dx_mm, y_mm=tip.y_mm + dy_mm, z_mm=tip.z_mm - by_mm
+        )
+
+
+@contextmanager
+def method_cell(kind: str, folder: Path, monkeypatch: Any) -> Iterator[MethodCell]:
+    """Set a cell up with its cell file."""
+    for name in [name for name in os.environ if name.startswith("ROBOLINK")]:
+        monkeypatch.delenv(name)
+    make = sensor_cell if kind == "epson" else plc_sensor_cell
+    with make() as cell:
+        if kind == "epson":
+            cell.simulator.machine.motors_on = True
+        path = folder / "robolink.toml"
+        path.write_text(CELL.format(url=cell.url, beams=cell.place_mm, plate=cell.plate))
+        monkeypatch.setenv("ROBOLINK_CONFIG", str(path))
+        monkeypatch.setenv("ROBOLINK_STATE_DIR", str(folder / "state"))
+        yield MethodCell(cell)

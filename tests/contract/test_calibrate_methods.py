@@ -1,0 +1,210 @@
+"""Every live method of ``calibrate`` on both kinds of controllers, with good and bad input."""
+
+import signal
+
+import pytest
+
+from robolink.journal import EntryKind
+from robolink.model import ToolOffset
+from tests.contract._method_cell import KINDS, method_cell
+
+pytestmark = pytest.mark.simulator_only
+
+OLD = ToolOffset(12.0, -3.5, -20.0)
+
+
+@pytest.fixture(params=KINDS)
+def cell(request, tmp_path, monkeypatch):
+    with method_cell(request.param, tmp_path, monkeypatch) as cell:
+        yield cell
+
+
+@pytest.fixture
+def arm(tmp_path, monkeypatch):
+    """An EPSON cell alone: what does not depend on the kind is shown once."""
+    with method_cell("epson", tmp_path, monkeypatch) as cell:
+        yield cell
+
+
+def within(document, truth, *, axes="xy"):
+    """Tell whether the truth lies in the stated interval, four times as wide for safety."""
+    half = document["fit"]["half_width95"]
+    return all(
+        abs(document["proposed"][f"{axis}_mm"] - getattr(truth, f"{axis}_mm"))
+        <= 4 * half[f"{axis}_mm"] + 0.002
+        for axis in axes
+    )
+
+
+def test_many_touches_end_early_and_one_touch_finds_the_next_needle(cell):
+    done = cell.calibrate("n-angle", "--station", "PIN-07", "--until", "0.05", "--count", "8")
+    assert done.code == 0, done.err
+    document = done.document
+    assert document["method"] == "n_angle"
+    assert 4 <= len(document["poses"]) < 8
+    assert max(document["fit"]["half_width95"].values()) <= 0.05
+    assert within(document, cell.truth)
+    assert document["verification"]["passed"]
+    assert all(verdict["passed"] for verdict in document["verdicts"])
+    assert "One more, at U" in done.err
+    assert "That is enough" in done.err
+    (found,) = cell.recorded(EntryKind.STATION)
+    pin, said = cell.world.pin_mm, found.details
+    assert (said["x_mm"], said["y_mm"]) == pytest.approx(pin[:2], abs=0.05)
+    assert said["sigma_mm"] > 0
+    assert found.signature.station == "PIN-07"
+    one_touch_gives_the_next_needle(cell)
+
+
+def one_touch_gives_the_next_needle(cell):
+    before, tip = cell.stored, cell.truth
+    cell.lengthen(0.4, 0.3, -0.2)
+    done = cell.calibrate("one-touch", "--station", "PIN-07")
+    assert done.code == 0, done.err
+    document = done.document
+    assert document["measured"] == ["x_mm", "y_mm", "z_mm"]
+    changed = [b - a for a, b in zip(tip.components(), cell.truth.components(), strict=True)]
+    proposed = document["proposed"]
+    for axis, change, old in zip("xyz", changed, before.components(), strict=False):
+        error = proposed[f"{axis}_mm"] - old - change
+        # Z of before was never measured, so only its change can be right.
+        assert abs(error) <= 3 * document["fit"]["half_width95"][f"{axis}_mm"]
+    assert document["verification"]["passed"]
+    assert document["warnings"] == []
+
+
+def test_the_chain_asks_for_a_full_calibration_in_time(arm):
+    arm.calibrate("n-angle", "--station", "PIN-07", "--count", "4", "--sigma", "0.01")
+    halves = []
+    for _ in range(2):
+        arm.lengthen(0.1)
+        done = arm.calibrate("one-touch", "--station", "PIN-07", "--max-changes", "2")
+        assert done.code == 0, done.err
+        halves.append(done.document["fit"]["half_width95"]["z_mm"])
+    assert halves[1] > halves[0]
+    assert done.document["warnings"] == ["full_calibration_due"]
+    assert "A full calibration is due" in done.err
+    refused = arm.calibrate("one-touch", "--station", "PIN-07", "--max-interval", "0.03")
+    assert refused.code == 7
+    assert refused.document["error"]["code"] == "large_interval"
+
+
+def test_one_touch_may_trust_the_place_of_the_pin(arm):
+    assert arm.calibrate("n-angle", "--station", "PIN-07", "--count", "4").code == 0
+    arm.lengthen(0.1, 0.2)
+    done = arm.calibrate(
+        "one-touch", "--station", "PIN-07", "--absolute", "--sigma", "0.01", "--no-verify"
+    )
+    assert done.code == 0, done.err
+    assert within(done.document, arm.truth)
+
+
+@pytest.mark.parametrize(
+    ("method", "station", "axes"), [("beams", "BEAMS-02", "xy"), ("z-touch", "PLATE", "z")]
+)
+def test_a_sensor_measures_at_its_station_and_nobody_is_asked(cell, method, station, axes):
+    cell.mount()
+    done = cell.calibrate(method, "--station", station)
+    assert done.code == 0, done.err
+    found = done.document["proposed"]
+    for axis in axes:
+        assert found[f"{axis}_mm"] == pytest.approx(getattr(cell.truth, f"{axis}_mm"), abs=0.02)
+    assert done.document["verification"]["passed"]
+    assert "nobody touches anything" in done.err
+    assert cell.recorded(EntryKind.DONE)[0].signature.station == station
+
+
+@pytest.mark.parametrize("method", ["pivot", "six-point"])
+def test_four_axes_cannot_tilt_and_say_so_before_anything_moves(cell, method):
+    refused = cell.calibrate(method)
+    assert refused.code == 7
+    error = refused.document["error"]
+    assert error["code"] == "rank_deficient"
+    assert "turns its tool about Z only" in error["what"]
+    assert cell.stored == OLD
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "named"),
+    [
+        (("one-touch", "--station", "PIN-99"), 2, "no station 'PIN-99'"),
+        (("one-touch", "--station", "PLATE"), 2, "of kind touch; pin is needed"),
+        (("one-touch", "--station", "PIN-07"), 7, "no_last_touch"),
+        (("one-touch", "--station", "PIN-07", "--absolute"), 2, "Nobody knows its place"),
+        (("beams", "--station", "PIN-07"), 2, "of kind pin; beams is needed"),
+        (("beams", "--station", "BEAMS-02", "--search", "6"), 2, "--search must be below"),
+        (("beams", "--station", "BEAMS-02"), 7, "no_edge"),
+        (("z-touch", "--station", "PLATE"), 7, "no_edge"),
+        (("z-touch", "--station", "PLATE", "--speeds", "2"), 2, "no speeds for touches"),
+        (("n-angle", "--angles", "0,90"), 2, "not angles for this method"),
+        (("n-angle", "--angles", "0,10,370"), 2, "not angles for this method"),
+        (("n-angle", "--angles", "0,10,20", "--no-verify"), 7, "insufficient_rotation"),
+        (("n-angle", "--station", "PLATE"), 2, "of kind touch; pin is needed"),
+        (("n-angle", "--box", "5"), 2, "outside the work box"),
+        (("n-angle", "--max-rms", "0.0005"), 7, "large_rms"),
+    ],
+)
+def test_what_cannot_be_is_refused_and_nothing_is_written(arm, words, code, named):
+    method, *more = words
+    refused = arm.calibrate(method, *more)
+    assert refused.code == code, refused.err
+    error = refused.document["error"]
+    assert named in (error.get("code"), *error["what"].splitlines()) or named in error["what"]
+    assert arm.stored == OLD
+
+
+def test_a_tool_that_somebody_changed_has_no_last_touch(arm):
+    assert arm.calibrate("n-angle", "--station", "PIN-07", "--count", "3").code == 0
+    arm.run("tool", "set", "1", "--x", "1", "--y", "2", "--z", "-20")
+    refused = arm.calibrate("one-touch", "--station", "PIN-07")
+    assert (refused.code, refused.document["error"]["code"]) == (7, "reference_outdated")
+
+
+def test_a_dry_run_lists_every_step_and_moves_nothing(arm):
+    shown = arm.calibrate("n-angle", "--count", "4", "--until", "0.5", "--dry-run")
+    assert shown.code == 0, shown.err
+    steps = shown.document["steps"]
+    assert sum(step["target"] is None for step in steps) == 4
+    assert not any(step["refusal"] for step in steps)
+    assert arm.recorded() == []
+
+
+def test_a_bumped_pin_is_told_from_a_moved_tip(arm):
+    nozzle = ("--nozzle", "N-1")
+    assert arm.calibrate("n-angle", "--station", "PIN-07", "--count", "4", *nozzle).code == 0
+    arm.bump_pin(0.3, -0.2)
+    found = arm.calibrate("n-angle", "--station", "PIN-07", "--count", "4", *nozzle)
+    assert found.code == 0, found.err
+    assert "station_moved" in found.document["warnings"]
+    assert within(found.document, arm.truth)
+    assert "the station moved" in found.err
+    arm.lengthen(0.0, 0.3, 0.2)
+    moved = arm.calibrate("n-angle", "--station", "PIN-07", "--count", "4", "--nozzle", "N-2")
+    assert moved.document["warnings"] == []
+
+
+def test_a_bumped_pin_shows_by_one_touch_of_the_same_nozzle(arm):
+    nozzle = ("--nozzle", "N-1")
+    assert arm.calibrate("n-angle", "--station", "PIN-07", "--count", "4", *nozzle).code == 0
+    arm.bump_pin(0.3, -0.2)
+    doubted = arm.calibrate("one-touch", "--station", "PIN-07", "--no-verify", *nozzle)
+    assert "station_moved" in doubted.document["warnings"]
+
+
+def test_ctrl_c_in_a_touch_leaves_the_old_value_and_the_tool_of_before(cell):
+    count = 0
+
+    def strike(*_):
+        nonlocal count
+        count += 1
+        if count == 40:
+            signal.raise_signal(signal.SIGINT)
+
+    cell.cell.simulator.on_request = strike
+    ended = cell.calibrate("n-angle", "--count", "4")
+    assert ended.code == 130
+    cell.cell.simulator.on_request = None
+    assert cell.stored == OLD
+    with cell.cell.connected() as controller:
+        assert controller.tools.selected() == 1
+        assert controller.outcomes.open_markers() == ()

@@ -1,5 +1,6 @@
 """Several pictures, and the one place that they agree on."""
 
+import math
 from collections.abc import Sequence
 from statistics import median
 
@@ -15,17 +16,30 @@ def seen_once(sensor: TipSensor, mark: int, *, pictures: int) -> Spot:
 
     Raises:
         CalibrationError: ``tip_not_seen`` or ``fiducial_not_seen``: not in most of the pictures;
-            ``several_tips_seen`` or ``several_fiducials_seen``: more than one at a time.
+            ``several_tips_seen`` or ``several_fiducials_seen``: more than one at a time;
+            ``non_finite``: the camera answers with something that is no place.
     """
     spots = list[Spot]()
     for _ in range(pictures):
         found = sensor.see(mark)
         if len(found) > 1:
             raise _several(mark, found)
+        for spot in found:
+            _require_finite(spot, sensor)
         spots += found
     if 2 * len(spots) <= pictures:
         raise _not_seen(mark, sensor, len(spots), pictures)
     return Spot(median(spot.x for spot in spots), median(spot.y for spot in spots))
+
+
+def _require_finite(spot: Spot, sensor: TipSensor) -> None:
+    # Before anything is calculated from it: the next movement would be.
+    if not (math.isfinite(spot.x) and math.isfinite(spot.y)):
+        raise CalibrationError(
+            "non_finite",
+            tr("{camera} answers {x}, {y}.", camera=sensor.identity, x=spot.x, y=spot.y),
+            remedy=tr("Restart the camera's program, and look what it finds in its picture."),
+        )
 
 
 def _not_seen(mark: int, sensor: TipSensor, seen: int, pictures: int) -> CalibrationError:

@@ -30,6 +30,8 @@ from robolink.nozzle_change._pose_methods import PoseMethod as PoseMethod
 from robolink.nozzle_change._pose_methods import SixPoints as SixPoints
 from robolink.nozzle_change._pose_methods import TwoTouches as TwoTouches
 from robolink.nozzle_change._preview import PlannedStep as PlannedStep
+from robolink.nozzle_change._preview import flange_now as flange_now
+from robolink.nozzle_change._preview import foresee as foresee
 from robolink.nozzle_change._preview import preview as preview
 from robolink.nozzle_change._preview import require_inside as require_inside
 from robolink.nozzle_change._proposal import ChangeReport as ChangeReport
@@ -39,6 +41,7 @@ from robolink.nozzle_change._source import Bench as Bench
 from robolink.nozzle_change._source import Equipped as Equipped
 from robolink.nozzle_change._source import MovingSource as MovingSource
 from robolink.nozzle_change._source import TipSource as TipSource
+from robolink.nozzle_change._station_learning import learn_station as learn_station
 from robolink.nozzle_change._touch_probe import TouchProbe as TouchProbe
 from robolink.nozzle_change._touching import PinAndPerson as PinAndPerson
 from robolink.nozzle_change._up_camera import UpCamera as UpCamera

@@ -28,6 +28,10 @@ FULL_METHODS = ("two_pose", "n_angle", "pivot", "six_point")
 """Methods that find the pin themselves, with the offset."""
 
 
+KEPT = (EntryKind.DONE, EntryKind.DECISION)
+"""Entries that say that a value stays, and what it rests on."""
+
+
 @dataclass(frozen=True, slots=True)
 class LastTouch:
     """The pin as a tool's last calibration on it places it.
@@ -122,7 +126,7 @@ def find_last_touch(controller: Controller, tool: int, station: str) -> LastTouc
         CalibrationError: ``no_last_touch``: there is none; ``reference_outdated``: the tool was
             changed since.
     """
-    kept = controller.outcomes.recorded(tool=tool, kinds=(EntryKind.DONE,))
+    kept = controller.outcomes.recorded(tool=tool, kinds=KEPT)
     newest = next(
         (found for found in (_last_touch(entry, station) for entry in kept) if found), None
     )

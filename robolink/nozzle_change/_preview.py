@@ -60,10 +60,21 @@ def preview(controller: Controller, plan: ChangePlan) -> tuple[PlannedStep, ...]
     """
     if not plan.moves:
         return ()
+    return tuple(_foresee(controller, plan, flange_now(controller)))
+
+
+def foresee(
+    procedure: Procedure[object], *, here: Pose, settings: RunSettings
+) -> tuple[PlannedStep, ...]:
+    """Return the steps of one procedure that begins with the flange at ``here``."""
+    return tuple(_follow(procedure, here, settings))
+
+
+def flange_now(controller: Controller) -> Pose:
+    """Read where the flange is, whatever tool is in force."""
     here = controller.groups[0].pose()
     selected = controller.tools.read(here.tool) if here.tool else None
-    start = flange_pose(here, selected or ToolOffset())
-    return tuple(_foresee(controller, plan, start))
+    return flange_pose(here, selected or ToolOffset())
 
 
 def require_inside(controller: Controller, steps: Sequence[PlannedStep]) -> None:

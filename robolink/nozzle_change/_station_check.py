@@ -9,7 +9,7 @@ from robolink.errors import CalibrationError
 from robolink.messages import tr
 from robolink.model import Controller, EntryKind, NewEntry, rotate_xy
 from robolink.nozzle_change._camera_to_find import CameraToFind
-from robolink.nozzle_change._pin_record import FULL_METHODS, found_pin
+from robolink.nozzle_change._pin_record import FULL_METHODS, KEPT, found_pin
 from robolink.nozzle_change._plan import ToolPlan
 from robolink.nozzle_change._proposal import Proposal
 from robolink.stations import Station, find_stations, station_entry
@@ -96,7 +96,9 @@ def _supposed_shift(controller: Controller, proposal: Proposal) -> TipShift | No
 def _same_nozzle(controller: Controller, proposal: Proposal) -> bool:
     """Tell whether the nozzle is known to be the one that was measured last."""
     outcomes = controller.outcomes
-    last = next(outcomes.recorded(tool=proposal.tool, kinds=(EntryKind.DONE,)), None)
+    kept = outcomes.recorded(tool=proposal.tool, kinds=KEPT)
+    # An answer to a question is a decision too, and stands for no value.
+    last = next((entry for entry in kept if "value" in entry.details), None)
     if last is None:
         return False
     now = _nozzle(proposal.kept_record, outcomes.signature.nozzle)

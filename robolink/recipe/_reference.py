@@ -21,7 +21,7 @@ from robolink.model import (
     read_offset,
 )
 
-_KINDS = (EntryKind.CALIBRATION, EntryKind.DONE)
+_KINDS = (EntryKind.CALIBRATION, EntryKind.DONE, EntryKind.DECISION)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""Reference stations: pins, light beams and touch surfaces that stand in a cell, by name.
+"""Reference stations: pins, light beams, surfaces, cameras in a cell, by name.
 
 What a person knows about a station stands in the cell file; where a measurement found it is kept
 in the journal, and counts from then on. docs/stations.md explains both.

@@ -158,12 +158,21 @@ class ToolChange:
             ConfigError: It cannot be recorded; the change stays open for ``recover``.
         """
         if self._marker is None:
+            # Each write said itself that it is done; this says what the values rest on.
+            if any(wanted.details for wanted in self._wanted):
+                self._controller.outcomes.append(*self._ends(EntryKind.DECISION, "", verdict))
             self.kept = True
             return
-        entries = [
+        entries = self._ends(EntryKind.DONE, self._marker.operation, verdict)
+        with self._controller.uninterrupted():
+            self._controller.finish(self._marker, *entries)
+            self.kept = True
+
+    def _ends(self, kind: EntryKind, operation: str, verdict: str) -> list[NewEntry]:
+        return [
             NewEntry(
-                EntryKind.DONE,
-                operation=self._marker.operation,
+                kind,
+                operation=operation,
                 tool=receipt.tool,
                 verdict=verdict,
                 details={
@@ -175,9 +184,6 @@ class ToolChange:
             )
             for wanted, receipt in zip(self._wanted, self._receipts, strict=True)
         ]
-        with self._controller.uninterrupted():
-            self._controller.finish(self._marker, *entries)
-            self.kept = True
 
     def _request(self) -> str:
         numbers = ", ".join(str(wanted.tool) for wanted in self._wanted)

@@ -79,9 +79,11 @@ class MethodCell:
         return self.cell.truth
 
     @property
-    def stored(self) -> ToolOffset | None:
+    def stored(self) -> ToolOffset:
         """What the controller holds in tool 1, past the wire."""
-        return self.held(1)
+        held = self.held(1)
+        assert held is not None
+        return held
 
     def held(self, tool: int) -> ToolOffset | None:
         """Return what the controller holds, past the wire."""

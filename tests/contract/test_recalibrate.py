@@ -128,6 +128,11 @@ def test_pendant_points_only_and_nothing_moves(cell):
     assert tool["tip"]["x_mm"] == pytest.approx(12.5, abs=1e-3)
     assert cell.simulator.machine.arm.moves_started == 0
     assert not [text for text in changes(cell.requests) if "TLSet 1" not in text]
+    # Nothing was verified; what was kept is the reference of the next change all the same.
+    teach(cell, ToolOffset(12.4, -3.5, -20))
+    third = cell.run("recalibrate", path, "--yes", "--json")
+    assert third.code == 0, third.err
+    assert cell.tool_1.x_mm == pytest.approx(OLD_TIP.x_mm + 0.1, abs=2e-3)
 
 
 def test_two_nozzles_on_one_head(cell):

@@ -1,0 +1,188 @@
+"""``recalibrate`` at named stations: one touch with Z, a bumped pin, beams on record, a retake."""
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+from robolink_cli import _operator
+
+from robolink.journal import EntryKind
+from robolink.model import ToolOffset
+from tests.contract._method_cell import KINDS, method_cell
+
+pytestmark = pytest.mark.simulator_only
+
+EXAMPLE = Path(__file__).parents[2] / "examples" / "recipes" / "needle-one-touch.toml"
+
+TWO_TOOLS = """
+schema = "robolink/recipe/1"
+name = "two needles, one touch each"
+basis = "difference"
+z = "measured"
+[source]
+kind = "one_touch"
+[station]
+id = "PIN-07"
+[[tools]]
+number = 1
+[[tools]]
+number = 2
+[tolerances]
+sigma_mm = 0.01
+"""
+
+AT_STATION = """
+schema = "robolink/recipe/1"
+name = "at a station"
+basis = "absolute"
+z = "{z}"
+[source]
+{source}
+[station]
+id = "{station}"
+[[tools]]
+number = 1
+"""
+
+
+@pytest.fixture(params=KINDS)
+def cell(request, tmp_path, monkeypatch):
+    with method_cell(request.param, tmp_path, monkeypatch) as cell:
+        yield cell
+
+
+@pytest.fixture
+def arm(tmp_path, monkeypatch):
+    with method_cell("epson", tmp_path, monkeypatch) as cell:
+        yield cell
+
+
+def recalibrate(cell, path, *more):
+    assist = ("--assist", cell.cell.url, "--yes", "--json")
+    return cell.run("recalibrate", str(path), *assist, *more)
+
+
+def written(path, text):
+    path.write_text(text)
+    return path
+
+
+def example_for(cell, folder):
+    """Return the shipped recipe; its safe pose is that of a simulated EPSON cell."""
+    if hasattr(cell.cell.simulator, "machine"):
+        return EXAMPLE
+    lines = EXAMPLE.read_text().splitlines()
+    text = "\n".join(line for line in lines if not line.startswith("safe = "))
+    return written(folder / "one-touch.toml", text)
+
+
+def test_the_example_changes_a_needle_with_z_inside_the_stated_interval(cell, tmp_path, capsys):
+    path = example_for(cell, tmp_path)
+    refused = recalibrate(cell, path, "--nozzle", "N-0")
+    assert refused.code == 7
+    assert refused.document["error"]["code"] == "no_last_touch"
+    assert cell.calibrate("n-angle", "--station", "PIN-07", "--count", "4").code == 0
+    value, tip = cell.stored, cell.truth
+    cell.lengthen(0.35, 0.25, -0.3)
+    began_ns = cell.clock.now_ns()
+    done = recalibrate(cell, path, "--nozzle", "N-1")
+    took_s = (cell.clock.now_ns() - began_ns) / 1e9
+    assert done.code == 0, done.err
+    (tool,) = done.document["tools"]
+    changed = [b - a for a, b in zip(tip.components(), cell.truth.components(), strict=True)]
+    halves = tool["fit"]["half_width95"]
+    for axis, change in zip("xyz", changed, strict=False):
+        moved_mm = tool["proposed"][f"{axis}_mm"] - getattr(value, f"{axis}_mm")
+        assert abs(moved_mm - change) <= halves[f"{axis}_mm"]
+    assert tool["verification"]["passed"]
+    assert cell.recorded(EntryKind.DONE)[0].signature.nozzle == "N-1"
+    with capsys.disabled():
+        sys.stdout.write(
+            f"\nneedle change by one touch, with proof: {took_s:.1f} s of robot time\n"
+        )
+
+
+def test_a_bumped_pin_shifts_all_tools_and_nothing_is_written(arm, tmp_path):
+    with arm.cell.connected() as controller:
+        controller.tools.write(2, ToolOffset(12.4, -3.7, -20.0), expected=None)
+    arm.world.tips[2] = ToolOffset(12.3, -3.8, -20.2)
+    for tool in (1, 2):
+        full = ("--station", "PIN-07", "--count", "4", "--no-verify")
+        assert arm.calibrate("n-angle", *full, tool=tool).code == 0
+    held = [arm.held(tool) for tool in (1, 2)]
+    path = written(tmp_path / "two.toml", TWO_TOOLS)
+    arm.bump_pin(0.3, -0.2)
+    refused = recalibrate(arm, path)
+    assert refused.code == 7, refused.err
+    error = refused.document["error"]
+    assert error["code"] == "station_moved"
+    assert "Tools 1, 2 all shifted by X +0." in error["what"]
+    assert "the station moved, not the tips" in error["what"]
+    assert [arm.held(tool) for tool in (1, 2)] == held
+    assert {entry.details["code"] for entry in arm.recorded(EntryKind.REFUSED)} == {"station_moved"}
+    arm.bump_pin(-0.3, 0.2)
+    arm.lengthen(0.2, 0.3, 0.1, tool=1)
+    arm.lengthen(0.1, -0.2, 0.3, tool=2)
+    done = recalibrate(arm, path)
+    assert done.code == 0, done.err
+    assert [tool["warnings"] for tool in done.document["tools"]] == [[], []]
+
+
+def test_a_recipe_may_name_beams_and_a_surface_by_their_stations(arm, tmp_path):
+    arm.mount()
+    beams = AT_STATION.format(source='kind = "beams"', station="BEAMS-02", z="kept")
+    surface = AT_STATION.format(source='kind = "touch"\ninput = 5', station="PLATE", z="measured")
+    for text, axes in ((beams, "xy"), (surface, "z")):
+        done = recalibrate(arm, written(tmp_path / "recipe.toml", text))
+        assert done.code == 0, done.err
+        (tool,) = done.document["tools"]
+        for axis in axes:
+            true = getattr(arm.truth, f"{axis}_mm")
+            assert tool["proposed"][f"{axis}_mm"] == pytest.approx(true, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("source", "station", "z", "why"),
+    [
+        ('kind = "beams"', "BEAMS-99", "kept", "no station of that name is known"),
+        ('kind = "beams"', "PLATE", "kept", "of kind touch, not beams"),
+        ('kind = "operator"', "PIN-07", "measured", "its place is not known"),
+    ],
+)
+def test_a_station_that_nobody_can_place_stops_the_recipe_first(
+    arm, tmp_path, source, station, z, why
+):
+    text = AT_STATION.format(source=source, station=station, z=z)
+    refused = recalibrate(arm, written(tmp_path / "recipe.toml", text))
+    assert refused.code == 2
+    assert why in refused.document["error"]["what"]
+    assert arm.recorded() == []
+
+
+def test_a_recipe_offers_the_worst_pose_again_and_the_answer_is_on_record(
+    arm, tmp_path, monkeypatch
+):
+    source = 'kind = "operator"\nmethod = "n_angle"\ncount = 4\nretake = true\nuntil_mm = 1.0'
+    text = AT_STATION.format(source=source, station="PIN-07", z="kept")
+    path = written(tmp_path / "recipe.toml", text)
+    monkeypatch.setattr("robolink_cli._consent.on_terminal", lambda: True)
+    monkeypatch.setattr("robolink_cli._recalibrating.agree_to_motion", lambda *_, **__: None)
+    monkeypatch.setattr("robolink_cli._recalibrating.asked", lambda _: True)
+    asked = []
+    answer = _operator.AssistedOperator.ask
+
+    def ask(operator, question, kind):
+        asked.append(question)
+        answer(operator, question, kind)
+
+    monkeypatch.setattr(_operator.AssistedOperator, "ask", ask)
+    done = arm.run("recalibrate", str(path), "--assist", arm.cell.url, "--jsonl")
+    assert done.code == 0, done.err
+    events = [json.loads(line) for line in done.out.splitlines()]
+    kinds = [event.get("kind") for event in events if event["event"] == "step"]
+    assert kinds.count("offer") == 3
+    assert "remark" in kinds
+    assert sum("Take it again?" in question for question in asked) == 3
+    said = [entry.details.get("question", "") for entry in arm.recorded(EntryKind.DECISION)]
+    assert sum("Take it again?" in str(question) for question in said) == 3

@@ -1,0 +1,175 @@
+"""Stations: what the cell file declares, what the journal has learnt, when a check is due."""
+
+from datetime import UTC, datetime, timedelta
+
+import pytest
+
+from robolink.config import check_file, find_cell
+from robolink.errors import ConfigError
+from robolink.journal import EntryKind, memory_journal
+from robolink.stations import (
+    Found,
+    StationKind,
+    beam_station,
+    find_station,
+    find_stations,
+    pin_of,
+    station_entry,
+    touch_station,
+)
+
+CELL = """
+[cells.a]
+url = "epson+sim://a"
+[cells.a.stations.PIN]
+kind = "pin"
+gauge = "G-1"
+check_every_days = 30
+[cells.a.stations.BEAMS]
+kind = "beams"
+z_mm = -100.0
+beams = [
+    { input = 3, x_mm = 300.0, y_mm = 80.0, direction_deg = 0.0 },
+    { input = 4, x_mm = 300.0, y_mm = 80.0, direction_deg = 90.0 },
+]
+[cells.a.stations.PLATE]
+kind = "touch"
+x_mm = 310.0
+y_mm = 90.0
+z_mm = -104.0
+input = 5
+"""
+PIN = Found(
+    id="PIN",
+    kind=StationKind.PIN,
+    x_mm=1.0,
+    y_mm=2.0,
+    z_mm=3.0,
+    sigma_mm=0.01,
+    how="n_angle with tool 1",
+    tool=1,
+)
+
+
+@pytest.fixture
+def file(tmp_path, monkeypatch):
+    path = tmp_path / "robolink.toml"
+    monkeypatch.setenv("ROBOLINK_CONFIG", str(path))
+
+    def write(text):
+        path.write_text(text)
+        return path
+
+    return write
+
+
+@pytest.fixture
+def record(request):
+    log = memory_journal(f"epson+sim://{request.node.name}").log(request.node.name)
+
+    def entries(*found):
+        log.append(*(station_entry(one) for one in found))
+        return list(log.recorded(kinds=(EntryKind.STATION,)))
+
+    return entries
+
+
+def test_what_the_cell_file_declares_is_a_station(file):
+    file(CELL)
+    stations = find_stations(find_cell("a"), [])
+    assert {name: one.kind for name, one in stations.items()} == {
+        "PIN": "pin",
+        "BEAMS": "beams",
+        "PLATE": "touch",
+    }
+    assert not any(one.learnt for one in stations.values())
+    beams = beam_station(stations["BEAMS"])
+    assert (beams.z_mm, beams.inputs, beams.beams[1].direction_deg) == (-100.0, (3, 4), 90.0)
+    plate = touch_station(stations["PLATE"])
+    assert (plate.x_mm, plate.z_mm, plate.input) == (310.0, -104.0, 5)
+
+
+def test_what_was_learnt_last_replaces_the_place_and_keeps_the_rest(file, record):
+    file(CELL)
+    entries = record(PIN, Found(id="PIN", kind=StationKind.PIN, x_mm=1.5, y_mm=2.5, z_mm=3.5))
+    pin = find_station(find_cell("a"), entries, "PIN", kind=StationKind.PIN)
+    assert (pin.x_mm, pin.gauge, pin.check_every_days) == (1.5, "G-1", 30)
+    assert pin.learnt
+    assert pin.declared
+    assert pin_of(pin).z_mm == 3.5
+
+
+def test_a_pin_may_be_known_from_the_journal_alone(record):
+    pin = find_station(None, record(PIN), "PIN")
+    assert (pin.sigma_mm, pin.how, pin.declared) == (0.01, "n_angle with tool 1", False)
+
+
+def test_a_record_of_another_kind_does_not_replace_a_declaration(file, record):
+    file(CELL)
+    other = Found(id="BEAMS", kind=StationKind.PIN, x_mm=1.0, y_mm=1.0, z_mm=1.0)
+    assert find_stations(find_cell("a"), record(other))["BEAMS"].kind is StationKind.BEAMS
+
+
+def test_a_station_that_nobody_knows_is_named_with_those_that_are(file):
+    file(CELL)
+    with pytest.raises(ConfigError, match="no station 'PNI'") as unknown:
+        find_station(find_cell("a"), [], "PNI")
+    assert "BEAMS, PIN, PLATE" in unknown.value.remedy
+    with pytest.raises(ConfigError, match="of kind beams; pin is needed"):
+        find_station(find_cell("a"), [], "BEAMS", kind=StationKind.PIN)
+    with pytest.raises(ConfigError, match="Nobody knows its place of station PIN"):
+        pin_of(find_station(find_cell("a"), [], "PIN"))
+
+
+def test_a_check_is_due_by_the_calendar(file, record):
+    file(CELL)
+    cell = find_cell("a")
+    assert "no check is on record" in find_station(cell, [], "PIN").remark()
+    pin = find_station(cell, record(PIN), "PIN")
+    found = datetime.fromisoformat(pin.found_at)
+    assert pin.remark(found + timedelta(days=29)) == ""
+    assert "has been due since" in pin.remark(found + timedelta(days=31))
+    assert find_stations(cell, [])["PLATE"].remark(datetime.now(UTC)) == ""
+
+
+def test_a_nearer_file_adds_stations_and_takes_none_away(tmp_path, monkeypatch):
+    monkeypatch.delenv("ROBOLINK_CONFIG", raising=False)
+    folders = {name: tmp_path / name for name in ("user", "site", "here")}
+    for name, folder in folders.items():
+        folder.mkdir()
+        if name != "here":
+            monkeypatch.setattr(
+                f"platformdirs.{name}_config_path", lambda *a, folder=folder, **k: folder
+            )
+    monkeypatch.chdir(folders["here"])
+    (folders["site"] / "robolink.toml").write_text(CELL)
+    (folders["here"] / "robolink.toml").write_text(
+        '[cells.a.stations.PIN]\nkind = "pin"\ngauge = "G-2"\n'
+        '[cells.a.stations.NEW]\nkind = "pin"\n'
+    )
+    stations = find_stations(find_cell("a"), [])
+    assert set(stations) == {"PIN", "BEAMS", "PLATE", "NEW"}
+    assert stations["PIN"].gauge == "G-2"
+
+
+@pytest.mark.parametrize(
+    ("text", "where", "what"),
+    [
+        ('kind = "laser"', "cells.a.stations.S", "needs a kind: pin, beams, touch"),
+        ("x_mm = 1.0", "cells.a.stations.S", "needs a kind"),
+        ('kind = "pin"\nguage = "G"', "cells.a.stations.S.guage", "is gauge meant?"),
+        ('kind = "pin"\nx_mm = "1"', "cells.a.stations.S.x_mm", "must be a number"),
+        ('kind = "pin"\ncheck_every_days = 0', "cells.a.stations.S.check_every_days", "more than"),
+        (
+            'kind = "touch"\nx_mm = 1.0\ny_mm = 1.0\nz_mm = 1.0',
+            "cells.a.stations.S.input",
+            "is missing",
+        ),
+        ('kind = "beams"\nz_mm = 1.0\nbeams = []', "cells.a.stations.S.beams", "must hold 2"),
+    ],
+)
+def test_what_is_wrong_with_a_station_is_told_by_its_key(file, text, where, what):
+    path = file(f'[cells.a]\nurl = "epson+sim://a"\n[cells.a.stations.S]\n{text}\n')
+    (problem,) = check_file(path)
+    assert problem.where == where
+    assert what in problem.what

@@ -32,7 +32,7 @@ def interval_sentence(result: CalibrationResult) -> str:
         for name, half in zip(result.measured, result.half_width95, strict=True)
     )
     if result.sigma_stated:
-        basis = tr("from the stated standard deviation")
+        basis = tr("from a given standard deviation")
     else:
         basis = tr("from the residuals")
     return tr("95 % interval: {parts}, {basis}", parts="  ".join(parts), basis=basis)

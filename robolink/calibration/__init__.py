@@ -50,6 +50,7 @@ from robolink.calibration._steps import Seek as Seek
 from robolink.calibration._steps import SeenAt as SeenAt
 from robolink.calibration._steps import Step as Step
 from robolink.calibration._steps import Tell as Tell
+from robolink.calibration._student import NORMAL_95 as NORMAL_95
 from robolink.calibration._tolerance import PLANAR_TOLERANCE as PLANAR_TOLERANCE
 from robolink.calibration._tolerance import TOUCH_TOLERANCE as TOUCH_TOLERANCE
 from robolink.calibration._tolerance import Tolerance as Tolerance

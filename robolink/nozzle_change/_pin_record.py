@@ -5,11 +5,12 @@ The offset that is written and the touches that it came from say together where 
 touches the pin shows by how much it differs from the old one (calibration.md 2).
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from statistics import fmean
 
-from robolink.calibration import CalibrationResult, NeedleChain
+from robolink.calibration import NORMAL_95, CalibrationResult, NeedleChain
 from robolink.errors import CalibrationError
 from robolink.messages import tr
 from robolink.model import (
@@ -69,13 +70,33 @@ def pin_mm(proposal: Proposal) -> tuple[float, float, float]:
 
 
 def offset_sigma_mm(result: CalibrationResult) -> float | None:
-    """Return the largest standard deviation of a measured length, ``None`` if nothing tells it."""
-    lengths = [
-        result.covariance[index][index] ** 0.5
+    """Return how uncertain a measured length is, as a standard deviation; the largest of them.
+
+    A scatter that was estimated from few poses is itself uncertain, and its 95 % interval is wider
+    for that. What is kept is the standard deviation of a normal distribution whose interval is as
+    wide, because whoever uses it later no longer knows from how many poses it came.
+
+    Returns:
+        ``None`` when nothing tells it.
+    """
+    widths = zip(result.measured, result.half_width95, strict=False)
+    lengths = [half for name, half in widths if name.endswith("_mm")]
+    return max(lengths) / NORMAL_95 if lengths else None
+
+
+def _touch_sigma_mm(result: CalibrationResult) -> float | None:
+    """Return the same for one coordinate of one touch."""
+    offset_mm = offset_sigma_mm(result)
+    if offset_mm is None or result.sigma_mm is None:
+        return None
+    if result.sigma_stated:
+        return result.sigma_mm
+    largest = max(
+        result.covariance[index][index]
         for index, name in enumerate(result.measured)
-        if name.endswith("_mm") and result.covariance
-    ]
-    return max(lengths, default=None)
+        if name.endswith("_mm")
+    )
+    return result.sigma_mm * offset_mm / math.sqrt(largest) if largest else result.sigma_mm
 
 
 def found_pin(station: str, proposal: Proposal) -> Found | None:
@@ -115,7 +136,7 @@ def touch_details(station: str, proposal: Proposal) -> dict[str, object]:
         "u_deg": result.inputs[-1].u_deg,
         "sigma_mm": chain.sigma_mm,
         "changes": chain.changes,
-        "touch_sigma_mm": result.sigma_mm,
+        "touch_sigma_mm": _touch_sigma_mm(result),
     }
 
 

@@ -13,6 +13,7 @@ from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
 from robolink.nozzle_change._flange import seen_from
 from robolink.nozzle_change._looks import angles_between, pixel_camera
+from robolink.nozzle_change._pin_record import offset_sigma_mm
 from robolink.nozzle_change._source import Bench
 from robolink.stations import Found, StationKind
 
@@ -68,7 +69,7 @@ class CameraToFind:
             x_mm=self.station.x_mm,
             y_mm=self.station.y_mm,
             z_mm=self.station.z_mm,
-            sigma_mm=result.sigma_mm,
+            sigma_mm=offset_sigma_mm(result),
             how=tr("{method} with tool {tool}", method=result.method, tool=tool),
             tool=tool,
             details={

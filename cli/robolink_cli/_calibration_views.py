@@ -5,7 +5,12 @@ from collections.abc import Mapping, Sequence
 from robolink.messages import tr
 from robolink.nozzle_change import PlannedStep, Proposal, ToolReport, Verdict
 from robolink_cli._doubts import doubts as doubts
-from robolink_cli._fit_views import fit_sentence, interval_sentence, show_residuals
+from robolink_cli._fit_views import (
+    camera_sentence,
+    fit_sentence,
+    interval_sentence,
+    show_residuals,
+)
 from robolink_cli._render import note, say
 from robolink_cli._tables import show_change
 from robolink_cli._views import (
@@ -26,7 +31,8 @@ def show_proposal(proposal: Proposal) -> None:
         unmeasured=proposal.kept,
     )
     result = proposal.result
-    for remark in (*proposal.notes, fit_sentence(result), interval_sentence(result)):
+    sentences = (fit_sentence(result), interval_sentence(result), camera_sentence(result))
+    for remark in (*proposal.notes, *sentences):
         if remark:
             say(f"  {remark}")
     if result.residuals_mm:
@@ -105,7 +111,7 @@ def report_payload(report: ToolReport) -> dict[str, object]:
 def show_course(steps: Sequence[PlannedStep]) -> None:
     """Say how a measurement will go, before anybody is asked."""
     moves = sum(step.target is not None for step in steps)
-    asks = len(steps) - moves
+    asks = sum(step.by_person for step in steps)
     if asks:
         plan = tr(
             "The plan: {asks} times a person brings the tip onto the pin, with {moves} movements "

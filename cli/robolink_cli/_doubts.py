@@ -22,6 +22,12 @@ _SENTENCES: Final[Mapping[str, Callable[[], str]]] = {
     "sigma_too_small": lambda: tr(
         "The poses scatter more than the stated standard deviation says."
     ),
+    "camera_moved": lambda: tr(
+        "The camera sees things beside where they are: it was moved, or its calibration is old."
+    ),
+    "unequal_scale": lambda: tr("The camera's two axes differ much in scale."),
+    "large_shear": lambda: tr("The image is askew: the camera seems to lean."),
+    "large_pixel_residual": lambda: tr("The looks agree within more than half a pixel only."),
     "full_calibration_due": lambda: tr(
         "A full calibration is due: the differences since the last one add up."
     ),

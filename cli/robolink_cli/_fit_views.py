@@ -38,6 +38,33 @@ def interval_sentence(result: CalibrationResult) -> str:
     return tr("95 % interval: {parts}, {basis}", parts="  ".join(parts), basis=basis)
 
 
+def camera_sentence(result: CalibrationResult) -> str:
+    """Return what a measurement says about its camera; empty where it says nothing."""
+    from robolink.calibration import CameraCalibration, CameraRound
+
+    if isinstance(result, CameraRound) and result.camera_error_mm is not None:
+        dx_mm, dy_mm = result.camera_error_mm
+        return tr(
+            "the camera sees things X {dx:+.3f} Y {dy:+.3f} mm beside where they are",
+            dx=dx_mm,
+            dy=dy_mm,
+        )
+    if isinstance(result, CameraCalibration):
+        camera = result.camera
+        x, y = (1000 * scale for scale in camera.scale_mm_per_px)
+        mirror = tr("mirrored") if camera.mirrored else tr("not mirrored")
+        return tr(
+            "camera: {x:.2f} x {y:.2f} micrometres per pixel, turned by {turn:.2f} degrees, "
+            "{mirror}, shear {shear:.2f} degrees",
+            x=x,
+            y=y,
+            turn=camera.turn_deg,
+            mirror=mirror,
+            shear=camera.shear_deg,
+        )
+    return ""
+
+
 def show_residuals(result: CalibrationResult) -> None:
     """Show the residual of every pose."""
     rows = []

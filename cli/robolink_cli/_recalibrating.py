@@ -29,6 +29,7 @@ class Recalibration:
         assist_url: A simulator's stand-in for the person.
         take_reference: Whether only a reference is taken.
         accepted_change_mm: A larger jump that an engineer accepts this time.
+        sensor: The camera, in place of the recipe's.
     """
 
     def __init__(
@@ -41,6 +42,7 @@ class Recalibration:
         assist_url: str | None,
         take_reference: bool,
         accepted_change_mm: float | None,
+        sensor: str | None,
     ) -> None:
         self._context = context
         self._loaded = loaded
@@ -49,6 +51,7 @@ class Recalibration:
         self._assist_url = assist_url
         self._take_reference = take_reference
         self._accepted_change_mm = accepted_change_mm
+        self._sensor = sensor
 
     def run(self, *, dry_run: bool) -> None:
         """Carry the recipe out, or only show it.
@@ -72,6 +75,7 @@ class Recalibration:
                 take_reference=self._take_reference,
                 accepted_change_mm=self._accepted_change_mm,
                 ask_before_write=not self._answers.yes,
+                sensor=self._sensor,
                 cell=self._context.cell,
             )
             run.preflight()

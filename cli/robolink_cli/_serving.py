@@ -4,13 +4,17 @@ import json
 import signal
 import threading
 from collections.abc import Sequence
-from typing import Any
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_cli._render import json_is_on
+
+if TYPE_CHECKING:
+    from robolink_simulators.world_parameters import WorldParameters
 
 
 class Termination:
@@ -78,3 +82,15 @@ def named_values(texts: Sequence[str], example: str) -> dict[str, str]:
             )
         pairs[name] = value
     return pairs
+
+
+def world_from(texts: Sequence[str]) -> "WorldParameters":
+    """Return the world that ``--world`` describes.
+
+    Raises:
+        ConfigError: It is not NAME=VALUE, or there is no such parameter.
+    """
+    from robolink_simulators.world_parameters import WorldParameters, parameters_from_text
+
+    pairs = named_values(texts, "--world camera_noise_px=0.3")
+    return replace(WorldParameters(), **parameters_from_text(pairs))  # type: ignore[arg-type]

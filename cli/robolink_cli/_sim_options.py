@@ -13,7 +13,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 def simulation_options(function: F) -> F:
-    """Add ``--seed``, ``--state``, ``--speed``, ``--option`` and ``--allow-remote``."""
+    """Add ``--seed``, ``--state``, ``--speed``, ``--option``, ``--allow-remote``, ``--world``."""
     options = (
         seed_option,
         click.option(
@@ -37,6 +37,13 @@ def simulation_options(function: F) -> F:
             help="A habit of the device; a wrong name lists them all. May be repeated.",
         ),
         allow_remote_option,
+        click.option(
+            "--world",
+            multiple=True,
+            metavar="NAME=VALUE",
+            help="How imperfect the cell is, and how its camera is built; a wrong name lists all. "
+            "May be repeated.",
+        ),
     )
     for option in reversed(options):
         function = option(function)

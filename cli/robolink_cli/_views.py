@@ -52,6 +52,7 @@ def proposal_payload(proposal: Proposal) -> dict[str, object]:
         "warnings": list(result.warnings),
         "poses": [pose_payload(pose) for pose in result.inputs],
         "fit": fit_payload(result),
+        **result.details(),
     }
 
 

@@ -69,7 +69,7 @@ COMMANDS: Final = {
     ),
     "station": (
         "robolink_cli.station:station",
-        tr("The pins, beams and surfaces of a cell: where they are, and how sure."),
+        tr("Pins, beams, surfaces and cameras of a cell: where they are, and how sure."),
     ),
     "solve": ("robolink_cli.solve:solve", tr("Calculate a tool offset from a file, offline.")),
     "doctor": ("robolink_cli.doctor:doctor", tr("What could get in the way on this computer.")),

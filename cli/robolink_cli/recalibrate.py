@@ -9,6 +9,7 @@ from robolink_cli._consent import dry_run_option, yes_option
 from robolink_cli._context import CliContext, controller_options
 from robolink_cli._people import nozzle_options
 from robolink_cli._recipe_answers import answer_options
+from robolink_cli._sensor_option import sensor_option
 
 
 @click.command()
@@ -30,6 +31,7 @@ from robolink_cli._recipe_answers import answer_options
     metavar="URL",
     help=tr("A simulator's assist or sim URL: its operator brings the tip onto the pin."),
 )
+@sensor_option
 @click.option(
     "--jsonl",
     is_flag=True,
@@ -47,6 +49,7 @@ def recalibrate(
     reference: bool,
     accepted_change_mm: float | None,
     assist: str | None,
+    sensor: str | None,
     jsonl: bool,
     nozzle: str | None,
     lot: str | None,
@@ -79,4 +82,5 @@ def recalibrate(
             assist_url=assist,
             take_reference=reference,
             accepted_change_mm=accepted_change_mm,
+            sensor=sensor,
         ).run(dry_run=dry_run)

@@ -1,4 +1,4 @@
-"""station list, show, learn: the pins, beams and surfaces of a cell."""
+"""station list, show, learn: the pins, beams, surfaces and cameras of a cell."""
 
 import click
 
@@ -9,7 +9,7 @@ from robolink_cli._context import CliContext, controller_options
 
 @click.group()
 def station() -> None:
-    """The pins, light beams and touch surfaces of a cell: where they are, and how sure."""
+    """Pins, beams, surfaces and cameras of a cell: where they are, and how sure."""
 
 
 @station.command("list")

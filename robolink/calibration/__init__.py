@@ -6,6 +6,15 @@ at the controller should not wait for it.
 
 from typing import TYPE_CHECKING
 
+from robolink.calibration._camera_model import CameraLimits as CameraLimits
+from robolink.calibration._camera_model import CameraModel as CameraModel
+from robolink.calibration._camera_model import require_same_camera as require_same_camera
+from robolink.calibration._camera_station import HALF_ROUND_DEG as HALF_ROUND_DEG
+from robolink.calibration._camera_station import TWO_ANGLES_DEG as TWO_ANGLES_DEG
+from robolink.calibration._camera_station import CameraStation as CameraStation
+from robolink.calibration._camera_station import LookPlan as LookPlan
+from robolink.calibration._camera_station import PatternPlan as PatternPlan
+from robolink.calibration._held_board import BoardDrawing as BoardDrawing
 from robolink.calibration._impact import Impact as Impact
 from robolink.calibration._impact import PointImpact as PointImpact
 from robolink.calibration._impact import impact_on as impact_on
@@ -18,6 +27,7 @@ from robolink.calibration._moved_station import judge_shifts as judge_shifts
 from robolink.calibration._needle_chain import NeedleChain as NeedleChain
 from robolink.calibration._needle_chain import NeedleLimits as NeedleLimits
 from robolink.calibration._planar_checks import MIN_ROTATION_DEG as MIN_ROTATION_DEG
+from robolink.calibration._planar_checks import angle_spread_deg as angle_spread_deg
 from robolink.calibration._planar_checks import planar_sigma_gain as planar_sigma_gain
 from robolink.calibration._poses import ToolFit as ToolFit
 from robolink.calibration._poses import better_fit as better_fit
@@ -32,10 +42,12 @@ from robolink.calibration._stations import CrossingPlan as CrossingPlan
 from robolink.calibration._stations import ProbePlan as ProbePlan
 from robolink.calibration._stations import TouchStation as TouchStation
 from robolink.calibration._steps import Ask as Ask
+from robolink.calibration._steps import Look as Look
 from robolink.calibration._steps import Move as Move
 from robolink.calibration._steps import Offer as Offer
 from robolink.calibration._steps import Procedure as Procedure
 from robolink.calibration._steps import Seek as Seek
+from robolink.calibration._steps import SeenAt as SeenAt
 from robolink.calibration._steps import Step as Step
 from robolink.calibration._steps import Tell as Tell
 from robolink.calibration._student import NORMAL_95 as NORMAL_95
@@ -48,6 +60,7 @@ from robolink.calibration._touch import raised as raised
 from robolink.calibration._touch import travel as travel
 from robolink.calibration._touch import two_pose as two_pose
 from robolink.calibration._touch import verify_by_turning as verify_by_turning
+from robolink.calibration._turning import toward_zero as toward_zero
 from robolink.calibration._two_pose import solve_two_pose as solve_two_pose
 
 if TYPE_CHECKING:
@@ -56,24 +69,28 @@ if TYPE_CHECKING:
     from robolink.calibration._beams import find_beams as find_beams
     from robolink.calibration._board import solve_board as solve_board
     from robolink.calibration._board_fit import solve_board_fit as solve_board_fit
+    from robolink.calibration._board_round import solve_board_round as solve_board_round
     from robolink.calibration._camera import Sighting as Sighting
     from robolink.calibration._camera import solve_up_camera as solve_up_camera
     from robolink.calibration._camera_affine import CameraCalibration as CameraCalibration
     from robolink.calibration._camera_affine import PixelSighting as PixelSighting
     from robolink.calibration._camera_affine import solve_camera_affine as solve_camera_affine
-    from robolink.calibration._camera_model import CameraLimits as CameraLimits
-    from robolink.calibration._camera_model import CameraModel as CameraModel
-    from robolink.calibration._camera_model import require_same_camera as require_same_camera
+    from robolink.calibration._camera_round import CameraRound as CameraRound
+    from robolink.calibration._camera_round import solve_camera_round as solve_camera_round
     from robolink.calibration._crossed_beams import BeamsResult as BeamsResult
     from robolink.calibration._crossed_beams import solve_crossed_beams as solve_crossed_beams
     from robolink.calibration._crossing import cross_beams as cross_beams
-    from robolink.calibration._crossing import toward_zero as toward_zero
     from robolink.calibration._crossing import trace_beams as trace_beams
     from robolink.calibration._crossing import verify_by_crossing as verify_by_crossing
     from robolink.calibration._joint import JointResult as JointResult
     from robolink.calibration._joint import JointTouch as JointTouch
     from robolink.calibration._joint import ToolDifference as ToolDifference
     from robolink.calibration._joint import solve_joint as solve_joint
+    from robolink.calibration._looking import find_camera as find_camera
+    from robolink.calibration._looking import look_at_board as look_at_board
+    from robolink.calibration._looking import look_at_tip as look_at_tip
+    from robolink.calibration._looking_again import verify_board as verify_board
+    from robolink.calibration._looking_again import verify_by_looking as verify_by_looking
     from robolink.calibration._n_angle import solve_n_angle as solve_n_angle
     from robolink.calibration._needle_change import NeedleChangeResult as NeedleChangeResult
     from robolink.calibration._needle_change import solve_needle_change as solve_needle_change
@@ -119,24 +136,28 @@ _LOADED_LATER = {
     "find_beams": "_beams",
     "solve_board": "_board",
     "solve_board_fit": "_board_fit",
+    "solve_board_round": "_board_round",
     "Sighting": "_camera",
     "solve_up_camera": "_camera",
     "CameraCalibration": "_camera_affine",
     "PixelSighting": "_camera_affine",
     "solve_camera_affine": "_camera_affine",
-    "CameraLimits": "_camera_model",
-    "CameraModel": "_camera_model",
-    "require_same_camera": "_camera_model",
     "BeamsResult": "_crossed_beams",
     "solve_crossed_beams": "_crossed_beams",
     "cross_beams": "_crossing",
-    "toward_zero": "_crossing",
     "trace_beams": "_crossing",
     "verify_by_crossing": "_crossing",
+    "CameraRound": "_camera_round",
+    "solve_camera_round": "_camera_round",
     "JointResult": "_joint",
     "JointTouch": "_joint",
     "ToolDifference": "_joint",
     "solve_joint": "_joint",
+    "find_camera": "_looking",
+    "look_at_board": "_looking",
+    "look_at_tip": "_looking",
+    "verify_board": "_looking_again",
+    "verify_by_looking": "_looking_again",
     "solve_n_angle": "_n_angle",
     "NeedleChangeResult": "_needle_change",
     "solve_needle_change": "_needle_change",

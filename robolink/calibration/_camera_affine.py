@@ -58,6 +58,20 @@ class CameraCalibration(CalibrationResult):
     camera: CameraModel
     rms_px: float | None = None
 
+    def details(self) -> dict[str, object]:
+        """Return the camera."""
+        return {
+            "camera": {
+                "mm_per_px": [list(row) for row in self.camera.mm_per_px],
+                "origin_mm": list(self.camera.origin_mm),
+                "scale_mm_per_px": list(self.camera.scale_mm_per_px),
+                "turn_deg": self.camera.turn_deg,
+                "shear_deg": self.camera.shear_deg,
+                "mirrored": self.camera.mirrored,
+                "rms_px": self.rms_px,
+            }
+        }
+
 
 def solve_camera_affine(
     sightings: Sequence[PixelSighting],

@@ -17,6 +17,7 @@ from robolink.calibration._result import Drift, VerifyResult
 from robolink.calibration._stations import BeamStation, CrossingPlan
 from robolink.calibration._steps import Procedure
 from robolink.calibration._touch import NO_OFFSET
+from robolink.calibration._turning import toward_zero
 from robolink.errors import CalibrationError
 from robolink.messages import tr
 from robolink.model import Pose, ToolOffset, rotate_xy
@@ -134,11 +135,6 @@ def verify_by_crossing(
         dx, dy = rotate_xy(aside.x_mm - found.x_mm, aside.y_mm - found.y_mm, angle_deg)
         drifts.append(Drift(angle_deg, dx, dy))
     return VerifyResult(tuple(drifts), tolerance_mm)
-
-
-def toward_zero(u_deg: float, turn_deg: float) -> float:
-    """Return U after a turn that keeps it inside the joint's range: toward zero."""
-    return u_deg - turn_deg if u_deg > 0 else u_deg + turn_deg
 
 
 def _require_straight(

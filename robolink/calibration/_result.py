@@ -64,6 +64,10 @@ class CalibrationResult:
     dof: int | None = None
     unobservable: tuple[str, ...] = ()
 
+    def details(self) -> dict[str, object]:
+        """Return what the method tells besides, plain JSON; nothing for most."""
+        return {}
+
     @property
     def interval95(self) -> dict[str, tuple[float, float]]:
         """Lower and upper end of each measured component's 95 % interval, by name."""

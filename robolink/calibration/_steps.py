@@ -9,7 +9,7 @@ from collections.abc import Generator
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from robolink.model import InputEdge, Path, Pose
+from robolink.model import TIP, InputEdge, Path, Pose, Spot, SpotUnit
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +44,57 @@ class Seek:
 
 
 @dataclass(frozen=True, slots=True)
+class Look:
+    """Have the camera say where it sees a mark; answered with :class:`SeenAt`.
+
+    When it sees none, or two, whoever runs the procedure throws CalibrationError
+    ``tip_not_seen``, ``several_tips_seen`` and their like into it.
+
+    Attributes:
+        purpose: What for, for a person.
+        expected_mm: Where in the base, X and Y, the mark should be.
+        mark: The tip, or the number of a fiducial.
+        pictures: How many are taken; the median of them counts.
+    """
+
+    purpose: str
+    expected_mm: tuple[float, float]
+    mark: int = TIP
+    pictures: int = 3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SeenAt(Pose):
+    """The pose of the frame in force, and where the camera saw the mark meanwhile.
+
+    Attributes:
+        spot: Where, in the camera's unit.
+        unit: That unit.
+    """
+
+    spot: Spot
+    unit: SpotUnit
+
+    @classmethod
+    def of(cls, pose: Pose, spot: Spot, unit: SpotUnit) -> "SeenAt":
+        """Return what was seen from ``pose``."""
+        x_mm, y_mm, z_mm, u_deg, v_deg, w_deg = pose.coordinates()
+        return cls(
+            x_mm=x_mm,
+            y_mm=y_mm,
+            z_mm=z_mm,
+            u_deg=u_deg,
+            v_deg=v_deg,
+            w_deg=w_deg,
+            hand=pose.hand,
+            local=pose.local,
+            tool=pose.tool,
+            spot=spot,
+            unit=unit,
+        )
+
+
+@dataclass(frozen=True, slots=True)
 class Tell:
     """Let a person know how it goes; answered with ``None``."""
 
@@ -60,7 +111,7 @@ class Offer:
     question: str
 
 
-Step = Move | Ask | Seek | Tell | Offer
+Step = Move | Ask | Seek | Look | Tell | Offer
 
 T = TypeVar("T")
 Procedure = Generator[Step, Any, T]

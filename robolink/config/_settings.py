@@ -38,7 +38,7 @@ class CellSettings(BaseModel):
             and largest single one, that is believed.
         interval_tolerance_mm: Largest half of the 95 % interval of a measured length.
         people: Who works at the cell: badge or name, and ``operator`` or ``engineer``.
-        stations: Pins, beams and surfaces that stand there, by name.
+        stations: Pins, beams, surfaces and cameras that stand there, by name.
         notes: For people.
     """
 

@@ -2,7 +2,9 @@
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
+
+from robolink.messages import tr
 
 Text = Annotated[str, Field(min_length=1, max_length=200)]
 Positive = Annotated[float, Field(gt=0)]
@@ -89,8 +91,42 @@ class TouchSettings(_Station):
     off_when_touched: bool = False
 
 
+Pair = Annotated[tuple[float, ...], Field(strict=False, min_length=2, max_length=2)]
+
+
+class CameraSettings(_Station):
+    """An up-looking camera; X, Y and Z are where tips are brought before it, in focus.
+
+    Attributes:
+        sensor: Name or URL of the camera.
+        mm_per_px: What a pixel is in the base, where that is known without robolink: two rows.
+        origin_mm: Base point that is seen at pixel (0, 0), likewise.
+    """
+
+    kind: Literal["camera"]
+    x_mm: float
+    y_mm: float
+    z_mm: float
+    sensor: Text | None = None
+    mm_per_px: (
+        Annotated[tuple[Pair, ...], Field(strict=False, min_length=2, max_length=2)] | None
+    ) = None
+    origin_mm: Annotated[Pair | None, Field(validate_default=True)] = None
+
+    @field_validator("origin_mm")
+    @classmethod
+    def _goes_with_the_pixels(
+        cls, origin_mm: tuple[float, ...] | None, info: ValidationInfo
+    ) -> tuple[float, ...] | None:
+        # A value that is wrong itself is missing in the data, and told already.
+        pixels = info.data.get("mm_per_px", ...)
+        if pixels is not ... and (pixels is None) != (origin_mm is None):
+            raise ValueError(tr("goes with mm_per_px: give both, or neither"))
+        return origin_mm
+
+
 StationSettings = Annotated[
-    PinSettings | BeamsSettings | TouchSettings, Field(discriminator="kind")
+    PinSettings | BeamsSettings | TouchSettings | CameraSettings, Field(discriminator="kind")
 ]
 """More kinds join this union."""
 
@@ -101,4 +137,5 @@ def station_keys() -> dict[str, list[str]]:
         "pin": list(PinSettings.model_fields),
         "beams": list(BeamsSettings.model_fields),
         "touch": list(TouchSettings.model_fields),
+        "camera": list(CameraSettings.model_fields),
     }

@@ -32,6 +32,10 @@ from robolink.model._outcomes import new_operation as new_operation
 from robolink.model._people import Role as Role
 from robolink.model._people import require_engineer as require_engineer
 from robolink.model._secret import Secret as Secret
+from robolink.model._tip_sensor import TIP as TIP
+from robolink.model._tip_sensor import Spot as Spot
+from robolink.model._tip_sensor import SpotUnit as SpotUnit
+from robolink.model._tip_sensor import TipSensor as TipSensor
 from robolink.model._tools import ANY as ANY
 from robolink.model._tools import Expect as Expect
 from robolink.model._tools import Expected as Expected

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
-from robolink.calibration import Ask, Offer, Seek, travel
+from robolink.calibration import Ask, Look, Offer, Seek, travel
 from robolink.errors import CalibrationError, ConfigError, RobolinkError
 from robolink.messages import tr
 from robolink.model import NewEntry, Pose
@@ -75,7 +75,7 @@ class Measuring:
         log = self._bench.controller.outcomes
 
         def on_step(done: StepDone) -> None:
-            if done.pose is not None and isinstance(done.step, (Ask, Seek)):
+            if done.pose is not None and isinstance(done.step, (Ask, Seek, Look)):
                 poses.append(done.pose)
             if isinstance(done.step, Offer):
                 answer = tr("accepted") if done.accepted else tr("declined")

@@ -7,7 +7,7 @@ from robolink.model import Pose, ToolOffset, WorkBox, plain_offset
 from robolink.nozzle_change._gate import Gate
 from robolink.nozzle_change._pin_record import touch_details
 from robolink.nozzle_change._proposal import Proposal
-from robolink.nozzle_change._source import MovingSource, TipSource
+from robolink.nozzle_change._source import Equipped, MovingSource, TipSource
 from robolink.nozzle_change._touching import PinAndPerson
 from robolink.runner import RunSettings
 
@@ -106,3 +106,14 @@ class ChangePlan:
     def moves(self) -> bool:
         """Whether the robot moves."""
         return any(plan.moving for plan in self.tools)
+
+
+def require_ready(plan: ChangePlan) -> None:
+    """Find out whether the cameras of a plan are there, before anything moves.
+
+    Raises:
+        CalibrationError, ConfigError, ConnectError: As :meth:`Equipped.require_ready`.
+    """
+    for one in plan.tools:
+        if isinstance(one.source, Equipped):
+            one.source.require_ready()

@@ -4,10 +4,20 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from robolink.calibration import Ask, Move, Offer, Procedure, Seek, Tell, travel
+from robolink.calibration import Ask, Look, Move, Offer, Procedure, Seek, SeenAt, Tell, travel
 from robolink.errors import CalibrationError, LimitError
 from robolink.messages import tr
-from robolink.model import Controller, InputEdge, MotionGroup, MotionProfile, Path, Pose, ToolOffset
+from robolink.model import (
+    Controller,
+    InputEdge,
+    MotionGroup,
+    MotionProfile,
+    Path,
+    Pose,
+    Spot,
+    SpotUnit,
+    ToolOffset,
+)
 from robolink.nozzle_change._flange import flange_pose
 from robolink.nozzle_change._plan import ChangePlan
 from robolink.nozzle_change._source import MovingSource
@@ -20,10 +30,11 @@ class PlannedStep:
 
     Attributes:
         text: What is done.
-        target: Where the flange goes, ``None`` for a step of the person.
+        target: Where the flange goes, ``None`` for a step that moves nothing.
         profile: How it goes there.
         edge: The input that ends the step on the way, ``None`` for none.
         refusal: Why the limits forbid it, empty when they do not.
+        by_person: Whether a person has to do it.
     """
 
     text: str
@@ -31,6 +42,7 @@ class PlannedStep:
     profile: MotionProfile | None = None
     edge: InputEdge | None = None
     refusal: str = ""
+    by_person: bool = False
 
     def requests(self, group: MotionGroup) -> tuple[str, ...]:
         """Return what the step would send besides its reads, as it stands on the wire."""
@@ -128,12 +140,16 @@ def _follow(
                 # What it would say depends on poses that nobody took.
                 step = procedure.send(None)
                 continue
+            answer = here
             if isinstance(step, Ask):
-                yield PlannedStep(step.instruction)
+                yield PlannedStep(step.instruction, by_person=True)
+            elif isinstance(step, Look):
+                yield PlannedStep(step.purpose)
+                answer = SeenAt.of(here, Spot(*step.expected_mm), SpotUnit.BASE_MM)
             else:
-                here = step.target
+                answer = here = step.target
                 yield _planned(step, settings)
-            step = procedure.send(here)
+            step = procedure.send(answer)
     except (StopIteration, CalibrationError):
         # The poses are foreseen, so what they would give means nothing.
         return here

@@ -1,9 +1,9 @@
 """What a nozzle change puts on record: raw poses, verdicts in words, decisions."""
 
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, fields
 
-from robolink.calibration import CalibrationResult, VerifyResult
+from robolink.calibration import CalibrationResult, SeenAt, VerifyResult
 from robolink.errors import CalibrationError, RobolinkError
 from robolink.messages import tr
 from robolink.model import EntryKind, NewEntry, Pose, describe_offset, plain_offset
@@ -51,7 +51,7 @@ def refusal_entry(
         tool=tool,
         tolerance=gate.tolerance,
         verdict=why,
-        details={"code": code, "poses": [_pose(pose) for pose in poses]},
+        details={"code": code, "poses": [_pose(pose) for pose in poses], **_seen(poses)},
     )
 
 
@@ -86,6 +86,7 @@ def _result(result: CalibrationResult) -> dict[str, object]:
         "kept": list(result.kept),
         "reference_point_mm": list(result.reference_point_mm),
         "poses": [_pose(pose) for pose in result.inputs],
+        **_seen(result.inputs),
         "residuals_mm": [list(residual) for residual in result.residuals_mm],
         "rejected": list(result.rejected),
         "rms_mm": result.rms_mm,
@@ -98,8 +99,19 @@ def _result(result: CalibrationResult) -> dict[str, object]:
         "sigma_gain": result.sigma_gain,
         "condition_number": result.condition_number,
         "warnings": list(result.warnings),
+        **result.details(),
     }
 
 
 def _pose(pose: Pose) -> dict[str, object]:
-    return {name: value for name, value in asdict(pose).items() if value is not None}
+    values = {field.name: getattr(pose, field.name) for field in fields(Pose)}
+    return {name: value for name, value in values.items() if value is not None}
+
+
+def _seen(poses: Sequence[Pose]) -> dict[str, object]:
+    """Return what a camera saw from each pose, in its own unit; nothing without one."""
+    looks = [pose for pose in poses if isinstance(pose, SeenAt)]
+    if not looks:
+        return {}
+    spots = [[pose.spot.x, pose.spot.y] if isinstance(pose, SeenAt) else None for pose in poses]
+    return {"spots": spots, "spots_in": looks[0].unit.value}

@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from typing import Protocol, TypeVar, runtime_checkable
 
 from robolink.calibration import CalibrationResult, Procedure, VerifyResult
-from robolink.model import Controller, Pose, ToolOffset
+from robolink.model import Controller, Pose, TipSensor, ToolOffset
 from robolink.runner import Operator, Runner, RunSettings, StepDone
 
 T = TypeVar("T")
@@ -49,16 +49,23 @@ class Bench:
         finally:
             self._on_step = None
 
-    def run(self, procedure: Procedure[T], *, tip: ToolOffset | None = None) -> T:
+    def run(
+        self,
+        procedure: Procedure[T],
+        *,
+        tip: ToolOffset | None = None,
+        camera: TipSensor | None = None,
+    ) -> T:
         """Take the steps of a procedure; see :meth:`robolink.runner.Runner.run`.
 
         Args:
             procedure: What is to be done.
             tip: Offset of the tip in whose frame it moves, ``None`` for the flange.
+            camera: What looks are taken with.
         """
-        return self.runner(tip).run(procedure)
+        return self.runner(tip, camera).run(procedure)
 
-    def runner(self, tip: ToolOffset | None = None) -> Runner:
+    def runner(self, tip: ToolOffset | None = None, camera: TipSensor | None = None) -> Runner:
         """Return a runner for the flange, or for a tip at an offset from it."""
         group = self.controller.groups[0]
         # Where nothing moves there is nothing to limit, and perhaps no pose to be read.
@@ -69,6 +76,7 @@ class Bench:
             self.operator,
             self._settings(start, tip),
             on_step=self._on_step,
+            camera=camera,
             offers=self._offers,
         )
 
@@ -122,4 +130,18 @@ class MovingSource(TipSource, Protocol):
             result: What was measured, with the offset that was written.
             tip: Where the tip was found, which differs from it where a difference was written.
             tolerance_mm: Largest drift that passes.
+        """
+
+
+@runtime_checkable
+class Equipped(Protocol):
+    """A source that needs equipment besides the robot."""
+
+    def require_ready(self) -> None:
+        """Find out whether the equipment is there and can be used, before anything moves.
+
+        Raises:
+            CalibrationError: ``sensor_not_found``, ``camera_not_calibrated``.
+            ConfigError: It cannot be used in this way.
+            ConnectError: It does not answer.
         """

@@ -5,6 +5,7 @@ from dataclasses import asdict
 from typing import Final
 
 from robolink.calibration import Ask, CrossingPlan, Move, ProbePlan, Procedure, raised
+from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import Path, Pose, ToolOffset
 from robolink.nozzle_change._pin_record import offset_sigma_mm
@@ -32,8 +33,18 @@ def learn_station(
 
     Raises:
         CalibrationError: ``no_edge``, ``edge_passed``, and those of the solvers.
-        ConfigError: Nobody knows what the station switches, or about where it is.
+        ConfigError: Nobody knows what the station switches, or about where it is; or it is a
+            camera.
     """
+    if station.kind is StationKind.CAMERA:
+        raise ConfigError(
+            tr("A camera is found together with a tip."),
+            remedy=tr(
+                "robolink calibrate camera-affine --tool {tool} --station {id}",
+                tool=tool,
+                id=station.id,
+            ),
+        )
     courses: dict[StationKind, Callable[[], Procedure[Found]]] = {
         StationKind.PIN: lambda: _pin(station, tool, tip, sigma_mm),
         StationKind.BEAMS: lambda: _beams(station, here, tool, tip),

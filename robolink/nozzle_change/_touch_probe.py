@@ -14,8 +14,6 @@ from robolink.model import Pose, ToolOffset
 from robolink.nozzle_change._flange import seen_from
 from robolink.nozzle_change._source import Bench
 
-_HALF_A_TURN_DEG = 180.0
-
 
 @dataclass(frozen=True, slots=True)
 class TouchProbe:
@@ -25,11 +23,14 @@ class TouchProbe:
         station: Where the surface is.
         plan: How it is touched.
         sigma_mm: Standard deviation of one touch, where it is known.
+        proof_turn_deg: By how much U differs at the touch that proves the new value; 0 on a
+            machine that cannot turn.
     """
 
     station: TouchStation
     plan: ProbePlan = field(default_factory=ProbePlan)
     sigma_mm: float | None = None
+    proof_turn_deg: float = 180.0
 
     @property
     def sentence(self) -> str:
@@ -73,7 +74,7 @@ class TouchProbe:
             self.station,
             self.plan,
             here=here,
-            angles_deg=(toward_zero(here.u_deg, _HALF_A_TURN_DEG),),
+            angles_deg=(toward_zero(here.u_deg, self.proof_turn_deg),),
             tolerance_mm=tolerance_mm,
             aside=seen_from(result.offset, tip),
         )

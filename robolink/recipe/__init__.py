@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from robolink.recipe._schema import json_schema as json_schema
     from robolink.recipe._sources import BeamLine as BeamLine
     from robolink.recipe._sources import BeamsSource as BeamsSource
+    from robolink.recipe._sources import CameraSource as CameraSource
     from robolink.recipe._sources import OneTouchSource as OneTouchSource
     from robolink.recipe._sources import OperatorSource as OperatorSource
     from robolink.recipe._sources import PointsSource as PointsSource
@@ -45,6 +46,7 @@ _LOADED_LATER = {
     "json_schema": "_schema",
     "BeamLine": "_sources",
     "BeamsSource": "_sources",
+    "CameraSource": "_sources",
     "OneTouchSource": "_sources",
     "OperatorSource": "_sources",
     "PointsSource": "_sources",

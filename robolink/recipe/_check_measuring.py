@@ -9,7 +9,13 @@ from robolink.config import Problem
 from robolink.messages import tr
 from robolink.model import angle_difference_deg
 from robolink.recipe._draft import Draft
-from robolink.recipe._sources import BeamsSource, OneTouchSource, OperatorSource, TouchSource
+from robolink.recipe._sources import (
+    BeamsSource,
+    CameraSource,
+    OneTouchSource,
+    OperatorSource,
+    TouchSource,
+)
 
 _SAME_ANGLE_DEG: Final = 1e-9
 
@@ -84,6 +90,8 @@ def height(draft: Draft) -> Iterator[Problem]:
         return
     if isinstance(draft.source, BeamsSource):
         yield Problem("z", tr('cannot be "measured" with beams; write "typed" or "kept"'))
+    elif isinstance(draft.source, CameraSource):
+        yield Problem("z", tr('cannot be "measured" by a camera; write "typed" or "kept"'))
     elif draft.source is not None and not draft.source.moves:
         yield Problem(
             "z",

@@ -11,6 +11,7 @@ from robolink.recipe._draft import Draft
 from robolink.recipe._sources import (
     AnySource,
     BeamsSource,
+    CameraSource,
     OneTouchSource,
     OperatorSource,
     TouchSource,
@@ -87,6 +88,11 @@ def _without_residual(source: AnySource) -> str:
         return tr(
             "cannot be judged: two touches always agree, so they leave no residual; give four "
             "speeds_mm_s, or interval_mm with sigma_mm"
+        )
+    if isinstance(source, CameraSource):
+        return tr(
+            "cannot be judged: looks at one or two angles always agree, so they leave no residual; "
+            "give three turns_deg or more, or interval_mm with sigma_mm"
         )
     if isinstance(source, OneTouchSource):
         return tr("cannot be judged: one touch leaves no residual; use interval_mm")

@@ -5,6 +5,7 @@ from typing import Final
 
 from robolink.config import Problem
 from robolink.recipe._check_beams import beams, beams_height
+from robolink.recipe._check_camera import camera_looks, camera_pixels, camera_place
 from robolink.recipe._check_measuring import (
     angles,
     clearance,
@@ -24,6 +25,9 @@ _CHECKS: Final[tuple[Callable[[Draft], Iterator[Problem]], ...]] = (
     beams_height,
     surface,
     touches,
+    camera_place,
+    camera_pixels,
+    camera_looks,
     station,
     height,
     tool_numbers,

@@ -9,11 +9,18 @@ from robolink.recipe._recipe import Recipe
 from robolink.recipe._sources import (
     BeamLine,
     BeamsSource,
+    CameraSource,
     OneTouchSource,
     OperatorSource,
     TouchSource,
 )
-from robolink.stations import Station, StationKind, beam_station
+from robolink.stations import (
+    Station,
+    StationKind,
+    beam_station,
+    camera_station,
+    sensor_of,
+)
 
 
 def located(recipe: Recipe, stations: Mapping[str, Station]) -> Recipe:
@@ -29,6 +36,8 @@ def located(recipe: Recipe, stations: Mapping[str, Station]) -> Recipe:
     source, place = recipe.source, recipe.station
     if isinstance(source, BeamsSource):
         return recipe if source.beams else _with_beams(recipe, source, stations)
+    if isinstance(source, CameraSource):
+        return _with_camera(recipe, source, stations)
     if isinstance(source, TouchSource) and place.z_mm is None:
         return _with_place(recipe, _known(recipe, stations, StationKind.TOUCH))
     pin_needed = isinstance(source, OneTouchSource) or (
@@ -54,6 +63,20 @@ def _with_beams(recipe: Recipe, source: BeamsSource, stations: Mapping[str, Stat
     )
     beams = {"beams": lines, "z_mm": found.z_mm, "off_when_broken": found.off_when_broken}
     return recipe.model_copy(update={"source": source.model_copy(update=beams)})
+
+
+def _with_camera(recipe: Recipe, source: CameraSource, stations: Mapping[str, Station]) -> Recipe:
+    """Return the recipe with what it does not say itself: place, sensor, meaning of a pixel."""
+    missing = recipe.station.z_mm is None
+    if not missing and recipe.station.id not in stations:
+        return recipe
+    station = _known(recipe, stations, StationKind.CAMERA)
+    located = _with_place(recipe, station) if missing else recipe
+    added: dict[str, object] = {"sensor": source.sensor or sensor_of(station) or None}
+    model = camera_station(station).model
+    if source.model is None and model is not None:
+        added |= {"mm_per_px": model.mm_per_px, "origin_mm": model.origin_mm}
+    return located.model_copy(update={"source": source.model_copy(update=added)})
 
 
 def _known(recipe: Recipe, stations: Mapping[str, Station], kind: StationKind) -> Station:

@@ -2,8 +2,10 @@
 
 from robolink.calibration import (
     BeamStation,
+    CameraStation,
     Course,
     CrossingPlan,
+    LookPlan,
     NeedleLimits,
     ProbePlan,
     TouchPlan,
@@ -27,12 +29,14 @@ from robolink.nozzle_change import (
     ToolPlan,
     TouchProbe,
     TwoTouches,
+    UpCamera,
     difference_from_last,
     taught_poses,
 )
 from robolink.recipe._recipe import Recipe
 from robolink.recipe._sources import (
     BeamsSource,
+    CameraSource,
     OneTouchSource,
     OperatorSource,
     PointsSource,
@@ -47,6 +51,7 @@ def plan_of(
     *,
     ask_before_write: bool = True,
     accepted_change_mm: float | None = None,
+    sensor: str | None = None,
 ) -> ChangePlan:
     """Return what a recipe asks for, on one controller.
 
@@ -55,9 +60,10 @@ def plan_of(
         controller: The controller; nothing is sent yet.
         ask_before_write: Whether a person accepts the proposals.
         accepted_change_mm: A larger jump than the recipe's that an engineer accepts this time.
+        sensor: The camera, in place of the recipe's.
 
     Raises:
-        ConfigError: This kind of controller has no taught points.
+        ConfigError: This kind of controller has no taught points, or no camera is named.
     """
     tolerances = recipe.tolerances
     gate = Gate(
@@ -73,7 +79,7 @@ def plan_of(
         tuple(
             ToolPlan(
                 tool.number,
-                _source(recipe, controller, tool),
+                _source(recipe, controller, tool, sensor),
                 gate,
                 verify=recipe.verifies,
                 attempts=recipe.attempts,
@@ -95,7 +101,7 @@ def plan_of(
     )
 
 
-def _source(recipe: Recipe, controller: Controller, tool: Tool) -> TipSource:
+def _source(recipe: Recipe, controller: Controller, tool: Tool, sensor: str | None) -> TipSource:
     source, tolerances = recipe.source, recipe.tolerances
     if isinstance(source, OperatorSource):
         touch = TouchPlan(
@@ -113,6 +119,8 @@ def _source(recipe: Recipe, controller: Controller, tool: Tool) -> TipSource:
         return _from_beams(source, tolerances.sigma_mm)
     if isinstance(source, TouchSource):
         return _from_touch(source, recipe.station, tolerances.sigma_mm)
+    if isinstance(source, CameraSource):
+        return _from_camera(source, recipe.station, sensor, tolerances.sigma_mm)
     return _from_points(source, controller, tool, recipe)
 
 
@@ -192,7 +200,25 @@ def _from_touch(source: TouchSource, place: Station, sigma_mm: float | None) -> 
         lift_mm=source.lift_mm,
         speeds_mm_s=source.speeds_mm_s,
     )
-    return TouchProbe(station, plan, sigma_mm=sigma_mm)
+    return TouchProbe(station, plan, sigma_mm=sigma_mm, proof_turn_deg=source.proof_turn_deg)
+
+
+def _from_camera(
+    source: CameraSource, place: Station, sensor: str | None, sigma_mm: float | None
+) -> TipSource:
+    sensor = sensor or source.sensor
+    if sensor is None:
+        raise ConfigError(
+            tr("The recipe does not say which camera sees the tip."),
+            remedy=tr("Give --sensor, or write source.sensor."),
+        )
+    plan = LookPlan(
+        turns_deg=source.turns_deg,
+        pictures=source.pictures,
+        lift_mm=source.lift_mm,
+        beside_mm=source.beside_mm,
+    )
+    return UpCamera(sensor, CameraStation(*_place(place), source.model), plan, sigma_mm=sigma_mm)
 
 
 def _from_points(

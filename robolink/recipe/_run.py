@@ -14,6 +14,7 @@ from robolink.nozzle_change import (
     NozzleChange,
     preview,
     require_inside,
+    require_ready,
 )
 from robolink.recipe._answers import Answers
 from robolink.recipe._listening import RecipeListener
@@ -46,6 +47,7 @@ class RecipeRun:
         take_reference: Whether to take a new reference in any case.
         accepted_change_mm: A larger jump than the recipe's that an engineer accepts this time.
         ask_before_write: Whether a person accepts the proposals.
+        sensor: The camera, in place of the recipe's.
         cell: The cell, whose file may say where stations are.
 
     Raises:
@@ -64,6 +66,7 @@ class RecipeRun:
         take_reference: bool = False,
         accepted_change_mm: float | None = None,
         ask_before_write: bool = True,
+        sensor: str | None = None,
         cell: Cell | None = None,
     ) -> None:
         self._controller = controller
@@ -77,6 +80,7 @@ class RecipeRun:
             controller,
             ask_before_write=ask_before_write,
             accepted_change_mm=accepted_change_mm,
+            sensor=sensor,
         )
         if take_reference and isinstance(loaded.recipe.source, OneTouchSource):
             raise ConfigError(
@@ -90,7 +94,8 @@ class RecipeRun:
         """Find out, reading only, whatever would end the run later.
 
         Raises:
-            CalibrationError: ``reference_outdated`` or ``no_last_touch``.
+            CalibrationError: ``reference_outdated``, ``no_last_touch`` or ``sensor_not_found``.
+            ConnectError: A camera is not there.
             LimitError: A foreseen target lies outside the box.
             NotAllowedError: A jump is accepted by somebody who is no engineer.
             OutcomeUnknownError: Something earlier is unsettled.
@@ -114,6 +119,7 @@ class RecipeRun:
                     self._references[tool] = reference
             # One without a reference makes all of them wait: all are written, or none.
             self.takes_reference = len(self._references) < len(stored)
+        require_ready(self.plan)
         require_inside(controller, preview(controller, self.plan))
 
     def run(self) -> ChangeReport:

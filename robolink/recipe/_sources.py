@@ -5,10 +5,10 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field
 
 from robolink.calibration import MIN_ROTATION_DEG, telling_order
-from robolink.recipe._tables import Length, Table
+from robolink.recipe._camera_source import CameraSource as CameraSource
+from robolink.recipe._tables import Angle, Length, Table
 
 Method = Literal["two_pose", "n_angle"]
-Angle = Annotated[float, Field(ge=-360, le=360)]
 InputNumber = Annotated[int, Field(ge=0, le=0xFFFF)]
 TouchSpeed = Annotated[float, Field(ge=0.1, le=10)]
 
@@ -166,6 +166,9 @@ class TouchSource(Table):
     """How far the tip is lifted after each touch, mm."""
     lift_mm: Annotated[float, Field(ge=1, le=100)] = 10.0
     """How far above the surface the tip comes, goes and turns, mm."""
+    proof_turn_deg: Annotated[float, Field(ge=0, le=360 - MIN_ROTATION_DEG)] = 180.0
+    """By how much U differs at the touch that proves the new value, degrees; 0 on a machine that
+    cannot turn, such as a gantry."""
 
     @property
     def agrees_always(self) -> bool:
@@ -194,6 +197,8 @@ class OneTouchSource(Table):
         return True
 
 
-AnySource = OperatorSource | PointsSource | BeamsSource | TouchSource | OneTouchSource
+AnySource = (
+    OperatorSource | PointsSource | BeamsSource | TouchSource | OneTouchSource | CameraSource
+)
 Source = Annotated[AnySource, Field(discriminator="kind")]
 """More kinds join this union."""

@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TypeVar
 
-from robolink.calibration import Ask, Move, Offer, Procedure, Seek, Step, Tell
+from robolink.calibration import Ask, Look, Move, Offer, Procedure, Seek, SeenAt, Step, Tell
 from robolink.errors import (
     CalibrationError,
     ConfigError,
@@ -23,10 +23,12 @@ from robolink.model import (
     MotionProfile,
     Path,
     Pose,
+    TipSensor,
 )
 from robolink.runner._jog_steps import jog_target
 from robolink.runner._operator import Operator, Question
 from robolink.runner._settings import RunSettings
+from robolink.sensing import seen_once
 
 POLL_S = 1.0
 """Longest time between two status reads while a person is asked (design: at most 5 s)."""
@@ -58,6 +60,7 @@ class Runner:
         operator: Who is asked.
         settings: Limits and speeds.
         on_step: Told of every step taken.
+        camera: What looks are taken with, ``None`` where there are none.
         offers: Whether the person is asked about offers; else each is declined unasked.
     """
 
@@ -69,6 +72,7 @@ class Runner:
         settings: RunSettings,
         *,
         on_step: Callable[[StepDone], None] | None = None,
+        camera: TipSensor | None = None,
         offers: bool = True,
     ) -> None:
         self._controller = controller
@@ -76,6 +80,7 @@ class Runner:
         self._operator = operator
         self._settings = settings
         self._on_step = on_step
+        self._camera = camera
         self._offers = offers
 
     def run(self, procedure: Procedure[T]) -> T:
@@ -139,13 +144,27 @@ class Runner:
             return StepDone(step, accepted=self._offers and self.confirm(step.question))
         return StepDone(step, self._moved(step))
 
-    def _moved(self, step: Ask | Move | Seek) -> Pose:
+    def _moved(self, step: Ask | Move | Seek | Look) -> Pose:
         if isinstance(step, Ask):
             return self._ask(step)
         self._operator.tell(step.purpose)
+        if isinstance(step, Look):
+            return self._look(step)
         if isinstance(step, Seek):
             return self._seek(step)
         return self.move(step.target, step.path)
+
+    def _look(self, step: Look) -> SeenAt:
+        camera = self._camera
+        if camera is None:
+            raise ConfigError(
+                tr("A camera is needed, and none was named."),
+                remedy=tr("Name it with --sensor, in the recipe, or in the cell file."),
+            )
+        self._controller.clock.sleep(camera.settle_s)
+        pose = self._group.pose()
+        spot = seen_once(camera, step.mark, pictures=step.pictures)
+        return SeenAt.of(pose, spot, camera.unit)
 
     def _seek(self, step: Seek) -> Pose:
         settings = self._settings

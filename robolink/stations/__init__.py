@@ -1,4 +1,4 @@
-"""Reference stations: pins, light beams and touch surfaces that stand in a cell, by name.
+"""Reference stations: pins, light beams, surfaces, cameras in a cell, by name.
 
 What a person knows about a station stands in the cell file; where a measurement found it is kept
 in the journal, and counts from then on. docs/stations.md explains both.
@@ -7,7 +7,9 @@ in the journal, and counts from then on. docs/stations.md explains both.
 from robolink.stations._finding import find_station as find_station
 from robolink.stations._finding import find_stations as find_stations
 from robolink.stations._places import beam_station as beam_station
+from robolink.stations._places import camera_station as camera_station
 from robolink.stations._places import pin_of as pin_of
+from robolink.stations._places import sensor_of as sensor_of
 from robolink.stations._places import touch_station as touch_station
 from robolink.stations._records import Found as Found
 from robolink.stations._records import station_entry as station_entry

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, cast
 
-from robolink.calibration import BeamStation, TouchStation
+from robolink.calibration import BeamStation, CameraModel, CameraStation, TouchStation
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.stations._station import Station
@@ -60,6 +60,28 @@ def beam_station(station: Station) -> BeamStation:
         (int(first["input"]), int(second["input"])),
         off_when_broken=bool(station.details.get("off_when_broken", False)),
     )
+
+
+def camera_station(station: Station) -> CameraStation:
+    """Return where a camera looks, and what its pixels mean if that is known.
+
+    Raises:
+        ConfigError: Nobody knows where it looks.
+    """
+    rows, origin = station.details.get("mm_per_px"), station.details.get("origin_mm")
+    model = None
+    if isinstance(rows, Sequence) and isinstance(origin, Sequence):
+        ((a, b), (c, d)), (x_mm, y_mm) = rows, origin
+        model = CameraModel(((a, b), (c, d)), (x_mm, y_mm))
+    return CameraStation(*_place(station), model)
+
+
+def sensor_of(station: Station) -> str:
+    """Return the name or URL of the camera at a station, empty when nobody knows it.
+
+    What the cell file says goes before what the camera was calibrated through.
+    """
+    return str(station.details.get("sensor") or station.details.get("seen_by") or "")
 
 
 def _place(station: Station) -> tuple[float, float, float]:

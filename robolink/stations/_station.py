@@ -14,6 +14,7 @@ class StationKind(StrEnum):
     PIN = "pin"
     BEAMS = "beams"
     TOUCH = "touch"
+    CAMERA = "camera"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -20,8 +20,8 @@ from robolink_simulators.clock import ScaledClock
 from robolink_simulators.epson.refusals import Refusal
 from robolink_simulators.hosting import in_process, plc_in_process
 from robolink_simulators.hosting._tcp_host import TcpHost
+from robolink_simulators.person import Look
 from robolink_simulators.softmotion.smc_errors import Refused
-from robolink_simulators.workplace import Look
 
 _MAX_LINE: Final = 65536
 _SCHEME: Final = "assist+tcp"
@@ -161,6 +161,10 @@ class AssistClient:
         flange: dict[str, float] = self.do("jog_onto_pin")["flange"]
         return flange
 
+    def see(self, mark: int) -> list[tuple[float, float]]:
+        """Take a picture and return the pixels at which something looks like a mark."""
+        return [(x, y) for x, y in self.do("see", mark=mark)["seen"]]
+
     def truth(self) -> dict[str, Any]:
         """Return where the tips and the pin really are."""
         return self.do("truth")
@@ -200,6 +204,22 @@ class InProcessEyes:
             return self._simulator.world.operator.look(tool)
 
 
+def simulator_at(url: str) -> Assisted:
+    """Return the simulator of this process that a sim URL names.
+
+    Raises:
+        ConfigError: It is no sim URL, or no simulator has that name.
+    """
+    parts = urlsplit(url)
+    named = _IN_PROCESS.get(parts.scheme)
+    if named is None:
+        raise ConfigError(
+            tr("{url!r} is not a sim URL.", url=url),
+            remedy=tr("Known are: {known}.", known=", ".join(f"{it}://NAME" for it in _IN_PROCESS)),
+        )
+    return named(parts.hostname or "")
+
+
 @contextmanager
 def open_eyes(url: str) -> Iterator[AssistClient | InProcessEyes]:
     """Open the operator's eyes on a simulator.
@@ -212,9 +232,8 @@ def open_eyes(url: str) -> Iterator[AssistClient | InProcessEyes]:
         ConfigError: It is neither, or no simulator has that name.
         ConnectError: Nobody listens there.
     """
-    parts = urlsplit(url)
-    if named := _IN_PROCESS.get(parts.scheme):
-        yield InProcessEyes(named(parts.hostname or ""))
+    if urlsplit(url).scheme in _IN_PROCESS:
+        yield InProcessEyes(simulator_at(url))
     else:
         with AssistClient(url) as client:
             yield client

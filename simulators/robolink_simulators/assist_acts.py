@@ -8,6 +8,7 @@ from robolink.messages import tr
 from robolink_simulators.assist_epson_acts import EPSON_ACTS
 from robolink_simulators.assist_parameters import Answer, Parameters
 from robolink_simulators.assist_plc_acts import PLC_ACTS
+from robolink_simulators.assist_world_acts import WORLD_ACTS
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 
@@ -33,6 +34,7 @@ def perform(simulator: Assisted, request: Parameters) -> Answer:
 
 
 def _acts_at(simulator: Assisted) -> Mapping[str, Callable[[Parameters], Answer]]:
+    world = {name: partial(act, simulator.world) for name, act in WORLD_ACTS.items()}
     if isinstance(simulator, EpsonSimulator):
-        return {name: partial(act, simulator) for name, act in EPSON_ACTS.items()}
-    return {name: partial(act, simulator) for name, act in PLC_ACTS.items()}
+        return {name: partial(act, simulator) for name, act in EPSON_ACTS.items()} | world
+    return {name: partial(act, simulator) for name, act in PLC_ACTS.items()} | world

@@ -1,5 +1,6 @@
 """What acts at an assist port take and give."""
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -33,6 +34,21 @@ def whole_number(request: Parameters, name: str) -> int:
             remedy=tr("Give it as {example}.", example=f'"{name}": 1'),
         )
     return value
+
+
+def number_in(request: Parameters, name: str) -> float:
+    """Return a parameter that is a finite number.
+
+    Raises:
+        ConfigError: It is missing, or something else.
+    """
+    value = request.get(name)
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        raise ConfigError(
+            tr("{act} needs {name}, a number.", act=request.get("do"), name=name),
+            remedy=tr("Give it as {example}.", example=f'"{name}": 1.5'),
+        )
+    return float(value)
 
 
 def tool_number(request: Parameters) -> int | None:

@@ -1,15 +1,39 @@
 """What a nozzle can trip: a light beam, a touch plate. Fed with the true place of its tip."""
 
 import math
+import random
 from dataclasses import dataclass
 from typing import Final, Protocol
 
-from robolink_simulators.workplace import XyzMm
+from robolink_simulators.places import XyzMm
 
 Lean = tuple[float, float]
 """By how much a bent nozzle's shaft lies beside its tip, X and Y in mm per mm above the tip."""
 
 UPRIGHT: Final[Lean] = (0.0, 0.0)
+
+
+class Shake:
+    """By how much a sensor switches beside its place: drawn anew for each motion.
+
+    Args:
+        sigma_mm: Standard deviation, per axis.
+        rng: Source of the scatter.
+    """
+
+    def __init__(self, sigma_mm: float, rng: random.Random) -> None:
+        self._sigma_mm = sigma_mm
+        self._rng = rng
+        self._motion = -1
+        self._by_mm: XyzMm = (0.0, 0.0, 0.0)
+
+    def of(self, motion: int) -> XyzMm:
+        """Return it for the motion of that number; the same as long as the number is."""
+        if self._motion != motion:
+            self._motion = motion
+            x, y, z = (self._rng.gauss(0.0, self._sigma_mm) for _ in range(3))
+            self._by_mm = (x, y, z)
+        return self._by_mm
 
 
 class TipSwitch(Protocol):

@@ -1,17 +1,20 @@
-"""The place where a simulated robot works, whatever its controller: tips, a pin, a person.
+"""The place where a simulated robot works: tips, a pin, a camera, a board.
 
 Ground truth. The controller knows none of it; only what it stores.
 """
 
+import math
 import random
-from collections.abc import Callable, Hashable
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Hashable
+from dataclasses import asdict, replace
 from typing import Any, Final, Protocol
 
-from robolink.model import Pose, ToolOffset
-
-XyzMm = tuple[float, float, float]
-"""X, Y, Z in mm, in the robot's base frame."""
+from robolink.model import TIP, Pose, ToolOffset
+from robolink_simulators.camera import Pixel, UpCamera
+from robolink_simulators.held_board import HeldBoard
+from robolink_simulators.places import XyzMm as XyzMm
+from robolink_simulators.sensing import UPRIGHT, Lean
+from robolink_simulators.world_parameters import WorldParameters
 
 MOUNTED_TOOL: Final = 1
 """The tool number of the nozzle on the arm."""
@@ -35,6 +38,9 @@ class Handled(Protocol):
         What it cannot reach it refuses with the error of its own controller.
         """
 
+    def loosen(self, parameters: WorldParameters) -> None:
+        """Give the axes the play that the parameters say."""
+
 
 class Workplace:
     """What is true around a robot.
@@ -43,9 +49,14 @@ class Workplace:
         robot: Who works here.
         tips: The physical tip of each tool number, seen from the flange.
         pin_mm: Tip of the reference pin.
-        operator_sigma_mm: Standard deviation of what an eye reads, per axis.
-        seed: Decides the next nozzles.
+        seed: Decides the next nozzles, where the camera is, and how a board is held.
         replaced: What the next nozzle differs from where no tip is known yet.
+        parameters: What goes wrong here; see :meth:`set_up`.
+
+    Attributes:
+        leans: By how much the nozzle of a tool is bent; upright where none is named.
+        camera: The up-looking camera.
+        board: The board that the mounted nozzle holds, ``None`` for none.
     """
 
     def __init__(
@@ -54,16 +65,50 @@ class Workplace:
         tips: dict[int, ToolOffset],
         pin_mm: XyzMm,
         *,
-        operator_sigma_mm: float = 0.01,
         seed: int,
         replaced: ToolOffset,
+        parameters: WorldParameters,
     ) -> None:
         self.robot = robot
         self.tips = tips
         self.pin_mm = pin_mm
-        self.operator_sigma_mm = operator_sigma_mm
+        self.leans: dict[int, Lean] = {}
+        self.board: HeldBoard | None = None
+        self._seed = seed
         self._random = random.Random(f"nozzles {seed}")
         self._replaced = replaced
+        rng = random.Random(f"camera {seed}")
+        self.camera = UpCamera(camera_beside(self.tip_mm(), rng), parameters.optics, rng)
+        self.set_up(parameters)
+
+    def set_up(self, parameters: WorldParameters) -> None:
+        """Give the cell other imperfections; nozzles, pin and camera stay where they are."""
+        self.parameters = parameters
+        self.operator_sigma_mm = parameters.eye_sigma_mm
+        self.leans[MOUNTED_TOOL] = parameters.lean
+        self.camera.optics = parameters.optics
+        self.robot.loosen(parameters)
+        if not parameters.board_held:
+            self.board = None
+        elif self.board is None:
+            self.board = HeldBoard.grasped(random.Random(f"board {self._seed}"))
+
+    def lean_of(self, tool: int) -> Lean:
+        """Return by how much a nozzle is bent, in the flange's axes."""
+        return self.leans.get(tool, UPRIGHT)
+
+    def see(self, mark: int = TIP) -> tuple[Pixel, ...]:
+        """Take a picture and return everything in it that looks like the tip, or a fiducial.
+
+        Fiducials look alike: every one in the image is found, whichever is asked for.
+        """
+        nozzle, board = self.tips.get(MOUNTED_TOOL, ToolOffset()), self.board
+        if mark == TIP:
+            # A held board hides the tip of its nozzle.
+            seen = [tip for tool, tip in self.tips.items() if not (board and tool == MOUNTED_TOOL)]
+        else:
+            seen = list(board.fiducials(nozzle)) if board else []
+        return self.camera.picture(self.robot.tip_mm(place) for place in seen)
 
     def tip_mm(self, tool: int = MOUNTED_TOOL) -> XyzMm:
         """Return where a physical tip is now."""
@@ -80,78 +125,20 @@ class Workplace:
             "tips": {str(tool): asdict(tip) for tool, tip in self.tips.items()},
             "pin_mm": list(self.pin_mm),
             "operator_sigma_mm": self.operator_sigma_mm,
+            "camera": {
+                "middle_mm": list(self.camera.middle_mm),
+                "mm_per_px": [list(row) for row in self.camera.optics.mm_per_px],
+                "size_px": list(self.camera.optics.size_px),
+            },
+            "board": self._held(),
+            "parameters": asdict(self.parameters),
         }
 
-
-@dataclass(frozen=True, slots=True)
-class Look:
-    """What an eye sees: the vector from the physical tip to the pin, in base axes."""
-
-    dx_mm: float
-    dy_mm: float
-    dz_mm: float
-
-
-class Operator:
-    """A person at the cell: looks at the tip, and jogs it onto the pin.
-
-    The eye errs by the same amount however often it looks at one placement of the arm; each
-    new placement draws a new error.
-
-    Args:
-        workplace: What there is to see.
-        require_jogging: Raises ConfigError where the person cannot jog.
-        seed: Seed of the eye's errors.
-    """
-
-    def __init__(
-        self, workplace: Workplace, *, require_jogging: Callable[[], None], seed: int
-    ) -> None:
-        self._workplace = workplace
-        self._require_jogging = require_jogging
-        self._random = random.Random(f"operator {seed}")
-        self._placement: tuple[Hashable, int] | None = None
-        self._error = Look(0.0, 0.0, 0.0)
-
-    def look(self, tool: int | None = None) -> Look:
-        """Return the vector from the tip to the pin, with the eye's error.
-
-        Args:
-            tool: Whose tip; the nozzle on the arm by default, whatever tool is selected.
-        """
-        tool = MOUNTED_TOOL if tool is None else tool
-        placement = (self._workplace.robot.placement(), tool)
-        if placement != self._placement:
-            self._placement = placement
-            self._error = self._drawn_error()
-        dx, dy, dz = self._gap(tool)
-        return Look(dx, dy, dz)
-
-    def jog_onto_pin(self, tool: int | None = None) -> Pose:
-        """Jog until the eye sees no gap; the orientation stays. Return the flange pose.
-
-        Raises:
-            ConfigError: The person cannot jog now.
-        """
-        self._require_jogging()
-        tool = MOUNTED_TOOL if tool is None else tool
-        robot = self._workplace.robot
-        self._error = self._drawn_error()
-        robot.carry(self._workplace.tips.get(tool), self._gap(tool))
-        self._placement = (robot.placement(), tool)
-        return robot.flange()
-
-    def _gap(self, tool: int) -> XyzMm:
-        pin, tip, error = self._workplace.pin_mm, self._workplace.tip_mm(tool), self._error
-        return (
-            pin[0] - tip[0] + error.dx_mm,
-            pin[1] - tip[1] + error.dy_mm,
-            pin[2] - tip[2] + error.dz_mm,
-        )
-
-    def _drawn_error(self) -> Look:
-        sigma_mm = self._workplace.operator_sigma_mm
-        return Look(*(self._random.gauss(0.0, sigma_mm) for _ in range(3)))
+    def _held(self) -> dict[str, Any] | None:
+        if self.board is None:
+            return None
+        frame = self.board.frame(self.tips.get(MOUNTED_TOOL, ToolOffset()))
+        return {"frame": asdict(frame), "drawing_mm": [list(at) for at in self.board.drawing_mm]}
 
 
 def exchanged(old: ToolOffset, rng: random.Random) -> ToolOffset:
@@ -166,6 +153,17 @@ def pin_beside(tip_mm: XyzMm, rng: random.Random) -> XyzMm:
         round(tip_mm[0] + _signed(rng, 5.0, 9.0), 3),
         round(tip_mm[1] + _signed(rng, 5.0, 9.0), 3),
         round(tip_mm[2] - rng.uniform(3.0, 6.0), 3),
+    )
+
+
+def camera_beside(tip_mm: XyzMm, rng: random.Random) -> XyzMm:
+    """Return where a camera looks: nearer to the robot's base than a tip, and below it."""
+    reach_mm = math.hypot(tip_mm[0], tip_mm[1])
+    inward, beside = rng.uniform(12.0, 18.0) / reach_mm, _signed(rng, 4.0, 8.0) / reach_mm
+    return (
+        round(tip_mm[0] * (1 - inward) - tip_mm[1] * beside, 3),
+        round(tip_mm[1] * (1 - inward) + tip_mm[0] * beside, 3),
+        round(tip_mm[2] - rng.uniform(6.0, 9.0), 3),
     )
 
 

@@ -12,10 +12,12 @@ from robolink_simulators.epson.kinematics import Joints, inverse, tip_of
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.points import Point
 from robolink_simulators.epson.tip_input import Nozzle, TipInput
-from robolink_simulators.sensing import UPRIGHT, Lean, TipSwitch
+from robolink_simulators.person import Look as Look
+from robolink_simulators.person import Operator
+from robolink_simulators.sensing import TipSwitch
 from robolink_simulators.workplace import MOUNTED_TOOL as MOUNTED_TOOL
-from robolink_simulators.workplace import Look as Look
-from robolink_simulators.workplace import Operator, Workplace, XyzMm, exchanged, pin_beside
+from robolink_simulators.workplace import Workplace, XyzMm, exchanged, pin_beside
+from robolink_simulators.world_parameters import WorldParameters
 
 STORED: Final = ToolOffset(12.0, -3.5, -20.0)
 """What the controller holds for tool 1 at first: the nozzle that was there before."""
@@ -28,14 +30,13 @@ class World(Workplace):
         machine: The robot in this world.
         tips: The physical tip of each tool number, seen from the flange.
         pin_mm: X, Y, Z of the tip of the reference pin, in base coordinates.
-        operator_sigma_mm: Standard deviation of what an eye reads, per axis.
         seed: Decides the next nozzles and the errors of the eye.
         pendant_live: Whether the pendant may move the arm (Teach mode).
         now_ns: The simulated time.
+        parameters: What goes wrong here.
 
     Attributes:
         operator: The person at the cell.
-        leans: By how much the nozzle of a tool is bent; upright where none is named.
     """
 
     def __init__(
@@ -44,22 +45,20 @@ class World(Workplace):
         tips: dict[int, ToolOffset],
         pin_mm: XyzMm,
         *,
-        operator_sigma_mm: float = 0.01,
         seed: int,
         pendant_live: Callable[[], bool],
         now_ns: Callable[[], int],
+        parameters: WorldParameters | None = None,
     ) -> None:
         super().__init__(
             _HandledArm(machine, now_ns),
             tips,
             pin_mm,
-            operator_sigma_mm=operator_sigma_mm,
             seed=seed,
             replaced=STORED,
+            parameters=parameters or WorldParameters(),
         )
         self.machine = machine
-        self.leans: dict[int, Lean] = {}
-        self._seed = seed
         self.operator = PendantOperator(self, pendant_live=pendant_live, now_ns=now_ns, seed=seed)
 
     @classmethod
@@ -70,6 +69,7 @@ class World(Workplace):
         *,
         pendant_live: Callable[[], bool],
         now_ns: Callable[[], int],
+        parameters: WorldParameters | None = None,
     ) -> "World":
         """Set up a nozzle change: tool 1 is stored and selected, but its tip is elsewhere.
 
@@ -88,7 +88,15 @@ class World(Workplace):
         )
         tip = tip_of(machine.arm.flange(), tips[MOUNTED_TOOL])
         pin_mm = pin_beside((tip.x_mm, tip.y_mm, tip.z_mm), rng)
-        return cls(machine, tips, pin_mm, seed=seed, pendant_live=pendant_live, now_ns=now_ns)
+        return cls(
+            machine,
+            tips,
+            pin_mm,
+            seed=seed,
+            pendant_live=pendant_live,
+            now_ns=now_ns,
+            parameters=parameters,
+        )
 
     def connect(
         self,
@@ -111,7 +119,7 @@ class World(Workplace):
         sense = TipInput(
             switch,
             self.machine.arm,
-            lambda: Nozzle(self.tips.get(tool), self.leans.get(tool, UPRIGHT)),
+            lambda: Nozzle(self.tips.get(tool), self.lean_of(tool)),
             latency_s=latency_s,
             noise_mm=noise_mm,
             rng=random.Random(f"input {number} {self._seed}"),
@@ -203,3 +211,7 @@ class _HandledArm:
             z_mm=flange.z_mm + by_mm[2],
         )
         arm.place(inverse(arm.model, target, arm.hand), self._now_ns())
+
+    def loosen(self, parameters: WorldParameters) -> None:
+        arm = self._machine.arm
+        arm.backlash_deg, arm.backlash_mm = parameters.backlash_deg, parameters.backlash_mm

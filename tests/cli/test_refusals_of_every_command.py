@@ -78,6 +78,12 @@ BAD = {
     "calibrate one-touch": (["--tool", "1"], "Missing option '--station'"),
     "calibrate beams": (["--tool", "1", "--station", "B"], "no station 'B'"),
     "calibrate z-touch": (["--tool", "1", "--station", "P", "--speeds", "x"], "no speeds"),
+    "calibrate camera": (["--tool", "1", "--station", "C"], "no station 'C'"),
+    "calibrate camera-affine": (
+        ["--tool", "1", "--station", "C", "--at", "1,2"],
+        "'1,2' is no place",
+    ),
+    "calibrate board": (["--tool", "1", "--station", "C"], "drawing of the board is missing"),
     "calibrate pivot": (["--tool", "1", "--pose", "1,2,3"], "does not state all"),
     "calibrate six-point": (["--tool", "0"], "never written"),
     "station list": (["all"], "unexpected extra argument"),

@@ -16,7 +16,7 @@ from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 from robolink_simulators.workplace import XyzMm
 
 import robolink
-from robolink.calibration import Beam, BeamStation, Move, Seek, TouchStation
+from robolink.calibration import Ask, Beam, BeamStation, Look, Move, Seek, TouchStation
 from robolink.model import Controller, InputEdge, Pose, ToolOffset
 from robolink.nozzle_change import (
     ChangePlan,
@@ -79,7 +79,7 @@ class Inverted:
 class Taken:
     """A step in which nobody was asked, and the pose after it."""
 
-    step: Move | Seek
+    step: Move | Seek | Look
     pose: Pose
 
     @property
@@ -97,8 +97,9 @@ class Followed(Listener):
     def step(self, tool: int, done: StepDone) -> None:
         """Keep a step."""
         assert tool == TOOL
-        assert isinstance(done.step, (Move, Seek))
-        assert done.pose is not None
+        assert not isinstance(done.step, Ask)
+        if done.pose is None or not isinstance(done.step, (Move, Seek, Look)):
+            return
         self.steps.append(Taken(done.step, done.pose))
 
     @property

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from robolink.calibration import ProbePlan
+from robolink.calibration import Move, ProbePlan, Seek
 from robolink.errors import CalibrationError, VerifyError
 from robolink.nozzle_change import TouchProbe
 from tests.contract._sensor_cell import TOOL, Followed, sensor_cell
@@ -47,6 +47,7 @@ def test_the_tip_stops_at_the_touch_and_retreats_before_anything_else(cell):
         assert done.pose.z_mm > touch_mm - BRAKING_MM - 0.01
         after = followed.steps[followed.steps.index(done) + 1]
         assert after.pose.z_mm > done.pose.z_mm + 0.9
+        assert isinstance(after.step, Move)
         assert after.step.target.coordinates()[:2] == done.pose.coordinates()[:2]
 
 
@@ -88,7 +89,7 @@ def test_a_surface_that_is_not_there_is_sought_so_far_and_no_further(cell):
     followed = Followed()
     refused(cell, "no_edge", followed)
     assert not followed.edges
-    targets = [done.step.target.z_mm for done in followed.steps]
+    targets = [s.step.target.z_mm for s in followed.steps if isinstance(s.step, Move | Seek)]
     assert min(targets) > lowest
 
 

@@ -24,6 +24,7 @@ HEADINGS = {
     "BeamsSource": '`[source]` with `kind = "beams"`',
     "BeamLine": "`[[source.beams]]`",
     "TouchSource": '`[source]` with `kind = "touch"`',
+    "CameraSource": '`[source]` with `kind = "camera"`',
     "OneTouchSource": '`[source]` with `kind = "one_touch"`',
     "Station": "`[station]`",
     "Poses": "`[poses]`",

@@ -183,6 +183,73 @@ def test_a_touch_has_a_surface_and_two_speeds(text, where, what):
     assert found[where].startswith(what)
 
 
+CAMERA = """\
+schema = "robolink/recipe/1"
+name = "Nozzle"
+basis = "absolute"
+z = "kept"
+[station]
+id = "CAM"
+x_mm = 300
+y_mm = 80
+z_mm = -60
+[source]
+kind = "camera"
+mm_per_px = [[0.02, 0.001], [0.001, -0.02]]
+origin_mm = [287, 90]
+[[tools]]
+number = 3
+"""
+ONE_LOOK = "turns_deg = [0]"
+
+
+@pytest.mark.parametrize(
+    ("text", "where", "what"),
+    [
+        (CAMERA.replace('"kept"', '"measured"'), "z", 'cannot be "measured" by a camera'),
+        (CAMERA.replace("x_mm = 300\ny_mm = 80\n", ""), "station.x_mm", "is missing: with kind"),
+        (CAMERA.replace("z_mm = -60\n", ""), "station.z_mm", "is missing: with kind"),
+        (CAMERA.replace("origin_mm = [287, 90]\n", ""), "source.origin_mm", "is missing: give"),
+        (CAMERA.replace("mm_per_px = ", "# "), "source.mm_per_px", "is missing: give"),
+        (CAMERA.replace("[287, 90]", "[287, 90, 0]"), "source.origin_mm", ""),
+        (
+            CAMERA.replace("[[0.02, 0.001], [0.001, -0.02]]", "[[0.02, 0.02], [0.01, 0.01]]"),
+            "source.mm_per_px",
+            "maps all pixels onto one line",
+        ),
+        (
+            with_(CAMERA, "[source]", "turns_deg = [0, 20]"),
+            "source.turns_deg",
+            "must spread over at least 30 degrees",
+        ),
+        (with_(CAMERA, "[box]", "down_mm = 4", "up_mm = 4"), "source.lift_mm", "must be at most"),
+        (
+            with_(with_(CAMERA, "[source]", ONE_LOOK), "[tolerances]", "rms_mm = 0.1"),
+            "tolerances.rms_mm",
+            "cannot be judged: looks at one or two",
+        ),
+        (
+            with_(with_(CAMERA, "[source]", ONE_LOOK), "[tolerances]", "interval_mm = 0.1"),
+            "tolerances.sigma_mm",
+            "is missing: the measurement leaves no residual",
+        ),
+    ],
+)
+def test_a_camera_has_a_place_and_a_meaning_and_is_judged(text, where, what):
+    found = problems(text)
+    assert list(found) == [where]
+    assert found[where].startswith(what)
+
+
+def test_the_place_of_a_camera_may_be_left_to_its_record():
+    assert problems(CAMERA.replace("x_mm = 300\ny_mm = 80\nz_mm = -60\n", "")) == {}
+
+
+def test_a_camera_that_answers_in_millimetres_needs_no_meaning():
+    bare = CAMERA.replace("mm_per_px = ", "# ").replace("origin_mm = ", "# ")
+    assert problems(bare) == problems(with_(bare, "[source]", ONE_LOOK)) == {}
+
+
 def test_a_tool_has_no_points_where_beams_measure_it():
     found = problems(BEAMS.replace("number = 3", "number = 3\npoints = [1, 2]"))
     assert list(found) == ["tools#1.points"]

@@ -13,11 +13,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robolink.calibration import CrossingPlan, ProbePlan, TouchPlan
+from robolink.calibration import CrossingPlan, LookPlan, ProbePlan, TouchPlan
 from robolink.errors import ConfigError
 from robolink.nozzle_change import Gate, Limits, Moment
 from robolink.recipe import (
     BeamsSource,
+    CameraSource,
     OperatorSource,
     Output,
     PointsSource,
@@ -66,15 +67,29 @@ def test_every_example_loads(path):
     assert loaded.sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
 
 
+def example(name):
+    (path,) = (path for path in EXAMPLES if path.stem == name)
+    return path
+
+
 def test_the_examples_are_those_that_the_page_describes():
     assert [path.name for path in EXAMPLES] == [
+        "gantry-touch-probe.toml",
         "needle-beams.toml",
         "needle-one-touch.toml",
         "pendant-points.toml",
+        "pick-nozzle-camera.toml",
         "scara-pin.toml",
         "two-nozzles.toml",
     ]
-    beams, one_touch, points, pin, nozzles = (load_recipe(path).recipe for path in EXAMPLES)
+    gantry, beams, one_touch, points, camera, pin, nozzles = (
+        load_recipe(path).recipe for path in EXAMPLES
+    )
+    assert isinstance(gantry.source, TouchSource)
+    assert (gantry.z, gantry.source.proof_turn_deg) == ("measured", 0.0)
+    assert isinstance(camera.source, CameraSource)
+    assert camera.source.model is not None
+    assert camera.source.model.mirrored
     assert (one_touch.source.kind, one_touch.z, one_touch.basis) == (
         "one_touch",
         "measured",
@@ -116,13 +131,20 @@ def test_what_is_left_out_is_as_in_a_calibration_by_hand():
 
 
 def test_what_is_left_out_about_beams_is_as_in_the_library():
-    beams = load_recipe(EXAMPLES[0]).recipe.source
+    beams = load_recipe(example("needle-beams")).recipe.source
     assert isinstance(beams, BeamsSource)
     plan = CrossingPlan()
     told = {name: field.default for name, field in BeamsSource.model_fields.items()}
     own = {f"{field.name}": getattr(plan, field.name) for field in fields(plan)}
     own["crossing_mm_s"] = own.pop("speed_mm_s")
     assert own.items() <= told.items()
+
+
+def test_what_is_left_out_about_a_camera_is_as_in_the_library():
+    told = {name: field.default for name, field in CameraSource.model_fields.items()}
+    plan = LookPlan()
+    said = {name: getattr(plan, name) for name in ("turns_deg", "pictures", "lift_mm", "beside_mm")}
+    assert said.items() <= told.items()
 
 
 def test_what_is_left_out_about_touches_is_as_in_the_library():
@@ -137,7 +159,7 @@ def test_an_output_can_be_switched_at_every_moment_of_a_nozzle_change():
 
 
 def test_a_pose_of_the_flange_is_a_pose_in_tool_0():
-    pose = load_recipe(EXAMPLES[3]).recipe.poses.safe
+    pose = load_recipe(example("scara-pin")).recipe.poses.safe
     assert pose is not None
     assert pose.pose.coordinates() == (158.6, 495.4, -40.0, 0.0, 0.0, 0.0)
     assert pose.pose.tool == 0
@@ -178,14 +200,14 @@ def test_a_missing_basis_says_what_both_mean(problems):
     ("lines", "where", "what"),
     [
         (
-            '[source]\nkind = "camera"',
+            '[source]\nkind = "laser"',
             "source.kind",
-            'must be one of "beams", "one_touch", "operator", "points", "touch"',
+            'must be one of "beams", "camera", "one_touch", "operator", "points", "touch"',
         ),
         (
             "[source]\nlift_mm = 5",
             "source.kind",
-            'must be one of "beams", "one_touch", "operator", "points", "touch"',
+            'must be one of "beams", "camera", "one_touch", "operator", "points", "touch"',
         ),
         ('[source]\nkind = "operator"\nlift_mm = 0.5', "source.lift_mm", "must be at least 1"),
         ('[source]\nkind = "operator"\nturn_deg = 350', "source.turn_deg", "must be at most 330"),

@@ -32,6 +32,18 @@ METHODS: Final = {
         "robolink_cli.calibrate.z_touch:z_touch",
         tr("Touch a surface that switches an input: Z."),
     ),
+    "camera": (
+        "robolink_cli.calibrate.camera:camera",
+        tr("See the tip with a calibrated, up-looking camera: X and Y."),
+    ),
+    "camera-affine": (
+        "robolink_cli.calibrate.camera_affine:camera_affine",
+        tr("Find an up-looking camera and the tip together."),
+    ),
+    "board": (
+        "robolink_cli.calibrate.board:board",
+        tr("See the fiducials of a held board: X, Y and U."),
+    ),
     "pivot": (
         "robolink_cli.calibrate.pivot:pivot",
         tr("Tilted touches of one pin, taught on the pendant: X, Y and Z, on six axes."),

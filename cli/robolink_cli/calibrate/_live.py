@@ -13,6 +13,7 @@ from robolink.nozzle_change import (
     ToolReport,
     preview,
     require_inside,
+    require_ready,
 )
 from robolink.transaction import earlier_corrections
 from robolink_cli._calibration_views import (
@@ -74,11 +75,13 @@ class LiveCalibration:
         """Refuse before anything moves what would be refused at the write; back up first.
 
         Raises:
+            CalibrationError: A camera is not there, or means nothing.
             ConfigError: The backup before the first write cannot be stored.
             OutcomeUnknownError: Something earlier is unsettled.
             NotReadyError: The state forbids it.
         """
         self._controller.require_settled(tr("calibrate tool {tool}", tool=self.tool))
+        require_ready(self._plan)
         note_change(self._controller, self.tool, self._controller.tools.read(self.tool))
         back_up_first(self._controller)
 

@@ -41,6 +41,14 @@ if TYPE_CHECKING:
     help=tr("How far below it the search ends; a new tip may be shorter by less."),
 )
 @motion_option("--lift", "lift_mm", type=click.FloatRange(1, 100), default=10.0, show_default=True)
+@motion_option(
+    "--proof-turn",
+    "proof_turn_deg",
+    type=click.FloatRange(0, 330),
+    default=180.0,
+    metavar="DEG",
+    help=tr("By how much U differs in the proof; 0 on a machine that cannot turn."),
+)
 @sigma_option
 @calibration_options
 def z_touch(
@@ -51,6 +59,7 @@ def z_touch(
     clearance_mm: float,
     beyond_mm: float,
     lift_mm: float,
+    proof_turn_deg: float,
     sigma_mm: float | None,
 ) -> None:
     """Touch a surface that switches an input: Z; nobody touches anything.
@@ -78,7 +87,7 @@ def z_touch(
         from robolink_cli.calibrate._pins import station_at
 
         place = touch_station(station_at(frame, controller, StationKind.TOUCH))
-        return TouchProbe(place, plan, sigma_mm=sigma_mm)
+        return TouchProbe(place, plan, sigma_mm=sigma_mm, proof_turn_deg=proof_turn_deg)
 
     frame.measure(source)
 

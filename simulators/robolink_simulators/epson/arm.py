@@ -78,6 +78,7 @@ class Arm:
 
     Attributes:
         moves_started: Motions begun since the arm was made; a repeated command shows here.
+        backlash_mm: Play of joint 3, likewise; none at first.
     """
 
     def __init__(
@@ -87,6 +88,7 @@ class Arm:
         self.model = model
         self.moves_started = 0
         self.backlash_deg = backlash_deg
+        self.backlash_mm = 0.0
         self._joints = joints
         self._now_ns = 0
         self._travel: _Travel | None = None
@@ -211,7 +213,7 @@ class Arm:
 
     def _trailing(self, joints: Joints, ways: _Ways) -> Joints:
         half = self.backlash_deg / 2
-        plays = (half, half, 0.0, half)
+        plays = (half, half, self.backlash_mm / 2, half)
         trails = zip(joints.values(), plays, ways, strict=True)
         return Joints(*(value - play * way for value, play, way in trails))
 

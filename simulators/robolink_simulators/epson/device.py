@@ -36,6 +36,7 @@ from robolink_simulators.epson.window import CommandWindow
 from robolink_simulators.epson.wire_text import shown_reply, shown_request
 from robolink_simulators.faults import Departure, Fault, FaultAction, FaultPlan
 from robolink_simulators.world import World
+from robolink_simulators.world_parameters import WorldParameters
 
 _LOG_LINES: Final = 2000
 
@@ -53,6 +54,7 @@ class EpsonSimulator:
         options: The controller's habits.
         state_path: File that keeps what the controller's flash keeps.
         faults: What is planned to go wrong.
+        world: What goes wrong around the robot.
 
     The motors are on at first, as in a cell that stands ready; after a restart they are off.
 
@@ -91,6 +93,7 @@ class EpsonSimulator:
         options: EpsonOptions | None = None,
         state_path: Path | None = None,
         faults: Iterable[Fault] = (),
+        world: WorldParameters | None = None,
     ) -> None:
         self.lock = threading.RLock()
         self.watchers: list[Callable[[], None]] = []
@@ -114,6 +117,7 @@ class EpsonSimulator:
             seed,
             pendant_live=lambda: self.condition.mode is Mode.TEACH,
             now_ns=lambda: self._now_ns,
+            parameters=world,
         )
         self._flash = Flash(state_path, self.machine)
         self._flash.restore()

@@ -8,7 +8,7 @@ from robolink.model import ToolOffset, rotate_xy
 from robolink.timing import NS_PER_S
 from robolink_simulators.epson.arm import Arm
 from robolink_simulators.epson.kinematics import tip_of
-from robolink_simulators.sensing import Lean, TipSwitch
+from robolink_simulators.sensing import Lean, Shake, TipSwitch
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,25 +51,15 @@ class TipInput:
         self._arm = arm
         self._nozzle = nozzle
         self._latency_ns = round(latency_s * NS_PER_S)
-        self._noise_mm = noise_mm
-        self._rng = rng
-        self._motion = -1
-        self._shake_mm = (0.0, 0.0, 0.0)
+        self._shake = Shake(noise_mm, rng)
 
     def __call__(self, instant_ns: int | None) -> bool:
         """Tell whether the input is on at an instant of the motion, ``None`` for now."""
-        self._draw()
         arm, nozzle = self._arm, self._nozzle()
         if instant_ns is None:
             flange = arm.true_flange()
         else:
             flange = arm.true_flange_at(instant_ns - self._latency_ns)
-        tip, (dx_mm, dy_mm, dz_mm) = tip_of(flange, nozzle.tip), self._shake_mm
+        tip, (dx_mm, dy_mm, dz_mm) = tip_of(flange, nozzle.tip), self._shake.of(arm.moves_started)
         place = (tip.x_mm + dx_mm, tip.y_mm + dy_mm, tip.z_mm + dz_mm)
         return self._switch.trips(place, rotate_xy(*nozzle.lean, flange.u_deg))
-
-    def _draw(self) -> None:
-        if self._motion != self._arm.moves_started:
-            self._motion = self._arm.moves_started
-            x, y, z = (self._rng.gauss(0.0, self._noise_mm) for _ in range(3))
-            self._shake_mm = (x, y, z)

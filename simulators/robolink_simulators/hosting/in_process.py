@@ -14,6 +14,7 @@ from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.option_text import option_names, options_from_text
 from robolink_simulators.hosting._named import NamedSimulators, seed_from_text
 from robolink_simulators.hosting._transport import InProcessTransport
+from robolink_simulators.world_parameters import from_options, plain
 
 _OWN_OPTIONS: Final = ("robot", "seed", "state", "split")
 
@@ -30,8 +31,8 @@ def open_epson(
 
     Args:
         link_url: ``epson+sim://NAME``, with ``robot``, ``seed``, ``state`` (a file that keeps
-            the tools), ``split`` (1 cuts what arrives into random pieces) and any field of
-            ``EpsonOptions`` as options.
+            the tools), ``split`` (1 cuts what arrives into random pieces), ``world.NAME`` (see
+            ``WorldParameters``) and any field of ``EpsonOptions`` as options.
         timeout_s: Not needed; part of the contract of an opener.
         clock: A :class:`ManualClock` becomes the clock of a new simulator. Any other clock
             is left aside: simulated time is the simulator's own.
@@ -93,7 +94,7 @@ def clock_of(name: str) -> ManualClock:
 
 def _made(options: Mapping[str, str]) -> EpsonSimulator:
     known = {key: options[key] for key in _OWN_OPTIONS if key in options}
-    habits = {key: value for key, value in options.items() if key not in _OWN_OPTIONS}
+    habits = {key: value for key, value in plain(options).items() if key not in _OWN_OPTIONS}
     unknown = sorted(set(habits) - set(option_names()))
     if unknown:
         raise ConfigError(
@@ -106,4 +107,5 @@ def _made(options: Mapping[str, str]) -> EpsonSimulator:
         seed=seed_from_text(known.get("seed", "1")),
         options=options_from_text(habits),
         state_path=Path(state) if state else None,
+        world=from_options(options),
     )

@@ -18,6 +18,7 @@ from robolink_simulators.softmotion.mailbox.simulator import (
     DEFAULT_KINEMATICS,
     SoftMotionSimulator,
 )
+from robolink_simulators.world_parameters import from_options, plain
 
 _OWN_OPTIONS: Final = ("kinematics", "seed", "state")
 
@@ -32,8 +33,8 @@ def open_softmotion(
     Args:
         link_url: ``softmotion+sim://NAME``, with ``kinematics`` (``+Kin_CAxis`` is written
             ``%2BKin_CAxis``), ``seed``, ``state`` (a file that keeps what is retained), any
-            parameter of the kinematics, and any field of ``GroupOptions`` and
-            ``MailboxOptions`` as options.
+            parameter of the kinematics, ``world.NAME`` (see ``WorldParameters``), and any field
+            of ``GroupOptions`` and ``MailboxOptions`` as options.
         timeout_s: Longest wait for an answer, in simulated time.
         clock: A :class:`ManualClock` becomes the clock of a new simulator. Any other clock
             is left aside: simulated time is the simulator's own.
@@ -83,7 +84,7 @@ def _made(options: Mapping[str, str]) -> SoftMotionSimulator:
     kinematics = options.get("kinematics", DEFAULT_KINEMATICS).replace(" ", "+")
     of_machine = parameter_names(kinematics) if kinematics in NAMES else ()
     names = (*_OWN_OPTIONS, *of_machine, *option_names())
-    unknown = sorted(set(options) - set(names))
+    unknown = sorted(set(plain(options)) - set(names))
     if unknown:
         raise ConfigError(
             tr("The PLC simulator has no option {name!r}.", name=unknown[0]),
@@ -98,4 +99,5 @@ def _made(options: Mapping[str, str]) -> SoftMotionSimulator:
         parameters=parameters_from_text(parameters),
         options=options_from_text(habits),
         state_path=Path(state) if state else None,
+        world=from_options(options),
     )

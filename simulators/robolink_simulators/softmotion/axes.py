@@ -1,5 +1,6 @@
 """The drives of an axis group: their limits, power, state and single movements."""
 
+import math
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Final
@@ -79,20 +80,38 @@ class Axis:
         limits: What it may do.
 
     Attributes:
-        value: Where it is: degrees or mm.
         powered: Whether the drive has power.
         failed: Whether it is in error, until a reset; power off and on does not help.
+        play: Behind the encoder: the true axis trails :attr:`value` by half of it, against the
+            way it last went (assumed model).
     """
 
     def __init__(self, number: int, kind: AxisKind, limits: AxisLimits) -> None:
         self.number = number
         self.kind = kind
         self.limits = limits
-        self.value = 0.0
+        self.play = 0.0
+        self._value = 0.0
+        self._way = 0.0
         self.powered = False
         self.failed = False
         self._coupled = AxisState.STANDSTILL
         self._travel: _Travel | None = None
+
+    @property
+    def value(self) -> float:
+        """Where it is by its encoder: degrees or mm."""
+        return self._value
+
+    @value.setter
+    def value(self, value: float) -> None:
+        if abs(value - self._value) > _STILL:
+            self._way = math.copysign(1.0, value - self._value)
+        self._value = value
+
+    def trailing(self, value: float) -> float:
+        """Return where the true axis is, with the encoder at ``value`` on the way it last went."""
+        return value - self.play / 2 * self._way
 
     @property
     def state(self) -> AxisState:

@@ -7,7 +7,8 @@ from typing import Final
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
-from robolink_simulators.sensing import TipSwitch
+from robolink_simulators.person import Operator
+from robolink_simulators.sensing import Lean, Shake, TipSwitch
 from robolink_simulators.softmotion.condition import GroupState
 from robolink_simulators.softmotion.frames import (
     NO_TURN,
@@ -20,16 +21,16 @@ from robolink_simulators.softmotion.frames import (
     zyx_angles,
 )
 from robolink_simulators.softmotion.group import AxisGroup
-from robolink_simulators.softmotion.kinematics import AxisValues
+from robolink_simulators.softmotion.kinematics import AxisKind, AxisValues
 from robolink_simulators.softmotion.smc_errors import ErrorKind, Refused
 from robolink_simulators.workplace import (
     MOUNTED_TOOL,
-    Operator,
     Workplace,
     XyzMm,
     exchanged,
     pin_beside,
 )
+from robolink_simulators.world_parameters import WorldParameters
 
 STORED: Final = ToolOffset(12.0, -3.5, -20.0)
 """The nozzle that was there before, on a kinematics that carries any tool."""
@@ -51,6 +52,7 @@ class SoftMotionWorld(Workplace):
         pin_mm: Tip of the reference pin, in MCS.
         seed: Decides the next nozzles and the errors of the eye.
         stored: The nozzle that was there before.
+        parameters: What goes wrong here.
 
     Attributes:
         operator: The person at the cell, who jogs with the machine's own panel.
@@ -65,14 +67,24 @@ class SoftMotionWorld(Workplace):
         *,
         seed: int,
         stored: ToolOffset,
+        parameters: WorldParameters | None = None,
     ) -> None:
-        super().__init__(_HandledGroup(group), tips, pin_mm, seed=seed, replaced=stored)
+        super().__init__(
+            _HandledGroup(group),
+            tips,
+            pin_mm,
+            seed=seed,
+            replaced=stored,
+            parameters=parameters or WorldParameters(),
+        )
         self.group = group
         self.stored = stored
         self.operator = Operator(self, require_jogging=self._require_rest, seed=seed)
 
     @classmethod
-    def seeded(cls, group: AxisGroup, seed: int) -> "SoftMotionWorld":
+    def seeded(
+        cls, group: AxisGroup, seed: int, parameters: WorldParameters | None = None
+    ) -> "SoftMotionWorld":
         """Set up a nozzle change: the tip is some tenths of a mm from where it was.
 
         The machine is put where the physical tip stands some mm beside the pin and above it.
@@ -87,13 +99,32 @@ class SoftMotionWorld(Workplace):
             tip = ToolOffset(0.0, 0.0, tip.z_mm)
         group.place(tuple(_stance(axis.limits.low, axis.limits.high) for axis in group.axes))
         pin_mm = pin_beside(_tip_at(group, group.values, tip), rng)
-        return cls(group, {MOUNTED_TOOL: tip}, pin_mm, seed=seed, stored=stored)
-
-    def connect(self, number: int, switch: TipSwitch, tool: int = MOUNTED_TOOL) -> None:
-        """Let a beam or a plate that the tip meets switch an input of the group."""
-        self.group.inputs.connect(
-            number, lambda axes: switch.trips(_tip_at(self.group, axes, self.tips.get(tool)))
+        return cls(
+            group, {MOUNTED_TOOL: tip}, pin_mm, seed=seed, stored=stored, parameters=parameters
         )
+
+    def connect(
+        self, number: int, switch: TipSwitch, tool: int = MOUNTED_TOOL, *, noise_mm: float = 0.0
+    ) -> None:
+        """Let a beam or a plate that the tip meets switch an input of the group.
+
+        Args:
+            number: The input.
+            switch: What the tip meets.
+            tool: Whose tip.
+            noise_mm: Standard deviation, per axis, of where it switches; drawn anew for each
+                movement.
+        """
+        group, shake = self.group, Shake(noise_mm, random.Random(f"input {number} {self._seed}"))
+
+        def sense(axes: AxisValues) -> bool:
+            true_axes = trailing(group, axes)
+            place = add(
+                _tip_at(group, true_axes, self.tips.get(tool)), shake.of(group.movements_started)
+            )
+            return switch.trips(place, _lean_at(group, true_axes, self.lean_of(tool)))
+
+        group.inputs.connect(number, sense)
 
     def _require_rest(self) -> None:
         if self.group.state not in (GroupState.DISABLED, GroupState.STANDBY):
@@ -117,13 +148,19 @@ class _HandledGroup:
         return Pose(*flange.shift_mm, *zyx_angles(flange.rotation), tool=0)
 
     def tip_mm(self, tip: ToolOffset | None) -> XyzMm:
-        return _tip_at(self._group, self._group.values, tip)
+        group = self._group
+        return _tip_at(group, trailing(group, group.values), tip)
+
+    def loosen(self, parameters: WorldParameters) -> None:
+        for axis in self._group.axes:
+            rotary = axis.kind is AxisKind.ROTARY
+            axis.play = parameters.backlash_deg if rotary else parameters.backlash_mm
 
     def carry(self, tip: ToolOffset | None, by_mm: XyzMm) -> None:
         """Try again while the flange turns with the arms and takes the tip along."""
         group, kinematics = self._group, self._group.kinematics
-        target = add(self.tip_mm(tip), by_mm)
         axes = group.values
+        target = add(_tip_at(group, axes, tip), by_mm)
         configuration = kinematics.configuration(axes)
         for _ in range(_MOST_TRIES):
             flange = kinematics.flange(axes)
@@ -143,6 +180,16 @@ def _stance(low: float, high: float) -> float:
 
 def _tip_at(group: AxisGroup, axes: AxisValues, tip: ToolOffset | None) -> XyzMm:
     return (group.kinematics.flange(axes) @ _frame(tip)).shift_mm
+
+
+def trailing(group: AxisGroup, axes: AxisValues) -> AxisValues:
+    """Return where the true axes are with their encoders at ``axes``."""
+    return tuple(axis.trailing(value) for axis, value in zip(group.axes, axes, strict=True))
+
+
+def _lean_at(group: AxisGroup, axes: AxisValues, lean: Lean) -> Lean:
+    x, y, _ = turned(group.kinematics.flange(axes).rotation, (*lean, 0.0))
+    return x, y
 
 
 def _frame(tip: ToolOffset | None) -> Frame:

@@ -29,6 +29,7 @@ from robolink_simulators.softmotion.mailbox.panel import PlcPanel
 from robolink_simulators.softmotion.mailbox.plc import Plc
 from robolink_simulators.softmotion.mailbox.retained import RetainedFile
 from robolink_simulators.softmotion.world import SoftMotionWorld
+from robolink_simulators.world_parameters import WorldParameters
 
 DEFAULT_KINEMATICS: Final = "Kin_Scara3_Z"
 
@@ -50,6 +51,7 @@ class SoftMotionSimulator:
         options: The PLC's habits.
         state_path: File that keeps what retained memory keeps.
         faults: What is planned to go wrong.
+        world: What goes wrong around the robot.
 
     At first the machine stands ready: enabled, slot 1 defined and selected. With a state file
     of an earlier run it has just been switched on: without a tool and, in the profile
@@ -86,6 +88,7 @@ class SoftMotionSimulator:
         options: PlcOptions | None = None,
         state_path: Path | None = None,
         faults: Iterable[PlcFault] = (),
+        world: WorldParameters | None = None,
     ) -> None:
         self.lock = threading.RLock()
         self.url = ""
@@ -105,7 +108,7 @@ class SoftMotionSimulator:
         self.faults = WireFaults(faults, seed)
         given = dict(parameters or {})
         self.plc = Plc(machine_named(kinematics, given), given, self.options)
-        self.world = SoftMotionWorld.seeded(self.plc.group, seed)
+        self.world = SoftMotionWorld.seeded(self.plc.group, seed, world)
         self.panel = PlcPanel(self.plc, self.acting)
         self._mishaps = Mishaps(self.panel)
         self._file = RetainedFile(state_path, self.plc.memory, kinematics)

@@ -1,0 +1,103 @@
+"""An up-looking camera in the cell whose pixels are known; nobody has to touch anything."""
+
+from dataclasses import dataclass, field
+
+from robolink.calibration import (
+    CalibrationResult,
+    CameraStation,
+    LookPlan,
+    Procedure,
+    VerifyResult,
+)
+from robolink.messages import tr
+from robolink.model import Pose, ToolOffset
+from robolink.nozzle_change._flange import seen_from
+from robolink.nozzle_change._looks import angles_between, calibrated_camera, camera_error_of
+from robolink.nozzle_change._source import Bench
+
+
+@dataclass(frozen=True, slots=True)
+class UpCamera:
+    """Measures X and Y of a tip by looking at it at several angles of U.
+
+    Attributes:
+        sensor: URL or name of the camera (:func:`robolink.sensing.open_sensor`).
+        station: Where it is, and what its pixels mean.
+        plan: How the tip is brought before it.
+        sigma_mm: Standard deviation of one coordinate of one look, where it is known.
+        retake: Offer to take the look again that fits worst.
+    """
+
+    sensor: str
+    station: CameraStation
+    plan: LookPlan = field(default_factory=LookPlan)
+    sigma_mm: float | None = None
+    retake: bool = False
+
+    @property
+    def sentence(self) -> str:
+        """What it does, for a report."""
+        return tr(
+            "measured on the robot: seen by the camera {sensor} at {count} angles of U",
+            sensor=self.sensor,
+            count=len(self.plan.turns_deg),
+        )
+
+    @property
+    def remedy(self) -> str:
+        """What to do when a measurement makes the tip jump."""
+        return tr(
+            "Look at the picture: is it the tip that was found, and is it clean? Was the camera "
+            "moved? If the change is real, allow it with --max-change."
+        )
+
+    def require_ready(self) -> None:
+        """Find out whether the camera is there; see :class:`~robolink.nozzle_change.Equipped`."""
+        with calibrated_camera(self.sensor, self.station):
+            pass
+
+    def measure(self, bench: Bench, tool: int, stored: ToolOffset | None) -> CalibrationResult:  # noqa: ARG002 - the flange is what moves
+        """Look and solve; see :class:`~robolink.nozzle_change.MovingSource`."""
+        with calibrated_camera(self.sensor, self.station) as camera:
+            bench.controller.tools.select(0)
+            here = bench.controller.groups[0].pose()
+            return bench.run(self.procedure(stored, here), camera=camera)
+
+    def procedure(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:
+        """Return the steps of a measurement; see :class:`~robolink.nozzle_change.MovingSource`."""
+        from robolink.calibration import look_at_tip  # numpy, which a look does without
+
+        return look_at_tip(
+            self.station,
+            self.plan,
+            here=here,
+            stored=stored,
+            sigma_mm=self.sigma_mm,
+            retake=self.retake,
+        )
+
+    def verify(
+        self,
+        bench: Bench,
+        tool: int,
+        result: CalibrationResult,
+        *,
+        tip: ToolOffset,
+        tolerance_mm: float,
+    ) -> VerifyResult:
+        """Look again at other angles; see :class:`~robolink.nozzle_change.MovingSource`."""
+        from robolink.calibration import verify_by_looking  # numpy
+
+        measured_deg = [pose.u_deg + result.offset.u_deg for pose in result.inputs]
+        with calibrated_camera(self.sensor, self.station) as camera:
+            bench.controller.tools.select(tool)
+            procedure = verify_by_looking(
+                self.station,
+                self.plan,
+                here=bench.controller.groups[0].pose(),
+                angles_deg=angles_between(measured_deg),
+                tolerance_mm=tolerance_mm,
+                camera_error_mm=camera_error_of(result),
+                aside=seen_from(result.offset, tip),
+            )
+            return bench.run(procedure, tip=result.offset, camera=camera)

@@ -1,0 +1,57 @@
+"""Whether a recipe says where the camera is, what its pixels mean, and turns the tool enough."""
+
+from collections.abc import Iterator
+
+from robolink.calibration import MIN_ROTATION_DEG, angle_spread_deg
+from robolink.config import Problem
+from robolink.messages import tr
+from robolink.recipe._draft import Draft
+from robolink.recipe._sources import CameraSource
+
+
+def camera_place(draft: Draft) -> Iterator[Problem]:
+    """Check that the station says where tips are brought before the camera."""
+    place = draft.station
+    if place is None or not isinstance(draft.source, CameraSource):
+        return
+    if place.x_mm is None and place.y_mm is None and place.z_mm is None:
+        return  # all of it comes from the station's record
+    if place.x_mm is None and place.y_mm is None:
+        yield Problem(
+            "station.x_mm", tr('is missing: with kind = "camera" it is where the camera looks')
+        )
+    if place.z_mm is None:
+        yield Problem(
+            "station.z_mm", tr('is missing: with kind = "camera" it is the height in focus')
+        )
+
+
+def camera_pixels(draft: Draft) -> Iterator[Problem]:
+    """Check that what a pixel means is said whole, or not at all."""
+    source = draft.source
+    if not isinstance(source, CameraSource):
+        return
+    if (source.mm_per_px is None) != (source.origin_mm is None):
+        absent = "origin_mm" if source.origin_mm is None else "mm_per_px"
+        yield Problem(
+            f"source.{absent}", tr("is missing: give mm_per_px and origin_mm, or neither")
+        )
+    elif source.model is not None and not source.model.determinant:
+        yield Problem("source.mm_per_px", tr("maps all pixels onto one line"))
+
+
+def camera_looks(draft: Draft) -> Iterator[Problem]:
+    """Check that several looks turn the tool, and that the lift has room."""
+    source, box = draft.source, draft.box
+    if not isinstance(source, CameraSource):
+        return
+    spread_deg = angle_spread_deg(source.turns_deg)
+    if len(source.turns_deg) > 1 and spread_deg < MIN_ROTATION_DEG:
+        yield Problem(
+            "source.turns_deg",
+            tr("must spread over at least {limit:g} degrees", limit=MIN_ROTATION_DEG),
+        )
+    if box is not None and source.lift_mm > box.down_mm + box.up_mm:
+        yield Problem(
+            "source.lift_mm", tr("must be at most the height of the box, down_mm + up_mm")
+        )

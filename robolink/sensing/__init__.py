@@ -1,0 +1,10 @@
+"""Cameras that see a tip: how one is opened by name, and how it is asked.
+
+The cameras themselves are brought by other packages through the entry-point group
+``robolink.sensors``; the simulated ones come through the same door.
+"""
+
+from robolink.sensing._asking import seen_once as seen_once
+from robolink.sensing._registry import SENSORS_GROUP as SENSORS_GROUP
+from robolink.sensing._registry import SensorOpener as SensorOpener
+from robolink.sensing._registry import open_sensor as open_sensor

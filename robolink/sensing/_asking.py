@@ -1,0 +1,88 @@
+"""Several pictures, and the one place that they agree on."""
+
+import math
+from collections.abc import Sequence
+from statistics import median
+
+from robolink.errors import CalibrationError
+from robolink.messages import tr
+from robolink.model import TIP, Spot, TipSensor
+
+
+def seen_once(sensor: TipSensor, mark: int, *, pictures: int) -> Spot:
+    """Return where a camera sees a mark: the median of some pictures, in its own unit.
+
+    The median, because one false detection among three pictures does not shift it far.
+
+    Raises:
+        CalibrationError: ``tip_not_seen`` or ``fiducial_not_seen``: not in most of the pictures;
+            ``several_tips_seen`` or ``several_fiducials_seen``: more than one at a time;
+            ``non_finite``: the camera answers with something that is no place.
+    """
+    spots = list[Spot]()
+    for _ in range(pictures):
+        found = sensor.see(mark)
+        if len(found) > 1:
+            raise _several(mark, found)
+        for spot in found:
+            _require_finite(spot, sensor)
+        spots += found
+    if 2 * len(spots) <= pictures:
+        raise _not_seen(mark, sensor, len(spots), pictures)
+    return Spot(median(spot.x for spot in spots), median(spot.y for spot in spots))
+
+
+def _require_finite(spot: Spot, sensor: TipSensor) -> None:
+    # Before anything is calculated from it: the next movement would be.
+    if not (math.isfinite(spot.x) and math.isfinite(spot.y)):
+        raise CalibrationError(
+            "non_finite",
+            tr("{camera} answers {x}, {y}.", camera=sensor.identity, x=spot.x, y=spot.y),
+            remedy=tr("Restart the camera's program, and look what it finds in its picture."),
+        )
+
+
+def _not_seen(mark: int, sensor: TipSensor, seen: int, pictures: int) -> CalibrationError:
+    where = tr(
+        "{camera}: seen in {seen} of {pictures} pictures.",
+        camera=sensor.identity,
+        seen=seen,
+        pictures=pictures,
+    )
+    if mark == TIP:
+        return CalibrationError(
+            "tip_not_seen",
+            tr("The camera does not see the tip. {where}", where=where),
+            remedy=tr(
+                "Check light, lens and focus, that the tip is clean, and that the station is where "
+                "the camera looks."
+            ),
+        )
+    return CalibrationError(
+        "fiducial_not_seen",
+        tr("The camera does not see fiducial {mark}. {where}", mark=mark, where=where),
+        remedy=tr("Check light and focus, the drawing, and that the board is held as drawn."),
+    )
+
+
+def _several(mark: int, found: Sequence[Spot]) -> CalibrationError:
+    places = ", ".join(f"({spot.x:.1f}, {spot.y:.1f})" for spot in found)
+    if mark == TIP:
+        return CalibrationError(
+            "several_tips_seen",
+            tr("The camera sees {count} tips, at {places}.", count=len(found), places=places),
+            remedy=tr(
+                "Only one may be in the image: retract the other nozzle, clean the window, or make "
+                "the field of view smaller."
+            ),
+        )
+    return CalibrationError(
+        "several_fiducials_seen",
+        tr(
+            "The camera sees {count} marks that may be fiducial {mark}, at {places}.",
+            count=len(found),
+            mark=mark,
+            places=places,
+        ),
+        remedy=tr("Only one may be in the image; make the field of view smaller."),
+    )

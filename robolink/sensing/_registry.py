@@ -1,0 +1,75 @@
+"""From a name or URL to an open camera.
+
+What stands before ``://`` or ``?``, or the whole text, is the name of an entry point of the
+group ``robolink.sensors``; its opener gets the whole text and reads the rest as it likes.
+"""
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Final, Protocol, cast
+
+from robolink.errors import CalibrationError
+from robolink.messages import tr
+from robolink.model import TipSensor
+
+SENSORS_GROUP: Final = "robolink.sensors"
+
+_NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9+._-]*(?=://|\?|$)", re.ASCII)
+
+
+class SensorOpener(Protocol):
+    """What an entry point of the group provides."""
+
+    def __call__(self, url: str) -> TipSensor:
+        """Open the camera that ``url`` names.
+
+        Raises:
+            ConfigError: The rest of the URL makes no sense.
+            ConnectError: The camera is not there.
+        """
+
+
+@contextmanager
+def open_sensor(url: str) -> Iterator[TipSensor]:
+    """Open a camera, and let go of it at the end of the block.
+
+    Args:
+        url: For example ``assist+tcp://127.0.0.1:40001`` or the name of a plug-in.
+
+    Raises:
+        CalibrationError: ``sensor_not_found``: nothing of that name is installed.
+        ConfigError: The rest of the URL makes no sense.
+        ConnectError: The camera is not there.
+    """
+    sensor = _opener(url)(url)
+    try:
+        yield sensor
+    finally:
+        sensor.close()
+
+
+def _opener(url: str) -> SensorOpener:
+    from importlib import metadata  # costs more than the rest of this package
+
+    name = _NAME.match(url)
+    found = tuple(metadata.entry_points(group=SENSORS_GROUP, name=name[0])) if name else ()
+    if not found:
+        known = sorted(metadata.entry_points(group=SENSORS_GROUP).names)
+        raise CalibrationError(
+            "sensor_not_found",
+            tr("No sensor is called {url!r}.", url=url),
+            remedy=tr(
+                "Name it in the cell file under sensors, or install the package that brings it. "
+                "Known are: {known}.",
+                known=", ".join(known),
+            ),
+        )
+    try:
+        return cast(SensorOpener, found[0].load())
+    except (ImportError, AttributeError) as error:
+        raise CalibrationError(
+            "sensor_not_found",
+            tr("The sensor {url!r} cannot be loaded: {cause}.", url=url, cause=error),
+            remedy=tr("Install the package that brings it again."),
+        ) from error

@@ -1,0 +1,289 @@
+"""The drives before an up-looking camera, fed with an ideal cell: what moves, and what follows."""
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from robolink.calibration import (
+    BoardDrawing,
+    CameraModel,
+    CameraStation,
+    Look,
+    LookPlan,
+    Move,
+    Offer,
+    PatternPlan,
+    SeenAt,
+    Tell,
+    find_camera,
+    look_at_board,
+    look_at_tip,
+    verify_board,
+    verify_by_looking,
+)
+from robolink.errors import CalibrationError
+from robolink.model import Pose, Spot, SpotUnit, ToolOffset, rotate_xy
+from tests.calibration._simulated import refused
+
+MODEL = CameraModel(((0.02, 0.001), (0.001, -0.02)), (287.0, 90.0))
+STATION = CameraStation(300.0, 80.0, -30.0, MODEL)
+TIP = ToolOffset(12.4, -3.8, -20.0)
+STORED = ToolOffset(12.0, -3.5, -20.0, 7.0)
+HERE = Pose(280.0, 90.0, 20.0, 120.0, tool=0)
+BOARD = BoardDrawing(((20.0, 12.5), (-20.0, 12.5), (-20.0, -12.5), (20.0, -12.5)))
+HELD = ToolOffset(12.3, -3.2, -20.0, 8.2)
+OFF_MM = (0.25, -0.15)
+"""By how much the simulated camera was moved since its calibration."""
+
+
+class IdealCell:
+    """Takes the steps of a procedure; the camera sees the true marks, in pixels.
+
+    Attributes:
+        frame: Where the frame is.
+        steps: The steps taken.
+        told, offers: What a person heard; the first offer is accepted.
+        wrong: By how many pixels which looks are wrong.
+    """
+
+    def __init__(self, marks, *, here=HERE, off_mm=OFF_MM, blind=None, unit=SpotUnit.PIXEL):
+        self.marks, self.frame, self.off_mm = marks, here, off_mm
+        self.blind, self.unit, self.steps = blind, unit, []
+        self.told, self.offers, self.wrong = [], [], {}
+
+    def run(self, procedure):
+        try:
+            step = next(procedure)
+            while True:
+                if isinstance(step, Tell):
+                    self.told.append(step.text)
+                    step = procedure.send(None)
+                    continue
+                if isinstance(step, Offer):
+                    self.offers.append(step.question)
+                    step = procedure.send(len(self.offers) == 1)
+                    continue
+                self.steps.append(step)
+                try:
+                    answer = self._take(step)
+                except CalibrationError as error:
+                    step = procedure.throw(error)
+                    continue
+                step = procedure.send(answer)
+        except StopIteration as finished:
+            return finished.value
+
+    @property
+    def looks(self):
+        return [step for step in self.steps if isinstance(step, Look)]
+
+    def _take(self, step):
+        if isinstance(step, Move):
+            self.frame = step.target
+            return self.frame
+        if len(self.looks) == self.blind:
+            raise CalibrationError("tip_not_seen", "nothing there", remedy="look")
+        spot = self._spot(self.marks[step.mark])
+        spot = replace(spot, x=spot.x + self.wrong.get(len(self.looks), 0.0))
+        return SeenAt.of(self.frame, spot, self.unit)
+
+    def _spot(self, mark):
+        dx, dy = rotate_xy(mark.x_mm, mark.y_mm, self.frame.u_deg)
+        x, y = self.frame.x_mm + dx + self.off_mm[0], self.frame.y_mm + dy + self.off_mm[1]
+        if self.unit is SpotUnit.BASE_MM:
+            return Spot(x, y)
+        (a, b), (c, d) = MODEL.mm_per_px
+        x, y = x - MODEL.origin_mm[0], y - MODEL.origin_mm[1]
+        area = MODEL.determinant
+        return Spot((d * x - b * y) / area, (a * y - c * x) / area)
+
+
+def fiducials(held, board=BOARD):
+    return dict(enumerate(board.seen_from(held), start=1))
+
+
+def tip_cell(**options):
+    return IdealCell({0: TIP}, **options)
+
+
+def miss(offset, true):
+    return math.hypot(offset.x_mm - true.x_mm, offset.y_mm - true.y_mm)
+
+
+@pytest.mark.parametrize("unit", list(SpotUnit))
+def test_a_tip_and_what_the_camera_is_off_by_are_told_apart(unit):
+    result = tip_cell(unit=unit).run(look_at_tip(STATION, LookPlan(), here=HERE, stored=STORED))
+    assert miss(result.offset, TIP) < 1e-9
+    assert (result.offset.z_mm, result.offset.u_deg) == (STORED.z_mm, STORED.u_deg)
+    assert result.camera_error_mm == pytest.approx(OFF_MM)
+    assert "camera_moved" in result.warnings
+    assert result.dof == 4
+    assert isinstance(result.inputs[0], SeenAt)
+
+
+def test_a_single_look_believes_the_camera_and_says_so():
+    plan = LookPlan(turns_deg=(0.0,))
+    result = tip_cell().run(look_at_tip(STATION, plan, here=HERE, stored=STORED))
+    assert miss(result.offset, TIP) == pytest.approx(math.hypot(*OFF_MM))
+    assert result.camera_error_mm is None
+    assert result.half_width95 == ()
+
+
+def test_the_tool_is_lifted_before_it_turns_and_every_place_is_met_from_one_side():
+    cell, plan = tip_cell(), LookPlan()
+    cell.run(look_at_tip(STATION, plan, here=HERE, stored=STORED))
+    in_focus_mm = STATION.z_mm - STORED.z_mm
+    before = HERE
+    for index, step in enumerate(cell.steps):
+        if isinstance(step, Look):
+            beside, came = cell.steps[index - 2].target, cell.steps[index - 1].target
+            assert came.z_mm == beside.z_mm == in_focus_mm
+            assert came.x_mm - beside.x_mm == pytest.approx(plan.beside_mm)
+            assert came.y_mm - beside.y_mm == pytest.approx(plan.beside_mm)
+        elif step.target.u_deg != before.u_deg:
+            assert min(step.target.z_mm, before.z_mm) >= in_focus_mm + plan.lift_mm
+            before = step.target
+        else:
+            before = step.target
+    assert before.z_mm == in_focus_mm + plan.lift_mm
+    assert {round(step.expected_mm[0], 6) for step in cell.looks} == {STATION.x_mm}
+
+
+def test_after_the_first_look_the_tip_is_brought_to_the_middle():
+    cell = tip_cell(off_mm=(0.0, 0.0))
+    result = cell.run(look_at_tip(STATION, LookPlan(), here=HERE, stored=STORED))
+    for seen in result.inputs:
+        assert STATION.base_mm(seen) == pytest.approx((STATION.x_mm, STATION.y_mm))
+
+
+def test_the_look_that_fits_worst_is_offered_and_taken_again():
+    cell = tip_cell()
+    cell.wrong = {3: 20.0}
+    result = cell.run(look_at_tip(STATION, LookPlan(), here=HERE, stored=STORED, retake=True))
+    assert cell.offers[0].startswith("Look 2, at U 60.0, fits worst: it is 0.2")
+    assert len(cell.offers) == 2
+    assert len(cell.looks) == 1 + 4 + 1
+    assert miss(result.offset, TIP) < 1e-9
+    assert cell.told[0] == "seen X +0.310 Y +0.346 mm from where it is expected"
+    assert cell.frame.z_mm == STATION.z_mm - STORED.z_mm + LookPlan().lift_mm
+
+
+def test_a_camera_of_unknown_pose_is_found_with_the_tip():
+    blank = replace(STATION, x_mm=300.8, y_mm=79.5, model=None)
+    cell = tip_cell(off_mm=(0.0, 0.0))
+    result = cell.run(find_camera(blank, PatternPlan(), here=HERE, stored=STORED))
+    assert miss(result.offset, TIP) < 1e-9
+    for found, true in zip(result.camera.mm_per_px, MODEL.mm_per_px, strict=True):
+        assert found == pytest.approx(true)
+    assert result.camera.origin_mm == pytest.approx(MODEL.origin_mm)
+    assert result.condition_number < 3
+    assert result.dof == 8
+
+
+def test_a_camera_that_is_not_as_it_was_is_refused():
+    before = replace(MODEL, mm_per_px=((0.0215, 0.001), (0.001, -0.02)))
+    station = replace(STATION, model=before)
+    procedure = find_camera(station, PatternPlan(), here=HERE, stored=STORED)
+    with refused("camera_changed"):
+        tip_cell().run(procedure)
+
+
+@pytest.mark.parametrize(
+    ("plan", "code"),
+    [
+        (PatternPlan(span_mm=0.0), "rank_deficient"),
+        (PatternPlan(LookPlan(turns_deg=(0.0, 20.0))), "insufficient_rotation"),
+    ],
+)
+def test_a_pattern_that_cannot_tell_is_refused_before_anything_moves(plan, code):
+    cell = tip_cell()
+    with refused(code):
+        cell.run(find_camera(STATION, plan, here=HERE, stored=STORED))
+    assert cell.steps == []
+
+
+def test_pixels_that_mean_nothing_are_refused():
+    station = replace(STATION, model=None)
+    with refused("camera_not_calibrated"):
+        tip_cell().run(look_at_tip(station, LookPlan(), here=HERE, stored=STORED))
+
+
+@pytest.mark.parametrize("blind", [1, 3])
+def test_what_is_not_seen_is_refused_with_the_tool_lifted(blind):
+    cell = tip_cell(blind=blind)
+    with refused("tip_not_seen"):
+        cell.run(look_at_tip(STATION, LookPlan(), here=HERE, stored=STORED))
+    assert cell.frame.z_mm == STATION.z_mm - STORED.z_mm + LookPlan().lift_mm
+    assert len(cell.looks) == blind
+
+
+def test_a_board_and_what_the_camera_is_off_by_are_told_apart():
+    plan = LookPlan(turns_deg=(0.0, 120.0))
+    cell = IdealCell(fiducials(HELD))
+    result = cell.run(look_at_board(STATION, plan, BOARD, here=HERE, stored=STORED))
+    assert miss(result.offset, HELD) < 1e-9
+    assert result.offset.u_deg == pytest.approx(HELD.u_deg)
+    assert result.camera_error_mm == pytest.approx(OFF_MM)
+    assert result.dof == 2 * 8 - 5
+    assert len(cell.looks) == 2 + 8
+
+
+def test_two_fiducials_at_one_angle_are_epsons_board():
+    pair, plan = BoardDrawing.of_two(40.0), LookPlan(turns_deg=(0.0,))
+    cell = IdealCell(fiducials(HELD, pair), off_mm=(0.0, 0.0))
+    result = cell.run(look_at_board(STATION, plan, pair, here=HERE, stored=STORED))
+    assert result.method == "board"
+    assert miss(result.offset, HELD) < 1e-9
+    assert result.offset.u_deg == pytest.approx(HELD.u_deg)
+
+
+@pytest.mark.parametrize(
+    ("drawn", "code"),
+    [
+        (((10.0, 0.0), (10.0, 1.0)), "coincident_fiducials"),
+        (((20.6, 0.0), (-20.6, 0.0)), "spacing_mismatch"),
+    ],
+)
+def test_a_drawing_that_is_not_the_boards_is_refused(drawn, code):
+    pair = BoardDrawing.of_two(40.0)
+    cell = IdealCell(fiducials(HELD, pair))
+    with refused(code):
+        cell.run(look_at_board(STATION, LookPlan(), BoardDrawing(drawn), here=HERE, stored=STORED))
+
+
+def test_the_proof_shows_an_error_and_not_the_cameras():
+    beside = {0: ToolOffset(-0.1, 0.0, 0.0)}
+    here = Pose(290.0, 85.0, 0.0, 120.0, tool=1)
+    for marks, drift in (({0: ToolOffset()}, 0.0), (beside, 0.1)):
+        proof = IdealCell(marks, here=here).run(
+            verify_by_looking(
+                STATION,
+                LookPlan(),
+                here=here,
+                angles_deg=(30.0, -90.0),
+                tolerance_mm=0.05,
+                camera_error_mm=OFF_MM,
+            )
+        )
+        assert proof.max_drift_mm == pytest.approx(drift, abs=1e-9)
+        assert proof.passed is (drift == 0.0)
+
+
+def test_the_proof_of_a_board_looks_at_all_its_fiducials():
+    here = Pose(290.0, 85.0, 0.0, 120.0, tool=1)
+    turned = ToolOffset(0.0, 0.0, 0.0, 0.5)
+    proof = IdealCell(fiducials(turned), here=here).run(
+        verify_board(
+            STATION,
+            LookPlan(),
+            BOARD,
+            here=here,
+            angles_deg=(30.0, -90.0),
+            tolerance_mm=0.05,
+            camera_error_mm=OFF_MM,
+        )
+    )
+    lever_mm = math.hypot(20.0, 12.5)
+    assert len(proof.drifts) == 8
+    assert proof.max_drift_mm == pytest.approx(lever_mm * math.radians(0.5), rel=1e-3)

@@ -1,0 +1,232 @@
+"""``calibrate camera|camera-affine|board``: what a user types, on both kinds of controllers."""
+
+import json
+import math
+from functools import partial
+from itertools import count
+
+import pytest
+from robolink_cli import main
+from robolink_simulators.hosting import in_process, plc_in_process
+
+from robolink.journal import EntryKind, open_journal
+from tests.contract._camera_cell import camera_model, camera_station
+from tests.contract._sensor_cell import SensorCell
+from tests.faults._nozzle_cell import OLD_TIP, served_cell
+
+pytestmark = [pytest.mark.simulator_only, pytest.mark.timeout(120)]
+
+SIM = "SIM"
+"""Stands for the URL of a cell in the arguments below."""
+
+_names = count()
+
+
+HOSTING = {"epson": in_process, "softmotion": plc_in_process}
+
+
+class Desk:
+    """A simulated cell, and the commands that are typed at it.
+
+    Attributes:
+        cell: The cell.
+        at: Where its camera looks, as an option says it.
+    """
+
+    def __init__(self, kind, options, capsys):
+        self._capsys = capsys
+        name = f"calibrate-camera-{next(_names)}"
+        self.url, hosting = f"{kind}+sim://{name}", HOSTING[kind]
+        assert main.run(["-c", f"{self.url}{options}", "status"]) == 0
+        simulator = hosting.simulator_named(name)
+        self.forget = partial(hosting.unregister, name)
+        self.cell = SensorCell(simulator, self.url, hosting.clock_of(name))
+        station = camera_station(self.cell)
+        self.at = f"{station.x_mm},{station.y_mm},{station.z_mm}"
+
+    def run(self, *arguments):
+        """Run a command in this process; gives its exit code, document and messages."""
+        self._capsys.readouterr()
+        code = main.run(["-c", self.url, *(self.url if a == SIM else a for a in arguments)])
+        shown = self._capsys.readouterr()
+        document = json.loads(shown.out) if "--json" in arguments and shown.out else None
+        return code, document, shown.err
+
+
+@pytest.fixture
+def desk(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
+    monkeypatch.chdir(tmp_path)
+    desks = []
+
+    def opened(kind="epson", options="?seed=1"):
+        desks.append(Desk(kind, options, capsys))
+        return desks[-1]
+
+    yield opened
+    for one in desks:
+        one.forget()
+
+
+def miss_mm(document, true):
+    proposed = document["proposed"]
+    return math.hypot(proposed["x_mm"] - true.x_mm, proposed["y_mm"] - true.y_mm)
+
+
+@pytest.mark.parametrize("kind", HOSTING)
+def test_a_camera_is_found_and_then_sees_the_next_nozzle(desk, kind):
+    opened = desk(kind)
+    cell = opened.cell
+    usual = ("--tool", "1", "--station", "CAM", "--sensor", SIM, "--yes", "--json")
+    code, found, messages = opened.run("calibrate", "camera-affine", "--at", opened.at, *usual)
+    assert code == 0, messages
+    assert miss_mm(found, cell.truth) < 0.008
+    assert found["verification"]["passed"]
+    true = camera_model(cell)
+    assert found["camera"]["mirrored"] is true.mirrored
+    assert found["camera"]["turn_deg"] == pytest.approx(true.turn_deg, abs=0.3)
+    assert found["camera"]["rms_px"] < 0.5
+    assert "micrometres per pixel" in messages
+    if kind == "epson":
+        cell.simulator.world.change_nozzle()
+        code, seen, messages = opened.run("calibrate", "camera", *usual)
+        assert code == 0, messages
+        assert miss_mm(seen, cell.truth) < 0.008
+        assert seen["method"] == "up_camera"
+        assert max(map(abs, seen["camera_error_mm"])) < 0.02
+        assert len(seen["fit"]["residuals_mm"]) == 4
+
+
+def test_a_board_is_measured_by_its_fiducials(desk):
+    opened = desk(options="?world.board_held=true")
+    cell = opened.cell
+    affine = ("--tool", "1", "--station", "CAM", "--at", opened.at, "--sensor", SIM, "--yes")
+    world = cell.simulator.world
+    held, world.board = world.board, None
+    assert opened.run("calibrate", "camera-affine", *affine)[0] == 0
+    world.board = held
+    fiducials = [f"--fiducial={x},{y}" for x, y in held.drawing_mm]
+    code, document, messages = opened.run(
+        "calibrate", "board", *fiducials, "--tool", "1", "--station", "CAM",
+        "--sensor", SIM, "--yes", "--json",
+    )  # fmt: skip
+    assert code == 0, messages
+    truth = held.frame(cell.truth)
+    assert miss_mm(document, truth) < 0.01
+    assert document["proposed"]["u_deg"] == pytest.approx(truth.u_deg, abs=0.02)
+    assert document["verification"]["passed"]
+    assert "look at fiducial 4" in messages
+
+
+RECIPE = """
+schema = "robolink/recipe/1"
+name = "All else is on record"
+basis = "absolute"
+z = "kept"
+[source]
+kind = "camera"
+[station]
+id = "CAM"
+[[tools]]
+number = 1
+"""
+
+
+def test_a_served_cell_keeps_its_camera_on_record_under_the_name_in_the_cell_file(
+    tmp_path, monkeypatch
+):
+    with served_cell(tmp_path / "cell", monkeypatch) as cell:
+        monkeypatch.chdir(tmp_path)
+        cell.simulator.machine.motors_on = True
+        x_mm, y_mm, z_mm = cell.simulator.world.camera.middle_mm
+        (tmp_path / "robolink.toml").write_text(f'''
+[cells.line3]
+url = "{cell.url}"
+remote_timeout_s = 60.0
+remote_timeout_confirmed_by = "test"
+[cells.line3.stations.CAM]
+kind = "camera"
+x_mm = {x_mm}
+y_mm = {y_mm}
+z_mm = {z_mm}
+sensor = "{cell.assist_url}"
+''')
+        usual = ("--tool", "1", "--station", "CAM", "--yes")
+        early = cell.run("-c", "line3", "calibrate", "camera", *usual)
+        assert early.code == 7
+        assert "camera-affine" in early.err
+        done = cell.run("-c", "line3", "calibrate", "camera-affine", *usual)
+        assert done.code == 0, done.err
+        (kept,) = open_journal().log(cell.url).recorded(kinds=[EntryKind.STATION])
+        assert kept.details["kind"] == "camera"
+        shown = cell.run("-c", "line3", "station", "show", "CAM")
+        assert "mm per px" in shown.out
+        cell.simulator.world.change_nozzle()
+        done = cell.run("-c", "line3", "calibrate", "camera", *usual)
+        assert done.code == 0, done.err
+        cell.simulator.world.change_nozzle()
+        (tmp_path / "nozzle.toml").write_text(RECIPE)
+        done = cell.run("-c", "line3", "recalibrate", "nozzle.toml", "--yes")
+        assert done.code == 0, done.err
+        true = cell.simulator.world.tips[1]
+        found = cell.tool_1
+        assert found is not None
+        assert math.hypot(found.x_mm - true.x_mm, found.y_mm - true.y_mm) < 0.015
+        cell.check_settings_are_those_of_before()
+
+
+AFFINE = ("calibrate", "camera-affine")
+BOARD = ("calibrate", "board")
+
+
+@pytest.mark.parametrize(
+    ("options", "command", "code", "said"),
+    [
+        ("", (*AFFINE, "--sensor", "basler"), 7, "No sensor is called"),
+        ("", (*AFFINE, "--sensor", SIM, "--span", "0"), 7, "what a pixel is"),
+        ("", (*AFFINE, "--sensor", SIM, "--angles", "0,20"), 7, "turns the tool by 20.0"),
+        ("", (*AFFINE, "--sensor", SIM, "--angles", "0,0"), 2, "are not angles"),
+        ("", AFFINE, 2, "through which sensor"),
+        ("?world.camera_miss_share=1", (*AFFINE, "--sensor", SIM), 7, "does not see the tip"),
+        ("", ("calibrate", "camera", "--sensor", SIM), 7, "nothing says what they mean"),
+        ("", (*BOARD, "--sensor", SIM, "--spacing", "3"), 7, "3.000 mm apart"),
+        ("", (*BOARD, "--sensor", SIM), 2, "The drawing of the board is missing"),
+        ("", (*BOARD, "--sensor", SIM, "--fiducial", "1"), 2, "is no fiducial"),
+    ],
+)
+def test_what_cannot_be_is_refused_with_its_code_and_nothing_is_written(
+    desk, options, command, code, said
+):
+    opened = desk(options=options)
+    cell = opened.cell
+    usual = ("--tool", "1", "--station", "CAM", "--at", opened.at, "--yes")
+    ended, _, messages = opened.run(*command, *usual)
+    assert ended == code, messages
+    assert said in messages
+    assert cell.stored == OLD_TIP
+    assert cell.simulator.machine.tools.selected == 1
+
+
+def test_a_camera_that_changed_is_refused_until_a_person_says_it_is_another(desk):
+    opened = desk()
+    cell = opened.cell
+    usual = ("--tool", "1", "--station", "CAM", "--at", opened.at, "--sensor", SIM, "--yes")
+    assert opened.run(*AFFINE, *usual)[0] == 0
+    world, kept = cell.simulator.world, cell.stored
+    world.camera.optics = type(world.camera.optics)(um_per_px_x=21.0, um_per_px_y=21.0)
+    code, _, messages = opened.run(*AFFINE, *usual)
+    assert code == 7
+    assert "The scale of the image changed by" in messages
+    assert cell.stored == kept
+    assert opened.run(*AFFINE, "--new-camera", *usual)[0] == 0
+
+
+def test_a_look_before_shows_every_step_and_moves_nothing(desk):
+    opened = desk()
+    code, document, _ = opened.run(
+        *AFFINE, "--tool", "1", "--station", "CAM", "--at", opened.at, "--sensor", SIM,
+        "--dry-run", "--json",
+    )  # fmt: skip
+    assert code == 0
+    assert [step["text"] for step in document["steps"]].count("look") == 8
+    assert opened.cell.simulator.machine.arm.moves_started == 0

@@ -146,5 +146,7 @@ def test_every_order_of_their_steps_ends_with_one_writer_after_the_other(tmp_pat
     wishes = ({1: ANNS}, {1: BOBS})
     ends = follow_orders(orders, start, wishes, unknown=UNKNOWN, overtaken=OVERTAKEN)
     if whole:
-        assert set(ends) == LOST | UNKNOWN | OVERTAKEN, "an order that must occur did not"
+        # Who owns the mailbox cannot lose the lease to somebody who asks for the mailbox first.
+        occurring = LOST - {"LeaseLostError"} | UNKNOWN | OVERTAKEN
+        assert set(ends) == occurring, "an order that must occur did not"
     print(f"PLC: {orders.seen} orders; refused: {dict(ends)}")  # noqa: T201 - for pytest -s

@@ -113,6 +113,8 @@ class Orders:
             if not has_ended(now.state):
                 return None
             return Ended(command, now.state, now.error_class, now)
+        if _has_taken(command, now):
+            return Ended(command, CommandState.DONE, ErrorClass.NONE, now)
         if now.ack_owner != command.owner:
             raise self._wire.ended(self._overtaken(command, now))
         # Our own stop was accepted after it, from another thread.
@@ -152,7 +154,7 @@ class Orders:
         now = before
         while True:
             now = self._snapshots.news(now)
-            if is_own(command, now):
+            if is_own(command, now) or _has_taken(command, now):
                 return now, True
             if (now.ack_head, now.ack_owner) != (before.ack_head, before.ack_owner):
                 raise self._wire.ended(self._overtaken(command, now))
@@ -218,4 +220,20 @@ def is_own(command: Command, now: Response) -> bool:
         command.owner,
         command.sequence,
         command.opcode,
+    )
+
+
+def _has_taken(command: Command, now: Response) -> bool:
+    """Whether a take succeeded although the answer to it is gone already.
+
+    Another client that asked for the mailbox just after it was refused, and the answer to him
+    names the holder and the epoch.
+    """
+    taking = command.opcode == Opcode.OWNERSHIP and command.operands[0] == 1
+    return (
+        taking
+        and now.opcode_echo == Opcode.OWNERSHIP
+        and now.ack_owner != command.owner
+        and now.answer.holder == command.owner
+        and now.answer.epoch != 0
     )

@@ -97,6 +97,14 @@ def test_one_touch_may_trust_the_place_of_the_pin(arm):
     )
     assert done.code == 0, done.err
     assert within(done.document, arm.truth)
+    assert (
+        arm.run("station", "learn", "PIN-07", "--tool", "1", "--assist", arm.cell.url, "--yes").code
+        == 0
+    )
+    unsure = arm.calibrate(
+        "one-touch", "--station", "PIN-07", "--absolute", "--sigma", "0.01", "--no-verify"
+    )
+    assert unsure.document["fit"]["half_width95"] == {}
 
 
 @pytest.mark.parametrize(

@@ -5,12 +5,7 @@ from collections.abc import Mapping, Sequence
 from robolink.messages import tr
 from robolink.nozzle_change import PlannedStep, Proposal, ToolReport, Verdict
 from robolink_cli._doubts import doubts as doubts
-from robolink_cli._fit_views import (
-    camera_sentence,
-    fit_sentence,
-    interval_sentence,
-    show_residuals,
-)
+from robolink_cli._fit_views import remarks, show_residuals
 from robolink_cli._render import note, say
 from robolink_cli._tables import show_change
 from robolink_cli._views import (
@@ -31,10 +26,8 @@ def show_proposal(proposal: Proposal) -> None:
         unmeasured=proposal.kept,
     )
     result = proposal.result
-    sentences = (fit_sentence(result), interval_sentence(result), camera_sentence(result))
-    for remark in (*proposal.notes, *sentences):
-        if remark:
-            say(f"  {remark}")
+    for remark in (*proposal.notes, *remarks(result)):
+        say(f"  {remark}")
     if result.residuals_mm:
         show_residuals(result)
     for sentence in doubts(proposal):

@@ -1,14 +1,25 @@
 """How sure a measurement is, in words and as a table."""
 
-from robolink.calibration import CalibrationResult
+from collections.abc import Iterator
+
+from robolink.calibration import CalibrationResult, chain_of
 from robolink.messages import tr
 from robolink_cli._render import table
 from robolink_cli._views import number
 
 
-def fit_sentence(result: CalibrationResult) -> str:
+def remarks(result: CalibrationResult) -> Iterator[str]:
+    """Yield what there is to say about a measurement beside its numbers, a sentence each."""
+    for sentence in (_fit(result), _interval(result), _camera(result), _chain(result)):
+        if sentence:
+            yield sentence
+
+
+def _fit(result: CalibrationResult) -> str:
     """Return how well the poses agree, in one sentence; empty where a sensor measured once."""
     if result.rms_mm is None:
+        if result.method == "one_touch":
+            return tr("one touch leaves no residual")
         if result.method == "two_pose":
             return tr(
                 "two poses leave no residual: each placement error counts {gain:.2f} times",
@@ -23,7 +34,7 @@ def fit_sentence(result: CalibrationResult) -> str:
     )
 
 
-def interval_sentence(result: CalibrationResult) -> str:
+def _interval(result: CalibrationResult) -> str:
     """Return the 95 % interval of each measured component; empty when nothing tells it."""
     if not result.half_width95:
         return ""
@@ -38,7 +49,7 @@ def interval_sentence(result: CalibrationResult) -> str:
     return tr("95 % interval: {parts}, {basis}", parts="  ".join(parts), basis=basis)
 
 
-def camera_sentence(result: CalibrationResult) -> str:
+def _camera(result: CalibrationResult) -> str:
     """Return what a measurement says about its camera; empty where it says nothing."""
     from robolink.calibration import CameraCalibration, CameraRound
 
@@ -63,6 +74,14 @@ def camera_sentence(result: CalibrationResult) -> str:
             shear=camera.shear_deg,
         )
     return ""
+
+
+def _chain(result: CalibrationResult) -> str:
+    """Return where in a chain of differences this one stands; empty for other methods."""
+    chain = chain_of(result)
+    if chain is None:
+        return ""
+    return tr("difference {count} since the last full calibration", count=chain.changes)
 
 
 def show_residuals(result: CalibrationResult) -> None:

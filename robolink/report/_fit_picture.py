@@ -25,7 +25,7 @@ def fit(report: Report) -> Iterator[Element]:
         return
     axes = interval_ellipse(report.fit)
     panels = []
-    if report.fit.residuals_mm:
+    if any(any(residual[:2]) for residual in _in_the_plane(report.fit)):
         panels.append(_residuals(report.fit))
     if axes is not None:
         panels.append(_interval(report.fit, axes))
@@ -52,10 +52,15 @@ def interval_ellipse(result: CalibrationResult) -> Axes | None:
     return long_mm, short_mm, math.degrees(math.atan2(2 * xy, xx - yy)) / 2
 
 
+def _in_the_plane(result: CalibrationResult) -> tuple[tuple[float, ...], ...]:
+    """Return the residuals, none where they are heights only."""
+    return tuple(residual for residual in result.residuals_mm if len(residual) > 1)
+
+
 def _residuals(result: CalibrationResult) -> Element:
     """Draw the residual of each pose from above, in base axes."""
     panel = Panel(max(*result.residual_distances_mm, _LOWEST_MM) * 1.2)
-    places = [panel.at(residual[0], residual[1]) for residual in result.residuals_mm]
+    places = [panel.at(residual[0], residual[1]) for residual in _in_the_plane(result)]
     rms_mm = result.rms_mm or 0.0
     rms = circle(panel.at(0, 0), round(rms_mm * panel.per_mm, 2), class_="rms")
     dots = [

@@ -119,9 +119,8 @@ def _poses(poses: Sequence[Pose], fit: CalibrationResult | None, *, heights: boo
         name = tr("{number} (left out)", number=number + 1) if left_out else str(number + 1)
         rows.append(element("tr", element("td", name), *cells, class_=kind))
     if residuals:
-        columns += [tr("residual X, Y mm"), tr("length mm")]
-        if any(len(residual) > 2 for residual in residuals):
-            columns[-2] = tr("residual X, Y, Z mm")
+        axes = ("Z", "X, Y", "X, Y, Z")[max(map(len, residuals)) - 1]
+        columns += [tr("residual {axes} mm", axes=axes), tr("length mm")]
     return table(tuple(columns), rows)
 
 

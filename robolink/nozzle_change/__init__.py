@@ -14,10 +14,7 @@ from robolink.nozzle_change._given_poses import taught_poses as taught_poses
 from robolink.nozzle_change._held_board import HeldBoard as HeldBoard
 from robolink.nozzle_change._listener import Listener as Listener
 from robolink.nozzle_change._listener import Moment as Moment
-from robolink.nozzle_change._one_touch import Absolute as Absolute
-from robolink.nozzle_change._one_touch import Difference as Difference
 from robolink.nozzle_change._one_touch import OneTouch as OneTouch
-from robolink.nozzle_change._one_touch import difference_from_last as difference_from_last
 from robolink.nozzle_change._pin_record import LastTouch as LastTouch
 from robolink.nozzle_change._pin_record import find_last_touch as find_last_touch
 from robolink.nozzle_change._plan import ChangePlan as ChangePlan
@@ -43,6 +40,9 @@ from robolink.nozzle_change._source import MovingSource as MovingSource
 from robolink.nozzle_change._source import TipSource as TipSource
 from robolink.nozzle_change._station_learning import learn_station as learn_station
 from robolink.nozzle_change._touch_probe import TouchProbe as TouchProbe
+from robolink.nozzle_change._touch_solvers import Absolute as Absolute
+from robolink.nozzle_change._touch_solvers import Difference as Difference
+from robolink.nozzle_change._touch_solvers import difference_from_last as difference_from_last
 from robolink.nozzle_change._touching import PinAndPerson as PinAndPerson
 from robolink.nozzle_change._up_camera import UpCamera as UpCamera
 from robolink.nozzle_change._verdict import Verdict as Verdict

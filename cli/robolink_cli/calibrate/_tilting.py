@@ -17,12 +17,12 @@ def refuse_live(frame: Frame, method: str) -> NoReturn:
 
     Raises:
         CalibrationError: ``rank_deficient``: this robot cannot tilt its tool at all.
-        ConfigError: It can, but robolink drives no tilted poses.
+        ConfigError: It can, or does not tell; but robolink drives no tilted poses.
     """
     with open_controller(frame.context) as controller:
         axes = _axes(controller)
         models = ", ".join(controller.facts().robot_models) or controller.identity
-    if axes < _LEAST_AXES:
+    if 0 < axes < _LEAST_AXES:
         raise CalibrationError(
             "rank_deficient",
             tr(
@@ -39,8 +39,8 @@ def refuse_live(frame: Frame, method: str) -> NoReturn:
         )
     raise ConfigError(
         tr(
-            "{robot} can tilt its tool, but robolink drives no tilted poses: it takes them as they "
-            "were taught.",
+            "robolink drives no tilted poses, with {robot} either: it takes them as they were "
+            "taught.",
             robot=models,
         ),
         remedy=tr("Teach them on the pendant and give --points, or give --pose or --poses."),

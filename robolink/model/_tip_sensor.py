@@ -58,8 +58,7 @@ class TipSensor(Protocol):
         Args:
             mark: :data:`TIP`, or the number of a fiducial.
 
-        Raises:
-            ConnectError, TransportBrokenError: The camera does not answer.
+        Whatever it raises ends the measurement, with the tool lifted.
         """
 
     def close(self) -> None:

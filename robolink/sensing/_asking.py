@@ -17,11 +17,12 @@ def seen_once(sensor: TipSensor, mark: int, *, pictures: int) -> Spot:
     Raises:
         CalibrationError: ``tip_not_seen`` or ``fiducial_not_seen``: not in most of the pictures;
             ``several_tips_seen`` or ``several_fiducials_seen``: more than one at a time;
-            ``non_finite``: the camera answers with something that is no place.
+            ``non_finite``: the camera answers with something that is no place;
+            ``sensor_failed``: it does not answer.
     """
     spots = list[Spot]()
     for _ in range(pictures):
-        found = sensor.see(mark)
+        found = _seen(sensor, mark)
         if len(found) > 1:
             raise _several(mark, found)
         for spot in found:
@@ -30,6 +31,19 @@ def seen_once(sensor: TipSensor, mark: int, *, pictures: int) -> Spot:
     if 2 * len(spots) <= pictures:
         raise _not_seen(mark, sensor, len(spots), pictures)
     return Spot(median(spot.x for spot in spots), median(spot.y for spot in spots))
+
+
+def _seen(sensor: TipSensor, mark: int) -> Sequence[Spot]:
+    # Whatever a camera's driver raises: it must neither leave the tip down before the lens, nor be
+    # taken for a failure of the controller's link.
+    try:
+        return sensor.see(mark)
+    except Exception as error:
+        raise CalibrationError(
+            "sensor_failed",
+            tr("The camera {camera} failed: {cause}", camera=sensor.identity, cause=error),
+            remedy=tr("Look after its cable, power and program, and start again."),
+        ) from error
 
 
 def _require_finite(spot: Spot, sensor: TipSensor) -> None:

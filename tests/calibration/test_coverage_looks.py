@@ -13,7 +13,7 @@ HELD = ToolOffset(12.3, -3.9, -20.0, 1.2)
 DRAWING = ((20.0, 12.5), (-20.0, 12.5), (-20.0, -12.5), (20.0, -12.5))
 SIGMA_MM = 0.01
 OFF_MM = (0.3, -0.2)
-TRIALS = 1000
+TRIALS = 700
 
 
 def seen(mark, u_deg):

@@ -109,9 +109,7 @@ def test_a_served_cell_lends_its_camera_through_the_assist_port(tmp_path, monkey
         assert "up_camera" in page.read_text()
 
 
-def test_the_same_recipe_serves_a_plc_and_the_next_nozzle_by_its_difference(
-    run, plc, tmp_path, capsys
-):
+def test_the_same_recipe_serves_a_plc(run, plc, tmp_path, capsys):
     url, simulator, clock = plc("Kin_Scara3_Z")
     station = camera_station(SensorCell(simulator, url, clock))
     flange = simulator.plc.group.flange().shift_mm
@@ -119,9 +117,8 @@ def test_the_same_recipe_serves_a_plc_and_the_next_nozzle_by_its_difference(
     model = camera_model(SensorCell(simulator, url, clock))
     ((a, b), (c, d)), (ox, oy) = model.mm_per_px, model.origin_mm
     for old, new in (
-        ('basis = "absolute"', 'basis = "difference"'),
         ("[[0.01997, 0.00105], [0.00105, -0.01997]]", f"[[{a}, {b}], [{c}, {d}]]"),
-        ("[157.63, 486.62]", f"[{ox + 0.3}, {oy}]"),
+        ("[157.63, 486.62]", f"[{ox}, {oy}]"),
         ("x_mm = 170.952", f"x_mm = {station.x_mm}"),
         ("y_mm = 477.063", f"y_mm = {station.y_mm}"),
         ("z_mm = -107.442", f"z_mm = {station.z_mm}"),
@@ -134,18 +131,42 @@ def test_the_same_recipe_serves_a_plc_and_the_next_nozzle_by_its_difference(
         text = text.replace(old, new)
     recipe = tmp_path / "plc.toml"
     recipe.write_text(f"{text}[[tools]]\nnumber = 1\n")
-    call = ("-c", url, "recalibrate", str(recipe), "--sensor", url, "--yes")
-    code, _, messages = run(*call, "--reference")
-    assert code == 0, messages
-    before, stored = simulator.world.tips[1], simulator.plc.memory.defined()[1].tool
-    after = simulator.world.change_nozzle()
     began_ns = clock.now_ns()
-    code, _, messages = run(*call)
+    code, document, messages = run(
+        "-c", url, "recalibrate", str(recipe), "--sensor", url, "--yes", "--json"
+    )
     assert code == 0, messages
-    told(capsys, "pick nozzle on a PLC, by difference", (clock.now_ns() - began_ns) / 1e9)
-    now = simulator.plc.memory.defined()[1].tool
-    assert now[0] - stored[0] == pytest.approx(after.x_mm - before.x_mm, abs=0.008)
-    assert now[1] - stored[1] == pytest.approx(after.y_mm - before.y_mm, abs=0.008)
+    told(capsys, "pick nozzle on a PLC, camera recipe", (clock.now_ns() - began_ns) / 1e9)
+    (tool,) = document["tools"]
+    stored, true = simulator.plc.memory.defined()[1].tool, simulator.world.tips[1]
+    for found_mm, true_mm, half_mm in zip(
+        stored, (true.x_mm, true.y_mm), tool["fit"]["half_width95"].values(), strict=False
+    ):
+        assert abs(found_mm - true_mm) <= half_mm < 0.02
+    assert tool["verification"]["passed"]
+
+
+def test_the_next_nozzle_is_a_difference_that_a_moved_camera_does_not_shift(run, epson, tmp_path):
+    text = Path(CAMERA).read_text().replace('basis = "absolute"', 'basis = "difference"')
+    recipe = tmp_path / "difference.toml"
+    # Looked at from one angle, so that the camera's error stays in both.
+    recipe.write_text(
+        text.replace("[157.63,", "[157.93,")
+        .replace("[0, 60, 120, 180]", "[0]")
+        .replace("rms_mm = 0.02\ninterval_mm = 0.02\n", "")
+        .replace("drift_mm = 0.05", "drift_mm = 1.0")
+    )
+    call = ("recalibrate", str(recipe), "--sensor", epson, "--yes")
+    code, _, messages = run("-c", f"{epson}?seed=1", *call, "--reference")
+    assert code == 0, messages
+    simulator = in_process.simulator_named("camera-recipe")
+    before, after = simulator.world.tips[1], simulator.world.change_nozzle()
+    code, _, messages = run("-c", epson, *call)
+    assert code == 0, messages
+    now = simulator.machine.tools.get(1)
+    assert now is not None
+    assert now.x_mm - OLD_TIP.x_mm == pytest.approx(after.x_mm - before.x_mm, abs=0.01)
+    assert now.y_mm - OLD_TIP.y_mm == pytest.approx(after.y_mm - before.y_mm, abs=0.01)
 
 
 def test_the_gantry_measures_writes_and_proves_a_length(run, plc, capsys):

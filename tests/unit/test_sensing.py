@@ -6,7 +6,7 @@ from importlib import metadata
 import pytest
 from robolink_simulators.sensors import open_in_process
 
-from robolink.errors import CalibrationError, ConfigError, ConnectError
+from robolink.errors import CalibrationError, ConfigError, ConnectError, TransportBrokenError
 from robolink.model import TIP, Spot, SpotUnit, TipSensor
 from robolink.nozzle_change import CameraToFind, UpCamera
 from robolink.sensing import SENSORS_GROUP, open_sensor, seen_once
@@ -171,6 +171,27 @@ def test_a_camera_that_answers_in_millimetres_needs_no_station_model(plug_in):
         assert report.verification.passed
         with pytest.raises(ConfigError, match="answers in millimetres already"):
             run_source(cell, CameraToFind("metric", blank))
+
+
+@pytest.mark.parametrize("error", [TransportBrokenError("cable"), ValueError("driver")])
+def test_a_camera_that_dies_on_the_way_ends_it_with_the_tool_lifted_and_put_back(plug_in, error):
+    class Dying(MetricCamera):
+        def see(self, mark=TIP):
+            self.pictures.append(())
+            if len(self.pictures) > 8:
+                raise error
+            return super().see(mark)
+
+    with cell_of("epson") as cell:
+        before = cell.stored
+        plug_in("dying", lambda _: Dying(cell))
+        with pytest.raises(CalibrationError, match="The camera bench failed") as refusal:
+            run_source(cell, UpCamera("dying", camera_station(cell)))
+        assert refusal.value.code == "sensor_failed"
+        assert refusal.value.__cause__ is error
+        assert cell.tip_z_mm > cell.simulator.world.camera.middle_mm[2] + 8.0
+        assert cell.stored == before
+        assert cell.simulator.machine.tools.selected == 1
 
 
 def test_numbers_that_are_none_are_refused(plug_in):

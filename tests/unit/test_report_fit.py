@@ -6,7 +6,7 @@ from xml.etree.ElementTree import tostring
 import numpy as np
 import pytest
 
-from robolink.calibration import Robust, solve_n_angle, solve_two_pose
+from robolink.calibration import Robust, Touch, solve_n_angle, solve_two_pose, solve_z_touch
 from robolink.model import ControllerFacts, Pose, ToolOffset
 from robolink.report import Outcome, Report, render
 from robolink.report._fit_picture import fit, interval_ellipse
@@ -99,3 +99,11 @@ def test_a_pose_that_was_left_out_is_marked_in_picture_table_and_plan():
     assert "red: left out" in picture
     assert "4 (left out)" in page
     assert drawn(pose_plan(report(result))).count('class="largest"') == 1
+
+
+def test_heights_have_no_picture_from_above_and_need_none():
+    touches = [Touch(-106.0 - 0.01 * v + e, v) for v, e in ((2.0, 0.002), (1.0, 0.0), (2.0, 0.0))]
+    result = solve_z_touch(touches, -86.0, stored=TIP)
+    assert result.residuals_mm
+    assert drawn(fit(report(result))) == drawn(pose_plan(report(result))) == ""
+    assert "95 % interval" in render(report(result))

@@ -107,8 +107,8 @@ def show_course(steps: Sequence[PlannedStep]) -> None:
     asks = sum(step.by_person for step in steps)
     if asks:
         plan = tr(
-            "The plan: {asks} times a person brings the tip onto the pin, with {moves} movements "
-            "of the robot in between.",
+            "The plan: touches of the pin by a person: {asks}; movements of the robot between "
+            "them: {moves}.",
             asks=asks,
             moves=moves,
         )

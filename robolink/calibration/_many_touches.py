@@ -8,7 +8,7 @@ from typing import Final
 from robolink.calibration._planar_checks import planar_sigma_gain
 from robolink.calibration._result import CalibrationResult
 from robolink.calibration._steps import Ask, Offer, Procedure, Tell
-from robolink.calibration._touch import TouchPlan, touch_again
+from robolink.calibration._touch import TouchPlan, lift_off, touch_again
 from robolink.errors import CalibrationError
 from robolink.messages import tr
 from robolink.model import Pose, ToolOffset, angle_difference_deg
@@ -65,6 +65,7 @@ def n_angle(
 
     guess = stored or ToolOffset()
     first: Pose = yield Ask(tr("Bring the tip onto the pin."))
+    yield lift_off(plan, first)
     touches = [first]
     # Within half a turn of zero: adding up from touch to touch leaves the joint's range.
     angles = [angle_difference_deg(first.u_deg + turn_deg, 0.0) for turn_deg in turns_deg]

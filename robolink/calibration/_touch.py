@@ -44,6 +44,7 @@ def two_pose(
         CalibrationError: As :func:`solve_two_pose`.
     """
     first: Pose = yield Ask(tr("Bring the tip onto the pin."))
+    yield lift_off(plan, first)
     # Toward zero, by the angle as it is counted and not modulo 360: U starts inside the
     # joint's range, and so it stays there.
     turn_deg = -plan.turn_deg if first.u_deg > 0 else plan.turn_deg
@@ -106,7 +107,7 @@ def verify_by_turning(
         )
         found: Pose = yield Ask(tr("Bring the tip back onto the pin; what you jog is the drift."))
         drifts.append(Drift(angle, found.x_mm - place.x_mm, found.y_mm - place.y_mm))
-        yield Move(raised(found, plan.lift_mm), Path.STRAIGHT, tr("lift off the pin"))
+        yield lift_off(plan, found)
     return VerifyResult(tuple(drifts), tolerance_mm)
 
 
@@ -132,18 +133,29 @@ def raised(pose: Pose, by_mm: float) -> Pose:
     return replace(pose, z_mm=pose.z_mm + by_mm)
 
 
-def touch_again(plan: TouchPlan, contact: Pose, u_deg: float, guess: ToolOffset) -> Procedure[Pose]:
-    """Lift off, turn to ``u_deg``, come down beside the pin, and let the person touch it."""
-    lifted: Pose = yield Move(raised(contact, plan.lift_mm), Path.STRAIGHT, tr("lift off the pin"))
-    above = replace(_turned(contact, u_deg, guess), z_mm=lifted.z_mm)
+def lift_off(plan: TouchPlan, touch: Pose) -> Move:
+    """Return the step that takes the tip off the pin, after which it may turn."""
+    return Move(raised(touch, plan.lift_mm), Path.STRAIGHT, tr("lift off the pin"))
+
+
+def touch_again(plan: TouchPlan, last: Pose, u_deg: float, guess: ToolOffset) -> Procedure[Pose]:
+    """Turn to ``u_deg``, come down beside the pin, let the person touch it, and lift off.
+
+    Args:
+        plan: Lift and clearance.
+        last: The touch from which the tip was lifted off.
+        u_deg: U of the next touch.
+        guess: About where the tip is.
+    """
+    above = _turned(raised(last, plan.lift_mm), u_deg, guess)
     yield Move(above, Path.JOINT, tr("turn in the air"))
     yield Move(
-        replace(above, z_mm=contact.z_mm + plan.clearance_mm),
+        replace(above, z_mm=last.z_mm + plan.clearance_mm),
         Path.STRAIGHT,
         tr("come down to the clearance"),
     )
     touch: Pose = yield Ask(tr("Bring the tip onto the pin again, with the tool turned."))
-    yield Move(raised(touch, plan.lift_mm), Path.STRAIGHT, tr("lift off the pin"))
+    yield lift_off(plan, touch)
     return touch
 
 

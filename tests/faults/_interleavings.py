@@ -9,7 +9,7 @@ import random
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Protocol
 
-from tests.faults._operator_process import Waiting
+from tests.faults._operator_steps import Waiting
 
 Plan = tuple[tuple[int, ...], frozenset[int]]
 """Who does the first steps, and who need not go next: it was tried before."""

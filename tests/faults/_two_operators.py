@@ -10,7 +10,8 @@ from robolink.model import EntryKind, ToolOffset, read_offset
 from tests.faults._change_cell import ChangeCell
 from tests.faults._change_process import OLD
 from tests.faults._interleavings import Interleavings
-from tests.faults._operator_process import Ended, OperatorProcess, Waiting
+from tests.faults._operator_process import Ended, OperatorProcess
+from tests.faults._operator_steps import Waiting
 
 Wish = dict[int, ToolOffset]
 """What an operator wants in the tools, in the order in which he writes them."""

@@ -15,7 +15,8 @@ from robolink.model import EntryKind, ToolOffset
 from tests.contract._softmotion_cell import OWNER_SILENCE_S, SkippingClock
 from tests.faults._change_process import OLD
 from tests.faults._interleavings import Interleavings
-from tests.faults._operator_process import OperatorProcess, StepKind
+from tests.faults._operator_process import OperatorProcess
+from tests.faults._operator_steps import StepKind
 from tests.faults._softmotion_change_cell import plc_change_cell
 from tests.faults._two_operators import LOST, follow_orders
 

@@ -22,7 +22,8 @@ from robolink.transaction import Recovery, recover
 from tests.faults._change_cell import ChangeCell, change_cell
 from tests.faults._change_process import NEW, OLD
 from tests.faults._interleavings import Interleavings, apart
-from tests.faults._operator_process import OperatorProcess, Waiting
+from tests.faults._operator_process import OperatorProcess
+from tests.faults._operator_steps import Waiting
 from tests.faults._two_clients import SharedSimulator
 from tests.faults._two_operators import LOST, Wish, follow_orders
 

@@ -5,6 +5,7 @@ from itertools import count
 
 import pytest
 
+from robolink.controllers.epson import EpsonController
 from robolink.transaction import ToolChange, change_tools
 from tests.unit._transaction_cell import NEW, OLD, tool_cell, wanted
 
@@ -69,3 +70,23 @@ def test_ctrl_c_leaves_all_or_nothing_of_a_change(program):
             assert cell.writes in (0, 2, 4), at
     assert cell.tools == NEW
     assert at > 30
+
+
+def test_ctrl_c_while_an_output_is_switched_leaves_nothing_in_doubt():
+    for at in count(1):
+        with tool_cell() as cell:
+            log = cell.log()
+            with cell.connected(log) as controller:
+                assert isinstance(controller, EpsonController)
+                interrupted = Interrupted(cell, log, at)
+                try:
+                    controller.io.set_output(8, True)
+                except KeyboardInterrupt:
+                    pass
+                else:
+                    break
+                finally:
+                    interrupted.at = 0
+            assert cell.journal.open_markers() == (), at
+    assert cell.simulator.machine.outputs.get(8)
+    assert at > 10

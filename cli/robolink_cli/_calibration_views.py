@@ -7,6 +7,7 @@ from robolink.nozzle_change import PlannedStep, Proposal, ToolReport, Verdict
 from robolink_cli._doubts import doubts as doubts
 from robolink_cli._fit_views import (
     camera_sentence,
+    chain_sentence,
     fit_sentence,
     interval_sentence,
     show_residuals,
@@ -31,8 +32,8 @@ def show_proposal(proposal: Proposal) -> None:
         unmeasured=proposal.kept,
     )
     result = proposal.result
-    sentences = (fit_sentence(result), interval_sentence(result), camera_sentence(result))
-    for remark in (*proposal.notes, *sentences):
+    sentences = (fit_sentence, interval_sentence, chain_sentence, camera_sentence)
+    for remark in (*proposal.notes, *(sentence(result) for sentence in sentences)):
         if remark:
             say(f"  {remark}")
     if result.residuals_mm:

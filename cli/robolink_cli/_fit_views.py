@@ -1,6 +1,6 @@
 """How sure a measurement is, in words and as a table."""
 
-from robolink.calibration import CalibrationResult
+from robolink.calibration import CalibrationResult, chain_of
 from robolink.messages import tr
 from robolink_cli._render import table
 from robolink_cli._views import number
@@ -9,6 +9,8 @@ from robolink_cli._views import number
 def fit_sentence(result: CalibrationResult) -> str:
     """Return how well the poses agree, in one sentence; empty where a sensor measured once."""
     if result.rms_mm is None:
+        if result.method == "one_touch":
+            return tr("one touch leaves no residual")
         if result.method == "two_pose":
             return tr(
                 "two poses leave no residual: each placement error counts {gain:.2f} times",
@@ -65,6 +67,14 @@ def camera_sentence(result: CalibrationResult) -> str:
             shear=camera.shear_deg,
         )
     return ""
+
+
+def chain_sentence(result: CalibrationResult) -> str:
+    """Return where in a chain of differences this one stands; empty for other methods."""
+    chain = chain_of(result)
+    if chain is None:
+        return ""
+    return tr("difference {count} since the last full calibration", count=chain.changes)
 
 
 def show_residuals(result: CalibrationResult) -> None:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from robolink.calibration import CalibrationResult, VerifyResult
+from robolink.calibration import CalibrationResult, VerifyResult, chain_of
 from robolink.model import Controller, Finding, Pose, ToolOffset, ToolReceipt
 from robolink.nozzle_change import Proposal
 
@@ -58,6 +58,7 @@ def proposal_payload(proposal: Proposal) -> dict[str, object]:
 
 def fit_payload(result: CalibrationResult) -> dict[str, object]:
     """Return how sure a measurement is; what nothing tells is ``None`` or empty."""
+    chain = chain_of(result)
     return {
         "half_width95": dict(zip(result.measured, result.half_width95, strict=False)),
         "sigma_mm": result.sigma_mm,
@@ -69,6 +70,7 @@ def fit_payload(result: CalibrationResult) -> dict[str, object]:
         "condition_number": result.condition_number,
         "dof": result.dof,
         "unobservable": list(result.unobservable),
+        "chain": {"changes": chain.changes, "sigma_mm": chain.sigma_mm} if chain else None,
     }
 
 

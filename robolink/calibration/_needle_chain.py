@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass
 
+from robolink.calibration._result import CalibrationResult
 from robolink.calibration._update_guard import NEEDLE_LIMIT_MM
 
 
@@ -36,3 +37,12 @@ class NeedleLimits:
     max_change_mm: float = NEEDLE_LIMIT_MM
     tolerance_mm: float = 0.1
     max_changes: int = 20
+
+
+def chain_of(result: CalibrationResult) -> NeedleChain | None:
+    """Return what the differences up to this result add up to; ``None`` for other methods.
+
+    It asks for the attribute, because the class that has it brings numpy along.
+    """
+    chain = getattr(result, "chain", None)
+    return chain if isinstance(chain, NeedleChain) else None

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from statistics import fmean
 
-from robolink.calibration import NORMAL_95, CalibrationResult, NeedleChain
+from robolink.calibration import NORMAL_95, CalibrationResult, NeedleChain, chain_of
 from robolink.errors import CalibrationError
 from robolink.messages import tr
 from robolink.model import (
@@ -121,9 +121,7 @@ def found_pin(station: str, proposal: Proposal) -> Found | None:
 def touch_details(station: str, proposal: Proposal) -> dict[str, object]:
     """Return what the journal keeps of the pin beside a value that was kept."""
     result = proposal.result
-    chain = getattr(result, "chain", None)
-    if not isinstance(chain, NeedleChain):
-        chain = NeedleChain(offset_sigma_mm(result) or 0.0)
+    chain = chain_of(result) or NeedleChain(offset_sigma_mm(result) or 0.0)
     x_mm, y_mm, z_mm = pin_mm(proposal)
     # Where a difference was written, the value puts the pin elsewhere than the tip does.
     tip, value, last = proposal.tip, proposal.offset, result.inputs[-1]

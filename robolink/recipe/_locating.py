@@ -49,9 +49,10 @@ def located(recipe: Recipe, stations: Mapping[str, Station]) -> Recipe:
 
 
 def _with_place(recipe: Recipe, station: Station) -> Recipe:
-    given = {"x_mm": station.x_mm, "y_mm": station.y_mm, "z_mm": station.z_mm}
-    if None in given.values():
+    place = {"x_mm": station.x_mm, "y_mm": station.y_mm, "z_mm": station.z_mm}
+    if None in place.values():
         raise _unknown(recipe, tr("its place is not known"))
+    given = {**place, "sigma_mm": station.sigma_mm}
     return recipe.model_copy(update={"station": recipe.station.model_copy(update=given)})
 
 

@@ -138,8 +138,10 @@ def _from_one_touch(
     if recipe.basis == "absolute":
         from robolink.calibration import Pin  # numpy, which other recipes do without
 
-        x_mm, y_mm, z_mm = _place(station)
-        return OneTouch(Absolute(Pin(x_mm, y_mm, z_mm), tolerances.sigma_mm), touch)
+        pin = Pin(*_place(station), station.sigma_mm or 0.0)
+        # Whoever does not know how sure the pin is cannot say how sure the tip is.
+        sigma_mm = tolerances.sigma_mm if station.sigma_mm else None
+        return OneTouch(Absolute(pin, sigma_mm), touch)
     limits = NeedleLimits(
         max_change_mm=tolerances.jump_mm,
         tolerance_mm=tolerances.interval_mm or NeedleLimits().tolerance_mm,

@@ -68,6 +68,9 @@ class Station(Table):
     z_mm: float | None = None
     """Z of the pin's end or of the surface, base, mm; z = "measured" needs it, from here or from
     the station's record, when basis is "absolute", and source "touch" always."""
+    sigma_mm: Length | None = None
+    """Standard deviation of each of them, mm, where it is known; one touch with basis "absolute"
+    needs it to say how sure it is."""
     note: Note = ""
     """For people."""
 

@@ -31,6 +31,7 @@ gauge = "G-123"
 
 [cells.a.stations.BEAMS-02]
 kind = "beams"
+check_every_days = 90
 z_mm = {beams[2]}
 beams = [
     {{ input = 3, x_mm = {beams[0]}, y_mm = {beams[1]}, direction_deg = 3.0 }},

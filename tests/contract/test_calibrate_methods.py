@@ -82,6 +82,8 @@ def test_the_chain_asks_for_a_full_calibration_in_time(arm):
         assert done.code == 0, done.err
         halves.append(done.document["fit"]["half_width95"]["z_mm"])
     assert halves[1] > halves[0]
+    assert done.document["fit"]["chain"]["changes"] == 2
+    assert "difference 2 since the last full calibration" in done.err
     assert done.document["warnings"] == ["full_calibration_due"]
     assert "A full calibration is due" in done.err
     refused = arm.calibrate("one-touch", "--station", "PIN-07", "--max-interval", "0.03")
@@ -97,6 +99,14 @@ def test_one_touch_may_trust_the_place_of_the_pin(arm):
     )
     assert done.code == 0, done.err
     assert within(done.document, arm.truth)
+    assert (
+        arm.run("station", "learn", "PIN-07", "--tool", "1", "--assist", arm.cell.url, "--yes").code
+        == 0
+    )
+    unsure = arm.calibrate(
+        "one-touch", "--station", "PIN-07", "--absolute", "--sigma", "0.01", "--no-verify"
+    )
+    assert unsure.document["fit"]["half_width95"] == {}
 
 
 @pytest.mark.parametrize(
@@ -111,6 +121,7 @@ def test_a_sensor_measures_at_its_station_and_nobody_is_asked(cell, method, stat
         assert found[f"{axis}_mm"] == pytest.approx(getattr(cell.truth, f"{axis}_mm"), abs=0.02)
     assert done.document["verification"]["passed"]
     assert "nobody touches anything" in done.err
+    assert ("is to be checked every 90 days" in done.err) is (station == "BEAMS-02")
     assert cell.recorded(EntryKind.DONE)[0].signature.station == station
 
 

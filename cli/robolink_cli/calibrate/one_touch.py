@@ -84,7 +84,9 @@ def _absolute(frame: Frame, controller: "Controller", sigma_mm: float | None) ->
     from robolink.stations import StationKind, pin_of
     from robolink_cli.calibrate._pins import station_at
 
-    return Absolute(pin_of(station_at(frame, controller, StationKind.PIN)), sigma_mm)
+    station = station_at(frame, controller, StationKind.PIN)
+    # Whoever does not know how sure the pin is cannot say how sure the tip is.
+    return Absolute(pin_of(station), sigma_mm if station.sigma_mm else None)
 
 
 def _difference(

@@ -51,7 +51,9 @@ def _interval(result: CalibrationResult) -> str:
 
 def _camera(result: CalibrationResult) -> str:
     """Return what a measurement says about its camera; empty where it says nothing."""
-    from robolink.calibration import CameraCalibration, CameraRound
+    if not result.details():
+        return ""
+    from robolink.calibration import CameraCalibration, CameraRound  # numpy, loaded by then
 
     if isinstance(result, CameraRound) and result.camera_error_mm is not None:
         dx_mm, dy_mm = result.camera_error_mm

@@ -1,6 +1,7 @@
 """The drive of marks before a camera, as places and steps: lifted, turned, down, then a look."""
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from robolink.calibration._camera_station import CameraStation, LookPlan
@@ -64,6 +65,47 @@ class CameraDrive:
             yield Move(here, Path.STRAIGHT, tr("come before the camera from the same side"))
             seen.append((yield from self._look(place)))
         return seen
+
+    def centred(
+        self, places: Sequence[Place], here: Pose, found: Callable[[Sequence[SeenAt]], ToolOffset]
+    ) -> Procedure[ToolOffset]:
+        """Look where marks are, and return where they are to be expected from now on.
+
+        Args:
+            places: What to look at; ends before the camera, at the last of them.
+            here: Where the frame is.
+            found: Makes the expectation of the looks.
+
+        Raises:
+            CalibrationError: ``far_off``: a mark is farther from where it was expected than
+                anything explains; those of :meth:`looks`, and those of ``found``. The frame is
+                lifted then.
+        """
+        seen = yield from self.looks(places, here)
+        try:
+            for place, look in zip(places, seen, strict=True):
+                self._require_near(look, self._middle(place))
+            return found(seen)
+        except CalibrationError:
+            yield from self.lifted(places[-1])
+            raise
+
+    def _require_near(self, look: SeenAt, middle_mm: tuple[float, float]) -> None:
+        away_mm = math.dist(self.station.base_mm(look), middle_mm)
+        if away_mm > self.plan.search_mm:
+            raise CalibrationError(
+                "far_off",
+                tr(
+                    "What the camera found is {away:.2f} mm from where it is expected; up to "
+                    "{limit:g} mm are followed.",
+                    away=away_mm,
+                    limit=self.plan.search_mm,
+                ),
+                remedy=tr(
+                    "Look at the picture: is it the tip? Check the number of the tool, its stored "
+                    "offset, and what a pixel means."
+                ),
+            )
 
     def lifted(self, place: Place) -> Procedure[None]:
         """Lift off the camera from where :meth:`looks` ended."""

@@ -79,6 +79,8 @@ class LookPlan:
         lift_mm: How far the mark is lifted before anything turns.
         centre_first: Look once to find the mark, and bring it to the middle for the measurement:
             there an error of the camera's scale, or of the height, does no harm.
+        search_mm: How far from where it is expected the first look may find the mark; the robot
+            does not follow anything farther.
         beside_mm: Every place is approached from this far beside it in X and Y, always from the
             same side, so that play in the joints shifts all looks alike.
     """
@@ -87,6 +89,7 @@ class LookPlan:
     pictures: int = 3
     lift_mm: float = 10.0
     centre_first: bool = True
+    search_mm: float = 5.0
     beside_mm: float = 1.0
 
     def angles_deg(self, u_deg: float) -> tuple[float, ...]:

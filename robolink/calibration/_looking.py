@@ -54,8 +54,11 @@ def look_at_tip(
     drive, angles_deg = CameraDrive(station, plan, here), plan.angles_deg(here.u_deg)
     if plan.centre_first:
         found = Place(angles_deg[0], tip)
-        (first,) = yield from drive.looks([found], here)
-        tip = solve_up_camera(station.sighting(first), stored=tip).offset
+
+        def expected(looks: Sequence[SeenAt]) -> ToolOffset:
+            return solve_up_camera(station.sighting(looks[0]), stored=stored).offset
+
+        tip = yield from drive.centred([found], here, expected)
         here, centred = drive.pose(found), True
     places = [Place(u_deg, tip) for u_deg in angles_deg]
     seen = yield from drive.looks(places, here, before_camera=centred)

@@ -157,6 +157,23 @@ def test_after_the_first_look_the_tip_is_brought_to_the_middle():
         assert STATION.base_mm(seen) == pytest.approx((STATION.x_mm, STATION.y_mm))
 
 
+def test_a_find_far_from_where_it_is_expected_is_not_followed():
+    cell = tip_cell()
+    cell.wrong = {1: 300.0}
+    with refused("far_off"):
+        cell.run(look_at_tip(STATION, LookPlan(), here=HERE, stored=STORED))
+    assert len(cell.looks) == 1
+    assert cell.frame.z_mm == STATION.z_mm - STORED.z_mm + LookPlan().lift_mm
+
+
+def test_a_first_look_that_means_nothing_ends_lifted_too():
+    cell = tip_cell(off_mm=(2000.0, 0.0))
+    plan = LookPlan(search_mm=5000.0)
+    with refused("implausible_offset"):
+        cell.run(look_at_tip(STATION, plan, here=HERE, stored=STORED))
+    assert cell.frame.z_mm == STATION.z_mm - STORED.z_mm + plan.lift_mm
+
+
 def test_the_look_that_fits_worst_is_offered_and_taken_again():
     cell = tip_cell()
     cell.wrong = {3: 20.0}

@@ -23,8 +23,10 @@ SHARES: Final = 8
 _EVERY = 48
 """Of all other exchanges, every 48th makes the sample."""
 
-_MATTERS = re.compile(r'\$(Log|Execute,"(Tool \d|TLSet \d|Move |Go ))')
-"""Logs in or out, selects, writes or moves."""
+_MATTERS = re.compile(r'\$(Log|Execute,"(Tool \d|Move |Go ))')
+"""Logs in or out, selects or moves."""
+
+_WRITES = re.compile(r'\$Execute,"TLSet \d')
 
 
 @dataclass(frozen=True)
@@ -40,14 +42,18 @@ class Step:
 
 
 def steps_of(requests: list[str], share: int) -> list[Step]:
-    """Return the steps to disturb: all of them, or without the switch a fixed sample."""
+    """Return the steps to disturb: all of them, or without the switch a fixed sample.
+
+    The sample has both moments of a write, and of other steps one.
+    """
     all_of_them = os.environ.get("ROBOLINK_ALL_KILL_POINTS") == "1"
-    chosen = [
-        Step(number, moment, request)
-        for number, request in enumerate(requests, start=1)
-        for moment in MOMENTS
-        if all_of_them or number % _EVERY == 1 or _MATTERS.match(request)
-    ]
+    chosen: list[Step] = []
+    for number, request in enumerate(requests, start=1):
+        if all_of_them or _WRITES.match(request):
+            chosen += [Step(number, moment, request) for moment in MOMENTS]
+        elif number % _EVERY == 1 or _MATTERS.match(request):
+            moment = MOMENTS[len(chosen) % 2]
+            chosen.append(Step(number, moment, request))
     return chosen[share::SHARES]
 
 

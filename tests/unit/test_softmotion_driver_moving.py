@@ -1,5 +1,6 @@
 """Movements of an axis group: marked, sent once, kept alive by whoever waits (design part 7)."""
 
+import signal
 import threading
 from collections.abc import Iterator
 from dataclasses import replace
@@ -394,6 +395,22 @@ def test_a_jog_that_an_interrupt_ends_is_ended_on_the_plc_too(cell, plc, group):
     with pytest.raises(KeyboardInterrupt):
         group.jog(Jog(forward=frozenset({0})), duration_s=5.0, box=ANYWHERE)
     assert plc.executed[-1].operands[:2] == (0, 0)
+    assert cell.open_requests() == []
+
+
+def test_ctrl_c_while_the_marker_of_a_jog_is_stored_leaves_none_and_nothing_begins(
+    cell, plc, group, monkeypatch
+):
+    begin, executed = cell.outcomes.begin, len(plc.executed)
+
+    def interrupted(marker):
+        begin(marker)
+        signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(cell.outcomes, "begin", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        group.jog(Jog(forward=frozenset({0})), duration_s=5.0, box=ANYWHERE)
+    assert not [done for done in plc.executed[executed:] if done.opcode == Opcode.JOG]
     assert cell.open_requests() == []
 
 

@@ -84,6 +84,7 @@ class JogWatch:
         self._end_draft = Command(0, Opcode.JOG, operands=(0, 0, jog.system, 0))
         self.draft = jog.draft(unit_um=mailbox.unit_um)
         self.request = describe(self.draft)
+        self._marker: Marker | None = None
 
     def run(self, duration_s: float) -> Pose:
         """Jog for a time and return where the tip is then.
@@ -96,23 +97,27 @@ class JogWatch:
             RejectedError: The PLC refused it.
             OutcomeUnknownError: No answer came.
         """
-        mailbox = self._mailbox
-        marker = mailbox.desk.begin(MarkerKind.MOVE, self.request, {"duration_s": duration_s})
-        with mailbox.desk.doubt(self.request):
+        with self._mailbox.desk.doubt(self.request):
             try:
-                self._begin(marker)
+                self._begin(duration_s)
                 outside = self._hold(duration_s)
             except KeyboardInterrupt:
-                self._end(marker)
+                if self._marker is not None:
+                    self._end()
                 raise
-            now = self._end(marker)
+            now = self._end()
         if outside is not None:
             raise outside
         return self._pose(now)
 
-    def _begin(self, marker: Marker) -> None:
+    def _begin(self, duration_s: float) -> None:
         mailbox = self._mailbox
         with mailbox.uninterrupted():
+            marker = mailbox.desk.begin(MarkerKind.MOVE, self.request, {"duration_s": duration_s})
+            if mailbox.wire.interrupted:
+                mailbox.desk.clear(marker)
+                raise KeyboardInterrupt  # held back until here: nothing moves after it
+            self._marker = marker
             mailbox.wire.rides.jogging = True
             try:
                 mailbox.orders.start(self.draft)
@@ -133,8 +138,9 @@ class JogWatch:
             now = snapshots.news(now, wait_s=min(LOOK_S, deadline.remaining_s()))
         return None
 
-    def _end(self, marker: Marker) -> Response:
+    def _end(self) -> Response:
         mailbox = self._mailbox
+        marker, self._marker = self._marker, None
         with mailbox.uninterrupted():
             now = mailbox.orders.carry_out(self._end_draft)
             deadline = Deadline.after(mailbox.wire.clock, _REST_S)
@@ -148,7 +154,8 @@ class JogWatch:
                     )
                 now = mailbox.snapshots.news(now)
             mailbox.wire.rides.jogging = False
-            mailbox.desk.clear(marker)
+            if marker is not None:
+                mailbox.desk.clear(marker)
         return now
 
     def _pose(self, now: Response) -> Pose:

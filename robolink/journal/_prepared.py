@@ -5,8 +5,7 @@ cursor: wrapping each transaction and each result for one row costs several time
 takes for the statement itself.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final, TypeAlias
 
 from sqlalchemy import Connection, Dialect
@@ -49,7 +48,7 @@ class Prepared:
 
 
 class Runner:
-    """Runs prepared statements over one connection, and begins and ends its transactions."""
+    """Runs prepared statements over one connection, and ends its transactions."""
 
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
@@ -57,33 +56,6 @@ class Runner:
         driver: Any = connection.connection.dbapi_connection
         self._driver = driver
         self._cursor: DBAPICursor = driver.cursor()
-
-    @contextmanager
-    def transaction(self, begin: "Prepared | None") -> Iterator[None]:
-        """Make a block durable as a whole; an exception undoes all of it.
-
-        Args:
-            begin: Statement that takes the write lock; ``None`` where the driver begins.
-
-        Raises:
-            DBAPIError: The database refuses; nothing is stored.
-        """
-        if begin is not None:
-            self.run(begin)
-        try:
-            yield
-        except BaseException:
-            self.roll_back()
-            raise
-        self.commit()
-
-    @contextmanager
-    def reading(self) -> Iterator[None]:
-        """Leave nothing open that a block has read."""
-        try:
-            yield
-        finally:
-            self.roll_back()
 
     def commit(self) -> None:
         """Make durable what was done since the last end.

@@ -3,7 +3,7 @@
 import os
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 
 from sqlalchemy import Connection, Engine
 from sqlalchemy.exc import SQLAlchemyError
@@ -61,8 +61,7 @@ class Store:
         """Whether it outlives this process."""
         return bool(self._place.path or self._place.url)
 
-    @contextmanager
-    def write(self, consequence: str = "") -> Iterator[Tables]:
+    def write(self, consequence: str = "") -> AbstractContextManager[Tables]:
         """Run a block as one durable transaction; an exception undoes all of it.
 
         Args:
@@ -76,15 +75,10 @@ class Store:
                 tr("The journal {name} was opened for reading only.", name=self._place.name),
                 remedy=tr("Open it for writing to add to it."),
             )
-        with (
-            self._use(consequence) as (backend, tables),
-            tables.runner.transaction(backend.begin_writing),
-        ):
-            yield tables
+        return self._use(consequence, writing=True)
 
-    @contextmanager
-    def read(self, consequence: str = "") -> Iterator[Tables]:
-        """Run a block that only reads.
+    def read(self, consequence: str = "") -> AbstractContextManager[Tables]:
+        """Run a block that only reads, and leave nothing open.
 
         Args:
             consequence: What a failure means for the controller, one sentence.
@@ -92,8 +86,7 @@ class Store:
         Raises:
             JournalError: It cannot be read.
         """
-        with self._use(consequence) as (_, tables), tables.runner.reading():
-            yield tables
+        return self._use(consequence, writing=False)
 
     def open(self) -> None:
         """Connect now, and bring older tables up to date.
@@ -101,7 +94,7 @@ class Store:
         Raises:
             JournalError: That is impossible.
         """
-        with self._use(tr("The controller was not touched.")):
+        with self.read(tr("The controller was not touched.")):
             pass
 
     def close(self) -> None:
@@ -113,10 +106,22 @@ class Store:
                 self._backend = None
 
     @contextmanager
-    def _use(self, consequence: str) -> Iterator[tuple[Backend, Tables]]:
+    def _use(self, consequence: str, *, writing: bool) -> Iterator[Tables]:
         with self._lock:
             try:
-                yield self._connected()
+                backend, tables = self._connected()
+                runner = tables.runner
+                if writing and backend.begin_writing is not None:
+                    runner.run(backend.begin_writing)
+                try:
+                    yield tables
+                except BaseException:
+                    runner.roll_back()
+                    raise
+                if writing:
+                    runner.commit()
+                else:
+                    runner.roll_back()
             except JournalError:
                 self._drop()
                 raise

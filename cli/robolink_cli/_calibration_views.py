@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
+from robolink.calibration import VerifyResult
 from robolink.messages import tr
 from robolink.nozzle_change import PlannedStep, Proposal, ToolReport, Verdict
 from robolink_cli._doubts import doubts as doubts
@@ -69,12 +70,19 @@ def show_report(report: ToolReport) -> None:
                 distance=drift.distance_mm,
             )
         )
-    say(
-        tr(
-            "Turned about the new tip it drifts {drift:.3f} mm at most ({limit:.3f} mm allowed).",
-            drift=report.verification.max_drift_mm,
-            limit=report.verification.tolerance_mm,
+    say(_proof(report.verification))
+
+
+def _proof(verification: VerifyResult) -> str:
+    """Return how the verification ended, in one sentence."""
+    found = {"drift": verification.max_drift_mm, "limit": verification.tolerance_mm}
+    if verification.heights_only:
+        return tr(
+            "Touched again it is {drift:.3f} mm off at most ({limit:.3f} mm allowed).", **found
         )
+    return tr(
+        "Turned about the new tip it drifts {drift:.3f} mm at most ({limit:.3f} mm allowed).",
+        **found,
     )
 
 

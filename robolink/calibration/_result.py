@@ -119,6 +119,11 @@ class VerifyResult:
         return max(drift.distance_mm for drift in self.drifts)
 
     @property
+    def heights_only(self) -> bool:
+        """Whether only Z was judged, as by touching a surface."""
+        return not any(drift.dx_mm or drift.dy_mm for drift in self.drifts)
+
+    @property
     def passed(self) -> bool:
         """Whether every drift is inside the tolerance."""
         return self.max_drift_mm <= self.tolerance_mm

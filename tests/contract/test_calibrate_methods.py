@@ -121,6 +121,8 @@ def test_a_sensor_measures_at_its_station_and_nobody_is_asked(cell, method, stat
         assert found[f"{axis}_mm"] == pytest.approx(getattr(cell.truth, f"{axis}_mm"), abs=0.02)
     assert done.document["verification"]["passed"]
     assert "nobody touches anything" in done.err
+    proof = "Touched again it is" if method == "z-touch" else "Turned about the new tip it drifts"
+    assert proof in done.err
     assert ("is to be checked every 90 days" in done.err) is (station == "BEAMS-02")
     assert cell.recorded(EntryKind.DONE)[0].signature.station == station
 

@@ -40,7 +40,7 @@ def pivot(
         plan: Lift and clearance.
         tilts: Orientations of the further touches, counted from the first one.
         stored: The offset stored now; the approaches use it. Where it is wrong by e, the tip comes
-            down nearer to the pin by up to e sin(tilt).
+            down nearer to the pin by up to 2 e sin(tilt / 2).
         sigma_mm: Standard deviation of one coordinate of one touch, where it is known.
         course: When it ends, and whether a pose may be taken again.
 

@@ -88,7 +88,9 @@ def _chain(result: CalibrationResult) -> str:
 
 def show_residuals(result: CalibrationResult) -> None:
     """Show the residual of every pose."""
-    rows = []
+    rows, names = [], ["u_deg"]
+    if any(pose.v_deg or pose.w_deg for pose in result.inputs):
+        names += ["v_deg", "w_deg"]
     for index, residual in enumerate(result.residuals_mm):
         pose = result.inputs[index] if index < len(result.inputs) else None
         # A single component is a height.
@@ -96,11 +98,12 @@ def show_residuals(result: CalibrationResult) -> None:
         rows.append(
             [
                 str(index + 1),
-                number(pose.u_deg if pose else None),
+                *(number(getattr(pose, name, None)) for name in names),
                 *map(number, parts),
                 number(result.residual_distances_mm[index]),
                 tr("left out") if index in result.rejected else "",
             ]
         )
-    columns = (tr("pose"), "U deg", "dX mm", "dY mm", "dZ mm", tr("distance mm"), "")
+    angles = (f"{name[0].upper()} deg" for name in names)
+    columns = (tr("pose"), *angles, "dX mm", "dY mm", "dZ mm", tr("distance mm"), "")
     table(tr("residuals"), columns, rows)

@@ -87,6 +87,7 @@ def verification_payload(result: VerifyResult | None) -> dict[str, object] | Non
                 "u_deg": drift.u_deg,
                 "dx_mm": drift.dx_mm,
                 "dy_mm": drift.dy_mm,
+                "dz_mm": drift.dz_mm,
                 "distance_mm": drift.distance_mm,
             }
             for drift in result.drifts

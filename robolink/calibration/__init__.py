@@ -6,6 +6,8 @@ at the controller should not wait for it.
 
 from typing import TYPE_CHECKING
 
+from robolink.calibration._angle_touches import n_angle as n_angle
+from robolink.calibration._angle_touches import telling_order as telling_order
 from robolink.calibration._camera_model import CameraLimits as CameraLimits
 from robolink.calibration._camera_model import CameraModel as CameraModel
 from robolink.calibration._camera_model import require_same_camera as require_same_camera
@@ -19,8 +21,6 @@ from robolink.calibration._impact import Impact as Impact
 from robolink.calibration._impact import PointImpact as PointImpact
 from robolink.calibration._impact import impact_on as impact_on
 from robolink.calibration._many_touches import Course as Course
-from robolink.calibration._many_touches import n_angle as n_angle
-from robolink.calibration._many_touches import telling_order as telling_order
 from robolink.calibration._moved_station import StationShift as StationShift
 from robolink.calibration._moved_station import TipShift as TipShift
 from robolink.calibration._moved_station import judge_shifts as judge_shifts
@@ -119,6 +119,12 @@ if TYPE_CHECKING:
     from robolink.calibration._suggest import PosePlan as PosePlan
     from robolink.calibration._suggest import precise_enough as precise_enough
     from robolink.calibration._suggest import suggest_poses as suggest_poses
+    from robolink.calibration._tilted_touches import pivot as pivot
+    from robolink.calibration._tilted_touches import verify_by_tilting as verify_by_tilting
+    from robolink.calibration._tilts import OverPin as OverPin
+    from robolink.calibration._tilts import Tilt as Tilt
+    from robolink.calibration._tilts import proving_tilts as proving_tilts
+    from robolink.calibration._tilts import telling_tilts as telling_tilts
     from robolink.calibration._touching_off import touch_off as touch_off
     from robolink.calibration._touching_off import verify_by_touching as verify_by_touching
     from robolink.calibration._update_guard import NEEDLE_LIMIT_MM as NEEDLE_LIMIT_MM
@@ -186,6 +192,12 @@ _LOADED_LATER = {
     "PosePlan": "_suggest",
     "precise_enough": "_suggest",
     "suggest_poses": "_suggest",
+    "pivot": "_tilted_touches",
+    "verify_by_tilting": "_tilted_touches",
+    "OverPin": "_tilts",
+    "Tilt": "_tilts",
+    "proving_tilts": "_tilts",
+    "telling_tilts": "_tilts",
     "touch_off": "_touching_off",
     "verify_by_touching": "_touching_off",
     "Correction": "_update_guard",

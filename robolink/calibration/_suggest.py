@@ -1,29 +1,19 @@
-"""Which poses to take: the plan with the best condition that limits and workspace allow.
+"""Which poses to take: the plan with the best condition that limits and workspace allow."""
 
-How well a tip will be known depends on orientations alone. With Rm their mean, the tip's
-covariance is sigma^2 (N I - N Rm' Rm)^-1; the plan makes its trace as small as it can.
-"""
-
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from robolink.calibration._result import CalibrationResult
-from robolink.calibration._robust import Floats
 from robolink.calibration._rotations import pose_arrays, rotations
 from robolink.calibration._scatter import require_positive
+from robolink.calibration._telling import most_telling, sigma_gain
 from robolink.errors import CalibrationError, ConfigError, LimitError
 from robolink.messages import tr
 from robolink.model import Pose, ToolOffset, WorkBox
 
 U_STEP_DEG = 15.0
-
-_EXCHANGES = 20
-
-# Makes two poses comparable before any combination of them tells everything.
-_FAINT = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,10 +81,9 @@ def suggest_poses(
     size = 3 if limits.tilt_deg > 0 else 2
     turned = pose_arrays(candidates)[1][:, :size, :size]
     before = pose_arrays(taken)[1][:, :size, :size] if taken else np.zeros((0, size, size))
-    chosen = _exchanged(turned, before, _greedy(turned, before, range(len(turned)), count))
-    order = _greedy(turned, before, chosen, count)
+    order = most_telling(turned, before, count)
     gains = [
-        _sigma_gain(np.concatenate((before, turned[order[: k + 1]]))) for k in range(len(order))
+        sigma_gain(np.concatenate((before, turned[order[: k + 1]]))) for k in range(len(order))
     ]
     return PosePlan(tuple(candidates[index] for index in order), tuple(gains))
 
@@ -145,50 +134,3 @@ def _allowed(pose: Pose, box: WorkBox | None) -> bool:
     except LimitError:
         return False
     return True
-
-
-def _greedy(turned: Floats, before: Floats, among: Sequence[int], count: int) -> list[int]:
-    """Return indices into ``turned``, each the best addition to those before it."""
-    chosen: list[int] = []
-    left = list(among)
-    for _ in range(count):
-        costs = _costs(np.concatenate((before, turned[chosen])), turned[left])
-        best = left[int(np.argmin(costs))]
-        chosen.append(best)
-        if len(left) > 1:
-            left.remove(best)
-    return chosen
-
-
-def _exchanged(turned: Floats, before: Floats, chosen: list[int]) -> list[int]:
-    """Replace one pose after the other while that makes the plan better."""
-    for _ in range(_EXCHANGES):
-        earlier = list(chosen)
-        for place in range(len(chosen)):
-            others = chosen[:place] + chosen[place + 1 :]
-            free = [index for index in range(len(turned)) if index not in others] or others
-            costs = _costs(np.concatenate((before, turned[others])), turned[free])
-            best = int(np.argmin(costs))
-            if costs[best] < costs[free.index(chosen[place])] * (1 - 1e-9):
-                chosen[place] = free[best]
-        if chosen == earlier:
-            break
-    return chosen
-
-
-def _costs(base: Floats, additions: Floats) -> Floats:
-    """Return the trace of the covariance after each single addition to ``base``."""
-    count = len(base) + 1
-    mean = (base.sum(axis=0) + additions) / count
-    size = additions.shape[-1]
-    told = count * (np.eye(size) - mean.transpose(0, 2, 1) @ mean)
-    costs: Floats = (1 / np.maximum(np.linalg.eigvalsh(told), _FAINT)).sum(axis=1)
-    return costs
-
-
-def _sigma_gain(turned: Floats) -> float:
-    mean = turned.mean(axis=0)
-    told = len(turned) * (np.eye(turned.shape[-1]) - mean.T @ mean)
-    if float(np.linalg.eigvalsh(told)[0]) < _FAINT:
-        return math.inf
-    return math.sqrt(float(np.linalg.inv(told).diagonal().max()))

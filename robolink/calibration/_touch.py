@@ -64,7 +64,7 @@ def travel(target: Pose, *, here: Pose, purpose: str) -> Procedure[None]:
     above = replace(target, z_mm=top_mm)
     if here.z_mm < top_mm:
         yield Move(replace(here, z_mm=top_mm), Path.STRAIGHT, purpose)
-    if above.coordinates()[:2] != here.coordinates()[:2] or above.u_deg != here.u_deg:
+    if above.coordinates() != replace(here, z_mm=top_mm).coordinates():
         yield Move(above, Path.JOINT, purpose)
     if target.z_mm < top_mm:
         yield Move(target, Path.STRAIGHT, purpose)

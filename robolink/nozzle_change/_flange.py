@@ -47,6 +47,22 @@ def tilted_flange_pose(tip: Pose, offset: ToolOffset) -> Pose:
     )
 
 
+def tilted_from(written: ToolOffset, tip: ToolOffset) -> ToolOffset:
+    """Return where a tip is, seen from the frame of a written offset of a six-axis robot."""
+    from robolink.calibration import rotation_of  # numpy, which four axes do without
+
+    own = rotation_of(Pose(0.0, 0.0, 0.0, written.u_deg, written.v_deg, written.w_deg))
+    aside = [b - a for a, b in zip(written.components(), tip.components(), strict=True)][:3]
+    x_mm, y_mm, z_mm = (own.T @ aside).tolist()
+    return ToolOffset(x_mm, y_mm, z_mm)
+
+
+def flange_of(tip: Pose, offset: ToolOffset) -> Pose:
+    """Return where the flange is, on four axes and on more."""
+    tilted = (tip.v_deg, tip.w_deg, offset.v_deg, offset.w_deg) != (0.0, 0.0, 0.0, 0.0)
+    return tilted_flange_pose(tip, offset) if tilted else flange_pose(tip, offset)
+
+
 def seen_from(written: ToolOffset, tip: ToolOffset) -> ToolOffset:
     """Return where a tip is, seen from the frame of a written offset of a four-axis robot."""
     dx, dy = rotate_xy(tip.x_mm - written.x_mm, tip.y_mm - written.y_mm, -written.u_deg)

@@ -36,8 +36,8 @@ class Limits:
             start: Flange pose at the start; the box lies about it.
             offset: The tip that moves, ``None`` for the flange.
         """
-        shift_z = offset.z_mm if offset else 0.0
-        reach = self.box_mm + (math.hypot(offset.x_mm, offset.y_mm) if offset else 0.0)
+        shift_z, aside = _tip_about(start, offset) if offset else (0.0, 0.0)
+        reach = self.box_mm + aside
         box = WorkBox(
             start.x_mm - reach,
             start.x_mm + reach,
@@ -106,6 +106,15 @@ class ChangePlan:
     def moves(self) -> bool:
         """Whether the robot moves."""
         return any(plan.moving for plan in self.tools)
+
+
+def _tip_about(flange: Pose, offset: ToolOffset) -> tuple[float, float]:
+    """Return how far above a flange a tip is, and how far beside it at most, whatever its U."""
+    x_mm, y_mm, z_mm = offset.components()[:3]
+    v, w = math.radians(flange.v_deg), math.radians(flange.w_deg)
+    above_mm = -math.sin(v) * x_mm + math.cos(v) * (math.sin(w) * y_mm + math.cos(w) * z_mm)
+    beside_mm2 = x_mm**2 + y_mm**2 + z_mm**2 - above_mm**2
+    return above_mm, math.sqrt(max(0.0, beside_mm2))
 
 
 def require_ready(plan: ChangePlan) -> None:

@@ -18,7 +18,7 @@ from robolink.model import (
     SpotUnit,
     ToolOffset,
 )
-from robolink.nozzle_change._flange import flange_pose
+from robolink.nozzle_change._flange import flange_of
 from robolink.nozzle_change._plan import ChangePlan
 from robolink.nozzle_change._source import MovingSource
 from robolink.runner import RunSettings
@@ -74,7 +74,7 @@ def flange_now(controller: Controller) -> Pose:
     """Read where the flange is, whatever tool is in force."""
     here = controller.groups[0].pose()
     selected = controller.tools.read(here.tool) if here.tool else None
-    return flange_pose(here, selected or ToolOffset())
+    return flange_of(here, selected or ToolOffset())
 
 
 def require_inside(controller: Controller, steps: Sequence[PlannedStep]) -> None:

@@ -29,11 +29,12 @@ def verification(report: Report) -> Iterator[Element]:
         figure(result.tolerance_mm),
         tr(" mm are allowed."),
     )
-    yield table(
-        ("U deg", "dX mm", "dY mm", tr("distance mm")), [_row(drift) for drift in result.drifts]
-    )
+    heights = any(drift.dz_mm for drift in result.drifts)
+    columns = ("U deg", "dX mm", "dY mm", *(["dZ mm"] if heights else []), tr("distance mm"))
+    yield table(columns, [_row(drift, heights=heights) for drift in result.drifts])
 
 
-def _row(drift: Drift) -> Element:
-    values = (drift.u_deg, drift.dx_mm, drift.dy_mm, drift.distance_mm)
+def _row(drift: Drift, *, heights: bool) -> Element:
+    height = (drift.dz_mm,) if heights else ()
+    values = (drift.u_deg, drift.dx_mm, drift.dy_mm, *height, drift.distance_mm)
     return element("tr", *(element("td", figure(value)) for value in values))

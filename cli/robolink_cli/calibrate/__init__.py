@@ -46,7 +46,7 @@ METHODS: Final = {
     ),
     "pivot": (
         "robolink_cli.calibrate.pivot:pivot",
-        tr("Tilted touches of one pin, taught on the pendant: X, Y and Z, on six axes."),
+        tr("Touch one pin with the tool tilted and turned: X, Y and Z, on five axes or six."),
     ),
     "six-point": (
         "robolink_cli.calibrate.six_point:six_point",

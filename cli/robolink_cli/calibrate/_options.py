@@ -71,6 +71,18 @@ def touch_options(function: Callable[..., Any]) -> Callable[..., Any]:
     return command
 
 
+def until_option(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Add ``--until``."""
+    command: Callable[..., Any] = motion_option(
+        "--until",
+        "until_mm",
+        type=_LENGTH,
+        metavar="MM",
+        help=tr("End before the last touch when half the 95 % interval is at most this."),
+    )(function)
+    return command
+
+
 def pin_option(function: Callable[..., Any]) -> Callable[..., Any]:
     """Add ``--station`` for a pin."""
     command: Callable[..., Any] = click.option(

@@ -12,6 +12,7 @@ from robolink_cli.calibrate._options import (
     pin_option,
     sigma_option,
     touch_options,
+    until_option,
 )
 
 
@@ -28,13 +29,7 @@ from robolink_cli.calibrate._options import (
     metavar="0,120,..",
     help=tr("Instead of --count: U of each touch, counted from the first one, which is 0."),
 )
-@motion_option(
-    "--until",
-    "until_mm",
-    type=click.FloatRange(min=0, min_open=True),
-    metavar="MM",
-    help=tr("End before the last touch when half the 95 % interval is at most this."),
-)
+@until_option
 @touch_options
 @sigma_option
 @pin_option

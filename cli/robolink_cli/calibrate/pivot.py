@@ -1,14 +1,45 @@
-"""calibrate pivot: one pin touched in tilted orientations, on six axes."""
+"""calibrate pivot: one pin touched in tilted orientations, on five axes and six."""
+
+from typing import TYPE_CHECKING
 
 import click
 
 from robolink.messages import tr
+from robolink_cli._motion_options import motion_option
 from robolink_cli._pose_source import PoseSource, pose_source_options
 from robolink_cli.calibrate._frame import Frame
-from robolink_cli.calibrate._options import calibration_options, pin_option, sigma_option
+from robolink_cli.calibrate._options import (
+    calibration_options,
+    pin_option,
+    sigma_option,
+    touch_options,
+    until_option,
+)
+
+if TYPE_CHECKING:
+    from robolink.model import Controller
+    from robolink.nozzle_change import TiltedPin
 
 
 @click.command("pivot")
+@motion_option(
+    "--count",
+    type=click.IntRange(4, 12),
+    default=6,
+    show_default=True,
+    help=tr("Number of touches, the first one in the orientation in which the tool stands."),
+)
+@motion_option(
+    "--tilt",
+    "tilt_deg",
+    type=click.FloatRange(5, 45),
+    default=20.0,
+    metavar="DEG",
+    show_default=True,
+    help=tr("How far the tool leans in the others, against the first one."),
+)
+@until_option
+@touch_options
 @sigma_option
 @pin_option
 @pose_source_options(
@@ -18,19 +49,40 @@ from robolink_cli.calibrate._options import calibration_options, pin_option, sig
 )
 @calibration_options
 def pivot(
-    frame: Frame, *, sigma_mm: float | None, station: str | None, poses: PoseSource | None
+    frame: Frame,
+    *,
+    count: int,
+    tilt_deg: float,
+    until_mm: float | None,
+    lift_mm: float,
+    clearance_mm: float,
+    sigma_mm: float | None,
+    station: str | None,
+    poses: PoseSource | None,
 ) -> None:
-    """Touch one pin with the tool tilted and turned: X, Y and Z, on six axes.
+    """Touch one pin with the tool tilted and turned: X, Y and Z, on five axes or six.
 
-    The poses are taken by a person on the pendant and given with --points, --pose or --poses; tilt
-    by 15 to 45 degrees and turn as well. A robot whose tool only turns about Z cannot do this.
+    Put the tip some millimetres above a fixed pin first, the tool as it stands in production. After
+    the first touch the robot lifts it, tilts and turns it in the air, and comes down to a
+    clearance; you do the rest. The tool must be defined already, to a millimetre or two. A robot
+    whose tool only turns about Z cannot do this.
+
+    With --points, --pose or --poses the touches exist already: nothing moves.
     """
-    from robolink.nozzle_change import PivotTouches
+    from robolink.calibration import Course, telling_tilts
+    from robolink.nozzle_change import PivotTouches, TiltedPin
+    from robolink_cli.calibrate._tilting import require_tilting
+    from robolink_cli.calibrate._touch_plan import touch_plan
 
     frame = frame.at_pin(station)
-    if poses is None:
-        from robolink_cli.calibrate._tilting import refuse_live
-
-        refuse_live(frame, "pivot")
+    touch = touch_plan(lift_mm, clearance_mm)
+    if poses is not None:
+        frame.solve(poses, lambda _controller: PivotTouches(sigma_mm))
         return
-    frame.solve(poses, lambda _controller: PivotTouches(sigma_mm))
+    tilts, course = telling_tilts(count - 1, tilt_deg), Course(until_mm, retake=True)
+
+    def source(controller: "Controller") -> "TiltedPin":
+        require_tilting(controller, "pivot")
+        return TiltedPin(tilts, touch, sigma_mm=sigma_mm, course=course)
+
+    frame.measure(source)

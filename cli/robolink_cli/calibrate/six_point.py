@@ -1,10 +1,12 @@
 """calibrate six-point: position and orientation of a tool, on six axes."""
 
-from typing import Literal
+from typing import Literal, NoReturn
 
 import click
 
+from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink_cli._context import open_controller
 from robolink_cli._pose_source import PoseSource, pose_source_options
 from robolink_cli.calibrate._frame import Frame
 from robolink_cli.calibrate._options import calibration_options, sigma_option
@@ -41,8 +43,24 @@ def six_point(
     from robolink.nozzle_change import SixPoints
 
     if poses is None:
-        from robolink_cli.calibrate._tilting import refuse_live
-
-        refuse_live(frame, "six-point")
-        return
+        _refuse_live(frame)
     frame.solve(poses, lambda _controller: SixPoints(second_is, sigma_mm))
+
+
+def _refuse_live(frame: Frame) -> NoReturn:
+    """Say what to do instead of driving the ways along the tool's axes; reads only.
+
+    Raises:
+        CalibrationError: ``rank_deficient``: this robot cannot tilt its tool at all.
+        ConfigError: It can; but the last two poses are driven by a person.
+    """
+    from robolink_cli.calibrate._tilting import require_tilting
+
+    with open_controller(frame.context) as controller:
+        require_tilting(controller, "six-point")
+    raise ConfigError(
+        tr("six-point is solved from poses that were taught; robolink drives none for it."),
+        remedy=tr(
+            "Teach them and give --points, --pose or --poses. X, Y and Z alone: 'calibrate pivot'."
+        ),
+    )

@@ -1,0 +1,87 @@
+"""A tip touched onto a pin at several angles of U."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from robolink.calibration._many_touches import ALL_OF_THEM, Course, many_touches
+from robolink.calibration._planar_checks import planar_sigma_gain
+from robolink.calibration._result import CalibrationResult
+from robolink.calibration._steps import Ask, Procedure
+from robolink.calibration._touch import TouchPlan, lift_off, touch_again
+from robolink.messages import tr
+from robolink.model import Pose, ToolOffset, angle_difference_deg
+
+
+def n_angle(
+    plan: TouchPlan,
+    *,
+    turns_deg: Sequence[float],
+    stored: ToolOffset | None,
+    sigma_mm: float | None = None,
+    course: Course = ALL_OF_THEM,
+) -> Procedure[CalibrationResult]:
+    """Measure a tip on a pin at several angles. Runs in Tool 0; see :func:`many_touches`.
+
+    Args:
+        plan: Lift and clearance.
+        turns_deg: Angles of the further touches, counted from the first one.
+        stored: The offset stored now; the approaches use it.
+        sigma_mm: Standard deviation of one coordinate of one touch, where it is known.
+        course: When it ends, and whether a pose may be taken again.
+
+    Raises:
+        CalibrationError: As :func:`solve_n_angle`.
+    """
+    first: Pose = yield Ask(tr("Bring the tip onto the pin."))
+    yield lift_off(plan, first)
+    # Within half a turn of zero: adding up from touch to touch leaves the joint's range.
+    angles = [angle_difference_deg(first.u_deg + turn_deg, 0.0) for turn_deg in turns_deg]
+    turning = _Turning(plan, stored, sigma_mm)
+    return (yield from many_touches(turning, first, [first.u_deg, *angles], course))
+
+
+def telling_order(turns_deg: Sequence[float]) -> tuple[float, ...]:
+    """Return the same angles, those first that tell the most together with the ones before.
+
+    The first touch is at 0. Whoever ends early then ends with angles that are spread well.
+    """
+    chosen, left = [0.0], list(turns_deg)
+    while left:
+        best = min(left, key=lambda turn: (round(_gain([*chosen, turn]), 9), left.index(turn)))
+        left.remove(best)
+        chosen.append(best)
+    return tuple(chosen[1:])
+
+
+@dataclass(frozen=True, slots=True)
+class _Turning:
+    """Touches at angles of U; implements :class:`Touching`."""
+
+    plan: TouchPlan
+    stored: ToolOffset | None
+    sigma_mm: float | None
+
+    @property
+    def measured(self) -> str:
+        return tr("X and Y")
+
+    def touch(self, touches: Sequence[Pose], place: float) -> Procedure[Pose]:
+        return touch_again(self.plan, touches[-1], place, self.stored or ToolOffset())
+
+    def foreseen(self, place: float) -> Pose:
+        return Pose(0.0, 0.0, 0.0, place)
+
+    def solve(self, touches: Sequence[Pose]) -> CalibrationResult:
+        from robolink.calibration._n_angle import solve_n_angle  # numpy, not for --help
+
+        return solve_n_angle(touches, stored=self.stored, sigma_mm=self.sigma_mm)
+
+    def gain(self, poses: Sequence[Pose]) -> float:
+        return planar_sigma_gain(poses)
+
+    def named(self, pose: Pose) -> str:
+        return tr("U {u:.1f}", u=pose.u_deg)
+
+
+def _gain(turns_deg: Sequence[float]) -> float:
+    return planar_sigma_gain([Pose(0.0, 0.0, 0.0, turn) for turn in turns_deg])

@@ -1,0 +1,111 @@
+"""A pin in the cell, a person who brings the tip onto it, and a robot that can tilt its tool."""
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from robolink.calibration import CalibrationResult, Course, Procedure, TouchPlan, VerifyResult
+from robolink.errors import ConfigError
+from robolink.messages import tr
+from robolink.model import Pose, ToolOffset
+from robolink.nozzle_change._flange import tilted_from
+from robolink.nozzle_change._source import Bench
+
+if TYPE_CHECKING:
+    from robolink.calibration import Tilt
+
+
+@dataclass(frozen=True, slots=True)
+class TiltedPin:
+    """Measures by touching one pin with the tool tilted and turned.
+
+    Attributes:
+        tilts: Orientations of the touches after the first; see
+            :func:`~robolink.calibration.telling_tilts`.
+        touch: Lift and clearance.
+        sigma_mm: Standard deviation of one coordinate of one placement, where it is known.
+        course: When a measurement ends, and whether a pose is offered again.
+    """
+
+    tilts: "tuple[Tilt, ...]"
+    touch: TouchPlan = field(default_factory=TouchPlan)
+    sigma_mm: float | None = None
+    course: Course = field(default_factory=Course)
+
+    @property
+    def sentence(self) -> str:
+        """What it does, for a report."""
+        return tr(
+            "measured on the robot: one pin touched in {count} orientations, tilted by {tilt:g} "
+            "degrees",
+            count=len(self.tilts) + 1,
+            tilt=self._tilt_deg,
+        )
+
+    @property
+    def remedy(self) -> str:
+        """What to do when a measurement makes the tip jump."""
+        return tr(
+            "Check that all poses touched the same point. If the change is real, allow it with "
+            "--max-change."
+        )
+
+    def measure(self, bench: Bench, tool: int, stored: ToolOffset | None) -> CalibrationResult:  # noqa: ARG002 - the flange is what moves
+        """Touch and solve; see :class:`~robolink.nozzle_change.MovingSource`."""
+        bench.controller.tools.select(0)
+        return bench.run(self._steps(stored, self.course))
+
+    def procedure(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:  # noqa: ARG002 - the person brings the tip to the pin
+        """Return the steps of a measurement; see :class:`~robolink.nozzle_change.MovingSource`.
+
+        All of them: when it ends early depends on touches that nobody has made yet.
+        """
+        return self._steps(stored, Course())
+
+    def verify(
+        self,
+        bench: Bench,
+        tool: int,
+        result: CalibrationResult,
+        *,
+        tip: ToolOffset,
+        tolerance_mm: float,
+    ) -> VerifyResult:
+        """Tilt about the new tip; see :class:`~robolink.nozzle_change.MovingSource`."""
+        from robolink.calibration import OverPin, proving_tilts, verify_by_tilting  # numpy
+
+        bench.controller.tools.select(tool)
+        x_mm, y_mm, z_mm = result.reference_point_mm
+        over = OverPin(
+            bench.controller.groups[0].pose(),
+            (x_mm, y_mm, z_mm),
+            tip=tilted_from(result.offset, tip),
+            frame=result.offset,
+        )
+        procedure = verify_by_tilting(
+            self.touch, over=over, tilts=proving_tilts(self._tilt_deg), tolerance_mm=tolerance_mm
+        )
+        return bench.run(procedure, tip=result.offset)
+
+    @property
+    def _tilt_deg(self) -> float:
+        return max(abs(tilt.lean_deg) for tilt in self.tilts)
+
+    def _steps(self, stored: ToolOffset | None, course: Course) -> Procedure[CalibrationResult]:
+        """Return the steps.
+
+        Raises:
+            ConfigError: Nobody knows about where the tip is, so it cannot be kept off the pin.
+        """
+        from robolink.calibration import pivot  # numpy, which a look does without
+
+        if stored is None:
+            raise ConfigError(
+                tr("The tool is not defined, so a tilt would swing its tip nobody knows where to."),
+                remedy=tr(
+                    "Write about where the tip is with 'tool set', to a millimetre or two, and "
+                    "measure then."
+                ),
+            )
+        return pivot(
+            self.touch, tilts=self.tilts, stored=stored, sigma_mm=self.sigma_mm, course=course
+        )

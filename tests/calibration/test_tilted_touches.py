@@ -1,0 +1,188 @@
+"""A pivot with a person at the pin: the way there, what it tells, the truth in its interval."""
+
+import math
+import random
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from robolink.calibration import (
+    Ask,
+    Course,
+    Move,
+    Offer,
+    OverPin,
+    Tell,
+    Tilt,
+    TouchPlan,
+    pivot,
+    rotation_of,
+    telling_tilts,
+    verify_by_tilting,
+)
+from robolink.errors import CalibrationError
+from robolink.model import Hand, Path, Pose, ToolOffset
+
+STORED = ToolOffset(12.0, -3.5, -20.0)
+TIP = ToolOffset(12.4, -3.2, -20.5)
+PIN = np.array([300.0, 100.0, -60.0])
+PLAN = TouchPlan(lift_mm=10.0, clearance_mm=2.0)
+FRAMES = (
+    Pose(0.0, 0.0, 0.0, 72.0, tool=0),
+    # A six-axis arm whose flange points down, and one that stands askew.
+    Pose(0.0, 0.0, 0.0, -150.0, 0.0, 180.0, hand=Hand.RIGHT, tool=0),
+    Pose(0.0, 0.0, 0.0, 30.0, 8.0, -12.0, tool=0),
+)
+UPRIGHT = FRAMES[0]
+
+
+def tip_mm(pose, tip=TIP):
+    """Return where the tip is with the flange in a pose."""
+    return np.array(pose.coordinates()[:3]) + rotation_of(pose) @ tip.components()[:3]
+
+
+def turned_deg(one, other):
+    """Return by which angle two orientations differ."""
+    cosine = (np.trace(rotation_of(one).T @ rotation_of(other)) - 1) / 2
+    return math.degrees(math.acos(np.clip(cosine, -1.0, 1.0)))
+
+
+class Person:
+    """Touches the pin with an error, and keeps where the flange went."""
+
+    def __init__(self, start=UPRIGHT, *, sigma_mm=0.01, slips=(), accepts=0, seed=1, stiff=False):
+        self._random = random.Random(seed)
+        self._here = start
+        self._sigma_mm, self._slips, self._accepts = sigma_mm, set(slips), accepts
+        self._stiff = stiff
+        self.steps, self.touches, self.offers, self.told = [], [], [], []
+
+    def run(self, procedure, tip=TIP):
+        """Answer every step; return the result."""
+        answer = None
+        try:
+            while True:
+                answer = self._answer(procedure.send(answer), tip)
+        except StopIteration as finished:
+            return finished.value
+
+    def _answer(self, step, tip):
+        match step:
+            case Ask():
+                error = [self._random.gauss(0, self._sigma_mm) for _ in "xyz"]
+                if len(self.touches) + 1 in self._slips:
+                    error[0] += 0.4
+                x, y, z = (PIN + error - rotation_of(self._here) @ tip.components()[:3]).tolist()
+                self._here = replace(self._here, x_mm=x, y_mm=y, z_mm=z)
+                self.touches.append(self._here)
+                return self._here
+            case Move():
+                angles = ("u_deg", "v_deg", "w_deg") if self._stiff else ()
+                kept = {name: getattr(self._here, name) for name in angles}
+                before, self._here = self._here, replace(step.target, **kept)
+                self.steps.append((step, before, self._here))
+                return self._here
+            case Tell():
+                self.told.append(step.text)
+                return None
+            case Offer():
+                self.offers.append(step.question)
+                return len(self.offers) <= self._accepts
+
+
+def course(person, *, count=6, tilt_deg=20.0, sigma_mm=None, **how):
+    tilts = telling_tilts(count - 1, tilt_deg)
+    return person.run(
+        pivot(PLAN, tilts=tilts, stored=STORED, sigma_mm=sigma_mm, course=Course(**how))
+    )
+
+
+@pytest.mark.parametrize("start", FRAMES)
+def test_exact_touches_give_the_tip_and_the_pin_whichever_way_the_flange_points(start):
+    person = Person(start, sigma_mm=0.0)
+    result = course(person)
+    assert result.offset.components()[:3] == pytest.approx(TIP.components()[:3], abs=1e-9)
+    assert result.reference_point_mm == pytest.approx(PIN.tolist(), abs=1e-9)
+    assert result.condition_number < 10
+    assert {pose.hand for pose in person.touches} == {start.hand}
+
+
+@pytest.mark.parametrize("start", FRAMES)
+def test_it_tilts_in_the_air_only_in_small_steps_and_never_far_from_above_the_pin(start):
+    person = Person(start)
+    course(person)
+    for step, here, there in person.steps:
+        if step.path is Path.STRAIGHT:
+            assert there.coordinates()[:2] == here.coordinates()[:2]
+            assert turned_deg(here, there) == pytest.approx(0.0, abs=1e-4)
+            continue
+        # The stored tip is 0.7 mm beside the true one, and is what it goes by.
+        assert tip_mm(there)[2] > PIN[2] + PLAN.lift_mm - 0.5
+        assert math.dist(tip_mm(there)[:2], PIN[:2]) < 1.5
+        same_lean = rotation_of(here)[2] == pytest.approx(rotation_of(there)[2], abs=1e-9)
+        assert same_lean or turned_deg(here, there) <= 10.0 + 1e-6
+    assert rotation_of(there) == pytest.approx(rotation_of(person.touches[0]), abs=1e-9)
+    assert tip_mm(there)[2] == pytest.approx(PIN[2] + PLAN.lift_mm, abs=0.1)
+
+
+def test_it_tells_how_sure_all_three_lengths_are_and_ends_when_that_is_enough():
+    person = Person()
+    result = course(person, count=12, until_mm=0.1)
+    assert person.told[0].startswith("3 touches agree within")
+    assert "X, Y and Z are known to" in person.told[0]
+    assert "One more, at U" in person.told[0]
+    assert "touches were taken" in person.told[-1]
+    assert 4 <= len(result.inputs) < 12
+
+
+@pytest.mark.parametrize("slip", [1, 4])
+def test_the_pose_that_fits_worst_is_taken_again_in_the_same_orientation(slip):
+    person = Person(slips=[slip], accepts=1)
+    result = course(person, count=8, retake=True)
+    assert f"Pose {slip}, at U" in person.offers[0]
+    assert len(person.touches) == 9
+    again, first = person.touches[8], person.touches[slip - 1]
+    assert rotation_of(again) == pytest.approx(rotation_of(first), abs=1e-9)
+    assert result.max_residual_mm < 0.05
+
+
+def test_a_robot_that_does_not_take_up_the_tilt_stands_lifted_and_is_refused():
+    person = Person(stiff=True)
+    with pytest.raises(CalibrationError, match="degrees from the orientation") as refused:
+        course(person)
+    assert refused.value.code == "not_tilted"
+    assert len(person.touches) == 1
+    assert tip_mm(person.steps[-1][2])[2] > PIN[2] + PLAN.lift_mm - 1.0
+
+
+def test_the_interval_holds_the_truth_about_as_often_as_it_says():
+    held = total = 0
+    for seed in range(60):
+        result = course(Person(seed=seed))
+        errors = np.subtract(result.offset.components()[:3], TIP.components()[:3])
+        held += int((np.abs(errors) <= result.half_width95).sum())
+        total += 3
+    assert 0.90 < held / total < 0.99
+
+
+@pytest.mark.parametrize("error", [(0.0, 0.0, 0.0), (0.3, 0.0, 0.0), (0.0, 0.0, 0.3)])
+def test_tilting_about_a_wrong_tip_shows_its_error_in_height_too(error):
+    written = ToolOffset(TIP.x_mm, TIP.y_mm, TIP.z_mm, 15.0, 8.0, -5.0)
+    own = rotation_of(Pose(0.0, 0.0, 0.0, *written.components()[3:]))
+    # In the frame of the tool the true tip is where the error says.
+    x_mm, y_mm, z_mm = (own.T @ error).tolist()
+    aside = ToolOffset(x_mm, y_mm, z_mm)
+    start = Pose(300.0, 100.0, -60.0, 87.0, 8.0, -5.0, tool=1)
+    over = OverPin(start, (300.0, 100.0, -60.0), frame=written)
+    person = Person(start, sigma_mm=0.0)
+    tilts = (Tilt(30.0, 20.0), Tilt(-150.0, 20.0))
+    result = person.run(
+        verify_by_tilting(PLAN, over=over, tilts=tilts, tolerance_mm=0.05), tip=aside
+    )
+    assert result.passed is not any(error)
+    assert [drift.distance_mm for drift in result.drifts] == pytest.approx(
+        [float(np.linalg.norm(error))] * 2, abs=1e-9
+    )
+    assert all((abs(drift.dz_mm) > 0.05) is any(error) for drift in result.drifts)
+    assert len(person.touches) == 2

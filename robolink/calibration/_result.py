@@ -106,22 +106,19 @@ class Drift:
 class VerifyResult:
     """Drift of the tip about the reference point, one entry per angle.
 
-    ``warnings`` are named doubts about the test itself.
+    ``warnings`` are named doubts about the test itself; ``heights_only`` tells that a surface was
+    touched, which shows Z and nothing else.
     """
 
     drifts: tuple[Drift, ...]
     tolerance_mm: float
     warnings: tuple[str, ...] = ()
+    heights_only: bool = False
 
     @property
     def max_drift_mm(self) -> float:
         """The largest drift."""
         return max(drift.distance_mm for drift in self.drifts)
-
-    @property
-    def heights_only(self) -> bool:
-        """Whether only Z was judged, as by touching a surface."""
-        return not any(drift.dx_mm or drift.dy_mm for drift in self.drifts)
 
     @property
     def passed(self) -> bool:

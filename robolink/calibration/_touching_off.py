@@ -67,7 +67,7 @@ def verify_by_touching(
         here = replace(_above(station, plan, frame, aside), z_mm=_safe_z_mm(station, plan, aside))
         found = solve_z_touch(touches, station.z_mm).offset
         drifts.append(Drift(angle_deg, 0.0, 0.0, aside.z_mm - found.z_mm))
-    return VerifyResult(tuple(drifts), tolerance_mm)
+    return VerifyResult(tuple(drifts), tolerance_mm, heights_only=True)
 
 
 def _touches(

@@ -106,9 +106,13 @@ def _chained(
     number, previous = head
     common = {**common, "at": datetime.now(UTC).isoformat(timespec="milliseconds")}
     rows = []
+    details, text = None, ""
     for entry in entries:
+        if entry.details is not details:  # what was read back and what is done share theirs
+            details, text = entry.details, canonical(entry.details)
         number += 1
-        row = {**common, **_fields(entry, change), "number": number, "previous": previous}
+        row = {**common, **_fields(entry, change), "details": text}
+        row["number"], row["previous"] = number, previous
         previous = row["hash"] = digest(row)
         rows.append(row)
     return rows
@@ -151,6 +155,5 @@ def _fields(entry: NewEntry, change: str) -> dict[str, Any]:
         "tool": entry.tool,
         "tolerance": storable(entry.tolerance),
         "verdict": storable(entry.verdict),
-        "details": canonical(entry.details),
         "proved_tool": entry.tool if proves else None,
     }

@@ -75,7 +75,6 @@ def _entries(metadata: MetaData) -> None:
         *map(_text, ("tolerance", "verdict", "details")),
         Column("proved_tool", Integer),
         *map(_text, texts.split()),
-        Index("entries_by_tool", "controller", "tool", "number"),
         Index("entries_by_controller", "controller", "number"),
         Index(
             "entries_by_change",

@@ -109,7 +109,7 @@ class Store:
     def _use(self, consequence: str, *, writing: bool) -> Iterator[Tables]:
         with self._lock:
             try:
-                backend, tables = self._connected()
+                backend, tables = self._connected(to_write=writing)
                 runner = tables.runner
                 if writing and backend.begin_writing is not None:
                     runner.run(backend.begin_writing)
@@ -129,13 +129,13 @@ class Store:
                 self._drop()
                 raise journal_error(error, self._place.name, consequence) from error
 
-    def _connected(self) -> tuple[Backend, Tables]:
+    def _connected(self, *, to_write: bool) -> tuple[Backend, Tables]:
         if self._backend is None:
             self._backend = backend_of(self._place, read_only=self._read_only)
         if self._tables is None:
             self._tables = self._connect(self._backend)
             self._file = self._file_now()
-        elif self._file_now() != self._file:
+        elif to_write and self._file_now() != self._file:
             raise JournalError(
                 tr("The journal {name} was moved or deleted while in use.", name=self._place.name),
                 remedy=tr(

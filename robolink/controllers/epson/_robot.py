@@ -33,10 +33,18 @@ class RobotFacts:
         self._window = window
         self._robot: Robot | None = None
 
-    def read(self) -> Robot:
-        """Return the robot in force."""
+    def read(self, request: str = "Print Robot") -> Robot:
+        """Return the robot in force.
+
+        Args:
+            request: What needs to know it.
+
+        Raises:
+            NotReadyError: The controller answers no question now.
+        """
         if self._robot is None:
-            number = spel.parse_integer(self._window.printed(spel.print_robot()))
-            kind = spel.parse_integer(self._window.printed(spel.print_robot_type()))
+            with self._window.proving_ready(request):
+                number = spel.parse_integer(self._window.printed(spel.print_robot()))
+                kind = spel.parse_integer(self._window.printed(spel.print_robot_type()))
             self._robot = Robot(number, kind)
         return self._robot

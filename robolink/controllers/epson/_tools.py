@@ -76,8 +76,7 @@ class EpsonToolTable:
         self.require_writable(tool)
         requested = offset.rounded(DECIMALS)
         with self._lock.held(f"TLSet {tool}"):
-            with self._window.proving_ready(f"TLSet {tool}"):
-                six_axes = self._robot.read().six_axes
+            six_axes = self._robot.read(f"TLSet {tool}").six_axes
             self._check_axes(requested, six_axes=six_axes)
             statement = spel.set_tool(tool, requested, six_axes=six_axes)
             return self._set(tool, requested, expected, statement)

@@ -9,13 +9,20 @@ from tests.faults._change_process import NEW, OLD, CommitStep
 NOTHING_LEFT = "Nothing is unsettled on this controller."
 
 
-def chosen(cell: ChangeCell, steps: list[Step]) -> list[Step]:
-    """Return the steps at which to kill: all of them, or without the switch a sample."""
+def chosen(cell: ChangeCell, steps: list[Step], *, every: int = 1) -> list[Step]:
+    """Return the steps at which to kill: all of them, or without the switch a sample.
+
+    Args:
+        cell: Where; it knows which exchanges matter.
+        steps: All of them.
+        every: Of what matters, one in so many makes the sample.
+    """
     if os.environ.get("ROBOLINK_ALL_KILL_POINTS") == "1":
         return steps
-    return [
+    matters = [
         step for step in steps if isinstance(step, CommitStep) or cell.matters.match(step.request)
     ]
+    return matters[::every]
 
 
 def right_values(program: str, cell: ChangeCell, written: list[int]) -> dict[int, ToolOffset]:

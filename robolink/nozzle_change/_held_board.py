@@ -65,9 +65,7 @@ class HeldBoard:
     def measure(self, bench: Bench, tool: int, stored: ToolOffset | None) -> CalibrationResult:  # noqa: ARG002 - the flange is what moves
         """Look and solve; see :class:`~robolink.nozzle_change.MovingSource`."""
         with calibrated_camera(self.sensor, self.station) as camera:
-            bench.controller.tools.select(0)
-            here = bench.controller.groups[0].pose()
-            return bench.run(self.procedure(stored, here), camera=camera)
+            return bench.measure(lambda here: self.procedure(stored, here), camera=camera)
 
     def procedure(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:
         """Return the steps of a measurement; see :class:`~robolink.nozzle_change.MovingSource`."""

@@ -65,6 +65,18 @@ class Bench:
         """
         return self.runner(tip, camera).run(procedure)
 
+    def measure(
+        self, steps: Callable[[Pose], Procedure[T]], *, camera: TipSensor | None = None
+    ) -> T:
+        """Take the steps of a measurement, in Tool 0: it is the flange that moves.
+
+        Args:
+            steps: Returns them, given where the flange is.
+            camera: What looks are taken with.
+        """
+        self.controller.tools.select(0)
+        return self.run(steps(self.controller.groups[0].pose()), camera=camera)
+
     def runner(self, tip: ToolOffset | None = None, camera: TipSensor | None = None) -> Runner:
         """Return a runner for the flange, or for a tip at an offset from it."""
         group = self.controller.groups[0]

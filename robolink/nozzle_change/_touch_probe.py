@@ -47,8 +47,7 @@ class TouchProbe:
 
     def measure(self, bench: Bench, tool: int, stored: ToolOffset | None) -> CalibrationResult:  # noqa: ARG002 - the flange is what moves
         """Touch and solve; see :class:`~robolink.nozzle_change.MovingSource`."""
-        bench.controller.tools.select(0)
-        return bench.run(self.procedure(stored, bench.controller.groups[0].pose()))
+        return bench.measure(lambda here: self.procedure(stored, here))
 
     def procedure(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:
         """Return the steps of a measurement; see :class:`~robolink.nozzle_change.MovingSource`."""

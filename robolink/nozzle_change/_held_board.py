@@ -6,7 +6,6 @@ from robolink.calibration import (
     TWO_ANGLES_DEG,
     BoardDrawing,
     CalibrationResult,
-    CameraStation,
     LookPlan,
     Procedure,
     VerifyResult,
@@ -14,6 +13,7 @@ from robolink.calibration import (
 from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
 from robolink.nozzle_change._flange import seen_from
+from robolink.nozzle_change._known_camera import KnownCamera
 from robolink.nozzle_change._looks import angles_between, calibrated_camera, camera_error_of
 from robolink.nozzle_change._source import Bench
 
@@ -21,20 +21,16 @@ _TWO_ANGLES = LookPlan(turns_deg=TWO_ANGLES_DEG)
 
 
 @dataclass(frozen=True, slots=True)
-class HeldBoard:
+class HeldBoard(KnownCamera):
     """Measures X, Y and U of a held board by its fiducials.
 
     Attributes:
-        sensor: URL or name of the camera.
-        station: Where it is, and what its pixels mean.
         board: Where the fiducials are on the board.
         plan: How they are brought before the camera.
         sigma_mm: Standard deviation of one coordinate of one look, where it is known.
         retake: Offer to take the look again that fits worst.
     """
 
-    sensor: str
-    station: CameraStation
     board: BoardDrawing
     plan: LookPlan = field(default=_TWO_ANGLES)
     sigma_mm: float | None = None
@@ -56,16 +52,6 @@ class HeldBoard:
             "Look whether the board is held as drawn, and which marks the camera found. If the "
             "change is real, allow it with --max-change."
         )
-
-    def require_ready(self) -> None:
-        """Find out whether the camera is there; see :class:`~robolink.nozzle_change.Equipped`."""
-        with calibrated_camera(self.sensor, self.station):
-            pass
-
-    def measure(self, bench: Bench, tool: int, stored: ToolOffset | None) -> CalibrationResult:  # noqa: ARG002 - the flange is what moves
-        """Look and solve; see :class:`~robolink.nozzle_change.MovingSource`."""
-        with calibrated_camera(self.sensor, self.station) as camera:
-            return bench.measure(lambda here: self.procedure(stored, here), camera=camera)
 
     def procedure(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:
         """Return the steps of a measurement; see :class:`~robolink.nozzle_change.MovingSource`."""

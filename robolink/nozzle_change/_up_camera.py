@@ -4,7 +4,6 @@ from dataclasses import dataclass, field
 
 from robolink.calibration import (
     CalibrationResult,
-    CameraStation,
     LookPlan,
     Procedure,
     VerifyResult,
@@ -12,24 +11,21 @@ from robolink.calibration import (
 from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
 from robolink.nozzle_change._flange import seen_from
+from robolink.nozzle_change._known_camera import KnownCamera
 from robolink.nozzle_change._looks import angles_between, calibrated_camera, camera_error_of
 from robolink.nozzle_change._source import Bench
 
 
 @dataclass(frozen=True, slots=True)
-class UpCamera:
+class UpCamera(KnownCamera):
     """Measures X and Y of a tip by looking at it at several angles of U.
 
     Attributes:
-        sensor: URL or name of the camera (:func:`robolink.sensing.open_sensor`).
-        station: Where it is, and what its pixels mean.
         plan: How the tip is brought before it.
         sigma_mm: Standard deviation of one coordinate of one look, where it is known.
         retake: Offer to take the look again that fits worst.
     """
 
-    sensor: str
-    station: CameraStation
     plan: LookPlan = field(default_factory=LookPlan)
     sigma_mm: float | None = None
     retake: bool = False
@@ -50,16 +46,6 @@ class UpCamera:
             "Look at the picture: is it the tip that was found, and is it clean? Was the camera "
             "moved? If the change is real, allow it with --max-change."
         )
-
-    def require_ready(self) -> None:
-        """Find out whether the camera is there; see :class:`~robolink.nozzle_change.Equipped`."""
-        with calibrated_camera(self.sensor, self.station):
-            pass
-
-    def measure(self, bench: Bench, tool: int, stored: ToolOffset | None) -> CalibrationResult:  # noqa: ARG002 - the flange is what moves
-        """Look and solve; see :class:`~robolink.nozzle_change.MovingSource`."""
-        with calibrated_camera(self.sensor, self.station) as camera:
-            return bench.measure(lambda here: self.procedure(stored, here), camera=camera)
 
     def procedure(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:
         """Return the steps of a measurement; see :class:`~robolink.nozzle_change.MovingSource`."""

@@ -5,6 +5,7 @@ monotonic time. Wall time appears in records only, as a label.
 """
 
 import time
+from functools import lru_cache
 from typing import NamedTuple, Protocol, Self
 
 NS_PER_S = 1_000_000_000
@@ -56,6 +57,11 @@ class Deadline(NamedTuple):
 
 def wall_label() -> str:
     """Return the wall-clock time, ISO 8601 UTC, as a label for people."""
+    return _label(int(time.time()))
+
+
+@lru_cache(maxsize=1)
+def _label(second: int) -> str:
     from datetime import UTC, datetime  # here, because most users of clocks need no calendar
 
-    return datetime.now(UTC).isoformat(timespec="seconds")
+    return datetime.fromtimestamp(second, UTC).isoformat(timespec="seconds")

@@ -27,6 +27,7 @@ _MOVE_HEAD: Final = Prepared(
 )
 _INSERT: Final = Prepared(insert(ENTRIES))
 _SIGNATURE: Final = tuple(field.name for field in fields(Signature))
+_PLACES: Final = dict.fromkeys(sorted(column.name for column in ENTRIES.c if column.name != "hash"))
 _COUNT: Final = select(func.count()).select_from(ENTRIES)
 
 
@@ -142,8 +143,12 @@ def _listing(wanted: Filter) -> Select[Any]:
 
 @lru_cache(maxsize=64)
 def _common(controller: str, signature: Signature) -> dict[str, Any]:
+    """Return a row with what all entries of a run share, and places for the rest.
+
+    The places are sorted by name, because the hash is taken of them so.
+    """
     signed = {name: storable(getattr(signature, name)) for name in _SIGNATURE}
-    return {**signed, "controller": storable(controller)}
+    return {**_PLACES, **signed, "controller": storable(controller)}
 
 
 def _fields(entry: NewEntry, change: str) -> dict[str, Any]:

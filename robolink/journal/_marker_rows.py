@@ -3,7 +3,7 @@
 import json
 from typing import Final, NamedTuple
 
-from sqlalchemy import BindParameter, bindparam, delete, insert, select, update
+from sqlalchemy import BindParameter, bindparam, delete, func, insert, select, update
 
 from robolink.errors import JournalError
 from robolink.journal._chain import canonical, storable
@@ -35,7 +35,8 @@ _NAMES: Final[dict[str, BindParameter[object]]] = {
     name: bindparam(f"of_{name}") for name in ("controller", "operation")
 }
 _UPDATE: Final = Prepared(update(MARKERS).where(*_SAME).values(**_STATE))
-_INSERT: Final = Prepared(insert(MARKERS).values(**_NAMES, **_STATE), UNLESS_THERE)
+_NEXT: Final = select(func.coalesce(func.max(MARKERS.c.id), 0) + 1).scalar_subquery()
+_INSERT: Final = Prepared(insert(MARKERS).values(id=_NEXT, **_NAMES, **_STATE), UNLESS_THERE)
 _DELETE: Final = Prepared(delete(MARKERS).where(*_SAME))
 _LISTING: Final = select(*(MARKERS.c[name] for name in _Stored._fields)).order_by(MARKERS.c.id)
 _SELECT: Final = Prepared(_LISTING.where(MARKERS.c.controller == bindparam("of_controller")))

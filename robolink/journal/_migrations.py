@@ -15,7 +15,6 @@ from sqlalchemy import (
     MetaData,
     Table,
     Text,
-    UniqueConstraint,
     insert,
     inspect,
     select,
@@ -45,9 +44,11 @@ def _first_tables(connection: Connection) -> None:
     Table(
         "markers",
         metadata,
-        Column("id", _NUMBER, primary_key=True),
-        *map(_text, ("controller", "operation", "kind", "request", "begun_at", "details")),
-        UniqueConstraint("controller", "operation"),
+        Column("controller", Text, primary_key=True),
+        Column("operation", Text, primary_key=True),
+        Column("id", BigInteger, nullable=False),
+        *map(_text, ("kind", "request", "begun_at", "details")),
+        sqlite_with_rowid=False,  # a table and an index of it are two pages in each commit
     )
     Table(
         "leases",

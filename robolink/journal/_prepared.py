@@ -6,7 +6,7 @@ takes for the statement itself.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Final, TypeAlias
+from typing import Any, Final, NamedTuple, TypeAlias
 
 from sqlalchemy import Connection, Dialect
 from sqlalchemy.engine.interfaces import DBAPICursor, DBAPIModule
@@ -15,13 +15,29 @@ from sqlalchemy.sql.elements import ClauseElement
 
 Values: TypeAlias = Mapping[str, object]
 
-Words: TypeAlias = tuple[str, Values]
-"""The text of a statement and the values that never change."""
-
 NOTHING: Final[Values] = {}
 
 UNLESS_THERE: Final = " ON CONFLICT DO NOTHING"
 """Ends an insert that leaves alone what is there; both databases say it alike."""
+
+
+class Words(NamedTuple):
+    """A statement as one database is told.
+
+    Attributes:
+        text: The statement.
+        names: Its parameters, in the order in which they stand there.
+        constants: The values that never change.
+    """
+
+    text: str
+    names: tuple[str, ...]
+    constants: Values
+
+    def places(self, values: Values) -> list[object]:
+        """Return the values in the order of their places."""
+        known = {**self.constants, **values} if self.constants else values
+        return [known[name] for name in self.names]
 
 
 class Prepared:
@@ -38,11 +54,13 @@ class Prepared:
         self._words: dict[str, Words] = {}
 
     def words(self, dialect: Dialect) -> Words:
-        """Return it as a database is told; its parameters have names."""
+        """Return it as a database is told."""
         known = self._words.get(dialect.name)
         if known is None:
             compiled: Any = self._statement.compile(dialect=dialect)
-            known = (compiled.string + self._ending, dict(compiled.params))
+            names = tuple(compiled.positiontup or ())
+            given = {name: value for name, value in compiled.params.items() if value is not None}
+            known = Words(compiled.string + self._ending, names, given)
             self._words[dialect.name] = known
         return known
 
@@ -82,11 +100,11 @@ class Runner:
         Raises:
             DBAPIError: The database refuses.
         """
-        text, constants = statement.words(self._dialect)
+        words = statement.words(self._dialect)
         try:
-            self._cursor.execute(text, {**constants, **values})
+            self._cursor.execute(words.text, words.places(values))
         except self._dialect.loaded_dbapi.Error as error:
-            raise self._refused(text, error) from error
+            raise self._refused(words.text, error) from error
         return self._cursor.rowcount
 
     def run_many(self, statement: Prepared, rows: Sequence[Values]) -> None:
@@ -95,11 +113,11 @@ class Runner:
         Raises:
             DBAPIError: The database refuses.
         """
-        text, constants = statement.words(self._dialect)
+        words = statement.words(self._dialect)
         try:
-            self._cursor.executemany(text, [{**constants, **row} for row in rows])
+            self._cursor.executemany(words.text, [words.places(row) for row in rows])
         except self._dialect.loaded_dbapi.Error as error:
-            raise self._refused(text, error) from error
+            raise self._refused(words.text, error) from error
 
     def rows(self, statement: Prepared, values: Values = NOTHING) -> Sequence[Sequence[Any]]:
         """Return all that it finds.
@@ -107,13 +125,13 @@ class Runner:
         Raises:
             DBAPIError: The database refuses.
         """
-        text, constants = statement.words(self._dialect)
+        words = statement.words(self._dialect)
         try:
-            self._cursor.execute(text, {**constants, **values})
+            self._cursor.execute(words.text, words.places(values))
             # To the end: a result left open would keep SQLite at what it reads.
             return self._cursor.fetchall()
         except self._dialect.loaded_dbapi.Error as error:
-            raise self._refused(text, error) from error
+            raise self._refused(words.text, error) from error
 
     def _end(self, known: Callable[[], None], bare: Callable[[], None]) -> None:
         """End the transaction, by SQLAlchemy if it was asked something and so knows of one."""

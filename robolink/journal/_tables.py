@@ -32,9 +32,9 @@ HEAD: Final = table("head", column("number", BigInteger), column("hash", Text))
 
 MARKERS: Final = table(
     "markers",
-    column("id", BigInteger),
     column("controller", Text),
     column("operation", Text),
+    column("id", BigInteger),
     column("kind", Text),
     column("request", Text),
     column("begun_at", Text),

@@ -255,6 +255,18 @@ def test_a_journal_that_is_moved_away_while_in_use_is_not_written_into_nowhere(f
     assert len(log.open_markers()) == 2
 
 
+def test_a_commit_writes_few_and_small_pages(path, open_anew):
+    log = open_anew(str(path)).log("cell")
+    log.begin(marker("a"))
+    log.clear("a", NewEntry(EntryKind.DONE))
+    pages = path.with_name(path.name + "-wal")
+    before = pages.stat().st_size
+    log.begin(marker("b"))
+    frame = 2048 + 24  # https://www.sqlite.org/fileformat.html 4.1
+    # The lease, the marker, the head, the entry and its place among those of the controller.
+    assert pages.stat().st_size - before == 5 * frame
+
+
 def test_many_entries_do_not_slow_down_the_questions_of_every_day(path, open_anew):
     journal = open_anew(str(path))
     log = journal.log("cell")

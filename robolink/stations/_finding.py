@@ -7,6 +7,7 @@ from robolink.config import Cell
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import Recorded
+from robolink.stations._apart import apart_mm
 from robolink.stations._records import station_of
 from robolink.stations._station import Station, StationKind
 
@@ -113,5 +114,6 @@ def _together(declared: Station, learnt: Station) -> Station:
         gauge=learnt.gauge or declared.gauge,
         check_every_days=declared.check_every_days,
         declared=True,
+        apart_mm=apart_mm(declared, learnt),
         details={**declared.details, **learnt.details},
     )

@@ -4,8 +4,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
 from enum import StrEnum
+from typing import Final
 
 from robolink.messages import tr
+
+AGREEING_MM: Final = 2.0
+"""So far may the cell file be from what was learnt: a search finds the station still."""
 
 
 class StationKind(StrEnum):
@@ -32,6 +36,7 @@ class Station:
         gauge: Id of the gauge that stands there, empty for none.
         check_every_days: After so many days it has to be learnt again, ``None`` for never.
         declared: Whether the cell file names it.
+        apart_mm: How far the place in the cell file is from the one that was learnt.
         details: What its kind needs besides, plain JSON: inputs, beams.
     """
 
@@ -47,6 +52,7 @@ class Station:
     gauge: str = ""
     check_every_days: float | None = None
     declared: bool = False
+    apart_mm: float = 0.0
     details: Mapping[str, object] = field(default_factory=dict)
 
     @property
@@ -67,6 +73,22 @@ class Station:
         Args:
             now: The time of day; the computer's own by default.
         """
+        return " ".join(filter(None, (self._contradiction(), self._check(now))))
+
+    def _contradiction(self) -> str:
+        if self.apart_mm <= AGREEING_MM:
+            return ""
+        return tr(
+            "The cell file puts station {id} {apart:.1f} mm from where it was learnt "
+            "({at}, entry {entry}), and what was learnt counts: learn it again if it was moved, "
+            "else correct the cell file.",
+            id=self.id,
+            apart=self.apart_mm,
+            at=self.found_at,
+            entry=self.entry,
+        )
+
+    def _check(self, now: datetime | None) -> str:
         due = self.check_due
         if due is not None and (now or datetime.now(UTC)) >= due:
             return tr(

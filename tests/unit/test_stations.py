@@ -99,6 +99,31 @@ def test_what_was_learnt_last_replaces_the_place_and_keeps_the_rest(file, record
     assert pin_of(pin).z_mm == 3.5
 
 
+def test_a_cell_file_that_was_corrected_by_hand_is_not_passed_over_in_silence(file, record):
+    file(CELL)
+    beams = {
+        "beams": [
+            {"input": 3, "x_mm": 340.0, "y_mm": 80.5, "direction_deg": 0.0},
+            {"input": 4, "x_mm": 300.0, "y_mm": 20.0, "direction_deg": 90.0},
+        ]
+    }
+    plate, near = (
+        Found(id="PLATE", kind=StationKind.TOUCH, x_mm=310.0, y_mm=90.0, z_mm=z_mm)
+        for z_mm in (-112.5, -104.4)
+    )
+    lines = Found(
+        id="BEAMS", kind=StationKind.BEAMS, x_mm=None, y_mm=None, z_mm=-100, details=beams
+    )
+    cell, entries = find_cell("a"), record(lines, plate)
+    found = find_stations(cell, entries)["PLATE"]
+    assert (found.z_mm, found.apart_mm) == (-112.5, 8.5)
+    assert "8.5 mm from where it was learnt" in found.remark()
+    assert "learn it again if it was moved, else correct the cell file" in found.remark()
+    assert find_stations(cell, record(near))["PLATE"].remark() == ""
+    # A beam is a line: where along it somebody stated a point does not matter.
+    assert find_stations(cell, entries)["BEAMS"].apart_mm == 0.5
+
+
 def test_a_pin_may_be_known_from_the_journal_alone(record):
     pin = find_station(None, record(PIN), "PIN")
     assert (pin.sigma_mm, pin.how, pin.declared) == (0.01, "n_angle with tool 1", False)

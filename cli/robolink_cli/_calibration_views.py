@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
-from robolink.calibration import VerifyResult
+from robolink.calibration import Shown, VerifyResult
 from robolink.messages import tr
 from robolink.nozzle_change import PlannedStep, Proposal, ToolReport, Verdict
 from robolink_cli._doubts import doubts as doubts
@@ -112,8 +112,17 @@ def report_payload(report: ToolReport) -> dict[str, object]:
 def show_course(steps: Sequence[PlannedStep]) -> None:
     """Say how a measurement will go, before anybody is asked."""
     moves = sum(step.target is not None for step in steps)
-    asks = sum(step.by_person for step in steps)
-    if asks:
+    asks = sum(step.shown is Shown.PIN for step in steps)
+    ways = sum(step.shown in (Shown.ALONG_X, Shown.ALONG_Z) for step in steps)
+    if ways:
+        plan = tr(
+            "The plan: touches of the pin by a person: {asks}; ways along the tool's axes shown by "
+            "a person: {ways}; movements of the robot between them: {moves}.",
+            asks=asks,
+            ways=ways,
+            moves=moves,
+        )
+    elif asks:
         plan = tr(
             "The plan: touches of the pin by a person: {asks}; movements of the robot between "
             "them: {moves}.",

@@ -28,6 +28,10 @@ _SENTENCES: Final[Mapping[str, Callable[[], str]]] = {
     "unequal_scale": lambda: tr("The camera's two axes differ much in scale."),
     "large_shear": lambda: tr("The image is askew: the camera seems to lean."),
     "large_pixel_residual": lambda: tr("The looks agree within more than half a pixel only."),
+    "turned_from_stored": lambda: tr(
+        "An axis lies more than 45 degrees from where it is stored: make sure that +X and +Z were "
+        "not taken for other axes. The proof by tilting does not show it."
+    ),
     "full_calibration_due": lambda: tr(
         "A full calibration is due: the differences since the last one add up."
     ),

@@ -10,7 +10,8 @@ from robolink_cli._views import number
 
 def remarks(result: CalibrationResult) -> Iterator[str]:
     """Yield what there is to say about a measurement beside its numbers, a sentence each."""
-    for sentence in (_fit(result), _interval(result), _camera(result), _chain(result)):
+    for said in (_fit, _interval, _ways, _camera, _chain):
+        sentence = said(result)
         if sentence:
             yield sentence
 
@@ -47,6 +48,14 @@ def _interval(result: CalibrationResult) -> str:
     else:
         basis = tr("from the residuals")
     return tr("95 % interval: {parts}, {basis}", parts="  ".join(parts), basis=basis)
+
+
+def _ways(result: CalibrationResult) -> str:
+    """Return how square the ways along a tool's axes were; empty for other methods."""
+    off_deg = result.details().get("off_square_deg")
+    if not isinstance(off_deg, float):
+        return ""
+    return tr("the ways are {off:.2f} degrees off a right angle", off=abs(off_deg))
 
 
 def _camera(result: CalibrationResult) -> str:

@@ -1,16 +1,24 @@
 """The person at the terminal, and the simulator's stand-in for one."""
 
+import math
 import queue
 import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
+from typing import TYPE_CHECKING, Final
 
 from robolink.errors import DeclinedError
 from robolink.messages import tr
 from robolink.runner import Operator, Question
 from robolink_cli._render import note
+
+if TYPE_CHECKING:
+    from robolink_simulators.places import Axis, XyzMm
+
+WAY_MM: Final = 60.0
+"""How far the stand-in jogs to show an axis."""
 
 
 class TerminalOperator:
@@ -31,13 +39,7 @@ class TerminalOperator:
 
     def ask(self, question: str, kind: Question) -> None:
         """Show what is wanted and how to answer."""
-        if kind is Question.PLACE:
-            how = tr("steps like x+0.1 z-0.5; ENTER when it is on the pin; q ends")
-        elif kind is Question.TEXT:
-            how = tr("type it, then ENTER; q ends")
-        else:
-            how = tr("y or n")
-        self._show(f"{question} [{how}]")
+        self._show(f"{question} [{_how(kind)}]")
         if self._reader is None:
             self._reader = threading.Thread(target=self._read, name="prompt", daemon=True)
             self._reader.start()
@@ -67,6 +69,17 @@ class TerminalOperator:
             self._lines.put(None)
 
 
+def _how(kind: Question) -> str:
+    """Return how a question is answered."""
+    if kind is Question.PLACE:
+        return tr("steps like x+0.1 z-0.5; ENTER when it is on the pin; q ends")
+    if kind is Question.TEXT:
+        return tr("type it, then ENTER; q ends")
+    if kind is Question.YES_NO:
+        return tr("y or n")
+    return tr("steps like x+5 z-0.5; ENTER when it is there; q ends")
+
+
 @cache
 def terminal() -> TerminalOperator:
     """Return the one operator of this process's terminal: two would share the input badly."""
@@ -80,6 +93,8 @@ class AssistedOperator:
         look: Returns the vector, in mm, that the simulated person sees from the tip to the
             pin.
         show: Where to echo questions and answers.
+        way: Returns the vector, in mm, along an axis of the tool as the simulated person sees it;
+            without it they know of none, and jog nowhere to show one.
         max_step_mm: Largest step it types at once.
         satisfied_mm: Content when less than this is seen on each axis; an eye that reads
             with an error would otherwise jog for ever.
@@ -87,17 +102,20 @@ class AssistedOperator:
 
     def __init__(
         self,
-        look: Callable[[], tuple[float, float, float]],
+        look: "Callable[[], XyzMm]",
         show: Callable[[str], None],
         *,
+        way: "Callable[[Axis], XyzMm]" = lambda _axis: (0.0, 0.0, 0.0),
         max_step_mm: float = 5.0,
         satisfied_mm: float = 0.02,
     ) -> None:
         self._look = look
         self._show = show
+        self._way = way
         self._max_step_mm = max_step_mm
         self._satisfied_mm = satisfied_mm
         self._kind = Question.PLACE
+        self._ahead: list[str] = []
 
     def tell(self, text: str) -> None:
         """Echo a line."""
@@ -106,6 +124,7 @@ class AssistedOperator:
     def ask(self, question: str, kind: Question) -> None:
         """Echo the question."""
         self._kind = kind
+        self._ahead = list(self._steps_along(kind))
         self._show(question)
 
     def poll(self, wait_s: float) -> str | None:  # noqa: ARG002 - it answers at once
@@ -114,12 +133,36 @@ class AssistedOperator:
             return "y"
         if self._kind is Question.TEXT:
             return tr("simulated")
+        if self._kind is Question.PLACE:
+            steps, arrived = self._steps_to_pin(), tr("on the pin")
+        else:
+            steps, arrived = self._ahead.pop(0) if self._ahead else "", tr("there")
+        self._show(tr("  operator: {answer}", answer=steps or arrived))
+        return steps or "done"
+
+    def _steps_to_pin(self) -> str:
         # Sideways first, down last, as one does with a needle.
         dx_mm, dy_mm, dz_mm = self._look()
-        aside = {"x": dx_mm, "y": dy_mm}
-        steps = self._steps(aside) or self._steps({"z": dz_mm})
-        self._show(tr("  operator: {answer}", answer=steps or tr("on the pin")))
-        return steps or "done"
+        return self._steps({"x": dx_mm, "y": dy_mm}) or self._steps({"z": dz_mm})
+
+    def _steps_along(self, kind: Question) -> Iterator[str]:
+        """Yield the steps of a way along an axis, or up to where both ways have room."""
+        if kind is Question.ROOM:
+            lowest_mm = min(self._way("x")[2], self._way("z")[2])
+            way_mm = (0.0, 0.0, max(0.0, -lowest_mm))
+        elif kind is Question.ALONG_X:
+            way_mm = self._way("x")
+        elif kind is Question.ALONG_Z:
+            way_mm = self._way("z")
+        else:
+            return
+        pieces = math.ceil(max(map(abs, way_mm)) / self._max_step_mm)
+        gone = [0.0, 0.0, 0.0]
+        for piece in range(1, pieces + 1):
+            # What one step was rounded by, the next one makes good.
+            step = [round(mm * piece / pieces - at, 3) for mm, at in zip(way_mm, gone, strict=True)]
+            gone = [at + by for at, by in zip(gone, step, strict=True)]
+            yield " ".join(f"{axis}{by:+.3f}" for axis, by in zip("xyz", step, strict=True))
 
     def _steps(self, wanted: dict[str, float]) -> str:
         if all(abs(distance_mm) < self._satisfied_mm for distance_mm in wanted.values()):
@@ -144,8 +187,11 @@ def operator_at(assist_url: str | None, tool: Callable[[], int]) -> Iterator[Ope
 
     with open_eyes(assist_url) as eyes:
 
-        def look() -> tuple[float, float, float]:
+        def look() -> "XyzMm":
             seen = eyes.look(tool())
             return seen.dx_mm, seen.dy_mm, seen.dz_mm
 
-        yield AssistedOperator(look, note)
+        def way(axis: "Axis") -> "XyzMm":
+            return eyes.way_along(axis, WAY_MM, tool())
+
+        yield AssistedOperator(look, note, way=way)

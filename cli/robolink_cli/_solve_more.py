@@ -100,6 +100,7 @@ def six_point(node: Node) -> Payload:
         read_poses(node, "pivot_poses"),
         read_pose(node.child("along_x")),
         read_pose(node.child("second")),
+        start=node.optional("start", lambda name: read_pose(node.child(name))),
         second_is=second,
         sigma_mm=node.optional("sigma_mm", node.number),
     )

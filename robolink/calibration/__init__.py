@@ -49,6 +49,7 @@ from robolink.calibration._steps import Offer as Offer
 from robolink.calibration._steps import Procedure as Procedure
 from robolink.calibration._steps import Seek as Seek
 from robolink.calibration._steps import SeenAt as SeenAt
+from robolink.calibration._steps import Shown as Shown
 from robolink.calibration._steps import Step as Step
 from robolink.calibration._steps import Tell as Tell
 from robolink.calibration._student import NORMAL_95 as NORMAL_95
@@ -111,6 +112,8 @@ if TYPE_CHECKING:
     from robolink.calibration._rotations import zyz_deg as zyz_deg
     from robolink.calibration._runout import RunoutReport as RunoutReport
     from robolink.calibration._runout import runout_report as runout_report
+    from robolink.calibration._shown_axes import WayPlan as WayPlan
+    from robolink.calibration._shown_axes import six_point as six_point
     from robolink.calibration._six_point import SixPointResult as SixPointResult
     from robolink.calibration._six_point import ToolAxis as ToolAxis
     from robolink.calibration._six_point import solve_six_point as solve_six_point
@@ -184,6 +187,8 @@ _LOADED_LATER = {
     "zyz_deg": "_rotations",
     "RunoutReport": "_runout",
     "runout_report": "_runout",
+    "WayPlan": "_shown_axes",
+    "six_point": "_shown_axes",
     "SixPointResult": "_six_point",
     "ToolAxis": "_six_point",
     "solve_six_point": "_six_point",

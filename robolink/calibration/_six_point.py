@@ -6,12 +6,13 @@ After the pivot the tool is moved, without turning, along its own X and then alo
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
+from robolink.calibration._axis_ways import between_deg, flange_way
 from robolink.calibration._checks import check_poses, keep_unmeasured
 from robolink.calibration._judging import judged
 from robolink.calibration._pivot import solve_pivot
@@ -24,13 +25,16 @@ from robolink.calibration._scatter import require_positive
 from robolink.calibration._tolerance import TOUCH_TOLERANCE, Tolerance
 from robolink.errors import CalibrationError
 from robolink.messages import tr
-from robolink.model import Pose
+from robolink.model import Pose, ToolOffset
 
-LEAST_WAY_MM = 5.0
 MOST_OFF_SQUARE_DEG = 2.0
 """Raw axes that are further from a right angle are refused (calibration.md 2)."""
 
-_TURNED_DEG = 0.01
+FAR_DEG = 45.0
+"""A way that leads further from where its axis is stored is nearer to another axis."""
+
+_START = -3
+"""Where among all poses the ways start: before their two ends."""
 
 _MEASURED = ("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
 
@@ -45,6 +49,10 @@ class SixPointResult(CalibrationResult):
     """
 
     off_square_deg: float | None
+
+    def details(self) -> dict[str, object]:
+        """Return what the ways say beside the frame."""
+        return {"off_square_deg": self.off_square_deg}
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,18 +79,22 @@ def solve_six_point(
     along_x: Pose,
     second: Pose,
     *,
+    start: Pose | None = None,
     second_is: Literal["z", "xz"] = "z",
+    stored: ToolOffset | None = None,
     sigma_mm: float | None = None,
     tolerance: Tolerance = TOUCH_TOLERANCE,
 ) -> SixPointResult:
     """Return position and orientation of a tool.
 
     Args:
-        pivot_poses: Flange poses (Tool 0) with the tip on one point, at least three; the
-            ways below start at the last of them.
+        pivot_poses: Flange poses (Tool 0) with the tip on one point, at least three.
         along_x: Flange pose after a way along the tool's +X, not turned.
         second: Flange pose after a way from the same start, not turned.
+        start: Flange pose at which both ways start, anywhere; ``None`` for the last pivot pose.
         second_is: ``z``: along the tool's +Z; ``xz``: in its XZ plane, on the side of +Z.
+        stored: The offset stored now. An orientation far from its own is doubted, with
+            ``turned_from_stored``: where a way went along another axis nothing else shows it.
         sigma_mm: Standard deviation of one coordinate of one placement, when it is known.
         tolerance: Residuals above which the result carries a warning.
 
@@ -92,21 +104,23 @@ def solve_six_point(
         ConfigError: ``sigma_mm`` is not positive.
     """
     pivot = solve_pivot(pivot_poses, tolerance=tolerance)
-    start = pivot_poses[-1]
-    poses = (*pivot_poses, along_x, second)
+    ways = (along_x, second) if start is None else (start, along_x, second)
+    poses = (*pivot_poses, *ways)
     check_poses(poses, allow_mixed_hand=False)
-    x_axis, second_axis = _way(start, along_x), _way(start, second)
-    off = None if second_is == "xz" else _off_square_deg(x_axis, second_axis)
+    begun = poses[_START]
+    x_axis, second_axis = flange_way(begun, along_x), flange_way(begun, second)
+    off = None if second_is == "xz" else 90.0 - between_deg(x_axis, second_axis)
     if off is not None and abs(off) > MOST_OFF_SQUARE_DEG:
         raise CalibrationError(
             "axes_not_square",
             tr("The ways along X and Z are {angle:.1f} degrees off a right angle.", angle=off),
-            remedy=tr("Move along the tool's own axes; start both ways at the last pivot pose."),
+            remedy=tr("Move along the tool's own axes; start both ways at the same pose."),
         )
     frame = _frame(x_axis, second_axis, square=second_is == "xz")
     u, v, w = uvw_deg(frame)
     positions, turned = pose_arrays(poses)
-    unit = _unit_covariance(positions, turned, frame, square=second_is == "xz")
+    touches = len(pivot_poses)
+    unit = _unit_covariance(positions, turned, frame, touches=touches, square=second_is == "xz")
     result = SixPointResult(
         method="six_point",
         offset=keep_unmeasured(pivot.offset, u_deg=u, v_deg=v, w_deg=w),
@@ -114,7 +128,10 @@ def solve_six_point(
         kept=(),
         reference_point_mm=pivot.reference_point_mm,
         sigma_gain=pivot.sigma_gain,
-        warnings=tuple(doubt for doubt in pivot.warnings if not doubt.startswith("large_")),
+        warnings=(
+            *(doubt for doubt in pivot.warnings if not doubt.startswith("large_")),
+            *_far_from(stored, frame),
+        ),
         inputs=poses,
         residuals_mm=pivot.residuals_mm,
         condition_number=pivot.condition_number,
@@ -145,38 +162,13 @@ def solve_tool_axis(first: Pose, second: Pose, *, sigma_mm: float | None = None)
         ConfigError: ``sigma_mm`` is not positive.
     """
     check_poses((first, second), allow_mixed_hand=False)
-    way = _way(first, second)
+    way = flange_way(first, second)
     length = float(np.linalg.norm(way))
     x, y, z = (way / length).tolist()
     if sigma_mm is None:
         return ToolAxis((x, y, z), None)
     require_positive(sigma_mm, "sigma_mm")
     return ToolAxis((x, y, z), math.degrees(math.sqrt(2) * sigma_mm / length))
-
-
-def _way(start: Pose, end: Pose) -> Floats:
-    """Return the way of the flange in its own axes."""
-    before, after = rotation_of(start), rotation_of(end)
-    # Half of |R1 - R2| is sqrt2 sin(angle / 2).
-    if float(np.linalg.norm(before - after)) > math.sqrt(2) * math.radians(_TURNED_DEG):
-        raise CalibrationError(
-            "turned_on_the_way",
-            tr("The tool turned on the way that should show its axis."),
-            remedy=tr("Keep the orientation of the last pivot pose."),
-        )
-    way: Floats = before.T @ np.subtract(end.coordinates()[:3], start.coordinates()[:3])
-    if float(np.linalg.norm(way)) < LEAST_WAY_MM:
-        raise CalibrationError(
-            "short_axis",
-            tr("The way along the axis is {way:.2f} mm.", way=float(np.linalg.norm(way))),
-            remedy=tr("Move 50 mm or more; the direction is as good as the way is long."),
-        )
-    return way
-
-
-def _off_square_deg(x_axis: Floats, z_axis: Floats) -> float:
-    cosine = float(x_axis @ z_axis / (np.linalg.norm(x_axis) * np.linalg.norm(z_axis)))
-    return 90.0 - math.degrees(math.acos(cosine))
 
 
 def _frame(x_axis: Floats, second: Floats, *, square: bool) -> Floats:
@@ -192,18 +184,29 @@ def _frame(x_axis: Floats, second: Floats, *, square: bool) -> Floats:
     return frame
 
 
-def _unit_covariance(positions: Floats, turned: Floats, frame: Floats, *, square: bool) -> Floats:
+def _far_from(stored: ToolOffset | None, frame: Floats) -> Iterator[str]:
+    """Yield the doubt that an axis was taken for another one."""
+    if stored is None:
+        return
+    before = rotation_of(Pose(0.0, 0.0, 0.0, *stored.components()[3:]))
+    if any(between_deg(before[:, axis], frame[:, axis]) > FAR_DEG for axis in range(3)):
+        yield "turned_from_stored"
+
+
+def _unit_covariance(
+    positions: Floats, turned: Floats, frame: Floats, *, touches: int, square: bool
+) -> Floats:
     """Return the covariance of x, y, z and of small changes of u, v, w, for sigma = 1 mm.
 
-    Numeric, because the last pivot pose serves the tip and both axes.
+    Numeric, because one pose serves both axes, and the tip too where the ways start at the pin.
     """
-    condition = pivot_design(turned[:-2]).condition_number
-    start_turn = turned[-3].T
+    condition = pivot_design(turned[:touches]).condition_number
+    start_turn = turned[_START].T
     around = np.array(uvw_deg(frame))
 
     def calculate(p: Floats) -> Floats:
-        tip = fit_pivot(p[:-2], turned[:-2], condition_number=condition).tip
-        ways = (start_turn @ (p[-2] - p[-3]), start_turn @ (p[-1] - p[-3]))
+        tip = fit_pivot(p[:touches], turned[:touches], condition_number=condition).tip
+        ways = (start_turn @ (p[-2] - p[_START]), start_turn @ (p[-1] - p[_START]))
         angles = np.array(uvw_deg(_frame(*ways, square=square)))
         # Away from the jump at 180 degrees.
         return np.concatenate((tip, (angles - around + 180.0) % 360.0 - 180.0))

@@ -7,6 +7,7 @@ it numbers, shown before anything moves, and replayed from a record.
 
 from collections.abc import Generator
 from dataclasses import dataclass
+from enum import Enum
 from typing import Any, TypeVar
 
 from robolink.model import TIP, InputEdge, Path, Pose, Spot, SpotUnit
@@ -21,11 +22,35 @@ class Move:
     purpose: str
 
 
+class Shown(Enum):
+    """What a person shows with the pose to which they bring the tool."""
+
+    PIN = "pin"
+    """The tip is on the reference point."""
+
+    ROOM = "room"
+    """The tip is free in the air, with room to go along the axes of the tool."""
+
+    ALONG_X = "along_x"
+    """The tip has gone along the tool's own +X since."""
+
+    ALONG_Z = "along_z"
+    """The same along its +Z."""
+
+
 @dataclass(frozen=True, slots=True)
 class Ask:
-    """Let a person bring the tip onto the reference point; answered with the pose then."""
+    """Let a person bring the tool somewhere; answered with the pose then.
+
+    Attributes:
+        instruction: Where to, for a person.
+        shown: What the pose shows then.
+        foreseen: About where that is, for a look ahead; ``None`` for where the frame is already.
+    """
 
     instruction: str
+    shown: Shown = Shown.PIN
+    foreseen: Pose | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -47,13 +47,28 @@ def pivot(
     Raises:
         CalibrationError: ``not_tilted``, and as :func:`solve_pivot`.
     """
+    result, _ = yield from pivot_then_lift(
+        plan, tilts=tilts, stored=stored, sigma_mm=sigma_mm, course=course
+    )
+    return result
+
+
+def pivot_then_lift(
+    plan: TouchPlan,
+    *,
+    tilts: Sequence[Tilt],
+    stored: ToolOffset,
+    sigma_mm: float | None,
+    course: Course,
+) -> Procedure[tuple[CalibrationResult, Pose]]:
+    """Do what :func:`pivot` does; return the pose of the lifted flange at its end as well."""
     first: Pose = yield Ask(tr("Bring the tip onto the pin."))
     yield lift_off(plan, first)
     swing = _Swing(plan, OverPin.touched(first, stored))
     tilting = _Tilting(swing, stored, sigma_mm)
     result = yield from many_touches(tilting, first, [UPRIGHT, *tilts], course)
     yield from swing.to(UPRIGHT)
-    return result
+    return result, swing.over.pose(UPRIGHT, plan.lift_mm)
 
 
 def verify_by_tilting(

@@ -103,7 +103,7 @@ class SixPoints:
     second_is: Literal["z", "xz"] = "z"
     sigma_mm: float | None = None
 
-    def solve(self, flange: Sequence[Pose], stored: ToolOffset | None) -> CalibrationResult:  # noqa: ARG002 - all six are measured
+    def solve(self, flange: Sequence[Pose], stored: ToolOffset | None) -> CalibrationResult:
         """Solve five poses and more, the last two away from the pin; see :class:`PoseMethod`."""
         from robolink.calibration import solve_six_point  # numpy, which a look does without
 
@@ -118,7 +118,12 @@ class SixPoints:
             )
         *pivot, along_x, second = flange
         return solve_six_point(
-            pivot, along_x, second, second_is=self.second_is, sigma_mm=self.sigma_mm
+            pivot,
+            along_x,
+            second,
+            second_is=self.second_is,
+            stored=stored,
+            sigma_mm=self.sigma_mm,
         )
 
 

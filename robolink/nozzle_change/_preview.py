@@ -4,7 +4,18 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from robolink.calibration import Ask, Look, Move, Offer, Procedure, Seek, SeenAt, Tell, travel
+from robolink.calibration import (
+    Ask,
+    Look,
+    Move,
+    Offer,
+    Procedure,
+    Seek,
+    SeenAt,
+    Shown,
+    Tell,
+    travel,
+)
 from robolink.errors import CalibrationError, LimitError
 from robolink.messages import tr
 from robolink.model import (
@@ -34,7 +45,7 @@ class PlannedStep:
         profile: How it goes there.
         edge: The input that ends the step on the way, ``None`` for none.
         refusal: Why the limits forbid it, empty when they do not.
-        by_person: Whether a person has to do it.
+        shown: What a person has to show, ``None`` where nobody is asked.
     """
 
     text: str
@@ -42,7 +53,7 @@ class PlannedStep:
     profile: MotionProfile | None = None
     edge: InputEdge | None = None
     refusal: str = ""
-    by_person: bool = False
+    shown: Shown | None = None
 
     def requests(self, group: MotionGroup) -> tuple[str, ...]:
         """Return what the step would send besides its reads, as it stands on the wire."""
@@ -56,7 +67,8 @@ class PlannedStep:
 def preview(controller: Controller, plan: ChangePlan) -> tuple[PlannedStep, ...]:
     """Return the steps of the measurements from where the robot stands now.
 
-    Reads only. The person's part is foreseen as no movement at all.
+    Reads only. The person's part is foreseen as no movement at all, but where the step says
+    about where it leads.
     """
     if not plan.moves:
         return ()
@@ -142,7 +154,9 @@ def _follow(
                 continue
             answer = here
             if isinstance(step, Ask):
-                yield PlannedStep(step.instruction, by_person=True)
+                answer = here = step.foreseen or here
+                refusal = _refusal(step.foreseen, settings) if step.foreseen else ""
+                yield PlannedStep(step.instruction, refusal=refusal, shown=step.shown)
             elif isinstance(step, Look):
                 yield PlannedStep(step.purpose)
                 answer = SeenAt.of(here, Spot(*step.expected_mm), SpotUnit.BASE_MM)
@@ -161,9 +175,14 @@ def _planned(step: Move | Seek, settings: RunSettings) -> PlannedStep:
         edge = None
     else:
         profile, edge = MotionProfile(Path.STRAIGHT, speed_mm_s=step.speed_mm_s), step.edge
-    try:
-        settings.box.check(step.target)
-        refusal = ""
-    except LimitError as error:
-        refusal = str(error)
+    refusal = _refusal(step.target, settings)
     return PlannedStep(step.purpose, step.target, profile, edge, refusal)
+
+
+def _refusal(target: Pose, settings: RunSettings) -> str:
+    """Return why the limits forbid a target, empty when they do not."""
+    try:
+        settings.box.check(target)
+    except LimitError as error:
+        return str(error)
+    return ""

@@ -11,12 +11,12 @@ from robolink.nozzle_change._flange import tilted_from
 from robolink.nozzle_change._source import Bench
 
 if TYPE_CHECKING:
-    from robolink.calibration import Tilt
+    from robolink.calibration import Tilt, WayPlan
 
 
 @dataclass(frozen=True, slots=True)
 class TiltedPin:
-    """Measures by touching one pin with the tool tilted and turned.
+    """Measures by touching one pin with the tool tilted and turned, and by ways along its axes.
 
     Attributes:
         tilts: Orientations of the touches after the first; see
@@ -24,22 +24,31 @@ class TiltedPin:
         touch: Lift and clearance.
         sigma_mm: Standard deviation of one coordinate of one placement, where it is known.
         course: When a measurement ends, and whether a pose is offered again.
+        ways: How the person shows the axes of the tool; ``None`` to measure its lengths alone.
     """
 
     tilts: "tuple[Tilt, ...]"
     touch: TouchPlan = field(default_factory=TouchPlan)
     sigma_mm: float | None = None
     course: Course = field(default_factory=Course)
+    ways: "WayPlan | None" = None
 
     @property
     def sentence(self) -> str:
         """What it does, for a report."""
-        return tr(
+        touched = tr(
             "measured on the robot: one pin touched in {count} orientations, tilted by {tilt:g} "
             "degrees",
             count=len(self.tilts) + 1,
             tilt=self._tilt_deg,
         )
+        if self.ways is None:
+            return touched
+        shown = tr(
+            "two ways of {length:g} mm and more along the tool's own axes",
+            length=self.ways.length_mm,
+        )
+        return f"{touched}; {shown}"
 
     @property
     def remedy(self) -> str:
@@ -96,7 +105,7 @@ class TiltedPin:
         Raises:
             ConfigError: Nobody knows about where the tip is, so it cannot be kept off the pin.
         """
-        from robolink.calibration import pivot  # numpy, which a look does without
+        from robolink.calibration import pivot, six_point  # numpy, which a look does without
 
         if stored is None:
             raise ConfigError(
@@ -106,6 +115,15 @@ class TiltedPin:
                     "measure then."
                 ),
             )
-        return pivot(
-            self.touch, tilts=self.tilts, stored=stored, sigma_mm=self.sigma_mm, course=course
+        if self.ways is None:
+            return pivot(
+                self.touch, tilts=self.tilts, stored=stored, sigma_mm=self.sigma_mm, course=course
+            )
+        return six_point(
+            self.touch,
+            self.ways,
+            tilts=self.tilts,
+            stored=stored,
+            sigma_mm=self.sigma_mm,
+            course=course,
         )

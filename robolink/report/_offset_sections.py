@@ -116,12 +116,23 @@ def _poses(poses: Sequence[Pose], fit: CalibrationResult | None, *, heights: boo
             cells += _residual(residuals[number] if number < len(residuals) else ())
         left_out = fit is not None and number in fit.rejected
         kind = "left-out" if left_out else None
-        name = tr("{number} (left out)", number=number + 1) if left_out else str(number + 1)
+        name = _named(number, len(poses), fit, left_out=left_out)
         rows.append(element("tr", element("td", name), *cells, class_=kind))
     if residuals:
         axes = ("Z", "X, Y", "X, Y, Z")[max(map(len, residuals)) - 1]
         columns += [tr("residual {axes} mm", axes=axes), tr("length mm")]
     return table(tuple(columns), rows)
+
+
+def _named(number: int, count: int, fit: CalibrationResult | None, *, left_out: bool) -> str:
+    """Return what stands before a pose: its number from 1, and what it is beside a touch."""
+    if left_out:
+        return tr("{number} (left out)", number=number + 1)
+    if fit is None or fit.method != "six_point" or number < len(fit.residuals_mm):
+        return str(number + 1)
+    # The last two show the axes; the one before them, where it is no touch, is where they begin.
+    part = (tr("where the ways begin"), tr("along X"), tr("second way"))[number - count]
+    return tr("{number} ({part})", number=number + 1, part=part)
 
 
 def _residual(residual: Sequence[float]) -> list[Element]:

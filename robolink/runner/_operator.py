@@ -10,6 +10,15 @@ class Question(Enum):
     PLACE = "place"
     """Jog steps until the tip is on the reference point, then an empty line."""
 
+    ROOM = "room"
+    """Jog steps until the tip is free to go along the axes of the tool, then an empty line."""
+
+    ALONG_X = "along x"
+    """Jog steps along the tool's own +X, then an empty line."""
+
+    ALONG_Z = "along z"
+    """The same along its +Z."""
+
     YES_NO = "yes/no"
 
     TEXT = "text"

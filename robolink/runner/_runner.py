@@ -3,9 +3,9 @@
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Final, TypeVar
 
-from robolink.calibration import Ask, Look, Move, Offer, Procedure, Seek, SeenAt, Step, Tell
+from robolink.calibration import Ask, Look, Move, Offer, Procedure, Seek, SeenAt, Shown, Step, Tell
 from robolink.errors import (
     CalibrationError,
     ConfigError,
@@ -34,6 +34,13 @@ POLL_S = 1.0
 """Longest time between two status reads while a person is asked (design: at most 5 s)."""
 
 T = TypeVar("T")
+
+_QUESTIONS: Final = {
+    Shown.PIN: Question.PLACE,
+    Shown.ROOM: Question.ROOM,
+    Shown.ALONG_X: Question.ALONG_X,
+    Shown.ALONG_Z: Question.ALONG_Z,
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,7 +192,7 @@ class Runner:
         return found
 
     def _ask(self, step: Ask) -> Pose:
-        self._operator.ask(step.instruction, Question.PLACE)
+        self._operator.ask(step.instruction, _QUESTIONS[step.shown])
         while True:
             word = self._answer()
             if word in ("", "done"):

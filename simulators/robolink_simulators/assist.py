@@ -21,6 +21,7 @@ from robolink_simulators.epson.refusals import Refusal
 from robolink_simulators.hosting import in_process, plc_in_process
 from robolink_simulators.hosting._tcp_host import TcpHost
 from robolink_simulators.person import Look
+from robolink_simulators.places import Axis, XyzMm
 from robolink_simulators.softmotion.smc_errors import Refused
 
 _MAX_LINE: Final = 65536
@@ -156,6 +157,12 @@ class AssistClient:
         """Return the vector, in base axes, that the operator sees from the tip to the pin."""
         return Look(**(self.do("look") if tool is None else self.do("look", tool=tool)))
 
+    def way_along(self, axis: Axis, length_mm: float, tool: int) -> XyzMm:
+        """Return the way, in base axes, that the operator sees an axis of a tool lead."""
+        answer = self.do("way_along", axis=axis, length_mm=length_mm, tool=tool)
+        x_mm, y_mm, z_mm = answer["way_mm"]
+        return x_mm, y_mm, z_mm
+
     def jog_onto_pin(self) -> dict[str, float]:
         """Jog the tip onto the pin on the pendant (Teach only); return the flange pose."""
         flange: dict[str, float] = self.do("jog_onto_pin")["flange"]
@@ -202,6 +209,11 @@ class InProcessEyes:
         """Return the vector, in base axes, that the operator sees from the tip to the pin."""
         with self._simulator.lock:
             return self._simulator.world.operator.look(tool)
+
+    def way_along(self, axis: Axis, length_mm: float, tool: int) -> XyzMm:
+        """Return the way, in base axes, that the operator sees an axis of a tool lead."""
+        with self._simulator.lock:
+            return self._simulator.world.operator.way_along(axis, length_mm, tool)
 
 
 def simulator_at(url: str) -> Assisted:

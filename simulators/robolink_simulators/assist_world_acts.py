@@ -6,7 +6,14 @@ from typing import Final
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink_simulators.assist_parameters import Answer, Parameters, number_in, whole_number
+from robolink_simulators.assist_parameters import (
+    Answer,
+    Parameters,
+    number_in,
+    tool_number,
+    whole_number,
+)
+from robolink_simulators.places import Axis
 from robolink_simulators.sensing import LightBeam, TouchPlate
 from robolink_simulators.softmotion.world import SoftMotionWorld
 from robolink_simulators.world import World
@@ -20,6 +27,20 @@ Act = Callable[[Furnished, Parameters], Answer]
 def _see(world: Furnished, request: Parameters) -> Answer:
     mark = whole_number(request, "mark") if "mark" in request else 0
     return {"seen": [list(pixel) for pixel in world.see(mark)]}
+
+
+def _way_along(world: Furnished, request: Parameters) -> Answer:
+    axis: Axis
+    match request.get("axis"):
+        case "x" | "z" as named:
+            axis = named
+        case other:
+            raise ConfigError(
+                tr("A tool has no axis {axis!r} that is shown.", axis=other),
+                remedy=tr("Give it as {example}.", example='"axis": "x"'),
+            )
+    length_mm = number_in(request, "length_mm")
+    return {"way_mm": list(world.operator.way_along(axis, length_mm, tool_number(request)))}
 
 
 def _set_world(world: Furnished, request: Parameters) -> Answer:
@@ -61,6 +82,7 @@ def _as_text(value: object) -> str:
 
 WORLD_ACTS: Final[Mapping[str, Act]] = {
     "see": _see,
+    "way_along": _way_along,
     "set_world": _set_world,
     "mount_beam": _mount_beam,
     "mount_plate": _mount_plate,

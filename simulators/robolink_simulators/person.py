@@ -1,4 +1,4 @@
-"""The person at a simulated cell: looks at the tip, and jogs it onto the pin."""
+"""The person at a simulated cell: looks at tool and tip, and jogs the tip onto the pin."""
 
 import math
 import random
@@ -6,7 +6,7 @@ from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 
 from robolink.model import Pose
-from robolink_simulators.places import XyzMm
+from robolink_simulators.places import Axis, XyzMm
 from robolink_simulators.workplace import MOUNTED_TOOL, Workplace
 
 
@@ -53,6 +53,22 @@ class Operator:
             self._error = self._drawn_error()
         dx, dy, dz = self._gap(tool)
         return Look(dx, dy, dz)
+
+    def way_along(self, axis: Axis, length_mm: float, tool: int | None = None) -> XyzMm:
+        """Return, in base axes, a way along an axis of the tool, with the eye's error at its end.
+
+        Args:
+            axis: Which one; the way goes to its positive side.
+            length_mm: How long.
+            tool: Whose; the nozzle on the arm by default.
+        """
+        x, y, z = self._workplace.axis(axis, MOUNTED_TOOL if tool is None else tool)
+        error = self._drawn_error()
+        return (
+            length_mm * x + error.dx_mm,
+            length_mm * y + error.dy_mm,
+            length_mm * z + error.dz_mm,
+        )
 
     def jog_onto_pin(self, tool: int | None = None) -> Pose:
         """Jog until the eye sees no gap; the orientation stays. Return the flange pose.

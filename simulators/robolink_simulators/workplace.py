@@ -12,6 +12,7 @@ from typing import Any, Final, Protocol
 from robolink.model import TIP, Pose, ToolOffset
 from robolink_simulators.camera import Pixel, UpCamera
 from robolink_simulators.held_board import HeldBoard
+from robolink_simulators.places import Axis, Direction, axis_of
 from robolink_simulators.places import XyzMm as XyzMm
 from robolink_simulators.sensing import UPRIGHT, Lean
 from robolink_simulators.world_parameters import WorldParameters
@@ -31,6 +32,9 @@ class Handled(Protocol):
 
     def tip_mm(self, tip: ToolOffset | None) -> XyzMm:
         """Return where a physical tip is, given where it sits on the flange."""
+
+    def turned(self, direction: Direction) -> Direction:
+        """Return how a direction on the flange lies in the base."""
 
     def carry(self, tip: ToolOffset | None, by_mm: XyzMm) -> None:
         """Jog until the tip has moved that far; the flange turns as little as possible.
@@ -79,10 +83,15 @@ class Workplace:
         self._replaced = replaced
         rng = random.Random(f"camera {seed}")
         self.camera = UpCamera(camera_beside(self.tip_mm(), rng), parameters.optics, rng)
+        self.parameters = WorldParameters()
         self.set_up(parameters)
 
     def set_up(self, parameters: WorldParameters) -> None:
-        """Give the cell other imperfections; nozzles, pin and camera stay where they are."""
+        """Give the cell other imperfections; tips, pin and camera stay where they are."""
+        if parameters.tool_turn != self.parameters.tool_turn:
+            u_deg, v_deg, w_deg = parameters.tool_turn
+            tip = self.tips.get(MOUNTED_TOOL, self._replaced)
+            self.tips[MOUNTED_TOOL] = replace(tip, u_deg=u_deg, v_deg=v_deg, w_deg=w_deg)
         self.parameters = parameters
         self.operator_sigma_mm = parameters.eye_sigma_mm
         self.leans[MOUNTED_TOOL] = parameters.lean
@@ -113,6 +122,10 @@ class Workplace:
     def tip_mm(self, tool: int = MOUNTED_TOOL) -> XyzMm:
         """Return where a physical tip is now."""
         return self.robot.tip_mm(self.tips.get(tool))
+
+    def axis(self, axis: Axis, tool: int = MOUNTED_TOOL) -> Direction:
+        """Return how an axis of a physical tool lies in the base now."""
+        return self.robot.turned(axis_of(self.tips.get(tool, ToolOffset()), axis))
 
     def change_nozzle(self, tool: int = MOUNTED_TOOL) -> ToolOffset:
         """Put another nozzle on; its tip is some tenths of a mm from the old one's."""

@@ -7,13 +7,14 @@ from typing import Any, Final
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink.model import Pose, ToolOffset
+from robolink.model import Pose, ToolOffset, rotate_xy
 from robolink_simulators.epson.kinematics import Joints, inverse, tip_of
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.points import Point
 from robolink_simulators.epson.tip_input import Nozzle, TipInput
 from robolink_simulators.person import Look as Look
 from robolink_simulators.person import Operator
+from robolink_simulators.places import Direction
 from robolink_simulators.sensing import TipSwitch
 from robolink_simulators.workplace import MOUNTED_TOOL as MOUNTED_TOOL
 from robolink_simulators.workplace import Workplace, XyzMm, exchanged, pin_beside
@@ -200,6 +201,10 @@ class _HandledArm:
     def tip_mm(self, tip: ToolOffset | None) -> XyzMm:
         met = tip_of(self._machine.arm.true_flange(), tip)
         return (met.x_mm, met.y_mm, met.z_mm)
+
+    def turned(self, direction: Direction) -> Direction:
+        x, y, z = direction
+        return (*rotate_xy(x, y, self._machine.arm.true_flange().u_deg), z)
 
     def carry(self, tip: ToolOffset | None, by_mm: XyzMm) -> None:  # noqa: ARG002 - U stays, so the flange goes as far as the tip
         arm = self._machine.arm

@@ -31,6 +31,7 @@ class WorldParameters:
         backlash_mm: Play of the linear axes.
         lean_deg: By how much the mounted nozzle's shaft is bent.
         lean_toward_deg: Toward which direction, counted from the flange's X.
+        tool_u_deg, tool_v_deg, tool_w_deg: How the mounted tool is turned on the flange.
         camera_um_per_px_x, camera_um_per_px_y: Length of a pixel at focus.
         camera_turn_deg, camera_shear_deg, camera_mirrored: How the image lies in the base.
         camera_tilt_deg, camera_tilt_toward_deg: By how much, and where to, the lens leans.
@@ -47,6 +48,9 @@ class WorldParameters:
     backlash_mm: float = 0.0
     lean_deg: float = 0.0
     lean_toward_deg: float = 0.0
+    tool_u_deg: float = 0.0
+    tool_v_deg: float = 0.0
+    tool_w_deg: float = 0.0
     camera_um_per_px_x: float = 20.0
     camera_um_per_px_y: float = 20.0
     camera_turn_deg: float = 3.0
@@ -65,6 +69,11 @@ class WorldParameters:
         """The bent shaft, in the flange's axes."""
         beside, toward = math.tan(math.radians(self.lean_deg)), math.radians(self.lean_toward_deg)
         return beside * math.cos(toward), beside * math.sin(toward)
+
+    @property
+    def tool_turn(self) -> tuple[float, float, float]:
+        """U, V and W of the mounted tool."""
+        return self.tool_u_deg, self.tool_v_deg, self.tool_w_deg
 
     @property
     def optics(self) -> CameraOptics:

@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from robolink.calibration import rotation_of, solve_six_point, solve_tool_axis, uvw_deg, zyz_deg
-from robolink.model import Pose
+from robolink.model import Pose, ToolOffset
 from tests.calibration._simulated import (
     assert_honest,
     coverage,
@@ -50,6 +50,28 @@ def test_a_point_in_the_xz_plane_does_as_well():
     result = solve(six(second=(70, 0, 90)), second_is="xz")
     assert result.offset.components() == pytest.approx((*TIP, *ANGLES), abs=1e-9)
     assert result.off_square_deg is None
+
+
+def test_the_ways_may_start_where_there_is_room():
+    poses = six()
+    pivot, start = (
+        poses[:-2],
+        replace(poses[-3], x_mm=poses[-3].x_mm + 30, z_mm=poses[-3].z_mm + 80),
+    )
+    ends = (moved(start, (WAY_MM, 0, 0)), moved(start, (0, 0, WAY_MM)))
+    result = solve_six_point(pivot, *ends, start=start, sigma_mm=0.05)
+    assert result.offset.components() == pytest.approx((*TIP, *ANGLES), abs=1e-9)
+    assert result.inputs == (*pivot, start, *ends)
+    # The place of the tip is as sure as ever, and so is each angle to about sigma sqrt2 / way.
+    at_pin = solve(poses, sigma_mm=0.05)
+    assert result.half_width95[:3] == pytest.approx(at_pin.half_width95[:3])
+    assert result.half_width95[3:] == pytest.approx(at_pin.half_width95[3:], rel=0.3)
+
+
+def test_an_axis_far_from_where_it_is_stored_is_in_doubt():
+    near, far = ToolOffset(0, 0, 0, 20, 10, -30), ToolOffset(0, 0, 0, 200, 20, -50)
+    assert "turned_from_stored" not in solve(six(), stored=near).warnings
+    assert "turned_from_stored" in solve(six(), stored=far).warnings
 
 
 def test_ways_that_are_not_square_are_refused_beyond_two_degrees():

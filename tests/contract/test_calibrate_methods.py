@@ -137,16 +137,6 @@ def test_four_axes_cannot_tilt_and_say_so_before_anything_moves(cell, method):
     assert cell.stored == OLD
 
 
-def test_six_axes_could_tilt_but_the_ways_of_six_point_are_taught(arm, monkeypatch):
-    monkeypatch.setattr(
-        "robolink.controllers.epson._motion.EpsonGroup.axes", lambda _: {"joints": (0.0,) * 6}
-    )
-    refused = arm.calibrate("six-point")
-    assert refused.code == 2
-    assert "poses that were taught" in refused.document["error"]["what"]
-    assert "--points" in refused.document["error"]["remedy"]
-
-
 @pytest.mark.parametrize(
     ("words", "code", "named"),
     [

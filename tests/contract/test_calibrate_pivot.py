@@ -170,19 +170,6 @@ def test_ctrl_c_in_a_tilt_puts_the_tool_back_and_writes_nothing():
     assert "WRITE_TOOL" not in cell.commands
 
 
-def test_over_a_bus_it_does_the_same():
-    simulator = SoftMotionSimulator(FIVE, seed=9)
-    with served("modbus-tcp", simulator) as cell, cell.connect() as controller:
-        # In real time, so only as far as the write.
-        (report,) = change(controller, simulator, verify=False).run().tools
-        result, truth = report.proposal.result, simulator.world.tips[1].components()[:3]
-        errors = [a - b for a, b in zip(result.offset.components()[:3], truth, strict=True)]
-        widths = result.half_width95
-        assert all(abs(e) < 4 * half for e, half in zip(errors, widths, strict=True))
-        assert controller.tools.selected() == 1
-        assert cell.commands.count("WRITE_TOOL") == 1
-
-
 def test_six_axes_are_sent_v_and_w_but_four_are_refused(tmp_path, monkeypatch):
     """No six-axis EPSON arm is simulated: the requests alone are looked at."""
     with method_cell("epson", tmp_path, monkeypatch) as cell:

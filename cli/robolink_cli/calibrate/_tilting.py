@@ -1,13 +1,39 @@
-"""Whether a robot can tilt its tool."""
+"""Whether a robot can tilt its tool, and how often and how far it is to."""
 
-from typing import Final
+from collections.abc import Callable
+from typing import Any, Final
+
+import click
 
 from robolink.errors import CalibrationError
 from robolink.messages import tr
 from robolink.model import Controller
+from robolink_cli._motion_options import motion_option
 
 _LEAST_AXES: Final = 5
 """X, Y, Z and a turn take four; whatever tilts needs another one."""
+
+
+def tilt_options(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Add ``--count`` and ``--tilt``."""
+    lean = motion_option(
+        "--tilt",
+        "tilt_deg",
+        type=click.FloatRange(5, 45),
+        default=20.0,
+        metavar="DEG",
+        show_default=True,
+        help=tr("How far the tool leans in the others, against the first one."),
+    )
+    number = motion_option(
+        "--count",
+        type=click.IntRange(4, 12),
+        default=6,
+        show_default=True,
+        help=tr("Number of touches, the first one in the orientation in which the tool stands."),
+    )
+    command: Callable[..., Any] = number(lean(function))
+    return command
 
 
 def require_tilting(controller: Controller, method: str) -> None:

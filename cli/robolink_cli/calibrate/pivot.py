@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING
 import click
 
 from robolink.messages import tr
-from robolink_cli._motion_options import motion_option
 from robolink_cli._pose_source import PoseSource, pose_source_options
 from robolink_cli.calibrate._frame import Frame
 from robolink_cli.calibrate._options import (
@@ -15,6 +14,7 @@ from robolink_cli.calibrate._options import (
     touch_options,
     until_option,
 )
+from robolink_cli.calibrate._tilting import require_tilting, tilt_options
 
 if TYPE_CHECKING:
     from robolink.model import Controller
@@ -22,22 +22,7 @@ if TYPE_CHECKING:
 
 
 @click.command("pivot")
-@motion_option(
-    "--count",
-    type=click.IntRange(4, 12),
-    default=6,
-    show_default=True,
-    help=tr("Number of touches, the first one in the orientation in which the tool stands."),
-)
-@motion_option(
-    "--tilt",
-    "tilt_deg",
-    type=click.FloatRange(5, 45),
-    default=20.0,
-    metavar="DEG",
-    show_default=True,
-    help=tr("How far the tool leans in the others, against the first one."),
-)
+@tilt_options
 @until_option
 @touch_options
 @sigma_option
@@ -71,7 +56,6 @@ def pivot(
     """
     from robolink.calibration import Course, telling_tilts
     from robolink.nozzle_change import PivotTouches, TiltedPin
-    from robolink_cli.calibrate._tilting import require_tilting
     from robolink_cli.calibrate._touch_plan import touch_plan
 
     frame = frame.at_pin(station)

@@ -1,26 +1,50 @@
-"""calibrate six-point: position and orientation of a tool, on six axes."""
+"""calibrate six-point: position and orientation of a tool, on five axes and six."""
 
-from typing import Literal, NoReturn
+from dataclasses import replace
+from typing import TYPE_CHECKING, Literal
 
 import click
 
-from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink_cli._context import open_controller
+from robolink_cli._motion_options import motion_option
 from robolink_cli._pose_source import PoseSource, pose_source_options
 from robolink_cli.calibrate._frame import Frame
-from robolink_cli.calibrate._options import calibration_options, sigma_option
+from robolink_cli.calibrate._options import (
+    calibration_options,
+    pin_option,
+    sigma_option,
+    touch_options,
+    until_option,
+)
+from robolink_cli.calibrate._tilting import require_tilting, tilt_options
+
+if TYPE_CHECKING:
+    from robolink.model import Controller
+    from robolink.nozzle_change import TiltedPin
 
 
 @click.command("six-point")
+@tilt_options
+@until_option
+@motion_option(
+    "--way",
+    "way_mm",
+    type=click.FloatRange(10, 200),
+    default=50.0,
+    metavar="MM",
+    show_default=True,
+    help=tr("Least length of each of the two ways; the longer, the surer the axes."),
+)
 @click.option(
     "--second-is",
     type=click.Choice(["z", "xz"]),
     default="z",
     show_default=True,
-    help=tr("What the last pose shows: the tool's +Z, or its XZ plane on the side of +Z."),
+    help=tr("What the second way shows: the tool's +Z, or its XZ plane on the side of +Z."),
 )
+@touch_options
 @sigma_option
+@pin_option
 @pose_source_options(
     points=tr("The points on the pin, then the one along X and the one along Z."),
     typed=tr("A pose X,Y,Z,U,V,W in mm and degrees; give it five times or more."),
@@ -30,37 +54,43 @@ from robolink_cli.calibrate._options import calibration_options, sigma_option
 def six_point(
     frame: Frame,
     *,
+    count: int,
+    tilt_deg: float,
+    until_mm: float | None,
+    way_mm: float,
     second_is: Literal["z", "xz"],
+    lift_mm: float,
+    clearance_mm: float,
     sigma_mm: float | None,
+    station: str | None,
     poses: PoseSource | None,
 ) -> None:
     """Find all six components: a pivot, then a way along the tool's X and one along its Z.
 
-    Three poses or more with the tip on one pin, tilted and turned; the last two, in this order,
-    after a way of 50 mm or more along the tool's own +X and then +Z, both from the last pose on the
-    pin and without turning.
+    The touches go as in 'calibrate pivot'. Then, in the air and without turning, you bring the tip
+    to where it has room, and jog it along the tool's own +X; the robot goes straight back; and
+    along its own +Z. A way that is too short or has turned is said at once. The work box reaches
+    higher by the length of a way.
+
+    With --points, --pose or --poses the poses exist already: three or more on one pin, tilted and
+    turned; the last two, in this order, after a way along +X and one along +Z, both from the last
+    pose on the pin. Nothing moves.
     """
-    from robolink.nozzle_change import SixPoints
+    from robolink.calibration import Course, WayPlan, telling_tilts
+    from robolink.nozzle_change import SixPoints, TiltedPin
+    from robolink_cli.calibrate._touch_plan import touch_plan
 
-    if poses is None:
-        _refuse_live(frame)
-    frame.solve(poses, lambda _controller: SixPoints(second_is, sigma_mm))
+    frame = frame.at_pin(station)
+    touch = touch_plan(lift_mm, clearance_mm)
+    if poses is not None:
+        frame.solve(poses, lambda _controller: SixPoints(second_is, sigma_mm))
+        return
+    tilts, course = telling_tilts(count - 1, tilt_deg), Course(until_mm, retake=True)
+    ways, limits = WayPlan(way_mm, second_is), frame.limits
+    frame = replace(frame, limits=replace(limits, box_up_mm=limits.box_up_mm + way_mm))
 
-
-def _refuse_live(frame: Frame) -> NoReturn:
-    """Say what to do instead of driving the ways along the tool's axes; reads only.
-
-    Raises:
-        CalibrationError: ``rank_deficient``: this robot cannot tilt its tool at all.
-        ConfigError: It can; but the last two poses are driven by a person.
-    """
-    from robolink_cli.calibrate._tilting import require_tilting
-
-    with open_controller(frame.context) as controller:
+    def source(controller: "Controller") -> "TiltedPin":
         require_tilting(controller, "six-point")
-    raise ConfigError(
-        tr("six-point is solved from poses that were taught; robolink drives none for it."),
-        remedy=tr(
-            "Teach them and give --points, --pose or --poses. X, Y and Z alone: 'calibrate pivot'."
-        ),
-    )
+        return TiltedPin(tilts, touch, sigma_mm=sigma_mm, course=course, ways=ways)
+
+    frame.measure(source)

@@ -8,6 +8,7 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
 from robolink_simulators.person import Operator
+from robolink_simulators.places import Direction
 from robolink_simulators.sensing import Lean, Shake, TipSwitch
 from robolink_simulators.softmotion.condition import GroupState
 from robolink_simulators.softmotion.frames import (
@@ -151,6 +152,9 @@ class _HandledGroup:
         group = self._group
         return _tip_at(group, trailing(group, group.values), tip)
 
+    def turned(self, direction: Direction) -> Direction:
+        return _turned_at(self._group, trailing(self._group, self._group.values), direction)
+
     def loosen(self, parameters: WorldParameters) -> None:
         for axis in self._group.axes:
             rotary = axis.kind is AxisKind.ROTARY
@@ -188,8 +192,12 @@ def trailing(group: AxisGroup, axes: AxisValues) -> AxisValues:
 
 
 def _lean_at(group: AxisGroup, axes: AxisValues, lean: Lean) -> Lean:
-    x, y, _ = turned(group.kinematics.flange(axes).rotation, (*lean, 0.0))
+    x, y, _ = _turned_at(group, axes, (*lean, 0.0))
     return x, y
+
+
+def _turned_at(group: AxisGroup, axes: AxisValues, direction: Direction) -> Direction:
+    return turned(group.kinematics.flange(axes).rotation, direction)
 
 
 def _frame(tip: ToolOffset | None) -> Frame:

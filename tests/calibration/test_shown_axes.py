@@ -1,0 +1,149 @@
+"""Six points with a person: touches, then the axes shown in the air; what is wrong said at once."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from robolink.calibration import Shown, WayPlan, rotation_of, six_point, telling_tilts
+from robolink.errors import CalibrationError
+from robolink.model import Path, Pose, ToolOffset
+from tests.calibration._tilting_person import (
+    FRAMES,
+    PIN,
+    PLAN,
+    STORED,
+    TIP,
+    Person,
+    tip_mm,
+    turned_deg,
+)
+
+TURN_DEG = (15.0, 8.0, -5.0)
+TOOL = ToolOffset(*TIP.components()[:3], *TURN_DEG)
+AXES = rotation_of(Pose(0.0, 0.0, 0.0, *TURN_DEG))
+X, Y, Z = AXES.T
+WAYS = {Shown.ALONG_X: X, Shown.ALONG_Z: Z}
+ANY_Z = {Shown.ALONG_X: X, Shown.ALONG_Z: 0.7 * X + 0.7 * Z}
+
+
+class Guide(Person):
+    """Shows axes too: each time the next of ``shows``, and in the end as is right.
+
+    A step to show is a vector in the flange's axes, mm, and by how much the tool is turned.
+    """
+
+    def __init__(self, start=FRAMES[0], *, shows=(), ways=WAYS, **more):
+        super().__init__(start, **more)
+        self._shows, self._ways = list(shows), ways
+        self.asked = []
+
+    def _shown(self, step):
+        self.asked.append(step.shown)
+        here = self._here
+        if step.shown is Shown.ROOM:
+            # A flange that points down needs the room of a way below it.
+            down_mm = min(0.0, *(60 * (rotation_of(here) @ way)[2] for way in self._ways.values()))
+            way, turn_deg = (0.0, 0.0, -down_mm), 0.0
+        else:
+            right = 60.0 * self._ways[step.shown], 0.0
+            own, turn_deg = self._shows.pop(0) if self._shows else right
+            way = rotation_of(here) @ own
+        x, y, z = np.add(way, self._error()).tolist()
+        self._here = replace(
+            here,
+            x_mm=here.x_mm + x,
+            y_mm=here.y_mm + y,
+            z_mm=here.z_mm + z,
+            u_deg=here.u_deg + turn_deg,
+        )
+        return self._here
+
+
+def measured(guide, **more):
+    return guide.run(six_point(PLAN, WayPlan(**more), tilts=telling_tilts(5, 20.0), stored=STORED))
+
+
+@pytest.mark.parametrize("start", FRAMES)
+@pytest.mark.parametrize(("second_is", "ways"), [("z", WAYS), ("xz", ANY_Z)])
+def test_exact_poses_give_all_six_whichever_way_the_flange_points(start, second_is, ways):
+    guide = Guide(start, sigma_mm=0.0, ways=ways)
+    result = measured(guide, second_is=second_is)
+    assert result.method == "six_point"
+    assert result.offset.components() == pytest.approx(TOOL.components(), abs=1e-8)
+    assert guide.asked == [Shown.ROOM, Shown.ALONG_X, Shown.ALONG_Z]
+    assert result.inputs[-1].u_deg == pytest.approx(start.u_deg)
+
+
+@pytest.mark.parametrize("start", FRAMES)
+def test_the_robot_only_goes_straight_back_and_ends_above_the_pin_as_it_began(start):
+    guide = Guide(start)
+    measured(guide)
+    shown = [move for move in guide.steps if "where the way began" in move[0].purpose]
+    assert [step.path for step, _, _ in shown] == [Path.STRAIGHT] * 2
+    assert all(turned_deg(here, there) < 1e-4 for _, here, there in shown)
+    for _, _, there in guide.steps:
+        assert tip_mm(there)[2] > PIN[2] + PLAN.clearance_mm - 1.0
+    end = guide.steps[-1][2]
+    assert tip_mm(end) == pytest.approx(np.add(PIN, (0, 0, PLAN.lift_mm)), abs=1.5)
+    assert turned_deg(end, guide.touches[0]) < 1e-4
+
+
+@pytest.mark.parametrize(
+    ("shows", "what", "remedy"),
+    [
+        ([(8.0 * X, 0.0)], "The way along the axis is 8.0", "Move 50 mm or more"),
+        ([(60.0 * X, 0.5), (0.0 * X, -0.5)], "The tool turned on the way", "Keep the orientation"),
+        (
+            [(60.0 * X + 4.0 * Z, 0.0)],
+            "degrees off a right angle",
+            "start both ways at the same pose",
+        ),
+    ],
+)
+def test_a_way_that_cannot_be_used_is_said_at_once_and_shown_again(shows, what, remedy):
+    guide = Guide(sigma_mm=0.0, shows=shows)
+    result = measured(guide)
+    (told,) = [text for text in guide.told if what in text and remedy in text]
+    assert told
+    assert result.offset.components() == pytest.approx(TOOL.components(), abs=1e-6)
+    assert any("U, V and W are known to" in text for text in guide.told)
+
+
+@pytest.mark.parametrize(
+    ("show", "code", "asked"),
+    [
+        ((2.0 * X, 0.0), "short_axis", 4),
+        ((60.0 * X, 0.5), "turned_on_the_way", 4),
+        ((60.0 * (X + Z), 0.0), "axes_not_square", 7),
+    ],
+)
+def test_after_the_third_time_it_ends_with_the_name_of_what_is_wrong(show, code, asked):
+    guide = Guide(shows=[show] * 6)
+    if code == "axes_not_square":
+        guide = Guide(ways={Shown.ALONG_X: X + Z, Shown.ALONG_Z: Z})
+    with pytest.raises(CalibrationError) as refused:
+        measured(guide)
+    assert refused.value.code == code
+    assert len(guide.asked) == asked
+
+
+@pytest.mark.parametrize("accepts", [0, 1])
+def test_a_way_to_the_wrong_side_is_offered_again_or_stays_in_doubt(accepts):
+    guide = Guide(sigma_mm=0.0, shows=[(-60.0 * X, 0.0)], accepts=accepts)
+    result = measured(guide)
+    assert guide.offers[0].startswith("This way leads 163 degrees away from +X")
+    assert ("turned_from_stored" in result.warnings) is (not accepts)
+    right = result.offset.components() == pytest.approx(TOOL.components(), abs=1e-6)
+    assert right is bool(accepts)
+
+
+def test_the_truth_of_place_and_orientation_lies_in_the_interval():
+    held = total = 0
+    for seed in range(25):
+        result = measured(Guide(seed=seed))
+        errors = np.abs(np.subtract(result.offset.components(), TOOL.components()))
+        held += int((errors <= result.half_width95).sum())
+        total += 6
+        assert (errors < 4 * np.array(result.half_width95)).all()
+    assert 0.90 < held / total < 1.0

@@ -1,0 +1,161 @@
+"""``calibrate six-point`` live: all six components, on a PLC whose flange leaves the vertical."""
+
+from dataclasses import replace
+
+import pytest
+from robolink_cli._operator import AssistedOperator
+from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
+from robolink_simulators.world_parameters import WorldParameters
+
+from robolink.calibration import Ask, Shown, TouchPlan, WayPlan, rotation_of, telling_tilts
+from robolink.errors import VerifyError
+from robolink.model import Pose, ToolOffset
+from robolink.nozzle_change import ChangePlan, Gate, Listener, NozzleChange, TiltedPin, ToolPlan
+from tests.contract._method_cell import method_cell
+from tests.contract._softmotion_cell import served
+from tests.contract.test_calibrate_pivot import FIVE, QUICK, STORED, plc, run
+
+__all__ = ["plc"]
+
+pytestmark = pytest.mark.simulator_only
+
+TURNED = {"tool_u_deg": 14.0, "tool_v_deg": 7.0, "tool_w_deg": 356.0}
+
+
+def orientation(offset):
+    """Return how an offset turns the tool."""
+    return rotation_of(Pose(0.0, 0.0, 0.0, *offset.components()[3:]))
+
+
+def person(simulator, way_mm=12.0):
+    operator = simulator.world.operator
+
+    def look():
+        seen = operator.look(1)
+        return seen.dx_mm, seen.dy_mm, seen.dz_mm
+
+    return AssistedOperator(
+        look, lambda _text: None, way=lambda axis: operator.way_along(axis, way_mm)
+    )
+
+
+def change(controller, simulator, *, listener=None, verify=True):
+    source = TiltedPin(telling_tilts(2, 20.0), TouchPlan(), ways=WayPlan(10.0))
+    plan = ChangePlan((ToolPlan(1, source, Gate(), verify=verify),), QUICK, ask_before_write=False)
+    return NozzleChange(controller, plan, operator=person(simulator), listener=listener)
+
+
+def turned_simulator(seed=4):
+    return SoftMotionSimulator(FIVE, seed=seed, world=WorldParameters(**TURNED))
+
+
+def test_place_and_orientation_are_found_written_and_proved(plc, tmp_path):
+    world, page = plc.world, tmp_path / "page.html"
+    world.set_up(replace(world.parameters, **TURNED))
+    words = (
+        "calibrate",
+        "six-point",
+        "--tool",
+        "1",
+        "--assist",
+        plc.url,
+        "--yes",
+        "--speed",
+        "100",
+    )
+    code, document, said = run(plc.url, *words, "--count", "4", "--report", str(page))
+    assert code == 0, said
+    assert document["measured"] == list(document["proposed"])
+    truth, half = world.tips[1].components(), document["fit"]["half_width95"].values()
+    for found, true, width in zip(document["proposed"].values(), truth, half, strict=True):
+        assert abs((found - true + 180) % 360 - 180) < 4 * width
+    assert max(list(half)[3:]) < 0.1
+    assert document["off_square_deg"] == pytest.approx(0.0, abs=0.1)
+    assert document["verification"]["passed"]
+    assert "ways along the tool's axes shown by a person: 2" in said
+    assert "The ways are 0.0" in said
+    with_tool = replace(ToolOffset(), **document["proposed"])
+    a_deg, b_deg, c_deg = plc.plc.memory.slot(1).tool[3:]
+    # The PLC keeps Rz(A) Ry(B) Rz(C).
+    kept = (rotation_of(Pose(0, 0, 0, a_deg)) @ rotation_of(Pose(0, 0, 0, 0, b_deg))) @ rotation_of(
+        Pose(0, 0, 0, c_deg)
+    )
+    assert kept == pytest.approx(orientation(with_tool), abs=1e-6)
+    text = page.read_text()
+    assert "5 (where the ways begin)" in text
+    assert "6 (along X)" in text
+
+
+def test_a_tip_that_slips_is_found_and_place_and_orientation_come_back():
+    class Slips(Listener):
+        def wrote(self, receipt):
+            tip = simulator.world.tips[1]
+            simulator.world.tips[1] = replace(tip, z_mm=tip.z_mm - 1.0)
+            self.written = simulator.plc.memory.slot(1).tool
+
+    simulator, listener = turned_simulator(), Slips()
+    with served("sim", simulator) as cell, cell.connect() as controller:
+        with pytest.raises(VerifyError):
+            change(controller, simulator, listener=listener).run()
+    assert any(abs(angle) > 1 for angle in listener.written[3:])
+    assert simulator.plc.memory.slot(1).tool == (*STORED, 0.0, 0.0, 0.0)
+
+
+def test_ctrl_c_on_a_way_puts_the_tool_back_and_writes_nothing():
+    class Leaves(Listener):
+        def step(self, tool, done):
+            if isinstance(done.step, Ask) and done.step.shown is Shown.ALONG_X:
+                raise KeyboardInterrupt
+
+    simulator = turned_simulator()
+    with served("sim", simulator) as cell, cell.connect() as controller:
+        with pytest.raises(KeyboardInterrupt):
+            change(controller, simulator, listener=Leaves()).run()
+        assert controller.tools.selected() == 1
+        assert cell.open_requests == []
+    assert "WRITE_TOOL" not in cell.commands
+    assert simulator.plc.memory.slot(1).tool == (*STORED, 0.0, 0.0, 0.0)
+
+
+def test_over_a_bus_touches_and_ways_go_the_same():
+    simulator = turned_simulator(seed=9)
+    with served("modbus-tcp", simulator) as cell, cell.connect() as controller:
+        # In real time, so only as far as the write.
+        (report,) = change(controller, simulator, verify=False).run().tools
+        result, truth = report.proposal.result, simulator.world.tips[1]
+        for axis, other in zip(orientation(result.offset).T, orientation(truth).T, strict=True):
+            assert axis @ other > 0.9999
+        assert cell.commands.count("WRITE_TOOL") == 1
+        assert controller.tools.read(1).components() == pytest.approx(result.offset.components())
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "what"),
+    [
+        (("--box", "40", "--yes"), 2, "outside the work box"),
+        (("--way", "5", "--yes"), 2, "--way"),
+        (("--way", "60", "--pose", "1,2,3,4,5,6"), 2, "says how to move"),
+        ((), 9, ""),
+    ],
+)
+def test_what_cannot_be_done_is_refused_before_anything_moves(plc, words, code, what):
+    ended, document, _ = run(plc.url, "calibrate", "six-point", "--tool", "1", *words)
+    assert ended == code, document
+    assert what in document["error"]["what"]
+    assert plc.plc.group.movements_started == 0
+
+
+def test_six_axes_of_an_arm_would_do_it_too(tmp_path, monkeypatch):
+    """No six-axis EPSON arm is simulated: the steps and requests alone are looked at."""
+    with method_cell("epson", tmp_path, monkeypatch) as cell:
+        robot = "robolink.controllers.epson"
+        monkeypatch.setattr(f"{robot}._motion.EpsonGroup.axes", lambda _: {"joints": (0.0,) * 6})
+        monkeypatch.setattr(f"{robot}._robot.Robot.six_axes", property(lambda _: True))
+        shown = cell.run("calibrate", "six-point", "--tool", "1", "--dry-run", "--json")
+        assert shown.code == 0, shown.err
+        steps = shown.document["steps"]
+        assert sum("onto the pin" in step["text"] for step in steps) == 6
+        ways = [step["text"] for step in steps if "tool's own" in step["text"]]
+        assert ["+X" in way for way in ways] == [True, True, False]
+        assert not any(step["refusal"] for step in steps)
+        monkeypatch.undo()

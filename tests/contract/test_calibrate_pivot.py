@@ -4,6 +4,7 @@ import contextlib
 import io
 import json
 from dataclasses import replace
+from functools import partial
 from itertools import count
 
 import pytest
@@ -40,7 +41,11 @@ _names = count()
 
 @pytest.fixture
 def plc(tmp_path, monkeypatch):
-    """A simulated machine of five axes, in process; its URL stands in ``url``."""
+    """A simulated machine of five axes, in process; its URL stands in ``url``.
+
+    It moves faster than commands let it, which changes nothing but how long a test takes.
+    """
+    monkeypatch.setattr("robolink.nozzle_change.Limits", partial(Limits, speed_percent=100))
     monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
     name, simulator = f"five-axes-{next(_names)}", SoftMotionSimulator(FIVE, seed=4)
     simulator.url = plc_in_process.register(name, simulator, clock=ManualClock())

@@ -32,6 +32,10 @@ _SENTENCES: Final[Mapping[str, Callable[[], str]]] = {
         "An axis lies more than 45 degrees from where it is stored: make sure that +X and +Z were "
         "not taken for other axes. The proof by tilting does not show it."
     ),
+    "ways_askew": lambda: tr(
+        "The ways are further off a right angle than the touches scatter: the orientation is less "
+        "sure than its interval says."
+    ),
     "full_calibration_due": lambda: tr(
         "A full calibration is due: the differences since the last one add up."
     ),

@@ -54,7 +54,7 @@ def six_point(
 
     The touches go as in :func:`pivot`. Then the person shows the axes. A way that cannot be used
     is said at once, and the person goes on from where the tool stands. Ways that are not square
-    are both asked for again. It ends as :func:`pivot` does.
+    are both asked for again; those that are a little askew may be. It ends as :func:`pivot` does.
 
     Args:
         plan: Lift and clearance.
@@ -87,12 +87,15 @@ def six_point(
                 stored=stored,
                 sigma_mm=sigma_mm,
             )
-            break
         except CalibrationError as error:
             if error.code != "axes_not_square" or not left:
                 raise
             yield Tell(str(error))
-    yield Tell(_sureness(result))
+            continue
+        yield Tell(_sureness(result))
+        askew = "ways_askew" in result.warnings
+        if not left or not askew or not (yield Offer(tr("Show both ways again?"))):
+            break
     yield from travel(lifted, here=start, purpose=tr("go back above the pin"))
     return result
 
@@ -216,5 +219,8 @@ def _sureness(result: SixPointResult) -> str:
         said = tr("The ways are {off:.2f} degrees off a right angle.", off=abs(off_deg))
     if half_deg is None:
         return said
+    if "ways_askew" in result.warnings:
+        doubted = tr("That is more than the touches scatter: a way was not quite along its axis.")
+        return f"{said} {doubted}"
     known = tr("U, V and W are known to +-{half:.3f} degrees.", half=half_deg)
     return f"{said} {known}"

@@ -7,7 +7,7 @@ After the pivot the tool is moved, without turning, along its own X and then alo
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -32,6 +32,12 @@ MOST_OFF_SQUARE_DEG = 2.0
 
 FAR_DEG = 45.0
 """A way that leads further from where its axis is stored is nearer to another axis."""
+
+_MOST_ASKEW = 2.0
+"""How many halves of its 95 % interval the angle between the ways may be off a right angle."""
+
+_LEAST_ASKEW_DEG = 0.001
+"""Below what a controller prints nothing is doubted."""
 
 _START = -3
 """Where among all poses the ways start: before their two ends."""
@@ -95,7 +101,9 @@ def solve_six_point(
         second_is: ``z``: along the tool's +Z; ``xz``: in its XZ plane, on the side of +Z.
         stored: The offset stored now. An orientation far from its own is doubted, with
             ``turned_from_stored``: where a way went along another axis nothing else shows it.
-        sigma_mm: Standard deviation of one coordinate of one placement, when it is known.
+        sigma_mm: Standard deviation of one coordinate of one placement, when it is known. Ways
+            that are less square than it, or the scatter of the touches, explains are doubted,
+            with ``ways_askew``.
         tolerance: Residuals above which the result carries a warning.
 
     Raises:
@@ -138,7 +146,7 @@ def solve_six_point(
         rank=pivot.rank,
         off_square_deg=off,
     )
-    return judged(
+    result = judged(
         result,
         np.array(pivot.residuals_mm),
         unit,
@@ -146,6 +154,7 @@ def solve_six_point(
         sigma_mm=sigma_mm,
         tolerance=tolerance,
     )
+    return _doubted(result, (x_axis, second_axis))
 
 
 def solve_tool_axis(first: Pose, second: Pose, *, sigma_mm: float | None = None) -> ToolAxis:
@@ -182,6 +191,23 @@ def _frame(x_axis: Floats, second: Floats, *, square: bool) -> Floats:
     u, _, v = np.linalg.svd(np.column_stack((x, y / np.linalg.norm(y), z)))
     frame: Floats = u @ v
     return frame
+
+
+def _doubted(result: SixPointResult, ways: tuple[Floats, Floats]) -> SixPointResult:
+    """Return the result, with ``ways_askew`` where the touches do not explain the angle.
+
+    Both ends of both ways err by sigma across, and the ways share a start at which their errors
+    are square to each other: var = 2 sigma^2 (1 / a^2 + 1 / b^2).
+    """
+    off, sigma_mm = result.off_square_deg, result.sigma_mm
+    if off is None or abs(off) < _LEAST_ASKEW_DEG or not sigma_mm:
+        return result
+    lengths = np.linalg.norm(ways, axis=1)
+    sigma_deg = math.degrees(sigma_mm * math.sqrt(2 * float((1 / lengths**2).sum())))
+    half_widths = result.half_width95[0] / math.sqrt(result.covariance[0][0])
+    if abs(off) <= _MOST_ASKEW * half_widths * sigma_deg:
+        return result
+    return replace(result, warnings=(*result.warnings, "ways_askew"))
 
 
 def _far_from(stored: ToolOffset | None, frame: Floats) -> Iterator[str]:

@@ -30,7 +30,8 @@ ANY_Z = {Shown.ALONG_X: X, Shown.ALONG_Z: 0.7 * X + 0.7 * Z}
 class Guide(Person):
     """Shows axes too: each time the next of ``shows``, and in the end as is right.
 
-    A step to show is a vector in the flange's axes, mm, and by how much the tool is turned.
+    A step to show is a vector in the flange's axes, mm, and by how much the tool is turned. Where a
+    way begins is sighted with an error just as where it ends.
     """
 
     def __init__(self, start=FRAMES[0], *, shows=(), ways=WAYS, **more):
@@ -44,12 +45,13 @@ class Guide(Person):
         if step.shown is Shown.ROOM:
             # A flange that points down needs the room of a way below it.
             down_mm = min(0.0, *(60 * (rotation_of(here) @ way)[2] for way in self._ways.values()))
-            way, turn_deg = (0.0, 0.0, -down_mm), 0.0
+            way, turn_deg, error = (0.0, 0.0, -down_mm), 0.0, self._error()
+            self._aside = error
         else:
             right = 60.0 * self._ways[step.shown], 0.0
             own, turn_deg = self._shows.pop(0) if self._shows else right
-            way = rotation_of(here) @ own
-        x, y, z = np.add(way, self._error()).tolist()
+            way, error = rotation_of(here) @ own, np.subtract(self._error(), self._aside)
+        x, y, z = np.add(way, error).tolist()
         self._here = replace(
             here,
             x_mm=here.x_mm + x,
@@ -138,12 +140,25 @@ def test_a_way_to_the_wrong_side_is_offered_again_or_stays_in_doubt(accepts):
     assert right is bool(accepts)
 
 
+def test_ways_that_are_less_square_than_the_touches_scatter_are_offered_again():
+    askew = (60.0 * X + 0.4 * Z, 0.0)
+    doubted = Guide(shows=[askew])
+    assert "ways_askew" in measured(doubted).warnings
+    (told,) = [text for text in doubted.told if "right angle" in text]
+    assert "more than the touches scatter" in told
+    again = Guide(shows=[askew], accepts=1)
+    assert measured(again).warnings == ()
+    assert again.offers == ["Show both ways again?"]
+    assert len(again.asked) == 5
+
+
 def test_the_truth_of_place_and_orientation_lies_in_the_interval():
     held = total = 0
-    for seed in range(25):
+    for seed in range(100, 140):
         result = measured(Guide(seed=seed))
         errors = np.abs(np.subtract(result.offset.components(), TOOL.components()))
         held += int((errors <= result.half_width95).sum())
         total += 6
+        assert "ways_askew" not in result.warnings
         assert (errors < 4 * np.array(result.half_width95)).all()
-    assert 0.90 < held / total < 1.0
+    assert 0.90 < held / total < 0.99

@@ -19,7 +19,7 @@ __all__ = ["plc"]
 
 pytestmark = pytest.mark.simulator_only
 
-TURNED = {"tool_u_deg": 14.0, "tool_v_deg": 7.0, "tool_w_deg": 356.0}
+TURNED = WorldParameters(tool_u_deg=14.0, tool_v_deg=7.0, tool_w_deg=356.0)
 
 
 def orientation(offset):
@@ -46,12 +46,12 @@ def change(controller, simulator, *, listener=None, verify=True):
 
 
 def turned_simulator(seed=4):
-    return SoftMotionSimulator(FIVE, seed=seed, world=WorldParameters(**TURNED))
+    return SoftMotionSimulator(FIVE, seed=seed, world=TURNED)
 
 
 def test_place_and_orientation_are_found_written_and_proved(plc, tmp_path):
     world, page = plc.world, tmp_path / "page.html"
-    world.set_up(replace(world.parameters, **TURNED))
+    world.set_up(TURNED)
     words = (
         "calibrate",
         "six-point",
@@ -126,7 +126,7 @@ def test_over_a_bus_touches_and_ways_go_the_same():
         for axis, other in zip(orientation(result.offset).T, orientation(truth).T, strict=True):
             assert axis @ other > 0.9999
         assert cell.commands.count("WRITE_TOOL") == 1
-        assert controller.tools.read(1).components() == pytest.approx(result.offset.components())
+        assert controller.tools.same(controller.tools.read(1), result.offset)
 
 
 @pytest.mark.parametrize(

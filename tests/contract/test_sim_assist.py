@@ -1,6 +1,7 @@
 """The assist port: a person, as JSON lines."""
 
 import json
+import math
 import socket
 from contextlib import closing
 
@@ -46,6 +47,18 @@ def test_the_assist_port_looks_jogs_and_tells_the_truth(assisted):
     assert flange["u_deg"] == pytest.approx(simulator.machine.arm.flange().u_deg)
     assert abs(assist.look().dx_mm) < 1e-6
     assert assist.truth() == json.loads(json.dumps(simulator.world.truth()))
+
+
+def test_the_assist_port_shows_the_axes_of_the_true_tool(assisted):
+    _, assist, simulator = assisted
+    assist.do("set_world", tool_v_deg=90, eye_sigma_mm=0)
+    u_deg = math.radians(simulator.machine.arm.flange().u_deg)
+    # Turned about Y by a quarter of a turn, +Z points to where +X was.
+    aside = [50 * math.cos(u_deg), 50 * math.sin(u_deg), 0]
+    assert assist.way_along("z", 50.0, 1) == pytest.approx(aside)
+    assert assist.way_along("x", 50.0, 1) == pytest.approx([0, 0, -50])
+    with pytest.raises(ConfigError, match="no axis 'y'"):
+        assist.do("way_along", axis="y", length_mm=50)
 
 
 def test_the_assist_port_pushes_buttons(assisted):

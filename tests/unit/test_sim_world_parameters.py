@@ -53,6 +53,20 @@ def test_play_is_lost_when_the_way_turns(make):
         assert abs(lost_mm) > least_mm
 
 
+def test_a_tool_that_is_turned_on_the_flange_keeps_its_tip(make):
+    straight, turned = make().world, make(tool_u_deg=14, tool_v_deg=7, tool_w_deg=356).world
+    assert turned.tip_mm() == pytest.approx(straight.tip_mm())
+    assert turned.pin_mm == straight.pin_mm
+    assert straight.axis("z") == pytest.approx((0, 0, 1), abs=1e-9)
+    x, z = (turned.axis(name) for name in ("x", "z"))
+    assert sum(a * b for a, b in zip(x, z, strict=True)) == pytest.approx(0.0, abs=1e-12)
+    # R = Rz(14) Ry(7) Rx(-4)
+    assert z[2] == pytest.approx(math.cos(math.radians(7)) * math.cos(math.radians(4)))
+    assert x[2] == pytest.approx(-math.sin(math.radians(7)))
+    turned.set_up(WorldParameters())
+    assert turned.axis("z") == pytest.approx((0, 0, 1), abs=1e-9)
+
+
 def test_a_gantry_has_play_in_its_linear_axes():
     simulator = SoftMotionSimulator("Kin_Gantry3", seed=2, world=WorldParameters(backlash_mm=0.05))
     jogged(simulator, 1.0)

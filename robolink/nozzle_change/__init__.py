@@ -40,6 +40,7 @@ from robolink.nozzle_change._source import MovingSource as MovingSource
 from robolink.nozzle_change._source import TipSource as TipSource
 from robolink.nozzle_change._station_learning import learn_station as learn_station
 from robolink.nozzle_change._tilted_pin import TiltedPin as TiltedPin
+from robolink.nozzle_change._tilting import require_tilting as require_tilting
 from robolink.nozzle_change._touch_probe import TouchProbe as TouchProbe
 from robolink.nozzle_change._touch_solvers import Absolute as Absolute
 from robolink.nozzle_change._touch_solvers import Difference as Difference

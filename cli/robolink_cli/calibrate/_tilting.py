@@ -1,17 +1,12 @@
-"""Whether a robot can tilt its tool, and how often and how far it is to."""
+"""How often a pin is touched with a tilted tool, and how far the tool leans."""
 
 from collections.abc import Callable
-from typing import Any, Final
+from typing import Any
 
 import click
 
-from robolink.errors import CalibrationError
 from robolink.messages import tr
-from robolink.model import Controller
 from robolink_cli._motion_options import motion_option
-
-_LEAST_AXES: Final = 5
-"""X, Y, Z and a turn take four; whatever tilts needs another one."""
 
 
 def tilt_options(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -34,36 +29,3 @@ def tilt_options(function: Callable[..., Any]) -> Callable[..., Any]:
     )
     command: Callable[..., Any] = number(lean(function))
     return command
-
-
-def require_tilting(controller: Controller, method: str) -> None:
-    """Refuse a method with tilted poses on a robot of four axes; reads only.
-
-    A machine that does not tell its axes is not refused here: what it cannot take up shows when it
-    has moved.
-
-    Raises:
-        CalibrationError: ``rank_deficient``.
-    """
-    axes = _axes(controller)
-    if not 0 < axes < _LEAST_AXES:
-        return
-    raise CalibrationError(
-        "rank_deficient",
-        tr(
-            "{robot} has {axes} axes and turns its tool about Z only, so {method} cannot be "
-            "measured with it: nothing shows Z and the tilt of the tool.",
-            robot=", ".join(controller.facts().robot_models) or controller.identity,
-            axes=axes,
-            method=method,
-        ),
-        remedy=tr(
-            "Measure X and Y with 'calibrate n-angle' and Z with 'calibrate z-touch' or "
-            "'calibrate one-touch'."
-        ),
-    )
-
-
-def _axes(controller: Controller) -> int:
-    counted = controller.groups[0].axes() if controller.groups else {}
-    return max((len(values) for name, values in counted.items() if name != "pulses"), default=0)

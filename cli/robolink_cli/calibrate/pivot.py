@@ -14,7 +14,7 @@ from robolink_cli.calibrate._options import (
     touch_options,
     until_option,
 )
-from robolink_cli.calibrate._tilting import require_tilting, tilt_options
+from robolink_cli.calibrate._tilting import tilt_options
 
 if TYPE_CHECKING:
     from robolink.model import Controller
@@ -55,7 +55,7 @@ def pivot(
     With --points, --pose or --poses the touches exist already: nothing moves.
     """
     from robolink.calibration import Course, telling_tilts
-    from robolink.nozzle_change import PivotTouches, TiltedPin
+    from robolink.nozzle_change import PivotTouches, TiltedPin, require_tilting
     from robolink_cli.calibrate._touch_plan import touch_plan
 
     frame = frame.at_pin(station)

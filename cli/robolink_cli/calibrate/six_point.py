@@ -16,7 +16,7 @@ from robolink_cli.calibrate._options import (
     touch_options,
     until_option,
 )
-from robolink_cli.calibrate._tilting import require_tilting, tilt_options
+from robolink_cli.calibrate._tilting import tilt_options
 
 if TYPE_CHECKING:
     from robolink.model import Controller
@@ -77,7 +77,7 @@ def six_point(
     pose on the pin. Nothing moves.
     """
     from robolink.calibration import Course, WayPlan, telling_tilts
-    from robolink.nozzle_change import SixPoints, TiltedPin
+    from robolink.nozzle_change import SixPoints, TiltedPin, require_tilting
     from robolink_cli.calibrate._touch_plan import touch_plan
 
     frame = frame.at_pin(station)

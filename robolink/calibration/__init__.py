@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING
 
 from robolink.calibration._angle_touches import n_angle as n_angle
 from robolink.calibration._angle_touches import telling_order as telling_order
+from robolink.calibration._board import LEAST_SPACING_MM as LEAST_SPACING_MM
 from robolink.calibration._camera_model import CameraLimits as CameraLimits
 from robolink.calibration._camera_model import CameraModel as CameraModel
 from robolink.calibration._camera_model import require_same_camera as require_same_camera
 from robolink.calibration._camera_station import HALF_ROUND_DEG as HALF_ROUND_DEG
+from robolink.calibration._camera_station import LEAST_SPAN_MM as LEAST_SPAN_MM
 from robolink.calibration._camera_station import TWO_ANGLES_DEG as TWO_ANGLES_DEG
 from robolink.calibration._camera_station import CameraStation as CameraStation
 from robolink.calibration._camera_station import LookPlan as LookPlan

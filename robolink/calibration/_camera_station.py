@@ -19,6 +19,9 @@ that no controller has two ways to choose from, and all in one direction."""
 TWO_ANGLES_DEG: Final = (0.0, 120.0)
 """Two that tell the camera's own error from what is on the tool."""
 
+LEAST_SPAN_MM: Final = 0.2
+"""A smaller pattern does not tell what a pixel is."""
+
 
 @dataclass(frozen=True, slots=True)
 class CameraStation:

@@ -13,7 +13,12 @@ from robolink.calibration._camera_affine import (
 )
 from robolink.calibration._camera_drive import CameraDrive, Place
 from robolink.calibration._camera_round import CameraRound, as_round, solve_camera_round
-from robolink.calibration._camera_station import CameraStation, LookPlan, PatternPlan
+from robolink.calibration._camera_station import (
+    LEAST_SPAN_MM,
+    CameraStation,
+    LookPlan,
+    PatternPlan,
+)
 from robolink.calibration._held_board import BoardDrawing
 from robolink.calibration._planar_checks import MIN_ROTATION_DEG, angle_spread_deg
 from robolink.calibration._retaking import settled
@@ -23,8 +28,6 @@ from robolink.calibration._turning import toward_zero
 from robolink.errors import CalibrationError
 from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
-
-LEAST_SPAN_MM = 0.2
 
 
 def look_at_tip(

@@ -123,15 +123,17 @@ def touch_details(station: str, proposal: Proposal) -> dict[str, object]:
     result = proposal.result
     chain = chain_of(result) or NeedleChain(offset_sigma_mm(result) or 0.0)
     x_mm, y_mm, z_mm = pin_mm(proposal)
+    # The next nozzle touches upright once: what counts is how this one stood upright last.
+    touch = min(reversed(result.inputs), key=lambda pose: abs(pose.v_deg) + abs(pose.w_deg))
     # Where a difference was written, the value puts the pin elsewhere than the tip does.
-    tip, value, last = proposal.tip, proposal.offset, result.inputs[-1]
-    dx, dy = rotate_xy(value.x_mm - tip.x_mm, value.y_mm - tip.y_mm, last.u_deg)
+    tip, value = proposal.tip, proposal.offset
+    dx, dy = rotate_xy(value.x_mm - tip.x_mm, value.y_mm - tip.y_mm, touch.u_deg)
     return {
         "station": station,
         "x_mm": x_mm + dx,
         "y_mm": y_mm + dy,
         "z_mm": z_mm + value.z_mm - tip.z_mm,
-        "u_deg": result.inputs[-1].u_deg,
+        "u_deg": touch.u_deg,
         "sigma_mm": chain.sigma_mm,
         "changes": chain.changes,
         "touch_sigma_mm": _touch_sigma_mm(result),

@@ -20,9 +20,12 @@ if TYPE_CHECKING:
     from robolink.recipe._schema import json_schema as json_schema
     from robolink.recipe._sources import BeamLine as BeamLine
     from robolink.recipe._sources import BeamsSource as BeamsSource
+    from robolink.recipe._sources import BoardSource as BoardSource
+    from robolink.recipe._sources import CameraAffineSource as CameraAffineSource
     from robolink.recipe._sources import CameraSource as CameraSource
     from robolink.recipe._sources import OneTouchSource as OneTouchSource
     from robolink.recipe._sources import OperatorSource as OperatorSource
+    from robolink.recipe._sources import PivotSource as PivotSource
     from robolink.recipe._sources import PointsSource as PointsSource
     from robolink.recipe._sources import TouchSource as TouchSource
     from robolink.recipe._tables import Box as Box
@@ -46,9 +49,12 @@ _LOADED_LATER = {
     "json_schema": "_schema",
     "BeamLine": "_sources",
     "BeamsSource": "_sources",
+    "BoardSource": "_sources",
+    "CameraAffineSource": "_sources",
     "CameraSource": "_sources",
     "OneTouchSource": "_sources",
     "OperatorSource": "_sources",
+    "PivotSource": "_sources",
     "PointsSource": "_sources",
     "TouchSource": "_sources",
     "Box": "_tables",

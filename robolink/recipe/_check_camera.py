@@ -6,30 +6,32 @@ from robolink.calibration import MIN_ROTATION_DEG, angle_spread_deg
 from robolink.config import Problem
 from robolink.messages import tr
 from robolink.recipe._draft import Draft
-from robolink.recipe._sources import CameraSource
+from robolink.recipe._sources import CameraAffineSource, LookingSource
 
 
 def camera_place(draft: Draft) -> Iterator[Problem]:
     """Check that the station says where tips are brought before the camera."""
-    place = draft.station
-    if place is None or not isinstance(draft.source, CameraSource):
+    place, source = draft.station, draft.source
+    if place is None or not isinstance(source, LookingSource):
         return
     if place.x_mm is None and place.y_mm is None and place.z_mm is None:
         return  # all of it comes from the station's record
     if place.x_mm is None and place.y_mm is None:
         yield Problem(
-            "station.x_mm", tr('is missing: with kind = "camera" it is where the camera looks')
+            "station.x_mm",
+            tr('is missing: with kind = "{kind}" it is where the camera looks', kind=source.kind),
         )
     if place.z_mm is None:
         yield Problem(
-            "station.z_mm", tr('is missing: with kind = "camera" it is the height in focus')
+            "station.z_mm",
+            tr('is missing: with kind = "{kind}" it is the height in focus', kind=source.kind),
         )
 
 
 def camera_pixels(draft: Draft) -> Iterator[Problem]:
     """Check that what a pixel means is said whole, or not at all."""
     source = draft.source
-    if not isinstance(source, CameraSource):
+    if not isinstance(source, LookingSource):
         return
     if (source.mm_per_px is None) != (source.origin_mm is None):
         absent = "origin_mm" if source.origin_mm is None else "mm_per_px"
@@ -43,10 +45,12 @@ def camera_pixels(draft: Draft) -> Iterator[Problem]:
 def camera_looks(draft: Draft) -> Iterator[Problem]:
     """Check that several looks turn the tool, and that the lift has room."""
     source, box = draft.source, draft.box
-    if not isinstance(source, CameraSource):
+    if not isinstance(source, LookingSource):
         return
-    spread_deg = angle_spread_deg(source.turns_deg)
-    if len(source.turns_deg) > 1 and spread_deg < MIN_ROTATION_DEG:
+    # The corners of the pattern are looked at without a turn.
+    corners = (0.0,) if isinstance(source, CameraAffineSource) else ()
+    angles_deg = (*corners, *source.turns_deg)
+    if len(angles_deg) > 1 and angle_spread_deg(angles_deg) < MIN_ROTATION_DEG:
         yield Problem(
             "source.turns_deg",
             tr("must spread over at least {limit:g} degrees", limit=MIN_ROTATION_DEG),

@@ -11,9 +11,9 @@ from robolink.model import angle_difference_deg
 from robolink.recipe._draft import Draft
 from robolink.recipe._sources import (
     BeamsSource,
-    CameraSource,
-    OneTouchSource,
+    LookingSource,
     OperatorSource,
+    PinSource,
     TouchSource,
 )
 
@@ -61,7 +61,7 @@ def _many_angles(source: OperatorSource) -> Iterator[Problem]:
 def clearance(draft: Draft) -> Iterator[Problem]:
     """Check that the tip stops on its way down to the pin, and that the lift has room."""
     source = draft.source
-    if not isinstance(source, (OperatorSource, OneTouchSource)):
+    if not isinstance(source, PinSource):
         return
     if source.clearance_mm >= source.lift_mm:
         yield Problem(
@@ -90,7 +90,7 @@ def height(draft: Draft) -> Iterator[Problem]:
         return
     if isinstance(draft.source, BeamsSource):
         yield Problem("z", tr('cannot be "measured" with beams; write "typed" or "kept"'))
-    elif isinstance(draft.source, CameraSource):
+    elif isinstance(draft.source, LookingSource):
         yield Problem("z", tr('cannot be "measured" by a camera; write "typed" or "kept"'))
     elif draft.source is not None and not draft.source.moves:
         yield Problem(

@@ -6,7 +6,7 @@ from itertools import combinations
 from robolink.config import Problem
 from robolink.messages import tr
 from robolink.recipe._draft import Draft
-from robolink.recipe._sources import PointsSource
+from robolink.recipe._sources import PivotSource, PointsSource
 from robolink.recipe._tables import Box, FlangePose, Tool
 
 
@@ -76,6 +76,25 @@ def standstill(draft: Draft) -> Iterator[Problem]:
         )
 
 
+def upright(draft: Draft) -> Iterator[Problem]:
+    """Check that the flange is tilted only where the measurement can bear it."""
+    source = draft.source
+    if source is None or not source.moves or isinstance(source, PivotSource):
+        return
+    safe = draft.poses.safe if draft.poses else None
+    for where, pose in [*_poses(draft), *([("poses.safe", safe)] if safe else [])]:
+        for key in ("v_deg", "w_deg"):
+            if getattr(pose, key):
+                yield Problem(
+                    f"{where}.{key}",
+                    tr(
+                        'must be 0 with kind = "{kind}", which measures upright; "pivot" alone '
+                        "works on a tilted flange",
+                        kind=source.kind,
+                    ),
+                )
+
+
 def room(draft: Draft) -> Iterator[Problem]:
     """Check that the poses can lie in one box.
 
@@ -85,12 +104,7 @@ def room(draft: Draft) -> Iterator[Problem]:
     box, poses = draft.box, draft.poses
     if box is None or poses is None:
         return
-    targets = [
-        (f"{place}.{key}", pose)
-        for place, tool in _tools(draft)
-        for key, pose in (("approach", tool.approach), ("retreat", tool.retreat))
-        if pose is not None
-    ]
+    targets = list(_poses(draft))
     if poses.safe is None:
         yield from _together(box, [pose for _, pose in targets])
         return
@@ -123,6 +137,14 @@ def _inside(box: Box, pose: FlangePose, *, about: FlangePose) -> bool:
         and abs(pose.y_mm - about.y_mm) <= box.sideways_mm
         and -box.down_mm <= pose.z_mm - about.z_mm <= box.up_mm
     )
+
+
+def _poses(draft: Draft) -> Iterator[tuple[str, FlangePose]]:
+    """Yield the poses of the tools, each with its path."""
+    for place, tool in _tools(draft):
+        for key, pose in (("approach", tool.approach), ("retreat", tool.retreat)):
+            if pose is not None:
+                yield f"{place}.{key}", pose
 
 
 def _tools(draft: Draft) -> list[tuple[str, Tool]]:

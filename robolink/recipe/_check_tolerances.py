@@ -11,6 +11,7 @@ from robolink.recipe._draft import Draft
 from robolink.recipe._sources import (
     AnySource,
     BeamsSource,
+    BoardSource,
     CameraSource,
     OneTouchSource,
     OperatorSource,
@@ -93,6 +94,11 @@ def _without_residual(source: AnySource) -> str:
         return tr(
             "cannot be judged: looks at one or two angles always agree, so they leave no residual; "
             "give three turns_deg or more, or interval_mm with sigma_mm"
+        )
+    if isinstance(source, BoardSource):
+        return tr(
+            "cannot be judged: two fiducials at one angle always agree, so they leave no residual; "
+            "give two turns_deg or more, or interval_mm with sigma_mm"
         )
     if isinstance(source, OneTouchSource):
         return tr("cannot be judged: one touch leaves no residual; use interval_mm")

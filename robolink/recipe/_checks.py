@@ -5,6 +5,7 @@ from typing import Final
 
 from robolink.config import Problem
 from robolink.recipe._check_beams import beams, beams_height
+from robolink.recipe._check_board import fiducials
 from robolink.recipe._check_camera import camera_looks, camera_pixels, camera_place
 from robolink.recipe._check_measuring import (
     angles,
@@ -13,7 +14,13 @@ from robolink.recipe._check_measuring import (
     station,
 )
 from robolink.recipe._check_moments import answers, moments
-from robolink.recipe._check_places import points, room, standstill, tool_numbers
+from robolink.recipe._check_places import (
+    points,
+    room,
+    standstill,
+    tool_numbers,
+    upright,
+)
 from robolink.recipe._check_tolerances import intervals, refusals, residuals, verification
 from robolink.recipe._check_touch import surface, touches
 from robolink.recipe._draft import Draft
@@ -28,11 +35,13 @@ _CHECKS: Final[tuple[Callable[[Draft], Iterator[Problem]], ...]] = (
     camera_place,
     camera_pixels,
     camera_looks,
+    fiducials,
     station,
     height,
     tool_numbers,
     points,
     standstill,
+    upright,
     room,
     residuals,
     intervals,

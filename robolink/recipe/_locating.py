@@ -9,7 +9,7 @@ from robolink.recipe._recipe import Recipe
 from robolink.recipe._sources import (
     BeamLine,
     BeamsSource,
-    CameraSource,
+    LookingSource,
     OneTouchSource,
     OperatorSource,
     TouchSource,
@@ -36,7 +36,7 @@ def located(recipe: Recipe, stations: Mapping[str, Station]) -> Recipe:
     source, place = recipe.source, recipe.station
     if isinstance(source, BeamsSource):
         return recipe if source.beams else _with_beams(recipe, source, stations)
-    if isinstance(source, CameraSource):
+    if isinstance(source, LookingSource):
         return _with_camera(recipe, source, stations)
     if isinstance(source, TouchSource) and place.z_mm is None:
         return _with_place(recipe, _known(recipe, stations, StationKind.TOUCH))
@@ -66,7 +66,7 @@ def _with_beams(recipe: Recipe, source: BeamsSource, stations: Mapping[str, Stat
     return recipe.model_copy(update={"source": source.model_copy(update=beams)})
 
 
-def _with_camera(recipe: Recipe, source: CameraSource, stations: Mapping[str, Station]) -> Recipe:
+def _with_camera(recipe: Recipe, source: LookingSource, stations: Mapping[str, Station]) -> Recipe:
     """Return the recipe with what it does not say itself: place, sensor, meaning of a pixel."""
     missing = recipe.station.z_mm is None
     if not missing and recipe.station.id not in stations:

@@ -1,44 +1,29 @@
 """From a recipe to the plan of a nozzle change."""
 
-from robolink.calibration import (
-    BeamStation,
-    CameraStation,
-    Course,
-    CrossingPlan,
-    LookPlan,
-    NeedleLimits,
-    ProbePlan,
-    TouchPlan,
-    TouchStation,
-)
+from robolink.calibration import BeamStation, CrossingPlan, ProbePlan, TouchStation
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import Controller, Pose
 from robolink.nozzle_change import (
-    Absolute,
     ChangePlan,
     CrossedBeams,
-    Deferred,
     Gate,
     GivenPoses,
     Limits,
     ManyTouches,
-    OneTouch,
-    PinAndPerson,
     TipSource,
     ToolPlan,
     TouchProbe,
     TwoTouches,
-    UpCamera,
-    difference_from_last,
     taught_poses,
 )
+from robolink.recipe._camera_plans import from_camera
+from robolink.recipe._pin_plans import from_pin
 from robolink.recipe._recipe import Recipe
 from robolink.recipe._sources import (
     BeamsSource,
-    CameraSource,
-    OneTouchSource,
-    OperatorSource,
+    LookingSource,
+    PinSource,
     PointsSource,
     TouchSource,
 )
@@ -57,12 +42,13 @@ def plan_of(
 
     Args:
         recipe: The recipe.
-        controller: The controller; nothing is sent yet.
+        controller: The controller; only read, and only where the robot has to tilt.
         ask_before_write: Whether a person accepts the proposals.
         accepted_change_mm: A larger jump than the recipe's that an engineer accepts this time.
         sensor: The camera, in place of the recipe's.
 
     Raises:
+        CalibrationError: ``rank_deficient``: this robot cannot tilt its tool.
         ConfigError: This kind of controller has no taught points, or no camera is named.
     """
     tolerances = recipe.tolerances
@@ -103,66 +89,20 @@ def plan_of(
 
 def _source(recipe: Recipe, controller: Controller, tool: Tool, sensor: str | None) -> TipSource:
     source, tolerances = recipe.source, recipe.tolerances
-    if isinstance(source, OperatorSource):
-        touch = TouchPlan(
-            lift_mm=source.lift_mm, clearance_mm=source.clearance_mm, turn_deg=source.turn_deg
-        )
-        return PinAndPerson(
-            touch,
-            turns_deg=source.turns_deg,
-            sigma_mm=tolerances.sigma_mm,
-            course=Course(source.until_mm, retake=source.retake),
-        )
-    if isinstance(source, OneTouchSource):
-        return _from_one_touch(source, controller, tool, recipe)
+    if isinstance(source, PinSource):
+        return from_pin(source, controller, tool, recipe)
+    if isinstance(source, LookingSource):
+        return from_camera(source, recipe.station, sensor, tolerances.sigma_mm)
     if isinstance(source, BeamsSource):
         return _from_beams(source, tolerances.sigma_mm)
     if isinstance(source, TouchSource):
         return _from_touch(source, recipe.station, tolerances.sigma_mm)
-    if isinstance(source, CameraSource):
-        return _from_camera(source, recipe.station, sensor, tolerances.sigma_mm)
     return _from_points(source, controller, tool, recipe)
 
 
 def _pin(recipe: Recipe) -> str:
     """Return the name of the pin whose place is kept, empty where none is touched."""
-    touched = isinstance(recipe.source, (OperatorSource, OneTouchSource))
-    return recipe.station.id if touched else ""
-
-
-def _from_one_touch(
-    source: OneTouchSource, controller: Controller, tool: Tool, recipe: Recipe
-) -> TipSource:
-    touch = TouchPlan(lift_mm=source.lift_mm, clearance_mm=source.clearance_mm)
-    tolerances, station = recipe.tolerances, recipe.station
-    if recipe.basis == "absolute":
-        from robolink.calibration import Pin  # numpy, which other recipes do without
-
-        pin = Pin(*_place(station), station.sigma_mm or 0.0)
-        # Whoever does not know how sure the pin is cannot say how sure the tip is.
-        sigma_mm = tolerances.sigma_mm if station.sigma_mm else None
-        return OneTouch(Absolute(pin, sigma_mm), touch)
-    limits = NeedleLimits(
-        max_change_mm=tolerances.jump_mm,
-        tolerance_mm=tolerances.interval_mm or NeedleLimits().tolerance_mm,
-        max_changes=source.max_changes,
-    )
-
-    def make() -> OneTouch:
-        solver = difference_from_last(
-            controller, tool.number, station.id, sigma_mm=tolerances.sigma_mm, limits=limits
-        )
-        return OneTouch(solver, touch)
-
-    return Deferred(make, sentence=tr("measured on the robot: one pin touched once"))
-
-
-def _place(place: Station) -> tuple[float, float, float]:
-    x_mm, y_mm, z_mm = place.x_mm, place.y_mm, place.z_mm
-    assert x_mm is not None  # noqa: S101 - the recipe was checked and located
-    assert y_mm is not None  # noqa: S101
-    assert z_mm is not None  # noqa: S101
-    return x_mm, y_mm, z_mm
+    return recipe.station.id if isinstance(recipe.source, PinSource) else ""
 
 
 def _from_beams(source: BeamsSource, sigma_mm: float | None) -> TipSource:
@@ -194,7 +134,7 @@ def _from_beams(source: BeamsSource, sigma_mm: float | None) -> TipSource:
 
 
 def _from_touch(source: TouchSource, place: Station, sigma_mm: float | None) -> TipSource:
-    station = TouchStation(*_place(place), source.input, off_when_touched=source.off_when_touched)
+    station = TouchStation(*place.place_mm, source.input, off_when_touched=source.off_when_touched)
     plan = ProbePlan(
         clearance_mm=source.clearance_mm,
         beyond_mm=source.beyond_mm,
@@ -203,24 +143,6 @@ def _from_touch(source: TouchSource, place: Station, sigma_mm: float | None) -> 
         speeds_mm_s=source.speeds_mm_s,
     )
     return TouchProbe(station, plan, sigma_mm=sigma_mm, proof_turn_deg=source.proof_turn_deg)
-
-
-def _from_camera(
-    source: CameraSource, place: Station, sensor: str | None, sigma_mm: float | None
-) -> TipSource:
-    sensor = sensor or source.sensor
-    if sensor is None:
-        raise ConfigError(
-            tr("The recipe does not say which camera sees the tip."),
-            remedy=tr("Give --sensor, or write source.sensor."),
-        )
-    plan = LookPlan(
-        turns_deg=source.turns_deg,
-        pictures=source.pictures,
-        lift_mm=source.lift_mm,
-        beside_mm=source.beside_mm,
-    )
-    return UpCamera(sensor, CameraStation(*_place(place), source.model), plan, sigma_mm=sigma_mm)
 
 
 def _from_points(

@@ -1,11 +1,12 @@
 """What is proposed from a measurement: the basis, and where Z comes from."""
 
+from collections.abc import Collection
 from dataclasses import replace
 from statistics import fmean
 
 from robolink.errors import CalibrationError
 from robolink.messages import tr
-from robolink.model import ToolOffset
+from robolink.model import ToolOffset, angle_difference_deg, rotate_xy
 from robolink.nozzle_change import Proposal
 from robolink.recipe._recipe import Recipe
 from robolink.recipe._reference import Reference, reference_details
@@ -42,15 +43,10 @@ def proposed(
     offset, notes = tip, list[str]()
     height = contact_z_mm(measured) if recipe.source.touches else None
     if recipe.basis == "difference" and reference is not None:
-        offset = _moved(reference, tip)
-        notes.append(
-            tr(
-                "the stored offset moved by X {dx:+.3f} Y {dy:+.3f} mm, as the tip did since {at}",
-                dx=tip.x_mm - reference.tip.x_mm,
-                dy=tip.y_mm - reference.tip.y_mm,
-                at=reference.at,
-            )
-        )
+        # A height that a touch tells is compared below.
+        shown = {name for name in measured.result.measured if name != "z_mm" or height is None}
+        offset = _moved(reference, tip, shown)
+        notes.append(_as_moved(reference, offset, shown))
     if recipe.z == "typed" and typed_z_mm is not None:
         offset = replace(offset, z_mm=typed_z_mm)
         notes.append(tr("Z was typed"))
@@ -75,11 +71,52 @@ def proposed(
     )
 
 
-def _moved(reference: Reference, tip: ToolOffset) -> ToolOffset:
+def _moved(reference: Reference, tip: ToolOffset, shown: Collection[str]) -> ToolOffset:
+    """Return the value of the reference, carried along by the tip as if it were fixed to it.
+
+    Args:
+        reference: Where the tip was, and the value that stood for it.
+        tip: Where it is.
+        shown: The components that the measurement shows; Z and U move with these only.
+    """
+    value, before = reference.value, reference.tip
+    turn_deg = angle_difference_deg(tip.u_deg, before.u_deg) if "u_deg" in shown else 0.0
+    dx, dy = rotate_xy(value.x_mm - before.x_mm, value.y_mm - before.y_mm, turn_deg)
     return replace(
-        reference.value,
-        x_mm=reference.value.x_mm + tip.x_mm - reference.tip.x_mm,
-        y_mm=reference.value.y_mm + tip.y_mm - reference.tip.y_mm,
+        value,
+        x_mm=tip.x_mm + dx,
+        y_mm=tip.y_mm + dy,
+        z_mm=value.z_mm + (tip.z_mm - before.z_mm if "z_mm" in shown else 0.0),
+        u_deg=value.u_deg + turn_deg,
+    )
+
+
+def _as_moved(reference: Reference, offset: ToolOffset, shown: Collection[str]) -> str:
+    value, at = reference.value, reference.at
+    dx, dy = offset.x_mm - value.x_mm, offset.y_mm - value.y_mm
+    if "u_deg" in shown:
+        return tr(
+            "the stored offset moved by X {dx:+.3f} Y {dy:+.3f} mm and turned by {du:+.3f} "
+            "degrees, as the board did since {at}",
+            dx=dx,
+            dy=dy,
+            du=offset.u_deg - value.u_deg,
+            at=at,
+        )
+    if "z_mm" in shown:
+        return tr(
+            "the stored offset moved by X {dx:+.3f} Y {dy:+.3f} Z {dz:+.3f} mm, as the tip did "
+            "since {at}",
+            dx=dx,
+            dy=dy,
+            dz=offset.z_mm - value.z_mm,
+            at=at,
+        )
+    return tr(
+        "the stored offset moved by X {dx:+.3f} Y {dy:+.3f} mm, as the tip did since {at}",
+        dx=dx,
+        dy=dy,
+        at=at,
     )
 
 

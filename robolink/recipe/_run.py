@@ -51,6 +51,7 @@ class RecipeRun:
         cell: The cell, whose file may say where stations are.
 
     Raises:
+        CalibrationError: ``rank_deficient``: this robot cannot tilt its tool, and would have to.
         ConfigError: Neither the recipe nor the station's record says where the station is, or the
             recipe takes no reference.
     """

@@ -21,6 +21,7 @@ Length = Annotated[float, Field(ge=0.001)]
 Angle = Annotated[float, Field(ge=-360, le=360)]
 ToolNumber = Annotated[int, Field(ge=1, le=15)]
 OutputNumber = Annotated[int, Field(ge=0, le=0xFFFF)]
+Method = Literal["two_pose", "n_angle"]
 PointNumber = Annotated[int, Field(ge=0, le=999)]
 
 
@@ -48,11 +49,15 @@ class FlangePose(Table):
     """Z of the flange, base, mm."""
     u_deg: float
     """U of the flange, degrees."""
+    v_deg: Angle = 0.0
+    """V of the flange, degrees; kind = "pivot" only, whose robots can tilt it."""
+    w_deg: Angle = 0.0
+    """W of the flange, degrees; likewise."""
 
     @property
     def pose(self) -> Pose:
         """The same as a pose."""
-        return Pose(self.x_mm, self.y_mm, self.z_mm, self.u_deg, tool=0)
+        return Pose(self.x_mm, self.y_mm, self.z_mm, self.u_deg, self.v_deg, self.w_deg, tool=0)
 
 
 class Station(Table):
@@ -73,6 +78,15 @@ class Station(Table):
     needs it to say how sure it is."""
     note: Note = ""
     """For people."""
+
+    @property
+    def place_mm(self) -> tuple[float, float, float]:
+        """Where it is, once recipe or record have said so."""
+        x_mm, y_mm, z_mm = self.x_mm, self.y_mm, self.z_mm
+        assert x_mm is not None  # noqa: S101 - the recipe was checked and located
+        assert y_mm is not None  # noqa: S101
+        assert z_mm is not None  # noqa: S101
+        return x_mm, y_mm, z_mm
 
 
 class Poses(Table):
@@ -125,7 +139,8 @@ class Tolerances(Table):
     max_mm: Length | None = None
     """Largest single residual, mm; not for "two_pose"."""
     interval_mm: Length | None = None
-    """Largest half width of the 95 % interval of X or Y, mm; "two_pose" needs sigma_mm for it."""
+    """Largest half width of the 95 % interval of any measured length, mm; "two_pose" needs sigma_mm
+    for it."""
     sigma_mm: Length | None = None
     """Standard deviation of one coordinate of one touch, or of one crossing, mm, where known."""
     jump_mm: Length = 2.0

@@ -1,8 +1,10 @@
 """A simulated cell with an up-looking camera, and what is known about that camera."""
 
+import re
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, Final
 
 from robolink.calibration import CameraModel, CameraStation
@@ -30,6 +32,27 @@ def camera_station(cell: SensorCell, *, known: bool = True) -> CameraStation:
     """Return where the camera is."""
     x_mm, y_mm, z_mm = cell.simulator.world.camera.middle_mm
     return CameraStation(x_mm, y_mm, z_mm, camera_model(cell) if known else None)
+
+
+def recipe_here(cell: SensorCell, example: Path, folder: Path) -> Path:
+    """Return a recipe written for the simulated EPSON cell, with the numbers of this one."""
+    station, model = camera_station(cell), camera_model(cell)
+    flange = cell.simulator.world.robot.flange()
+    safe = f"x_mm = {flange.x_mm}, y_mm = {flange.y_mm}, z_mm = {flange.z_mm}, u_deg = {{u}}"
+    text = example.read_text()
+    for old, new in (
+        (r"mm_per_px = .*", f"mm_per_px = {[list(row) for row in model.mm_per_px]}"),
+        (r"origin_mm = \[.*?\]", f"origin_mm = {list(model.origin_mm)}"),
+        (r"\nx_mm = .*", f"\nx_mm = {station.x_mm}"),
+        (r"\ny_mm = .*", f"\ny_mm = {station.y_mm}"),
+        (r"\nz_mm = .*", f"\nz_mm = {station.z_mm}"),
+        (r"safe = {.*", f"safe = {{ {safe.format(u=flange.u_deg)} }}"),
+        (r"\napproach = .*", ""),
+    ):
+        text = re.sub(old, new, text)
+    path = folder / example.name
+    path.write_text(text)
+    return path
 
 
 def furnish(cell: SensorCell, **parameters: Any) -> None:

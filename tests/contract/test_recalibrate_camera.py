@@ -11,7 +11,7 @@ from robolink_simulators.hosting import in_process, plc_in_process
 from robolink_simulators.sensing import TouchPlate
 
 from robolink.journal import EntryKind, open_journal
-from tests.contract._camera_cell import camera_model, camera_station
+from tests.contract._camera_cell import recipe_here
 from tests.contract._sensor_cell import SensorCell
 from tests.faults._nozzle_cell import OLD_TIP, served_cell
 
@@ -111,26 +111,7 @@ def test_a_served_cell_lends_its_camera_through_the_assist_port(tmp_path, monkey
 
 def test_the_same_recipe_serves_a_plc(run, plc, tmp_path, capsys):
     url, simulator, clock = plc("Kin_Scara3_Z")
-    station = camera_station(SensorCell(simulator, url, clock))
-    flange = simulator.plc.group.flange().shift_mm
-    text = Path(CAMERA).read_text().partition("[[tools]]")[0]
-    model = camera_model(SensorCell(simulator, url, clock))
-    ((a, b), (c, d)), (ox, oy) = model.mm_per_px, model.origin_mm
-    for old, new in (
-        ("[[0.01997, 0.00105], [0.00105, -0.01997]]", f"[[{a}, {b}], [{c}, {d}]]"),
-        ("[157.63, 486.62]", f"[{ox}, {oy}]"),
-        ("x_mm = 170.952", f"x_mm = {station.x_mm}"),
-        ("y_mm = 477.063", f"y_mm = {station.y_mm}"),
-        ("z_mm = -107.442", f"z_mm = {station.z_mm}"),
-        (
-            "x_mm = 158.6, y_mm = 495.4, z_mm = -60, u_deg = 0",
-            f"x_mm = {flange[0]}, y_mm = {flange[1]}, z_mm = {flange[2]}, u_deg = 140.0",
-        ),
-    ):
-        assert old in text
-        text = text.replace(old, new)
-    recipe = tmp_path / "plc.toml"
-    recipe.write_text(f"{text}[[tools]]\nnumber = 1\n")
+    recipe = recipe_here(SensorCell(simulator, url, clock), Path(CAMERA), tmp_path)
     began_ns = clock.now_ns()
     code, document, messages = run(
         "-c", url, "recalibrate", str(recipe), "--sensor", url, "--yes", "--json"

@@ -241,6 +241,79 @@ def test_a_camera_has_a_place_and_a_meaning_and_is_judged(text, where, what):
     assert found[where].startswith(what)
 
 
+AFFINE = CAMERA.replace('"camera"', '"camera_affine"')
+BOARD = CAMERA.replace('"camera"', '"board"\nspacing_mm = 40')
+MARKS = BOARD.replace("spacing_mm = 40", "fiducials_mm = [[20, 0], [-20, 0], [-20, 3]]")
+PIVOT = PIN.replace('"operator"', '"pivot"')
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        AFFINE,
+        with_(AFFINE, "[source]", "turns_deg = [60]"),
+        BOARD,
+        with_(BOARD, "[source]", ONE_LOOK),
+        MARKS.replace("[-20, 3]", "[-20, 5]"),
+        PIVOT,
+        PIVOT.replace('"kept"', '"measured"'),
+        PIVOT.replace("number = 3", f"number = 3\napproach = {at(1, 2)[:-1]}, w_deg = 180 }}"),
+    ],
+)
+def test_what_these_kinds_can_measure_is_accepted(text):
+    judged = with_(text, "[tolerances]", "interval_mm = 0.1", "sigma_mm = 0.01")
+    assert problems(judged) == {}
+
+
+@pytest.mark.parametrize(
+    ("text", "where", "what"),
+    [
+        (AFFINE.replace('"kept"', '"measured"'), "z", 'cannot be "measured" by a camera'),
+        (BOARD.replace('"kept"', '"measured"'), "z", 'cannot be "measured" by a camera'),
+        (AFFINE.replace("z_mm = -60\n", ""), "station.z_mm", 'is missing: with kind = "camera_aff'),
+        (
+            BOARD.replace("x_mm = 300\ny_mm = 80\n", ""),
+            "station.x_mm",
+            'is missing: with kind = "b',
+        ),
+        (with_(AFFINE, "[source]", "span_mm = 0.1"), "source.span_mm", "must be at least 0.2"),
+        (with_(AFFINE, "[source]", ONE_LOOK), "source.turns_deg", "must spread over at least 30"),
+        (with_(CAMERA, "[source]", "span_mm = 3"), "source.span_mm", "is not known"),
+        (with_(AFFINE, "[box]", "down_mm = 4", "up_mm = 4"), "source.lift_mm", "must be at most"),
+        (BOARD.replace("spacing_mm = 40", ""), "source.fiducials_mm", "is missing: say where"),
+        (BOARD.replace("= 40", "= 4"), "source.spacing_mm", "must be at least 5"),
+        (
+            with_(BOARD, "[source]", "fiducials_mm = [[20, 0], [-20, 0]]"),
+            "source.spacing_mm",
+            "excludes fiducials_mm",
+        ),
+        (MARKS, "source.fiducials_mm#3", "lies 3 mm from fiducial 2"),
+        (
+            with_(with_(BOARD, "[source]", ONE_LOOK), "[tolerances]", "rms_mm = 0.1"),
+            "tolerances.rms_mm",
+            "cannot be judged: two fiducials",
+        ),
+        (with_(PIVOT, "[source]", "count = 3"), "source.count", "must be at least 4"),
+        (with_(PIVOT, "[source]", "tilt_deg = 50"), "source.tilt_deg", "must be at most 45"),
+        (with_(PIVOT, "[source]", "lift_mm = 2"), "source.clearance_mm", "must be smaller than"),
+        (
+            PIN.replace("number = 3", f"number = 3\nretreat = {at(1, 2)[:-1]}, v_deg = 5 }}"),
+            "tools#1.retreat.v_deg",
+            'must be 0 with kind = "operator", which measures upright',
+        ),
+        (
+            f"{PIN}[poses]\nsafe = {at(1, 2)[:-1]}, w_deg = 180 }}\n",
+            "poses.safe.w_deg",
+            "must be 0 with kind",
+        ),
+    ],
+)
+def test_what_these_kinds_cannot_measure_is_refused_by_path(text, where, what):
+    found = problems(text)
+    assert list(found) == [where]
+    assert found[where].startswith(what)
+
+
 def test_the_place_of_a_camera_may_be_left_to_its_record():
     assert problems(CAMERA.replace("x_mm = 300\ny_mm = 80\nz_mm = -60\n", "")) == {}
 

@@ -13,14 +13,24 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robolink.calibration import CrossingPlan, LookPlan, ProbePlan, TouchPlan
+from robolink.calibration import (
+    TWO_ANGLES_DEG,
+    CrossingPlan,
+    LookPlan,
+    PatternPlan,
+    ProbePlan,
+    TouchPlan,
+)
 from robolink.errors import ConfigError
 from robolink.nozzle_change import Gate, Limits, Moment
 from robolink.recipe import (
     BeamsSource,
+    BoardSource,
+    CameraAffineSource,
     CameraSource,
     OperatorSource,
     Output,
+    PivotSource,
     PointsSource,
     Prompt,
     Recipe,
@@ -31,6 +41,10 @@ from robolink.recipe import (
 from robolink.recipe._loading import _checked
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples" / "recipes").iterdir())
+KINDS = (
+    'must be one of "beams", "board", "camera", "camera_affine", "one_touch", "operator", "pivot", '
+    '"points", "touch"'
+)
 LEAST = """\
 schema = "robolink/recipe/1"
 name = "Needle"
@@ -74,17 +88,27 @@ def example(name):
 
 def test_the_examples_are_those_that_the_page_describes():
     assert [path.name for path in EXAMPLES] == [
+        "five-axes-pivot.toml",
         "gantry-touch-probe.toml",
+        "held-board.toml",
         "needle-beams.toml",
         "needle-one-touch.toml",
+        "nozzle-and-camera.toml",
         "pendant-points.toml",
         "pick-nozzle-camera.toml",
         "scara-pin.toml",
         "two-nozzles.toml",
     ]
-    gantry, beams, one_touch, points, camera, pin, nozzles = (
+    pivot, gantry, board, beams, one_touch, affine, points, camera, pin, nozzles = (
         load_recipe(path).recipe for path in EXAMPLES
     )
+    assert isinstance(pivot.source, PivotSource)
+    assert (pivot.z, pivot.source.count, pivot.source.tilt_deg) == ("measured", 6, 20)
+    assert isinstance(board.source, BoardSource)
+    assert board.source.drawing
+    assert len(board.source.drawing.fiducials_mm) == 4
+    assert isinstance(affine.source, CameraAffineSource)
+    assert affine.source.model is None
     assert isinstance(gantry.source, TouchSource)
     assert (gantry.z, gantry.source.proof_turn_deg) == ("measured", 0.0)
     assert isinstance(camera.source, CameraSource)
@@ -147,6 +171,19 @@ def test_what_is_left_out_about_a_camera_is_as_in_the_library():
     assert said.items() <= told.items()
 
 
+def test_what_is_left_out_about_a_pattern_a_board_and_tilted_touches_is_as_in_the_library():
+    told = {
+        source: {name: field.default for name, field in source.model_fields.items()}
+        for source in (CameraAffineSource, BoardSource, PivotSource)
+    }
+    pattern, touch = PatternPlan(), TouchPlan()
+    assert told[CameraAffineSource]["span_mm"] == pattern.span_mm
+    assert told[CameraAffineSource]["turns_deg"] == pattern.look.turns_deg
+    assert told[BoardSource]["turns_deg"] == TWO_ANGLES_DEG
+    apart = {"lift_mm": touch.lift_mm, "clearance_mm": touch.clearance_mm}
+    assert apart.items() <= told[PivotSource].items()
+
+
 def test_what_is_left_out_about_touches_is_as_in_the_library():
     told = {name: field.default for name, field in TouchSource.model_fields.items()}
     plan = ProbePlan()
@@ -202,12 +239,12 @@ def test_a_missing_basis_says_what_both_mean(problems):
         (
             '[source]\nkind = "laser"',
             "source.kind",
-            'must be one of "beams", "camera", "one_touch", "operator", "points", "touch"',
+            KINDS,
         ),
         (
             "[source]\nlift_mm = 5",
             "source.kind",
-            'must be one of "beams", "camera", "one_touch", "operator", "points", "touch"',
+            KINDS,
         ),
         ('[source]\nkind = "operator"\nlift_mm = 0.5', "source.lift_mm", "must be at least 1"),
         ('[source]\nkind = "operator"\nturn_deg = 350', "source.turn_deg", "must be at most 330"),

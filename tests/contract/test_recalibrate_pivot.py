@@ -1,0 +1,108 @@
+"""``recalibrate`` with tilted touches, on a PLC whose flange leaves the vertical."""
+
+import contextlib
+import io
+import json
+import sys
+from itertools import count
+from pathlib import Path
+
+import pytest
+from robolink_cli import main
+from robolink_simulators.clock import ManualClock
+from robolink_simulators.hosting import plc_in_process
+from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
+
+from robolink.journal import EntryKind, memory_journal
+
+pytestmark = pytest.mark.simulator_only
+
+EXAMPLE = Path(__file__).parents[2] / "examples" / "recipes" / "five-axes-pivot.toml"
+STORED = (12.0, -3.5, -20.0)
+
+_names = count()
+
+
+@pytest.fixture
+def machine(tmp_path, monkeypatch):
+    """Opens a simulated machine in virtual time; its URL stands in ``url``."""
+    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
+    opened = []
+
+    def open_machine(kinematics="Kin_5Axes"):
+        name = f"pivot-recipe-{next(_names)}"
+        simulator = SoftMotionSimulator(kinematics, seed=1)
+        simulator.url = plc_in_process.register(name, simulator, clock=ManualClock())
+        opened.append(name)
+        return simulator
+
+    yield open_machine
+    for name in opened:
+        plc_in_process.unregister(name)
+
+
+def recalibrate(simulator, path, *more):
+    """Run a recipe with the simulated person; return exit code, document and messages."""
+    words = ("recalibrate", str(path), "--assist", simulator.url, "--yes", "--json", *more)
+    out, err = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        code = main.run(["-c", simulator.url, *words])
+    return code, json.loads(out.getvalue()), err.getvalue()
+
+
+def slot(simulator):
+    """Return the lengths that the PLC holds."""
+    return simulator.plc.memory.slot(1).tool[:3]
+
+
+def truth(simulator):
+    return simulator.world.tips[1].components()[:3]
+
+
+def test_the_example_finds_the_whole_tip_inside_the_stated_interval(machine, capsys):
+    simulator = machine()
+    code, document, messages = recalibrate(simulator, EXAMPLE, "--nozzle", "N-1")
+    assert code == 0, messages
+    (tool,) = document["tools"]
+    halves = tool["fit"]["half_width95"]
+    assert list(halves) == ["x_mm", "y_mm", "z_mm"]
+    for found, true, half in zip(slot(simulator), truth(simulator), halves.values(), strict=True):
+        assert abs(found - true) <= half < 0.05
+    assert tool["verification"]["passed"]
+    with capsys.disabled():
+        took_s = plc_in_process.clock_of(simulator.url.partition("://")[2]).now_ns() / 1e9
+        sys.stdout.write(f"\nfive axes, pivot recipe: {took_s:.1f} s of robot time\n")
+    (pin,) = memory_journal(simulator.url).entries(kinds=[EntryKind.STATION])
+    place = [pin.details[name] for name in ("x_mm", "y_mm", "z_mm")]
+    assert place == pytest.approx(simulator.world.pin_mm, abs=0.03)
+
+
+def test_a_look_before_shows_each_tilt_and_moves_nothing(machine):
+    simulator = machine()
+    code, document, messages = recalibrate(simulator, EXAMPLE, "--dry-run")
+    assert code == 0, messages
+    steps = document["steps"]
+    assert sum("onto the pin" in step["text"] for step in steps) == 6
+    leaning = {round(step["target"]["v_deg"], 3) for step in steps if step["target"]}
+    assert {-20.0, 0.0, 20.0} <= leaning
+    assert not any(step["refusal"] for step in steps)
+    assert simulator.plc.group.movements_started == 0
+
+
+def test_a_robot_that_cannot_tilt_is_refused_before_anything_moves(machine):
+    simulator = machine("Kin_Scara3_Z")
+    code, document, _ = recalibrate(simulator, EXAMPLE, "--nozzle", "N-1")
+    assert code == 7
+    assert document["error"]["code"] == "rank_deficient"
+    assert simulator.plc.group.movements_started == 0
+
+
+def test_a_box_that_a_tilt_leaves_is_refused_before_anything_moves(machine, tmp_path):
+    simulator = machine()
+    path = tmp_path / "narrow.toml"
+    path.write_text(EXAMPLE.read_text().replace("sideways_mm = 60", "sideways_mm = 6"))
+    code, document, _ = recalibrate(simulator, path, "--nozzle", "N-1")
+    assert code == 2
+    assert "outside the work box" in document["error"]["what"]
+    assert simulator.plc.group.movements_started == 0
+    assert slot(simulator) == STORED

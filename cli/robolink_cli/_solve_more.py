@@ -1,10 +1,12 @@
 """The methods of ``solve`` that go beyond one tip on one point."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import asdict
 from typing import Final, Literal
 
 from robolink import calibration as cal
 from robolink.messages import tr
+from robolink.model import WorkBox
 from robolink_cli._solve_case import (
     Node,
     read_offset,
@@ -202,6 +204,7 @@ def suggest_poses(node: Node) -> Payload:
             node.number_or("u_min_deg", usual.u_min_deg),
             node.number_or("u_max_deg", usual.u_max_deg),
             node.number_or("tilt_deg", usual.tilt_deg),
+            node.optional("box", lambda name: _box(node.child(name))),
         ),
         taken=node.optional("taken", lambda name: read_poses(node, name)) or (),
     )
@@ -217,6 +220,12 @@ def _place(node: Node) -> tuple[float, ...]:
     height = node.optional("z", node.number)
     node.finish()
     return tuple(place if height is None else [*place, height])
+
+
+def _box(node: Node) -> WorkBox:
+    sides = {name: node.number_or(name, usual) for name, usual in asdict(WorkBox()).items()}
+    node.finish()
+    return WorkBox(**sides)
 
 
 def _beam(node: Node) -> "cal.Beam":

@@ -371,6 +371,17 @@ def test_fiducials_and_their_drawing_are_fitted(solved):
     assert answer["u"] == pytest.approx(0)
 
 
+def test_a_pose_plan_stays_inside_the_workspace_and_says_what_each_pose_brings(solved):
+    asked = {**MORE["suggest_poses"][0], "count": 4}
+    free = solved(case("suggest_poses", **asked))[1]
+    boxed = solved(case("suggest_poses", **asked, box={"y_max_mm": 95.0}))[1]
+    assert max(pose["y"] for pose in free["poses"]) > 95 >= max(p["y"] for p in boxed["poses"])
+    assert boxed["sigma_gains"][-1] > free["sigma_gains"][-1]
+    code, answer = solved(case("suggest_poses", **asked, box={"y_max": 95.0}))
+    assert code == 2
+    assert "y_max" in answer["error"]["what"]
+
+
 def test_a_drift_beyond_the_tolerance_is_a_warning(solved):
     _, answer = solved(case("verify", poses=ROUND, offset={"x": 13, "y": -3.25}))
     assert (answer["status"], answer["codes"], answer["passed"]) == ("warn", ["large_drift"], False)

@@ -143,7 +143,7 @@ def look_at_board(
         retake: Offer to take the look again that fits worst.
 
     Raises:
-        CalibrationError: ``fiducial_not_seen``, ``several_fiducials_seen``,
+        CalibrationError: ``fiducial_not_seen``, ``several_fiducials_seen``, ``far_off``,
             ``camera_not_calibrated``, ``coincident_fiducials``, ``spacing_mismatch``, and the
             others of :func:`solve_board` and :func:`solve_board_round`.
     """
@@ -152,11 +152,13 @@ def look_at_board(
     drive, angles_deg = CameraDrive(station, plan, here), plan.angles_deg(here.u_deg)
     if plan.centre_first:
         found = board.places(tool, angles_deg[:1])[:2]
-        seen = yield from drive.looks(found, here)
         pair = BoardDrawing(board.fiducials_mm[:2])
-        tool = _board_tool(
-            [station.sighting(look) for look in seen], (1, 2), pair, tool, None
-        ).offset
+
+        def expected(looks: Sequence[SeenAt]) -> ToolOffset:
+            sightings = [station.sighting(look) for look in looks]
+            return _board_tool(sightings, (1, 2), pair, tool, None).offset
+
+        tool = yield from drive.centred(found, here, expected)
         here, centred = drive.pose(found[-1]), True
     places = board.places(tool, angles_deg)
     seen = yield from drive.looks(places, here, before_camera=centred)

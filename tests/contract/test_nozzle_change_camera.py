@@ -211,6 +211,17 @@ def test_a_drawing_that_is_not_the_boards_is_refused(cell, drawing, code):
     world = cell.simulator.world
     world.board = replace(world.board, drawing_mm=((20.0, 0.0), (-20.0, 0.0)))
     refused(cell, code, HeldBoard(cell.url, camera_station(cell), drawing))
+    assert cell.tip_z_mm > world.camera.middle_mm[2]
+
+
+def test_a_board_far_from_where_it_is_expected_is_refused_lifted(cell):
+    furnish(cell, board_held=True)
+    world = cell.simulator.world
+    pair = ((20.0, 0.0), (-20.0, 0.0))
+    world.board = replace(world.board, shift_mm=(4.5, 4.5), drawing_mm=pair)
+    drawing = BoardDrawing.of_two(40.0)
+    refused(cell, "far_off", HeldBoard(cell.url, camera_station(cell), drawing))
+    assert cell.tip_z_mm > world.camera.middle_mm[2] + 8.0
 
 
 def test_a_camera_that_changed_is_refused(cell):

@@ -77,7 +77,7 @@ class Measuring:
         def on_step(done: StepDone) -> None:
             if done.pose is not None and isinstance(done.step, (Ask, Seek, Look)):
                 poses.append(done.pose)
-            if isinstance(done.step, Offer):
+            if isinstance(done.step, Offer) and done.accepted is not None:
                 answer = tr("accepted") if done.accepted else tr("declined")
                 details = {"question": done.step.question, "tool": plan.tool}
                 log.append(decision_entry(answer, **details))

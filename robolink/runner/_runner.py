@@ -50,7 +50,8 @@ class StepDone:
     Attributes:
         step: Which one.
         pose: Where the frame was after it, ``None`` for a step that only concerns a person.
-        accepted: Whether an offer was accepted, ``None`` for other steps.
+        accepted: Whether a person accepted an offer, ``None`` for other steps and where nobody was
+            asked.
     """
 
     step: Step
@@ -109,7 +110,7 @@ class Runner:
                     continue
                 if self._on_step is not None:
                     self._on_step(done)
-                step = procedure.send(done.pose if done.accepted is None else done.accepted)
+                step = procedure.send(_answer(done))
         except StopIteration as finished:
             result: T = finished.value
             return result
@@ -148,7 +149,7 @@ class Runner:
             self._operator.tell(step.text)
             return StepDone(step)
         if isinstance(step, Offer):
-            return StepDone(step, accepted=self._offers and self.confirm(step.question))
+            return StepDone(step, accepted=self.confirm(step.question) if self._offers else None)
         return StepDone(step, self._moved(step))
 
     def _moved(self, step: Ask | Move | Seek | Look) -> Pose:
@@ -249,6 +250,11 @@ class Runner:
                 remedy=tr("Clear the cause and start again; nothing goes on by itself."),
                 controller=self._controller.identity,
             )
+
+
+def _answer(done: StepDone) -> Pose | bool | None:
+    """Return what a procedure is sent for a step: an offer that nobody heard is not accepted."""
+    return done.accepted is True if isinstance(done.step, Offer) else done.pose
 
 
 def ask_for_pose(instruction: str) -> Procedure[Pose]:

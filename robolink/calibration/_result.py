@@ -79,6 +79,12 @@ class CalibrationResult:
         }
 
     @property
+    def half95_mm(self) -> float | None:
+        """Half the 95 % interval of the length that is known worst; ``None`` without one."""
+        widths = zip(self.measured, self.half_width95, strict=False)
+        return max((half for name, half in widths if name.endswith("_mm")), default=None)
+
+    @property
     def residual_distances_mm(self) -> tuple[float, ...]:
         """Length of each pose's residual, in the order of the poses."""
         return tuple(math.hypot(*residual) for residual in self.residuals_mm)

@@ -24,7 +24,8 @@ from robolink.runner import Operator
 from robolink.transaction import ToolChange, Wanted
 
 Earlier = Callable[[int], Sequence[float]]
-"""Returns the lengths of a tool's corrections since its nozzle was mounted, oldest first."""
+"""Returns the lengths, in the plane, of a tool's corrections since its nozzle was mounted, oldest
+first."""
 
 
 class NozzleChange:

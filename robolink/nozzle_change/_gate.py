@@ -15,7 +15,7 @@ class Gate:
     """Limits of a measurement; what is ``None`` is not judged.
 
     Attributes:
-        max_change_mm: Largest plausible change against the stored value, in the plane.
+        max_change_mm: Largest plausible change against the stored value, over the lengths measured.
         rms_mm: Largest root mean square of the residuals.
         max_residual_mm: Largest residual.
         interval_mm: Largest half width of a component's 95 % interval.
@@ -61,17 +61,18 @@ class Gate:
 
         Args:
             proposal: What is to be written.
-            earlier_mm: Lengths of the corrections made since this nozzle was mounted, oldest
-                first.
+            earlier_mm: Lengths in the plane of the corrections made since this nozzle was mounted,
+                oldest first.
             remedy: What to do about an implausible change.
 
         Raises:
             CalibrationError: ``diverging`` or ``implausible_change``.
         """
-        change = proposal.change_mm
-        if change is None:
+        change, in_plane = proposal.change_mm, proposal.plane_change_mm
+        if change is None or in_plane is None:
             return
-        require_shrinking(change, earlier_mm)
+        # Z is often measured by another method, so only the plane has a history of its own.
+        require_shrinking(in_plane, earlier_mm)
         if change > self.limit_mm:
             raise CalibrationError(
                 "implausible_change",
@@ -112,8 +113,6 @@ class Gate:
             yield tr("95 % interval up to +-{limit:g} mm", limit=self.interval_mm)
 
     def _of_fit(self, result: CalibrationResult) -> Iterator[Verdict]:
-        widths = zip(result.measured, result.half_width95, strict=False)
-        largest = max((half for name, half in widths if name.endswith("_mm")), default=None)
         for code, name, found_mm, limit_mm in (
             ("large_rms", tr("The rms residual"), result.rms_mm, self.rms_mm),
             (
@@ -122,7 +121,7 @@ class Gate:
                 result.max_residual_mm,
                 self.max_residual_mm,
             ),
-            ("large_interval", tr("Half the 95 % interval"), largest, self.interval_mm),
+            ("large_interval", tr("Half the 95 % interval"), result.half95_mm, self.interval_mm),
         ):
             if found_mm is not None and limit_mm is not None:
                 yield Verdict(code, name, found_mm, limit_mm)

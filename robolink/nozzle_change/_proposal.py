@@ -53,11 +53,24 @@ class Proposal:
 
     @property
     def change_mm(self) -> float | None:
+        """Length of the measured change, ``None`` when the tool was undefined.
+
+        A Z that a person typed is the person's to answer for, and does not count.
+        """
+        plane_mm = self.plane_change_mm
+        if self.before is None or plane_mm is None:
+            return None
+        measured_z = "z_mm" in self.result.measured or self.z_from == "measured"
+        if not measured_z or self.z_from == "typed":
+            return plane_mm
+        return math.hypot(plane_mm, self.offset.z_mm - self.before.z_mm)
+
+    @property
+    def plane_change_mm(self) -> float | None:
         """Length of the change in the plane, ``None`` when the tool was undefined."""
         if self.before is None:
             return None
-        after = self.result.offset
-        return math.hypot(after.x_mm - self.before.x_mm, after.y_mm - self.before.y_mm)
+        return math.hypot(self.offset.x_mm - self.before.x_mm, self.offset.y_mm - self.before.y_mm)
 
 
 @dataclass(frozen=True, slots=True)

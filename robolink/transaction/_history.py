@@ -44,8 +44,9 @@ def changed_since(controller: Controller, tool: int, now: ToolOffset | None) -> 
 def earlier_corrections(controller: Controller, tool: int) -> tuple[float, ...]:
     """Return the lengths, mm, of the corrections since the nozzle was mounted, oldest first.
 
-    A nozzle is known by the id that was given for it; without one nothing is known to be the
-    same nozzle, and there is nothing to compare with. What was taken back is none.
+    They are those in the plane: Z is often measured by another method. A nozzle is known by the id
+    that was given for it; without one nothing is known to be the same nozzle, and there is nothing
+    to compare with. What was taken back is none.
     """
     nozzle = controller.outcomes.signature.nozzle
     lengths: list[float] = []

@@ -73,6 +73,18 @@ def test_a_nozzle_that_slips_after_the_write_fails_the_proof(cell):
     assert cell.stored == before
 
 
+def test_a_length_that_jumps_is_refused_by_the_limit_of_the_change(cell):
+    cell.mount_plate()
+    before = cell.stored
+    cell.simulator.world.tips[TOOL] = replace(cell.truth, z_mm=before.z_mm - 2.6)
+    with pytest.raises(CalibrationError, match=r"would move by 2\.[56]") as refusal:
+        cell.run(TouchProbe(cell.plate))
+    assert refusal.value.code == "implausible_change"
+    assert cell.stored == before
+    cell.run(TouchProbe(cell.plate), max_change_mm=3.0)
+    assert cell.stored.z_mm == pytest.approx(before.z_mm - 2.6, abs=BARELY_MM)
+
+
 def refused(cell, code, listener=None):
     before = cell.stored
     with pytest.raises(CalibrationError) as refusal:

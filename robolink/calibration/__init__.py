@@ -22,7 +22,6 @@ from robolink.calibration._held_board import BoardDrawing as BoardDrawing
 from robolink.calibration._impact import Impact as Impact
 from robolink.calibration._impact import PointImpact as PointImpact
 from robolink.calibration._impact import impact_on as impact_on
-from robolink.calibration._many_touches import Course as Course
 from robolink.calibration._moved_station import StationShift as StationShift
 from robolink.calibration._moved_station import TipShift as TipShift
 from robolink.calibration._moved_station import judge_shifts as judge_shifts
@@ -55,6 +54,7 @@ from robolink.calibration._steps import Shown as Shown
 from robolink.calibration._steps import Step as Step
 from robolink.calibration._steps import Tell as Tell
 from robolink.calibration._student import NORMAL_95 as NORMAL_95
+from robolink.calibration._taking import Course as Course
 from robolink.calibration._tolerance import PLANAR_TOLERANCE as PLANAR_TOLERANCE
 from robolink.calibration._tolerance import TOUCH_TOLERANCE as TOUCH_TOLERANCE
 from robolink.calibration._tolerance import Tolerance as Tolerance

@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from robolink.calibration._many_touches import ALL_OF_THEM, Course, many_touches
 from robolink.calibration._planar_checks import planar_sigma_gain
 from robolink.calibration._result import CalibrationResult
 from robolink.calibration._steps import Ask, Procedure
+from robolink.calibration._taking import ALL_OF_THEM, Course, taken_in_turn
 from robolink.calibration._touch import TouchPlan, lift_off, touch_again
 from robolink.messages import tr
 from robolink.model import Pose, ToolOffset, angle_difference_deg
@@ -20,7 +20,7 @@ def n_angle(
     sigma_mm: float | None = None,
     course: Course = ALL_OF_THEM,
 ) -> Procedure[CalibrationResult]:
-    """Measure a tip on a pin at several angles. Runs in Tool 0; see :func:`many_touches`.
+    """Measure a tip on a pin at several angles. Runs in Tool 0; see :func:`taken_in_turn`.
 
     Args:
         plan: Lift and clearance.
@@ -36,8 +36,8 @@ def n_angle(
     yield lift_off(plan, first)
     # Within half a turn of zero: adding up from touch to touch leaves the joint's range.
     angles = [angle_difference_deg(first.u_deg + turn_deg, 0.0) for turn_deg in turns_deg]
-    turning = _Turning(plan, stored, sigma_mm)
-    return (yield from many_touches(turning, first, [first.u_deg, *angles], course))
+    turning = _Turning(plan, stored, sigma_mm, first)
+    return (yield from taken_in_turn(turning, first, [first.u_deg, *angles], course))
 
 
 def telling_order(turns_deg: Sequence[float]) -> tuple[float, ...]:
@@ -53,20 +53,33 @@ def telling_order(turns_deg: Sequence[float]) -> tuple[float, ...]:
     return tuple(chosen[1:])
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class _Turning:
-    """Touches at angles of U; implements :class:`Touching`."""
+    """Touches at angles of U; implements :class:`Taking`. Each ends lifted off the pin.
+
+    Attributes:
+        plan, stored, sigma_mm: As for :func:`n_angle`.
+        last: The touch from which the tip was lifted off.
+    """
 
     plan: TouchPlan
     stored: ToolOffset | None
     sigma_mm: float | None
+    last: Pose
 
     @property
-    def measured(self) -> str:
-        return tr("X and Y")
+    def known(self) -> str:
+        return tr("X and Y are known")
 
-    def touch(self, touches: Sequence[Pose], place: float) -> Procedure[Pose]:
-        return touch_again(self.plan, touches[-1], place, self.stored or ToolOffset())
+    def counted(self, count: int) -> str:
+        return tr("{count} touches", count=count)
+
+    def take(self, place: float) -> Procedure[Pose]:
+        self.last = yield from touch_again(self.plan, self.last, place, self.stored or ToolOffset())
+        return self.last
+
+    def away(self) -> Procedure[None]:
+        yield from ()
 
     def foreseen(self, place: float) -> Pose:
         return Pose(0.0, 0.0, 0.0, place)
@@ -81,6 +94,9 @@ class _Turning:
 
     def named(self, pose: Pose) -> str:
         return tr("U {u:.1f}", u=pose.u_deg)
+
+    def which(self, number: int, pose: Pose) -> str:
+        return tr("Pose {number}, at {where}", number=number, where=self.named(pose))
 
 
 def _gain(turns_deg: Sequence[float]) -> float:

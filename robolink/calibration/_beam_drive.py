@@ -1,4 +1,4 @@
-"""The drive of a tip through two crossed beams, as places and steps."""
+"""The drive of a tip through two crossed beams, as places, passages and steps."""
 
 from dataclasses import dataclass, replace
 
@@ -7,7 +7,6 @@ from robolink.calibration._crossed_beams import where_they_cross
 from robolink.calibration._drawing_back import sought
 from robolink.calibration._stations import BeamStation, CrossingPlan
 from robolink.calibration._steps import Move, Procedure, Seek
-from robolink.calibration._touch import travel
 from robolink.messages import tr
 from robolink.model import Path, Pose, ToolOffset, rotate_xy
 
@@ -47,49 +46,68 @@ class BeamDrive:
             z_mm=station.z_mm - plan.dip_mm - self.deeper_mm - self.tip.z_mm,
         )
 
-    def once(self) -> "BeamDrive":
-        """Return the same drive, crossing each beam both ways once."""
-        return replace(self, plan=replace(self.plan, repeats=1))
+    def round(self, first: int = 0) -> "list[Passage]":
+        """Return the passages that cross both beams, both ways, beginning with one of them."""
+        return [Passage(self, beam, side) for beam in (first, 1 - first) for side in (1, -1)]
 
-    def from_above(self, here: Pose) -> Procedure[list[Crossing]]:
-        """Go above the beams from wherever the frame is, then :meth:`run`."""
-        above = replace(self.place(0, -1), z_mm=self.safe_z_mm)
-        yield from travel(above, here=here, purpose=tr("go above the beams"))
-        return (yield from self.run())
+    def rounds(self) -> "list[Passage]":
+        """Return as many rounds as are planned.
 
-    def lifted(self) -> Procedure[Pose]:
-        """Lift out of the beams from where :meth:`run` ends."""
-        last = replace(self.place(1, -1), z_mm=self.safe_z_mm)
-        above: Pose = yield Move(last, Path.STRAIGHT, tr("lift out of the beams"))
-        return above
+        Each begins with the beam with which the one before ended. That spares a way, and what
+        drifts evenly meanwhile is the same for both beams.
+        """
+        return [
+            passage for number in range(self.plan.repeats) for passage in self.round(number % 2)
+        ]
 
-    def run(self) -> Procedure[list[Crossing]]:
-        """Cross both beams, both ways; begins and ends at the depth of the beams."""
-        found = []
-        for beam in (0, 1):
-            yield Move(self.place(beam, -1), Path.STRAIGHT, tr("go beside the beam"))
-            for side in (1, -1) * self.plan.repeats:
-                found.append((yield from self._cross(beam, side)))
-        return found
 
-    def _cross(self, beam: int, side: int) -> Procedure[Crossing]:
-        far = self.place(beam, side)
-        entry = yield from self._seek(beam, far, self.place(beam, -side), broken=True)
-        leaving = yield from self._seek(beam, far, entry, broken=False)
-        yield Move(far, Path.STRAIGHT, tr("go beside the beam"))
-        return Crossing(beam, entry, leaving)
+@dataclass(frozen=True, slots=True)
+class Passage:
+    """One way through a beam.
 
-    def _seek(self, beam: int, far: Pose, here: Pose, *, broken: bool) -> Procedure[Pose]:
-        number = beam + 1
+    Attributes:
+        drive: Where the places of the frame are.
+        beam: Which beam, 0 or 1.
+        side: The side to which it leads, 1 or -1.
+    """
+
+    drive: BeamDrive
+    beam: int
+    side: int
+
+    @property
+    def start(self) -> Pose:
+        """Where the frame is before, beside the beam."""
+        return self.drive.place(self.beam, -self.side)
+
+    @property
+    def end(self) -> Pose:
+        """Where it is afterwards."""
+        return self.drive.place(self.beam, self.side)
+
+    def cross(self) -> Procedure[Crossing]:
+        """Cross the beam; begins at :attr:`start`, and ends at :attr:`end`.
+
+        Raises:
+            CalibrationError: ``no_edge`` or ``edge_passed``, with the tip lifted.
+        """
+        entry = yield from self._seek(self.start, broken=True)
+        leaving = yield from self._seek(entry, broken=False)
+        yield Move(self.end, Path.STRAIGHT, tr("go beside the beam"))
+        return Crossing(self.beam, entry, leaving)
+
+    def _seek(self, here: Pose, *, broken: bool) -> Procedure[Pose]:
+        number = self.beam + 1
         purpose = (
             tr("seek beam {number}", number=number)
             if broken
             else tr("leave beam {number}", number=number)
         )
+        drive = self.drive
         step = Seek(
-            far,
-            self.station.edge(beam, broken=broken),
-            self.plan.speed_mm_s,
+            self.end,
+            drive.station.edge(self.beam, broken=broken),
+            drive.plan.speed_mm_s,
             purpose,
         )
-        return (yield from sought(step, here=here, safe_z_mm=self.safe_z_mm))
+        return (yield from sought(step, here=here, safe_z_mm=drive.safe_z_mm))

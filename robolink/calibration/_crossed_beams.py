@@ -9,7 +9,7 @@ import numpy as np
 from robolink.calibration._beams import Beam, Crossing, check_crossings, require_crossed
 from robolink.calibration._checks import keep_unmeasured
 from robolink.calibration._judging import judged
-from robolink.calibration._least_squares import linear_fit
+from robolink.calibration._least_squares import LinearFit, linear_fit
 from robolink.calibration._planar_checks import MIN_ROTATION_DEG, angle_spread_deg
 from robolink.calibration._result import CalibrationResult
 from robolink.calibration._robust import Floats
@@ -67,8 +67,9 @@ def solve_crossed_beams(
     if not all(two_ways):
         warnings = (*warnings, "one_direction")
     a, b = _system(crossings, beams, two_ways, beams_may_have_moved)
-    _require_enough(a)
-    fit = linear_fit(a, b)
+    fit = linear_fit(a, b) if len(a) >= a.shape[1] else None
+    if fit is None or fit.rank < a.shape[1]:
+        raise _too_few(len(a))
     lags = fit.x[2 : 2 + sum(two_ways)].tolist()
     result = BeamsResult(
         method="crossed_beams",
@@ -76,7 +77,7 @@ def solve_crossed_beams(
         measured=("x_mm", "y_mm"),
         kept=_KEPT,
         reference_point_mm=where_they_cross(beams),
-        sigma_gain=math.sqrt(float(fit.unit_covariance.diagonal()[:2].max())),
+        sigma_gain=_gain(fit),
         warnings=warnings,
         inputs=tuple(crossing.entry for crossing in crossings),
         residuals_mm=_vectors(fit.residuals, crossings, beams),
@@ -96,6 +97,24 @@ def solve_crossed_beams(
         sigma_mm=sigma_mm,
         tolerance=tolerance,
     )
+
+
+def crossing_sigma_gain(
+    crossings: Sequence[Crossing],
+    beams: tuple[Beam, Beam],
+    *,
+    beams_may_have_moved: bool = False,
+) -> float:
+    """Return the standard deviation of X or Y, the larger, as a multiple of one crossing's.
+
+    Only the directions and angles of the crossings count; see :func:`solve_crossed_beams`.
+    """
+    a, b = _system(crossings, beams, _two_ways(crossings, beams), beams_may_have_moved)
+    return _gain(linear_fit(a, b))
+
+
+def _gain(fit: LinearFit) -> float:
+    return math.sqrt(float(fit.unit_covariance.diagonal()[:2].max()))
 
 
 def _two_ways(crossings: Sequence[Crossing], beams: tuple[Beam, Beam]) -> tuple[bool, bool]:
@@ -148,13 +167,12 @@ def where_they_cross(beams: tuple[Beam, Beam]) -> tuple[float, float]:
     return x, y
 
 
-def _require_enough(a: Floats) -> None:
-    if len(a) < a.shape[1]:
-        raise CalibrationError(
-            "too_few_poses",
-            tr("{count} crossings are too few.", count=len(a)),
-            remedy=tr("Cross each beam in both directions, at each angle of U."),
-        )
+def _too_few(count: int) -> CalibrationError:
+    return CalibrationError(
+        "too_few_poses",
+        tr("{count} crossings are too few.", count=count),
+        remedy=tr("Cross each beam in both directions, at each angle of U."),
+    )
 
 
 def _require_turned(crossings: Sequence[Crossing]) -> None:

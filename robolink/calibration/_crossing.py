@@ -5,21 +5,21 @@ is in the beam whatever their thickness, and both ways together are free of late
 and backlash (calibration.md 2).
 """
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
 from robolink.calibration._beam_drive import BeamDrive
+from robolink.calibration._beam_travel import BeamTravel
 from robolink.calibration._beams import Beam, Crossing, find_beams
 from robolink.calibration._crossed_beams import BeamsResult, solve_crossed_beams
+from robolink.calibration._many_crossings import Crossings
 from robolink.calibration._result import Drift, VerifyResult
 from robolink.calibration._stations import BeamStation, CrossingPlan
 from robolink.calibration._steps import Procedure
+from robolink.calibration._taking import ALL_OF_THEM, Course, taken_in_turn
 from robolink.calibration._touch import NO_OFFSET
 from robolink.calibration._turning import toward_zero
-from robolink.errors import CalibrationError
-from robolink.messages import tr
 from robolink.model import Pose, ToolOffset, rotate_xy
 
 REFERENCE_ASIDES_MM: Final = (-12.0, -6.0, 6.0, 12.0)
@@ -34,8 +34,9 @@ def cross_beams(
     stored: ToolOffset | None,
     turn_deg: float = 0.0,
     sigma_mm: float | None = None,
+    course: Course = ALL_OF_THEM,
 ) -> Procedure[BeamsResult]:
-    """Measure X and Y of a tip with two beams. Runs in Tool 0, from above the beams.
+    """Measure X and Y of a tip with two beams. Runs in Tool 0; see :func:`taken_in_turn`.
 
     Args:
         station: Where the beams are.
@@ -45,30 +46,20 @@ def cross_beams(
         turn_deg: Measure again with U turned by this, toward zero. Only the directions of the
             beams are relied on then, not their places, and the offset is absolute.
         sigma_mm: Standard deviation of one crossing's middle, where it is known.
+        course: When it ends, and whether a crossing may be made again.
 
     Raises:
         CalibrationError: ``no_edge``, ``edge_passed``, ``bent_needle``, and those of
             :func:`solve_crossed_beams`.
     """
     drive = BeamDrive(station, plan, here, stored or NO_OFFSET)
-    shallow = yield from drive.from_above(here)
-    deep, turned = list[Crossing](), list[Crossing]()
-    if plan.shaft_mm:
-        deep = yield from replace(drive.once(), deeper_mm=plan.shaft_mm).run()
-    above = yield from drive.lifted()
+    turned = None
     if turn_deg:
-        other = replace(drive, frame=replace(here, u_deg=toward_zero(here.u_deg, turn_deg)))
-        turned = yield from other.from_above(above)
-        yield from other.lifted()
-    if deep:
-        _require_straight(shallow, deep, station, plan)
-    return solve_crossed_beams(
-        [*shallow, *turned],
-        station.beams,
-        stored=stored,
-        sigma_mm=sigma_mm,
-        beams_may_have_moved=bool(turn_deg),
-    )
+        turned = replace(drive, frame=replace(here, u_deg=toward_zero(here.u_deg, turn_deg)))
+    crossings = Crossings(BeamTravel(here), drive, turned, stored, sigma_mm)
+    passages = crossings.passages
+    first = yield from crossings.take(passages[0])
+    return (yield from taken_in_turn(crossings, first, passages, course))
 
 
 def trace_beams(
@@ -92,11 +83,11 @@ def trace_beams(
     Raises:
         CalibrationError: ``no_edge``, ``edge_passed``, and those of :func:`find_beams`.
     """
-    crossings = []
+    travel, crossings = BeamTravel(here), list[Crossing]()
     for aside_mm in asides_mm:
-        drive = BeamDrive(guess, replace(plan, aside_mm=aside_mm), here, tip).once()
-        crossings += yield from drive.from_above(here)
-        here = yield from drive.lifted()
+        drive = BeamDrive(guess, replace(plan, aside_mm=aside_mm), here, tip)
+        crossings += yield from travel.through(drive.round())
+        yield from travel.lifted()
     return find_beams(crossings, (tip.x_mm, tip.y_mm))
 
 
@@ -126,34 +117,12 @@ def verify_by_crossing(
     Raises:
         CalibrationError: As :func:`cross_beams`.
     """
-    drifts = []
+    travel, drifts = BeamTravel(here), list[Drift]()
     for angle_deg in angles_deg:
-        drive = BeamDrive(station, plan, replace(here, u_deg=angle_deg), aside).once()
-        crossings = yield from drive.from_above(here)
-        here = yield from drive.lifted()
+        drive = BeamDrive(station, plan, replace(here, u_deg=angle_deg), aside)
+        crossings = yield from travel.through(drive.round())
+        yield from travel.lifted()
         found = solve_crossed_beams(crossings, station.beams).offset
         dx, dy = rotate_xy(aside.x_mm - found.x_mm, aside.y_mm - found.y_mm, angle_deg)
         drifts.append(Drift(angle_deg, dx, dy))
     return VerifyResult(tuple(drifts), tolerance_mm)
-
-
-def _require_straight(
-    shallow: Sequence[Crossing],
-    deep: Sequence[Crossing],
-    station: BeamStation,
-    plan: CrossingPlan,
-) -> None:
-    """Refuse a needle whose shaft is not above its tip."""
-    tip, shaft = (solve_crossed_beams(c, station.beams).offset for c in (shallow, deep))
-    beside_mm = math.hypot(shaft.x_mm - tip.x_mm, shaft.y_mm - tip.y_mm)
-    lean_deg = math.degrees(math.atan2(beside_mm, plan.shaft_mm))
-    if lean_deg > plan.max_lean_deg:
-        raise CalibrationError(
-            "bent_needle",
-            tr(
-                "The needle leans by {lean:.1f} degrees; {limit:.1f} are allowed.",
-                lean=lean_deg,
-                limit=plan.max_lean_deg,
-            ),
-            remedy=tr("Change it, and look whether it is seated straight."),
-        )

@@ -20,8 +20,8 @@ from robolink.calibration._camera_station import (
     PatternPlan,
 )
 from robolink.calibration._held_board import BoardDrawing
+from robolink.calibration._looks import Looks
 from robolink.calibration._planar_checks import MIN_ROTATION_DEG, angle_spread_deg
-from robolink.calibration._retaking import settled
 from robolink.calibration._steps import Procedure, SeenAt
 from robolink.calibration._touch import NO_OFFSET
 from robolink.calibration._turning import toward_zero
@@ -64,13 +64,13 @@ def look_at_tip(
         tip = yield from drive.centred([found], here, expected)
         here, centred = drive.pose(found), True
     places = [Place(u_deg, tip) for u_deg in angles_deg]
-    seen = yield from drive.looks(places, here, before_camera=centred)
 
     def solve(looks: Sequence[SeenAt]) -> CameraRound:
         sightings = [station.sighting(look) for look in looks]
         return solve_camera_round(sightings, stored=stored, sigma_mm=sigma_mm)
 
-    return (yield from settled(drive, places, seen, solve, retake=retake))
+    looks = Looks(drive, solve, here, before_camera=centred)
+    return (yield from looks.at(places, retake=retake))
 
 
 def find_camera(
@@ -107,7 +107,6 @@ def find_camera(
     places = [
         Place(toward_zero(here.u_deg, turn), tip, aside_mm=(dx, dy)) for dx, dy, turn in plan.places
     ]
-    seen = yield from drive.looks(places, here)
 
     def solve(looks: Sequence[SeenAt]) -> CameraCalibration:
         sightings = [PixelSighting(look, look.spot.x, look.spot.y) for look in looks]
@@ -115,7 +114,7 @@ def find_camera(
             sightings, stored=stored, sigma_mm=sigma_mm, before=station.model
         )
 
-    return (yield from settled(drive, places, seen, solve, retake=retake))
+    return (yield from Looks(drive, solve, here).at(places, retake=retake))
 
 
 def look_at_board(
@@ -161,14 +160,14 @@ def look_at_board(
         tool = yield from drive.centred(found, here, expected)
         here, centred = drive.pose(found[-1]), True
     places = board.places(tool, angles_deg)
-    seen = yield from drive.looks(places, here, before_camera=centred)
 
     def solve(looks: Sequence[SeenAt]) -> CameraRound:
         sightings = [station.sighting(look) for look in looks]
         marks = [place.mark for place in places]
         return _board_tool(sightings, marks, board, stored, sigma_mm)
 
-    return (yield from settled(drive, places, seen, solve, retake=retake))
+    looks = Looks(drive, solve, here, before_camera=centred)
+    return (yield from looks.at(places, retake=retake))
 
 
 def _board_tool(

@@ -1,56 +1,116 @@
-"""After the looks: what they say, and the one that fits worst taken again if a person wants it."""
+"""What was taken place by place, and the one that fits worst taken again if a person wants it."""
 
-from collections.abc import Callable, Sequence
-from typing import TypeVar
+from collections.abc import Sequence
+from typing import Final, Protocol, TypeVar
 
-from robolink.calibration._camera_drive import CameraDrive, Place
-from robolink.calibration._many_touches import MOST_RETAKES, worst_pose
 from robolink.calibration._result import CalibrationResult
-from robolink.calibration._steps import Offer, Procedure, SeenAt
+from robolink.calibration._steps import Offer, Procedure, Tell
 from robolink.messages import tr
 
+MOST_RETAKES: Final = 3
+"""How often one is offered to be taken again; after that the measurement stands as it is."""
+
+_DIGITS: Final = 6
+"""Residuals that are equal in so many decimals of a millimetre differ by rounding alone."""
+
+PlaceT = TypeVar("PlaceT")
+TakenT = TypeVar("TakenT")
 ResultT = TypeVar("ResultT", bound=CalibrationResult)
+PlaceT_contra = TypeVar("PlaceT_contra", contravariant=True)
+ResultT_co = TypeVar("ResultT_co", bound=CalibrationResult, covariant=True)
+
+
+class Retaking(Protocol[PlaceT_contra, TakenT, ResultT_co]):
+    """How one method takes a touch, a look or a crossing, and what it makes of all of them."""
+
+    @property
+    def known(self) -> str:
+        """Which lengths become known, for a person: "X and Y are known"."""
+
+    def counted(self, count: int) -> str:
+        """Return how many were taken, for a person: "6 touches"."""
+
+    def take(self, place: PlaceT_contra) -> Procedure[TakenT]:
+        """Go to a place from wherever the one before ended, and take one there.
+
+        Raises:
+            CalibrationError: The sensor says nothing of use; the tip is drawn back.
+        """
+
+    def away(self) -> Procedure[None]:
+        """Lift the tip to where a person may take their time; nothing where it is there."""
+
+    def solve(self, taken: Sequence[TakenT]) -> ResultT_co:
+        """Return what they say, with their residuals in their order.
+
+        Raises:
+            CalibrationError: They say nothing that can be trusted.
+        """
+
+    def which(self, number: int, taken: TakenT) -> str:
+        """Return which one it is, for a person: "Pose 3, at U 120.0"."""
 
 
 def settled(
-    drive: CameraDrive,
-    places: Sequence[Place],
-    seen: Sequence[SeenAt],
-    solve: Callable[[Sequence[SeenAt]], ResultT],
+    method: Retaking[PlaceT, TakenT, ResultT],
+    places: Sequence[PlaceT],
+    taken: Sequence[TakenT],
     *,
     retake: bool,
 ) -> Procedure[ResultT]:
-    """Return what the looks say, after a person had the worst of them taken again or not.
+    """Return what was taken says, after the worst of it was taken again or not. Ends lifted.
 
     Args:
-        drive: Takes the looks; stands before the camera, at the last place.
-        places: Where the looks were taken.
-        seen: The looks.
-        solve: What they say.
-        retake: Whether a look is offered to be taken again. It ends lifted in any case.
+        method: How it is taken and solved.
+        places: Where it was taken.
+        taken: What was taken there.
+        retake: Whether the one that fits worst is offered to be taken again.
 
     Raises:
-        CalibrationError: Those of ``solve``, and of :meth:`CameraDrive.looks`.
+        CalibrationError: Those of ``method``.
     """
-    looks, last = list(seen), places[-1]
-    yield from drive.lifted(last)
-    result = solve(looks)
+    yield from method.away()
+    held, times = list(taken), [0] * len(taken)
+    result = method.solve(held)
     for _ in range(MOST_RETAKES if retake and result.dof else 0):
-        worst = worst_pose(result)
-        if not (yield Offer(_offer(result, worst))):
+        distances = result.residual_distances_mm
+        # Two that are checked by each other alone fit equally badly; then it is the other's turn.
+        worst = min(range(len(held)), key=lambda i: (-round(distances[i], _DIGITS), times[i]))
+        question = tr(
+            "{which}, fits worst: it is {distance:.3f} mm off. Take it again?",
+            which=method.which(worst + 1, held[worst]),
+            distance=distances[worst],
+        )
+        if not (yield Offer(question)):
             break
-        here = drive.above(last)
-        last = places[worst]
-        (looks[worst],) = yield from drive.looks([last], here)
-        yield from drive.lifted(last)
-        result = solve(looks)
+        times[worst] += 1
+        held[worst] = yield from method.take(places[worst])
+        yield from method.away()
+        result = method.solve(held)
+        yield Tell(agreement(method, result, last=worst))
     return result
 
 
-def _offer(result: CalibrationResult, worst: int) -> str:
+def agreement(
+    method: Retaking[PlaceT, TakenT, ResultT], fit: CalibrationResult, *, last: int
+) -> str:
+    """Return how well those agree that were taken so far, and how sure the tip is, as a sentence.
+
+    Args:
+        method: How they are named.
+        fit: What they say; it has a degree of freedom.
+        last: Index of the one that was taken last.
+    """
+    half_mm = fit.half95_mm
+    known = (
+        ""
+        if half_mm is None
+        else tr("; {known} to +-{half:.3f} mm", known=method.known, half=half_mm)
+    )
     return tr(
-        "Look {number}, at U {u:.1f}, fits worst: it is {distance:.3f} mm off. Take it again?",
-        number=worst + 1,
-        u=result.inputs[worst].u_deg,
-        distance=result.residual_distances_mm[worst],
+        "{counted} agree within {rms:.3f} mm rms, the last within {last:.3f} mm{known}.",
+        counted=method.counted(len(fit.residuals_mm)),
+        rms=fit.rms_mm,
+        last=fit.residual_distances_mm[last],
+        known=known,
     )

@@ -9,11 +9,11 @@ from dataclasses import dataclass, replace
 from typing import Final, Literal
 
 from robolink.calibration._axis_ways import GOOD_WAY_MM, between_deg, flange_way, require_unturned
-from robolink.calibration._many_touches import ALL_OF_THEM, Course
 from robolink.calibration._robust import Floats
 from robolink.calibration._rotations import rotation_of
 from robolink.calibration._six_point import FAR_DEG, SixPointResult, solve_six_point
 from robolink.calibration._steps import Ask, Move, Offer, Procedure, Shown, Tell
+from robolink.calibration._taking import ALL_OF_THEM, Course
 from robolink.calibration._tilted_touches import pivot_then_lift
 from robolink.calibration._tilts import Tilt
 from robolink.calibration._touch import TouchPlan, raised, travel

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from robolink.calibration._taking import may_end_early
 from robolink.model import InputEdge
 
 if TYPE_CHECKING:
@@ -57,6 +58,17 @@ class CrossingPlan:
     shaft_mm: float = 3.0
     max_lean_deg: float = 2.0
 
+    def may_end_early(self, *, turned: bool, sigma_stated: bool) -> bool:
+        """Tell whether the tip can be known well enough before the last crossing.
+
+        Args:
+            turned: Whether the beams are crossed at a second angle of U too.
+            sigma_stated: Whether somebody stated the standard deviation of a crossing.
+        """
+        # X, Y and a lag for each beam; turned, by how far each beam was moved as well.
+        count, unknowns = (8, 6) if turned else (4, 4)
+        return may_end_early(count * self.repeats, unknowns=unknowns, sigma_stated=sigma_stated)
+
 
 @dataclass(frozen=True, slots=True)
 class TouchStation:
@@ -98,3 +110,12 @@ class ProbePlan:
     back_off_mm: float = 1.0
     lift_mm: float = 10.0
     speeds_mm_s: tuple[float, ...] = (2.0, 1.0, 2.0, 1.0)
+
+    def may_end_early(self, *, sigma_stated: bool) -> bool:
+        """Tell whether the tip can be known well enough before the last touch.
+
+        Args:
+            sigma_stated: Whether somebody stated the standard deviation of a touch.
+        """
+        # Z and the latency.
+        return may_end_early(len(self.speeds_mm_s), unknowns=2, sigma_stated=sigma_stated)

@@ -8,11 +8,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from robolink.calibration._many_touches import ALL_OF_THEM, Course, many_touches
 from robolink.calibration._pivot import solve_pivot
 from robolink.calibration._result import CalibrationResult, Drift, VerifyResult
 from robolink.calibration._rotations import pose_arrays
 from robolink.calibration._steps import Ask, Move, Procedure
+from robolink.calibration._taking import ALL_OF_THEM, Course, taken_in_turn
 from robolink.calibration._telling import sigma_gain
 from robolink.calibration._tilts import UPRIGHT, OverPin, Tilt, apart_deg, way
 from robolink.calibration._touch import TouchPlan, lift_off
@@ -32,7 +32,7 @@ def pivot(
     sigma_mm: float | None = None,
     course: Course = ALL_OF_THEM,
 ) -> Procedure[CalibrationResult]:
-    """Measure a tip on a pin in tilted orientations. Runs in Tool 0; see :func:`many_touches`.
+    """Measure a tip on a pin in tilted orientations. Runs in Tool 0; see :func:`taken_in_turn`.
 
     It ends lifted, and in the orientation in which it began.
 
@@ -66,7 +66,7 @@ def pivot_then_lift(
     yield lift_off(plan, first)
     swing = _Swing(plan, OverPin.touched(first, stored))
     tilting = _Tilting(swing, stored, sigma_mm)
-    result = yield from many_touches(tilting, first, [UPRIGHT, *tilts], course)
+    result = yield from taken_in_turn(tilting, first, [UPRIGHT, *tilts], course)
     yield from swing.to(UPRIGHT)
     return result, swing.over.pose(UPRIGHT, plan.lift_mm)
 
@@ -150,20 +150,26 @@ class _Swing:
 
 @dataclass(frozen=True, slots=True)
 class _Tilting:
-    """Tilted touches; implements :class:`Touching`."""
+    """Tilted touches; implements :class:`Taking`. Each ends lifted off the pin."""
 
     swing: _Swing
     stored: ToolOffset
     sigma_mm: float | None
 
     @property
-    def measured(self) -> str:
-        return tr("X, Y and Z")
+    def known(self) -> str:
+        return tr("X, Y and Z are known")
 
-    def touch(self, touches: Sequence[Pose], place: Tilt) -> Procedure[Pose]:  # noqa: ARG002 - the way begins where the swing stands
+    def counted(self, count: int) -> str:
+        return tr("{count} touches", count=count)
+
+    def take(self, place: Tilt) -> Procedure[Pose]:
         return self.swing.touch(
             place, tr("Bring the tip onto the pin again, with the tool tilted.")
         )
+
+    def away(self) -> Procedure[None]:
+        yield from ()
 
     def foreseen(self, place: Tilt) -> Pose:
         return self.swing.over.pose(place, 0.0)
@@ -176,3 +182,6 @@ class _Tilting:
 
     def named(self, pose: Pose) -> str:
         return tr("U {u:.1f} V {v:.1f} W {w:.1f}", u=pose.u_deg, v=pose.v_deg, w=pose.w_deg)
+
+    def which(self, number: int, pose: Pose) -> str:
+        return tr("Pose {number}, at {where}", number=number, where=self.named(pose))

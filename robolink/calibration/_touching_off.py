@@ -1,14 +1,20 @@
 """Touch-off on a surface that switches an input. The tip stops at the touch, then retreats."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from robolink.calibration._drawing_back import sought
 from robolink.calibration._result import Drift, VerifyResult
 from robolink.calibration._stations import ProbePlan, TouchStation
 from robolink.calibration._steps import Move, Procedure, Seek
+from robolink.calibration._taking import ALL_OF_THEM, Course, taken_in_turn
 from robolink.calibration._touch import NO_OFFSET, raised, travel
-from robolink.calibration._z_touch import Touch, ZTouchResult, solve_z_touch
+from robolink.calibration._z_touch import (
+    Touch,
+    ZTouchResult,
+    solve_z_touch,
+    touch_sigma_gain,
+)
 from robolink.messages import tr
 from robolink.model import Path, Pose, ToolOffset, rotate_xy
 
@@ -20,8 +26,9 @@ def touch_off(
     here: Pose,
     stored: ToolOffset | None,
     sigma_mm: float | None = None,
+    course: Course = ALL_OF_THEM,
 ) -> Procedure[ZTouchResult]:
-    """Measure Z of a tip by touching a surface. Runs in Tool 0, from above the surface.
+    """Measure Z of a tip by touching a surface. Runs in Tool 0; see :func:`taken_in_turn`.
 
     Args:
         station: Where the surface is.
@@ -29,12 +36,14 @@ def touch_off(
         here: Where the flange is.
         stored: The offset stored now; the tip is expected there.
         sigma_mm: Standard deviation of one touch, where it is known.
+        course: When it ends, and whether a touch may be made again.
 
     Raises:
         CalibrationError: ``no_edge``, ``edge_passed``, and those of :func:`solve_z_touch`.
     """
-    touches = yield from _touches(station, plan, here, stored or NO_OFFSET)
-    return solve_z_touch(touches, station.z_mm, stored=stored, sigma_mm=sigma_mm)
+    probing = _Probing(station, plan, here, stored or NO_OFFSET, here, stored, sigma_mm)
+    first = yield from probing.take(plan.speeds_mm_s[0])
+    return (yield from taken_in_turn(probing, first, plan.speeds_mm_s, course))
 
 
 def verify_by_touching(
@@ -62,48 +71,88 @@ def verify_by_touching(
     """
     drifts = []
     for angle_deg in angles_deg:
-        frame = replace(here, u_deg=angle_deg)
-        touches = yield from _touches(station, plan, here, aside, frame=frame)
-        here = replace(_above(station, plan, frame, aside), z_mm=_safe_z_mm(station, plan, aside))
-        found = solve_z_touch(touches, station.z_mm).offset
+        probing = _Probing(station, plan, replace(here, u_deg=angle_deg), aside, here)
+        touches = []
+        for speed_mm_s in plan.speeds_mm_s:
+            touches.append((yield from probing.take(speed_mm_s)))
+        yield from probing.away()
+        here, found = probing.here, probing.solve(touches).offset
         drifts.append(Drift(angle_deg, 0.0, 0.0, aside.z_mm - found.z_mm))
     return VerifyResult(tuple(drifts), tolerance_mm, heights_only=True)
 
 
-def _touches(
-    station: TouchStation,
-    plan: ProbePlan,
-    here: Pose,
-    tip: ToolOffset,
-    *,
-    frame: Pose | None = None,
-) -> Procedure[list[Touch]]:
-    """Touch at every speed of the plan; begins and ends above the surface."""
-    above, safe_z_mm = _above(station, plan, frame or here, tip), _safe_z_mm(station, plan, tip)
-    safe = replace(above, z_mm=safe_z_mm)
-    end = raised(above, -plan.clearance_mm - plan.beyond_mm)
-    yield from travel(safe, here=here, purpose=tr("go above the surface"))
-    here = yield Move(above, Path.STRAIGHT, tr("come down to the clearance"))
-    touches = []
-    for speed_mm_s in plan.speeds_mm_s:
-        step = Seek(end, station.edge, speed_mm_s, tr("seek the surface"))
-        touch = yield from sought(step, here=here, safe_z_mm=safe_z_mm)
-        touches.append(Touch(touch.z_mm, speed_mm_s))
-        here = yield Move(raised(touch, plan.back_off_mm), Path.STRAIGHT, tr("back off"))
-    yield Move(safe, Path.STRAIGHT, tr("lift off the surface"))
-    return touches
+@dataclass(slots=True)
+class _Probing:
+    """Touches of a surface, each at a speed; implements :class:`Taking`.
 
+    Attributes:
+        station, plan: Where and how.
+        frame: A pose of the frame: its angles, hand, local and tool.
+        tip: Where the tip is expected, seen from the frame.
+        here: Where the frame is.
+        stored, sigma_mm: As for :func:`touch_off`.
+        near: Whether the frame is at the clearance or below, not above the surface.
+    """
 
-def _above(station: TouchStation, plan: ProbePlan, frame: Pose, tip: ToolOffset) -> Pose:
-    """Return the frame's pose with the tip where it begins to seek."""
-    dx, dy = rotate_xy(tip.x_mm, tip.y_mm, frame.u_deg)
-    return replace(
-        frame,
-        x_mm=station.x_mm - dx,
-        y_mm=station.y_mm - dy,
-        z_mm=station.z_mm + plan.clearance_mm - tip.z_mm,
-    )
+    station: TouchStation
+    plan: ProbePlan
+    frame: Pose
+    tip: ToolOffset
+    here: Pose
+    stored: ToolOffset | None = None
+    sigma_mm: float | None = None
+    near: bool = False
 
+    @property
+    def known(self) -> str:
+        return tr("Z is known")
 
-def _safe_z_mm(station: TouchStation, plan: ProbePlan, tip: ToolOffset) -> float:
-    return station.z_mm + plan.lift_mm - tip.z_mm
+    def counted(self, count: int) -> str:
+        return tr("{count} touches", count=count)
+
+    def take(self, place: float) -> Procedure[Touch]:
+        if not self.near:
+            yield from travel(self._safe, here=self.here, purpose=tr("go above the surface"))
+            self.here = yield Move(self._above, Path.STRAIGHT, tr("come down to the clearance"))
+            self.near = True
+        end = raised(self._above, -self.plan.clearance_mm - self.plan.beyond_mm)
+        step = Seek(end, self.station.edge, place, tr("seek the surface"))
+        touch = yield from sought(step, here=self.here, safe_z_mm=self._safe.z_mm)
+        self.here = yield Move(raised(touch, self.plan.back_off_mm), Path.STRAIGHT, tr("back off"))
+        return Touch(touch.z_mm, place)
+
+    def away(self) -> Procedure[None]:
+        if self.near:
+            self.here = yield Move(self._safe, Path.STRAIGHT, tr("lift off the surface"))
+            self.near = False
+
+    def solve(self, touches: Sequence[Touch]) -> ZTouchResult:
+        return solve_z_touch(touches, self.station.z_mm, stored=self.stored, sigma_mm=self.sigma_mm)
+
+    def foreseen(self, place: float) -> Touch:
+        return Touch(0.0, place)
+
+    def gain(self, touches: Sequence[Touch]) -> float:
+        return touch_sigma_gain(touches)
+
+    def named(self, touch: Touch) -> str:
+        return tr("{speed:g} mm/s", speed=touch.speed_mm_s)
+
+    def which(self, number: int, touch: Touch) -> str:
+        return tr("Touch {number}, at {where}", number=number, where=self.named(touch))
+
+    @property
+    def _above(self) -> Pose:
+        """The frame's pose with the tip where it begins to seek."""
+        dx, dy = rotate_xy(self.tip.x_mm, self.tip.y_mm, self.frame.u_deg)
+        return replace(
+            self.frame,
+            x_mm=self.station.x_mm - dx,
+            y_mm=self.station.y_mm - dy,
+            z_mm=self.station.z_mm + self.plan.clearance_mm - self.tip.z_mm,
+        )
+
+    @property
+    def _safe(self) -> Pose:
+        """The frame's pose with the tip above the surface, where it may turn."""
+        return replace(self._above, z_mm=self.station.z_mm + self.plan.lift_mm - self.tip.z_mm)

@@ -13,7 +13,7 @@ import numpy as np
 from robolink.calibration._checks import keep_unmeasured
 from robolink.calibration._finite import require_finite
 from robolink.calibration._judging import judged
-from robolink.calibration._least_squares import linear_fit
+from robolink.calibration._least_squares import LinearFit, linear_fit
 from robolink.calibration._planar_checks import require_poses
 from robolink.calibration._result import CalibrationResult
 from robolink.calibration._tolerance import Tolerance
@@ -84,15 +84,9 @@ def solve_z_touch(
     require_poses(len(touches), 1 if latency_s is not None else 2)
     require_finite(surface_z_mm=surface_z_mm)
     _check_touches(touches)
-    z = np.array([touch.z_mm for touch in touches], dtype=float)
-    speeds = np.array([touch.speed_mm_s for touch in touches], dtype=float)
-    columns = [np.ones(len(z))]
     if latency_s is None:
         _require_two_speeds(touches)
-        columns.append(-speeds)
-    else:
-        z = z + speeds * latency_s
-    fit = linear_fit(np.column_stack(columns), z)
+    fit = _fit(touches, latency_s)
     flange_z = float(fit.x[0])
     result = ZTouchResult(
         method="z_touch",
@@ -100,7 +94,7 @@ def solve_z_touch(
         measured=("z_mm",),
         kept=_KEPT,
         reference_point_mm=(),
-        sigma_gain=math.sqrt(float(fit.unit_covariance[0, 0])),
+        sigma_gain=_gain(fit),
         warnings=("few_poses",) if len(touches) < RECOMMENDED_TOUCHES else (),
         inputs=(),
         residuals_mm=tuple((0.0, 0.0, residual) for residual in fit.residuals.tolist()),
@@ -118,6 +112,24 @@ def solve_z_touch(
         sigma_mm=sigma_mm,
         tolerance=tolerance,
     )
+
+
+def touch_sigma_gain(touches: Sequence[Touch]) -> float:
+    """Return the standard deviation of Z as a multiple of one touch's; only the speeds count."""
+    return _gain(_fit(touches, None))
+
+
+def _fit(touches: Sequence[Touch], latency_s: float | None) -> LinearFit:
+    z = np.array([touch.z_mm for touch in touches], dtype=float)
+    speeds = np.array([touch.speed_mm_s for touch in touches], dtype=float)
+    ones = np.ones(len(z))
+    if latency_s is None:
+        return linear_fit(np.column_stack([ones, -speeds]), z)
+    return linear_fit(ones[:, None], z + speeds * latency_s)
+
+
+def _gain(fit: LinearFit) -> float:
+    return math.sqrt(float(fit.unit_covariance[0, 0]))
 
 
 def _check_touches(touches: Sequence[Touch]) -> None:

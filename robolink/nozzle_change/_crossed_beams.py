@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from robolink.calibration import (
     BeamStation,
     CalibrationResult,
+    Course,
     CrossingPlan,
     Procedure,
     VerifyResult,
@@ -26,12 +27,14 @@ class CrossedBeams:
         plan: How they are crossed.
         turn_deg: Measure at a second U too, so that beams that were moved do no harm; 0 for not.
         sigma_mm: Standard deviation of one crossing's middle, where it is known.
+        course: When it ends, and whether a crossing is offered to be made again.
     """
 
     station: BeamStation
     plan: CrossingPlan = field(default_factory=CrossingPlan)
     turn_deg: float = 0.0
     sigma_mm: float | None = None
+    course: Course = field(default_factory=Course)
 
     @property
     def sentence(self) -> str:
@@ -50,10 +53,18 @@ class CrossedBeams:
 
     def measure(self, bench: Bench, tool: int, stored: ToolOffset | None) -> CalibrationResult:  # noqa: ARG002 - the flange is what moves
         """Cross and solve; see :class:`~robolink.nozzle_change.MovingSource`."""
-        return bench.measure(lambda here: self.procedure(stored, here))
+        return bench.measure(lambda here: self._steps(stored, here, self.course))
 
     def procedure(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:
-        """Return the steps of a measurement; see :class:`~robolink.nozzle_change.MovingSource`."""
+        """Return the steps of a measurement; see :class:`~robolink.nozzle_change.MovingSource`.
+
+        All of them: when it ends early depends on crossings that nobody has made yet.
+        """
+        return self._steps(stored, here, Course())
+
+    def _steps(
+        self, stored: ToolOffset | None, here: Pose, course: Course
+    ) -> Procedure[CalibrationResult]:
         from robolink.calibration import cross_beams  # numpy, which a look does without
 
         return cross_beams(
@@ -63,6 +74,7 @@ class CrossedBeams:
             stored=stored,
             turn_deg=self.turn_deg,
             sigma_mm=self.sigma_mm,
+            course=course,
         )
 
     def verify(

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 from robolink.calibration import (
     CalibrationResult,
+    Course,
     ProbePlan,
     Procedure,
     TouchStation,
@@ -25,12 +26,14 @@ class TouchProbe:
         sigma_mm: Standard deviation of one touch, where it is known.
         proof_turn_deg: By how much U differs at the touch that proves the new value; 0 on a
             machine that cannot turn.
+        course: When it ends, and whether a touch is offered to be made again.
     """
 
     station: TouchStation
     plan: ProbePlan = field(default_factory=ProbePlan)
     sigma_mm: float | None = None
     proof_turn_deg: float = 180.0
+    course: Course = field(default_factory=Course)
 
     @property
     def sentence(self) -> str:
@@ -47,13 +50,28 @@ class TouchProbe:
 
     def measure(self, bench: Bench, tool: int, stored: ToolOffset | None) -> CalibrationResult:  # noqa: ARG002 - the flange is what moves
         """Touch and solve; see :class:`~robolink.nozzle_change.MovingSource`."""
-        return bench.measure(lambda here: self.procedure(stored, here))
+        return bench.measure(lambda here: self._steps(stored, here, self.course))
 
     def procedure(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:
-        """Return the steps of a measurement; see :class:`~robolink.nozzle_change.MovingSource`."""
+        """Return the steps of a measurement; see :class:`~robolink.nozzle_change.MovingSource`.
+
+        All of them: when it ends early depends on touches that nobody has made yet.
+        """
+        return self._steps(stored, here, Course())
+
+    def _steps(
+        self, stored: ToolOffset | None, here: Pose, course: Course
+    ) -> Procedure[CalibrationResult]:
         from robolink.calibration import touch_off  # numpy, which a look does without
 
-        return touch_off(self.station, self.plan, here=here, stored=stored, sigma_mm=self.sigma_mm)
+        return touch_off(
+            self.station,
+            self.plan,
+            here=here,
+            stored=stored,
+            sigma_mm=self.sigma_mm,
+            course=course,
+        )
 
     def verify(
         self,

@@ -7,6 +7,7 @@ from robolink.config import Problem
 from robolink.recipe._check_beams import beams, beams_height
 from robolink.recipe._check_board import fiducials
 from robolink.recipe._check_camera import camera_looks, camera_pixels, camera_place
+from robolink.recipe._check_course import course
 from robolink.recipe._check_measuring import (
     angles,
     clearance,
@@ -28,6 +29,7 @@ from robolink.recipe._draft import Draft
 _CHECKS: Final[tuple[Callable[[Draft], Iterator[Problem]], ...]] = (
     angles,
     clearance,
+    course,
     beams,
     beams_height,
     surface,

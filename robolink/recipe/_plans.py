@@ -1,6 +1,6 @@
 """From a recipe to the plan of a nozzle change."""
 
-from robolink.calibration import BeamStation, CrossingPlan, ProbePlan, TouchStation
+from robolink.calibration import BeamStation, Course, CrossingPlan, ProbePlan, TouchStation
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import Controller, Pose
@@ -130,7 +130,8 @@ def _from_beams(source: BeamsSource, sigma_mm: float | None) -> TipSource:
         shaft_mm=source.shaft_mm,
         max_lean_deg=source.max_lean_deg,
     )
-    return CrossedBeams(station, plan, turn_deg=source.turn_deg, sigma_mm=sigma_mm)
+    course = Course(source.until_mm, retake=source.retake)
+    return CrossedBeams(station, plan, turn_deg=source.turn_deg, sigma_mm=sigma_mm, course=course)
 
 
 def _from_touch(source: TouchSource, place: Station, sigma_mm: float | None) -> TipSource:
@@ -142,7 +143,10 @@ def _from_touch(source: TouchSource, place: Station, sigma_mm: float | None) -> 
         lift_mm=source.lift_mm,
         speeds_mm_s=source.speeds_mm_s,
     )
-    return TouchProbe(station, plan, sigma_mm=sigma_mm, proof_turn_deg=source.proof_turn_deg)
+    course = Course(source.until_mm, retake=source.retake)
+    return TouchProbe(
+        station, plan, sigma_mm=sigma_mm, proof_turn_deg=source.proof_turn_deg, course=course
+    )
 
 
 def _from_points(

@@ -13,7 +13,7 @@ from robolink.recipe._pin_sources import OneTouchSource as OneTouchSource
 from robolink.recipe._pin_sources import OperatorSource as OperatorSource
 from robolink.recipe._pin_sources import PinSource as PinSource
 from robolink.recipe._pin_sources import PivotSource as PivotSource
-from robolink.recipe._tables import Angle, Method, Table
+from robolink.recipe._tables import Angle, Length, Method, Table
 
 InputNumber = Annotated[int, Field(ge=0, le=0xFFFF)]
 TouchSpeed = Annotated[float, Field(ge=0.1, le=10)]
@@ -86,6 +86,10 @@ class BeamsSource(Table):
     """How far above the beams the tip comes, goes and turns, mm."""
     crossing_mm_s: Annotated[float, Field(ge=0.5, le=20)] = 5.0
     """How fast the tip crosses a beam, mm/s."""
+    until_mm: Length | None = None
+    """The crossings end early when half the 95 % interval of X and of Y is at most this, mm."""
+    retake: bool = False
+    """Whether the crossing that fits worst is offered to be made again."""
 
     @property
     def agrees_always(self) -> bool:
@@ -123,6 +127,10 @@ class TouchSource(Table):
     proof_turn_deg: Annotated[float, Field(ge=0, le=360 - MIN_ROTATION_DEG)] = 180.0
     """By how much U differs at the touch that proves the new value, degrees; 0 on a machine that
     cannot turn, such as a gantry."""
+    until_mm: Length | None = None
+    """The touches end early when half the 95 % interval of Z is at most this, mm."""
+    retake: bool = False
+    """Whether the touch that fits worst is offered to be made again."""
 
     @property
     def agrees_always(self) -> bool:

@@ -123,6 +123,9 @@ def test_a_pin_seen_in_one_direction_only_still_shows_the_direction():
 def test_what_cannot_be_used_is_named():
     with refused("too_few_poses"):
         solve_crossed_beams([c for c in travels(TIP) if c.beam == 0], TRUE)
+    half_turned = [*travels(TIP), *(c for c in travels(TIP, angles=(180.0,)) if c.beam == 0)]
+    with refused("too_few_poses"):
+        solve_crossed_beams(half_turned, TRUE, beams_may_have_moved=True)
     with refused("parallel_beams"):
         solve_crossed_beams(travels(TIP), (TRUE[0], replace(TRUE[0], direction_deg=185.0)))
     along = Crossing(0, Pose(290, 80, 0, 0), Pose(310, 81.0, 0, 0))

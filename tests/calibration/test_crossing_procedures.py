@@ -1,5 +1,6 @@
 """The drives through beams and onto a plate, fed with an ideal tip: what moves, and where."""
 
+import random
 from dataclasses import replace
 
 import pytest
@@ -7,10 +8,13 @@ import pytest
 from robolink.calibration import (
     Beam,
     BeamStation,
+    Course,
     CrossingPlan,
     Move,
+    Offer,
     ProbePlan,
     Seek,
+    Tell,
     TouchStation,
     cross_beams,
     touch_off,
@@ -34,17 +38,33 @@ class IdealCell:
 
     Attributes:
         frame: Where the frame is.
-        steps: The steps taken.
+        steps: The steps taken that move or seek.
+        told: What a person was told.
+        offers: What a person was offered; so many are accepted.
     """
 
-    def __init__(self, tip, *, here=HERE, silent=()):
+    def __init__(self, tip, *, here=HERE, silent=(), slips=(), noise_mm=0.0, accepts=0):
         self.tip, self.frame, self.silent = tip, here, silent
-        self.steps = []
+        self.steps, self.told, self.offers = [], [], []
+        self._slips, self._accepts = set(slips), accepts
+        self._random, self._noise_mm, self._slip_mm = random.Random(1), noise_mm, 0.0
+
+    @property
+    def seeks(self):
+        return [step for step in self.steps if isinstance(step, Seek)]
 
     def run(self, procedure):
         try:
             step = next(procedure)
             while True:
+                if isinstance(step, Tell):
+                    self.told.append(step.text)
+                    step = procedure.send(None)
+                    continue
+                if isinstance(step, Offer):
+                    self.offers.append((step.question, len(self.steps)))
+                    step = procedure.send(len(self.offers) <= self._accepts)
+                    continue
                 self.steps.append(step)
                 try:
                     self.frame = self._take(step)
@@ -64,11 +84,16 @@ class IdealCell:
             self.frame = step.target
             raise CalibrationError("no_edge", "nothing", remedy="look")
         if step.edge.number == PLATE.input:
-            return replace(step.target, z_mm=PLATE.z_mm - self.tip.z_mm)
+            self._slip_mm = 0.3 if len(self.seeks) in self._slips else 0.0
+            off_mm = self._slip_mm + self._random.gauss(0, self._noise_mm)
+            return replace(step.target, z_mm=PLATE.z_mm - self.tip.z_mm + off_mm)
+        crossing = (len(self.seeks) + 1) // 2
+        self._slip_mm = 0.3 if crossing in self._slips else 0.0
         beam = STATION.beams[STATION.inputs.index(step.edge.number)]
         begin, end = self._across(beam, self.frame), self._across(beam, step.target)
         way = 1.0 if end > begin else -1.0
         edge = way * WIDTH_MM if step.edge.falling else -way * WIDTH_MM
+        edge += self._slip_mm + self._random.gauss(0, self._noise_mm)
         share = (edge - begin) / (end - begin)
         assert 0 <= share <= 1
         pairs = zip(self.frame.coordinates(), step.target.coordinates(), strict=True)
@@ -98,13 +123,126 @@ def test_nothing_turns_and_no_joint_moves_while_the_tip_is_among_the_beams():
     cell = IdealCell(TIP)
     cell.run(cross_beams(STATION, CrossingPlan(), here=HERE, stored=STORED, turn_deg=180.0))
     safe_mm = STATION.z_mm + CrossingPlan().lift_mm - STORED.z_mm
-    before = HERE
-    for step in cell.steps:
-        turns = step.target.u_deg != before.u_deg
-        if turns or getattr(step, "path", Path.STRAIGHT) is Path.JOINT:
-            assert min(step.target.z_mm, before.z_mm) >= safe_mm - 1e-9
-        before = step.target
+    require_safe_ways(cell.steps)
     assert cell.frame.z_mm == pytest.approx(safe_mm)
+
+
+def require_safe_ways(steps):
+    """Among the beams it goes straight and keeps U; it comes and goes straight up and down."""
+    safe_mm = STATION.z_mm + CrossingPlan().lift_mm - STORED.z_mm - 1e-9
+    before = HERE
+    for step in steps:
+        down, up = step.target.z_mm < safe_mm, before.z_mm < safe_mm
+        if down or up:
+            assert step.target.u_deg == before.u_deg
+            assert getattr(step, "path", Path.STRAIGHT) is Path.STRAIGHT
+        if down is not up:
+            assert step.target.coordinates()[:2] == before.coordinates()[:2]
+        before = step.target
+
+
+PLANS = [
+    (0.0, 3, 4, "Crossing 4, at beam 2, fits", 4),
+    (180.0, 2, 14, "Crossing 10, at beam 1 and U -60.0, fits", 3),
+]
+"""Second angle, repeats, the crossing in which the needle slips, how it is named, and its input.
+
+The four of the shaft, made before the tool turns, have no number."""
+
+
+def test_each_crossing_that_others_check_tells_how_it_fits_and_how_sure_the_tip_is():
+    cell = IdealCell(TIP, noise_mm=0.003)
+    cell.run(cross_beams(STATION, CrossingPlan(), here=HERE, stored=STORED))
+    assert [text.partition(" agree")[0] for text in cell.told] == [
+        f"{count} crossings" for count in (5, 6, 7, 8)
+    ]
+    assert all("the last within 0.00" in text for text in cell.told)
+    assert all("X and Y are known to +-0.0" in text for text in cell.told)
+    assert "One more, at beam 2, leaves" in cell.told[0]
+    assert "One more" not in cell.told[-1]
+    assert cell.offers == []
+
+
+def test_where_the_beams_are_is_not_relied_on_before_the_tool_has_turned():
+    cell = IdealCell(TIP, noise_mm=0.003)
+    cell.run(cross_beams(STATION, CrossingPlan(), here=HERE, stored=STORED, turn_deg=180.0))
+    assert [int(text.split()[0]) for text in cell.told] == [5, 6, 7, 8, *range(11, 17)]
+    assert ["are known to" in text for text in cell.told] == [False] * 4 + [True] * 6
+    assert "One more, at beam 2 and U -60.0" in cell.told[4]
+
+
+@pytest.mark.parametrize(("turn_deg", "repeats", "slip", "named", "number"), PLANS)
+def test_the_crossing_that_fits_worst_is_offered_and_it_alone_is_driven_again(
+    turn_deg, repeats, slip, named, number
+):
+    cell = IdealCell(TIP, slips=[slip], accepts=1, noise_mm=1e-4)
+    found = cell.run(
+        cross_beams(
+            STATION,
+            CrossingPlan(repeats=repeats),
+            here=HERE,
+            stored=STORED,
+            turn_deg=turn_deg,
+            course=Course(retake=True),
+        )
+    )
+    (question, when), *_ = cell.offers
+    assert question.startswith(named)
+    assert question.endswith("Take it again?")
+    require_safe_ways(cell.steps)
+    again = cell.steps[when:]
+    seeks = [step for step in again if isinstance(step, Seek)]
+    assert len(seeks) == 2
+    assert {step.edge.number for step in seeks} == {number}
+    first, last = again[0], again[-1]
+    assert first.target.z_mm == last.target.z_mm == cell.steps[when - 1].target.z_mm
+    assert last.path is Path.STRAIGHT
+    assert (found.offset.x_mm, found.offset.y_mm) == pytest.approx((TIP.x_mm, TIP.y_mm), abs=1e-3)
+    assert found.max_residual_mm < 1e-3
+    assert "the last within 0.000" in cell.told[-1]
+
+
+def test_of_two_crossings_that_only_check_each_other_the_second_offer_is_the_other():
+    cell = IdealCell(TIP, slips=[8], accepts=2)
+    found = cell.run(
+        cross_beams(STATION, CrossingPlan(), here=HERE, stored=STORED, course=Course(retake=True))
+    )
+    assert [question[:10] for question, _ in cell.offers[:2]] == ["Crossing 2", "Crossing 8"]
+    assert found.max_residual_mm < 1e-9
+
+
+def test_who_declines_keeps_the_crossings_with_their_doubt():
+    cell = IdealCell(TIP, slips=[4])
+    found = cell.run(
+        cross_beams(STATION, CrossingPlan(), here=HERE, stored=STORED, course=Course(retake=True))
+    )
+    assert len(cell.offers) == 1
+    assert "large_residual" in found.warnings
+
+
+@pytest.mark.parametrize(
+    ("sigma_mm", "turn_deg", "least"), [(None, 0.0, 8), (0.003, 0.0, 5), (None, 180.0, 43)]
+)
+def test_crossings_end_when_the_interval_is_narrow_enough(sigma_mm, turn_deg, least):
+    """With two angles not before the tool has turned; the shaft is measured in any case."""
+    cell = IdealCell(TIP, noise_mm=0.003)
+    plan = CrossingPlan(repeats=10)
+    found = cell.run(
+        cross_beams(
+            STATION,
+            plan,
+            here=HERE,
+            stored=STORED,
+            turn_deg=turn_deg,
+            sigma_mm=sigma_mm,
+            course=Course(until_mm=0.03),
+        )
+    )
+    assert len(found.inputs) == least
+    assert f"That is enough: {least} crossings were taken." in cell.told
+    assert len(cell.seeks) == 2 * (least + 4)
+    require_safe_ways(cell.steps)
+    assert max(found.half_width95) <= 0.03
 
 
 def test_a_silent_beam_lifts_the_tip_straight_up_before_the_refusal():
@@ -159,6 +297,38 @@ def test_each_touch_begins_above_the_last_one_and_the_tip_ends_lifted():
     after = [b for a, b in zip(cell.steps, cell.steps[1:], strict=False) if isinstance(a, Seek)]
     assert [step.target.z_mm for step in after] == pytest.approx([touch_mm + 0.8] * 4)
     assert cell.frame.z_mm == pytest.approx(PLATE.z_mm + plan.lift_mm - STORED.z_mm)
+
+
+def test_each_touch_tells_how_it_fits_and_the_worst_alone_is_made_again():
+    speeds = (2.0, 1.0, 2.0, 1.0, 2.0, 1.0)
+    cell = IdealCell(TIP, slips=[3], accepts=1)
+    plan = ProbePlan(speeds_mm_s=speeds)
+    found = cell.run(touch_off(PLATE, plan, here=HERE, stored=STORED, course=Course(retake=True)))
+    assert [text.partition(" agree")[0] for text in cell.told] == [
+        f"{count} touches" for count in (3, 4, 5, 6, 6)
+    ]
+    assert "; Z is known to +-" in cell.told[0]
+    assert "One more, at 1 mm/s, leaves 75 % of that." in cell.told[0]
+    (question, when), *_ = cell.offers
+    assert question.startswith("Touch 3, at 2 mm/s, fits worst: it is 0.2")
+    down, seek, back_off, lift = cell.steps[when:]
+    assert isinstance(seek, Seek)
+    assert seek.speed_mm_s == 2.0
+    assert down.target.z_mm < lift.target.z_mm
+    assert back_off.target.coordinates()[:2] == lift.target.coordinates()[:2]
+    assert found.offset.z_mm == pytest.approx(TIP.z_mm)
+
+
+@pytest.mark.parametrize(("sigma_mm", "least"), [(None, 6), (0.003, 3)])
+def test_touches_end_when_the_interval_is_narrow_enough(sigma_mm, least):
+    cell = IdealCell(TIP, noise_mm=0.003)
+    plan = ProbePlan(speeds_mm_s=(2.0, 1.0) * 6)
+    course = Course(until_mm=0.1)
+    procedure = touch_off(PLATE, plan, here=HERE, stored=STORED, sigma_mm=sigma_mm, course=course)
+    found = cell.run(procedure)
+    assert found.dof == least - 2
+    assert len(cell.seeks) == least
+    assert f"That is enough: {least} touches were taken." in cell.told
 
 
 @pytest.mark.parametrize(("u_deg", "turned_deg"), [(90.0, -90.0), (0.0, 180.0), (-170.0, 10.0)])

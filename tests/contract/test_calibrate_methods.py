@@ -121,10 +121,41 @@ def test_a_sensor_measures_at_its_station_and_nobody_is_asked(cell, method, stat
         assert found[f"{axis}_mm"] == pytest.approx(getattr(cell.truth, f"{axis}_mm"), abs=0.02)
     assert done.document["verification"]["passed"]
     assert "nobody touches anything" in done.err
+    what, known = ("crossings", "X and Y are") if method == "beams" else ("touches", "Z is")
+    assert f" {what} agree within 0.0" in done.err
+    assert f"; {known} known to +-0.0" in done.err
+    assert "One more, at " in done.err
     proof = "Touched again it is" if method == "z-touch" else "Turned about the new tip it drifts"
     assert proof in done.err
     assert ("is to be checked every 90 days" in done.err) is (station == "BEAMS-02")
     assert cell.recorded(EntryKind.DONE)[0].signature.station == station
+
+
+@pytest.mark.parametrize(
+    ("kind", "words", "which"),
+    [
+        ("epson", ("beams", "--station", "BEAMS-02", "--repeats", "3"), "Crossing"),
+        ("plc", ("z-touch", "--station", "PLATE", "--speeds", "2,1,2,1,2,1,2"), "Touch"),
+    ],
+)
+def test_a_sensor_stops_inside_the_tolerance_and_its_worst_is_offered_for_retaking(
+    tmp_path, monkeypatch, kind, words, which
+):
+    """The simulated person accepts each offer; the answers are on record."""
+    monkeypatch.setattr("robolink_cli.calibrate._live.agree_to_motion", lambda *_, **__: None)
+    with method_cell(kind, tmp_path, monkeypatch) as cell:
+        cell.mount()
+        course = ("--until", "0.05", "--no-verify", "--tool", "1", "--speed", "100")
+        done = cell.run("calibrate", *words, *course, "--assist", cell.cell.url, "--json")
+        assert done.code == 0, done.err
+        assert "That is enough" in done.err
+        assert max(done.document["fit"]["half_width95"].values()) <= 0.05
+        said = [entry.details.get("question", "") for entry in cell.recorded(EntryKind.DECISION)]
+        *_, first = offered = [str(question) for question in said if question]
+        assert len(offered) == 3
+        assert first.startswith(which)
+        assert first.endswith("Take it again?")
+        assert within(done.document, cell.truth, axes="xy" if which == "Crossing" else "z")
 
 
 @pytest.mark.parametrize("method", ["pivot", "six-point"])
@@ -149,6 +180,8 @@ def test_four_axes_cannot_tilt_and_say_so_before_anything_moves(cell, method):
         (("beams", "--station", "BEAMS-02"), 7, "no_edge"),
         (("z-touch", "--station", "PLATE"), 7, "no_edge"),
         (("z-touch", "--station", "PLATE", "--speeds", "2"), 2, "no speeds for touches"),
+        (("beams", "--station", "BEAMS-02", "--until", "0.01"), 2, "has nothing to leave out"),
+        (("z-touch", "--station", "PLATE", "--until", "0.01"), 2, "too few touches for --until"),
         (("n-angle", "--angles", "0,90"), 2, "not angles for this method"),
         (("n-angle", "--angles", "0,10,370"), 2, "not angles for this method"),
         (("n-angle", "--angles", "0,10,20", "--no-verify"), 7, "insufficient_rotation"),

@@ -129,10 +129,18 @@ def test_a_bumped_pin_shifts_all_tools_and_nothing_is_written(arm, tmp_path):
     assert [tool["warnings"] for tool in done.document["tools"]] == [[], []]
 
 
-def test_a_recipe_may_name_beams_and_a_surface_by_their_stations(arm, tmp_path):
+EARLY_BEAMS = 'kind = "beams"\nrepeats = 3\nuntil_mm = 0.05\nretake = true'
+EARLY_TOUCH = """kind = "touch"
+input = 5
+speeds_mm_s = [2, 1, 2, 1, 2, 1, 2, 1]
+until_mm = 0.1
+retake = true"""
+
+
+def test_a_recipe_names_beams_and_a_surface_by_their_stations_and_may_end_early(arm, tmp_path):
     arm.mount()
-    beams = AT_STATION.format(source='kind = "beams"', station="BEAMS-02", z="kept")
-    surface = AT_STATION.format(source='kind = "touch"\ninput = 5', station="PLATE", z="measured")
+    beams = AT_STATION.format(source=EARLY_BEAMS, station="BEAMS-02", z="kept")
+    surface = AT_STATION.format(source=EARLY_TOUCH, station="PLATE", z="measured")
     for text, axes in ((beams, "xy"), (surface, "z")):
         done = recalibrate(arm, written(tmp_path / "recipe.toml", text))
         assert done.code == 0, done.err
@@ -140,6 +148,10 @@ def test_a_recipe_may_name_beams_and_a_surface_by_their_stations(arm, tmp_path):
         for axis in axes:
             true = getattr(arm.truth, f"{axis}_mm")
             assert tool["proposed"][f"{axis}_mm"] == pytest.approx(true, abs=0.02)
+        assert "That is enough" in done.err
+    # With --yes nobody is asked about the worst, and what nobody was asked nobody declined.
+    said = [entry.verdict for entry in arm.recorded(EntryKind.DECISION)]
+    assert said == ["accepted beforehand"] * 2
 
 
 @pytest.mark.parametrize(

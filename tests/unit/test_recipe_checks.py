@@ -141,6 +141,16 @@ def test_the_angles_are_those_of_the_method(text, where, what):
             "tolerances.sigma_mm",
             "is missing: the measurement leaves no residual",
         ),
+        (
+            with_(BEAMS, "[source]", "repeats = 1", "retake = true"),
+            "source.retake",
+            "means nothing: nothing is repeated",
+        ),
+        (
+            with_(BEAMS, "[source]", "until_mm = 0.01"),
+            "source.until_mm",
+            "has nothing to leave out; use repeats = 3",
+        ),
         (BEAMS + "points = [1, 2]\n", "source.beams#2.points", "is not known"),
         (BEAMS.replace("input = 4", "input = -4"), "source.beams#2.input", "must be at least 0"),
     ],
@@ -156,6 +166,13 @@ def test_a_second_angle_leaves_residuals_too():
     assert problems(with_(turned, "[tolerances]", "rms_mm = 0.1", "interval_mm = 0.1")) == {}
 
 
+def test_crossings_that_check_each_other_may_end_early_and_be_made_again():
+    course = ("until_mm = 0.01", "retake = true")
+    assert problems(with_(BEAMS, "[source]", "repeats = 3", *course)) == {}
+    stated = with_(BEAMS, "[tolerances]", "sigma_mm = 0.01")
+    assert problems(with_(stated, "[source]", *course)) == {}
+
+
 @pytest.mark.parametrize(
     ("text", "where", "what"),
     [
@@ -169,6 +186,11 @@ def test_a_second_angle_leaves_residuals_too():
         (TOUCH.replace("x_mm = 300\ny_mm = 80\n", ""), "station.x_mm", "is missing: with kind"),
         (TOUCH.replace("x_mm = 300\n", ""), "station.x_mm", "is missing: give x_mm and y_mm"),
         (with_(TOUCH, "[source]", "speeds_mm_s = [2, 2]"), "source.speeds_mm_s", "must differ"),
+        (
+            with_(TOUCH, "[source]", "until_mm = 0.01"),
+            "source.until_mm",
+            "has nothing to leave out; give 7 speeds_mm_s",
+        ),
         (with_(TOUCH, "[source]", "lift_mm = 2"), "source.clearance_mm", "must be smaller"),
         (
             with_(with_(TOUCH, "[source]", "speeds_mm_s = [2, 1]"), "[tolerances]", "rms_mm = 1"),

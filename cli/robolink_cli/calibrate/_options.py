@@ -78,7 +78,7 @@ def until_option(function: Callable[..., Any]) -> Callable[..., Any]:
         "until_mm",
         type=_LENGTH,
         metavar="MM",
-        help=tr("End before the last touch when half the 95 % interval is at most this."),
+        help=tr("End early when half the 95 % interval of each length is at most this."),
     )(function)
     return command
 

@@ -8,7 +8,7 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_cli._motion_options import motion_option
 from robolink_cli.calibrate._frame import Frame
-from robolink_cli.calibrate._options import calibration_options, sigma_option
+from robolink_cli.calibrate._options import calibration_options, sigma_option, until_option
 
 if TYPE_CHECKING:
     from robolink.model import Controller
@@ -72,6 +72,7 @@ if TYPE_CHECKING:
     show_default=True,
     help=tr("How far above the beams the tip comes, goes and turns."),
 )
+@until_option
 @sigma_option
 @calibration_options
 def beams(
@@ -85,14 +86,18 @@ def beams(
     shaft_mm: float,
     crossing_mm_s: float,
     lift_mm: float,
+    until_mm: float | None,
     sigma_mm: float | None,
 ) -> None:
     """Drive the tip through two crossed light beams: X and Y; nobody touches anything.
 
+    As soon as the crossings check each other it says after each how well they agree and how sure
+    the tip is. At the end the one that fits worst is named and may be made again.
+
     The station is declared in the cell file, or was learnt with 'station learn'. Afterwards the tip
     turns half a turn about itself and crosses the beams again.
     """
-    from robolink.calibration import CrossingPlan
+    from robolink.calibration import Course, CrossingPlan
 
     plan = CrossingPlan(
         search_mm=search_mm,
@@ -107,7 +112,13 @@ def beams(
             tr("--search must be below {aside:g} mm.", aside=plan.aside_mm),
             remedy=tr("The tip would break both beams at once."),
         )
-    frame = frame.at(station)
+    sigma_stated = sigma_mm is not None
+    if until_mm and not plan.may_end_early(turned=bool(turn_deg), sigma_stated=sigma_stated):
+        raise ConfigError(
+            tr("With {count} repeats --until has nothing to leave out.", count=repeats),
+            remedy=tr("Give --repeats 3 or more; with --sigma or --turn, 2 or more."),
+        )
+    frame, course = frame.at(station), Course(until_mm, retake=True)
 
     def source(controller: "Controller") -> "TipSource":
         from robolink.nozzle_change import CrossedBeams
@@ -115,6 +126,6 @@ def beams(
         from robolink_cli.calibrate._pins import station_at
 
         place = beam_station(station_at(frame, controller, StationKind.BEAMS))
-        return CrossedBeams(place, plan, turn_deg=turn_deg, sigma_mm=sigma_mm)
+        return CrossedBeams(place, plan, turn_deg=turn_deg, sigma_mm=sigma_mm, course=course)
 
     frame.measure(source)

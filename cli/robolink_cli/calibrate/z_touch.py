@@ -8,7 +8,7 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_cli._motion_options import motion_option
 from robolink_cli.calibrate._frame import Frame
-from robolink_cli.calibrate._options import calibration_options, sigma_option
+from robolink_cli.calibrate._options import calibration_options, sigma_option, until_option
 
 if TYPE_CHECKING:
     from robolink.model import Controller
@@ -49,6 +49,7 @@ if TYPE_CHECKING:
     metavar="DEG",
     help=tr("By how much U differs in the proof; 0 on a machine that cannot turn."),
 )
+@until_option
 @sigma_option
 @calibration_options
 def z_touch(
@@ -60,13 +61,16 @@ def z_touch(
     beyond_mm: float,
     lift_mm: float,
     proof_turn_deg: float,
+    until_mm: float | None,
     sigma_mm: float | None,
 ) -> None:
     """Touch a surface that switches an input: Z; nobody touches anything.
 
     X and Y are kept. The tip stops at the touch and retreats; two speeds tell the latency.
+    After each touch from the third on it says how well they agree and how sure Z is; at the end the
+    one that fits worst is named and may be made again.
     """
-    from robolink.calibration import ProbePlan
+    from robolink.calibration import Course, ProbePlan
 
     if clearance_mm >= lift_mm:
         raise ConfigError(
@@ -79,7 +83,12 @@ def z_touch(
         lift_mm=lift_mm,
         speeds_mm_s=_speeds(speeds),
     )
-    frame = frame.at(station)
+    if until_mm and not plan.may_end_early(sigma_stated=sigma_mm is not None):
+        raise ConfigError(
+            tr("{speeds!r} are too few touches for --until to leave any out.", speeds=speeds),
+            remedy=tr("Give 7 or more --speeds; with --sigma, 4 or more."),
+        )
+    frame, course = frame.at(station), Course(until_mm, retake=True)
 
     def source(controller: "Controller") -> "TipSource":
         from robolink.nozzle_change import TouchProbe
@@ -87,7 +96,9 @@ def z_touch(
         from robolink_cli.calibrate._pins import station_at
 
         place = touch_station(station_at(frame, controller, StationKind.TOUCH))
-        return TouchProbe(place, plan, sigma_mm=sigma_mm, proof_turn_deg=proof_turn_deg)
+        return TouchProbe(
+            place, plan, sigma_mm=sigma_mm, proof_turn_deg=proof_turn_deg, course=course
+        )
 
     frame.measure(source)
 

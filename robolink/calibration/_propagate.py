@@ -10,19 +10,24 @@ _STEP_MM = 1e-4
 
 
 def unit_covariance(calculate: Callable[[Floats], Floats], measured_mm: Floats) -> Floats:
-    """Return the covariance of ``calculate(measured_mm)`` for sigma = 1 mm in each input.
+    """Return the covariance of ``calculate(measured_mm)`` for sigma = 1 mm in each input."""
+    derivative = sensitivity(calculate, measured_mm)
+    covariance: Floats = derivative.T @ derivative
+    return covariance
+
+
+def sensitivity(calculate: Callable[[Floats], Floats], measured_mm: Floats) -> Floats:
+    """Return by how much ``calculate(measured_mm)`` changes per mm, a row for each input.
 
     The derivative is taken by central differences; the calculations are smooth, and a step of
     0.1 um leaves eight digits.
     """
     flat = measured_mm.ravel()
-    columns = []
+    rows = []
     for index in range(flat.size):
         step = np.zeros_like(flat)
         step[index] = _STEP_MM
         ahead = calculate((flat + step).reshape(measured_mm.shape))
         behind = calculate((flat - step).reshape(measured_mm.shape))
-        columns.append((ahead - behind) / (2 * _STEP_MM))
-    jacobian = np.array(columns)
-    covariance: Floats = jacobian.T @ jacobian
-    return covariance
+        rows.append((ahead - behind) / (2 * _STEP_MM))
+    return np.array(rows)

@@ -17,7 +17,7 @@ from robolink.calibration._checks import check_poses, keep_unmeasured
 from robolink.calibration._judging import judged
 from robolink.calibration._pivot import solve_pivot
 from robolink.calibration._pivot_fit import UNKNOWNS, fit_pivot, pivot_design
-from robolink.calibration._propagate import unit_covariance
+from robolink.calibration._propagate import sensitivity
 from robolink.calibration._result import CalibrationResult
 from robolink.calibration._robust import Floats
 from robolink.calibration._rotations import pose_arrays, rotation_of, uvw_deg
@@ -187,10 +187,17 @@ def _frame(x_axis: Floats, second: Floats, *, square: bool) -> Floats:
     if square:
         z = z - (z @ x) * x
         z = z / np.linalg.norm(z)
-    y = np.cross(z, x)
+    y = _cross(z, x)
     u, _, v = np.linalg.svd(np.column_stack((x, y / np.linalg.norm(y), z)))
     frame: Floats = u @ v
     return frame
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    """Return the cross product; numpy's own takes ten times as long for one pair."""
+    ax, ay, az = a.tolist()
+    bx, by, bz = b.tolist()
+    return np.array((ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx))
 
 
 def _doubted(result: SixPointResult, ways: tuple[Floats, Floats]) -> SixPointResult:
@@ -230,11 +237,18 @@ def _unit_covariance(
     start_turn = turned[_START].T
     around = np.array(uvw_deg(frame))
 
-    def calculate(p: Floats) -> Floats:
-        tip = fit_pivot(p[:touches], turned[:touches], condition_number=condition).tip
-        ways = (start_turn @ (p[-2] - p[_START]), start_turn @ (p[-1] - p[_START]))
-        angles = np.array(uvw_deg(_frame(*ways, square=square)))
-        # Away from the jump at 180 degrees.
-        return np.concatenate((tip, (angles - around + 180.0) % 360.0 - 180.0))
+    def tip(p: Floats) -> Floats:
+        return fit_pivot(p, turned[:touches], condition_number=condition).tip
 
-    return unit_covariance(calculate, positions)
+    def angles(p: Floats) -> Floats:
+        start, along_x, second = p
+        ways = (start_turn @ (along_x - start), start_turn @ (second - start))
+        # Away from the jump at 180 degrees.
+        turns: Floats = (np.array(uvw_deg(_frame(*ways, square=square))) - around + 180.0) % 360.0
+        return turns - 180.0
+
+    derivative = np.zeros((positions.size, len(_MEASURED)))
+    derivative[: 3 * touches, :3] = sensitivity(tip, positions[:touches])
+    derivative[3 * _START :, 3:] = sensitivity(angles, positions[_START:])
+    unit: Floats = derivative.T @ derivative
+    return unit

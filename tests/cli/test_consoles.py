@@ -21,7 +21,6 @@ COMMANDS = {
     ("--help",): 0,
     ("calibrate", "two-pose", "--help"): 0,
     ("demo", "--speed", "100"): 0,
-    ("demo", "--speed", "100", "--json"): 0,
     ("-c", "三号线", "status"): 0,
     ("-c", "三号线", "status", "--json"): 0,
     ("-c", "三号线", "where"): 0,

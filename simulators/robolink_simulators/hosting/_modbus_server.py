@@ -126,7 +126,8 @@ class ModbusServerThread:
 
     def _device(self) -> SimDevice:
         words = [SimData(0, count=REGISTERS, values=0, datatype=DataType.REGISTERS)]
-        bits = [SimData(0, values=[False] * REGISTERS * _WORD_BITS, datatype=DataType.BITS)]
+        # By the word: each value is looked at several times, and there are 65,536 bits.
+        bits = [SimData(0, values=[0] * REGISTERS, datatype=DataType.BITS)]
         banks = (bits, bits, words, words)
         return SimDevice(id=_ALL_UNITS, simdata=banks, action=self._act)
 

@@ -52,8 +52,7 @@ class CameraToFind:
     def remedy(self) -> str:
         """What to do when a measurement makes the tip jump."""
         return tr(
-            "Look at the pictures: is it the tip that was found in all of them, and is it clean? "
-            "If the change is real, allow it with --max-change."
+            "Look at the pictures: is it the tip that was found in all of them, and is it clean?"
         )
 
     def found(self, result: CalibrationResult, tool: int) -> Found | None:

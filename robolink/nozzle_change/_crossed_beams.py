@@ -48,7 +48,7 @@ class CrossedBeams:
         """What to do when a measurement makes the tip jump."""
         return tr(
             "Look whether the beams were moved since the reference record, and whether the "
-            "needle sits straight. If the change is real, allow it with --max-change."
+            "needle sits straight."
         )
 
     def measure(self, bench: Bench, tool: int, stored: ToolOffset | None) -> CalibrationResult:  # noqa: ARG002 - the flange is what moves

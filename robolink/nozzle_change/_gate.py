@@ -21,6 +21,7 @@ class Gate:
         interval_mm: Largest half width of a component's 95 % interval.
         drift_tolerance_mm: Largest drift that passes the verification.
         accepted_change_mm: A larger change that an engineer accepts this time.
+        accepted_with: The option that sets it, for whoever is refused; empty where there is none.
     """
 
     max_change_mm: float = 2.0
@@ -29,6 +30,7 @@ class Gate:
     interval_mm: float | None = None
     drift_tolerance_mm: float = 0.2
     accepted_change_mm: float | None = None
+    accepted_with: str = ""
 
     @property
     def limit_mm(self) -> float:
@@ -82,7 +84,7 @@ class Gate:
                     change=change,
                     limit=self.limit_mm,
                 ),
-                remedy=remedy,
+                remedy=" ".join(filter(None, (remedy, self._way_past))),
             )
 
     def verdicts(self, proposal: Proposal) -> tuple[Verdict, ...]:
@@ -97,6 +99,12 @@ class Gate:
         """Tell whether the change is larger than a nozzle change explains."""
         change = proposal.change_mm
         return change is not None and change > self.max_change_mm
+
+    @property
+    def _way_past(self) -> str:
+        if not self.accepted_with:
+            return ""
+        return tr("If the change is real, allow it with {option}.", option=self.accepted_with)
 
     @property
     def tolerance(self) -> str:

@@ -137,7 +137,7 @@ class GivenPoses:
             )
         return tr(
             "Check that all poses touched the same point and with which tool they were taught "
-            "(--taught-tool). If the change is real, allow it with --max-change."
+            "(--taught-tool)."
         )
 
 

@@ -48,10 +48,7 @@ class HeldBoard(KnownCamera):
     @property
     def remedy(self) -> str:
         """What to do when a measurement makes the board jump."""
-        return tr(
-            "Look whether the board is held as drawn, and which marks the camera found. If the "
-            "change is real, allow it with --max-change."
-        )
+        return tr("Look whether the board is held as drawn, and which marks the camera found.")
 
     def procedure(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:
         """Return the steps of a measurement; see :class:`~robolink.nozzle_change.MovingSource`."""

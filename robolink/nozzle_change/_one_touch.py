@@ -42,8 +42,8 @@ class OneTouch:
     def remedy(self) -> str:
         """What to do when a measurement makes the tip jump."""
         return tr(
-            "Look whether the pin was bumped and whether the nozzle sits firmly. If the change is "
-            "real, make a full calibration."
+            "Look whether the pin was bumped and whether the nozzle sits firmly. A full "
+            "calibration tells."
         )
 
     def measure(self, bench: Bench, tool: int, stored: ToolOffset | None) -> CalibrationResult:  # noqa: ARG002 - the flange is what moves

@@ -144,9 +144,16 @@ def _measurement(source: MovingSource, stored: ToolOffset | None, here: Pose) ->
 def _follow(
     procedure: Procedure[object], here: Pose, settings: RunSettings
 ) -> Generator[PlannedStep, None, Pose]:
-    """Yield the steps of a procedure, and return where they lead."""
+    """Yield the steps of a procedure, and return where they lead.
+
+    Raises:
+        CalibrationError: It refuses before its first step.
+    """
     try:
         step = next(procedure)
+    except StopIteration:
+        return here
+    try:
         while True:
             if isinstance(step, (Tell, Offer)):
                 # What it would say depends on poses that nobody took.

@@ -43,10 +43,7 @@ class TouchProbe:
     @property
     def remedy(self) -> str:
         """What to do when a measurement makes the tip jump."""
-        return tr(
-            "Clean the tip and the surface, and look whether the nozzle sits firmly. If the "
-            "change is real, allow it with --max-change."
-        )
+        return tr("Clean the tip and the surface, and look whether the nozzle sits firmly.")
 
     def measure(self, bench: Bench, tool: int, stored: ToolOffset | None) -> CalibrationResult:  # noqa: ARG002 - the flange is what moves
         """Touch and solve; see :class:`~robolink.nozzle_change.MovingSource`."""

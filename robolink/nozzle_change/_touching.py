@@ -50,10 +50,7 @@ class PinAndPerson:
     @property
     def remedy(self) -> str:
         """What to do when a measurement makes the tip jump."""
-        return tr(
-            "Check that all poses touched the same point. If the change is real, allow it with "
-            "--max-change."
-        )
+        return tr("Check that all poses touched the same point.")
 
     def measure(self, bench: Bench, tool: int, stored: ToolOffset | None) -> CalibrationResult:  # noqa: ARG002 - the flange is what moves
         """Touch and solve; see :class:`~robolink.nozzle_change.MovingSource`."""

@@ -44,7 +44,7 @@ class UpCamera(KnownCamera):
         """What to do when a measurement makes the tip jump."""
         return tr(
             "Look at the picture: is it the tip that was found, and is it clean? Was the camera "
-            "moved? If the change is real, allow it with --max-change."
+            "moved?"
         )
 
     def procedure(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:

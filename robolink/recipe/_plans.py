@@ -59,6 +59,7 @@ def plan_of(
         interval_mm=tolerances.interval_mm,
         drift_tolerance_mm=tolerances.drift_mm,
         accepted_change_mm=accepted_change_mm,
+        accepted_with="--accept-jump",
     )
     box, speeds, safe = recipe.box, recipe.speeds, recipe.poses.safe
     return ChangePlan(

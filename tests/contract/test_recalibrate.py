@@ -318,7 +318,9 @@ def test_a_jump_takes_an_engineer(cell, recipe, tmp_path, monkeypatch):
     def run(*words):
         return assisted(cell, path, "-c", "a", *words)
 
-    assert run("--operator", "anna").code == 7
+    refused = run("--operator", "anna")
+    assert refused.code == 7
+    assert "If the change is real, allow it with --accept-jump." in refused.err
     assert run("--operator", "4711", "--accept-jump", "5").code == 9
     assert run("--accept-jump", "5").code == 9
     assert run("--operator", "eve").code == 2

@@ -136,6 +136,7 @@ def frame_from(
     gate = Gate(
         max_change_mm=min(max_change_mm, jump_limit_mm(context.cell)),
         accepted_change_mm=max_change_mm,
+        accepted_with="--max-change",
         rms_mm=rms_mm,
         max_residual_mm=residual_mm,
         interval_mm=interval_mm,

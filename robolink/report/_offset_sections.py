@@ -106,12 +106,18 @@ def _interval(fit: CalibrationResult) -> Element:
 def _poses(poses: Sequence[Pose], fit: CalibrationResult | None, *, heights: bool) -> Element:
     names = ["x_mm", "y_mm", *(["z_mm"] if heights else []), "u_deg"]
     names += [name for name in ("v_deg", "w_deg") if any(getattr(pose, name) for pose in poses)]
-    columns = ["", *(_AXES[_NAMES.index(name)] for name in names), tr("hand")]
+    handed = any(pose.hand for pose in poses)
+    columns = [
+        "",
+        *(_AXES[_NAMES.index(name)] for name in names),
+        *([tr("hand")] if handed else []),
+    ]
     residuals = fit.residuals_mm if fit else ()
     rows = []
     for number, pose in enumerate(poses):
         cells = [element("td", figure(getattr(pose, name))) for name in names]
-        cells.append(element("td", str(pose.hand) if pose.hand else "-"))
+        if handed:
+            cells.append(element("td", str(pose.hand) if pose.hand else "-"))
         if residuals:
             cells += _residual(residuals[number] if number < len(residuals) else ())
         left_out = fit is not None and number in fit.rejected
@@ -121,7 +127,7 @@ def _poses(poses: Sequence[Pose], fit: CalibrationResult | None, *, heights: boo
     if residuals:
         axes = ("Z", "X, Y", "X, Y, Z")[max(map(len, residuals)) - 1]
         columns += [tr("residual {axes} mm", axes=axes), tr("length mm")]
-    return table(tuple(columns), rows)
+    return table(tuple(columns), rows, class_="dense")
 
 
 def _named(number: int, count: int, fit: CalibrationResult | None, *, left_out: bool) -> str:

@@ -138,7 +138,7 @@ def test_the_page_says_who_when_with_what_and_what_came_of_it(run, recorded, sim
         "change 0.300 -0.200 0.000",
         "calibration change up to 2 mm measured: X 12.300; rms 0.050 mm",
         "1 153.217 501.272 -83.500 0.000 right 0.030 0.040 0.050",
-        "1 1.250 2.000 3.000 4.000 -",
+        "1 1.250 2.000 3.000 4.000",
         "The poses lie too close.",
         "A person typed Z.",
         "half a turn would be best",

@@ -1,0 +1,58 @@
+"""The shipped recipes as a whole: how long the robot takes, and how sure the result is.
+
+Those with a camera or a probe and those for another robot stand with their sensors, in the other
+tests of ``recalibrate``.
+"""
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+from robolink_cli import main
+from robolink_simulators.sensing import LightBeam
+
+from robolink.model import ToolOffset
+from tests.contract._sensor_cell import sensor_cell
+
+pytestmark = pytest.mark.simulator_only
+
+EXAMPLES = Path(__file__).parents[2] / "examples" / "recipes"
+BEAMS_MM = (175.0, 488.0, -106.0)
+MOST_S = {"needle-beams": 20.0}
+
+
+@pytest.fixture
+def cell(tmp_path, monkeypatch):
+    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path))
+    with sensor_cell(seed=3) as cell:
+        cell.simulator.machine.motors_on = True
+        cell.simulator.machine.tools.set(2, ToolOffset(12.4, -3.7, -20.0))
+        cell.simulator.world.change_nozzle(2)
+        for number, heading_deg in ((3, 2.0), (4, 91.0)):
+            beam = LightBeam(BEAMS_MM, heading_deg, radius_mm=0.1)
+            cell.simulator.world.connect(number, beam, latency_s=0.002, noise_mm=0.003)
+        yield cell
+
+
+@pytest.mark.parametrize("example", ["scara-pin", "two-nozzles", "needle-beams"])
+def test_the_error_to_the_truth_is_inside_the_stated_interval(cell, example, capsys):
+    words = ("recalibrate", str(EXAMPLES / f"{example}.toml"), "--assist", cell.url)
+    began_ns = cell.clock.now_ns()
+    code = main.run(["-c", cell.url, *words, "--nozzle", "N-7", "--lot", "L", "--yes", "--json"])
+    took_s = (cell.clock.now_ns() - began_ns) / 1e9
+    shown = capsys.readouterr()
+    assert code == 0, shown.err
+    with capsys.disabled():
+        sys.stdout.write(f"\n{example} recipe, with proof: {took_s:.1f} s of robot time\n")
+    assert took_s < MOST_S.get(example, took_s + 1)
+    for tool in json.loads(shown.out)["tools"]:
+        number, halves = tool["tool"], tool["fit"]["half_width95"]
+        found = cell.simulator.machine.tools.get(number)
+        true = cell.simulator.world.tips[number]
+        assert set(halves) == {"x_mm", "y_mm"}
+        for name, half in halves.items():
+            # The controller keeps three decimals.
+            assert abs(getattr(found, name) - getattr(true, name)) <= half + 0.0005
+            assert half <= 0.05
+        assert tool["verification"]["passed"]

@@ -9,13 +9,6 @@ from robolink.calibration._robust import Floats
 _STEP_MM = 1e-4
 
 
-def unit_covariance(calculate: Callable[[Floats], Floats], measured_mm: Floats) -> Floats:
-    """Return the covariance of ``calculate(measured_mm)`` for sigma = 1 mm in each input."""
-    derivative = sensitivity(calculate, measured_mm)
-    covariance: Floats = derivative.T @ derivative
-    return covariance
-
-
 def sensitivity(calculate: Callable[[Floats], Floats], measured_mm: Floats) -> Floats:
     """Return by how much ``calculate(measured_mm)`` changes per mm, a row for each input.
 

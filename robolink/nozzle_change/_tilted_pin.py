@@ -6,16 +6,17 @@ from typing import TYPE_CHECKING
 from robolink.calibration import CalibrationResult, Course, Procedure, TouchPlan, VerifyResult
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink.model import Pose, ToolOffset
+from robolink.model import ToolOffset
 from robolink.nozzle_change._flange import tilted_from
 from robolink.nozzle_change._source import Bench
+from robolink.nozzle_change._touched_pin import TouchedPin
 
 if TYPE_CHECKING:
     from robolink.calibration import Tilt, WayPlan
 
 
 @dataclass(frozen=True, slots=True)
-class TiltedPin:
+class TiltedPin(TouchedPin):
     """Measures by touching one pin with the tool tilted and turned, and by ways along its axes.
 
     Attributes:
@@ -49,23 +50,6 @@ class TiltedPin:
             length=self.ways.length_mm,
         )
         return f"{touched}; {shown}"
-
-    @property
-    def remedy(self) -> str:
-        """What to do when a measurement makes the tip jump."""
-        return tr("Check that all poses touched the same point.")
-
-    def measure(self, bench: Bench, tool: int, stored: ToolOffset | None) -> CalibrationResult:  # noqa: ARG002 - the flange is what moves
-        """Touch and solve; see :class:`~robolink.nozzle_change.MovingSource`."""
-        bench.controller.tools.select(0)
-        return bench.run(self._steps(stored, self.course))
-
-    def procedure(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:  # noqa: ARG002 - the person brings the tip to the pin
-        """Return the steps of a measurement; see :class:`~robolink.nozzle_change.MovingSource`.
-
-        All of them: when it ends early depends on touches that nobody has made yet.
-        """
-        return self._steps(stored, Course())
 
     def verify(
         self,

@@ -16,12 +16,13 @@ from robolink.calibration import (
     verify_by_turning,
 )
 from robolink.messages import tr
-from robolink.model import Pose, ToolOffset
+from robolink.model import ToolOffset
 from robolink.nozzle_change._source import Bench
+from robolink.nozzle_change._touched_pin import TouchedPin
 
 
 @dataclass(frozen=True, slots=True)
-class PinAndPerson:
+class PinAndPerson(TouchedPin):
     """Measures by touching one pin at several angles of U.
 
     Attributes:
@@ -46,23 +47,6 @@ class PinAndPerson:
             "measured on the robot: one pin touched at {count} angles of U",
             count=len(self.turns_deg) + 1,
         )
-
-    @property
-    def remedy(self) -> str:
-        """What to do when a measurement makes the tip jump."""
-        return tr("Check that all poses touched the same point.")
-
-    def measure(self, bench: Bench, tool: int, stored: ToolOffset | None) -> CalibrationResult:  # noqa: ARG002 - the flange is what moves
-        """Touch and solve; see :class:`~robolink.nozzle_change.MovingSource`."""
-        bench.controller.tools.select(0)
-        return bench.run(self._steps(stored, self.course))
-
-    def procedure(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:  # noqa: ARG002 - the person brings the tip to the pin
-        """Return the steps of a measurement; see :class:`~robolink.nozzle_change.MovingSource`.
-
-        All of them: when it ends early depends on touches that nobody has made yet.
-        """
-        return self._steps(stored, Course())
 
     def _steps(self, stored: ToolOffset | None, course: Course) -> Procedure[CalibrationResult]:
         if not self.turns_deg:

@@ -25,6 +25,7 @@
     │       ├── LeaseHeldError             another program or person is changing the controller
     │       └── LeaseLostError             another did so meanwhile
     ├── OutcomeUnknownError                sent, not answered: the machine may or may not have acted
+    ├── StoppedError                       a stop ended it, from another thread or terminal
     ├── ToolError
     │   ├── ToolIndexError · ReservedToolError · UndefinedToolError
     │   ├── ToolChangedError               not the value that was expected; nothing was written
@@ -219,6 +220,14 @@ class OutcomeUnknownError(RobolinkError):
     """A command went out and no answer came: it may or may not have run.
 
     Motion on that controller is blocked until ``resolve``; nothing is sent again.
+    """
+
+
+class StoppedError(RobolinkError):
+    """A stop came: from another thread, another terminal or a person.
+
+    What was under way was ended by it, and nothing that moves or writes leaves this process
+    until the stop is released.
     """
 
 

@@ -13,6 +13,7 @@ code  meaning
 7     the measurements do not support a result
 8     verification failed; the old value was put back
 9     a person declined
+10    a stop ended it
 70    a defect in robolink
 130   interrupted
 141   whoever read the output has left
@@ -42,6 +43,7 @@ EXIT_CODES: Final[tuple[tuple[type[errors.RobolinkError], int], ...]] = (
     (errors.VerifyError, 8),
     (errors.CalibrationError, 7),
     (errors.OutcomeUnknownError, 6),
+    (errors.StoppedError, 10),
     (errors.ToolIndexError, USAGE),
     (errors.ReservedToolError, USAGE),
     (errors.ToolError, 5),

@@ -57,6 +57,7 @@ CODES = {
     "LeaseLostError": 5,
     "MotionTimeoutError": 5,
     "OutcomeUnknownError": 6,
+    "StoppedError": 10,
     "ToolError": 5,
     "ToolIndexError": 2,
     "ReservedToolError": 2,

@@ -136,7 +136,8 @@ class ToolWriter:
             marker = self._desk.begin(MarkerKind.SET, request, details)
             with self._desk.doubt(request):
                 try:
-                    send()
+                    with self._desk.unless_stopped(marker):
+                        send()
                 except RejectedError as error:
                     if self._not_executed(error):
                         self._desk.clear(marker, _refusal(marker, error))

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Final, TypeVar
 
 from robolink.calibration import Ask, Look, Move, Offer, Procedure, Seek, SeenAt, Shown, Step, Tell
+from robolink.checkpoints import Point, checkpoint
 from robolink.errors import (
     CalibrationError,
     ConfigError,
@@ -95,6 +96,7 @@ class Runner:
         """Take the procedure's steps until it returns; its result is a proposal.
 
         Raises:
+            StoppedError: A stop came, at whatever step.
             DeclinedError: The person ended it.
             CalibrationError: The procedure refuses its measurements.
             ControllerFaultError, NotReadyError, OutcomeUnknownError: From the controller.
@@ -102,6 +104,8 @@ class Runner:
         try:
             step = next(procedure)
             while True:
+                checkpoint(Point.STEP, type(step).__name__)
+                self._require_going()
                 try:
                     done = self._take(step)
                 except CalibrationError as error:
@@ -113,6 +117,7 @@ class Runner:
                 step = procedure.send(_answer(done))
         except StopIteration as finished:
             result: T = finished.value
+            self._require_going()
             return result
         finally:
             procedure.close()
@@ -238,11 +243,16 @@ class Runner:
         """Return the next line typed, reading the status at least once a second meanwhile."""
         while True:
             line = self._operator.poll(POLL_S)
+            checkpoint(Point.QUESTION, line or "")
             self._watch()
             if line is not None:
                 return line
 
+    def _require_going(self) -> None:
+        self._controller.latch.require_open(tr("The procedure"))
+
     def _watch(self) -> None:
+        self._require_going()
         obstacle = _ended_by(self._controller.status())
         if obstacle:
             raise ControllerFaultError(

@@ -13,6 +13,7 @@ from robolink.errors import (
     ControllerFaultError,
     NotReadyError,
     RejectedError,
+    StoppedError,
     UndefinedToolError,
 )
 from robolink.model import InputEdge, MotionOutcome, MotionProfile, Path, WorkBox
@@ -110,7 +111,9 @@ def test_an_abort_and_a_failed_statement_are_understood_with_every_habit(serve, 
         target = replace(here, z_mm=here.z_mm + 30)
         motion = group.move_to(target, MotionProfile(Path.STRAIGHT, 1, 1.0), box=WorkBox())
         controller.stop()
-        assert motion.wait(timeout_s=60) is MotionOutcome.STOPPED
+        with pytest.raises(StoppedError):
+            motion.wait(timeout_s=60)
+        controller.release_stop()
         beyond = replace(group.pose(), x_mm=5000.0)
         with pytest.raises((ControllerFaultError, RejectedError)) as caught:
             group.move_to(beyond, MotionProfile(), box=WorkBox()).wait(timeout_s=60)

@@ -104,7 +104,7 @@ class Preserver:
 
     def restore(self, before: InForce, marker: Marker) -> None:
         """Put ``before`` back, read it back, and forget ``marker``; Ctrl-C waits for the end."""
-        with self._session.uninterrupted():
+        with self._session.uninterrupted(), self._session.latch.restoring():
             self._group.abort_unfinished()
             self._tools.select(before.tool)
             self._group.settings.restore(before.settings)

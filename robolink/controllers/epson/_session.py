@@ -13,9 +13,12 @@ bytes die with the connection and can never be taken for the answer to a later q
 """
 
 import threading
-from contextlib import AbstractContextManager
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager
 
+from robolink.checkpoints import Point, checkpoint
 from robolink.controllers.epson._answers import rejected
+from robolink.controllers.epson._effects import effect_of
 from robolink.controllers.epson._pending import PendingExecute
 from robolink.errors import (
     BusyError,
@@ -42,6 +45,7 @@ from robolink.protocols.epson_text import (
     find_command,
 )
 from robolink.protocols.spel import Statement
+from robolink.stop_latch import StopLatch
 from robolink.timing import Clock, Deadline
 from robolink.transport import Transport
 
@@ -50,6 +54,9 @@ _LOGIN_REFUSED = (13, 98)
 
 class EpsonSession:
     """Requests and answers on one connection.
+
+    Attributes:
+        latch: What holds requests back while a stop is in force.
 
     Args:
         transport: An open transport; the session owns it from here on.
@@ -64,6 +71,7 @@ class EpsonSession:
         self._gate.open()
         self._pending: PendingExecute | None = None
         self._ended_by: RobolinkError | None = None
+        self.latch = StopLatch(transport.identity)
         self.timeout_s = timeout_s
         self.exchanges = 0
 
@@ -143,8 +151,7 @@ class EpsonSession:
     def start_execute(self, statement: Statement) -> PendingExecute:
         """Send a statement that takes its time; its answer is collected by name later."""
         request = Request("Execute", (statement,))
-        with self._gate, self._wire:
-            self._check_usable(request)
+        with self._exchanging(request):
             pending = PendingExecute(statement)
             try:
                 self._expect_silence()
@@ -197,9 +204,25 @@ class EpsonSession:
                     self._end(error)
                     raise
 
+    @contextmanager
+    def _exchanging(self, request: Request) -> Iterator[None]:
+        """Hold the exchange lock for ``request``, once it is legal and no stop forbids it."""
+        what = _shown(request)
+        checkpoint(Point.LOCK, what)
+        try:
+            with self._gate, self._wire:
+                checkpoint(Point.HELD, what)
+                self._check_usable(request)
+                self.latch.admit(effect_of(request), what)
+                if self._pending is not None and request.name == "Abort":
+                    # Whatever ends it from here on was asked for.
+                    self._pending.abort_requested = True
+                yield
+        finally:
+            checkpoint(Point.EXCHANGE, what)
+
     def _ask(self, request: Request, *, secret: bool = False) -> Reply | Refusal:
-        with self._gate, self._wire:
-            self._check_usable(request)
+        with self._exchanging(request):
             try:
                 self._expect_silence()
                 return self._receive(request, self._send(request, secret=secret))
@@ -297,3 +320,8 @@ class EpsonSession:
             if self._ended_by is None:
                 self._ended_by = error
             self._transport.close()
+
+
+def _shown(request: Request) -> str:
+    """Return a request as a person may read it; a login, with its password, is never held back."""
+    return request.parameters[0] if request.name == "Execute" else request.name

@@ -1,10 +1,11 @@
 """The axis group behind one mailbox: where its tip is, and how it is told to move."""
 
 import math
+from typing import Final
 
 from robolink.controllers._edge_ahead import require_edge_ahead
 from robolink.controllers.softmotion._answers import describe
-from robolink.controllers.softmotion._condition import require_still
+from robolink.controllers.softmotion._condition import is_moving, require_still
 from robolink.controllers.softmotion._dynamics import dynamics_of, up_to_an_edge
 from robolink.controllers.softmotion._io import SoftMotionIo
 from robolink.controllers.softmotion._jog import Jog, JogWatch
@@ -14,7 +15,7 @@ from robolink.controllers.softmotion._movement import (
     SoftMotionMotionUntilInput,
 )
 from robolink.controllers.softmotion._starting import MovementStarter
-from robolink.errors import ConfigError, ReadBackError, RejectedError
+from robolink.errors import ConfigError, OutcomeUnknownError, ReadBackError, RejectedError
 from robolink.messages import tr
 from robolink.model import InputEdge, MotionProfile, MotionTerms, Path, Pose, WorkBox
 from robolink.protocols.mailbox import (
@@ -24,9 +25,14 @@ from robolink.protocols.mailbox import (
     ErrorClass,
     GroupState,
     Opcode,
+    Response,
     Six,
     to_frame,
 )
+from robolink.timing import Deadline
+
+REST_S: Final = 5.0
+"""Longest time from the acknowledgement of a stop to a group at rest."""
 
 
 class SoftMotionGroup:
@@ -122,13 +128,19 @@ class SoftMotionGroup:
     def stop(self) -> None:
         """Stop and hold; may be called from any thread, at any time, more than once.
 
-        Until ``reset_fault`` releases it nothing moves.
+        Until ``release_stop`` nothing acts from here, and until ``reset_fault`` nothing moves.
+
+        Raises:
+            OutcomeUnknownError: The group did not come to rest in time.
         """
-        try:
-            self._mailbox.orders.carry_out(Command(0, Opcode.STOP))
-        except RejectedError as error:
-            if error.code != ErrorClass.STOPPING:
-                raise
+        with self._mailbox.wire.latch.stopping():
+            try:
+                now = self._mailbox.orders.carry_out(Command(0, Opcode.STOP))
+            except RejectedError as error:
+                if error.code != ErrorClass.STOPPING:
+                    raise
+                now = self._mailbox.snapshots.take()
+            self._await_rest(now)
 
     def halt(self) -> None:
         """Bring the group to rest, ending every movement; it may be moved again at once."""
@@ -193,10 +205,21 @@ class SoftMotionGroup:
             )
         return to_frame(target.coordinates(), unit_um=self._mailbox.unit_um)
 
+    def _await_rest(self, now: Response) -> None:
+        deadline = Deadline.after(self._mailbox.wire.clock, REST_S)
+        while is_moving(now):
+            if deadline.expired:
+                raise OutcomeUnknownError(
+                    tr("The PLC took the stop, and its axis group still moves."),
+                    controller=self._mailbox.identity,
+                    request=describe(Command(0, Opcode.STOP)),
+                )
+            now = self._mailbox.snapshots.news(now)
+
     def _switch(self, opcode: Opcode, *, enabled: bool) -> None:
         mailbox, draft = self._mailbox, Command(0, opcode)
         request = describe(draft)
-        with mailbox.lock.held(request):
+        with mailbox.lock.held(request, calming=not enabled):
             if self.motors_on() is enabled:
                 return
             now = mailbox.prepare(draft, request)

@@ -8,7 +8,13 @@ from robolink.controllers.softmotion._condition import is_moving
 from robolink.controllers.softmotion._dynamics import factors, straight
 from robolink.controllers.softmotion._mailbox import Mailbox
 from robolink.controllers.softmotion._snapshots import LOOK_S
-from robolink.errors import ConfigError, ControllerError, LimitError, TransportTimeoutError
+from robolink.errors import (
+    ConfigError,
+    ControllerError,
+    LimitError,
+    StoppedError,
+    TransportTimeoutError,
+)
 from robolink.messages import tr
 from robolink.model import Marker, MarkerKind, Pose, WorkBox
 from robolink.protocols.mailbox import Command, CoordinateSystem, Four, Opcode, Response
@@ -121,7 +127,7 @@ class JogWatch:
             mailbox.wire.rides.jogging = True
             try:
                 mailbox.orders.start(self.draft)
-            except (ControllerError, ConfigError):
+            except (ControllerError, ConfigError, StoppedError):
                 mailbox.wire.rides.jogging = False
                 mailbox.desk.clear(marker)
                 raise
@@ -130,7 +136,7 @@ class JogWatch:
         snapshots = self._mailbox.snapshots
         deadline = Deadline.after(self._mailbox.wire.clock, duration_s)
         now = snapshots.take()
-        while not deadline.expired:
+        while not deadline.expired and not self._mailbox.wire.latch.closed:
             try:
                 self._box.check(self._pose(now))
             except LimitError as error:

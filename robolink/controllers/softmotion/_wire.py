@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from typing import Final, TypeVar
 
+from robolink.checkpoints import Point, checkpoint
 from robolink.controllers.softmotion._pulse import ClientBeat
 from robolink.controllers.softmotion._rides import Rides
 from robolink.errors import (
@@ -20,6 +21,7 @@ from robolink.errors import (
 )
 from robolink.interrupts import InterruptGate
 from robolink.messages import tr
+from robolink.stop_latch import StopLatch
 from robolink.timing import Clock
 from robolink.transport import MailboxHead, MailboxLink
 
@@ -36,6 +38,7 @@ class MailboxWire:
         owner: This client's token, never 0.
         epoch: The epoch of our ownership, 0 while we have none.
         rides: The movements of this client.
+        latch: What holds commands back while a stop is in force.
         timeout_s: Longest wait for the PLC to acknowledge a command.
         exchanges: Requests sent so far.
     """
@@ -49,6 +52,7 @@ class MailboxWire:
         self.owner = owner
         self.epoch = 0
         self.rides = Rides(owner)
+        self.latch = StopLatch(link.identity)
         self.timeout_s = timeout_s
         self.exchanges = 0
 
@@ -142,7 +146,9 @@ class MailboxWire:
             try:
                 with self._gate:
                     self.exchanges += 1
-                    return exchange()
+                    found = exchange()
+                checkpoint(Point.EXCHANGE, "read")
+                return found
             except (TransportError, RemoteProtocolError) as error:
                 lost.append(error)
                 if isinstance(error, TransportClosedError):

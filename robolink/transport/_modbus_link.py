@@ -47,7 +47,7 @@ class MailboxPlaces:
 
 
 def open_modbus_link(
-    url: LinkUrl, *, timeout_s: float, clock: Clock | None = None
+    url: LinkUrl, *, timeout_s: float, clock: Clock | None = None, to_stop: bool = False
 ) -> "ModbusMailboxLink":
     """Open a mailbox over Modbus TCP or RTU.
 
@@ -57,6 +57,7 @@ def open_modbus_link(
             (``holding`` reads response and slots from holding registers, function 3).
         timeout_s: Longest wait for the connection, and for each answer.
         clock: Keeps the deadlines.
+        to_stop: Whether it is opened for a stop alone, so that nothing may be loaded for it.
 
     Raises:
         ConfigError: The URL or an option is wrong.
@@ -66,7 +67,9 @@ def open_modbus_link(
     options = UrlOptions(url)
     places = _take_places(options)
     probe = Probe(places.area, places.response)
-    client = open_client(url, options, probe=probe, timeout_s=timeout_s, clock=clock)
+    client = open_client(
+        url, options, probe=probe, timeout_s=timeout_s, clock=clock, to_stop=to_stop
+    )
     return ModbusMailboxLink(client, places)
 
 

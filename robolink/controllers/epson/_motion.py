@@ -124,10 +124,12 @@ class EpsonGroup:
         """Bring everything to rest; from here on nothing acts before ``release_stop``.
 
         Raises:
+            RejectedError: The controller takes no Stop from here.
             OutcomeUnknownError: It did not come to rest in time.
         """
         with self._parts.session.latch.stopping():
-            bring_to_rest(self._parts.session)
+            session = self._parts.session
+            bring_to_rest(session.exchange, session.clock, controller=session.identity)
 
     def abort_unfinished(self) -> None:
         """Abort the last movement if nobody has seen its end."""

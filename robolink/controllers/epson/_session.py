@@ -19,11 +19,10 @@ from contextlib import AbstractContextManager, contextmanager
 from robolink.checkpoints import Point, checkpoint
 from robolink.controllers.epson._answers import rejected
 from robolink.controllers.epson._effects import effect_of
+from robolink.controllers.epson._login import PASSWORD_REFUSALS, refused, unanswered
 from robolink.controllers.epson._pending import PendingExecute
 from robolink.errors import (
     BusyError,
-    LoginRefusedError,
-    LoginUnansweredError,
     RemoteProtocolError,
     RobolinkError,
     TransportBrokenError,
@@ -48,8 +47,6 @@ from robolink.protocols.spel import Statement
 from robolink.stop_latch import StopLatch
 from robolink.timing import Clock, Deadline
 from robolink.transport import Transport
-
-_LOGIN_REFUSED = (13, 98)
 
 
 class EpsonSession:
@@ -106,29 +103,11 @@ class EpsonSession:
         try:
             answer = self._ask(request, secret=True)
         except (TransportTimeoutError, TransportBrokenError) as error:
-            raise LoginUnansweredError(
-                tr("{identity} is reached but does not answer the login.", identity=self.identity),
-                remedy=tr(
-                    "Only one client may be logged in: close the other one. If there is none, "
-                    "check that this port is the controller's Remote Ethernet port."
-                ),
-                controller=self.identity,
-                request="Login",
-            ) from error
+            raise unanswered(self.identity) from error
         if isinstance(answer, Refusal):
             self.close()
-            if answer.code in _LOGIN_REFUSED:
-                raise LoginRefusedError(
-                    tr("The controller refused the login (code {code}).", code=answer.code),
-                    code=answer.code,
-                    remedy=tr(
-                        "Give the password set in the controller's Remote Ethernet page by "
-                        "keyring, --password-file or ROBOLINK_PASSWORD. No second attempt was "
-                        "made."
-                    ),
-                    controller=self.identity,
-                    request="Login",
-                )
+            if answer.code in PASSWORD_REFUSALS:
+                raise refused(answer.code, self.identity)
             raise rejected(answer, controller=self.identity)
 
     def exchange(self, name: str, *parameters: str) -> Reply:

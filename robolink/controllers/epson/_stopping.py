@@ -1,62 +1,86 @@
-"""Bringing an EPSON controller to rest, whoever made it move.
+"""Bringing an EPSON controller to rest, and knowing that it rests.
 
-Abort ends what Execute runs, also when the Execute came from a session that is gone; Stop ends
-tasks (epson.md 1.2). Neither answer says that the arm stands: a status without Running does. So
-both are sent, in this order, because only Abort is served while a statement runs, and then the
-status is read until it shows rest.
+Abort ends what Execute runs, whoever began it: also the Execute of a client that has died,
+which goes on without it where the controller's remote time-out is long (epson.md 1.7). Stop
+ends tasks. While an Execute runs only Abort and GetStatus are served (epson.md 1.5), so a Stop
+that was accepted shows, beside the Running flag, that no Execute is left: whether the flag is on
+during an Execute is not documented.
+
+It needs a codec, a transport and a clock; nothing here looks at a record or a file.
 """
 
+from collections.abc import Callable
+from contextlib import suppress
 from typing import Final
 
-from robolink.controllers.epson._session import EpsonSession
-from robolink.errors import OutcomeUnknownError, RejectedError
+from robolink.errors import BusyError, OutcomeUnknownError, RejectedError
 from robolink.messages import tr
-from robolink.protocols.epson_text import parse_status
-from robolink.timing import Deadline
+from robolink.protocols.epson_text import ErrorCode, Reply, StatusFlags, parse_status
+from robolink.timing import Clock, Deadline
 
 REST_S: Final = 5.0
-"""Longest time from the stop to a status that shows rest."""
+"""Longest time from the first Abort to a state that shows rest (design part 4)."""
 
-_LOOK_S: Final = 0.05
+_POLL_S: Final = 0.02
+_AGAIN_S: Final = 1.0
+"""A movement that still goes on after this long is aborted again: stopping may be repeated."""
+
+Ask = Callable[[str], Reply]
+"""Sends the request of that name and returns its reply; a refusal is a ``RejectedError``."""
 
 
-def bring_to_rest(session: EpsonSession) -> None:
-    """Send Abort and Stop, and wait for a status that shows rest; from any thread.
+def bring_to_rest(ask: Ask, clock: Clock, *, controller: str) -> tuple[StatusFlags, int]:
+    """Send Abort, then Stop, and return the flags and the code that show rest.
+
+    Args:
+        ask: Asks the controller.
+        clock: The clock on which its time passes.
+        controller: Its name in errors.
 
     Raises:
-        OutcomeUnknownError: No such status came in time.
-        TransportError, RemoteProtocolError: The session is over; rest was not seen.
+        RejectedError: The controller takes no Stop from here.
+        OutcomeUnknownError: It does not come to rest within :data:`REST_S`.
+        TransportError, RemoteProtocolError: The link is over; whether it stops is not known.
     """
-    deadline = Deadline.after(session.clock, REST_S)
-    _ask(session, "Abort")
+    deadline = Deadline.after(clock, REST_S)
     stopped = False
-    while True:
-        # Stop is refused while a statement runs, so it waits for the answer of that one.
-        pending = session.pending
-        if not stopped and (pending is None or pending.answer is not None):
-            _ask(session, "Stop")
-            stopped = True
-        if stopped and not _running(session):
-            return
-        if deadline.expired:
-            raise OutcomeUnknownError(
-                tr("The controller was told to stop, and its status still shows that it runs."),
-                controller=session.identity,
-                request="Abort, Stop",
-            )
-        if stopped:
-            session.clock.sleep(_LOOK_S)
-        else:
-            session.await_pending(wait_s=_LOOK_S)
+    while not deadline.expired:
+        _abort(ask)
+        again = Deadline.after(clock, min(_AGAIN_S, deadline.remaining_s()))
+        while True:
+            stopped = stopped or _stop(ask)
+            flags, code = parse_status(ask("GetStatus"))
+            if stopped and not flags.running:
+                return flags, code
+            if again.expired:
+                break
+            clock.sleep(min(_POLL_S, again.remaining_s()))
+    raise OutcomeUnknownError(
+        tr(
+            "{controller} took the stop, but did not come to rest within {seconds:g} s.",
+            controller=controller,
+            seconds=REST_S,
+        ),
+        remedy=tr("It may still be moving."),
+        controller=controller,
+        request="Stop",
+    )
 
 
-def _ask(session: EpsonSession, request: str) -> None:
-    """Ask for a stop. A refusal is no news: what counts is whether the arm stands."""
+def _abort(ask: Ask) -> None:
+    # Older firmware has none (epson.md 1.9); the Stop that follows tells what is so.
+    with suppress(RejectedError):
+        ask("Abort")
+
+
+def _stop(ask: Ask) -> bool:
+    """Send Stop; False while an Execute that is being aborted is in its way."""
     try:
-        session.exchange(request)
-    except RejectedError:
-        return
-
-
-def _running(session: EpsonSession) -> bool:
-    return parse_status(session.exchange("GetStatus"))[0].running
+        ask("Stop")
+    except BusyError:
+        return False
+    except RejectedError as error:
+        if error.code != ErrorCode.EXECUTE_RUNNING:
+            raise
+        return False
+    return True

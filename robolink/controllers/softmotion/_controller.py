@@ -8,11 +8,12 @@ from typing import Final, Self
 from robolink.controllers.softmotion._answers import describe
 from robolink.controllers.softmotion._condition import condition_of, status_of
 from robolink.controllers.softmotion._facts import MailboxFacts, set_kinematics
-from robolink.controllers.softmotion._group import REST_S, SoftMotionGroup
+from robolink.controllers.softmotion._group import SoftMotionGroup
 from robolink.controllers.softmotion._io import SoftMotionIo
 from robolink.controllers.softmotion._mailbox import Mailbox
 from robolink.controllers.softmotion._preserve import Preserver
 from robolink.controllers.softmotion._resolve import SoftMotionResolver
+from robolink.controllers.softmotion._stopping import REST_S
 from robolink.controllers.softmotion._tools import SoftMotionToolTable
 from robolink.errors import ControllerFaultError, RobolinkError
 from robolink.messages import tr

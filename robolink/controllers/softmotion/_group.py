@@ -1,11 +1,10 @@
 """The axis group behind one mailbox: where its tip is, and how it is told to move."""
 
 import math
-from typing import Final
 
 from robolink.controllers._edge_ahead import require_edge_ahead
 from robolink.controllers.softmotion._answers import describe
-from robolink.controllers.softmotion._condition import is_moving, require_still
+from robolink.controllers.softmotion._condition import require_still
 from robolink.controllers.softmotion._dynamics import dynamics_of, up_to_an_edge
 from robolink.controllers.softmotion._io import SoftMotionIo
 from robolink.controllers.softmotion._jog import Jog, JogWatch
@@ -15,24 +14,19 @@ from robolink.controllers.softmotion._movement import (
     SoftMotionMotionUntilInput,
 )
 from robolink.controllers.softmotion._starting import MovementStarter
-from robolink.errors import ConfigError, OutcomeUnknownError, ReadBackError, RejectedError
+from robolink.controllers.softmotion._stopping import bring_group_to_rest
+from robolink.errors import ConfigError, ReadBackError
 from robolink.messages import tr
 from robolink.model import InputEdge, MotionProfile, MotionTerms, Path, Pose, WorkBox
 from robolink.protocols.mailbox import (
     BufferMode,
     Command,
     CoordinateSystem,
-    ErrorClass,
     GroupState,
     Opcode,
-    Response,
     Six,
     to_frame,
 )
-from robolink.timing import Deadline
-
-REST_S: Final = 5.0
-"""Longest time from the acknowledgement of a stop to a group at rest."""
 
 
 class SoftMotionGroup:
@@ -133,14 +127,11 @@ class SoftMotionGroup:
         Raises:
             OutcomeUnknownError: The group did not come to rest in time.
         """
-        with self._mailbox.wire.latch.stopping():
-            try:
-                now = self._mailbox.orders.carry_out(Command(0, Opcode.STOP))
-            except RejectedError as error:
-                if error.code != ErrorClass.STOPPING:
-                    raise
-                now = self._mailbox.snapshots.take()
-            self._await_rest(now)
+        mailbox = self._mailbox
+        with mailbox.wire.latch.stopping():
+            bring_group_to_rest(
+                mailbox.orders, mailbox.snapshots, mailbox.wire.clock, controller=mailbox.identity
+            )
 
     def halt(self) -> None:
         """Bring the group to rest, ending every movement; it may be moved again at once."""
@@ -204,17 +195,6 @@ class SoftMotionGroup:
                 remedy=tr("Give finite decimal numbers."),
             )
         return to_frame(target.coordinates(), unit_um=self._mailbox.unit_um)
-
-    def _await_rest(self, now: Response) -> None:
-        deadline = Deadline.after(self._mailbox.wire.clock, REST_S)
-        while is_moving(now):
-            if deadline.expired:
-                raise OutcomeUnknownError(
-                    tr("The PLC took the stop, and its axis group still moves."),
-                    controller=self._mailbox.identity,
-                    request=describe(Command(0, Opcode.STOP)),
-                )
-            now = self._mailbox.snapshots.news(now)
 
     def _switch(self, opcode: Opcode, *, enabled: bool) -> None:
         mailbox, draft = self._mailbox, Command(0, opcode)

@@ -62,8 +62,12 @@ class Orders:
         self._last = 0
         self.ownership = Ownership(wire, self._to_end)
 
-    def carry_out(self, draft: Command) -> Response:
+    def carry_out(self, draft: Command, *, within_s: float = COMPLETION_S) -> Response:
         """Send a command that is no movement and return the snapshot that shows its end.
+
+        Args:
+            draft: The command.
+            within_s: Longest time between its acknowledgement and its end.
 
         Raises:
             RejectedError: The PLC refused it; it did nothing.
@@ -74,7 +78,7 @@ class Orders:
         """
         with self._wire.uninterrupted():
             self._possess(draft)
-            end = self._to_end(draft)
+            end = self._to_end(draft, within_s)
             if end.state == CommandState.ERROR:
                 raise self._refusal(end.command, end.now, end.error_class)
             if end.state == CommandState.ABORTED:
@@ -104,9 +108,9 @@ class Orders:
             self.ownership.lose()
         return refused(command, now, error_class)
 
-    def _to_end(self, draft: Command) -> Ended:
+    def _to_end(self, draft: Command, within_s: float = COMPLETION_S) -> Ended:
         command, now = self._send(draft)
-        deadline = Deadline.after(self._wire.clock, COMPLETION_S)
+        deadline = Deadline.after(self._wire.clock, within_s)
         while (end := self._end_of(command, now)) is None:
             if deadline.expired:
                 raise self._wire.ended(self._silence(command, tr("began, and has not ended")))

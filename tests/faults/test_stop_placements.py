@@ -5,7 +5,7 @@ there, and the step of the procedure. After the acknowledgement there is no move
 no write and no success, except that tool, power and speed are put back and each tool of an open
 change once (design part 4).
 
-By default a sample is taken. ``ROBOLINK_ALL_KILL_POINTS=1`` takes all. ``pytest -s`` shows how many.
+By default a sample is taken. ``ROBOLINK_ALL_KILL_POINTS=1`` takes all; ``pytest -s`` counts them.
 """
 
 import os

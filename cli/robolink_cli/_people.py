@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from robolink.errors import ConfigError, DeclinedError
+from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_cli._render import json_is_on
 
@@ -45,6 +45,7 @@ def signature_of(operator: str | None, cell: "Cell | None", *, changes: bool) ->
 
     Raises:
         ConfigError: The cell names people, and this is none of them.
+        DeclinedError: Nobody gave a name.
     """
     from robolink import __version__
     from robolink.journal import signature_here
@@ -67,11 +68,8 @@ def signature_of(operator: str | None, cell: "Cell | None", *, changes: bool) ->
 
 
 def _asked_for_badge() -> str:
-    from robolink_cli._consent import on_terminal
+    from robolink_cli._consent import asked_for_text, on_terminal
 
     if json_is_on() or not on_terminal():
         return ""
-    try:
-        return str(click.prompt(tr("Who works here (badge or name)"), err=True)).strip()
-    except click.Abort as end:
-        raise DeclinedError(tr("No name was given."), remedy=tr("Nothing was sent.")) from end
+    return asked_for_text(tr("Who works here (badge or name)?"))

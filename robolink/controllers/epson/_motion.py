@@ -104,6 +104,12 @@ class EpsonGroup:
         """Return what :meth:`move_to` would send besides its reads, as it stands on the wire."""
         return executes((*self._settings.statements(profile), self._statement_for(target, profile)))
 
+    def require_able(self, purpose: str) -> None:
+        """Refuse what no movement could begin in now; see :class:`robolink.model.MotionGroup`."""
+        self._require_supervision(purpose)
+        self._parts.window.require_ready(purpose)
+        self._require_motors(purpose)
+
     def terms(self) -> MotionTerms:
         """Read what a person must know before the robot moves."""
         (number,) = self._parts.session.exchange("GetCurRobot").fields

@@ -4,7 +4,12 @@ import math
 
 from robolink.controllers._edge_ahead import require_edge_ahead
 from robolink.controllers.softmotion._answers import describe
-from robolink.controllers.softmotion._condition import require_still
+from robolink.controllers.softmotion._condition import (
+    require_enabled,
+    require_permit,
+    require_power,
+    require_still,
+)
 from robolink.controllers.softmotion._dynamics import dynamics_of, up_to_an_edge
 from robolink.controllers.softmotion._io import SoftMotionIo
 from robolink.controllers.softmotion._jog import Jog, JogWatch
@@ -50,6 +55,14 @@ class SoftMotionGroup:
         """Read the axes of the machine, in the PLC's units and degrees."""
         now = self._mailbox.snapshots.take()
         return {"axes": now.axes[: now.axis_count]}
+
+    def require_able(self, purpose: str) -> None:
+        """Refuse what no movement could begin in now; see :class:`robolink.model.MotionGroup`."""
+        identity = self._mailbox.identity
+        now = self._mailbox.snapshots.take()
+        require_permit(now, controller=identity, request=purpose)
+        require_enabled(now, controller=identity, request=purpose)
+        require_power(now, controller=identity, request=purpose)
 
     def terms(self) -> MotionTerms:
         """Read what a person must know before the group moves."""

@@ -112,7 +112,10 @@ class SoftMotionController:
         return self._mailbox.wire.exchanges
 
     def status(self) -> ControllerStatus:
-        """Read the state; others see by it that this process is alive."""
+        """Read the state; others see by it that this process is alive.
+
+        It keeps nothing going: a movement or jog ends unless somebody waits on it.
+        """
         self._mailbox.desk.beat()
         return status_of(self._mailbox.snapshots.take())
 

@@ -13,9 +13,7 @@ from robolink.errors import RemoteProtocolError
 from robolink.messages import tr
 from robolink.model import OutcomeLog, ToolOffset
 from robolink.protocols.mailbox import (
-    OPCODES,
     Command,
-    Opcode,
     Response,
     Six,
     frames_match,
@@ -82,10 +80,9 @@ class Mailbox:
             LeaseHeldError, LeaseLostError: Another client owns the mailbox.
         """
         now = now or self.snapshots.take()
-        facts = OPCODES[Opcode(draft.opcode)]
-        if facts.needs_permit:
+        if draft.needs_permit:
             require_permit(now, controller=self.identity, request=request)
-        if facts.needs_owner:
+        if draft.needs_owner:
             self.orders.ownership.require(request)
         return now
 

@@ -26,6 +26,7 @@ from robolink.protocols.mailbox import (
     beats_for,
     crc16,
     decode_command,
+    encode_device_id,
     encode_response,
     kinematics_word,
     next_number,
@@ -55,6 +56,7 @@ class Plc:
         refusals: Opcodes that are refused, and how.
         refuses: Refuses single commands: it returns how, 0 for none.
         overhears: Which commands it never takes note of.
+        device: Its device block, which says which PLC it is.
         edge: Where the input switches on a movement that waits for it.
         executed: Every command that it accepted, in order.
     """
@@ -74,6 +76,7 @@ class Plc:
             state=CommandState.DONE,
         )
         self.slots = {number: Slot() for number in range(1, 16)}
+        self.device = encode_device_id(0x1234_BEEF)
         self.set_tool = IDENTITY
         self.owner = 0
         self.epoch = 65535

@@ -35,10 +35,19 @@ class Mailbox:
         desk: Markers.
         lock: One procedure at a time.
         writer: Changes that are marked, sent once and read back.
+        device_id: The number of the PLC, the same on every link; ``None`` where it has none.
     """
 
-    def __init__(self, wire: MailboxWire, snapshots: Snapshots, outcomes: OutcomeLog) -> None:
+    def __init__(
+        self,
+        wire: MailboxWire,
+        snapshots: Snapshots,
+        outcomes: OutcomeLog,
+        *,
+        device_id: int | None,
+    ) -> None:
         self.wire = wire
+        self.device_id = device_id
         self.snapshots = snapshots
         self.orders = Orders(wire, snapshots)
         self.desk = MarkerDesk(wire.identity, outcomes)

@@ -93,6 +93,15 @@ class MailboxWire:
         self.beat()
         return self._ask(lambda: self._link.read_slot(slot))
 
+    def read_device(self) -> tuple[int, ...]:
+        """Read the device block, after a beat if one is due.
+
+        Raises:
+            RejectedError: There is none.
+        """
+        self.beat()
+        return self._ask(self._link.read_device)
+
     def write(self, words: Sequence[int]) -> None:
         """Write the command block, once.
 

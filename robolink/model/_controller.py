@@ -28,6 +28,8 @@ class ControllerState(StrEnum):
     TEST = "test"
     NOT_REMOTE = "not in remote control"
     PAUSED = "paused"
+    NO_POWER = "without power"
+    DISABLED = "disabled"
     RUNNING = "running"
     READY = "ready"
     STARTING = "starting"
@@ -37,7 +39,8 @@ class ControllerState(StrEnum):
 class ControllerStatus:
     """The state flags of a controller at one moment.
 
-    ``code`` is the controller's own error or warning number, 0 when there is none.
+    ``code`` is the controller's own error or warning number, 0 when there is none. ``disabled``
+    and ``unpowered`` are told by controllers only that can tell them beside everything else.
     """
 
     remote: bool = False
@@ -51,6 +54,8 @@ class ControllerStatus:
     warning: bool = False
     teach: bool = False
     test: bool = False
+    disabled: bool = False
+    unpowered: bool = False
     code: int = 0
 
     @property
@@ -65,6 +70,8 @@ class ControllerStatus:
             (self.test, ControllerState.TEST),
             (not self.remote, ControllerState.NOT_REMOTE),
             (self.paused, ControllerState.PAUSED),
+            (self.unpowered, ControllerState.NO_POWER),
+            (self.disabled, ControllerState.DISABLED),
             (self.running, ControllerState.RUNNING),
             (self.ready, ControllerState.READY),
         )

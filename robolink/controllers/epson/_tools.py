@@ -129,7 +129,18 @@ class EpsonToolTable:
                 self._window.command(statement)
                 self._desk.note_selection(tool)
 
-            found = self._writer.carry_out(statement, details, send=send, read=self._selected)
+            def read() -> int:
+                found = self._selected()
+                self._desk.note_selection(found)
+                return found
+
+            found = self._writer.carry_out(
+                statement,
+                details,
+                send=send,
+                read=read,
+                tell=lambda found: tr("Tool {tool} is selected now.", tool=found),
+            )
             if found != tool:
                 raise ReadBackError(
                     tr(
@@ -153,6 +164,7 @@ class EpsonToolTable:
             read=lambda: self._before(tool, requested, expected),
             # A tool that was set just now is defined.
             read_back=lambda: self._read(tool) if requested is None else self._printed(tool),
+            read_doubted=lambda: self._read(tool),
         )
         return self._writer.change(write, expected)
 

@@ -182,6 +182,8 @@ class NotReadyReason(StrEnum):
     WRONG_TOOL = "wrong_tool"
     NO_REMOTE_TIMEOUT = "no_remote_timeout"
     EDGE_PASSED = "edge_passed"
+    DRY_RUN = "dry_run"
+    VIRTUAL_IO = "virtual_io"
 
 
 class NotReadyError(ControllerError):

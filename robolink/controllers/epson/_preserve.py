@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 from robolink.controllers._guarded import MarkerDesk, ProcedureLock
 from robolink.controllers.epson._motion import EpsonGroup
+from robolink.controllers.epson._preferences import Preferences
 from robolink.controllers.epson._session import EpsonSession
 from robolink.controllers.epson._settings import PowerAndSpeed
 from robolink.controllers.epson._tools import EpsonToolTable
@@ -79,6 +80,7 @@ class Preserver:
         window: CommandWindow,
         desk: MarkerDesk,
         lock: ProcedureLock,
+        preferences: Preferences,
         *,
         tools: EpsonToolTable,
         group: EpsonGroup,
@@ -87,6 +89,7 @@ class Preserver:
         self._window = window
         self._desk = desk
         self._lock = lock
+        self._preferences = preferences
         self._tools = tools
         self._group = group
 
@@ -97,6 +100,7 @@ class Preserver:
             self._desk.look()
             self._desk.require_settled(reason)
             self._window.require_ready(reason)
+            self._preferences.require_real(reason)
             before = self._in_force(reason)
             marker: Marker | None = None
             try:

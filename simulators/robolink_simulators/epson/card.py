@@ -15,6 +15,7 @@ class ControllerCard:
         robot_name: The name of its robot.
         camera: The model of the camera of its vision system.
         force_sensor: The serial number of its force sensor.
+        settings: What GetContSettings tells in place of the preferences, if anything.
         messages: Texts of error numbers; the others have texts of the simulator's own.
     """
 
@@ -25,4 +26,5 @@ class ControllerCard:
     robot_name: str = "Robot1"
     camera: str = "0"
     force_sensor: str = "0"
+    settings: str = ""
     messages: dict[int, str] = field(default_factory=dict)

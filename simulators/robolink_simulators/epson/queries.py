@@ -51,7 +51,7 @@ def query_commands(
         "getcontmacadd": lambda: ("00-00-00-00-00-00",),
         "getprjname": lambda: (card.project,),
         "getcpuload": lambda: ("0",),
-        "getcontsettings": lambda: (preferences_field(preferences_of(options)),),
+        "getcontsettings": lambda: (card.settings or preferences_field(preferences_of(options)),),
         "getcameramodel": lambda: (card.camera,),
         "getforceserial": lambda: (card.force_sensor,),
         "getrobotinfo": lambda: ("1", _SCARA, machine.model.name),

@@ -36,7 +36,7 @@ def not_tried() -> tuple[Fact, ...]:
         (tr("SetCurRobot,0"), writing, "robot_zero"),
         (tr("assignment to a variable"), writing, "variable_assignment"),
         (tr("If ... Then in a statement"), error, "single_line_if"),
-        (tr("Accel above 100 percent"), writing, "accel_max"),
+        (tr("Accel above 100 percent"), error, "accel_max"),
         (tr("time allowed before the login"), minutes, "login_timeout_s"),
         (tr("remote time-out"), setup, "remote_timeout_s"),
         (tr("noise of the measured position"), many, "real_pos_noise_mm"),

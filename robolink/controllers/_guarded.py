@@ -214,7 +214,7 @@ class MarkerDesk:
         except (TransportError, RemoteProtocolError) as error:
             raise OutcomeUnknownError(
                 tr(
-                    "No answer came to {request!r}: it may or may not have run ({cause})",
+                    "No clear answer came to {request!r}: it may or may not have run ({cause})",
                     request=request,
                     cause=error.what,
                 ),

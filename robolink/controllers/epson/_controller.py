@@ -13,6 +13,7 @@ from robolink.controllers.epson._facts import FactReader
 from robolink.controllers.epson._io import EpsonIo
 from robolink.controllers.epson._motion import EpsonGroup
 from robolink.controllers.epson._points import EpsonPoints
+from robolink.controllers.epson._preferences import Preferences
 from robolink.controllers.epson._preserve import Preserver
 from robolink.controllers.epson._published import PublishedReader, PublishedTools
 from robolink.controllers.epson._raw import RawStatements
@@ -37,6 +38,7 @@ from robolink.model import (
     NewEntry,
     OutcomeLog,
 )
+from robolink.protocols.epson_text import Preference
 from robolink.stop_latch import StopLatch
 from robolink.timing import Clock
 
@@ -64,12 +66,26 @@ class EpsonController:
         self._window = CommandWindow(session)
         self._lock = ProcedureLock(session.identity, session.latch)
         self._desk = MarkerDesk(session.identity, outcomes)
+        self._preferences = Preferences(session)
         self._group = EpsonGroup(
-            session, self._window, self._desk, self._lock, remote_timeout_s=remote_timeout_s
+            session,
+            self._window,
+            self._desk,
+            self._lock,
+            preferences=self._preferences,
+            remote_timeout_s=remote_timeout_s,
         )
-        self._tools = EpsonToolTable(self._window, self._desk, self._lock, self._group.robot)
+        self._tools = EpsonToolTable(
+            self._window, self._desk, self._lock, self._group.robot, self._preferences
+        )
         self._preserver = Preserver(
-            session, self._window, self._desk, self._lock, tools=self._tools, group=self._group
+            session,
+            self._window,
+            self._desk,
+            self._lock,
+            self._preferences,
+            tools=self._tools,
+            group=self._group,
         )
         self._acts = EpsonActs(session, self._window, self._lock, self._group)
         setter = ValueSetter(session, self._window, self._desk, self._lock)
@@ -225,10 +241,22 @@ class EpsonController:
         """
         return self._raw.execute(statement)
 
+    def preferences(self) -> frozenset[Preference] | None:
+        """Read the preferences that are on; asked once a connection.
+
+        Returns:
+            ``None`` where the firmware does not tell them.
+        """
+        return self._preferences.read()
+
     def condition(self) -> dict[str, object]:
-        """Read the error's text, the alarms, the tool in force, motors and power."""
+        """Read error text, alarms, preferences, the tool in force, motors and power."""
         reader = ConditionReader(
-            self._window, alarms=self.alarms, tools=self._tools, group=self._group
+            self._window,
+            alarms=self.alarms,
+            tools=self._tools,
+            group=self._group,
+            preferences=self._preferences,
         )
         return reader.read(published=self.published_tools)
 

@@ -7,6 +7,7 @@ from robolink.controllers._guarded import MarkerDesk, ProcedureLock
 from robolink.controllers.epson._as_sent import executes
 from robolink.controllers.epson._movement import EpsonMotion, MovementParts
 from robolink.controllers.epson._position import read_position
+from robolink.controllers.epson._preferences import Preferences
 from robolink.controllers.epson._robot import RobotFacts
 from robolink.controllers.epson._session import EpsonSession
 from robolink.controllers.epson._settings import Settings
@@ -33,8 +34,10 @@ class EpsonGroup:
         desk: MarkerDesk,
         lock: ProcedureLock,
         *,
+        preferences: Preferences,
         remote_timeout_s: float,
     ) -> None:
+        self._preferences = preferences
         self._parts = MovementParts(session, window, desk)
         self._lock = lock
         self._robot = RobotFacts(window)
@@ -86,6 +89,7 @@ class EpsonGroup:
         statement = self._statement_until(target, edge)
 
         def look_at_input() -> None:
+            self._preferences.require_real_inputs(statement)
             on = read_input(window, edge.number)
             require_edge_ahead(edge, on, controller=session.identity, request=statement)
 
@@ -156,6 +160,7 @@ class EpsonGroup:
                 desk.require_settled(statement)
                 self._require_supervision(statement)
                 window.require_ready(statement)
+                self._preferences.require_real_motion(statement)
                 self._require_motors(statement)
                 self._require_tool(target, statement)
                 self._settings.slow_down(profile)

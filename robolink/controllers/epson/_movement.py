@@ -7,11 +7,11 @@ from robolink.controllers.epson._pending import PendingExecute
 from robolink.controllers.epson._session import EpsonSession
 from robolink.controllers.epson._window import CommandWindow
 from robolink.errors import (
-    ControllerFaultError,
     MotionTimeoutError,
     RejectedError,
     TransportError,
     TransportTimeoutError,
+    UnclearAnswerError,
 )
 from robolink.messages import tr
 from robolink.model import Marker, MotionOutcome, Pose
@@ -151,8 +151,9 @@ class EpsonMotion:
         window = self._parts.window
         try:
             window.check(statement, answer)
-        except (RejectedError, ControllerFaultError) as error:
-            if self._pending.abort_requested and isinstance(error, RejectedError):
+        except (RejectedError, UnclearAnswerError):
+            # How an aborted statement is answered is not documented (epson.md 1.6).
+            if self._pending.abort_requested:
                 return MotionOutcome.STOPPED
             raise
         return MotionOutcome.STOPPED if self._pending.abort_requested else MotionOutcome.ARRIVED

@@ -48,6 +48,9 @@ from robolink.stop_latch import StopLatch
 from robolink.timing import Clock, Deadline
 from robolink.transport import Transport
 
+_SHOWN = 120
+"""Characters of an unexpected answer in a sentence; a text may be thousands long."""
+
 
 class EpsonSession:
     """Requests and answers on one connection.
@@ -256,11 +259,18 @@ class EpsonSession:
         return isinstance(event, Refusal) and not name and self._pending is None
 
     def _expect_silence(self) -> None:
-        """Read what has arrived unasked; only the pending Execute may answer by itself."""
+        """Read what has arrived unasked; only the pending Execute may answer by itself.
+
+        Each piece is judged before the next is read. So a far end that never stops sending is
+        noticed at its first whole message, or at the codec's limit for one, and not when
+        memory is full.
+        """
+        self._judge_unasked()
         while (data := self._transport.receive_waiting()) is not None:
             self._codec.receive_data(data)
-            if not data:
-                break
+            self._judge_unasked()
+
+    def _judge_unasked(self) -> None:
         while (event := self._codec.next_event()) is not NEED_DATA:
             self._take_aside(event)
 
@@ -284,7 +294,10 @@ class EpsonSession:
             pending.answer = event
             return
         raise RemoteProtocolError(
-            tr("The controller sent an answer to a question nobody asked: {event}.", event=event),
+            tr(
+                "The controller sent an answer to a question nobody asked: {event}.",
+                event=repr(event)[:_SHOWN],
+            ),
             remedy=tr(
                 "The connection is closed, because later answers could be mistaken. Connect "
                 "again; if it happens twice, look for a second program on this controller."

@@ -13,6 +13,8 @@ from robolink.model._geometry import Hand as Hand
 from robolink.model._geometry import Pose as Pose
 from robolink.model._geometry import angle_difference_deg as angle_difference_deg
 from robolink.model._geometry import rotate_xy as rotate_xy
+from robolink.model._identity import Identity as Identity
+from robolink.model._identity import Who as Who
 from robolink.model._io import DigitalIo as DigitalIo
 from robolink.model._journal_entries import EntryKind as EntryKind
 from robolink.model._journal_entries import NewEntry as NewEntry

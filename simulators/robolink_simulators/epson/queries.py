@@ -27,6 +27,7 @@ def query_commands(machine: Machine, options: EpsonOptions) -> dict[str, Served]
         **_constants(options),
         "getrobotinfo": lambda: ("1", _SCARA, machine.model.name),
         "getrobotname": _of_robot(lambda: ("1", "Robot1")),
+        "getcontno": lambda: (machine.controller_serial,),
         "getrobotserial": _of_robot(lambda: ("1", machine.serial)),
         "getmotor": _of_robot(
             lambda: ("1", str(int(machine.motors_on)), str(int(machine.power_high)))
@@ -76,7 +77,6 @@ class Alarms:
 def _constants(options: EpsonOptions) -> dict[str, Served]:
     values = {
         "getcontname": "SIMULATED",
-        "getcontno": "1",
         "getcontver": _FIRMWARE[options.rc_plus],
         "getconttype": "SIMULATOR",
         "getcontdev": "26",

@@ -176,7 +176,8 @@ def test_a_newer_journal_is_read_but_not_written(location, open_anew, monkeypatc
         newer.log(CELLS[0]).append(NewEntry(EntryKind.RAW, verdict="kept"))
     run(newer, "UPDATE entries SET kind = 'of the future'")
     own = len(MIGRATIONS)
-    with pytest.raises(JournalError, match=f"form {own + 1}; this robolink knows forms up to {own}"):
+    sentence = f"form {own + 1}; this robolink knows forms up to {own}"
+    with pytest.raises(JournalError, match=sentence):
         open_anew(location)
     reader = open_anew(location, read_only=True)
     (entry,) = reader.entries()

@@ -33,6 +33,7 @@ COMMAND_OBJECT: Final = 0x2100
 RESPONSE_OBJECT: Final = 0x2101
 SNAPSHOT: Final = (0x2102, 5)
 SLOT_OBJECT: Final = 0x2200
+SERIAL_NUMBER: Final = (0x1018, 4)
 HEARTBEAT_TIME_OBJECT: Final = 0x1017
 
 _MS_PER_S: Final = 1000
@@ -169,6 +170,15 @@ class CanopenMailboxLink:
         """See :meth:`robolink.transport.MailboxLink.read_slot`; one upload."""
         with self._exchange() as deadline:
             return self._upload_words(SLOT_OBJECT, require_slot(slot), SLOT_WORDS, deadline)
+
+    def read_device(self) -> tuple[int, ...]:
+        """See :meth:`robolink.transport.MailboxLink.read_device`; the serial number of 1018h.
+
+        That object holds the number alone; its complement is added here.
+        """
+        with self._exchange() as deadline:
+            low, high = self._upload_words(*SERIAL_NUMBER, 2, deadline)
+            return (low, high, low ^ 0xFFFF, high ^ 0xFFFF)
 
     def beat(self, word: int) -> None:
         """See :meth:`robolink.transport.MailboxLink.beat`; one RPDO1."""

@@ -5,11 +5,12 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
 
-from robolink.errors import ConfigError
+from robolink.errors import ConfigError, RejectedError
 from robolink.messages import tr
 from robolink.timing import Clock
 from robolink.transport._mailbox_link import (
     COMMAND_WORDS,
+    DEVICE_WORDS,
     HEAD_PLACES,
     HEARTBEAT_WORD,
     RESPONSE_WORDS,
@@ -26,6 +27,7 @@ from robolink.transport._url import LinkUrl
 from robolink.transport._url_options import UrlOptions
 
 _HEAD_WORDS: Final = max(HEAD_PLACES) + 1
+_REGISTERS: Final = 0x10000
 _AREAS: Final = {"input": Area.INPUT, "holding": Area.HOLDING}
 
 
@@ -114,6 +116,17 @@ class ModbusMailboxLink:
         """See :meth:`robolink.transport.MailboxLink.read_slot`; one request."""
         return self._read(self._places.slots + (require_slot(slot) - 1) * SLOT_WORDS, SLOT_WORDS)
 
+    def read_device(self) -> tuple[int, ...]:
+        """See :meth:`robolink.transport.MailboxLink.read_device`; one request."""
+        start = self._places.slots + SLOTS * SLOT_WORDS
+        if start + DEVICE_WORDS > _REGISTERS:
+            raise RejectedError(
+                tr("There are no registers behind the tool slots of {it}.", it=self.identity),
+                remedy=tr("Move the slots down by {count} registers.", count=DEVICE_WORDS),
+                controller=self.identity,
+            )
+        return self._read(start, DEVICE_WORDS)
+
     def beat(self, word: int) -> None:
         """See :meth:`robolink.transport.MailboxLink.beat`; function 16 with one register."""
         self._client.write_registers(
@@ -136,9 +149,9 @@ class ModbusMailboxLink:
 
 def _take_places(options: UrlOptions) -> MailboxPlaces:
     area = options.take_choice("registers", "input", _AREAS)
-    command = options.take_int("command", 0, 0, 0x10000 - COMMAND_WORDS)
-    response = options.take_int("response", 0, 0, 0x10000 - RESPONSE_WORDS)
-    last = 0x10000 - SLOTS * SLOT_WORDS
+    command = options.take_int("command", 0, 0, _REGISTERS - COMMAND_WORDS)
+    response = options.take_int("response", 0, 0, _REGISTERS - RESPONSE_WORDS)
+    last = _REGISTERS - SLOTS * SLOT_WORDS
     slots = options.take_int("slots", min(response + RESPONSE_WORDS, last), 0, last)
     blocks = {
         "response": range(response, response + RESPONSE_WORDS),

@@ -102,6 +102,10 @@ class PlcLink:
         """Read a tool slot."""
         return self._exchange("read_slot", lambda: encode_slot(self.plc.slots[slot]))
 
+    def read_device(self) -> tuple[int, ...]:
+        """Read the device block; an old program has none."""
+        return self._exchange("read_device", lambda: self.plc.device)
+
     def beat(self, word: int) -> None:
         """Write the heartbeat."""
         self.beats.append(word)

@@ -3,6 +3,7 @@
 from robolink.controllers.softmotion._controller import (
     SoftMotionController as SoftMotionController,
 )
+from robolink.controllers.softmotion._device import read_device_id as read_device_id
 from robolink.controllers.softmotion._facts import MailboxFacts as MailboxFacts
 from robolink.controllers.softmotion._jog import Jog as Jog
 from robolink.controllers.softmotion._open import open_softmotion as open_softmotion

@@ -75,6 +75,11 @@ class SoftMotionController:
         return self._mailbox.identity
 
     @property
+    def device_id(self) -> int | None:
+        """The number that the PLC drew once, the same on every link; ``None`` where it has none."""
+        return self._mailbox.device_id
+
+    @property
     def clock(self) -> Clock:
         """The clock on which the PLC's time passes."""
         return self._mailbox.wire.clock
@@ -112,7 +117,10 @@ class SoftMotionController:
         return self._mailbox.wire.exchanges
 
     def status(self) -> ControllerStatus:
-        """Read the state; others see by it that this process is alive."""
+        """Read the state; others see by it that this process is alive.
+
+        It keeps nothing going: a movement or jog ends unless somebody waits on it.
+        """
         self._mailbox.desk.beat()
         return status_of(self._mailbox.snapshots.take())
 
@@ -122,7 +130,7 @@ class SoftMotionController:
 
     def mailbox_facts(self) -> MailboxFacts:
         """Read which machine and which mailbox program this is."""
-        return MailboxFacts.of(self._mailbox.snapshots.take())
+        return MailboxFacts.of(self._mailbox.snapshots.take(), device_id=self.device_id)
 
     def condition(self) -> dict[str, object]:
         """Read the meaning of an error, the tool in force, and what the mailbox shows beside."""

@@ -66,7 +66,11 @@ class SoftMotionMotion:
             OutcomeUnknownError: No end was seen; the marker stays.
         """
         mailbox = self._mailbox
-        with mailbox.uninterrupted(), mailbox.desk.doubt(self._request):
+        with (
+            mailbox.uninterrupted(),
+            mailbox.desk.doubt(self._request),
+            mailbox.wire.attended(),
+        ):
             if self._end is None and mailbox.wire.rides.end_of(self._command.sequence) is None:
                 self._halted = True
                 # It may have just ended by itself, or by a stop; its end is awaited.
@@ -89,7 +93,7 @@ class SoftMotionMotion:
         if self._end is not None:
             return self._end
         try:
-            with mailbox.desk.doubt(self._request):
+            with mailbox.desk.doubt(self._request), mailbox.wire.attended():
                 ended = self._watch(Deadline.after(mailbox.wire.clock, timeout_s))
         except KeyboardInterrupt:
             self.abort()

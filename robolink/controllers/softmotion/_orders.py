@@ -82,7 +82,8 @@ class Orders:
         Raises:
             KeyboardInterrupt: Ctrl-C came before a movement was sent; it was not.
         """
-        with self._wire.uninterrupted():
+        # Who begins a movement is there; at most four begin before one has to be waited on.
+        with self._wire.uninterrupted(), self._wire.attended():
             self._possess(draft)
             command, now = self._send(draft, ride=draft.opcode != Opcode.JOG)
             if now.state == CommandState.ERROR:
@@ -91,11 +92,11 @@ class Orders:
             return command
 
     def _possess(self, draft: Command) -> None:
-        if OPCODES[Opcode(draft.opcode)].needs_owner:
+        if draft.needs_owner:
             self.ownership.require(describe(draft))
 
     def _refusal(self, command: Command, now: Response, error_class: int) -> RejectedError:
-        if error_class in _DISPOSSESSED and OPCODES[Opcode(command.opcode)].needs_owner:
+        if error_class in _DISPOSSESSED and command.needs_owner:
             self.ownership.lose()
         return refused(command, now, error_class)
 
@@ -161,7 +162,9 @@ class Orders:
             if now.rejected != before.rejected:
                 return now, False
             if deadline.expired:
-                raise self._wire.ended(self._silence(command, tr("was not acknowledged")))
+                silence = self._silence(command, tr("was not acknowledged"))
+                # Something stronger must be able to follow what should have ended a movement.
+                raise silence if command.only_ends else self._wire.ended(silence)
 
     def _addressed(self, draft: Command, before: Response) -> Command:
         taken = {before.ack_head, before.active_movement}

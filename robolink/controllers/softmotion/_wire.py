@@ -6,8 +6,9 @@ What ends the session ends it for good; a movement that was under way then is fo
 through its marker, not through this object.
 """
 
-from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from typing import Final, TypeVar
 
 from robolink.controllers.softmotion._pulse import ClientBeat
@@ -45,6 +46,7 @@ class MailboxWire:
         self._gate = InterruptGate()
         self._gate.open()
         self._beat = ClientBeat()
+        self._here = threading.local()
         self._ended_by: RobolinkError | None = None
         self.owner = owner
         self.epoch = 0
@@ -91,6 +93,15 @@ class MailboxWire:
         self.beat()
         return self._ask(lambda: self._link.read_slot(slot))
 
+    def read_device(self) -> tuple[int, ...]:
+        """Read the device block, after a beat if one is due.
+
+        Raises:
+            RejectedError: There is none.
+        """
+        self.beat()
+        return self._ask(self._link.read_device)
+
     def write(self, words: Sequence[int]) -> None:
         """Write the command block, once.
 
@@ -107,14 +118,34 @@ class MailboxWire:
                 self.ended(error)
                 raise
 
+    @contextmanager
+    def attended(self) -> Iterator[None]:
+        """Wait on what is unfinished: the exchanges of this thread keep it going meanwhile.
+
+        Nothing else does. A thread that only looks, or a program that does something else, would
+        else keep a robot moving that nobody watches (design part 7).
+        """
+        before = self._attends
+        self._here.attends = True
+        try:
+            yield
+        finally:
+            self._here.attends = before
+
     def next_beat(self) -> int:
         """Return the heartbeat word that goes with a command block."""
-        return self._beat.word(self.epoch, self.clock.now_ns())
+        if self._may_beat:
+            return self._beat.word(self.epoch, self.clock.now_ns())
+        return self._beat.again(self.epoch)
 
     def beat(self) -> None:
-        """Write the heartbeat alone, if we own the mailbox and it is due."""
+        """Write the heartbeat alone, if we own the mailbox and it is due.
+
+        While something is unfinished only who waits on it does (:meth:`attended`).
+        """
         now_ns = self.clock.now_ns()
-        if self.epoch and self._beat.due(now_ns, busy=self.rides.unfinished):
+        busy = self.rides.unfinished
+        if self.epoch and self._may_beat and self._beat.due(now_ns, busy=busy):
             word = self._beat.word(self.epoch, now_ns)
             self._ask(lambda: self._link.beat(word))
 
@@ -134,6 +165,14 @@ class MailboxWire:
         )
         self._link.close()
         self._gate.close()
+
+    @property
+    def _attends(self) -> bool:
+        return getattr(self._here, "attends", False)
+
+    @property
+    def _may_beat(self) -> bool:
+        return self._attends or not self.rides.unfinished
 
     def _ask(self, exchange: Callable[[], T]) -> T:
         self._require_alive()

@@ -26,6 +26,8 @@ from robolink.protocols.mailbox._codes import error_meaning as error_meaning
 from robolink.protocols.mailbox._command import Command as Command
 from robolink.protocols.mailbox._command import decode_command as decode_command
 from robolink.protocols.mailbox._command import encode_command as encode_command
+from robolink.protocols.mailbox._device import decode_device_id as decode_device_id
+from robolink.protocols.mailbox._device import encode_device_id as encode_device_id
 from robolink.protocols.mailbox._eds import electronic_data_sheet as electronic_data_sheet
 from robolink.protocols.mailbox._frames import frames_match as frames_match
 from robolink.protocols.mailbox._frames import from_frame as from_frame
@@ -35,6 +37,9 @@ from robolink.protocols.mailbox._kinematics import find_kinematics as find_kinem
 from robolink.protocols.mailbox._kinematics import kinematics_word as kinematics_word
 from robolink.protocols.mailbox._layouts import COMMAND as COMMAND
 from robolink.protocols.mailbox._layouts import COMMAND_WORDS as COMMAND_WORDS
+from robolink.protocols.mailbox._layouts import DEVICE as DEVICE
+from robolink.protocols.mailbox._layouts import DEVICE_START as DEVICE_START
+from robolink.protocols.mailbox._layouts import DEVICE_WORDS as DEVICE_WORDS
 from robolink.protocols.mailbox._layouts import PROBE as PROBE
 from robolink.protocols.mailbox._layouts import RESPONSE as RESPONSE
 from robolink.protocols.mailbox._layouts import RESPONSE_WORDS as RESPONSE_WORDS

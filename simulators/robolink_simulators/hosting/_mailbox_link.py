@@ -12,6 +12,8 @@ from robolink.errors import (
 from robolink.messages import tr
 from robolink.protocols.mailbox import (
     COMMAND,
+    DEVICE_START,
+    DEVICE_WORDS,
     RESPONSE_WORDS,
     SLOT_WORDS,
     Words,
@@ -87,6 +89,12 @@ class InProcessMailboxLink:
         """See :meth:`robolink.transport.MailboxLink.read_slot`."""
         first = slot_start(slot)
         return self._exchange(lambda now_ns: self._simulator.read(first, SLOT_WORDS, now_ns))
+
+    def read_device(self) -> Words:
+        """See :meth:`robolink.transport.MailboxLink.read_device`."""
+        return self._exchange(
+            lambda now_ns: self._simulator.read(DEVICE_START, DEVICE_WORDS, now_ns)
+        )
 
     def beat(self, word: int) -> None:
         """See :meth:`robolink.transport.MailboxLink.beat`."""

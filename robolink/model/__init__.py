@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from robolink.model._geometry import Pose as Pose
     from robolink.model._geometry import angle_difference_deg as angle_difference_deg
     from robolink.model._geometry import rotate_xy as rotate_xy
+    from robolink.model._identity import Identity as Identity
+    from robolink.model._identity import Who as Who
     from robolink.model._io import DigitalIo as DigitalIo
     from robolink.model._journal_entries import EntryKind as EntryKind
     from robolink.model._journal_entries import NewEntry as NewEntry
@@ -60,13 +62,14 @@ else:
             "_facts": "ControllerFacts",
             "_findings": "Finding Resolver Verdict",
             "_geometry": "Hand Pose angle_difference_deg rotate_xy",
+            "_identity": "Identity Who",
             "_io": "DigitalIo",
             "_journal_entries": "EntryKind NewEntry Recorded Signature",
             "_motion": "Motion MotionGroup MotionOutcome MotionProfile MotionTerms Path WorkBox",
             "_outcomes": "Marker MarkerKind OutcomeLog new_operation",
             "_people": "Role require_engineer",
             "_secret": "Secret",
-            "_tip_sensor": "TIP Spot SpotUnit TipSensor",
+            "_tip_sensor": "Spot SpotUnit TIP TipSensor",
             "_tools": (
                 "ANY Expect Expected ToolOffset ToolReceipt ToolTable describe_offset "
                 "plain_offset read_offset"

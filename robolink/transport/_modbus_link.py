@@ -95,9 +95,12 @@ class ModbusMailboxLink:
     @property
     def identity(self) -> str:
         """The client's, and which of a unit's mailboxes when it is not the usual one."""
-        name, command = self._client.identity, self._places.command
-        joint = "&" if "?" in name else "?"
-        return f"{name}{joint}command={command}" if command else name
+        return self._which(self._client.identity)
+
+    @property
+    def place(self) -> str:
+        """The client's, and which of a unit's mailboxes when it is not the usual one."""
+        return self._which(self._client.place)
 
     @property
     def durable(self) -> bool:
@@ -150,6 +153,10 @@ class ModbusMailboxLink:
     def close(self) -> None:
         """See :meth:`robolink.transport.MailboxLink.close`."""
         self._client.close()
+
+    def _which(self, name: str) -> str:
+        command, joint = self._places.command, "&" if "?" in name else "?"
+        return f"{name}{joint}command={command}" if command else name
 
     def _read(self, address: int, count: int) -> tuple[int, ...]:
         if self._places.area is Area.HOLDING:

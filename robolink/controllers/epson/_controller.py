@@ -10,6 +10,7 @@ from robolink.controllers.epson._acts import EpsonActs
 from robolink.controllers.epson._alarms import EpsonAlarms
 from robolink.controllers.epson._condition import ConditionReader
 from robolink.controllers.epson._facts import FactReader
+from robolink.controllers.epson._identity import IdentityReader
 from robolink.controllers.epson._io import EpsonIo
 from robolink.controllers.epson._motion import EpsonGroup
 from robolink.controllers.epson._points import EpsonPoints
@@ -64,6 +65,7 @@ class EpsonController:
         self._session = session
         self._outcomes = outcomes
         self._window = CommandWindow(session)
+        outcomes.ask(IdentityReader(session, self._window).read)
         self._lock = ProcedureLock(session.identity, session.latch)
         self._desk = MarkerDesk(session.identity, outcomes)
         self._preferences = Preferences(session)
@@ -103,7 +105,7 @@ class EpsonController:
 
     @property
     def identity(self) -> str:
-        """The URL without its options."""
+        """The URL without its options; who answers there is ``outcomes.identity``."""
         return self._session.identity
 
     @property

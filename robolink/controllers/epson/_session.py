@@ -81,6 +81,11 @@ class EpsonSession:
         return self._transport.identity
 
     @property
+    def place(self) -> str:
+        """Where it was reached, the same for each spelling of the URL."""
+        return self._transport.place
+
+    @property
     def clock(self) -> Clock:
         """The clock on which the controller's time passes."""
         return self._transport.clock

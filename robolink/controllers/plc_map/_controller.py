@@ -7,6 +7,7 @@ from typing import Self
 
 from robolink.controllers._guarded import MarkerDesk, ProcedureLock
 from robolink.controllers.plc_map._flange import FlangeReader, no_motion
+from robolink.controllers.plc_map._identity import IdentityReader
 from robolink.controllers.plc_map._inputs import MappedInputs
 from robolink.controllers.plc_map._probe import require_probe
 from robolink.controllers.plc_map._registers import RegisterClient, Registers
@@ -50,6 +51,7 @@ class PlcMapController:
         self.register_map = register_map
         self._registers = Registers(client)
         self._outcomes = outcomes
+        outcomes.ask(IdentityReader(self._registers, register_map).read)
         self._lock = ProcedureLock(client.identity, self._registers.latch)
         self._desk = MarkerDesk(client.identity, outcomes)
         self._tools = RegisterToolTable(

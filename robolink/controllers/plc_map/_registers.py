@@ -24,6 +24,10 @@ class RegisterClient(Protocol):
         """Which PLC this is."""
 
     @property
+    def place(self) -> str:
+        """Where it was reached, the same for each spelling of the URL."""
+
+    @property
     def clock(self) -> Clock:
         """The clock on which its time passes."""
 
@@ -70,6 +74,11 @@ class Registers:
     def identity(self) -> str:
         """Which PLC this is."""
         return self._client.identity
+
+    @property
+    def place(self) -> str:
+        """Where it was reached, the same for each spelling of the URL."""
+        return self._client.place
 
     @property
     def clock(self) -> Clock:

@@ -6,6 +6,7 @@ from contextlib import AbstractContextManager
 from robolink.controllers._guarded import MarkerDesk, ProcedureLock
 from robolink.controllers._tool_writing import ToolWriter
 from robolink.controllers.softmotion._condition import require_permit
+from robolink.controllers.softmotion._identity import identity_of
 from robolink.controllers.softmotion._orders import Orders
 from robolink.controllers.softmotion._snapshots import Snapshots
 from robolink.controllers.softmotion._wire import MailboxWire
@@ -48,6 +49,7 @@ class Mailbox:
     ) -> None:
         self.wire = wire
         self.device_id = device_id
+        outcomes.ask(lambda: identity_of(wire, device_id))
         self.snapshots = snapshots
         self.orders = Orders(wire, snapshots)
         self.desk = MarkerDesk(wire.identity, outcomes)

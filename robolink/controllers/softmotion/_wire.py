@@ -69,6 +69,11 @@ class MailboxWire:
         return self._link.identity
 
     @property
+    def place(self) -> str:
+        """Where it was reached, the same for each spelling of the URL."""
+        return self._link.place
+
+    @property
     def clock(self) -> Clock:
         """The clock on which the PLC's time passes."""
         return self._link.clock

@@ -28,9 +28,12 @@ import click
 
 from robolink import errors
 from robolink.messages import tr
+from robolink.standing import standing_after
 from robolink_cli._render import dumps
+from robolink_cli._standing import standing_payload, tell_standing
 
 USAGE: Final = 2
+UNKNOWN: Final = 6
 BUG: Final = 70
 INTERRUPTED: Final = 130
 READER_LEFT: Final = 141
@@ -42,7 +45,7 @@ EXIT_CODES: Final[tuple[tuple[type[errors.RobolinkError], int], ...]] = (
     (errors.DeclinedError, 9),
     (errors.VerifyError, 8),
     (errors.CalibrationError, 7),
-    (errors.OutcomeUnknownError, 6),
+    (errors.OutcomeUnknownError, UNKNOWN),
     (errors.StoppedError, 10),
     (errors.ToolIndexError, USAGE),
     (errors.ReservedToolError, USAGE),
@@ -55,7 +58,13 @@ EXIT_CODES: Final[tuple[tuple[type[errors.RobolinkError], int], ...]] = (
 
 
 def exit_code(error: BaseException) -> int:
-    """Return the exit code that ``error`` stands for."""
+    """Return the exit code that ``error`` stands for.
+
+    What it left on the controller comes first: where a write or a movement may stand unproved,
+    it is 6 whatever broke afterwards.
+    """
+    if not standing_after(error).settled:
+        return UNKNOWN
     if isinstance(error, (KeyboardInterrupt, EOFError, click.Abort)):
         return INTERRUPTED
     if isinstance(error, click.ClickException):
@@ -79,6 +88,8 @@ def report(error: BaseException, *, as_json: bool) -> int:
         click.echo(f"robolink: {what}", file=sys.stderr)
         if remedy:
             click.echo(f"  {remedy}", file=sys.stderr)
+    if not as_json:
+        tell_standing(standing_after(error))
     return code
 
 
@@ -91,12 +102,15 @@ def error_body(error: BaseException) -> dict[str, object]:
     """Return what is known about ``error``, as plain JSON."""
     what, remedy = _sentences(error)
     ours = isinstance(error, errors.RobolinkError)
+    standing = standing_after(error)
     return {
         "kind": type(error).__name__,
         "what": what,
         "remedy": remedy,
         "reason": getattr(error, "reason", None) if ours else None,
         "code": (getattr(error, "code", None) or None) if ours else None,
+        "controller_state": standing.effect,
+        "stands": standing_payload(standing),
     }
 
 

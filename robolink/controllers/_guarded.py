@@ -28,7 +28,8 @@ from robolink.errors import (
     TransportError,
 )
 from robolink.messages import tr
-from robolink.model import Marker, MarkerKind, NewEntry, OutcomeLog, new_operation
+from robolink.model import Ledger, Marker, MarkerKind, NewEntry, OutcomeLog, new_operation
+from robolink.standing import note_standing
 from robolink.timing import wall_label
 
 _PROCEDURES: Final = frozenset({MarkerKind.SELECTION, MarkerKind.CHANGE})
@@ -66,6 +67,7 @@ class MarkerDesk:
 
     Attributes:
         outcomes: Where they are kept.
+        ledger: What became of what was begun here; it is told before they are.
 
     Args:
         identity: Which controller.
@@ -75,6 +77,7 @@ class MarkerDesk:
     def __init__(self, identity: str, outcomes: OutcomeLog) -> None:
         self._identity = identity
         self.outcomes = outcomes
+        self.ledger = Ledger()
         self._procedures: dict[MarkerKind, Marker] = {}
 
     def look(self) -> None:
@@ -112,13 +115,16 @@ class MarkerDesk:
         name = operation or new_operation()
         marker = Marker(name, kind, request, wall_label(), dict(details))
         self.outcomes.begin(marker)
+        self.ledger.begin(marker)
         if kind in _PROCEDURES:
             self._procedures[kind] = marker
         return marker
 
     def clear(self, marker: Marker, *entries: NewEntry) -> None:
-        """Forget a marker whose outcome is proved, and journal how it ended."""
+        """Forget a marker whose outcome is known, and journal how it ended."""
+        self.ledger.ended(marker)
         self.outcomes.clear(marker.operation, *entries)
+        self.ledger.recorded(marker)
         known = self._procedures.get(marker.kind)
         if known is not None and known.operation == marker.operation:
             del self._procedures[marker.kind]
@@ -187,7 +193,7 @@ class MarkerDesk:
         try:
             yield
         except (TransportError, RemoteProtocolError) as error:
-            raise OutcomeUnknownError(
+            doubt = OutcomeUnknownError(
                 tr(
                     "No answer came to {request!r}: it may or may not have run ({cause})",
                     request=request,
@@ -200,4 +206,6 @@ class MarkerDesk:
                 controller=self._identity,
                 request=request,
                 raw=error.raw,
-            ) from error
+            )
+            note_standing(doubt, self.ledger.standing())
+            raise doubt from error

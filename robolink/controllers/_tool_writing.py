@@ -12,7 +12,12 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from robolink.controllers._guarded import MarkerDesk
-from robolink.errors import ReadBackError, RejectedError, ToolChangedError
+from robolink.errors import (
+    ControllerFaultError,
+    ReadBackError,
+    RejectedError,
+    ToolChangedError,
+)
 from robolink.messages import tr
 from robolink.model import (
     ANY,
@@ -72,7 +77,7 @@ class ToolWriter:
         not_executed: Callable[[RejectedError], bool],
     ) -> None:
         self._desk = desk
-        self._same = same
+        self._same = desk.ledger.same = same
         self._uninterrupted = uninterrupted
         self._not_executed = not_executed
 
@@ -83,6 +88,7 @@ class ToolWriter:
             require_engineer(self._desk.outcomes, tr("write tool {tool} blindly", tool=tool))
         self._desk.look()
         before = write.read()
+        self._desk.ledger.saw_tool(tool, before)
         if self._same(before, requested):
             return ToolReceipt(
                 tool, before, requested, before, skipped=True, unconditional=unconditional
@@ -132,16 +138,20 @@ class ToolWriter:
         Ctrl-C waits for that. A plain refusal settles the marker; a fault does not, because a
         controller in error may refuse to show the value that would prove what happened.
         """
-        with self._uninterrupted():
+        ledger = self._desk.ledger
+        with self._uninterrupted(), ledger.block():
             marker = self._desk.begin(MarkerKind.SET, request, details)
             with self._desk.doubt(request):
                 try:
                     send()
-                except RejectedError as error:
-                    if self._not_executed(error):
+                    ledger.answered(marker)
+                except (RejectedError, ControllerFaultError) as error:
+                    ledger.answered(marker)
+                    if isinstance(error, RejectedError) and self._not_executed(error):
                         self._desk.clear(marker, _refusal(marker, error))
                     raise
                 found = read()
+            ledger.proved(marker, found)
             self._desk.clear(marker, *entries(marker, found))
         return found
 

@@ -18,6 +18,8 @@ from robolink.model._journal_entries import EntryKind as EntryKind
 from robolink.model._journal_entries import NewEntry as NewEntry
 from robolink.model._journal_entries import Recorded as Recorded
 from robolink.model._journal_entries import Signature as Signature
+from robolink.model._ledger import Account as Account
+from robolink.model._ledger import Ledger as Ledger
 from robolink.model._motion import Motion as Motion
 from robolink.model._motion import MotionGroup as MotionGroup
 from robolink.model._motion import MotionOutcome as MotionOutcome
@@ -32,6 +34,7 @@ from robolink.model._outcomes import new_operation as new_operation
 from robolink.model._people import Role as Role
 from robolink.model._people import require_engineer as require_engineer
 from robolink.model._secret import Secret as Secret
+from robolink.model._standing_words import describe_standing as describe_standing
 from robolink.model._tip_sensor import TIP as TIP
 from robolink.model._tip_sensor import Spot as Spot
 from robolink.model._tip_sensor import SpotUnit as SpotUnit

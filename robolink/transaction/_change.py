@@ -28,6 +28,7 @@ from robolink.errors import (
 from robolink.messages import tr
 from robolink.model import (
     ANY,
+    Account,
     Controller,
     EntryKind,
     Expected,
@@ -40,6 +41,7 @@ from robolink.model import (
     new_operation,
     plain_offset,
 )
+from robolink.standing import note_standing
 from robolink.transaction._put_back import PutBack, Step, put_back
 
 _OUT_OF_REACH = (OutcomeUnknownError, TransportError, RemoteProtocolError, LeaseLostError)
@@ -94,9 +96,11 @@ class ToolChange:
         self._begun: list[Step] = []
         self._receipts: tuple[ToolReceipt, ...] = ()
         self._spoiled: int | None = None
+        self._account: Account | None = None
         self.kept = False
 
     def __enter__(self) -> Self:
+        self._account = self._controller.ledger.open()
         if not self._controller.outcomes.change:
             self._controller.outcomes.change = new_operation()
             self._own_id = True
@@ -115,6 +119,7 @@ class ToolChange:
         finally:
             if self._own_id:
                 self._controller.outcomes.change = ""
+            self._settle_account(error)
 
     def write(self) -> tuple[ToolReceipt, ...]:
         """Write everything and read it back.
@@ -247,6 +252,20 @@ class ToolChange:
             sentences = (result.sentence for result in done)
             error.remedy = " ".join((error.remedy, *sentences)).strip()
         self._record(done)
+
+    def _settle_account(self, error: BaseException | None) -> None:
+        """Let whoever is told of ``error`` know what stands, and which tool is selected."""
+        ledger, account = self._controller.ledger, self._account
+        assert account is not None  # noqa: S101 - __enter__ opened it
+        try:
+            if error is not None:
+                # A link that is gone has told what it knew.
+                with suppress(RobolinkError):
+                    self._controller.tools.selected()
+        finally:
+            ledger.close(account, kept=self.kept)
+            if error is not None:
+                note_standing(error, ledger.standing(account))
 
     def _leave_open(self, error: RobolinkError) -> None:
         """Say what stands in the journal for ``recover``."""

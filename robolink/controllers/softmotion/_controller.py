@@ -21,6 +21,7 @@ from robolink.model import (
     Capabilities,
     ControllerFacts,
     ControllerStatus,
+    Ledger,
     Marker,
     MarkerKind,
     NewEntry,
@@ -34,6 +35,7 @@ from robolink.protocols.mailbox import (
     Opcode,
     Response,
 )
+from robolink.standing import note_standing
 from robolink.timing import Clock, Deadline
 
 _RESETS: Final = (
@@ -100,6 +102,11 @@ class SoftMotionController:
     def outcomes(self) -> OutcomeLog:
         """Open markers of this PLC."""
         return self._mailbox.desk.outcomes
+
+    @property
+    def ledger(self) -> Ledger:
+        """What was done here since connecting, and how much of it is proved."""
+        return self._mailbox.desk.ledger
 
     @property
     def resolver(self) -> SoftMotionResolver:
@@ -270,6 +277,8 @@ class SoftMotionController:
         trace: TracebackType | None,
     ) -> None:
         self.close()
+        if error is not None:
+            note_standing(error, self.ledger.standing())
 
     def _left(self, state: GroupState, now: Response) -> Response:
         """Give the group the cycles that it needs to leave a state (softmotion.md 2.2)."""

@@ -58,8 +58,9 @@ class Standing:
         doubtful: Other requests that may or may not have been carried out.
         moved: Whether a movement was begun.
         moving: Movements whose end was not seen.
-        settled: Whether no write and no movement stands unproved or unrecorded. Otherwise the
-            next command that moves or writes is refused until ``recover``.
+        settled: Whether nothing is left open: no write and no movement unproved or unrecorded, no
+            change that was neither kept nor taken back, no selection to be put back. Otherwise
+            the next command that moves or writes is refused until ``recover``.
     """
 
     tools: Mapping[int, ToolStanding] = field(default_factory=dict)

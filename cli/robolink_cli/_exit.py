@@ -1,24 +1,4 @@
-"""The one place where errors become exit codes and text.
-
-====  =====================================================================
-code  meaning
-====  =====================================================================
-0     done
-1     ``compare`` found a difference
-2     usage or configuration is wrong; nothing was sent
-3     the controller is not reached, or the link broke
-4     the two sides do not understand each other
-5     the controller, or a check of its state, said no
-6     outcome unknown: sent, not answered
-7     the measurements do not support a result
-8     verification failed; the old value was put back
-9     a person declined
-10    a stop ended it
-70    a defect in robolink
-130   interrupted
-141   whoever read the output has left
-====  =====================================================================
-"""
+"""The one place where errors become exit codes and text."""
 
 import os
 import sys
@@ -32,11 +12,31 @@ from robolink.standing import standing_after
 from robolink_cli._render import dumps
 from robolink_cli._standing import standing_payload, tell_standing
 
+DONE: Final = 0
+DIFFERENT: Final = 1
 USAGE: Final = 2
 UNKNOWN: Final = 6
 BUG: Final = 70
 INTERRUPTED: Final = 130
 READER_LEFT: Final = 141
+
+MEANINGS: Final[dict[int, str]] = {
+    DONE: "done",
+    DIFFERENT: "`compare` found a difference; `journal verify` found a damaged record",
+    USAGE: "the command, a file, a setting or the journal is wrong",
+    3: "the controller is not reached, or the link broke",
+    4: "the two sides do not understand each other",
+    5: "the controller, or a check of its state, said no",
+    UNKNOWN: "something was begun and is not settled; `robolink recover` comes next",
+    7: "the measurements do not support a result",
+    8: "the proof failed; the old value was put back",
+    9: "a person said no, or was not there to say yes",
+    10: "a stop ended it",
+    BUG: "a defect in robolink",
+    INTERRUPTED: "interrupted (Ctrl-C)",
+    READER_LEFT: "whoever read the output has left",
+}
+"""What each exit code says; docs/exit-codes.md has the same table."""
 
 # The first class that fits decides. A tool number that does not exist is a mistake in the
 # command (2). A tool that was changed meanwhile, is undefined, or did not keep what was

@@ -70,7 +70,7 @@ class Ledger:
         self.same: Same = lambda a, b: a == b
         self._lock = threading.RLock()
         self._doubts: dict[str, _Deed] = {}
-        self._unrecorded: dict[str, _Deed] = {}
+        self._open: dict[str, Marker] = {}
         self._holds: dict[int, ToolOffset | None] = {}
         self._requested: dict[int, ToolOffset | None] = {}
         self._selected: int | None = None
@@ -81,10 +81,11 @@ class Ledger:
     # What is begun, and how it ends; told by whoever keeps the markers.
 
     def begin(self, marker: Marker) -> None:
-        """Note a command that is about to be sent; its marker is durable."""
-        if marker.kind not in (MarkerKind.SET, MarkerKind.MOVE):
-            return
+        """Note a command or a procedure that is about to begin; its marker is durable."""
         with self._lock:
+            self._open[marker.operation] = marker
+            if marker.kind not in (MarkerKind.SET, MarkerKind.MOVE):
+                return
             deed = self._doubts[marker.operation] = _Deed(marker)
             if deed.tool is not None:
                 self._requested[deed.tool] = deed.requested
@@ -110,24 +111,29 @@ class Ledger:
                 self._prove(deed, found)
 
     def ended(self, marker: Marker) -> None:
-        """Note that its outcome is known: proved before, or refused, or a movement that ended.
-
-        It counts as unrecorded until :meth:`recorded`.
-        """
+        """Note that its outcome is known: proved before, or refused, or a movement that ended."""
         with self._lock:
-            deed = self._doubts.get(marker.operation)
+            deed = self._doubts.pop(marker.operation, None)
             if deed is None:
                 return
             if deed.tool is not None:
                 self._holds.setdefault(deed.tool, deed.before)
             elif deed.selects:
                 self._selected = int(str(deed.marker.details["before"]))
-            self._close(deed)
 
     def recorded(self, marker: Marker) -> None:
-        """Note that its outcome is on record."""
+        """Note that its outcome is on record: its marker is gone."""
         with self._lock:
-            self._unrecorded.pop(marker.operation, None)
+            self._open.pop(marker.operation, None)
+
+    def open_writes(self, tool: int) -> tuple[Marker, ...]:
+        """Return the markers of writes to a tool whose outcome is known and not on record."""
+        with self._lock:
+            return tuple(
+                marker
+                for operation, marker in self._open.items()
+                if operation not in self._doubts and _Deed(marker).tool == tool
+            )
 
     # What is read besides.
 
@@ -147,7 +153,7 @@ class Ledger:
             doubts = [deed for deed in self._doubts.values() if deed.selects]
             if all(deed.answered for deed in doubts):
                 for deed in doubts:
-                    self._close(deed)
+                    del self._doubts[deed.marker.operation]
                 self._selected = tool
 
     # What stands.
@@ -200,7 +206,7 @@ class Ledger:
                 doubtful=tuple(deed.marker.request for deed in others),
                 moved=since.moved,
                 moving=tuple(deed.marker.request for deed in moves),
-                settled=not self._doubts and not self._unproved(since),
+                settled=not self._open and not any(map(self._stands, self._unkept)),
             )
 
     def _tool(self, tool: int, before: ToolOffset | None) -> ToolStanding:
@@ -214,22 +220,12 @@ class Ledger:
             differs=known and not self.same(holds, before),
         )
 
-    def _unproved(self, since: Account) -> bool:
-        """Whether something stands that is not on record, or that nobody has decided to keep."""
-        return any(self._matters(deed, since) for deed in self._unrecorded.values()) or any(
+    def _stands(self, account: Account) -> bool:
+        """Whether something that was not kept was not put back either."""
+        return any(
             not self.same(self._holds.get(tool, before), before)
-            for account in self._unkept
             for tool, before in account.before.items()
         )
-
-    def _matters(self, deed: _Deed, since: Account) -> bool:
-        """Whether it is more than a value that was put back."""
-        if deed.tool is not None and deed.tool in since.before:
-            before = since.before[deed.tool]
-            return not self.same(self._holds.get(deed.tool, before), before)
-        if deed.selects:
-            return self._selected != since.selected_before
-        return True
 
     def _prove(self, deed: _Deed, found: object) -> None:
         if deed.tool is not None:
@@ -239,12 +235,7 @@ class Ledger:
         else:
             for account in self._accounts:
                 account.carried_out[deed.marker.request] = None
-        self._close(deed)
-
-    def _close(self, deed: _Deed) -> None:
-        operation = deed.marker.operation
-        if self._doubts.pop(operation, None) is not None:
-            self._unrecorded[operation] = deed
+        del self._doubts[deed.marker.operation]
 
 
 def _plain(offset: ToolOffset | None) -> Components:

@@ -8,7 +8,7 @@ until :meth:`ToolChange.keep`; whatever ends it earlier puts the old values back
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import TracebackType
 from typing import Self
 
@@ -268,15 +268,24 @@ class ToolChange:
                 note_standing(error, ledger.standing(account))
 
     def _leave_open(self, error: RobolinkError) -> None:
-        """Say what stands in the journal for ``recover``."""
-        if not self._begun:
+        """Say what stands in the journal for ``recover``; nothing where no write was sent."""
+        tools = self._controller.ledger.standing(self._account).tools
+        stand = [number for number, tool in tools.items() if tool.differs or not tool.known]
+        if not stand:
             return
-        numbers = ", ".join(str(step.tool) for step in self._begun)
-        sentence = tr(
-            "Tool {numbers} may hold the new value, which nobody verified; 'robolink recover' "
-            "puts the old one back.",
-            numbers=numbers,
-        )
+        numbers = ", ".join(map(str, stand))
+        if self._marker is None:
+            sentence = tr(
+                "Tool {numbers} may hold the new value, which nobody verified; 'robolink recover' "
+                "reads what it holds.",
+                numbers=numbers,
+            )
+        else:
+            sentence = tr(
+                "Tool {numbers} may hold the new value, which nobody verified; 'robolink recover' "
+                "puts the old one back.",
+                numbers=numbers,
+            )
         self._tell(sentence)
         error.remedy = f"{error.remedy} {sentence}".strip()
 
@@ -285,10 +294,23 @@ class ToolChange:
         # The error under way matters more than that it cannot be recorded; what is not
         # recorded stays open.
         with suppress(ConfigError):
+            for result in done:
+                self._close_writes(result)
             if self._marker is not None and all(result.restored for result in done):
                 self._controller.finish(self._marker, *entries)
             else:
                 self._controller.outcomes.append(*entries)
+
+    def _close_writes(self, result: PutBack) -> None:
+        """Forget the markers of writes whose value is known to be gone again.
+
+        They stand open where a fault of the controller, or of the journal, came between write
+        and record.
+        """
+        if result.restored:
+            for marker in self._controller.ledger.open_writes(result.tool):
+                entry = replace(result.entry, operation=marker.operation)
+                self._controller.finish(marker, entry)
 
 
 def change_tools(

@@ -32,7 +32,7 @@ def disturbed_and_checked(name: str, command: Command, runs: list[Disturbed], fo
         except AssertionError as error:
             error.add_note(f"{name}: {disturbed}")
             raise
-    print(f"\n{name}: {len(runs)} runs, {dict(ends)}")
+    print(f"\n{name}: {len(runs)} runs, {dict(ends)}")  # noqa: T201 - for pytest -s
     assert any(end != "done" for end in ends), "nothing was disturbed"
 
 

@@ -11,6 +11,7 @@ import click
 import robolink
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink.standing import UNTOUCHED, note_standing, standing_after
 from robolink_cli._cell import (
     is_cell_name,
     link_options,
@@ -149,6 +150,7 @@ def open_controller(
         station=context.station,
     )
     with (
+        _only_what_was_touched(always=changes),
         recording(context.record, url.partition("?")[0]) as trace,
         robolink.connect(
             url,
@@ -178,6 +180,17 @@ def open_controller(
     if not any_robot:
         # A stop that came while the connection was closed: nobody may take this for a success.
         controller.latch.require_open(tr("The command"))
+
+
+@contextmanager
+def _only_what_was_touched(*, always: bool) -> Iterator[None]:
+    """Let an error tell what stands on the controller, if the command might have changed it."""
+    try:
+        yield
+    except BaseException as error:
+        if not always and standing_after(error).untouched:
+            note_standing(error, UNTOUCHED)
+        raise
 
 
 def password_of(context: CliContext) -> "Secret | None":

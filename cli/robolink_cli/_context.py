@@ -1,7 +1,7 @@
 """What every command that talks to a controller has in common."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from functools import wraps
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -161,6 +161,7 @@ def open_controller(
             signature=signature,
             outcomes=_journal_or_memory(url) if any_robot else None,
         ) as controller,
+        nullcontext() if any_robot else controller.latch.ending(tr("The command")),
     ):
         click.get_current_context().meta[WATCHED] = controller
         found = controller.outcomes.open_markers()

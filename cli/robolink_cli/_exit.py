@@ -1,7 +1,7 @@
 """The one place where errors become exit codes and text."""
 
+import io
 import os
-import sys
 from typing import Final
 
 import click
@@ -10,6 +10,7 @@ from robolink import errors
 from robolink.messages import tr
 from robolink.standing import standing_after
 from robolink_cli._render import dumps
+from robolink_cli._sink import hand_over, show
 from robolink_cli._standing import standing_payload, tell_standing
 
 DONE: Final = 0
@@ -78,16 +79,18 @@ def report(error: BaseException, *, as_json: bool) -> int:
     if os.environ.get("ROBOLINK_DEBUG"):
         import traceback  # here, because --help needs none
 
-        traceback.print_exception(error)
+        show("".join(traceback.format_exception(error)), beside=True)
     if as_json:
-        click.echo(error_document(error))
+        hand_over(error_document(error))
     elif isinstance(error, click.ClickException):
-        error.show(file=sys.stderr)
+        usage = io.StringIO()
+        error.show(file=usage)  # it repeats what was typed
+        show(usage.getvalue().rstrip("\n"), beside=True)
     else:
         what, remedy = _sentences(error)
-        click.echo(f"robolink: {what}", file=sys.stderr)
+        show(f"robolink: {what}", beside=True)
         if remedy:
-            click.echo(f"  {remedy}", file=sys.stderr)
+            show(f"  {remedy}", beside=True)
     if not as_json:
         tell_standing(standing_after(error))
     return code

@@ -99,7 +99,26 @@ def _text(name: str) -> Column[str]:
     return Column(name, Text, nullable=False)
 
 
-MIGRATIONS: tuple[Callable[[Connection], None], ...] = (_first_tables,)
+def _names(connection: Connection) -> None:
+    """Let a controller be known by what it says of itself, not by how its URL is spelled.
+
+    Entries are chained and stay as they are: whose they are stands in ``former_names``.
+    """
+    metadata = MetaData()
+    Table(
+        "addresses",
+        metadata,
+        Column("address", Text, primary_key=True),
+        *map(_text, ("controller", "met_at")),
+    )
+    Table("former_names", metadata, Column("name", Text, primary_key=True), _text("controller"))
+    metadata.create_all(connection)
+
+
+MIGRATIONS: tuple[Callable[[Connection], None], ...] = (_first_tables, _names)
+
+NAMED: Final = 2
+"""From this version on a journal tells names from addresses."""
 
 
 def stored_version(connection: Connection, name: str) -> int:
@@ -146,14 +165,9 @@ def newer_error(name: str, found: int) -> JournalError:
     )
 
 
-def older_error(name: str, found: int) -> JournalError:
-    """Return the error about tables that would have to be migrated before they can be read."""
-    if found == 0:
-        return JournalError(
-            tr("The journal {name} is empty.", name=name),
-            remedy=tr("The first change that robolink makes starts it."),
-        )
+def empty_error(name: str) -> JournalError:
+    """Return the error about a database in which nobody has made the tables yet."""
     return JournalError(
-        tr("The journal {name} has the older form {found}.", name=name, found=found),
-        remedy=tr("Open it once for writing; that brings it up to date."),
+        tr("The journal {name} is empty.", name=name),
+        remedy=tr("The first change that robolink makes starts it."),
     )

@@ -1,11 +1,9 @@
 """What stands on the controller when a command ended early: as a sentence, and as JSON."""
 
-import sys
 from typing import Final
 
-import click
-
 from robolink.standing import UNTOUCHED, Components, Standing
+from robolink_cli._sink import show
 
 _NAMES: Final = ("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
 
@@ -15,7 +13,7 @@ def tell_standing(standing: Standing) -> None:
     if standing is not UNTOUCHED:
         from robolink.model import describe_standing  # here, because --help needs none
 
-        click.echo(describe_standing(standing), file=sys.stderr)
+        show(describe_standing(standing), beside=True)
 
 
 def standing_payload(standing: Standing) -> dict[str, object]:

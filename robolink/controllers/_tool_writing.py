@@ -170,6 +170,7 @@ class ToolWriter:
                         self._desk.clear(marker, _refusal(marker, error))
                     raise
                 except UnclearAnswerError as error:
+                    ledger.answered(marker)
                     unclear = error
                 found = read()
             ledger.proved(marker, found)

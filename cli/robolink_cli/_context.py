@@ -137,6 +137,7 @@ def open_controller(
             not the cell's.
         ConnectError: It is not reached.
         LoginRefusedError: Wrong or missing password.
+        StoppedError: A stop came, at the end or before.
     """
     url = context.require_url()
     named = context.cell.name if context.cell else url
@@ -174,6 +175,9 @@ def open_controller(
         finally:
             left = controller.outcomes.open_markers()
             note_unsettled(controller, [m for m in left if m not in found], named)
+    if not any_robot:
+        # A stop that came while the connection was closed: nobody may take this for a success.
+        controller.latch.require_open(tr("The command"))
 
 
 def password_of(context: CliContext) -> "Secret | None":

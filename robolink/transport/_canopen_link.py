@@ -2,8 +2,9 @@
 
 import struct
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import Final
 
 from robolink.errors import (
@@ -62,9 +63,15 @@ def open_canopen_link(
     start = options.take_choice("start", "yes", {"yes": True, "no": False})
     in_process = url.options.get("interface") == "virtual"
     line = open_can_bus(url, options, identifiers(node))
+    looking = replace(url, options={**url.options, "start": "no"})
+
+    def again(timeout_s: float) -> CanopenMailboxLink:
+        return open_canopen_link(looking, timeout_s=timeout_s, clock=clock)
+
     link = CanopenMailboxLink(
         line,
         node,
+        again,
         identity=f"{url.identity}?node={node}",
         durable=not in_process,
         timeout_s=timeout_s,
@@ -85,6 +92,7 @@ class CanopenMailboxLink:
         self,
         line: CanLine,
         node: int,
+        again: Callable[[float], "CanopenMailboxLink"],
         *,
         identity: str,
         durable: bool,
@@ -93,6 +101,7 @@ class CanopenMailboxLink:
     ) -> None:
         self._line = line
         self._node = node
+        self._again = again
         self._identity = identity
         self._durable = durable
         self._timeout_s = timeout_s
@@ -185,6 +194,10 @@ class CanopenMailboxLink:
         (beat,) = require_words((word,), 1)
         with self._exchange():
             self._watch.beat(beat)
+
+    def reopened(self, *, timeout_s: float) -> "CanopenMailboxLink":
+        """See :meth:`robolink.transport.MailboxLink.reopened`; it does not start the node."""
+        return self._again(timeout_s)
 
     def close(self) -> None:
         """See :meth:`robolink.transport.MailboxLink.close`."""

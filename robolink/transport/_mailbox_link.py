@@ -85,6 +85,13 @@ class MailboxLink(Protocol):
     def beat(self, word: int) -> None:
         """Write the client's heartbeat alone, word 62 of the command block."""
 
+    def reopened(self, *, timeout_s: float) -> "MailboxLink":
+        """Open another link to the same far end, after this one has ended; never by itself.
+
+        Raises:
+            ConnectError: It cannot be reached.
+        """
+
     def close(self) -> None:
         """Close. Idempotent; any thread may call it at any time."""
 

@@ -1,6 +1,6 @@
 """A PLC mailbox in the registers of a Modbus server (design part 7)."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
@@ -49,7 +49,7 @@ class MailboxPlaces:
 
 
 def open_modbus_link(
-    url: LinkUrl, *, timeout_s: float, clock: Clock | None = None
+    url: LinkUrl, *, timeout_s: float, clock: Clock | None = None, to_stop: bool = False
 ) -> "ModbusMailboxLink":
     """Open a mailbox over Modbus TCP or RTU.
 
@@ -59,6 +59,7 @@ def open_modbus_link(
             (``holding`` reads response and slots from holding registers, function 3).
         timeout_s: Longest wait for the connection, and for each answer.
         clock: Keeps the deadlines.
+        to_stop: Whether it is opened for a stop alone, so that nothing may be loaded for it.
 
     Raises:
         ConfigError: The URL or an option is wrong.
@@ -68,16 +69,28 @@ def open_modbus_link(
     options = UrlOptions(url)
     places = _take_places(options)
     probe = Probe(places.area, places.response)
-    client = open_client(url, options, probe=probe, timeout_s=timeout_s, clock=clock)
-    return ModbusMailboxLink(client, places)
+    client = open_client(
+        url, options, probe=probe, timeout_s=timeout_s, clock=clock, to_stop=to_stop
+    )
+
+    def again(timeout_s: float) -> ModbusMailboxLink:
+        return open_modbus_link(url, timeout_s=timeout_s, clock=clock)
+
+    return ModbusMailboxLink(client, places, again)
 
 
 class ModbusMailboxLink:
     """Implements :class:`~robolink.transport.MailboxLink` on a client, and owns it."""
 
-    def __init__(self, client: ModbusClient, places: MailboxPlaces) -> None:
+    def __init__(
+        self,
+        client: ModbusClient,
+        places: MailboxPlaces,
+        again: Callable[[float], "ModbusMailboxLink"],
+    ) -> None:
         self._client = client
         self._places = places
+        self._again = again
 
     @property
     def identity(self) -> str:
@@ -132,6 +145,10 @@ class ModbusMailboxLink:
         self._client.write_registers(
             self._places.command + HEARTBEAT_WORD, require_words((word,), 1)
         )
+
+    def reopened(self, *, timeout_s: float) -> "ModbusMailboxLink":
+        """See :meth:`robolink.transport.MailboxLink.reopened`."""
+        return self._again(timeout_s)
 
     def close(self) -> None:
         """See :meth:`robolink.transport.MailboxLink.close`."""

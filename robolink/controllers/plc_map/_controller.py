@@ -26,6 +26,7 @@ from robolink.model import (
     OutcomeLog,
 )
 from robolink.register_maps import RegisterMap, confirmation_of
+from robolink.stop_latch import StopLatch
 from robolink.timing import Clock
 
 
@@ -51,7 +52,7 @@ class PlcMapController:
         self._registers = Registers(client)
         self._outcomes = outcomes
         outcomes.ask(IdentityReader(self._registers, register_map).read)
-        self._lock = ProcedureLock(client.identity)
+        self._lock = ProcedureLock(client.identity, self._registers.latch)
         self._desk = MarkerDesk(client.identity, outcomes)
         self._tools = RegisterToolTable(
             self._registers,
@@ -153,13 +154,23 @@ class PlcMapController:
         """Refuse; see :meth:`stop`."""
         raise no_motion(self.identity)
 
+    @property
+    def latch(self) -> StopLatch:
+        """What holds every write back from :meth:`stop` until :meth:`release_stop`."""
+        return self._registers.latch
+
     def stop(self) -> None:
-        """Refuse: nothing here can stop the machine.
+        """Write nothing from here on; the machine itself nothing here can stop.
 
         Raises:
             RejectedError: Always; the message says to use the emergency stop.
         """
+        self._registers.latch.close()
         raise no_motion(self.identity)
+
+    def release_stop(self) -> None:
+        """Let this process write again after :meth:`stop`, because a person says so."""
+        self._registers.latch.release()
 
     def reset_fault(self) -> None:
         """Refuse; see :meth:`stop`."""

@@ -53,7 +53,7 @@ class Mailbox:
         self.snapshots = snapshots
         self.orders = Orders(wire, snapshots)
         self.desk = MarkerDesk(wire.identity, outcomes)
-        self.lock = ProcedureLock(wire.identity)
+        self.lock = ProcedureLock(wire.identity, wire.latch)
         # A refused command did nothing, whatever the reason (design part 7).
         self.writer = ToolWriter(
             self.desk,

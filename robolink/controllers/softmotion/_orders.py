@@ -7,10 +7,14 @@ PLC counts one more damaged block and has acknowledged nothing since. Never afte
 """
 
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import Final
 
+from robolink.checkpoints import Point, checkpoint
 from robolink.controllers.softmotion._answers import Ended, cut_short, describe, refused
+from robolink.controllers.softmotion._effects import effect_of
 from robolink.controllers.softmotion._ownership import Ownership
 from robolink.controllers.softmotion._rides import has_ended
 from robolink.controllers.softmotion._snapshots import Snapshots
@@ -19,6 +23,7 @@ from robolink.errors import (
     ConfigError,
     RejectedError,
     RemoteProtocolError,
+    StoppedError,
     TransportTimeoutError,
 )
 from robolink.messages import tr
@@ -57,8 +62,12 @@ class Orders:
         self._last = 0
         self.ownership = Ownership(wire, self._to_end)
 
-    def carry_out(self, draft: Command) -> Response:
+    def carry_out(self, draft: Command, *, within_s: float = COMPLETION_S) -> Response:
         """Send a command that is no movement and return the snapshot that shows its end.
+
+        Args:
+            draft: The command.
+            within_s: Longest time between its acknowledgement and its end.
 
         Raises:
             RejectedError: The PLC refused it; it did nothing.
@@ -69,7 +78,7 @@ class Orders:
         """
         with self._wire.uninterrupted():
             self._possess(draft)
-            end = self._to_end(draft)
+            end = self._to_end(draft, within_s)
             if end.state == CommandState.ERROR:
                 raise self._refusal(end.command, end.now, end.error_class)
             if end.state == CommandState.ABORTED:
@@ -100,9 +109,9 @@ class Orders:
             self.ownership.lose()
         return refused(command, now, error_class)
 
-    def _to_end(self, draft: Command) -> Ended:
+    def _to_end(self, draft: Command, within_s: float = COMPLETION_S) -> Ended:
         command, now = self._send(draft)
-        deadline = Deadline.after(self._wire.clock, COMPLETION_S)
+        deadline = Deadline.after(self._wire.clock, within_s)
         while (end := self._end_of(command, now)) is None:
             if deadline.expired:
                 raise self._wire.ended(self._silence(command, tr("began, and has not ended")))
@@ -124,7 +133,8 @@ class Orders:
 
     def _send(self, draft: Command, *, ride: bool = False) -> tuple[Command, Response]:
         """Write a command and return it with the snapshot that acknowledges it."""
-        with self._lock:
+        request = describe(draft)
+        with self._exchanging(request):
             before = self._snapshots.take()
             self._require_able(draft, before)
             command = self._addressed(draft, before)
@@ -135,8 +145,9 @@ class Orders:
                 self._wire.rides.begin(command.sequence)
             for _ in range(_WRITES):
                 try:
+                    self._wire.latch.admit(effect_of(command), request)
                     self._wire.write(words)
-                except RejectedError:
+                except (RejectedError, StoppedError):
                     self._wire.rides.forget(command.sequence)
                     raise
                 before, accepted = self._await_acknowledgement(command, before)
@@ -148,6 +159,17 @@ class Orders:
                     remedy=tr("Look for a gateway that changes registers, or a bad line."),
                 )
             )
+
+    @contextmanager
+    def _exchanging(self, request: str) -> Iterator[None]:
+        """Hold the lock from the look at the latch to the acknowledgement."""
+        checkpoint(Point.LOCK, request)
+        try:
+            with self._lock:
+                checkpoint(Point.HELD, request)
+                yield
+        finally:
+            checkpoint(Point.EXCHANGE, request)
 
     def _await_acknowledgement(self, command: Command, before: Response) -> tuple[Response, bool]:
         """Return the snapshot that shows the acknowledgement, or the damage, of a block."""

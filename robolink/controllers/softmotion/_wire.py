@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from typing import Final, TypeVar
 
+from robolink.checkpoints import Point, checkpoint
 from robolink.controllers.softmotion._pulse import ClientBeat
 from robolink.controllers.softmotion._rides import Rides
 from robolink.errors import (
@@ -21,10 +22,13 @@ from robolink.errors import (
 )
 from robolink.interrupts import InterruptGate
 from robolink.messages import tr
+from robolink.stop_latch import StopLatch
 from robolink.timing import Clock
 from robolink.transport import MailboxHead, MailboxLink
 
 _READS: Final = 3
+_LOOK_BACK_S: Final = 1.0
+"""Longest time for a look at what ended the session."""
 
 T = TypeVar("T")
 ErrorT = TypeVar("ErrorT", bound=RobolinkError)
@@ -37,8 +41,11 @@ class MailboxWire:
         owner: This client's token, never 0.
         epoch: The epoch of our ownership, 0 while we have none.
         rides: The movements of this client.
+        latch: What holds commands back while a stop is in force.
         timeout_s: Longest wait for the PLC to acknowledge a command.
         exchanges: Requests sent so far.
+        look_back: Looks over another link at what ended the session; ``None`` before the
+            meeting.
     """
 
     def __init__(self, link: MailboxLink, *, owner: int, timeout_s: float) -> None:
@@ -51,8 +58,10 @@ class MailboxWire:
         self.owner = owner
         self.epoch = 0
         self.rides = Rides(owner)
+        self.latch = StopLatch(link.identity)
         self.timeout_s = timeout_s
         self.exchanges = 0
+        self.look_back: Callable[[MailboxLink], RobolinkError | None] | None = None
 
     @property
     def identity(self) -> str:
@@ -119,9 +128,10 @@ class MailboxWire:
             self.exchanges += 1
             try:
                 self._link.write_command(words)
+                return
             except (TransportError, RemoteProtocolError) as error:
-                self.ended(error)
-                raise
+                lost = error
+        raise self._over(lost)
 
     @contextmanager
     def attended(self) -> Iterator[None]:
@@ -186,12 +196,37 @@ class MailboxWire:
             try:
                 with self._gate:
                     self.exchanges += 1
-                    return exchange()
+                    found = exchange()
+                checkpoint(Point.EXCHANGE, "read")
+                return found
             except (TransportError, RemoteProtocolError) as error:
                 lost.append(error)
                 if isinstance(error, TransportClosedError):
                     break  # the link cannot be used any more
-        raise self.ended(lost[0])
+        raise self._over(lost[0])
+
+    def _over(self, error: RobolinkError) -> RobolinkError:
+        """End the session because of ``error``, and return what is to be said about it."""
+        told = self._explained(error)
+        if told is not error:
+            told.__cause__ = error
+        return self.ended(told)
+
+    def _explained(self, error: RobolinkError) -> RobolinkError:
+        """Return why the link ended, if another look tells more; it only reads."""
+        if self.look_back is None or isinstance(error, RemoteProtocolError):
+            return error
+        self._link.close()
+        try:
+            link = self._link.reopened(timeout_s=_LOOK_BACK_S)
+        except RobolinkError:
+            return error
+        try:
+            return self.look_back(link) or error
+        except RobolinkError:
+            return error
+        finally:
+            link.close()
 
     def _require_alive(self) -> None:
         if self._ended_by is not None:

@@ -100,6 +100,10 @@ class InProcessMailboxLink:
         """See :meth:`robolink.transport.MailboxLink.beat`."""
         self._exchange(lambda now_ns: self._simulator.write(_HEARTBEAT, (word,), now_ns))
 
+    def reopened(self, *, timeout_s: float) -> "InProcessMailboxLink":
+        """See :meth:`robolink.transport.MailboxLink.reopened`."""
+        return InProcessMailboxLink(self._identity, self._simulator, self._clock, timeout_s)
+
     def close(self) -> None:
         """See :meth:`robolink.transport.MailboxLink.close`."""
         self._closed = True

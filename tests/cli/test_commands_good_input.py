@@ -146,6 +146,7 @@ def test_the_dry_run_of_a_calibration_shows_every_step_and_writes_nothing(cell):
 
 
 def test_the_dry_run_of_resolve_says_what_is_true_and_settles_nothing(cell):
+    assert cell.run("status").code == 0
     log = open_journal().log(cell.url)
     details = {"tool": 1, "before": [12.0, -3.5, -20.0, 0.0, 0.0, 0.0], "requested": [1.0] * 6}
     marker = Marker("a", MarkerKind.SET, "TLSet 1, XY(1)", "2026-01-01T00:00:00+00:00", details)

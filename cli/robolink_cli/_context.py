@@ -211,7 +211,7 @@ def open_controller(
             signature=signature,
             outcomes=_journal_or_memory(url) if unhindered else None,
         ) as controller,
-        nullcontext() if any_robot else controller.latch.ending(tr("The command")),
+        nullcontext() if calms else controller.latch.ending(tr("The command")),
     ):
         click.get_current_context().meta.update({WATCHED: controller, REACHED: url})
         remember_address(context)
@@ -230,7 +230,7 @@ def open_controller(
         finally:
             left = _open_markers(controller, lenient=unhindered)
             note_unsettled(controller, [m for m in left if m not in found], named)
-    if not any_robot:
+    if not calms:
         # A stop that came while the connection was closed: nobody may take this for a success.
         controller.latch.require_open(tr("The command"))
 

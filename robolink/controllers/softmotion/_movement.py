@@ -78,9 +78,11 @@ class SoftMotionMotion:
         ):
             if self._end is None and mailbox.wire.rides.end_of(self._command.sequence) is None:
                 self._halted = True
-                # It may have just ended by itself, or by a stop; its end is awaited.
-                with suppress(RejectedError, ControllerFaultError):
-                    mailbox.orders.carry_out(Command(0, Opcode.HALT))
+                # It may have just ended by itself, or by a stop; its end is awaited. A stop that is
+                # under way ends it too, and a halt after it would only hide the end of the stop.
+                if not mailbox.wire.latch.closed:
+                    with suppress(RejectedError, ControllerFaultError):
+                        mailbox.orders.carry_out(Command(0, Opcode.HALT))
             if not self._watch(Deadline.after(mailbox.wire.clock, _HALT_S)):
                 raise mailbox.wire.ended(
                     TransportTimeoutError(

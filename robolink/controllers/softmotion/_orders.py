@@ -25,6 +25,7 @@ from robolink.errors import (
     RemoteProtocolError,
     StoppedError,
     TransportTimeoutError,
+    UnclearAnswerError,
 )
 from robolink.messages import tr
 from robolink.protocols.mailbox import (
@@ -45,6 +46,9 @@ COMPLETION_S: Final = 10.0
 """Longest time between the acknowledgement and the end of what is not a movement."""
 
 _WRITES: Final = 3
+_OVERTAKEN: Final = frozenset({Opcode.STOP, Opcode.HALT})
+"""Commands whose end another stop or halt may hide: it does the same, and rest is looked for."""
+
 _DISPOSSESSED: Final = frozenset({ErrorClass.NOT_OWNER, ErrorClass.STALE_EPOCH})
 
 
@@ -127,9 +131,12 @@ class Orders:
             return Ended(command, CommandState.DONE, ErrorClass.NONE, now)
         if now.ack_owner != command.owner:
             raise self._wire.ended(self._overtaken(command, now))
-        # Our own stop was accepted after it, from another thread.
+        # Our own stop or halt was accepted after it, from another thread.
         ends = (end for end in now.finished if end.sequence == command.sequence)
-        return next((Ended(command, end.state, end.error_class, now) for end in ends), None)
+        end = next((Ended(command, end.state, end.error_class, now) for end in ends), None)
+        if end is None and command.opcode not in _OVERTAKEN:
+            raise self._unseen(command)
+        return end or Ended(command, CommandState.DONE, ErrorClass.NONE, now)
 
     def _send(self, draft: Command, *, ride: bool = False) -> tuple[Command, Response]:
         """Write a command and return it with the snapshot that acknowledges it."""
@@ -222,6 +229,16 @@ class Orders:
         return TransportTimeoutError(
             tr("{request!r} {how}.", request=describe(command), how=how),
             remedy=tr("Look at the PLC; the command may still be carried out."),
+            request=describe(command),
+        )
+
+    def _unseen(self, command: Command) -> UnclearAnswerError:
+        # Only what a stop ends is kept among the last ends; what had ended before it, well or
+        # not, is not shown any more (design part 7).
+        return UnclearAnswerError(
+            tr("A stop came before the end of {request!r} was read.", request=describe(command)),
+            remedy=tr("Read again what it was to change."),
+            controller=self._wire.identity,
             request=describe(command),
         )
 

@@ -162,6 +162,8 @@ def open_controller(
     ):
         click.get_current_context().meta[WATCHED] = controller
         found = controller.outcomes.open_markers()
+        for remark in controller.outcomes.remarks:
+            note(remark)
         if not quiet:
             note_unsettled(controller, found, named)
         if context.cell and not any_robot:

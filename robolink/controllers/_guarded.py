@@ -30,7 +30,8 @@ from robolink.errors import (
     TransportError,
 )
 from robolink.messages import tr
-from robolink.model import Marker, MarkerKind, NewEntry, OutcomeLog, new_operation
+from robolink.model import Ledger, Marker, MarkerKind, NewEntry, OutcomeLog, new_operation
+from robolink.standing import note_standing
 from robolink.stop_latch import StopLatch
 from robolink.timing import wall_label
 
@@ -82,6 +83,7 @@ class MarkerDesk:
 
     Attributes:
         outcomes: Where they are kept.
+        ledger: What became of what was begun here; it is told before they are.
 
     Args:
         identity: Which controller.
@@ -91,6 +93,7 @@ class MarkerDesk:
     def __init__(self, identity: str, outcomes: OutcomeLog) -> None:
         self._identity = identity
         self.outcomes = outcomes
+        self.ledger = Ledger()
         self._procedures: dict[MarkerKind, Marker] = {}
 
     def look(self) -> None:
@@ -128,13 +131,16 @@ class MarkerDesk:
         name = operation or new_operation()
         marker = Marker(name, kind, request, wall_label(), dict(details))
         self.outcomes.begin(marker)
+        self.ledger.begin(marker)
         if kind in _PROCEDURES:
             self._procedures[kind] = marker
         return marker
 
     def clear(self, marker: Marker, *entries: NewEntry) -> None:
-        """Forget a marker whose outcome is proved, and journal how it ended."""
+        """Forget a marker whose outcome is known, and journal how it ended."""
+        self.ledger.ended(marker)
         self.outcomes.clear(marker.operation, *entries)
+        self.ledger.recorded(marker)
         known = self._procedures.get(marker.kind)
         if known is not None and known.operation == marker.operation:
             del self._procedures[marker.kind]
@@ -212,7 +218,7 @@ class MarkerDesk:
         try:
             yield
         except (TransportError, RemoteProtocolError) as error:
-            raise OutcomeUnknownError(
+            doubt = OutcomeUnknownError(
                 tr(
                     "No clear answer came to {request!r}: it may or may not have run ({cause})",
                     request=request,
@@ -225,4 +231,6 @@ class MarkerDesk:
                 controller=self._identity,
                 request=request,
                 raw=error.raw,
-            ) from error
+            )
+            note_standing(doubt, self.ledger.standing())
+            raise doubt from error

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from robolink.model._journal_entries import NewEntry as NewEntry
     from robolink.model._journal_entries import Recorded as Recorded
     from robolink.model._journal_entries import Signature as Signature
+    from robolink.model._ledger import Account as Account
+    from robolink.model._ledger import Ledger as Ledger
     from robolink.model._motion import Motion as Motion
     from robolink.model._motion import MotionGroup as MotionGroup
     from robolink.model._motion import MotionOutcome as MotionOutcome
@@ -39,6 +41,7 @@ if TYPE_CHECKING:
     from robolink.model._people import Role as Role
     from robolink.model._people import require_engineer as require_engineer
     from robolink.model._secret import Secret as Secret
+    from robolink.model._standing_words import describe_standing as describe_standing
     from robolink.model._tip_sensor import TIP as TIP
     from robolink.model._tip_sensor import Spot as Spot
     from robolink.model._tip_sensor import SpotUnit as SpotUnit
@@ -65,10 +68,12 @@ else:
             "_identity": "Identity Who",
             "_io": "DigitalIo",
             "_journal_entries": "EntryKind NewEntry Recorded Signature",
+            "_ledger": "Account Ledger",
             "_motion": "Motion MotionGroup MotionOutcome MotionProfile MotionTerms Path WorkBox",
             "_outcomes": "Marker MarkerKind OutcomeLog new_operation",
             "_people": "Role require_engineer",
             "_secret": "Secret",
+            "_standing_words": "describe_standing",
             "_tip_sensor": "Spot SpotUnit TIP TipSensor",
             "_tools": (
                 "ANY Expect Expected ToolOffset ToolReceipt ToolTable describe_offset "

@@ -10,6 +10,7 @@ from typing import Protocol, Self
 from robolink.model._facts import ControllerFacts
 from robolink.model._findings import Resolver
 from robolink.model._journal_entries import NewEntry
+from robolink.model._ledger import Ledger
 from robolink.model._motion import MotionGroup
 from robolink.model._outcomes import Marker, MarkerKind, OutcomeLog
 from robolink.model._tools import ToolTable
@@ -130,6 +131,10 @@ class Controller(Protocol):
     @property
     def outcomes(self) -> OutcomeLog:
         """The doubtful outcomes and the unfinished procedures of this controller."""
+
+    @property
+    def ledger(self) -> Ledger:
+        """What was done to it since connecting, and how much of that is proved."""
 
     @property
     def resolver(self) -> Resolver:

@@ -96,6 +96,16 @@ def test_an_error_is_one_json_document(command, capsys):
             "remedy": "Close it.",
             "reason": "guard_open",
             "code": None,
+            "controller_state": "unchanged",
+            "stands": {
+                "tools": {},
+                "selected_tool": None,
+                "selected_before": None,
+                "carried_out": [],
+                "doubtful": [],
+                "moving": [],
+                "settled": True,
+            },
         },
         "exit_code": 5,
     }

@@ -31,7 +31,7 @@ def cell(tmp_path, monkeypatch):
 COMMANDS = {
     "status": (["status"], "robolink/status/1", "tool in force: 1"),
     "where": (["where"], "robolink/where/1", "tool 1 in local 0"),
-    "stop": (["stop"], "robolink/stop/1", "Stop was accepted"),
+    "stop": (["stop"], "robolink/stop/1", "stands; its state is: ready"),
     "reset": (["reset", "--yes"], "robolink/reset/1", "ready"),
     "motors on": (["motors", "on", "--yes"], "robolink/motors/1", "The motors are on."),
     "motors off": (["motors", "off"], "robolink/motors/1", "The motors are off."),
@@ -54,7 +54,7 @@ COMMANDS = {
 }
 
 REQUESTS = {
-    "stop": ["$Stop"],
+    "stop": ["$Abort", "$Stop"],
     "reset": ["$Reset"],
     "motors on": ["$SetMotorsOn,1"],
     "motors off": ["$SetMotorsOff,1"],

@@ -34,12 +34,14 @@ from robolink.model import (
     Capabilities,
     ControllerFacts,
     ControllerStatus,
+    Ledger,
     Marker,
     MarkerKind,
     NewEntry,
     OutcomeLog,
 )
 from robolink.protocols.epson_text import Preference
+from robolink.standing import note_standing
 from robolink.stop_latch import StopLatch
 from robolink.timing import Clock
 
@@ -148,6 +150,11 @@ class EpsonController:
     def outcomes(self) -> OutcomeLog:
         """Open markers of this controller."""
         return self._outcomes
+
+    @property
+    def ledger(self) -> Ledger:
+        """What was done here since connecting, and how much of it is proved."""
+        return self._desk.ledger
 
     @property
     def resolver(self) -> EpsonResolver:
@@ -323,3 +330,5 @@ class EpsonController:
         trace: TracebackType | None,
     ) -> None:
         self.close()
+        if error is not None:
+            note_standing(error, self.ledger.standing())

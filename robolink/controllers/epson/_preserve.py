@@ -96,7 +96,7 @@ class Preserver:
     @contextmanager
     def preserved(self, reason: str) -> Iterator[None]:
         """See :meth:`robolink.model.Controller.preserved`."""
-        with self._lock.held(reason):
+        with self._lock.held(reason), self._desk.ledger.block():
             self._desk.look()
             self._desk.require_settled(reason)
             self._window.require_ready(reason)

@@ -110,7 +110,7 @@ class ValueSetter:
 
     def _set(self, change: Change[ValueT], request: str, before: ValueT) -> ValueT:
         details = {"item": list(change.item), "before": before, "requested": change.requested}
-        with self._session.uninterrupted():
+        with self._session.uninterrupted(), self._desk.ledger.block():
             marker = self._desk.begin(MarkerKind.SET, request, details)
             with self._desk.doubt(request):
                 try:
@@ -121,5 +121,6 @@ class ValueSetter:
                         self._desk.clear(marker)
                     raise
                 found = change.read()
+            self._desk.ledger.proved(marker, found)
             self._desk.clear(marker)
         return found

@@ -20,12 +20,14 @@ from robolink.model import (
     Capabilities,
     ControllerFacts,
     ControllerStatus,
+    Ledger,
     Marker,
     MarkerKind,
     NewEntry,
     OutcomeLog,
 )
 from robolink.register_maps import RegisterMap, confirmation_of
+from robolink.standing import note_standing
 from robolink.stop_latch import StopLatch
 from robolink.timing import Clock
 
@@ -96,6 +98,11 @@ class PlcMapController:
     def outcomes(self) -> OutcomeLog:
         """Open markers of this PLC."""
         return self._outcomes
+
+    @property
+    def ledger(self) -> Ledger:
+        """What was done here since connecting, and how much of it is proved."""
+        return self._desk.ledger
 
     @property
     def resolver(self) -> RegisterResolver:
@@ -210,7 +217,7 @@ class PlcMapController:
     @contextmanager
     def preserved(self, reason: str) -> Iterator[None]:
         """Keep other procedures out; nothing is selected or moved, so nothing is put back."""
-        with self._lock.held(reason):
+        with self._lock.held(reason), self._desk.ledger.block():
             self._desk.look()
             self._desk.require_settled(reason)
             yield
@@ -230,6 +237,8 @@ class PlcMapController:
         trace: TracebackType | None,
     ) -> None:
         self.close()
+        if error is not None:
+            note_standing(error, self.ledger.standing())
 
     @property
     def _permitted(self) -> bool:

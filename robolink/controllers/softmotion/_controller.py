@@ -22,6 +22,7 @@ from robolink.model import (
     Capabilities,
     ControllerFacts,
     ControllerStatus,
+    Ledger,
     Marker,
     MarkerKind,
     NewEntry,
@@ -35,6 +36,7 @@ from robolink.protocols.mailbox import (
     Opcode,
     Response,
 )
+from robolink.standing import note_standing
 from robolink.stop_latch import StopLatch
 from robolink.timing import Clock, Deadline
 
@@ -107,6 +109,11 @@ class SoftMotionController:
     def outcomes(self) -> OutcomeLog:
         """Open markers of this PLC."""
         return self._mailbox.desk.outcomes
+
+    @property
+    def ledger(self) -> Ledger:
+        """What was done here since connecting, and how much of it is proved."""
+        return self._mailbox.desk.ledger
 
     @property
     def resolver(self) -> SoftMotionResolver:
@@ -293,6 +300,8 @@ class SoftMotionController:
         trace: TracebackType | None,
     ) -> None:
         self.close()
+        if error is not None:
+            note_standing(error, self.ledger.standing())
 
     def _left(self, state: GroupState, now: Response) -> Response:
         """Give the group the cycles that it needs to leave a state (softmotion.md 2.2)."""

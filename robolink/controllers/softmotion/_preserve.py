@@ -30,7 +30,7 @@ class Preserver:
     def preserved(self, reason: str) -> Iterator[None]:
         """See :meth:`robolink.model.Controller.preserved`."""
         mailbox = self._mailbox
-        with mailbox.lock.held(reason):
+        with mailbox.lock.held(reason), mailbox.desk.ledger.block():
             mailbox.desk.require_settled(reason)
             tool = self._tools.selected()
             marker: Marker | None = None

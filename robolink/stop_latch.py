@@ -19,7 +19,7 @@ from robolink.errors import ControllerError, StoppedError
 from robolink.messages import tr
 
 
-class Effect(Enum):
+class CommandClass(Enum):
     """What a request does to the machine."""
 
     LOOK = auto()
@@ -85,17 +85,17 @@ class StopLatch:
         self._put_back.clear()
         self._closed = False
 
-    def admit(self, effect: Effect, request: str) -> None:
+    def admit(self, kind: CommandClass, request: str) -> None:
         """Hold ``request`` back if a stop forbids it; called under the lock of its exchange.
 
         Raises:
             StoppedError: It was not sent.
         """
-        if not self._closed or effect in (Effect.LOOK, Effect.CALM):
+        if not self._closed or kind in (CommandClass.LOOK, CommandClass.CALM):
             return
-        if effect is Effect.RESTORE and self._restoring:
+        if kind is CommandClass.RESTORE and self._restoring:
             return
-        if effect is Effect.WRITE and self._permit("writing"):
+        if kind is CommandClass.WRITE and self._permit("writing"):
             return
         raise StoppedError(
             tr("{request} was not sent: the controller was stopped.", request=request),
@@ -128,16 +128,16 @@ class StopLatch:
             StoppedError: A stop was in force at its beginning, or came meanwhile.
         """
         self.require_open(request)
-        yield
-        self.require_open(request)
+        with self.ending(request):
+            yield
 
     @contextmanager
     def ending(self, request: str) -> Iterator[None]:
-        """Surround the wait for the end of ``request``: under a stop it ends in nothing else.
+        """Surround what must not end well under a stop.
 
         Raises:
-            StoppedError: A stop is in force at its end, be that an arrival, a stop or an error
-                of the controller (which it is raised from).
+            StoppedError: A stop is in force at its end, be that a success or a "no" of the
+                controller, which the stop explains.
         """
         try:
             yield
@@ -164,7 +164,7 @@ class StopLatch:
             StoppedError: That was done since the stop already.
         """
         if self._closed and tool in self._put_back:
-            self.admit(Effect.ACT, tr("Tool {tool}, put back once more,", tool=tool))
+            self.admit(CommandClass.ACT, tr("Tool {tool}, put back once more,", tool=tool))
         before = self._permit("writing")
         self._permits.writing = True
         try:

@@ -5,7 +5,7 @@ import that the frame does not need (design part 4, docs/decisions/0017). What i
 the functions below is needed afterwards, or for one kind of controller only.
 """
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from robolink.errors import (
     ConfigError,
@@ -21,6 +21,7 @@ from robolink.transport import LinkUrl, parse_url
 if TYPE_CHECKING:
     from robolink.model import ControllerStatus, Secret
     from robolink.timing import Clock
+    from robolink.transport import TraceSink
 
 _TRIES: Final = 3
 """A stop may be repeated: an answer that was lost, or another client's words over ours in a
@@ -33,6 +34,7 @@ def stop_now(
     password: "str | Secret | None" = None,
     timeout_s: float = 3.0,
     clock: "Clock | None" = None,
+    trace: "TraceSink | None" = None,
 ) -> "ControllerStatus":
     """Bring a controller to rest, whoever moves it, and return the state that shows it.
 
@@ -44,6 +46,8 @@ def stop_now(
         password: An EPSON controller's remote password, if one is set.
         timeout_s: Longest wait for the connection, and for one answer.
         clock: Replaces the machine's clock; a simulator brings its own.
+        trace: Called with (time in ns, "sent" or "received", bytes) for all traffic with an
+            EPSON controller but the login frame.
 
     Raises:
         ConfigError: The URL is wrong.
@@ -61,13 +65,34 @@ def stop_now(
             remedy=tr("Write for example epson+tcp://192.168.0.1:5000."),
         )
     given = password if isinstance(password, str) else password.reveal() if password else ""
+    means = _Means(given, timeout_s, clock, trace)
     for tries_left in reversed(range(_TRIES)):
         try:
-            return kinds[link.kind](link, given, timeout_s, clock)
+            return kinds[link.kind](link, means)
         except (TransportError, RemoteProtocolError) as error:
             if isinstance(error, ConnectError) or not tries_left:
                 raise
     raise AssertionError  # the last try returns or raises
+
+
+def stop_requests(url: str) -> tuple[str, ...]:
+    """Return what a stop sends, as a person may read it; nothing is opened.
+
+    Raises:
+        ConfigError: The URL is wrong.
+    """
+    kind = parse_url(url).kind
+    if kind == "epson":
+        from robolink.controllers.epson._as_sent import as_sent
+        from robolink.protocols.epson_text import Request
+
+        return tuple(as_sent(Request(name)) for name in ("Abort", "Stop"))
+    if kind == "softmotion":
+        from robolink.controllers.softmotion._answers import describe
+        from robolink.protocols.mailbox import Command, Opcode
+
+        return (describe(Command(0, Opcode.STOP)),)
+    return ()
 
 
 def press_the_button(error: RobolinkError) -> RobolinkError:
@@ -78,15 +103,27 @@ def press_the_button(error: RobolinkError) -> RobolinkError:
     return error
 
 
-def _stop_epson(
-    link: LinkUrl, password: str, timeout_s: float, clock: "Clock | None"
-) -> "ControllerStatus":
+class _Means(NamedTuple):
+    """With what a controller is reached; see :func:`stop_now`."""
+
+    password: str
+    timeout_s: float
+    clock: "Clock | None"
+    trace: "TraceSink | None"
+
+
+def _stop_epson(link: LinkUrl, means: _Means) -> "ControllerStatus":
     from robolink.controllers.epson._stop_line import StopLine
     from robolink.transport import open_transport
 
-    line = StopLine(open_transport(link, timeout_s=timeout_s, clock=clock), timeout_s=timeout_s)
+    transport = open_transport(link, timeout_s=means.timeout_s, clock=means.clock)
+    if means.trace is not None:
+        from robolink.transport import TracingTransport
+
+        transport = TracingTransport(transport, means.trace)
+    line = StopLine(transport, timeout_s=means.timeout_s)
     try:
-        line.login(password)
+        line.login(means.password)
         flags, code = line.stop()
         from robolink.controllers.epson._answers import status_from_flags
 
@@ -96,11 +133,8 @@ def _stop_epson(
         line.close()
 
 
-def _stop_group(
-    link: LinkUrl, password: str, timeout_s: float, clock: "Clock | None"
-) -> "ControllerStatus":
-    del password  # a mailbox has none
-    import secrets
+def _stop_group(link: LinkUrl, means: _Means) -> "ControllerStatus":
+    import os
 
     from robolink.controllers.softmotion._orders import Orders
     from robolink.controllers.softmotion._snapshots import Snapshots
@@ -108,14 +142,13 @@ def _stop_group(
     from robolink.controllers.softmotion._wire import MailboxWire
     from robolink.transport import open_stop_link
 
-    mailbox = open_stop_link(link, timeout_s=timeout_s, clock=clock)
-    owner = 1 + secrets.randbelow(0xFFFF_FFFF)
-    wire = MailboxWire(mailbox, owner=owner, timeout_s=timeout_s)
+    mailbox = open_stop_link(link, timeout_s=means.timeout_s, clock=means.clock)
+    owner = int.from_bytes(os.urandom(4)) or 1  # a token that nobody else has
+    wire = MailboxWire(mailbox, owner=owner, timeout_s=means.timeout_s)
     try:
         snapshots = Snapshots(wire)
-        now = bring_group_to_rest(
-            Orders(wire, snapshots), snapshots, wire.clock, controller=wire.identity
-        )
+        orders = Orders(wire, snapshots)
+        now = bring_group_to_rest(orders, snapshots, wire.clock, controller=wire.identity)
         from robolink.controllers.softmotion._condition import status_of
 
         return status_of(now)
@@ -123,10 +156,8 @@ def _stop_group(
         wire.close()
 
 
-def _stop_map(
-    link: LinkUrl, password: str, timeout_s: float, clock: "Clock | None"
-) -> "ControllerStatus":
-    del password, timeout_s, clock
+def _stop_map(link: LinkUrl, means: _Means) -> "ControllerStatus":
+    del means
     raise RejectedError(
         tr("A PLC with a register map is neither moved nor stopped by robolink."),
         remedy=tr("Do it at the machine."),

@@ -21,6 +21,8 @@ from sqlalchemy import (
     text,
     update,
 )
+from sqlalchemy.schema import CreateIndex, CreateTable
+from sqlalchemy.sql.ddl import DDLElement
 
 from robolink.errors import JournalError
 from robolink.journal._chain import FIRST
@@ -30,8 +32,34 @@ from robolink.messages import tr
 # SQLite keeps a table in the order of its key only if the key is called INTEGER.
 _NUMBER: Final = BigInteger().with_variant(Integer, "sqlite")
 
+_MAKERS: Final[dict[tuple[Callable[[], MetaData], str], tuple[str, ...]]] = {}
+"""The statements that make some tables in a kind of database."""
+
+
+def _create(connection: Connection, tables: Callable[[], MetaData]) -> None:
+    """Make tables that are not there yet.
+
+    The statements are put together once: each simulated controller keeps a journal of its own.
+    """
+    dialect = connection.dialect
+    key = (tables, dialect.name)
+    if key not in _MAKERS:
+        wanted = tables().sorted_tables
+        indexes = {str(index.name): index for table in wanted for index in table.indexes}
+        makers: list[DDLElement] = [CreateTable(table, if_not_exists=True) for table in wanted]
+        makers += [CreateIndex(indexes[name], if_not_exists=True) for name in sorted(indexes)]
+        _MAKERS[key] = tuple(str(maker.compile(dialect=dialect)) for maker in makers)
+    for statement in _MAKERS[key]:
+        connection.exec_driver_sql(statement)
+
 
 def _first_tables(connection: Connection) -> None:
+    _create(connection, _first_metadata)
+    connection.execute(insert(HEAD).values(number=0, hash=FIRST))
+    connection.execute(insert(SCHEMA_VERSION).values(version=0))
+
+
+def _first_metadata() -> MetaData:
     metadata = MetaData()
     _entries(metadata)
     Table("schema_version", metadata, Column("version", Integer, nullable=False))
@@ -59,9 +87,7 @@ def _first_tables(connection: Connection) -> None:
         Column("beat_ns", BigInteger, nullable=False),
         *map(_text, ("token", "holder", "boot", "taken_at", "purpose")),
     )
-    metadata.create_all(connection)
-    connection.execute(insert(HEAD).values(number=0, hash=FIRST))
-    connection.execute(insert(SCHEMA_VERSION).values(version=0))
+    return metadata
 
 
 def _entries(metadata: MetaData) -> None:

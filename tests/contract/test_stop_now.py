@@ -2,6 +2,7 @@
 
 import socket
 from dataclasses import replace
+from typing import Any
 
 import pytest
 from robolink_simulators.epson.device import EpsonSimulator
@@ -24,7 +25,7 @@ from tests.contract._softmotion_cell import served as served_plc
 CREEPING = MotionProfile(Path.STRAIGHT, 5, 1.0)
 ANYWHERE = WorkBox()
 
-HABITS = (
+HABITS: tuple[dict[str, Any], ...] = (
     {},
     {"abort_reply_first": False},
     {"flags_during_execute": "ready"},

@@ -104,10 +104,16 @@ class Placements:
         if self._stopper is not None:
             if not self._held:
                 self._see_the_stop_through()
-        elif self._controller is not None and here not in self.distinct:
+        elif self._placeable(here):
             self.distinct[here] = None
             if here == self._at:
+                assert self._controller is not None
                 self._stop(self._controller, held=point is Point.HELD)
+
+    def _placeable(self, here: Placement) -> bool:
+        # After the logout there is no session left that could stop anything.
+        over = here.point is Point.EXCHANGE and here.what == "Logout"
+        return self._controller is not None and here not in self.distinct and not over
 
     def _stop(self, controller: Controller, *, held: bool) -> None:
         def stop() -> None:

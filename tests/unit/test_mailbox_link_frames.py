@@ -188,7 +188,7 @@ def test_a_stop_takes_what_pymodbus_takes_and_nothing_else(payload, serial, plac
     if place < len(frame) and place not in ((1, 2) if serial else (7, 8)):
         frame[place] ^= flip
     kinds = (StopRtuFraming(), RtuFraming()) if serial else (StopTcpFraming(), TcpFraming())
-    seen = []
+    seen: list[object] = []
     for framing in kinds:
         buffer = bytearray(frame)
         try:

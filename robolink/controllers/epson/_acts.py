@@ -92,8 +92,10 @@ class EpsonActs:
 
     def preview(self, act: Act) -> tuple[str, ...]:
         """Return the requests of an act, as they stand on the wire."""
-        if act is Act.STOP or act is Act.RESET:
-            return (as_sent(Request("Stop" if act is Act.STOP else "Reset")),)
+        if act is Act.STOP:
+            return tuple(as_sent(Request(request)) for request in ("Abort", "Stop"))
+        if act is Act.RESET:
+            return (as_sent(Request("Reset")),)
         name = "SetMotorsOn" if act is Act.MOTORS_ON else "SetMotorsOff"
         return (as_sent(Request(name, (str(self.robot_number()),))),)
 

@@ -18,7 +18,7 @@ from contextlib import AbstractContextManager, contextmanager
 
 from robolink.checkpoints import Point, checkpoint
 from robolink.controllers.epson._answers import rejected
-from robolink.controllers.epson._effects import effect_of
+from robolink.controllers.epson._command_classes import command_class_of
 from robolink.controllers.epson._login import PASSWORD_REFUSALS, refused, unanswered
 from robolink.controllers.epson._pending import PendingExecute
 from robolink.errors import (
@@ -200,7 +200,7 @@ class EpsonSession:
             with self._gate, self._wire:
                 checkpoint(Point.HELD, what)
                 self._check_usable(request)
-                self.latch.admit(effect_of(request), what)
+                self.latch.admit(command_class_of(request), what)
                 if self._pending is not None and request.name == "Abort":
                     # Whatever ends it from here on was asked for.
                     self._pending.abort_requested = True

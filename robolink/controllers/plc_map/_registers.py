@@ -10,7 +10,7 @@ from robolink.errors import RemoteProtocolError
 from robolink.interrupts import InterruptGate
 from robolink.messages import tr
 from robolink.register_maps import Signal, Table, Word, describe_place
-from robolink.stop_latch import Effect, StopLatch
+from robolink.stop_latch import CommandClass, StopLatch
 from robolink.timing import Clock
 
 _TRIES: Final = 3
@@ -136,19 +136,19 @@ class Registers:
             found = found >> signal.bit & 1
         return found == signal.on
 
-    def switch(self, signal: Signal, on: bool, *, effect: Effect = Effect.WRITE) -> None:
+    def switch(self, signal: Signal, on: bool, *, kind: CommandClass = CommandClass.WRITE) -> None:
         """Switch a coil, or write a whole register.
 
         Args:
             signal: Which one.
             on: Whether on.
-            effect: What that does to the machine; a request that is taken back calms.
+            kind: What that does to the machine; a request that is taken back calms.
 
         Raises:
             StoppedError: A stop forbids it; it was not sent.
         """
         value = signal.on if on else signal.off
-        with self._admitted(signal.place, effect):
+        with self._admitted(signal.place, kind):
             self.exchanges += 1
             if signal.table is Table.COIL:
                 self._client.write_coil(signal.address, bool(value))
@@ -157,7 +157,7 @@ class Registers:
 
     def write(self, address: int, words: Sequence[int]) -> None:
         """Write holding registers in one request (function 16); raises like :meth:`switch`."""
-        with self._admitted(describe_place(Table.HOLDING, address), Effect.WRITE):
+        with self._admitted(describe_place(Table.HOLDING, address), CommandClass.WRITE):
             self.exchanges += 1
             self._client.write_registers(address, words)
 
@@ -167,14 +167,14 @@ class Registers:
         self.gate.close()
 
     @contextmanager
-    def _admitted(self, place: str, effect: Effect) -> Iterator[None]:
+    def _admitted(self, place: str, kind: CommandClass) -> Iterator[None]:
         """Hold the lock of a write that no stop forbids."""
         request = tr("the write to {place}", place=place)
         checkpoint(Point.LOCK, request)
         try:
             with self.gate, self._writing:
                 checkpoint(Point.HELD, request)
-                self.latch.admit(effect, request)
+                self.latch.admit(kind, request)
                 yield
         finally:
             checkpoint(Point.EXCHANGE, request)

@@ -14,7 +14,7 @@ from typing import Final
 
 from robolink.checkpoints import Point, checkpoint
 from robolink.controllers.softmotion._answers import Ended, cut_short, describe, refused
-from robolink.controllers.softmotion._effects import effect_of
+from robolink.controllers.softmotion._command_classes import command_class_of
 from robolink.controllers.softmotion._ownership import Ownership
 from robolink.controllers.softmotion._rides import has_ended
 from robolink.controllers.softmotion._snapshots import Snapshots
@@ -145,7 +145,7 @@ class Orders:
                 self._wire.rides.begin(command.sequence)
             for _ in range(_WRITES):
                 try:
-                    self._wire.latch.admit(effect_of(command), request)
+                    self._wire.latch.admit(command_class_of(command), request)
                     self._wire.write(words)
                 except (RejectedError, StoppedError):
                     self._wire.rides.forget(command.sequence)

@@ -8,7 +8,7 @@ import re
 from typing import Final
 
 from robolink.protocols.epson_text import Request
-from robolink.stop_latch import Effect
+from robolink.stop_latch import CommandClass
 
 _CALM: Final = frozenset({"stop", "abort", "pause", "reset", "resetalm", "setmotorsoff"})
 _SESSION: Final = frozenset({"login", "logout"})
@@ -18,7 +18,7 @@ _RESTORES: Final = re.compile(r"(Tool [0-9]+|Power (Low|High)|SpeedS? [0-9., ]+)
 _WRITES: Final = re.compile(r"(TLSet [0-9]+, XY\([^()]*\)|TLClr [0-9]+)", re.ASCII)
 
 
-def effect_of(request: Request) -> Effect:
+def command_class_of(request: Request) -> CommandClass:
     """Return what ``request`` does.
 
     Statements are those of :mod:`robolink.protocols.spel`; one that a person typed, and several in
@@ -26,21 +26,21 @@ def effect_of(request: Request) -> Effect:
     """
     name = request.name.lower()
     if name.startswith("get") or name in _SESSION:
-        return Effect.LOOK
+        return CommandClass.LOOK
     if name in _CALM:
-        return Effect.CALM
+        return CommandClass.CALM
     if name == "execute" and request.parameters:
         return _of_statement(request.parameters[0])
-    return Effect.ACT
+    return CommandClass.ACT
 
 
-def _of_statement(statement: str) -> Effect:
+def _of_statement(statement: str) -> CommandClass:
     if ";" in statement:
-        return Effect.ACT
+        return CommandClass.ACT
     if _LOOKS.fullmatch(statement):
-        return Effect.LOOK
+        return CommandClass.LOOK
     if _RESTORES.fullmatch(statement):
-        return Effect.RESTORE
+        return CommandClass.RESTORE
     if _WRITES.fullmatch(statement):
-        return Effect.WRITE
-    return Effect.ACT
+        return CommandClass.WRITE
+    return CommandClass.ACT

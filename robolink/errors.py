@@ -14,7 +14,8 @@
     │   └── TransportBrokenError           they, or the cable, did
     ├── ProtocolError                      never raised as such
     │   ├── LocalProtocolError             we asked for something illegal
-    │   └── RemoteProtocolError            what they sent makes no sense; the session is dead
+    │   ├── RemoteProtocolError            what they sent makes no sense; the session is dead
+    │   └── UnclearAnswerError             neither done nor refused; it may or may not have run
     ├── ControllerError                    a well-formed "no"
     │   ├── RejectedError                  the controller refused the request
     │   │   └── LoginRefusedError          wrong password, or one is demanded
@@ -126,6 +127,15 @@ class RemoteProtocolError(ProtocolError):
     """The far side sent something that makes no sense. The session is over."""
 
 
+class UnclearAnswerError(ProtocolError):
+    """An answer in its place that says neither that a command ran nor that it was refused.
+
+    One garbled character makes it (``#Execute,1``), and so does a controller that gives up a
+    statement half-way without an error state (``!Execute,99``). The session goes on, so what
+    became of the command can be read.
+    """
+
+
 class ControllerError(RobolinkError):
     """The controller, or a check of its state, said no.
 
@@ -173,6 +183,8 @@ class NotReadyReason(StrEnum):
     WRONG_TOOL = "wrong_tool"
     NO_REMOTE_TIMEOUT = "no_remote_timeout"
     EDGE_PASSED = "edge_passed"
+    DRY_RUN = "dry_run"
+    VIRTUAL_IO = "virtual_io"
 
 
 class NotReadyError(ControllerError):

@@ -184,6 +184,7 @@ def open_controller(
             not the cell's.
         ConnectError: It is not reached.
         LoginRefusedError: Wrong or missing password.
+        StoppedError: A stop came, at the end or before.
     """
     url = context.require_url()
     unhindered = looks or calms
@@ -211,21 +212,24 @@ def open_controller(
     ):
         click.get_current_context().meta.update({WATCHED: controller, REACHED: url})
         remember_address(context)
-        found = _open_markers(controller, lenient=unhindered)
-        if not quiet:
-            note_unsettled(controller, found, named)
-        if context.cell and not calms:
-            _check_robot(controller, context.cell, looks=looks)
-        if found and not quiet and not calms:
-            from robolink_cli._offering import offer_to_restore
+        with listening_for_stop(controller, context):
+            found = _open_markers(controller, lenient=unhindered)
+            if not quiet:
+                note_unsettled(controller, found, named)
+            if context.cell and not calms:
+                _check_robot(controller, context.cell, looks=looks)
+            if found and not quiet and not calms:
+                from robolink_cli._offering import offer_to_restore
 
-            offer_to_restore(controller, found)
-        try:
-            with listening_for_stop(controller, context):
+                offer_to_restore(controller, found)
+            try:
                 yield controller
-        finally:
-            left = _open_markers(controller, lenient=unhindered)
-            note_unsettled(controller, [m for m in left if m not in found], named)
+            finally:
+                left = _open_markers(controller, lenient=unhindered)
+                note_unsettled(controller, [m for m in left if m not in found], named)
+    if not unhindered:
+        # A stop that came while the connection was closed: nobody may take this for a success.
+        controller.latch.require_open(tr("The command"))
 
 
 def password_of(context: CliContext) -> "Secret | None":

@@ -20,8 +20,8 @@ code  meaning
 ====  =====================================================================
 """
 
+import io
 import os
-import sys
 from typing import Final
 
 import click
@@ -29,6 +29,7 @@ import click
 from robolink import errors
 from robolink.messages import tr
 from robolink_cli._render import dumps
+from robolink_cli._sink import hand_over, show
 
 USAGE: Final = 2
 BUG: Final = 70
@@ -69,16 +70,18 @@ def report(error: BaseException, *, as_json: bool) -> int:
     if os.environ.get("ROBOLINK_DEBUG"):
         import traceback  # here, because --help needs none
 
-        traceback.print_exception(error)
+        show("".join(traceback.format_exception(error)), beside=True)
     if as_json:
-        click.echo(error_document(error))
+        hand_over(error_document(error))
     elif isinstance(error, click.ClickException):
-        error.show(file=sys.stderr)
+        usage = io.StringIO()
+        error.show(file=usage)  # it repeats what was typed
+        show(usage.getvalue().rstrip("\n"), beside=True)
     else:
         what, remedy = _sentences(error)
-        click.echo(f"robolink: {what}", file=sys.stderr)
+        show(f"robolink: {what}", beside=True)
         if remedy:
-            click.echo(f"  {remedy}", file=sys.stderr)
+            show(f"  {remedy}", beside=True)
     return code
 
 

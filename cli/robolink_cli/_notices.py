@@ -44,7 +44,7 @@ def marker_notice(marker: "Marker", url: str) -> str:
             url=url,
         )
     return tr(
-        "Sent {when} and never answered: {request}. It may or may not have run, so motion is "
+        "Sent {when} without a clear answer: {request}. It may or may not have run, so motion is "
         "blocked.\n  'robolink -c {url} recover' settles what reading can, 'resolve' the rest.",
         when=marker.begun_at,
         request=marker.request,

@@ -1,10 +1,18 @@
 """status, where, stop, reset, motors, resolve: looking at a controller and calming it."""
 
+from typing import TYPE_CHECKING
+
 import click
 
 from robolink.messages import tr
 from robolink.model import Act
-from robolink_cli._consent import agree, agree_to_motion, dry_run_option, yes_option
+from robolink_cli._consent import (
+    agree,
+    agree_to_motion,
+    dry_run_option,
+    on_terminal,
+    yes_option,
+)
 from robolink_cli._context import (
     CliContext,
     calming_options,
@@ -14,10 +22,13 @@ from robolink_cli._context import (
     show_requests,
     stop_request,
 )
-from robolink_cli._kinds import require_epson, require_softmotion
+from robolink_cli._kinds import preferences_of, require_epson, require_softmotion
 from robolink_cli._render import note, say
 from robolink_cli._shared_options import shared_options
 from robolink_cli._stop_notes import forget_stop
+
+if TYPE_CHECKING:
+    from robolink.model import Controller
 
 
 @click.command()
@@ -105,10 +116,10 @@ def reset(context: CliContext, dry_run: bool, yes: bool) -> None:
         if dry_run:
             context.show_requests(controller.preview(Act.RESET))
             return
-        agree(
-            tr("Reset may switch outputs off (vacuum, gripper). Go on?"),
-            yes=yes,
-        )
+        effect, told = _effect_of_reset(controller)
+        if told and (yes or not on_terminal()):
+            note(effect)  # nobody is asked, so it is said before it is sent
+        agree(tr("{effect} Go on?", effect=effect), yes=yes)
         controller.reset_fault()
         state = controller.status().state
     forget_stop(context)
@@ -118,6 +129,18 @@ def reset(context: CliContext, dry_run: bool, yes: bool) -> None:
         payload,
         lambda: say(tr("The reset was carried out; the controller is: {state}.", state=state)),
     )
+
+
+def _effect_of_reset(controller: "Controller") -> tuple[str, bool]:
+    """Return what a reset does to the outputs, and whether the controller told that."""
+    from robolink.protocols.epson_text import Preference
+
+    told = preferences_of(controller)
+    if told is None:
+        return tr("Reset may switch outputs off (vacuum, gripper)."), False
+    if Preference.RESET_OUTPUTS_OFF in told:
+        return tr("Reset SWITCHES THE OUTPUTS OFF (vacuum, gripper): a part may drop."), True
+    return tr("Reset clears the error; the outputs stay as they are."), True
 
 
 @click.command()

@@ -17,37 +17,52 @@ move, and a lost answer leaves nothing that the next connection would not set ag
 
 import threading
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from typing import Final
 
+from robolink.checkpoints import Point, checkpoint
 from robolink.errors import (
     BusyError,
     OutcomeUnknownError,
     RemoteProtocolError,
+    StoppedError,
     TransportError,
 )
 from robolink.messages import tr
 from robolink.model import Marker, MarkerKind, NewEntry, OutcomeLog, new_operation
+from robolink.stop_latch import StopLatch
 from robolink.timing import wall_label
 
 _PROCEDURES: Final = frozenset({MarkerKind.SELECTION, MarkerKind.CHANGE})
 
 
 class ProcedureLock:
-    """Lets one thread at a time run a procedure on a controller; others are told at once."""
+    """Lets one thread at a time run a procedure on a controller; others are told at once.
 
-    def __init__(self, identity: str) -> None:
+    Args:
+        identity: Which controller.
+        latch: Under which no procedure begins, and none ends well.
+    """
+
+    def __init__(self, identity: str, latch: StopLatch) -> None:
         self._lock = threading.RLock()
         self._identity = identity
+        self._latch = latch
 
     @contextmanager
-    def held(self, request: str) -> Iterator[None]:
+    def held(self, request: str, *, calming: bool = False) -> Iterator[None]:
         """Hold the procedure lock.
+
+        Args:
+            request: What it is held for.
+            calming: Whether that may go on while a stop is in force, as a reset may.
 
         Raises:
             BusyError: Another thread holds it.
+            StoppedError: A stop is in force, or came meanwhile.
         """
+        checkpoint(Point.PROCEDURE, request)
         if not self._lock.acquire(blocking=False):
             raise BusyError(
                 tr("{request} has to wait: another operation is under way.", request=request),
@@ -56,7 +71,8 @@ class ProcedureLock:
                 request=request,
             )
         try:
-            yield
+            with nullcontext() if calming else self._latch.watching(request):
+                yield
         finally:
             self._lock.release()
 
@@ -122,6 +138,15 @@ class MarkerDesk:
         known = self._procedures.get(marker.kind)
         if known is not None and known.operation == marker.operation:
             del self._procedures[marker.kind]
+
+    @contextmanager
+    def unless_stopped(self, marker: Marker) -> Iterator[None]:
+        """Surround the sending of what ``marker`` stands for; a stop that forbids it settles it."""
+        try:
+            yield
+        except StoppedError:
+            self.clear(marker)  # it was never sent
+            raise
 
     @property
     def changing(self) -> bool:
@@ -189,7 +214,7 @@ class MarkerDesk:
         except (TransportError, RemoteProtocolError) as error:
             raise OutcomeUnknownError(
                 tr(
-                    "No answer came to {request!r}: it may or may not have run ({cause})",
+                    "No clear answer came to {request!r}: it may or may not have run ({cause})",
                     request=request,
                     cause=error.what,
                 ),

@@ -8,6 +8,7 @@ from contextlib import AbstractContextManager, contextmanager
 from sqlalchemy import Connection, Engine
 from sqlalchemy.exc import SQLAlchemyError
 
+from robolink.checkpoints import Point, checkpoint
 from robolink.errors import JournalError
 from robolink.journal import _migrations
 from robolink.journal._engines import Backend, backend_of
@@ -107,6 +108,8 @@ class Store:
 
     @contextmanager
     def _use(self, consequence: str, *, writing: bool) -> Iterator[Tables]:
+        if writing:
+            checkpoint(Point.COMMIT, "before")
         with self._lock:
             try:
                 backend, tables = self._connected(to_write=writing)
@@ -128,6 +131,8 @@ class Store:
             except (SQLAlchemyError, OSError) as error:
                 self._drop()
                 raise journal_error(error, self._place.name, consequence) from error
+        if writing:
+            checkpoint(Point.COMMIT, "after")
 
     def _connected(self, *, to_write: bool) -> tuple[Backend, Tables]:
         if self._backend is None:

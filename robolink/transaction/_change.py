@@ -125,8 +125,10 @@ class ToolChange:
             ReadBackError: Another value came back; the old ones are put back.
             ConfigError: The intent cannot be stored; nothing was written.
             BusyError: Another process has the controller.
+            StoppedError: A stop came; what was written is put back.
         """
-        self._controller.require_settled(self._request())
+        self._controller.latch.require_open(self.request)
+        self._controller.require_settled(self.request)
         steps = self._compare()
         if self._several_steps and any(self._differs(step) for step in steps):
             tools = {
@@ -142,7 +144,7 @@ class ToolChange:
                 "change": self._controller.outcomes.change,
             }
             with self._controller.uninterrupted():
-                self._marker = self._controller.begin(MarkerKind.CHANGE, self._request(), details)
+                self._marker = self._controller.begin(MarkerKind.CHANGE, self.request, details)
         self._receipts = tuple(
             self._write(wanted, step) for wanted, step in zip(self._wanted, steps, strict=True)
         )
@@ -156,7 +158,9 @@ class ToolChange:
 
         Raises:
             ConfigError: It cannot be recorded; the change stays open for ``recover``.
+            StoppedError: A stop came before; what was written is put back.
         """
+        self._controller.latch.require_open(self.request)
         if self._marker is None:
             # Each write said itself that it is done; this says what the values rest on.
             if any(wanted.details for wanted in self._wanted):
@@ -185,7 +189,9 @@ class ToolChange:
             for wanted, receipt in zip(self._wanted, self._receipts, strict=True)
         ]
 
-    def _request(self) -> str:
+    @property
+    def request(self) -> str:
+        """What is done, as a person may read it."""
         numbers = ", ".join(str(wanted.tool) for wanted in self._wanted)
         return tr("change of tool {numbers}", numbers=numbers)
 
@@ -240,7 +246,7 @@ class ToolChange:
         if isinstance(error, _OUT_OF_REACH):
             self._leave_open(error)
             return
-        done = put_back(self._controller.tools, self._begun, spoiled=self._spoiled)
+        done = put_back(self._controller, self._begun, spoiled=self._spoiled)
         for result in done:
             self._tell(result.sentence)
         if isinstance(error, RobolinkError):
@@ -289,7 +295,8 @@ def change_tools(
         RobolinkError: As :meth:`ToolChange.write`; the old values are back, or the error says
             that they are not.
     """
-    with ToolChange(controller, wanted, tell=tell) as change:
+    change = ToolChange(controller, wanted, tell=tell)
+    with controller.latch.watching(change.request), change:
         receipts = change.write()
         change.keep()
     return receipts

@@ -47,6 +47,7 @@ CODES = {
     "ProtocolError": 4,
     "LocalProtocolError": 4,
     "RemoteProtocolError": 4,
+    "UnclearAnswerError": 4,
     "ControllerError": 5,
     "RejectedError": 5,
     "LoginRefusedError": 5,

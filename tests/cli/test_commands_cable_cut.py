@@ -62,7 +62,7 @@ def check_the_next_command_says_what_is_left(cell, *, unknown):
     assert shown.code == 0, shown.err
     (last,) = [text for text in cell.requests if MOVE.match(text)][-1:]
     statement = last.partition('"')[2].rstrip('"')
-    said = f"never answered: {statement}. It may or may not have run" in shown.err
+    said = f"without a clear answer: {statement}. It may or may not have run" in shown.err
     assert said is unknown
     if cell.selected_tool == 0:
         assert "Tool 0 is selected now; it was tool 1 before" in shown.err

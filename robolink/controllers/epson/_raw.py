@@ -34,7 +34,8 @@ class RawStatements:
             with self._window.uninterrupted():
                 marker = self._desk.begin(MarkerKind.SET, statement, {"raw": True})
                 with self._desk.doubt(statement):
-                    answer = self._session.execute(statement)
+                    with self._desk.unless_stopped(marker):
+                        answer = self._session.execute(statement)
                     self._check(statement, answer, marker)
                 printed = answer.text or "" if isinstance(answer, Reply) else ""
                 self._desk.clear(marker, _entry(marker, verdict=tr("carried out"), said=printed))

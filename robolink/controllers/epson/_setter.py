@@ -114,7 +114,8 @@ class ValueSetter:
             marker = self._desk.begin(MarkerKind.SET, request, details)
             with self._desk.doubt(request):
                 try:
-                    self._session.exchange(change.request.name, *change.request.parameters)
+                    with self._desk.unless_stopped(marker):
+                        self._session.exchange(change.request.name, *change.request.parameters)
                 except RejectedError as error:
                     if error.code in NOT_EXECUTED:
                         self._desk.clear(marker)

@@ -7,6 +7,7 @@ from robolink.controllers._guarded import MarkerDesk, ProcedureLock
 from robolink.controllers._tool_writing import ToolWrite, ToolWriter
 from robolink.controllers.epson._answers import NOT_EXECUTED
 from robolink.controllers.epson._as_sent import executes
+from robolink.controllers.epson._preferences import Preferences
 from robolink.controllers.epson._robot import RobotFacts
 from robolink.controllers.epson._window import CommandWindow
 from robolink.errors import (
@@ -36,8 +37,14 @@ class EpsonToolTable:
     """
 
     def __init__(
-        self, window: CommandWindow, desk: MarkerDesk, lock: ProcedureLock, robot: RobotFacts
+        self,
+        window: CommandWindow,
+        desk: MarkerDesk,
+        lock: ProcedureLock,
+        robot: RobotFacts,
+        preferences: Preferences,
     ) -> None:
+        self._preferences = preferences
         self._window = window
         self._desk = desk
         self._lock = lock
@@ -77,6 +84,7 @@ class EpsonToolTable:
         requested = offset.rounded(DECIMALS)
         with self._lock.held(f"TLSet {tool}"):
             six_axes = self._robot.read(f"TLSet {tool}").six_axes
+            self._preferences.require_real(f"TLSet {tool}")
             self._check_axes(requested, six_axes=six_axes)
             statement = spel.set_tool(tool, requested, six_axes=six_axes)
             return self._set(tool, requested, expected, statement)
@@ -106,6 +114,7 @@ class EpsonToolTable:
         """Clear and read back; see :class:`robolink.model.ToolTable`."""
         self.require_writable(tool)
         with self._lock.held(f"TLClr {tool}"):
+            self._preferences.require_real(f"TLClr {tool}")
             return self._set(tool, None, expected, spel.clear_tool(tool))
 
     def selected(self) -> int:
@@ -129,7 +138,18 @@ class EpsonToolTable:
                 self._window.command(statement)
                 self._desk.note_selection(tool)
 
-            found = self._writer.carry_out(statement, details, send=send, read=self._selected)
+            def read() -> int:
+                found = self._selected()
+                self._desk.note_selection(found)
+                return found
+
+            found = self._writer.carry_out(
+                statement,
+                details,
+                send=send,
+                read=read,
+                tell=lambda found: tr("Tool {tool} is selected now.", tool=found),
+            )
             if found != tool:
                 raise ReadBackError(
                     tr(
@@ -153,6 +173,7 @@ class EpsonToolTable:
             read=lambda: self._before(tool, requested, expected),
             # A tool that was set just now is defined.
             read_back=lambda: self._read(tool) if requested is None else self._printed(tool),
+            read_doubted=lambda: self._read(tool),
         )
         return self._writer.change(write, expected)
 

@@ -25,6 +25,7 @@ from robolink.model import (
     OutcomeLog,
 )
 from robolink.register_maps import RegisterMap, confirmation_of
+from robolink.stop_latch import StopLatch
 from robolink.timing import Clock
 
 
@@ -49,7 +50,7 @@ class PlcMapController:
         self.register_map = register_map
         self._registers = Registers(client)
         self._outcomes = outcomes
-        self._lock = ProcedureLock(client.identity)
+        self._lock = ProcedureLock(client.identity, self._registers.latch)
         self._desk = MarkerDesk(client.identity, outcomes)
         self._tools = RegisterToolTable(
             self._registers,
@@ -151,13 +152,23 @@ class PlcMapController:
         """Refuse; see :meth:`stop`."""
         raise no_motion(self.identity)
 
+    @property
+    def latch(self) -> StopLatch:
+        """What holds every write back from :meth:`stop` until :meth:`release_stop`."""
+        return self._registers.latch
+
     def stop(self) -> None:
-        """Refuse: nothing here can stop the machine.
+        """Write nothing from here on; the machine itself nothing here can stop.
 
         Raises:
             RejectedError: Always; the message says to use the emergency stop.
         """
+        self._registers.latch.close()
         raise no_motion(self.identity)
+
+    def release_stop(self) -> None:
+        """Let this process write again after :meth:`stop`, because a person says so."""
+        self._registers.latch.release()
 
     def reset_fault(self) -> None:
         """Refuse; see :meth:`stop`."""

@@ -13,9 +13,7 @@ from robolink.errors import RemoteProtocolError
 from robolink.messages import tr
 from robolink.model import OutcomeLog, ToolOffset
 from robolink.protocols.mailbox import (
-    OPCODES,
     Command,
-    Opcode,
     Response,
     Six,
     frames_match,
@@ -37,14 +35,23 @@ class Mailbox:
         desk: Markers.
         lock: One procedure at a time.
         writer: Changes that are marked, sent once and read back.
+        device_id: The number of the PLC, the same on every link; ``None`` where it has none.
     """
 
-    def __init__(self, wire: MailboxWire, snapshots: Snapshots, outcomes: OutcomeLog) -> None:
+    def __init__(
+        self,
+        wire: MailboxWire,
+        snapshots: Snapshots,
+        outcomes: OutcomeLog,
+        *,
+        device_id: int | None,
+    ) -> None:
         self.wire = wire
+        self.device_id = device_id
         self.snapshots = snapshots
         self.orders = Orders(wire, snapshots)
         self.desk = MarkerDesk(wire.identity, outcomes)
-        self.lock = ProcedureLock(wire.identity)
+        self.lock = ProcedureLock(wire.identity, wire.latch)
         # A refused command did nothing, whatever the reason (design part 7).
         self.writer = ToolWriter(
             self.desk,
@@ -82,10 +89,9 @@ class Mailbox:
             LeaseHeldError, LeaseLostError: Another client owns the mailbox.
         """
         now = now or self.snapshots.take()
-        facts = OPCODES[Opcode(draft.opcode)]
-        if facts.needs_permit:
+        if draft.needs_permit:
             require_permit(now, controller=self.identity, request=request)
-        if facts.needs_owner:
+        if draft.needs_owner:
             self.orders.ownership.require(request)
         return now
 

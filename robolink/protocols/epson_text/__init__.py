@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from robolink.protocols.epson_text._events import Refusal as Refusal
     from robolink.protocols.epson_text._events import Reply as Reply
     from robolink.protocols.epson_text._events import Request as Request
+    from robolink.protocols.epson_text._preferences import Preference as Preference
+    from robolink.protocols.epson_text._preferences import parse_preferences as parse_preferences
+    from robolink.protocols.epson_text._preferences import preferences_field as preferences_field
     from robolink.protocols.epson_text._status import StatusFlags as StatusFlags
     from robolink.protocols.epson_text._status import parse_status as parse_status
     from robolink.protocols.epson_text._status import status_fields as status_fields
@@ -32,6 +35,7 @@ else:
             "_codes": "ErrorCode",
             "_commands": "COMMANDS Command ParameterForm ReplyShape find_command",
             "_events": "BadRequest EndOfStream Event Refusal Reply Request",
+            "_preferences": "Preference parse_preferences preferences_field",
             "_status": "StatusFlags parse_status status_fields",
             "_variable_types": "VariableType",
         },

@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     from robolink.protocols.mailbox._command import Command as Command
     from robolink.protocols.mailbox._command import decode_command as decode_command
     from robolink.protocols.mailbox._command import encode_command as encode_command
+    from robolink.protocols.mailbox._device import decode_device_id as decode_device_id
+    from robolink.protocols.mailbox._device import encode_device_id as encode_device_id
     from robolink.protocols.mailbox._eds import electronic_data_sheet as electronic_data_sheet
     from robolink.protocols.mailbox._frames import frames_match as frames_match
     from robolink.protocols.mailbox._frames import from_frame as from_frame
@@ -40,6 +42,9 @@ if TYPE_CHECKING:
     from robolink.protocols.mailbox._kinematics import kinematics_word as kinematics_word
     from robolink.protocols.mailbox._layouts import COMMAND as COMMAND
     from robolink.protocols.mailbox._layouts import COMMAND_WORDS as COMMAND_WORDS
+    from robolink.protocols.mailbox._layouts import DEVICE as DEVICE
+    from robolink.protocols.mailbox._layouts import DEVICE_START as DEVICE_START
+    from robolink.protocols.mailbox._layouts import DEVICE_WORDS as DEVICE_WORDS
     from robolink.protocols.mailbox._layouts import PROBE as PROBE
     from robolink.protocols.mailbox._layouts import RESPONSE as RESPONSE
     from robolink.protocols.mailbox._layouts import RESPONSE_WORDS as RESPONSE_WORDS
@@ -79,18 +84,19 @@ else:
         __name__,
         {
             "_answer": "Answer",
-            "_blocks": "BlockError BlockFault Field Four Layout Six Words WordType",
+            "_blocks": "BlockError BlockFault Field Four Layout Six WordType Words",
             "_codes": (
                 "Bits BufferMode Capability CommandState CoordinateSystem ErrorClass "
                 "GroupState Profile ReadMode error_meaning"
             ),
             "_command": "Command decode_command encode_command",
+            "_device": "decode_device_id encode_device_id",
             "_eds": "electronic_data_sheet",
             "_frames": "frames_match from_frame to_frame",
             "_kinematics": "Kinematics find_kinematics kinematics_word",
             "_layouts": (
-                "COMMAND COMMAND_WORDS PROBE RESPONSE RESPONSE_WORDS SLOT SLOT_WORDS "
-                "SLOTS VERSION slot_start"
+                "COMMAND COMMAND_WORDS DEVICE DEVICE_START DEVICE_WORDS PROBE RESPONSE "
+                "RESPONSE_WORDS SLOT SLOTS SLOT_WORDS VERSION slot_start"
             ),
             "_opcodes": "OPCODES Opcode OpcodeFacts opcodes_of",
             "_register_map": "register_map_csv register_map_markdown",

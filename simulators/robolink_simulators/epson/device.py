@@ -16,6 +16,7 @@ from typing import Final
 
 from robolink.model import Secret
 from robolink.protocols.epson_text import BadRequest, ErrorCode, Request, StatusFlags
+from robolink_simulators.epson.card import ControllerCard
 from robolink_simulators.epson.client_slot import ClientSlot
 from robolink_simulators.epson.companion import Companion
 from robolink_simulators.epson.condition import Condition, Mode, Task
@@ -68,6 +69,7 @@ class EpsonSimulator:
         condition: What GetStatus shows.
         panel: What a person, or the rest of the cell, can do to the controller.
         alarms: The alarms that stand.
+        card: What it says of itself.
         variables: The Global Preserve variables.
         world: The truth, and the person at the cell.
         faults: What is planned to go wrong.
@@ -127,12 +129,18 @@ class EpsonSimulator:
             Companion(self.machine, self.variables) if self.options.companion else None
         )
         self.alarms = Alarms()
+        self.card = ControllerCard()
         self.condition = Condition(monitoring_only=self.options.monitoring_only)
         interpreter = Interpreter(self.machine, self.options, random.Random(f"arm {self.seed}"))
         self._window = CommandWindow(interpreter, self.condition, self.options)
         self._slot = ClientSlot(self.options.remote_timeout_s)
         self._desk = CommandDesk(
-            self.machine, self.condition, self.variables, self.alarms, options=self.options
+            self.machine,
+            self.condition,
+            self.variables,
+            self.alarms,
+            self.card,
+            options=self.options,
         )
         self._service = Service(
             self._desk,

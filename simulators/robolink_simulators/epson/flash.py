@@ -10,6 +10,7 @@ from typing import Final
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink.named_files import read_named
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.points import LocalTable, PointTable
 
@@ -39,7 +40,7 @@ class Flash:
             return
         robot = self._machine.model.name
         try:
-            state = json.loads(self._path.read_text(encoding="utf-8"))
+            state = json.loads(read_named(self._path))
             if state["schema"] != SCHEMA or state["robot"] != robot:
                 raise ValueError(state["robot"])
             self._machine.tools.restore(state["tools"])

@@ -74,7 +74,7 @@ def test_a_second_terminal_stops_a_plc_itself(plc, beside, capsys):
     await_that(lambda: group.movements_started > 0, process)
     assert entry.run(["-c", url.replace("127.0.0.1", "localhost"), "stop"]) == 0
     assert "stands" in capsys.readouterr().out
-    assert process.exit_code() != 0
+    assert process.exit_code() == 10
     assert group.movements_started == 1
     jog = ["-c", url, "jog", "x+1", "--yes"]
     assert main.run(jog) == 5  # the PLC holds it

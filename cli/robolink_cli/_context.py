@@ -214,30 +214,30 @@ def open_controller(
     ):
         click.get_current_context().meta.update({WATCHED: controller, REACHED: url})
         remember_address(context)
-        trouble = controller.outcomes.trouble
-        if trouble is not None and not unhindered:
-            raise trouble
-        found = _open_markers(controller, lenient=unhindered)
-        for remark in controller.outcomes.remarks:
-            note(remark)
-        if not quiet:
-            note_unsettled(controller, found, named)
-        if context.cell and not calms:
-            _check_robot(controller, context.cell, looks=looks)
-        if found and not quiet and not calms:
-            from robolink_cli._offering import offer_to_restore
+        with listening_for_stop(controller, context):
+            trouble = controller.outcomes.trouble
+            if trouble is not None and not unhindered:
+                raise trouble
+            found = _open_markers(controller, lenient=unhindered)
+            for remark in controller.outcomes.remarks:
+                note(remark)
+            if not quiet:
+                note_unsettled(controller, found, named)
+            if context.cell and not calms:
+                _check_robot(controller, context.cell, looks=looks)
+            if found and not quiet and not calms:
+                from robolink_cli._offering import offer_to_restore
 
-            offer_to_restore(controller, found)
-        try:
-            with listening_for_stop(controller, context):
+                offer_to_restore(controller, found)
+            try:
                 yield controller
-        finally:
-            left = _open_markers(controller, lenient=unhindered)
-            note_unsettled(controller, [m for m in left if m not in found], named)
-            if trouble is not None:
-                # After the work: nothing that the journal has to say stands before it.
-                note(f"{trouble.what} {_unrecorded()}")
-    if not calms:
+            finally:
+                left = _open_markers(controller, lenient=unhindered)
+                note_unsettled(controller, [m for m in left if m not in found], named)
+                if trouble is not None:
+                    # After the work: nothing that the journal has to say stands before it.
+                    note(f"{trouble.what} {_unrecorded()}")
+    if not unhindered:
         # A stop that came while the connection was closed: nobody may take this for a success.
         controller.latch.require_open(tr("The command"))
 

@@ -11,6 +11,7 @@ from robolink.errors import (
     MotionTimeoutError,
     RejectedError,
     RemoteProtocolError,
+    StoppedError,
     TransportTimeoutError,
 )
 from robolink.messages import tr
@@ -197,7 +198,7 @@ class SoftMotionMotionUntilInput:
         if end.error_class == ErrorClass.NO_EDGE:
             return None
         if self._motion.wait(timeout_s=timeout_s) is not MotionOutcome.ARRIVED:
-            raise ControllerFaultError(
+            raise StoppedError(
                 tr("The movement was stopped before the input switched."),
                 remedy=tr("Nothing goes on by itself; start again when the cell is clear."),
                 controller=self._mailbox.identity,

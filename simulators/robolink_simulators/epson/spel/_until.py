@@ -1,4 +1,4 @@
-"""``Till`` and ``Find``: motions that a condition ends or marks (spel.md 7.1).
+"""``Till``, ``Find`` and ``Sense``: motions that a condition ends or marks (spel.md 7.1).
 
 The instant at which an input that follows the robot meets the condition is known when the
 motion starts, because the motion is; an input that is switched by hand is seen at once. Till
@@ -9,11 +9,8 @@ from typing import Final
 
 from robolink_simulators.epson.points import Point
 from robolink_simulators.epson.spel._evaluate import Evaluator
-from robolink_simulators.epson.spel._tree import Binary, Expression, Literal, Name, Until
+from robolink_simulators.epson.spel._tree import Expression, Until
 from robolink_simulators.epson.spel._values import truth
-
-AT_POWER_ON: Final = Binary("=", Name("sw", (Literal(0),)), Name("on"))
-"""The condition of a bare Till or Find (spel.md 6.3): ``Sw(0) = On``."""
 
 _SAMPLE_NS: Final = 1_000_000
 """A condition that holds for less is not seen (assumed: controllers sample their inputs)."""
@@ -30,7 +27,8 @@ class Watch:
     def __init__(self, evaluator: Evaluator, until: Until) -> None:
         self.stops = until.word == "till"
         self._evaluator = evaluator
-        self._condition: Expression = until.condition or AT_POWER_ON
+        stored: Expression = getattr(evaluator.session.memory, until.word)
+        self._condition = until.condition or stored
         self._edge_ns: int | None = None
 
     def holds(self, instant_ns: int) -> bool:
@@ -78,3 +76,33 @@ class Watch:
             else:
                 before_ns = middle_ns
         return after_ns
+
+
+class DescentWatch:
+    """The Sense of a Jump: looked at once, just before the descent (documented).
+
+    Args:
+        evaluator: What evaluates the condition.
+        until: What the motion says.
+        at_ns: When the descent begins.
+    """
+
+    stops = False
+
+    def __init__(self, evaluator: Evaluator, until: Until, at_ns: int) -> None:
+        self._evaluator = evaluator
+        self._condition: Expression = until.condition or evaluator.session.memory.sense
+        self._at_ns = at_ns
+
+    def edge_after(self, seen_ns: int) -> int | None:
+        """Return when the look is due."""
+        return max(self._at_ns, seen_ns)
+
+    def meet(self, instant_ns: int) -> int | None:
+        """Look; stop above the target, or go on."""
+        session = self._evaluator.session
+        session.machine.sensed = truth(self._evaluator.value(self._condition))
+        if not session.machine.sensed:
+            return None
+        session.machine.arm.halt(instant_ns)
+        return instant_ns

@@ -1,7 +1,7 @@
 """Runs one line of the command window in simulated time."""
 
 import random
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from robolink.timing import NS_PER_S
@@ -80,7 +80,7 @@ class Execution:
         while not self._done and now_ns >= (change_ns := self._change_ns):
             arm.advance(change_ns)
             self._evaluator.session.machine.timed_bits.advance(change_ns)
-            self._attempt(lambda at_ns=change_ns: self._take_up(at_ns))
+            self._attempt(change_ns)
             self._seen_ns = change_ns
         arm.advance(now_ns)
         self._seen_ns = max(self._seen_ns, now_ns)
@@ -140,9 +140,9 @@ class Execution:
         session.memory.last_error = getattr(session.options.numbers, refusal.kind)
         self._fail(SpelError(session.memory.last_error, refusal.text))
 
-    def _attempt(self, act: Callable[[], None]) -> None:
+    def _attempt(self, change_ns: int) -> None:
         try:
-            act()
+            self._take_up(change_ns)
         except Refusal as refusal:
             self.refuse(refusal)
         except RecursionError:

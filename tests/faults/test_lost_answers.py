@@ -196,7 +196,7 @@ def unclear():
 @pytest.mark.parametrize("how", UNCLEAR)
 def test_a_write_whose_acknowledgement_was_garbled_is_told_as_that(serve, unclear, how):
     simulator = unclear(WRITE, *UNCLEAR[how])
-    told = []
+    told: list[str] = []
     with serve(simulator) as url, robolink.connect(url, timeout_s=0.5) as controller:
         old = controller.tools.read(1)
         with pytest.raises(UnclearAnswerError, match="neither that it ran nor") as caught:

@@ -47,7 +47,7 @@ HELD_BACK = [
 ]
 
 
-@pytest.mark.parametrize(("habit", "act"), HELD_BACK, ids=str)
+@pytest.mark.parametrize(("habit", "act"), HELD_BACK)
 def test_what_an_unreal_cell_would_falsify_is_held_back_before_it_is_sent(habit, act):
     simulator = EpsonSimulator(seed=3, options=options_from_text({habit: "yes"}))
     with served("sim", simulator) as cell, cell.connect() as controller:

@@ -26,6 +26,7 @@
     │       ├── LeaseHeldError             another program or person is changing the controller
     │       └── LeaseLostError             another did so meanwhile
     ├── OutcomeUnknownError                sent, not answered: the machine may or may not have acted
+    ├── StoppedError                       a stop ended it, from another thread or terminal
     ├── ToolError
     │   ├── ToolIndexError · ReservedToolError · UndefinedToolError
     │   ├── ToolChangedError               not the value that was expected; nothing was written
@@ -36,11 +37,14 @@
         └── NotAllowedError                it takes an engineer
 
 Each error says what happened (:attr:`~RobolinkError.what`) and what to do next
-(:attr:`~RobolinkError.remedy`); ``str(error)`` is both. Foreign exceptions are converted
-at the transport boundary only, always ``from`` the original.
+(:attr:`~RobolinkError.remedy`); ``str(error)`` is both. What it left on the controller is
+:attr:`~RobolinkError.controller_state`. Foreign exceptions are converted at the transport
+boundary only, always ``from`` the original.
 """
 
 from enum import StrEnum
+
+from robolink.standing import UNTOUCHED, Standing
 
 
 class RobolinkError(Exception):
@@ -52,6 +56,11 @@ class RobolinkError(Exception):
         controller: Identity or URL of the controller concerned, without any password.
         request: The request under way, as it may be shown to a person.
         raw: The bytes that were read and could not be used.
+
+    Attributes:
+        controller_state: What stands on the controller now, of what was done to it in the block
+            that this error ended: a write, a change, a procedure or a whole connection, whichever
+            was the outermost that it has left.
     """
 
     def __init__(
@@ -64,6 +73,7 @@ class RobolinkError(Exception):
         raw: bytes = b"",
     ) -> None:
         super().__init__(what)
+        self.controller_state: Standing = UNTOUCHED
         self.what = what
         self.remedy = remedy
         self.controller = controller
@@ -231,6 +241,14 @@ class OutcomeUnknownError(RobolinkError):
     """A command went out and no answer came: it may or may not have run.
 
     Motion on that controller is blocked until ``resolve``; nothing is sent again.
+    """
+
+
+class StoppedError(RobolinkError):
+    """A stop came: from another thread, another terminal or a person.
+
+    What was under way was ended by it, and nothing that moves or writes leaves this process
+    until the stop is released.
     """
 
 

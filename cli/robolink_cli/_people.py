@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from robolink.errors import ConfigError, DeclinedError
+from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_cli._line import LINE
 from robolink_cli._render import json_is_on
@@ -47,6 +47,7 @@ def signature_of(operator: str | None, cell: "Cell | None", *, changes: bool) ->
 
     Raises:
         ConfigError: The cell names people, and this is none of them.
+        DeclinedError: Nobody gave a name.
     """
     from robolink import __version__
     from robolink.journal import signature_here
@@ -69,12 +70,8 @@ def signature_of(operator: str | None, cell: "Cell | None", *, changes: bool) ->
 
 
 def _asked_for_badge() -> str:
-    from robolink_cli._consent import on_terminal
+    from robolink_cli._consent import asked_for_text, on_terminal
 
     if json_is_on() or not on_terminal():
         return ""
-    try:
-        question = tr("Who works here (badge or name)")
-        return str(click.prompt(question, type=LINE, err=True)).strip()
-    except click.Abort as end:
-        raise DeclinedError(tr("No name was given."), remedy=tr("Nothing was sent.")) from end
+    return LINE.convert(asked_for_text(tr("Who works here (badge or name)?")), None, None)

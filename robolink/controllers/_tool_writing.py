@@ -12,7 +12,13 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from robolink.controllers._guarded import MarkerDesk
-from robolink.errors import ReadBackError, RejectedError, ToolChangedError, UnclearAnswerError
+from robolink.errors import (
+    ControllerFaultError,
+    ReadBackError,
+    RejectedError,
+    ToolChangedError,
+    UnclearAnswerError,
+)
 from robolink.messages import tr
 from robolink.model import (
     ANY,
@@ -74,7 +80,7 @@ class ToolWriter:
         not_executed: Callable[[RejectedError], bool],
     ) -> None:
         self._desk = desk
-        self._same = same
+        self._same = desk.ledger.same = same
         self._uninterrupted = uninterrupted
         self._not_executed = not_executed
 
@@ -85,6 +91,7 @@ class ToolWriter:
             require_engineer(self._desk.outcomes, tr("write tool {tool} blindly", tool=tool))
         self._desk.look()
         before = write.read()
+        self._desk.ledger.saw_tool(tool, before)
         if self._same(before, requested):
             return ToolReceipt(
                 tool, before, requested, before, skipped=True, unconditional=unconditional
@@ -148,19 +155,25 @@ class ToolWriter:
         Raises:
             UnclearAnswerError: The answer told nothing; the message says what was read.
         """
-        with self._uninterrupted():
+        ledger = self._desk.ledger
+        with self._uninterrupted(), ledger.block():
             marker = self._desk.begin(MarkerKind.SET, request, details)
             unclear: UnclearAnswerError | None = None
             with self._desk.doubt(request):
                 try:
-                    send()
-                except RejectedError as error:
-                    if self._not_executed(error):
+                    with self._desk.unless_stopped(marker):
+                        send()
+                    ledger.answered(marker)
+                except (RejectedError, ControllerFaultError) as error:
+                    ledger.answered(marker)
+                    if isinstance(error, RejectedError) and self._not_executed(error):
                         self._desk.clear(marker, _refusal(marker, error))
                     raise
                 except UnclearAnswerError as error:
+                    ledger.answered(marker)
                     unclear = error
                 found = read()
+            ledger.proved(marker, found)
             self._desk.clear(marker, *entries(marker, found))
         if unclear is not None:
             # What such a link says is not relied on, so this ends as a failure in any case.

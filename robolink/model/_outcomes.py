@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Protocol
 
+from robolink.model._identity import Who
 from robolink.model._journal_entries import EntryKind, NewEntry, Recorded, Signature
 
 
@@ -59,6 +60,21 @@ class OutcomeLog(Protocol):
     @property
     def durable(self) -> bool:
         """Whether what is recorded outlives this process."""
+
+    @property
+    def identity(self) -> str:
+        """Who the controller is; it is asked if it was not asked yet."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Every name under which the controller is on record, its identity first."""
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What a person should know about who the controller is, once, in sentences."""
+
+    def ask(self, who: Who) -> None:
+        """Let the controller say who it is, at the next use and not before."""
 
     def begin(self, marker: Marker) -> None:
         """Store ``marker``; it is durable when this returns.

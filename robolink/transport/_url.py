@@ -40,6 +40,11 @@ class LinkUrl:
         port = "" if self.port is None else f":{self.port}"
         return f"{self.scheme}://{host}{port}{self.path}"
 
+    @property
+    def place(self) -> str:
+        """Where it leads, without the scheme; see :attr:`Transport.place`."""
+        return self.identity.partition("://")[2]
+
 
 def parse_url(text: str) -> LinkUrl:
     """Parse a controller URL.

@@ -12,6 +12,7 @@ from robolink import ANY, ToolOffset
 from robolink.errors import (
     ControllerFaultError,
     NotReadyError,
+    StoppedError,
     UnclearAnswerError,
     UndefinedToolError,
 )
@@ -124,7 +125,9 @@ def test_an_abort_and_a_failed_statement_are_understood_with_every_habit(serve, 
         target = replace(here, z_mm=here.z_mm + 30)
         motion = group.move_to(target, MotionProfile(Path.STRAIGHT, 1, 1.0), box=WorkBox())
         controller.stop()
-        assert motion.wait(timeout_s=60) is MotionOutcome.STOPPED
+        with pytest.raises(StoppedError):
+            motion.wait(timeout_s=60)
+        controller.release_stop()
         beyond = replace(group.pose(), x_mm=5000.0)
         with pytest.raises((ControllerFaultError, UnclearAnswerError)) as caught:
             group.move_to(beyond, MotionProfile(), box=WorkBox()).wait(timeout_s=60)

@@ -18,6 +18,7 @@ from robolink.errors import (
     NotReadyReason,
     OutcomeUnknownError,
     RejectedError,
+    StoppedError,
 )
 from robolink.model import InputEdge, MotionOutcome, MotionProfile, Path, Pose, Verdict, WorkBox
 from robolink.protocols.mailbox import (
@@ -209,7 +210,8 @@ def test_a_stop_from_another_thread_ends_the_wait(cell, plc, controller, group):
         stopped.append(True)
 
     cell.link.before("read_head", stop, nth=2)
-    assert motion.wait(timeout_s=5) is MotionOutcome.STOPPED
+    with pytest.raises(StoppedError):
+        motion.wait(timeout_s=5)
     assert stopped
     assert plc.now.group_state == GroupState.STOPPING
 

@@ -38,7 +38,8 @@ def answer(client, statement):
 
 @pytest.fixture
 def client(login):
-    client = login(EpsonSimulator(options=EpsonOptions(remote_timeout_s=0)))
+    options = EpsonOptions(remote_timeout_s=0)
+    client = login(EpsonSimulator(options=options, serial="SIM00001"))
     for line in before():
         assert answer(client, line) == "0"
     return client

@@ -10,6 +10,7 @@ from robolink.controllers.epson._acts import EpsonActs
 from robolink.controllers.epson._alarms import EpsonAlarms
 from robolink.controllers.epson._condition import ConditionReader
 from robolink.controllers.epson._facts import FactReader
+from robolink.controllers.epson._identity import IdentityReader
 from robolink.controllers.epson._io import EpsonIo
 from robolink.controllers.epson._motion import EpsonGroup
 from robolink.controllers.epson._points import EpsonPoints
@@ -20,6 +21,7 @@ from robolink.controllers.epson._raw import RawStatements
 from robolink.controllers.epson._resolve import EpsonResolver
 from robolink.controllers.epson._session import EpsonSession
 from robolink.controllers.epson._setter import ValueSetter
+from robolink.controllers.epson._stopping import REST_S
 from robolink.controllers.epson._tools import EpsonToolTable
 from robolink.controllers.epson._value_doubts import ValueDoubts
 from robolink.controllers.epson._variables import EpsonVariables
@@ -32,12 +34,15 @@ from robolink.model import (
     Capabilities,
     ControllerFacts,
     ControllerStatus,
+    Ledger,
     Marker,
     MarkerKind,
     NewEntry,
     OutcomeLog,
 )
 from robolink.protocols.epson_text import Preference
+from robolink.standing import note_standing
+from robolink.stop_latch import StopLatch
 from robolink.timing import Clock
 
 
@@ -62,7 +67,8 @@ class EpsonController:
         self._session = session
         self._outcomes = outcomes
         self._window = CommandWindow(session)
-        self._lock = ProcedureLock(session.identity)
+        outcomes.ask(IdentityReader(session, self._window).read)
+        self._lock = ProcedureLock(session.identity, session.latch)
         self._desk = MarkerDesk(session.identity, outcomes)
         self._preferences = Preferences(session)
         self._group = EpsonGroup(
@@ -101,7 +107,7 @@ class EpsonController:
 
     @property
     def identity(self) -> str:
-        """The URL without its options."""
+        """The URL without its options; who answers there is ``outcomes.identity``."""
         return self._session.identity
 
     @property
@@ -146,6 +152,11 @@ class EpsonController:
         return self._outcomes
 
     @property
+    def ledger(self) -> Ledger:
+        """What was done here since connecting, and how much of it is proved."""
+        return self._desk.ledger
+
+    @property
     def resolver(self) -> EpsonResolver:
         """Settles what was begun and not proved finished."""
         return self._resolver
@@ -168,15 +179,27 @@ class EpsonController:
         """Return the controller's own text for an error number, empty where it has none."""
         return self._window.error_text(code)
 
-    def stop(self) -> None:
-        """Stop: abort our own movement, else stop the controller's tasks.
+    @property
+    def latch(self) -> StopLatch:
+        """What holds everything back from :meth:`stop` until :meth:`release_stop`."""
+        return self._session.latch
 
-        May be called from any thread while another waits on a motion.
+    def stop(self) -> None:
+        """Bring everything to rest: Abort, Stop, and a status that shows it.
+
+        May be called from any thread, whatever another one is doing. From its first instant on
+        no movement, write or program start leaves this process until :meth:`release_stop`;
+        whoever is at work gets StoppedError.
 
         Raises:
-            RobolinkError: It was not confirmed; the message says to use the emergency stop.
+            OutcomeUnknownError: Rest was not seen; the message says to use the emergency stop.
+            RobolinkError: It was not confirmed; the message says the same.
         """
         self._acts.stop()
+
+    def release_stop(self) -> None:
+        """Let this process act again after :meth:`stop`, because a person says so."""
+        self._session.latch.release()
 
     def reset_fault(self) -> None:
         """Send Reset because a person asked for it; it may switch outputs off.
@@ -284,6 +307,7 @@ class EpsonController:
         the connection is just closed then. So it is when another device starts the cell: a
         task could begin between the look and the logout.
         """
+        self._session.latch.await_stops(REST_S)
         try:
             if self._session.alive:
                 self._group.abort_unfinished()
@@ -306,3 +330,5 @@ class EpsonController:
         trace: TracebackType | None,
     ) -> None:
         self.close()
+        if error is not None:
+            note_standing(error, self.ledger.standing())

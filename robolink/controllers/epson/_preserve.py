@@ -96,7 +96,7 @@ class Preserver:
     @contextmanager
     def preserved(self, reason: str) -> Iterator[None]:
         """See :meth:`robolink.model.Controller.preserved`."""
-        with self._lock.held(reason):
+        with self._lock.held(reason), self._desk.ledger.block():
             self._desk.look()
             self._desk.require_settled(reason)
             self._window.require_ready(reason)
@@ -145,7 +145,7 @@ class Preserver:
 
     def restore(self, before: InForce, marker: Marker) -> None:
         """Put ``before`` back, read it back, and forget ``marker``; Ctrl-C waits for the end."""
-        with self._session.uninterrupted():
+        with self._session.uninterrupted(), self._session.latch.restoring():
             self._group.abort_unfinished()
             self._tools.select(before.tool)
             self._group.settings.restore(before.settings)

@@ -76,7 +76,9 @@ class EpsonToolTable:
         """Read one tool, ``None`` when it is undefined; Tool 0 reads as all zeros."""
         self._check_index(tool, lowest=0)
         self._window.require_ready(f"TLSet {tool}")
-        return self._read(tool)
+        found = self._read(tool)
+        self._desk.ledger.saw_tool(tool, found)
+        return found
 
     def write(self, tool: int, offset: ToolOffset, *, expected: Expected) -> ToolReceipt:
         """Write and read back; see :class:`robolink.model.ToolTable`."""
@@ -120,7 +122,7 @@ class EpsonToolTable:
     def selected(self) -> int:
         """Read which tool is in force; the selection survives power-off (epson.md 3.1)."""
         self._window.require_ready("Print Tool")
-        return self._selected()
+        return self._selected_now()
 
     def select(self, tool: int) -> None:
         """Put ``tool`` in force and read the selection back."""
@@ -128,7 +130,7 @@ class EpsonToolTable:
         statement = spel.select_tool(tool)
         with self._lock.held(statement):
             self._window.require_ready(statement)
-            before = self._selected()
+            before = self._selected_now()
             if before == tool:
                 return
             self._require_defined(tool)
@@ -217,6 +219,12 @@ class EpsonToolTable:
                 remedy=tr("Define it first, with a calibration or 'robolink tool set'."),
                 request=spel.select_tool(tool),
             )
+
+    def _selected_now(self) -> int:
+        """Read the selection outside of a change of it."""
+        found = self._selected()
+        self._desk.ledger.saw_selected(found)
+        return found
 
     def _selected(self) -> int:
         return spel.parse_integer(self._window.printed(spel.print_selected_tool()))

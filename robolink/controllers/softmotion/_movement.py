@@ -53,11 +53,16 @@ class SoftMotionMotion:
         return self._end is not None
 
     def wait(self, *, timeout_s: float) -> MotionOutcome:
-        """Wait for the end; see :class:`robolink.model.Motion`."""
-        end = self.await_end(timeout_s)
-        if end.state == CommandState.DONE:
-            return MotionOutcome.ARRIVED
-        return self._stopped(end)
+        """Wait for the end; see :class:`robolink.model.Motion`.
+
+        Raises:
+            StoppedError: A stop came, whatever the movement did.
+        """
+        with self._mailbox.wire.latch.ending(self._request):
+            end = self.await_end(timeout_s)
+            if end.state == CommandState.DONE:
+                return MotionOutcome.ARRIVED
+            return self._stopped(end)
 
     def abort(self) -> None:
         """Halt the group once and await the end of the movement.
@@ -66,7 +71,11 @@ class SoftMotionMotion:
             OutcomeUnknownError: No end was seen; the marker stays.
         """
         mailbox = self._mailbox
-        with mailbox.uninterrupted(), mailbox.desk.doubt(self._request):
+        with (
+            mailbox.uninterrupted(),
+            mailbox.desk.doubt(self._request),
+            mailbox.wire.attended(),
+        ):
             if self._end is None and mailbox.wire.rides.end_of(self._command.sequence) is None:
                 self._halted = True
                 # It may have just ended by itself, or by a stop; its end is awaited.
@@ -89,7 +98,7 @@ class SoftMotionMotion:
         if self._end is not None:
             return self._end
         try:
-            with mailbox.desk.doubt(self._request):
+            with mailbox.desk.doubt(self._request), mailbox.wire.attended():
                 ended = self._watch(Deadline.after(mailbox.wire.clock, timeout_s))
         except KeyboardInterrupt:
             self.abort()
@@ -181,7 +190,8 @@ class SoftMotionMotionUntilInput:
             ControllerError: It was stopped, refused, or ended by an error.
             MotionTimeoutError, OutcomeUnknownError: As for any movement.
         """
-        end = self._motion.await_end(timeout_s)
+        with self._mailbox.wire.latch.ending(describe(self._motion.command)):
+            end = self._motion.await_end(timeout_s)
         if end.error_class == ErrorClass.NO_EDGE:
             return None
         if self._motion.wait(timeout_s=timeout_s) is not MotionOutcome.ARRIVED:

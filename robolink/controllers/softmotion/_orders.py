@@ -7,10 +7,14 @@ PLC counts one more damaged block and has acknowledged nothing since. Never afte
 """
 
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import Final
 
+from robolink.checkpoints import Point, checkpoint
 from robolink.controllers.softmotion._answers import Ended, cut_short, describe, refused
+from robolink.controllers.softmotion._command_classes import command_class_of
 from robolink.controllers.softmotion._ownership import Ownership
 from robolink.controllers.softmotion._rides import has_ended
 from robolink.controllers.softmotion._snapshots import Snapshots
@@ -19,6 +23,7 @@ from robolink.errors import (
     ConfigError,
     RejectedError,
     RemoteProtocolError,
+    StoppedError,
     TransportTimeoutError,
 )
 from robolink.messages import tr
@@ -57,8 +62,12 @@ class Orders:
         self._last = 0
         self.ownership = Ownership(wire, self._to_end)
 
-    def carry_out(self, draft: Command) -> Response:
+    def carry_out(self, draft: Command, *, within_s: float = COMPLETION_S) -> Response:
         """Send a command that is no movement and return the snapshot that shows its end.
+
+        Args:
+            draft: The command.
+            within_s: Longest time between its acknowledgement and its end.
 
         Raises:
             RejectedError: The PLC refused it; it did nothing.
@@ -69,7 +78,7 @@ class Orders:
         """
         with self._wire.uninterrupted():
             self._possess(draft)
-            end = self._to_end(draft)
+            end = self._to_end(draft, within_s)
             if end.state == CommandState.ERROR:
                 raise self._refusal(end.command, end.now, end.error_class)
             if end.state == CommandState.ABORTED:
@@ -82,7 +91,8 @@ class Orders:
         Raises:
             KeyboardInterrupt: Ctrl-C came before a movement was sent; it was not.
         """
-        with self._wire.uninterrupted():
+        # Who begins a movement is there; at most four begin before one has to be waited on.
+        with self._wire.uninterrupted(), self._wire.attended():
             self._possess(draft)
             command, now = self._send(draft, ride=draft.opcode != Opcode.JOG)
             if now.state == CommandState.ERROR:
@@ -91,17 +101,17 @@ class Orders:
             return command
 
     def _possess(self, draft: Command) -> None:
-        if OPCODES[Opcode(draft.opcode)].needs_owner:
+        if draft.needs_owner:
             self.ownership.require(describe(draft))
 
     def _refusal(self, command: Command, now: Response, error_class: int) -> RejectedError:
-        if error_class in _DISPOSSESSED and OPCODES[Opcode(command.opcode)].needs_owner:
+        if error_class in _DISPOSSESSED and command.needs_owner:
             self.ownership.lose()
         return refused(command, now, error_class)
 
-    def _to_end(self, draft: Command) -> Ended:
+    def _to_end(self, draft: Command, within_s: float = COMPLETION_S) -> Ended:
         command, now = self._send(draft)
-        deadline = Deadline.after(self._wire.clock, COMPLETION_S)
+        deadline = Deadline.after(self._wire.clock, within_s)
         while (end := self._end_of(command, now)) is None:
             if deadline.expired:
                 raise self._wire.ended(self._silence(command, tr("began, and has not ended")))
@@ -123,7 +133,8 @@ class Orders:
 
     def _send(self, draft: Command, *, ride: bool = False) -> tuple[Command, Response]:
         """Write a command and return it with the snapshot that acknowledges it."""
-        with self._lock:
+        request = describe(draft)
+        with self._exchanging(request):
             before = self._snapshots.take()
             self._require_able(draft, before)
             command = self._addressed(draft, before)
@@ -134,8 +145,9 @@ class Orders:
                 self._wire.rides.begin(command.sequence)
             for _ in range(_WRITES):
                 try:
+                    self._wire.latch.admit(command_class_of(command), request)
                     self._wire.write(words)
-                except RejectedError:
+                except (RejectedError, StoppedError):
                     self._wire.rides.forget(command.sequence)
                     raise
                 before, accepted = self._await_acknowledgement(command, before)
@@ -147,6 +159,17 @@ class Orders:
                     remedy=tr("Look for a gateway that changes registers, or a bad line."),
                 )
             )
+
+    @contextmanager
+    def _exchanging(self, request: str) -> Iterator[None]:
+        """Hold the lock from the look at the latch to the acknowledgement."""
+        checkpoint(Point.LOCK, request)
+        try:
+            with self._lock:
+                checkpoint(Point.HELD, request)
+                yield
+        finally:
+            checkpoint(Point.EXCHANGE, request)
 
     def _await_acknowledgement(self, command: Command, before: Response) -> tuple[Response, bool]:
         """Return the snapshot that shows the acknowledgement, or the damage, of a block."""
@@ -161,7 +184,9 @@ class Orders:
             if now.rejected != before.rejected:
                 return now, False
             if deadline.expired:
-                raise self._wire.ended(self._silence(command, tr("was not acknowledged")))
+                silence = self._silence(command, tr("was not acknowledged"))
+                # Something stronger must be able to follow what should have ended a movement.
+                raise silence if command.only_ends else self._wire.ended(silence)
 
     def _addressed(self, draft: Command, before: Response) -> Command:
         taken = {before.ack_head, before.active_movement}

@@ -78,7 +78,9 @@ class Ownership:
         self._lost = True
 
     def release(self) -> None:
-        """Give the mailbox back, if it is ours."""
+        """Give the mailbox back, if it is ours; what is unfinished is halted first."""
         if self._wire.epoch:
+            if self._wire.rides.unfinished:
+                self._send(Command(0, Opcode.HALT))
             self._send(Command(0, Opcode.OWNERSHIP))
             self._wire.epoch = 0

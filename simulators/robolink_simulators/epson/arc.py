@@ -45,14 +45,24 @@ class ArcLeg:
             return self
         return replace(self, ramp=BrakedRamp(self.ramp, elapsed_ns / NS_PER_S))
 
+    def flange_at(self, elapsed_ns: int) -> Pose:
+        """Return the pose of the flange that long after the start."""
+        elapsed_ns = min(elapsed_ns, self.duration_ns)
+        return self._flange_after(self.ramp.share_at(elapsed_ns / NS_PER_S))
+
     def joints_after(self, share: float) -> Joints:
         """Return the joints after a share of the arc."""
+        return solve(self.model, self._flange_after(share), self.hand)
+
+    def _flange_after(self, share: float) -> Pose:
         a, b = self.start, self.end
+        if share >= 1:
+            return flange_of(b, self.offset)
         spoke = complex(a.x_mm, a.y_mm) - self.centre
         at = self.centre + spoke * cmath.exp(1j * self.sweep_rad * share)
         z_mm = a.z_mm + (b.z_mm - a.z_mm) * share
         tip = Pose(at.real, at.imag, z_mm, a.u_deg + (b.u_deg - a.u_deg) * share)
-        return solve(self.model, flange_of(b if share >= 1 else tip, self.offset), self.hand)
+        return flange_of(tip, self.offset)
 
 
 def plan_arc(

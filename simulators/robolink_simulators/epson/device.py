@@ -36,6 +36,7 @@ from robolink_simulators.epson.variables import project_variables
 from robolink_simulators.epson.window import CommandWindow
 from robolink_simulators.epson.wire_text import shown_reply, shown_request
 from robolink_simulators.faults import Departure, Fault, FaultAction, FaultPlan
+from robolink_simulators.serial_numbers import drawn_serial
 from robolink_simulators.world import World
 from robolink_simulators.world_parameters import WorldParameters
 
@@ -50,10 +51,12 @@ class EpsonSimulator:
 
     Args:
         robot: Name of a SCARA model.
-        seed: Decides the world and every scatter; the same seed gives the same run.
+        seed: Decides the world and every scatter; the same seed gives the same run, but for
+            the serial number.
         password: Of Remote Ethernet; none means an empty one.
         options: The controller's habits.
-        state_path: File that keeps what the controller's flash keeps.
+        serial: Serial number of the robot; by default one that no other simulator has.
+        state_path: File that keeps what the controller's flash keeps, the serial number too.
         faults: What is planned to go wrong.
         world: What goes wrong around the robot.
 
@@ -93,6 +96,7 @@ class EpsonSimulator:
         seed: int = 1,
         password: Secret | None = None,
         options: EpsonOptions | None = None,
+        serial: str = "",
         state_path: Path | None = None,
         faults: Iterable[Fault] = (),
         world: WorldParameters | None = None,
@@ -112,7 +116,7 @@ class EpsonSimulator:
         self.on_reply: RequestHook | None = None
         self._requests = 0
         self._links: list[EpsonLink] = []
-        self.machine = Machine(find_robot(robot))
+        self.machine = Machine(find_robot(robot), serial=serial or drawn_serial())
         self.machine.switch_motors(True)
         self.world = World.seeded(
             self.machine,

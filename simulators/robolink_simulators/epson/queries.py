@@ -42,7 +42,7 @@ def query_commands(
     health = _NEW if options.maintenance_data else (_NOT_APPLICABLE,)
     return {
         "getcontname": lambda: (card.name,),
-        "getcontno": lambda: (card.number,),
+        "getcontno": lambda: (machine.controller_serial,),
         "getcontver": lambda: (_FIRMWARE[options.rc_plus],),
         "getconttype": lambda: (card.kind,),
         "getcontdev": lambda: (_control_device(machine, condition),),

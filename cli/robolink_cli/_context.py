@@ -29,7 +29,7 @@ from robolink_cli._stopping_beside import listening_for_stop, remember_address
 
 if TYPE_CHECKING:
     from robolink.config import Cell
-    from robolink.model import Controller, Marker, OutcomeLog, Secret
+    from robolink.model import Controller, Marker, Secret
 
 WATCHED = "robolink.watched"
 """Where a prompt finds the controller whose status it must read while a person thinks."""
@@ -209,28 +209,35 @@ def open_controller(
             remote_timeout_s=context.remote_timeout_s,
             trace=trace,
             signature=signature,
-            outcomes=_journal_or_memory(url) if unhindered else None,
         ) as controller,
         nullcontext() if calms else controller.latch.ending(tr("The command")),
     ):
         click.get_current_context().meta.update({WATCHED: controller, REACHED: url})
         remember_address(context)
-        found = _open_markers(controller, lenient=unhindered)
-        if not quiet:
-            note_unsettled(controller, found, named)
-        if context.cell and not calms:
-            _check_robot(controller, context.cell, looks=looks)
-        if found and not quiet and not calms:
-            from robolink_cli._offering import offer_to_restore
+        with listening_for_stop(controller, context):
+            trouble = controller.outcomes.trouble
+            if trouble is not None and not unhindered:
+                raise trouble
+            found = _open_markers(controller, lenient=unhindered)
+            for remark in controller.outcomes.remarks:
+                note(remark)
+            if not quiet:
+                note_unsettled(controller, found, named)
+            if context.cell and not calms:
+                _check_robot(controller, context.cell, looks=looks)
+            if found and not quiet and not calms:
+                from robolink_cli._offering import offer_to_restore
 
-            offer_to_restore(controller, found)
-        try:
-            with listening_for_stop(controller, context):
+                offer_to_restore(controller, found)
+            try:
                 yield controller
-        finally:
-            left = _open_markers(controller, lenient=unhindered)
-            note_unsettled(controller, [m for m in left if m not in found], named)
-    if not calms:
+            finally:
+                left = _open_markers(controller, lenient=unhindered)
+                note_unsettled(controller, [m for m in left if m not in found], named)
+                if trouble is not None:
+                    # After the work: nothing that the journal has to say stands before it.
+                    note(f"{trouble.what} {_unrecorded()}")
+    if not unhindered:
         # A stop that came while the connection was closed: nobody may take this for a success.
         controller.latch.require_open(tr("The command"))
 
@@ -303,18 +310,8 @@ def _calming_context_from(given: Mapping[str, Any]) -> CliContext:
         )
 
 
-def _journal_or_memory(url: str) -> "OutcomeLog | None":
-    """Return ``None`` for the journal, or a log in memory where the journal is out of order."""
-    from robolink.errors import JournalError
-    from robolink.journal import default_location, may_exist, memory_journal, open_journal
-
-    try:
-        if may_exist(default_location()):
-            open_journal().open_markers()  # one that is open already may have broken since
-    except JournalError as error:
-        note(error.what)
-        return memory_journal(url).log(url)
-    return None
+def _unrecorded() -> str:
+    return tr("So what is unfinished may not show, and nothing can be changed until it is mended.")
 
 
 def _open_markers(controller: "Controller", *, lenient: bool) -> "tuple[Marker, ...]":

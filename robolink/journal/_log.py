@@ -33,7 +33,10 @@ class JournalOutcomeLog:
         signature: Who works here, and with what.
         change: Id of the tool change under way, empty for none; it goes with every entry.
         durable: Whether what is recorded outlives this process.
+        trouble: ``None``: this record can be kept, as far as is known.
     """
+
+    trouble: JournalError | None = None
 
     def __init__(
         self,

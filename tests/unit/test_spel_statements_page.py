@@ -38,8 +38,7 @@ def answer(client, statement):
 
 @pytest.fixture
 def client(login):
-    options = EpsonOptions(remote_timeout_s=0)
-    client = login(EpsonSimulator(options=options, serial="SIM00001"))
+    client = login(EpsonSimulator(serial="SIM00001", options=EpsonOptions(remote_timeout_s=0)))
     for line in before():
         assert answer(client, line) == "0"
     return client

@@ -36,8 +36,11 @@ class ArcLeg:
 
     def joints_at(self, elapsed_ns: int) -> Joints:
         """Return the joints that long after the start."""
-        elapsed_ns = min(elapsed_ns, self.duration_ns)
-        return self.joints_after(self.ramp.share_at(elapsed_ns / NS_PER_S))
+        return self.joints_after(self._share_at(elapsed_ns))
+
+    def flange_at(self, elapsed_ns: int) -> Pose:
+        """Return the pose of the flange that long after the start."""
+        return self._flange_after(self._share_at(elapsed_ns))
 
     def braked(self, elapsed_ns: int) -> "ArcLeg":
         """Return the same leg, left to come to rest."""
@@ -45,24 +48,20 @@ class ArcLeg:
             return self
         return replace(self, ramp=BrakedRamp(self.ramp, elapsed_ns / NS_PER_S))
 
-    def flange_at(self, elapsed_ns: int) -> Pose:
-        """Return the pose of the flange that long after the start."""
-        elapsed_ns = min(elapsed_ns, self.duration_ns)
-        return self._flange_after(self.ramp.share_at(elapsed_ns / NS_PER_S))
-
     def joints_after(self, share: float) -> Joints:
         """Return the joints after a share of the arc."""
         return solve(self.model, self._flange_after(share), self.hand)
 
+    def _share_at(self, elapsed_ns: int) -> float:
+        return self.ramp.share_at(min(elapsed_ns, self.duration_ns) / NS_PER_S)
+
     def _flange_after(self, share: float) -> Pose:
         a, b = self.start, self.end
-        if share >= 1:
-            return flange_of(b, self.offset)
         spoke = complex(a.x_mm, a.y_mm) - self.centre
         at = self.centre + spoke * cmath.exp(1j * self.sweep_rad * share)
         z_mm = a.z_mm + (b.z_mm - a.z_mm) * share
         tip = Pose(at.real, at.imag, z_mm, a.u_deg + (b.u_deg - a.u_deg) * share)
-        return flange_of(tip, self.offset)
+        return flange_of(b if share >= 1 else tip, self.offset)
 
 
 def plan_arc(

@@ -11,11 +11,14 @@ from typing import Final
 from robolink_simulators.epson.input_bits import InputsAsked
 from robolink_simulators.epson.points import Point
 from robolink_simulators.epson.spel._evaluate import Evaluator
-from robolink_simulators.epson.spel._tree import Expression, Until
+from robolink_simulators.epson.spel._tree import Binary, Expression, Literal, Name, Unary, Until
 from robolink_simulators.epson.spel._values import truth
 
 _SAMPLE_NS: Final = 1_000_000
 """A condition that holds for less is not seen (assumed: controllers sample their inputs)."""
+
+_INPUTS: Final = frozenset({"sw", "in", "inw", "on", "off"})
+"""Functions of inputs, and the values to which they are compared."""
 
 
 class Watch:
@@ -70,6 +73,11 @@ class Watch:
         machine.found = Point.at(machine.tip())
         return None
 
+    @property
+    def asks_for_inputs_alone(self) -> bool:
+        """Whether nothing but inputs, numbers and operators stands in the condition."""
+        return _inputs_alone(self._condition)
+
     def value_and_inputs(self, instant_ns: int) -> tuple[bool, InputsAsked]:
         """Return whether the condition holds, and the inputs on which that hangs.
 
@@ -84,6 +92,29 @@ class Watch:
         inputs = self._evaluator.session.machine.inputs
         with inputs.as_at(instant_ns):
             return all(inputs.get(number) is on for number, on in asked.items())
+
+
+class _Scan:
+    """Looks at a condition again and again while nothing but the robot moves.
+
+    An expression of inputs alone is worked out anew only when an input that it asked for has
+    changed: of the thousands of instants of a slow search all but a few are alike. What else it
+    may ask for, where the robot is for one, is another at each instant.
+    """
+
+    def __init__(self, watch: Watch) -> None:
+        self._watch = watch
+        self._inputs_alone = watch.asks_for_inputs_alone
+        self._held = False
+        self._asked: InputsAsked | None = None
+
+    def holds(self, instant_ns: int) -> bool:
+        """Tell whether the condition holds at an instant of the motion under way."""
+        if not self._inputs_alone:
+            return self._watch.holds(instant_ns)
+        if self._asked is None or not self._watch.still(self._asked, instant_ns):
+            self._held, self._asked = self._watch.value_and_inputs(instant_ns)
+        return self._held
 
 
 class DescentWatch:
@@ -116,25 +147,6 @@ class DescentWatch:
         return instant_ns
 
 
-class _Scan:
-    """Looks at a condition again and again while nothing but the robot moves.
-
-    The expression is worked out anew only when an input that it asked for has changed: of the
-    thousands of instants of a slow search all but a few are alike.
-    """
-
-    def __init__(self, watch: Watch) -> None:
-        self._watch = watch
-        self._held = False
-        self._asked: InputsAsked | None = None
-
-    def holds(self, instant_ns: int) -> bool:
-        """Tell whether the condition holds at an instant of the motion under way."""
-        if self._asked is None or not self._watch.still(self._asked, instant_ns):
-            self._held, self._asked = self._watch.value_and_inputs(instant_ns)
-        return self._held
-
-
 def _first_between(before_ns: int, after_ns: int, holds: Callable[[int], bool]) -> int:
     """Return the first instant at which something holds, to the nanosecond."""
     while after_ns - before_ns > 1:
@@ -144,3 +156,16 @@ def _first_between(before_ns: int, after_ns: int, holds: Callable[[int], bool]) 
         else:
             before_ns = middle_ns
     return after_ns
+
+
+def _inputs_alone(expression: Expression) -> bool:
+    match expression:
+        case Literal():
+            return True
+        case Unary(_, operand):
+            return _inputs_alone(operand)
+        case Binary(_, left, right):
+            return _inputs_alone(left) and _inputs_alone(right)
+        case Name(name, arguments):
+            return name in _INPUTS and all(map(_inputs_alone, arguments or ()))
+    return False

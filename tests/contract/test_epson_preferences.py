@@ -47,7 +47,9 @@ HELD_BACK = [
 ]
 
 
-@pytest.mark.parametrize(("habit", "act"), HELD_BACK)
+@pytest.mark.parametrize(
+    ("habit", "act"), HELD_BACK, ids=lambda value: getattr(value, "__name__", value)
+)
 def test_what_an_unreal_cell_would_falsify_is_held_back_before_it_is_sent(habit, act):
     simulator = EpsonSimulator(seed=3, options=options_from_text({habit: "yes"}))
     with served("sim", simulator) as cell, cell.connect() as controller:
@@ -78,6 +80,7 @@ def test_they_are_asked_for_once_and_not_before_a_stop():
         controller.status()
         controller.tools.read(1)
         assert not any("GetContSettings" in text for _, _, text in simulator.log)
+        controller.release_stop()
         write(controller)
         with controller.preserved("a measurement"):
             move(controller)

@@ -112,7 +112,13 @@ def test_a_can_node_that_floods_is_named_before_anything_is_sent(monkeypatch):
     bus = ScriptedBus(clock, node_with(0))
     line = CanLine(bus, "softmotion+can://desk")  # type: ignore[arg-type]
     link = CanopenMailboxLink(
-        line, NODE, identity=IDENTITY, durable=True, timeout_s=1.0, clock=clock
+        line,
+        NODE,
+        lambda _timeout_s: link,
+        identity=IDENTITY,
+        durable=True,
+        timeout_s=1.0,
+        clock=clock,
     )
     link.meet(start=True)
     sent = len(bus.sent)

@@ -17,7 +17,7 @@ from robolink_cli._cell import (
     link_options,
     require_expected_robot,
 )
-from robolink_cli._notices import note_unsettled
+from robolink_cli._notices import note_at_work, note_unsettled
 from robolink_cli._people import signature_of
 from robolink_cli._recording import recording
 from robolink_cli._render import emit_json, json_is_on, note, say
@@ -220,11 +220,12 @@ def open_controller(
         found = _open_markers(controller, lenient=unhindered)
         for remark in controller.outcomes.remarks:
             note(remark)
-        if not quiet:
+        beside = not quiet and note_at_work(controller.outcomes, named)
+        if not (quiet or beside):
             note_unsettled(controller, found, named)
         if context.cell and not calms:
             _check_robot(controller, context.cell, looks=looks)
-        if found and not quiet and not calms:
+        if found and not (quiet or calms or beside):
             from robolink_cli._offering import offer_to_restore
 
             offer_to_restore(controller, found)

@@ -241,6 +241,18 @@ def test_a_selection_whose_acknowledgement_was_garbled_is_read_and_put_back(serv
         assert controller.outcomes.open_markers() == ()
 
 
+def test_a_garbled_acknowledgement_keeps_nothing_from_being_put_back(serve, unclear):
+    simulator = unclear("Speed 5, 5, 5", 9, "#Execute,")
+    with serve(simulator) as url, robolink.connect(url, timeout_s=0.5) as controller:
+        simulator.machine.power_high = True
+        with controller.preserved("a procedure"):
+            lift(controller).wait(timeout_s=60)
+            assert not simulator.machine.power_high
+        assert simulator.machine.power_high
+        assert simulator.faults.fired
+        assert controller.outcomes.open_markers() == ()
+
+
 def test_a_movement_whose_end_was_garbled_is_not_called_refused(serve, unclear):
     simulator = unclear(MOVE, 9, "#Execute,")
     with serve(simulator) as url, robolink.connect(url, timeout_s=0.5) as controller:

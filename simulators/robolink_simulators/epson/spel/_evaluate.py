@@ -14,6 +14,7 @@ from robolink_simulators.epson.spel._machine_functions import (
     POINT_FUNCTIONS,
     SIX_JOINTS,
     coordinates_of,
+    printed_pulses,
 )
 from robolink_simulators.epson.spel._operators import binary, unary
 from robolink_simulators.epson.spel._session import Session
@@ -29,6 +30,7 @@ from robolink_simulators.epson.spel._tree import (
     ModifierKind,
     Name,
     PointExpression,
+    PointFunction,
     StoredPoint,
     Unary,
 )
@@ -94,6 +96,15 @@ class Evaluator:
                 return binary(operator, self.value(left), self.value(right))
             case PointExpression():
                 return self.point(expression)
+
+    def shown(self, expression: Expression) -> Value:
+        """Return what an expression is worth to Print; AglToPls shows as pulses there."""
+        match expression:
+            case PointExpression(PointFunction("agltopls", arguments), 0, None, ()):
+                self.value(expression)
+                return printed_pulses(self.session, [self.value(a) for a in arguments])
+            case _:
+                return self.value(expression)
 
     def integer(self, expression: Expression) -> int:
         """Return a whole number."""

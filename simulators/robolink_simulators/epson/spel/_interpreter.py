@@ -226,7 +226,7 @@ class Execution:
         machine = evaluator.session.machine
         match statement:
             case Print(items, newline):
-                values = [evaluator.value(item) for item in items]
+                values = [evaluator.shown(item) for item in items]
                 end = CRLF if newline else ""
                 return Outcome(joined(values, evaluator.session.options) + end)
             case Command("wait"):

@@ -25,10 +25,11 @@ PointFunction = Callable[[Session, Arguments], Point]
 SCARA: Final = 3
 """RobotType (spel.md 9)."""
 
-OF_JOINTS: Final = frozenset({"ja", "agltopls", "pulse"})
+OF_JOINTS: Final = frozenset({"ja", "pulse"})
 """Functions of one value for each joint."""
 
 SIX_JOINTS: Final = 6
+_JOINTS: Final = 4
 
 _HAND_NUMBERS = {Hand.RIGHT: 1, Hand.LEFT: 2}
 
@@ -206,6 +207,21 @@ def _ja(session: Session, arguments: Arguments) -> Point:
     return _joint_point(session, [float(as_number(argument)) for argument in arguments])
 
 
+def _angles_to_pulses(session: Session, arguments: Arguments) -> Point:
+    # EPSON's own jog panel gives a SCARA six angles too; what there is no joint for is dropped.
+    return _ja(session, arguments[:_JOINTS])
+
+
+def printed_pulses(session: Session, arguments: Arguments) -> str:
+    """Return what Print shows of AglToPls.
+
+    A label and a whole number for each joint with blanks between: EPSON's own jog panel takes
+    every second word for pulses. What the label is, is not known.
+    """
+    joints = Joints(*(float(as_number(argument)) for argument in arguments[:_JOINTS]))
+    return " ".join(f"{i}: {n}" for i, n in enumerate(pulses_of(session, joints), start=1))
+
+
 def _pulse(session: Session, arguments: Arguments) -> Point:
     scales = session.machine.model.pulses_per_unit
     pairs = zip(arguments, scales, strict=True)
@@ -249,7 +265,7 @@ def _local_point(session: Session, arguments: Arguments) -> Point:
 POINT_FUNCTIONS: Final[dict[str, tuple[range, PointFunction]]] = {
     "xy": (range(4, 7), _xy),
     "ja": (range(4, 5), _ja),
-    "agltopls": (range(4, 5), _ja),
+    "agltopls": (range(4, 7), _angles_to_pulses),
     "pulse": (range(4, 5), _pulse),
     "pallet": (range(2, 4), _on_pallet),
     "here": (range(1), _here),

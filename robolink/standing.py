@@ -58,9 +58,11 @@ class Standing:
         doubtful: Other requests that may or may not have been carried out.
         moved: Whether a movement was begun.
         moving: Movements whose end was not seen.
-        settled: Whether nothing is left open: no write and no movement unproved or unrecorded, no
-            change that was neither kept nor taken back, no selection to be put back. Otherwise
-            the next command that moves or writes is refused until ``recover``.
+        settled: Whether no write and no movement is left unproved or unrecorded, and no change
+            that was neither kept nor taken back.
+        left_open: Whether ``recover`` has something to do: what is not settled, or another tool
+            than the cell's own that is still selected. The next command that moves or writes is
+            refused until then.
     """
 
     tools: Mapping[int, ToolStanding] = field(default_factory=dict)
@@ -72,6 +74,7 @@ class Standing:
     moved: bool = False
     moving: tuple[str, ...] = ()
     settled: bool = True
+    left_open: bool = False
 
     @property
     def effect(self) -> Effect:

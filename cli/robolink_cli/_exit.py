@@ -28,7 +28,7 @@ MEANINGS: Final[dict[int, str]] = {
     3: "the controller is not reached, or the link broke",
     4: "the two sides do not understand each other",
     5: "the controller, or a check of its state, said no",
-    UNKNOWN: "something was begun and is not settled; `robolink recover` comes next",
+    UNKNOWN: "a write or a movement stands unproved; `robolink recover` comes next",
     7: "the measurements do not support a result",
     8: "the proof failed; the old value was put back",
     9: "a person said no, or was not there to say yes",

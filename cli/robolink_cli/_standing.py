@@ -37,6 +37,7 @@ def standing_payload(standing: Standing) -> dict[str, object]:
         "doubtful": list(standing.doubtful),
         "moving": list(standing.moving),
         "settled": standing.settled,
+        "left_open": standing.left_open,
     }
 
 

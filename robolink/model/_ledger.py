@@ -196,6 +196,8 @@ class Ledger:
             since = self._whole if account is None else account
             doubts = self._doubts.values()
             moves = [deed for deed in doubts if deed.marker.kind is MarkerKind.MOVE]
+            unproved = {m.kind for m in self._open.values()} - {MarkerKind.SELECTION}
+            standing = any(map(self._stands, self._unkept))
             others = [d for d in doubts if d not in moves and d.tool is None and not d.selects]
             return Standing(
                 tools={tool: self._tool(tool, before) for tool, before in since.before.items()},
@@ -206,7 +208,8 @@ class Ledger:
                 doubtful=tuple(deed.marker.request for deed in others),
                 moved=since.moved,
                 moving=tuple(deed.marker.request for deed in moves),
-                settled=not self._open and not any(map(self._stands, self._unkept)),
+                settled=not unproved and not standing,
+                left_open=bool(self._open) or standing,
             )
 
     def _tool(self, tool: int, before: ToolOffset | None) -> ToolStanding:

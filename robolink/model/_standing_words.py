@@ -11,7 +11,7 @@ def describe_standing(standing: Standing) -> str:
     It claims nothing that was not looked at.
     """
     parts = [_movement(standing), *_writes(standing), _selection(standing)]
-    if not standing.settled:
+    if standing.left_open:
         parts.append(tr("Next: robolink recover."))
     return " ".join(parts)
 

@@ -7,18 +7,24 @@ Importing this module costs next to nothing: every pytest run of an environment 
 robolink is installed imports it.
 """
 
+import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import pytest
 
 if TYPE_CHECKING:
     from robolink_simulators.epson.device import EpsonSimulator
     from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
+
+_STATE: Final = ("ROBOLINK_STATE_DIR", "ROBOLINK_JOURNAL")
+"""What says where the journal, the backups and the like are kept."""
+
+_OF_THE_DEVELOPER: Final = {name: os.environ.get(name) for name in _STATE}
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,11 +76,19 @@ def pytest_report_header(config: pytest.Config) -> str:
 def robolink_state(
     monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[Path]:
-    """The folder in which robolink keeps journal, markers and backups during this test."""
-    folder = tmp_path_factory.mktemp("robolink-state")
-    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(folder))
-    monkeypatch.delenv("ROBOLINK_JOURNAL", raising=False)
-    yield folder
+    """The folder in which robolink keeps journal, markers and backups during this test.
+
+    It is the test's own, so that nothing is left in the developer's journal. A test that named
+    one itself, through ROBOLINK_STATE_DIR or ROBOLINK_JOURNAL, keeps it.
+    """
+    now = {name: os.environ.get(name) for name in _STATE}
+    folder = now["ROBOLINK_STATE_DIR"]
+    if now == _OF_THE_DEVELOPER or folder is None:
+        folder = str(tmp_path_factory.mktemp("robolink-state"))
+        monkeypatch.setenv("ROBOLINK_STATE_DIR", folder)
+    if now["ROBOLINK_JOURNAL"] == _OF_THE_DEVELOPER["ROBOLINK_JOURNAL"]:
+        monkeypatch.delenv("ROBOLINK_JOURNAL", raising=False)
+    yield Path(folder)
     if "robolink.journal" in sys.modules:
         from robolink.journal import close_files
 

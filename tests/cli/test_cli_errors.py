@@ -105,6 +105,7 @@ def test_an_error_is_one_json_document(command, capsys):
                 "doubtful": [],
                 "moving": [],
                 "settled": True,
+                "left_open": False,
             },
         },
         "exit_code": 5,

@@ -47,7 +47,7 @@ def test_what_is_not_settled_outranks_whatever_broke_afterwards(error):
     settled = _exit.exit_code(error)
     assert settled != 6
     tools = {1: ToolStanding(before=OLD, holds=NEW, requested=NEW)}
-    note_standing(error, Standing(tools=tools, settled=False))
+    note_standing(error, Standing(tools=tools, settled=False, left_open=True))
     assert _exit.exit_code(error) == 6
     body = _exit.error_body(error)
     assert body["controller_state"] == "changed"

@@ -16,7 +16,7 @@ from robolink_simulators.faults import Fault, FaultAction
 from robolink_simulators.softmotion.mailbox.faults import PlcFault, PlcFaultAction
 
 from robolink.journal._store import Store, Tables
-from robolink.model import EntryKind
+from robolink.model import EntryKind, MarkerKind
 from tests.faults._epson_recipe_cell import EpsonRecipeCell
 from tests.faults._recipe_cases import CASES, Case
 from tests.faults._recipe_cell import Ended, RecipeCell
@@ -142,8 +142,10 @@ def _check_the_document(
         assert components == pytest.approx(holds.components(), abs=1e-3), ended.out
     if stands["selected_tool"] is not None and disturbed.how != "GARBLE_REPLY":
         assert stands["selected_tool"] == selected, ended.out
-    # 6 says that the next command is refused until somebody has looked, and nothing else does.
     assert (ended.code == 6) is not stands["settled"], ended.out
-    assert (ended.code == 6) is bool(cell.open_markers()), (ended.out, cell.open_markers())
+    open_markers = cell.open_markers()
+    unproved = [marker for marker in open_markers if marker.kind is not MarkerKind.SELECTION]
+    assert (ended.code == 6) is bool(unproved), (ended.out, open_markers)
+    assert stands["left_open"] is bool(open_markers), (ended.out, open_markers)
     if said == "unknown":
         assert ended.code == 6, ended.out

@@ -115,7 +115,17 @@ def test_with_the_lowest_version_of_each_the_chosen_tests_pass(tmp_path):
     ]
     tools = ["hypothesis", "pytest", "pytest-timeout", "hatchling"]
     run(python, "-m", "pip", "install", "--quiet", "--no-compile", *pinned, *tools)
-    run(python, "-m", "pip", "install", "--quiet", "--no-deps", "--no-build-isolation", str(ROOT))
+    run(
+        python,
+        "-m",
+        "pip",
+        "install",
+        "--quiet",
+        "--no-deps",
+        "--no-build-isolation",
+        "-e",
+        str(ROOT),
+    )
     program = "import importlib.metadata as m, sys; print(*map(m.version, sys.argv[1:]))"
     names = [wanted.name for wanted in run_time_dependencies()]
     installed = run(python, "-c", program, *names).split()

@@ -298,7 +298,7 @@ def _beginning(marker: Marker, *, first: bool) -> tuple[NewEntry, ...]:
 
 
 def _untouched() -> str:
-    return tr("The controller was not touched.")
+    return tr("The command was not sent.")
 
 
 def _left_open() -> str:

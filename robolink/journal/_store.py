@@ -98,7 +98,7 @@ class Store:
         Raises:
             JournalError: That is impossible.
         """
-        with self.read(tr("The controller was not touched.")):
+        with self.read(tr("The command was not sent.")):
             pass
 
     def close(self) -> None:

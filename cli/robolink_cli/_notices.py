@@ -57,6 +57,8 @@ def marker_notice(marker: "Marker", url: str) -> str:
 
     if marker.kind is MarkerKind.SELECTION:
         return _unfinished(marker, url, str(marker.details.get("now", "?")))
+    if marker.kind is MarkerKind.HISTORY:
+        return _record_missing(marker, url)
     if marker.kind is MarkerKind.CHANGE:
         return tr(
             "Not finished since {when}: {request}.\n  'robolink -c {url} recover' settles it.",
@@ -71,6 +73,24 @@ def marker_notice(marker: "Marker", url: str) -> str:
         request=marker.request,
         url=url,
     )
+
+
+def _record_missing(marker: "Marker", url: str) -> str:
+    details = marker.details
+    journal, before = str(details.get("journal", "")), str(details.get("before", ""))
+    said = tr(
+        "This controller was changed from here before, but the journal {journal} knows nothing of "
+        "it: what was left unfinished does not show.",
+        journal=journal,
+    )
+    if before and before != journal:
+        said += " " + tr("Its record was kept in {before}.", before=before)
+    remedy = tr(
+        "Look at the selected tool and at the tools first. 'robolink -c {url} recover' shows them, "
+        "'resolve' begins a new record.",
+        url=url,
+    )
+    return f"{said}\n  {remedy}"
 
 
 def note_change(controller: "Controller", tool: int, now: "ToolOffset | None") -> None:

@@ -12,6 +12,7 @@ from robolink.errors import (
     ConfigError,
     ControllerFaultError,
     DeclinedError,
+    JournalError,
     NotReadyError,
     NotReadyReason,
     StoppedError,
@@ -220,6 +221,8 @@ class Runner:
                 raise _ended_by_operator()
             try:
                 self.jog(word)
+            except JournalError:
+                raise  # no mistake of the person's: the record cannot be kept any more
             except ConfigError as error:
                 # A typing mistake ends nothing; the limits held and nothing was sent.
                 refused += 1

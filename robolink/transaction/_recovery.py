@@ -13,8 +13,14 @@ from robolink.messages import tr
 from robolink.model import Controller, EntryKind, Finding, Marker, MarkerKind, NewEntry
 from robolink.transaction._settling import Settler
 
-_ORDER = (MarkerKind.SET, MarkerKind.CHANGE, MarkerKind.MOVE, MarkerKind.SELECTION)
-"""What was in flight is judged before the change around it; the cell's tool comes last."""
+_ORDER = (
+    MarkerKind.SET,
+    MarkerKind.CHANGE,
+    MarkerKind.MOVE,
+    MarkerKind.SELECTION,
+    MarkerKind.HISTORY,
+)
+"""What was in flight is judged before the change around it; the cell's tool comes after that."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,6 +8,7 @@ back as selected (design part 4).
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from robolink.controllers._guarded import what_is_left
 from robolink.controllers.softmotion._group import SoftMotionGroup
 from robolink.controllers.softmotion._mailbox import Mailbox
 from robolink.controllers.softmotion._tools import SoftMotionToolTable
@@ -59,12 +60,7 @@ class Preserver:
             self.restore(marker)
         except RobolinkError as second:
             if isinstance(error, RobolinkError):
-                left = tr(
-                    "The tool of before, tool {tool}, could not be selected again ({cause}) "
-                    "'robolink resolve' offers it.",
-                    tool=tool_before(marker),
-                    cause=second.what,
-                )
+                left = what_is_left(second, tool_before(marker))
                 error.remedy = f"{error.remedy} {left}".strip()
 
 

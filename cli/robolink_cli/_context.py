@@ -229,7 +229,8 @@ def open_controller(
                 yield controller
         finally:
             left = _open_markers(controller, lenient=unhindered)
-            note_unsettled(controller, [m for m in left if m not in found], named)
+            known = {marker.operation for marker in found}
+            note_unsettled(controller, [m for m in left if m.operation not in known], named)
     if not calms:
         # A stop that came while the connection was closed: nobody may take this for a success.
         controller.latch.require_open(tr("The command"))

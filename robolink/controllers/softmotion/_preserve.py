@@ -61,7 +61,7 @@ class Preserver:
             if isinstance(error, RobolinkError):
                 left = tr(
                     "The tool of before, tool {tool}, could not be selected again ({cause}) "
-                    "'robolink resolve' offers it.",
+                    "'robolink recover' selects it.",
                     tool=tool_before(marker),
                     cause=second.what,
                 )
@@ -78,6 +78,6 @@ def tool_before(marker: Marker) -> int:
     if not isinstance(tool, int):
         raise ConfigError(
             tr("The marker of {when} cannot be understood.", when=marker.begun_at),
-            remedy=tr("Select the right tool by hand, then 'robolink resolve --forget'."),
+            remedy=tr("Select the right tool by hand, then 'robolink recover --forget'."),
         )
     return tool

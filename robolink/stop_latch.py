@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from enum import Enum, auto
 
-from robolink.errors import ControllerError, StoppedError
+from robolink.errors import ControllerError, StoppedError, UnclearAnswerError
 from robolink.messages import tr
 
 
@@ -141,7 +141,7 @@ class StopLatch:
         """
         try:
             yield
-        except ControllerError:
+        except (ControllerError, UnclearAnswerError):
             self.require_open(request)
             raise
         self.require_open(request)

@@ -17,7 +17,7 @@ from robolink_cli._cell import (
     link_options,
     require_expected_robot,
 )
-from robolink_cli._notices import note_unsettled
+from robolink_cli._notices import note_at_work, note_unsettled
 from robolink_cli._people import signature_of
 from robolink_cli._recording import recording
 from robolink_cli._render import emit_json, json_is_on, note, say
@@ -29,7 +29,7 @@ from robolink_cli._stopping_beside import listening_for_stop, remember_address
 
 if TYPE_CHECKING:
     from robolink.config import Cell
-    from robolink.model import Controller, Marker, OutcomeLog, Secret
+    from robolink.model import Controller, Marker, Secret
 
 WATCHED = "robolink.watched"
 """Where a prompt finds the controller whose status it must read while a person thinks."""
@@ -191,7 +191,6 @@ def open_controller(
     unhindered = looks or calms
     if context.doubt is not None and not unhindered:
         raise context.doubt
-    named = context.cell.name if context.cell else url
     password = password_of(context)
     signature = replace(
         signature_of(context.operator, context.cell, changes=changes),
@@ -209,31 +208,57 @@ def open_controller(
             remote_timeout_s=context.remote_timeout_s,
             trace=trace,
             signature=signature,
-            outcomes=_journal_or_memory(url) if unhindered else None,
         ) as controller,
         nullcontext() if calms else controller.latch.ending(tr("The command")),
     ):
         click.get_current_context().meta.update({WATCHED: controller, REACHED: url})
         remember_address(context)
-        found = _open_markers(controller, lenient=unhindered)
-        if not quiet:
-            note_unsettled(controller, found, named)
-        if context.cell and not calms:
-            _check_robot(controller, context.cell, looks=looks)
-        if found and not quiet and not calms:
-            from robolink_cli._offering import offer_to_restore
-
-            offer_to_restore(controller, found)
-        try:
-            with listening_for_stop(controller, context):
-                yield controller
-        finally:
-            left = _open_markers(controller, lenient=unhindered)
-            known = {marker.operation for marker in found}
-            note_unsettled(controller, [m for m in left if m.operation not in known], named)
-    if not calms:
+        with (
+            listening_for_stop(controller, context),
+            _saying_what_is_left(controller, context, quiet=quiet, looks=looks, calms=calms),
+        ):
+            yield controller
+    if not unhindered:
         # A stop that came while the connection was closed: nobody may take this for a success.
-        controller.latch.require_open(tr("The command"))
+        with controller.ledger.telling():
+            controller.latch.require_open(tr("The command"))
+
+
+@contextmanager
+def _saying_what_is_left(
+    controller: "Controller", context: CliContext, *, quiet: bool, looks: bool, calms: bool
+) -> Iterator[None]:
+    """Say before the work what others left on the controller, and after it what this left.
+
+    Raises:
+        RobolinkError: The journal or the robot is not as the command needs it.
+    """
+    named = context.cell.name if context.cell else context.require_url()
+    lenient = looks or calms
+    trouble = controller.outcomes.trouble
+    if trouble is not None and not lenient:
+        raise trouble
+    found = _open_markers(controller, lenient=lenient)
+    for remark in controller.outcomes.remarks:
+        note(remark)
+    beside = not quiet and note_at_work(controller.outcomes, named)
+    if not (quiet or beside):
+        note_unsettled(controller, found, named)
+    if context.cell and not calms:
+        _check_robot(controller, context.cell, looks=looks)
+    if found and not (quiet or calms or beside):
+        from robolink_cli._offering import offer_to_restore
+
+        offer_to_restore(controller, found)
+    try:
+        yield
+    finally:
+        left = _open_markers(controller, lenient=lenient)
+        known = {marker.operation for marker in found}
+        note_unsettled(controller, [m for m in left if m.operation not in known], named)
+        if trouble is not None:
+            # After the work: nothing that the journal has to say stands before it.
+            note(f"{trouble.what} {_unrecorded()}")
 
 
 @contextmanager
@@ -304,18 +329,8 @@ def _calming_context_from(given: Mapping[str, Any]) -> CliContext:
         )
 
 
-def _journal_or_memory(url: str) -> "OutcomeLog | None":
-    """Return ``None`` for the journal, or a log in memory where the journal is out of order."""
-    from robolink.errors import JournalError
-    from robolink.journal import default_location, may_exist, memory_journal, open_journal
-
-    try:
-        if may_exist(default_location()):
-            open_journal().open_markers()  # one that is open already may have broken since
-    except JournalError as error:
-        note(error.what)
-        return memory_journal(url).log(url)
-    return None
+def _unrecorded() -> str:
+    return tr("So what is unfinished may not show, and nothing can be changed until it is mended.")
 
 
 def _open_markers(controller: "Controller", *, lenient: bool) -> "tuple[Marker, ...]":

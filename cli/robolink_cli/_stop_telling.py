@@ -75,8 +75,8 @@ class Telling:
 
         if not may_exist(default_location()):
             return
-        identity = parse_url(self._outcome.url).identity
-        log = open_journal(read_only=True).log(identity, signature=signature_here(__version__))
+        address = parse_url(self._outcome.url).address
+        log = open_journal(read_only=True).log(address, signature=signature_here(__version__))
         try:
             log.look()
         except LeaseHeldError as held:
@@ -127,14 +127,16 @@ class Telling:
             if not may_exist(default_location()):
                 return []
             journal = open_journal(read_only=True)
-            open_now = journal.open_markers()
+            address = parse_url(self._outcome.url).address if self._outcome.keys else ""
+            log = journal.log(address)
+            open_now = log.open_markers()
         except JournalError as error:
             return [error.what]
-        from robolink_cli._notices import marker_notice
+        from robolink_cli._notices import marker_notice, note_at_work
 
-        named = self._request.named
-        identity = parse_url(self._outcome.url).identity if self._outcome.keys else ""
-        return [marker_notice(marker, named) for who, marker in open_now if who == identity]
+        if open_now and note_at_work(log, self._request.named):
+            return []
+        return [marker_notice(marker, self._request.named) for marker in open_now]
 
 
 def _shown(url: str) -> str:

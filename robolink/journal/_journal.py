@@ -45,6 +45,14 @@ class Journal:
         """Whether it outlives this process."""
         return self._store.durable
 
+    def require_usable(self) -> None:
+        """Make sure that it can be opened as it is now.
+
+        Raises:
+            JournalError: It cannot.
+        """
+        self._store.open()
+
     def log(
         self,
         controller: str,

@@ -33,7 +33,10 @@ class JournalOutcomeLog:
         signature: Who works here, and with what.
         change: Id of the tool change under way, empty for none; it goes with every entry.
         durable: Whether what is recorded outlives this process.
+        trouble: ``None``: this record can be kept, as far as is known.
     """
+
+    trouble: JournalError | None = None
 
     def __init__(
         self,
@@ -180,6 +183,16 @@ class JournalOutcomeLog:
             # While something that it began is open, a lease that was lost stays lost: clearing
             # up after it is not for this process any more.
             self._lease.look(afresh=not self._begun)
+
+    def at_work(self) -> str:
+        """Return who else is working on the controller, in sentences; empty for nobody.
+
+        Raises:
+            JournalError: It cannot be read.
+        """
+        with self._lock:
+            self._named()
+            return self._lease.at_work()
 
     @contextmanager
     def hold(self, purpose: str) -> Iterator[None]:

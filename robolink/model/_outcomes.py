@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Protocol
 
+from robolink.errors import ConfigError
 from robolink.model._identity import Who
 from robolink.model._journal_entries import EntryKind, NewEntry, Recorded, Signature
 
@@ -52,10 +53,16 @@ class OutcomeLog(Protocol):
     Attributes:
         signature: Who works here, and with what.
         change: Id of the tool change under way, empty for none; it goes with every entry.
+        trouble: Why nothing can be recorded, so that nothing may be changed; ``None`` for a
+            record that is as it should be.
     """
 
     signature: Signature
     change: str
+
+    @property
+    def trouble(self) -> ConfigError | None:
+        """See above."""
 
     @property
     def durable(self) -> bool:
@@ -105,6 +112,13 @@ class OutcomeLog(Protocol):
 
         Raises:
             BusyError: Another process has the controller.
+        """
+
+    def at_work(self) -> str:
+        """Return who else is working on the controller, in sentences; empty for nobody.
+
+        Raises:
+            ConfigError: The record cannot be read.
         """
 
     def hold(self, purpose: str) -> AbstractContextManager[None]:

@@ -14,6 +14,7 @@ from robolink.errors import (
     DeclinedError,
     NotReadyError,
     NotReadyReason,
+    StoppedError,
 )
 from robolink.messages import tr
 from robolink.model import (
@@ -131,13 +132,13 @@ class Runner:
         """Move once and return where the frame is then.
 
         Raises:
-            ControllerFaultError: It was stopped before it arrived.
+            StoppedError: It was stopped before it arrived.
         """
         profile = MotionProfile(path, self._settings.speed_percent, self._settings.speed_mm_s)
         motion = self._group.move_to(target, profile, box=self._settings.box)
         outcome = motion.wait(timeout_s=self._settings.motion_timeout_s)
         if outcome is not MotionOutcome.ARRIVED:
-            raise ControllerFaultError(
+            raise StoppedError(
                 tr("The movement was stopped before it arrived."),
                 remedy=tr("Nothing goes on by itself; start again when the cell is clear."),
                 controller=self._controller.identity,

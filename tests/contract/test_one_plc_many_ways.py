@@ -11,6 +11,7 @@ import robolink
 from robolink.errors import LeaseHeldError, OutcomeUnknownError
 from robolink.journal import open_journal
 from robolink.model import ToolOffset
+from robolink.transport import parse_url
 
 
 class Killed(BaseException):
@@ -76,3 +77,13 @@ def test_a_tool_written_on_one_way_is_on_record_for_the_others(ways):
         with connect(url) as controller:
             newest = next(controller.outcomes.recorded(tool=7))
             assert newest.details["value"][0] == 1.5
+
+
+def test_a_url_names_the_far_end_as_the_link_does(ways):
+    for url in (*ways.values(), ways["number"] + "?unit=3"):
+        with connect(url) as controller:
+            assert parse_url(url).address == controller.identity
+    assert parse_url("plc+modbus-tcp://h?map=a&unit=255").address == "plc+modbus-tcp://h:502"
+    assert parse_url("softmotion+modbus-rtu:///dev/ttyS0?unit=2&command=64&baud=9600").address == (
+        "softmotion+modbus-rtu:///dev/ttyS0?unit=2&command=64"
+    )

@@ -75,6 +75,10 @@ class Placements:
             with observed(self._passed):
                 yield
 
+    def place_on(self, controller: Controller) -> None:
+        """Stop this controller, which was opened before."""
+        self._controller = controller
+
     def _entering(self, enter):
         def entered(controller):
             self._controller = controller
@@ -123,6 +127,8 @@ class Placements:
                 self.refused = error
             else:
                 self.acknowledged = True
+            finally:
+                self._at_lock.set()  # one that needs no lock never waits at any
 
         self._stopper = threading.Thread(target=stop)
         self._stopper.start()

@@ -350,7 +350,7 @@ def test_a_touch_without_an_edge_gives_nothing(cell, plc, group):
 def test_a_touch_that_is_stopped_is_no_measurement(cell, plc, group):
     motion = group.move_until_input(TARGET, InputEdge(4), speed_mm_s=2, box=ANYWHERE)
     cell.link.before("read_head", plc.end_all)
-    with pytest.raises(ControllerFaultError, match="stopped before the input"):
+    with pytest.raises(StoppedError, match="stopped before the input"):
         motion.wait(timeout_s=5)
 
 

@@ -11,6 +11,7 @@ from robolink.errors import (
     MotionTimeoutError,
     RejectedError,
     RemoteProtocolError,
+    StoppedError,
     TransportTimeoutError,
 )
 from robolink.messages import tr
@@ -78,9 +79,11 @@ class SoftMotionMotion:
         ):
             if self._end is None and mailbox.wire.rides.end_of(self._command.sequence) is None:
                 self._halted = True
-                # It may have just ended by itself, or by a stop; its end is awaited.
-                with suppress(RejectedError, ControllerFaultError):
-                    mailbox.orders.carry_out(Command(0, Opcode.HALT))
+                # It may have just ended by itself, or by a stop; its end is awaited. A stop that is
+                # under way ends it too, and a halt after it would only hide the end of the stop.
+                if not mailbox.wire.latch.closed:
+                    with suppress(RejectedError, ControllerFaultError):
+                        mailbox.orders.carry_out(Command(0, Opcode.HALT))
             if not self._watch(Deadline.after(mailbox.wire.clock, _HALT_S)):
                 raise mailbox.wire.ended(
                     TransportTimeoutError(
@@ -195,7 +198,7 @@ class SoftMotionMotionUntilInput:
         if end.error_class == ErrorClass.NO_EDGE:
             return None
         if self._motion.wait(timeout_s=timeout_s) is not MotionOutcome.ARRIVED:
-            raise ControllerFaultError(
+            raise StoppedError(
                 tr("The movement was stopped before the input switched."),
                 remedy=tr("Nothing goes on by itself; start again when the cell is clear."),
                 controller=self._mailbox.identity,

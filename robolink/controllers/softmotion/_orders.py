@@ -7,7 +7,7 @@ PLC counts one more damaged block and has acknowledged nothing since. Never afte
 """
 
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import Final
@@ -25,6 +25,7 @@ from robolink.errors import (
     RemoteProtocolError,
     StoppedError,
     TransportTimeoutError,
+    UnclearAnswerError,
 )
 from robolink.messages import tr
 from robolink.protocols.mailbox import (
@@ -33,6 +34,7 @@ from robolink.protocols.mailbox import (
     Command,
     CommandState,
     ErrorClass,
+    Finished,
     Opcode,
     Response,
     Words,
@@ -45,6 +47,9 @@ COMPLETION_S: Final = 10.0
 """Longest time between the acknowledgement and the end of what is not a movement."""
 
 _WRITES: Final = 3
+_OVERTAKEN: Final = frozenset({Opcode.STOP, Opcode.HALT})
+"""Commands whose end another stop or halt may hide: it does the same, and rest is looked for."""
+
 _DISPOSSESSED: Final = frozenset({ErrorClass.NOT_OWNER, ErrorClass.STALE_EPOCH})
 
 
@@ -62,12 +67,8 @@ class Orders:
         self._last = 0
         self.ownership = Ownership(wire, self._to_end)
 
-    def carry_out(self, draft: Command, *, within_s: float = COMPLETION_S) -> Response:
+    def carry_out(self, draft: Command) -> Response:
         """Send a command that is no movement and return the snapshot that shows its end.
-
-        Args:
-            draft: The command.
-            within_s: Longest time between its acknowledgement and its end.
 
         Raises:
             RejectedError: The PLC refused it; it did nothing.
@@ -78,12 +79,31 @@ class Orders:
         """
         with self._wire.uninterrupted():
             self._possess(draft)
-            end = self._to_end(draft, within_s)
-            if end.state == CommandState.ERROR:
-                raise self._refusal(end.command, end.now, end.error_class)
-            if end.state == CommandState.ABORTED:
-                raise cut_short(end.command)
-            return end.now
+            end = self._to_end(draft)
+            return self._taken(end)
+
+    def stop(self) -> Callable[[Response], bool]:
+        """Send 2003, and return what tells by a later snapshot whether it is done.
+
+        What it returns raises like :meth:`carry_out`.
+        """
+        with self._wire.uninterrupted():
+            command, now = self._send(Command(0, Opcode.STOP))
+
+        def done(now: Response) -> bool:
+            end = self._end_of(command, now)
+            return end is not None and self._taken(end) is not None
+
+        done(now)
+        return done
+
+    def _taken(self, end: Ended) -> Response:
+        """Return the snapshot of a command that is done; raise for one that is not."""
+        if end.state == CommandState.ERROR:
+            raise self._refusal(end.command, end.now, end.error_class)
+        if end.state == CommandState.ABORTED:
+            raise cut_short(end.command)
+        return end.now
 
     def start(self, draft: Command) -> Command:
         """Send a movement or a jog and return it as it was accepted; raises like the other.
@@ -98,6 +118,8 @@ class Orders:
             if now.state == CommandState.ERROR:
                 self._wire.rides.forget(command.sequence)
                 raise self._refusal(command, now, now.error_class)
+            # On a slow line the answer took its time; who waits now begins with a whole patience.
+            self._wire.beat()
             return command
 
     def _possess(self, draft: Command) -> None:
@@ -109,9 +131,15 @@ class Orders:
             self.ownership.lose()
         return refused(command, now, error_class)
 
-    def _to_end(self, draft: Command, within_s: float = COMPLETION_S) -> Ended:
+    def _to_end(self, draft: Command) -> Ended:
+        if draft.only_ends:
+            with self._wire.ahead():
+                return self._seen_to_end(draft)
+        return self._seen_to_end(draft)
+
+    def _seen_to_end(self, draft: Command) -> Ended:
         command, now = self._send(draft)
-        deadline = Deadline.after(self._wire.clock, within_s)
+        deadline = Deadline.after(self._wire.clock, COMPLETION_S)
         while (end := self._end_of(command, now)) is None:
             if deadline.expired:
                 raise self._wire.ended(self._silence(command, tr("began, and has not ended")))
@@ -127,9 +155,12 @@ class Orders:
             return Ended(command, CommandState.DONE, ErrorClass.NONE, now)
         if now.ack_owner != command.owner:
             raise self._wire.ended(self._overtaken(command, now))
-        # Our own stop was accepted after it, from another thread.
+        # Our own stop or halt was accepted after it, from another thread.
         ends = (end for end in now.finished if end.sequence == command.sequence)
-        return next((Ended(command, end.state, end.error_class, now) for end in ends), None)
+        end = next((Ended(command, end.state, end.error_class, now) for end in ends), None)
+        if end is None and command.opcode not in _OVERTAKEN:
+            raise self._unseen(command)
+        return end or Ended(command, CommandState.DONE, ErrorClass.NONE, now)
 
     def _send(self, draft: Command, *, ride: bool = False) -> tuple[Command, Response]:
         """Write a command and return it with the snapshot that acknowledges it."""
@@ -150,7 +181,11 @@ class Orders:
                 except (RejectedError, StoppedError):
                     self._wire.rides.forget(command.sequence)
                     raise
-                before, accepted = self._await_acknowledgement(command, before)
+                try:
+                    before, accepted = self._await_acknowledgement(command, before)
+                except RejectedError:
+                    self._wire.rides.forget(command.sequence)
+                    raise
                 if accepted:
                     return command, before
             raise self._wire.ended(
@@ -179,6 +214,8 @@ class Orders:
             now = self._snapshots.news(now)
             if is_own(command, now) or _has_taken(command, now):
                 return now, True
+            if _came_too_early(command, before, now):
+                raise refused(command, now, ErrorClass.BUSY)
             if (now.ack_head, now.ack_owner) != (before.ack_head, before.ack_owner):
                 raise self._wire.ended(self._overtaken(command, now))
             if now.rejected != before.rejected:
@@ -225,6 +262,16 @@ class Orders:
             request=describe(command),
         )
 
+    def _unseen(self, command: Command) -> UnclearAnswerError:
+        # Only what a stop ends is kept among the last ends; what had ended before it, well or
+        # not, is not shown any more (design part 7).
+        return UnclearAnswerError(
+            tr("A stop came before the end of {request!r} was read.", request=describe(command)),
+            remedy=tr("Read again what it was to change."),
+            controller=self._wire.identity,
+            request=describe(command),
+        )
+
     def _overtaken(self, command: Command, now: Response) -> RemoteProtocolError:
         return RemoteProtocolError(
             tr(
@@ -246,6 +293,15 @@ def is_own(command: Command, now: Response) -> bool:
         command.sequence,
         command.opcode,
     )
+
+
+def _came_too_early(command: Command, before: Response, now: Response) -> bool:
+    """Whether the PLC held a command back, which it then never carries out (design part 7).
+
+    Its number was in none of the ends when it was sent, so an end of that number is its own.
+    """
+    early = Finished(command.sequence, CommandState.ERROR, ErrorClass.BUSY)
+    return early in now.finished and early not in before.finished
 
 
 def _has_taken(command: Command, now: Response) -> bool:

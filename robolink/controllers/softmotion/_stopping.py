@@ -9,9 +9,9 @@ from typing import Final
 
 from robolink.controllers.softmotion._orders import Orders
 from robolink.controllers.softmotion._snapshots import Snapshots
-from robolink.errors import OutcomeUnknownError, RejectedError, TransportTimeoutError
+from robolink.errors import OutcomeUnknownError, RejectedError
 from robolink.messages import tr
-from robolink.protocols.mailbox import Command, ErrorClass, Opcode, Response
+from robolink.protocols.mailbox import ErrorClass, Response
 from robolink.timing import Clock, Deadline
 
 REST_S: Final = 5.0
@@ -42,24 +42,27 @@ def bring_group_to_rest(
     """
     deadline = Deadline.after(clock, REST_S)
     try:
-        now = orders.carry_out(Command(0, Opcode.STOP), within_s=REST_S)
-        done = True
+        done = orders.stop()
+        now = snapshots.take()
+        while not done(now):
+            if deadline.expired:
+                raise _restless(controller)
+            now = snapshots.news(now)
+        stands = True
     except RejectedError as error:
         if error.code not in _ALREADY:
             raise
-        now, done = snapshots.take(), False
-    except TransportTimeoutError as error:
-        raise _restless(controller) from error
+        now, stands = snapshots.take(), False
     # Here, because nothing may stand before the frame of a stop (design part 4).
     from robolink.controllers.softmotion._condition import is_moving
 
-    while is_moving(now) or not done:
+    while is_moving(now) or not stands:
         if deadline.expired:
             raise _restless(controller)
         before, looked = now, Deadline.after(clock, _LOOK_S)
         while not looked.expired:
             now = snapshots.news(now, wait_s=looked.remaining_s())
-        done = done or _still(before, now)
+        stands = stands or _still(before, now)
     return now
 
 

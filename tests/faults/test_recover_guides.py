@@ -7,6 +7,7 @@ import pytest
 
 from robolink.model import Marker, MarkerKind
 from tests.faults import _recipe_instants
+from tests.faults._epson_recipe_cell import EpsonRecipeCell
 from tests.faults._what_stands import COMMANDS, Disturbed
 
 WHEN = "2026-01-01T00:00:00+00:00"
@@ -19,7 +20,8 @@ def cell(tmp_path):
     """A cell whose link was cut in the turn that was to prove the new value of tool 1."""
     command = COMMANDS["EPSON: recalibrate"]
     with command.case.cell() as cell:
-        cut = []
+        assert isinstance(cell, EpsonRecipeCell)
+        panel, cut = cell.simulator.panel, list[str]()
 
         def pull(_number: int, request: str) -> None:
             if not cut and WRITTEN.match(request):
@@ -28,7 +30,7 @@ def cell(tmp_path):
                 cut.append(request)
             elif len(cut) == 2 and request == "$GetStatus":
                 cut.append("gone")
-                cell.simulator.panel.cut_link()
+                panel.cut_link()
 
         recipe = tmp_path / "recipe.toml"
         recipe.write_text(command.case.recipe)

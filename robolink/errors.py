@@ -240,7 +240,7 @@ class LeaseLostError(BusyError):
 class OutcomeUnknownError(RobolinkError):
     """A command went out and no answer came: it may or may not have run.
 
-    Motion on that controller is blocked until ``resolve``; nothing is sent again.
+    Motion on that controller is blocked until ``recover``; nothing is sent again.
     """
 
 

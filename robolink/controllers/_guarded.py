@@ -276,7 +276,7 @@ def what_is_left(failure: RobolinkError, tool: int) -> str:
         )
     return tr(
         "The tool of before, tool {tool}, could not be selected again ({cause}) 'robolink "
-        "resolve' offers it.",
+        "recover' selects it.",
         tool=tool,
         cause=failure.what,
     )

@@ -122,5 +122,6 @@ def test_after_a_stop_nothing_goes_on(tmp_path, placements, name):
             stopped(CASES[name], at, tmp_path)
         except AssertionError as error:
             failures.append(f"stopped at {at}: {error}")
+            print(failures[-1])  # noqa: T201 - for whoever waits an hour for all of them
     print(f"{name}: {len(chosen)} placements of {len(whole)}")  # noqa: T201 - for pytest -s
     assert not failures, f"{len(failures)} of {len(chosen)}:\n" + "\n\n".join(failures[:8])

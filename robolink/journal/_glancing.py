@@ -1,9 +1,9 @@
 """The record of a controller for somebody who only looks: opened when there is a reason to.
 
 Nearly always nothing is unfinished, and SQLAlchemy takes several times as long to load as a look
-at a controller. So an SQLite file is asked by itself: is anything unfinished, of any controller,
-and has this address been met before? No and yes are believed; all else, and any trouble with the
-file, opens the journal as for everybody.
+at a controller. So an SQLite file is asked by itself: is anything unfinished or at work, on any
+controller, and has this address been met before? No and yes are believed; all else, and any
+trouble with the file, opens the journal as for everybody.
 """
 
 import sqlite3
@@ -17,7 +17,9 @@ from robolink.journal._places import default_location, place_of
 from robolink.model import EntryKind, Marker, NewEntry, OutcomeLog, Recorded, Signature, Who
 
 _QUESTION: Final = """
-    SELECT EXISTS (SELECT 1 FROM markers), EXISTS (SELECT 1 FROM addresses WHERE address = ?)
+    SELECT
+        EXISTS (SELECT 1 FROM markers) OR EXISTS (SELECT 1 FROM leases WHERE token <> ''),
+        EXISTS (SELECT 1 FROM addresses WHERE address = ?)
 """
 _WAIT_S: Final = 1.0
 """Longest wait for another process that writes; after it the journal says what is the matter."""
@@ -87,6 +89,12 @@ class GlancingLog:
         if self._opened is None and nothing_is_open(self._address):
             return ()
         return self._log().open_markers()
+
+    def at_work(self) -> str:
+        """Return who else is working on the controller; empty for nobody."""
+        if self._opened is None and nothing_is_open(self._address):
+            return ""
+        return self._log().at_work()
 
     def begin(self, marker: Marker) -> None:
         """See the model."""

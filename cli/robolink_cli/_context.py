@@ -208,6 +208,7 @@ def open_controller(
             remote_timeout_s=context.remote_timeout_s,
             trace=trace,
             signature=signature,
+            glance=unhindered,
         ) as controller,
         nullcontext() if calms else controller.latch.ending(tr("The command")),
     ):

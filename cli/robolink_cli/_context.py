@@ -1,5 +1,6 @@
 """What every command that talks to a controller has in common."""
 
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -11,6 +12,7 @@ import click
 import robolink
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink_cli._begun import Begun
 from robolink_cli._cell import (
     is_cell_name,
     link_options,
@@ -147,7 +149,9 @@ def open_controller(
         lot=context.lot,
         station=context.station,
     )
+    begun = Begun(time.time())
     with (
+        begun.ending_in_words(),
         recording(context.record, url.partition("?")[0]) as trace,
         robolink.connect(
             url,
@@ -159,6 +163,7 @@ def open_controller(
             outcomes=_journal_or_memory(url) if any_robot else None,
         ) as controller,
     ):
+        begun.controller = controller
         click.get_current_context().meta[WATCHED] = controller
         found = controller.outcomes.open_markers()
         if not quiet:
@@ -170,7 +175,8 @@ def open_controller(
 
             offer_to_restore(controller, found)
         try:
-            yield controller
+            with begun.looking_once_more(found):
+                yield controller
         finally:
             left = controller.outcomes.open_markers()
             note_unsettled(controller, [m for m in left if m not in found], named)

@@ -3,15 +3,18 @@
 import os
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Final, NoReturn
 
 import click
 
 from robolink import __version__
+from robolink.interrupts import Interrupted, one_ending
 from robolink.messages import tr
-from robolink_cli._console import colour_wanted, help_width, leave_pipe, tolerate_any_console
-from robolink_cli._exit import READER_LEFT, report
+from robolink_cli._console import colour_wanted, help_width, tolerate_any_console
+from robolink_cli._exit import exit_code, report
 from robolink_cli._lazy import LazyGroup
+from robolink_cli._output import watched_output
 from robolink_cli._render import print_document
 from robolink_cli._shared_options import shared_options
 
@@ -108,18 +111,23 @@ def cli() -> None:
 
 def main() -> NoReturn:
     """Run the command line of this process and exit."""
-    sys.exit(run(sys.argv[1:]))
+    sys.exit(run(sys.argv[1:], last=True))
 
 
-def run(arguments: Sequence[str]) -> int:
-    """Run one command line; return the exit code (the table is in ``_exit``)."""
-    tolerate_any_console()
-    try:
-        code = _answer(arguments)
-        sys.stdout.flush()
-    except BrokenPipeError:
-        leave_pipe()
-        return READER_LEFT
+def run(arguments: Sequence[str], *, last: bool = False) -> int:
+    """Run one command line; return the exit code (the table is in ``_exit``).
+
+    Args:
+        arguments: The command line without the program's name.
+        last: Whether the process ends then.
+    """
+    with one_ending(last=last), watched_output():
+        tolerate_any_console()
+        try:
+            code = _answer(arguments)
+            sys.stdout.flush()
+        except KeyboardInterrupt as late:
+            return exit_code(late)
     return code
 
 
@@ -130,11 +138,13 @@ def _answer(arguments: Sequence[str]) -> int:
         return _invoke(arguments)
     except click.exceptions.Exit as end:
         return end.exit_code
-    except BrokenPipeError:
-        raise
     except (Exception, KeyboardInterrupt) as error:
-        # Looked for by hand, because the arguments may be what is wrong.
-        return report(error, as_json="--json" in arguments)
+        code = exit_code(error)
+        # That nobody is left to read how it ended is no other end.
+        with suppress(Interrupted):
+            # Looked for by hand, because the arguments may be what is wrong.
+            report(error, as_json="--json" in arguments)
+        return code
 
 
 def _invoke(arguments: Sequence[str]) -> int:

@@ -94,6 +94,7 @@ def test_an_error_is_one_json_document(command, capsys):
             "remedy": "Close it.",
             "reason": "guard_open",
             "code": None,
+            "ended_by": None,
         },
         "exit_code": 5,
     }

@@ -27,6 +27,7 @@
     ├── OutcomeUnknownError                sent, not answered: the machine may or may not have acted
     ├── ToolError
     │   ├── ToolIndexError · ReservedToolError · UndefinedToolError
+    │   ├── SelectedToolError              it is in force, so it was not cleared
     │   ├── ToolChangedError               not the value that was expected; nothing was written
     │   └── ReadBackError                  written, but another value came back
     ├── CalibrationError                   the data do not give a trustworthy result (.code)
@@ -228,6 +229,10 @@ class ToolError(RobolinkError):
 
 class ToolIndexError(ToolError, ValueError):
     """No such tool number."""
+
+
+class SelectedToolError(ToolError):
+    """The tool in force was not cleared: nobody said which one takes its place."""
 
 
 class ReservedToolError(ToolError):

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from robolink.errors import ReadBackError, RobolinkError
+from robolink.errors import ReadBackError, RobolinkError, SelectedToolError
 from robolink.messages import tr
 from robolink.model import (
     EntryKind,
@@ -50,7 +50,11 @@ class PutBack:
 
 
 def put_back(
-    tools: ToolTable, steps: Sequence[Step], *, spoiled: int | None = None
+    tools: ToolTable,
+    steps: Sequence[Step],
+    *,
+    spoiled: int | None = None,
+    selected: int | None = None,
 ) -> list[PutBack]:
     """Give each tool its old value back, the last one first, with one write each at most.
 
@@ -59,11 +63,17 @@ def put_back(
         steps: What the change was to do.
         spoiled: A tool whose write was read back as something else, so that what it holds is
             this change's own doing.
+        selected: The tool that was in force before the change, ``None`` where that is not known.
+            A tool that becomes undefined again gives way to it, should it be in force now, and to
+            the flange where it is not known.
     """
-    return [_put_one_back(tools, step, spoiled=step.tool == spoiled) for step in reversed(steps)]
+    return [
+        _put_one_back(tools, step, spoiled=step.tool == spoiled, selected=selected or 0)
+        for step in reversed(steps)
+    ]
 
 
-def _put_one_back(tools: ToolTable, step: Step, *, spoiled: bool) -> PutBack:
+def _put_one_back(tools: ToolTable, step: Step, *, spoiled: bool, selected: int) -> PutBack:
     tool, before = step.tool, step.before
     try:
         now = tools.read(tool)
@@ -72,13 +82,21 @@ def _put_one_back(tools: ToolTable, step: Step, *, spoiled: bool) -> PutBack:
         if not (spoiled or tools.same(now, step.requested)):
             return _conflict(step, now)
         if before is None:
-            tools.clear(tool, expected=now)
+            _clear(tools, tool, now, selected)
         else:
             tools.write(tool, before, expected=now)
     except RobolinkError as error:
         return _failed(step, error)
     sentence = tr("The old value of tool {tool} was written back.", tool=tool)
     return _restored(step, sentence, written=True)
+
+
+def _clear(tools: ToolTable, tool: int, now: ToolOffset | None, selected: int) -> None:
+    try:
+        tools.clear(tool, expected=now, then_select=selected)
+    except SelectedToolError:
+        # It was selected before, without a definition: the flange is what that meant.
+        tools.clear(tool, expected=now, then_select=0)
 
 
 def _restored(step: Step, sentence: str, *, written: bool) -> PutBack:

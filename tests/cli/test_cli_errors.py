@@ -60,6 +60,7 @@ CODES = {
     "ToolError": 5,
     "ToolIndexError": 2,
     "ReservedToolError": 2,
+    "SelectedToolError": 5,
     "UndefinedToolError": 5,
     "ToolChangedError": 5,
     "ReadBackError": 5,

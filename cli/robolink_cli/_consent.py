@@ -8,7 +8,7 @@ import click
 
 from robolink.errors import DeclinedError
 from robolink.messages import tr
-from robolink_cli._context import WATCHED
+from robolink_cli._context import REACHED, WATCHED
 
 if TYPE_CHECKING:
     from robolink.model import Controller
@@ -71,8 +71,14 @@ def agree_to_motion(question: str, *, yes: bool) -> None:
     """Ask before the robot moves; without a terminal only ``--yes`` is consent.
 
     Raises:
+        StoppedError: Somebody stopped this controller, and nobody has released it since.
         DeclinedError: The answer was no, or nobody could be asked.
     """
+    controller = click.get_current_context().meta.get(REACHED)
+    if controller is not None:
+        from robolink_cli._stop_notes import heed_stop
+
+        heed_stop(controller, yes=yes)
     if yes:
         return
     if not on_terminal():

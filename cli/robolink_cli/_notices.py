@@ -1,5 +1,6 @@
 """What a person must know about something that was begun and not proved finished."""
 
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from robolink.messages import tr
@@ -44,7 +45,7 @@ def marker_notice(marker: "Marker", url: str) -> str:
             url=url,
         )
     return tr(
-        "Sent {when} and never answered: {request}. It may or may not have run, so motion is "
+        "Sent {when} without a clear answer: {request}. It may or may not have run, so motion is "
         "blocked.\n  'robolink -c {url} recover' settles what reading can, 'resolve' the rest.",
         when=marker.begun_at,
         request=marker.request,
@@ -54,11 +55,14 @@ def marker_notice(marker: "Marker", url: str) -> str:
 
 def note_change(controller: "Controller", tool: int, now: "ToolOffset | None") -> None:
     """Say when a tool does not hold what was last proved to be in it, and the usual causes."""
+    from robolink.errors import JournalError
     from robolink.transaction import changed_since
 
-    change = changed_since(controller, tool, now)
-    if change is not None:
-        note(change.sentence)
+    # What is wrong with the journal is said once, when the command is done.
+    with suppress(JournalError):
+        change = changed_since(controller, tool, now)
+        if change is not None:
+            note(change.sentence)
 
 
 def _selected_now(controller: "Controller", marker: "Marker") -> str:

@@ -8,6 +8,7 @@ import click
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink_cli._line import LINE
 from robolink_cli._render import json_is_on
 
 if TYPE_CHECKING:
@@ -23,9 +24,10 @@ def nozzle_options(function: F) -> F:
         click.option(
             "--nozzle",
             metavar="ID",
+            type=LINE,
             help=tr("Id of the nozzle or needle that is mounted, for the record."),
         ),
-        click.option("--lot", metavar="LOT", help=tr("Its lot, for the record.")),
+        click.option("--lot", metavar="LOT", type=LINE, help=tr("Its lot, for the record.")),
     )
     for option in reversed(options):
         function = option(function)
@@ -72,4 +74,4 @@ def _asked_for_badge() -> str:
 
     if json_is_on() or not on_terminal():
         return ""
-    return asked_for_text(tr("Who works here (badge or name)?"))
+    return LINE.convert(asked_for_text(tr("Who works here (badge or name)?")), None, None)

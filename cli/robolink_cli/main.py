@@ -2,9 +2,9 @@
 
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
-from typing import Final, NoReturn
+from typing import TYPE_CHECKING, Final, NoReturn
 
 import click
 
@@ -15,8 +15,12 @@ from robolink_cli._console import colour_wanted, help_width, tolerate_any_consol
 from robolink_cli._exit import exit_code, report
 from robolink_cli._lazy import LazyGroup
 from robolink_cli._output import watched_output
-from robolink_cli._render import print_document
+from robolink_cli._render import dumps, note, print_document, say
 from robolink_cli._shared_options import shared_options
+
+if TYPE_CHECKING:
+    from robolink_cli._stop_first import StopOutcome
+    from robolink_cli._stop_request import StopRequest
 
 COMMANDS: Final = {
     "demo": (
@@ -27,6 +31,10 @@ COMMANDS: Final = {
     "status": ("robolink_cli.operate:status", tr("What the controller is doing.")),
     "where": ("robolink_cli.operate:where", tr("Where the robot is, and with which tool.")),
     "stop": ("robolink_cli.operate:stop", tr("Stop every motion.")),
+    "release": (
+        "robolink_cli.operate:release",
+        tr("Let the robot be moved again after a stop."),
+    ),
     "reset": ("robolink_cli.operate:reset", tr("Clear an error of the controller.")),
     "motors": ("robolink_cli.operate:motors", tr("Switch the motors on or off.")),
     "enable": ("robolink_cli.operate:enable", tr("Enable the axis group of a PLC.")),
@@ -121,13 +129,39 @@ def run(arguments: Sequence[str], *, last: bool = False) -> int:
         arguments: The command line without the program's name.
         last: Whether the process ends then.
     """
+    return _guarded(lambda: _answer(arguments), last=last)
+
+
+def tell_stop(request: "StopRequest", outcome: "StopOutcome") -> int:
+    """Tell how a stop ended that needed no click so far; return the exit code."""
+    return _guarded(lambda: _tell_stop(request, outcome), last=False)
+
+
+def _guarded(speak: Callable[[], int], *, last: bool) -> int:
     with one_ending(last=last), watched_output():
         tolerate_any_console()
         try:
-            code = _answer(arguments)
+            code = speak()
             sys.stdout.flush()
         except KeyboardInterrupt as late:
             return exit_code(late)
+    return code
+
+
+def _tell_stop(request: "StopRequest", outcome: "StopOutcome") -> int:
+    from robolink_cli._stop_telling import Telling
+
+    telling, code = Telling(request, outcome), 0
+    telling.explain_the_holder()
+    if outcome.error is not None:
+        code = report(outcome.error, as_json=request.json)
+    elif request.json:
+        click.echo(dumps("robolink/stop/1", telling.payload()))
+    else:
+        say(telling.sentence())
+    sys.stdout.flush()
+    for remark in telling.remarks():
+        note(remark)
     return code
 
 

@@ -42,6 +42,9 @@ class Grip:
 class Lease:
     """The lease of one controller, as one log sees it.
 
+    Attributes:
+        controller: Identity of the controller.
+
     Args:
         store: The journal's database.
         controller: Identity of the controller.
@@ -50,8 +53,8 @@ class Lease:
     """
 
     def __init__(self, store: "Store", controller: str, holder: Holder, clock: Clock) -> None:
+        self.controller = controller
         self._store = store
-        self._controller = controller
         self._holder = holder
         self._clock = clock
         self._token = new_operation()
@@ -94,7 +97,7 @@ class Lease:
             LeaseLostError: Somebody else took it from this log, or held it meanwhile.
         """
         now_ns = self._clock.now_ns()
-        if self.held and rows.renew(self._controller, self._epoch, self._token, now_ns):
+        if self.held and rows.renew(self.controller, self._epoch, self._token, now_ns):
             self._beaten_ns = now_ns
             return Grip(self._epoch)
         if self.held or self._lost or self._seen is None:
@@ -102,9 +105,9 @@ class Lease:
             raise self._lost_error()
         (seen, because), self._seen = self._seen, None
         claim = self._claim(purpose, operator, now_ns)
-        epoch = rows.take(self._controller, seen, claim)
+        epoch = rows.take(self.controller, seen, claim)
         if epoch == 0:
-            now = rows.sight(self._controller)
+            now = rows.sight(self.controller)
             raise self._held_error(now) if now.token != FREE else self._lost_error()
         self._beaten_ns = now_ns
         return Grip(epoch, (seen.taken_entry(because),) if because else ())
@@ -124,14 +127,14 @@ class Lease:
             return
         self._beaten_ns = now_ns
         with self._store.write() as tables:
-            kept = tables.leases.renew(self._controller, self._epoch, self._token, now_ns)
+            kept = tables.leases.renew(self.controller, self._epoch, self._token, now_ns)
         if not kept:
             self._lose()
 
     def release(self, rows: "LeaseRows") -> None:
         """Free it inside the caller's transaction; one that was lost is left alone."""
         if self.held:
-            rows.release(self._controller, self._epoch, self._token)
+            rows.release(self.controller, self._epoch, self._token)
 
     def forget(self) -> None:
         """Note, after the commit, that it was freed; what was seen before is of no use now."""
@@ -143,10 +146,10 @@ class Lease:
         Returns:
             What is put on record; ``None`` when this log holds it itself.
         """
-        seen = rows.sight(self._controller)
+        seen = rows.sight(self.controller)
         if seen.token == self._token:
             return None
-        rows.end(self._controller)
+        rows.end(self.controller)
         return seen.taken_entry(reason)
 
     def _judged(self, seen: Sighting) -> tuple[Sighting, str]:
@@ -178,7 +181,7 @@ class Lease:
 
     def _sight(self) -> Sighting:
         with self._store.read(tr("The controller was not touched.")) as tables:
-            return tables.leases.sight(self._controller)
+            return tables.leases.sight(self.controller)
 
     def _claim(self, purpose: str, operator: str, now_ns: int) -> dict[str, object]:
         return {
@@ -200,16 +203,16 @@ class Lease:
             sign = tr("{seconds:.0f} s ago", seconds=silent_s)
         else:
             sign = tr("while it was watched just now")
-        return seen.held_error(self._controller, sign)
+        return seen.held_error(self.controller, sign)
 
     def _lost_error(self) -> LeaseLostError:
         return LeaseLostError(
-            tr("Another took over {controller} meanwhile.", controller=self._controller),
+            tr("Another took over {controller} meanwhile.", controller=self.controller),
             remedy=tr(
                 "Nothing was sent. Read the tool again before you write: 'robolink journal list' "
                 "shows who did what."
             ),
-            controller=self._controller,
+            controller=self.controller,
         )
 
 

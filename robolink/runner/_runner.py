@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Final, TypeVar
 
 from robolink.calibration import Ask, Look, Move, Offer, Procedure, Seek, SeenAt, Shown, Step, Tell
+from robolink.checkpoints import Point, checkpoint
 from robolink.errors import (
     CalibrationError,
     ConfigError,
@@ -13,6 +14,7 @@ from robolink.errors import (
     DeclinedError,
     NotReadyError,
     NotReadyReason,
+    StoppedError,
 )
 from robolink.messages import tr
 from robolink.model import (
@@ -100,6 +102,7 @@ class Runner:
         """Take the procedure's steps until it returns; its result is a proposal.
 
         Raises:
+            StoppedError: A stop came, at whatever step.
             DeclinedError: The person ended it.
             CalibrationError: The procedure refuses its measurements.
             ControllerFaultError, NotReadyError, OutcomeUnknownError: From the controller.
@@ -107,6 +110,8 @@ class Runner:
         try:
             step = next(procedure)
             while True:
+                checkpoint(Point.STEP, type(step).__name__)
+                self._require_going()
                 try:
                     done = self._take(step)
                 except CalibrationError as error:
@@ -118,6 +123,7 @@ class Runner:
                 step = procedure.send(_answer(done))
         except StopIteration as finished:
             result: T = finished.value
+            self._require_going()
             return result
         finally:
             procedure.close()
@@ -126,13 +132,13 @@ class Runner:
         """Move once and return where the frame is then.
 
         Raises:
-            ControllerFaultError: It was stopped before it arrived.
+            StoppedError: It was stopped before it arrived.
         """
         profile = MotionProfile(path, self._settings.speed_percent, self._settings.speed_mm_s)
         motion = self._group.move_to(target, profile, box=self._settings.box)
         outcome = motion.wait(timeout_s=self._settings.motion_timeout_s)
         if outcome is not MotionOutcome.ARRIVED:
-            raise ControllerFaultError(
+            raise StoppedError(
                 tr("The movement was stopped before it arrived."),
                 remedy=tr("Nothing goes on by itself; start again when the cell is clear."),
                 controller=self._controller.identity,
@@ -265,11 +271,16 @@ class Runner:
         """Return the next line typed, reading the status at least once a second meanwhile."""
         while True:
             line = self._operator.poll(POLL_S)
+            checkpoint(Point.QUESTION, line or "")
             self._watch()
             if line is not None:
                 return line
 
+    def _require_going(self) -> None:
+        self._controller.latch.require_open(tr("The procedure"))
+
     def _watch(self) -> None:
+        self._require_going()
         obstacle = _ended_by(self._controller.status())
         if obstacle:
             raise ControllerFaultError(

@@ -99,7 +99,7 @@ class Settler:
         )
         selected = marker.details.get("selected")
         done = put_back(
-            self._controller.tools,
+            self._controller,
             _steps(marker),
             selected=selected if isinstance(selected, int) else None,
         )

@@ -2,8 +2,9 @@
 
 import struct
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import Final
 
 from robolink.errors import (
@@ -33,6 +34,7 @@ COMMAND_OBJECT: Final = 0x2100
 RESPONSE_OBJECT: Final = 0x2101
 SNAPSHOT: Final = (0x2102, 5)
 SLOT_OBJECT: Final = 0x2200
+SERIAL_NUMBER: Final = (0x1018, 4)
 HEARTBEAT_TIME_OBJECT: Final = 0x1017
 
 _MS_PER_S: Final = 1000
@@ -61,9 +63,15 @@ def open_canopen_link(
     start = options.take_choice("start", "yes", {"yes": True, "no": False})
     in_process = url.options.get("interface") == "virtual"
     line = open_can_bus(url, options, identifiers(node))
+    looking = replace(url, options={**url.options, "start": "no"})
+
+    def again(timeout_s: float) -> CanopenMailboxLink:
+        return open_canopen_link(looking, timeout_s=timeout_s, clock=clock)
+
     link = CanopenMailboxLink(
         line,
         node,
+        again,
         identity=f"{url.identity}?node={node}",
         durable=not in_process,
         timeout_s=timeout_s,
@@ -84,6 +92,7 @@ class CanopenMailboxLink:
         self,
         line: CanLine,
         node: int,
+        again: Callable[[float], "CanopenMailboxLink"],
         *,
         identity: str,
         durable: bool,
@@ -92,6 +101,7 @@ class CanopenMailboxLink:
     ) -> None:
         self._line = line
         self._node = node
+        self._again = again
         self._identity = identity
         self._durable = durable
         self._timeout_s = timeout_s
@@ -103,6 +113,11 @@ class CanopenMailboxLink:
     def identity(self) -> str:
         """The URL with the node, without its other options."""
         return self._identity
+
+    @property
+    def place(self) -> str:
+        """The bus and the node."""
+        return self._identity.partition("://")[2]
 
     @property
     def durable(self) -> bool:
@@ -165,11 +180,24 @@ class CanopenMailboxLink:
         with self._exchange() as deadline:
             return self._upload_words(SLOT_OBJECT, require_slot(slot), SLOT_WORDS, deadline)
 
+    def read_device(self) -> tuple[int, ...]:
+        """See :meth:`robolink.transport.MailboxLink.read_device`; the serial number of 1018h.
+
+        That object holds the number alone; its complement is added here.
+        """
+        with self._exchange() as deadline:
+            low, high = self._upload_words(*SERIAL_NUMBER, 2, deadline)
+            return (low, high, low ^ 0xFFFF, high ^ 0xFFFF)
+
     def beat(self, word: int) -> None:
         """See :meth:`robolink.transport.MailboxLink.beat`; one RPDO1."""
         (beat,) = require_words((word,), 1)
         with self._exchange():
             self._watch.beat(beat)
+
+    def reopened(self, *, timeout_s: float) -> "CanopenMailboxLink":
+        """See :meth:`robolink.transport.MailboxLink.reopened`; it does not start the node."""
+        return self._again(timeout_s)
 
     def close(self) -> None:
         """See :meth:`robolink.transport.MailboxLink.close`."""

@@ -9,6 +9,7 @@ COMMAND_WORDS: Final = 64
 RESPONSE_WORDS: Final = 112
 SLOT_WORDS: Final = 36
 SLOTS: Final = 15
+DEVICE_WORDS: Final = 4
 HEARTBEAT_WORD: Final = 62
 """The place of the client's heartbeat in the command block."""
 
@@ -51,6 +52,10 @@ class MailboxLink(Protocol):
         """Which far end this is: the URL, without the options that do not name one."""
 
     @property
+    def place(self) -> str:
+        """Where the far end was reached, the same for each spelling of the URL."""
+
+    @property
     def durable(self) -> bool:
         """Whether the far end outlives this process, so that markers about it must too."""
 
@@ -70,8 +75,22 @@ class MailboxLink(Protocol):
     def read_slot(self, slot: int) -> tuple[int, ...]:
         """Return the 36 words of tool slot 1 to 15."""
 
+    def read_device(self) -> tuple[int, ...]:
+        """Return the 4 words behind the last slot, which say which PLC this is.
+
+        A far end that has none of them refuses with
+        :class:`~robolink.errors.RejectedError`, whatever the link.
+        """
+
     def beat(self, word: int) -> None:
         """Write the client's heartbeat alone, word 62 of the command block."""
+
+    def reopened(self, *, timeout_s: float) -> "MailboxLink":
+        """Open another link to the same far end, after this one has ended; never by itself.
+
+        Raises:
+            ConnectError: It cannot be reached.
+        """
 
     def close(self) -> None:
         """Close. Idempotent; any thread may call it at any time."""

@@ -1,15 +1,16 @@
 """A PLC mailbox in the registers of a Modbus server (design part 7)."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
 
-from robolink.errors import ConfigError
+from robolink.errors import ConfigError, RejectedError
 from robolink.messages import tr
 from robolink.timing import Clock
 from robolink.transport._mailbox_link import (
     COMMAND_WORDS,
+    DEVICE_WORDS,
     HEAD_PLACES,
     HEARTBEAT_WORD,
     RESPONSE_WORDS,
@@ -26,6 +27,7 @@ from robolink.transport._url import LinkUrl
 from robolink.transport._url_options import UrlOptions
 
 _HEAD_WORDS: Final = max(HEAD_PLACES) + 1
+_REGISTERS: Final = 0x10000
 _AREAS: Final = {"input": Area.INPUT, "holding": Area.HOLDING}
 
 
@@ -47,7 +49,7 @@ class MailboxPlaces:
 
 
 def open_modbus_link(
-    url: LinkUrl, *, timeout_s: float, clock: Clock | None = None
+    url: LinkUrl, *, timeout_s: float, clock: Clock | None = None, to_stop: bool = False
 ) -> "ModbusMailboxLink":
     """Open a mailbox over Modbus TCP or RTU.
 
@@ -57,6 +59,7 @@ def open_modbus_link(
             (``holding`` reads response and slots from holding registers, function 3).
         timeout_s: Longest wait for the connection, and for each answer.
         clock: Keeps the deadlines.
+        to_stop: Whether it is opened for a stop alone, so that nothing may be loaded for it.
 
     Raises:
         ConfigError: The URL or an option is wrong.
@@ -66,23 +69,38 @@ def open_modbus_link(
     options = UrlOptions(url)
     places = _take_places(options)
     probe = Probe(places.area, places.response)
-    client = open_client(url, options, probe=probe, timeout_s=timeout_s, clock=clock)
-    return ModbusMailboxLink(client, places)
+    client = open_client(
+        url, options, probe=probe, timeout_s=timeout_s, clock=clock, to_stop=to_stop
+    )
+
+    def again(timeout_s: float) -> ModbusMailboxLink:
+        return open_modbus_link(url, timeout_s=timeout_s, clock=clock)
+
+    return ModbusMailboxLink(client, places, again)
 
 
 class ModbusMailboxLink:
     """Implements :class:`~robolink.transport.MailboxLink` on a client, and owns it."""
 
-    def __init__(self, client: ModbusClient, places: MailboxPlaces) -> None:
+    def __init__(
+        self,
+        client: ModbusClient,
+        places: MailboxPlaces,
+        again: Callable[[float], "ModbusMailboxLink"],
+    ) -> None:
         self._client = client
         self._places = places
+        self._again = again
 
     @property
     def identity(self) -> str:
         """The client's, and which of a unit's mailboxes when it is not the usual one."""
-        name, command = self._client.identity, self._places.command
-        joint = "&" if "?" in name else "?"
-        return f"{name}{joint}command={command}" if command else name
+        return self._which(self._client.identity)
+
+    @property
+    def place(self) -> str:
+        """The client's, and which of a unit's mailboxes when it is not the usual one."""
+        return self._which(self._client.place)
 
     @property
     def durable(self) -> bool:
@@ -111,15 +129,34 @@ class ModbusMailboxLink:
         """See :meth:`robolink.transport.MailboxLink.read_slot`; one request."""
         return self._read(self._places.slots + (require_slot(slot) - 1) * SLOT_WORDS, SLOT_WORDS)
 
+    def read_device(self) -> tuple[int, ...]:
+        """See :meth:`robolink.transport.MailboxLink.read_device`; one request."""
+        start = self._places.slots + SLOTS * SLOT_WORDS
+        if start + DEVICE_WORDS > _REGISTERS:
+            raise RejectedError(
+                tr("There are no registers behind the tool slots of {it}.", it=self.identity),
+                remedy=tr("Move the slots down by {count} registers.", count=DEVICE_WORDS),
+                controller=self.identity,
+            )
+        return self._read(start, DEVICE_WORDS)
+
     def beat(self, word: int) -> None:
         """See :meth:`robolink.transport.MailboxLink.beat`; function 16 with one register."""
         self._client.write_registers(
             self._places.command + HEARTBEAT_WORD, require_words((word,), 1)
         )
 
+    def reopened(self, *, timeout_s: float) -> "ModbusMailboxLink":
+        """See :meth:`robolink.transport.MailboxLink.reopened`."""
+        return self._again(timeout_s)
+
     def close(self) -> None:
         """See :meth:`robolink.transport.MailboxLink.close`."""
         self._client.close()
+
+    def _which(self, name: str) -> str:
+        command, joint = self._places.command, "&" if "?" in name else "?"
+        return f"{name}{joint}command={command}" if command else name
 
     def _read(self, address: int, count: int) -> tuple[int, ...]:
         if self._places.area is Area.HOLDING:
@@ -129,9 +166,9 @@ class ModbusMailboxLink:
 
 def _take_places(options: UrlOptions) -> MailboxPlaces:
     area = options.take_choice("registers", "input", _AREAS)
-    command = options.take_int("command", 0, 0, 0x10000 - COMMAND_WORDS)
-    response = options.take_int("response", 0, 0, 0x10000 - RESPONSE_WORDS)
-    last = 0x10000 - SLOTS * SLOT_WORDS
+    command = options.take_int("command", 0, 0, _REGISTERS - COMMAND_WORDS)
+    response = options.take_int("response", 0, 0, _REGISTERS - RESPONSE_WORDS)
+    last = _REGISTERS - SLOTS * SLOT_WORDS
     slots = options.take_int("slots", min(response + RESPONSE_WORDS, last), 0, last)
     blocks = {
         "response": range(response, response + RESPONSE_WORDS),

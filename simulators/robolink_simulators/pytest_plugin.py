@@ -4,17 +4,23 @@ Importing this module costs next to nothing: every pytest run of an environment 
 robolink is installed imports it.
 """
 
+import os
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import pytest
 
 if TYPE_CHECKING:
     from robolink_simulators.epson.device import EpsonSimulator
     from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
+
+_STATE: Final = ("ROBOLINK_STATE_DIR", "ROBOLINK_JOURNAL")
+"""What says where the journal, the backups and the like are kept."""
+
+_OF_THE_DEVELOPER: Final = {name: os.environ.get(name) for name in _STATE}
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +69,28 @@ def pytest_report_header(config: pytest.Config) -> str:
 
 
 @pytest.fixture
-def epson_sim(request: pytest.FixtureRequest) -> Iterator["EpsonSimulator"]:
+def robolink_state(
+    monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory
+) -> Path:
+    """A state folder of the test's own, so that nothing is left in the developer's journal.
+
+    A test that named one itself, through ROBOLINK_STATE_DIR or ROBOLINK_JOURNAL, keeps it.
+    """
+    now = {name: os.environ.get(name) for name in _STATE}
+    folder = now["ROBOLINK_STATE_DIR"]
+    if now == _OF_THE_DEVELOPER or folder is None:
+        folder = str(tmp_path_factory.mktemp("robolink-state"))
+        monkeypatch.setenv("ROBOLINK_STATE_DIR", folder)
+    if now["ROBOLINK_JOURNAL"] == _OF_THE_DEVELOPER["ROBOLINK_JOURNAL"]:
+        monkeypatch.delenv("ROBOLINK_JOURNAL", raising=False)
+    return Path(folder)
+
+
+@pytest.fixture
+def epson_sim(
+    request: pytest.FixtureRequest,
+    robolink_state: Path,  # noqa: ARG001 - where whoever connects keeps the record
+) -> Iterator["EpsonSimulator"]:
     """A simulated EPSON controller in this process; connect to its ``url``."""
     from robolink_simulators.epson.device import EpsonSimulator
     from robolink_simulators.hosting.in_process import register, unregister
@@ -76,7 +103,10 @@ def epson_sim(request: pytest.FixtureRequest) -> Iterator["EpsonSimulator"]:
 
 
 @pytest.fixture
-def epson_tcp(request: pytest.FixtureRequest) -> Iterator[ServedEpson]:
+def epson_tcp(
+    request: pytest.FixtureRequest,
+    robolink_state: Path,  # noqa: ARG001 - where whoever connects keeps the record
+) -> Iterator[ServedEpson]:
     """A simulated EPSON controller on a loopback TCP port, with its assist port."""
     from robolink_simulators.assist import serve_assist
     from robolink_simulators.clock import ScaledClock
@@ -92,7 +122,10 @@ def epson_tcp(request: pytest.FixtureRequest) -> Iterator[ServedEpson]:
 
 
 @pytest.fixture
-def softmotion_sim(request: pytest.FixtureRequest) -> Iterator[ServedSoftMotion]:
+def softmotion_sim(
+    request: pytest.FixtureRequest,
+    robolink_state: Path,  # noqa: ARG001 - where whoever connects keeps the record
+) -> Iterator[ServedSoftMotion]:
     """A simulated SoftMotion PLC in this process.
 
     Parametrize it indirectly for other ways to reach it: ``sim``, ``modbus-tcp``,
@@ -125,7 +158,9 @@ def _serve(simulator: "SoftMotionSimulator", medium: str, stack: ExitStack) -> N
 
 
 @pytest.fixture
-def epson_replay() -> Iterator[Callable[[Path], str]]:
+def epson_replay(
+    robolink_state: Path,  # noqa: ARG001 - where whoever connects keeps the record
+) -> Iterator[Callable[[Path], str]]:
     """A maker of replays: give it a recording, connect to the URL that it returns.
 
     The test fails when a client asked otherwise than recorded, or did not connect as often.

@@ -36,6 +36,9 @@ class FarEnd(Protocol):
     def put_slot(self, slot: int, words: Sequence[int]) -> None:
         """Set a tool slot."""
 
+    def put_device(self, low: int, high: int) -> None:
+        """Set the number of the PLC, by its two words."""
+
     def command(self) -> list[int]:
         """Return the command block as it was written."""
 
@@ -85,6 +88,9 @@ class ModbusFarEnd:
 
     def put_slot(self, slot, words):
         self._put(INPUT, SLOTS_AT + 36 * (slot - 1), words)
+
+    def put_device(self, low, high):
+        self._put(INPUT, SLOTS_AT + 36 * 15, (low, high, low ^ 0xFFFF, high ^ 0xFFFF))
 
     def command(self):
         return list(self._run(self._server.async_getValues(1, HOLDING, 0, 64)))
@@ -227,6 +233,9 @@ class CanopenFarEnd:
     def put_slot(self, slot, words):
         self._put(0x2200, slot, struct.pack("<36H", *words))
 
+    def put_device(self, low, high):
+        self._put(0x1018, 4, struct.pack("<2H", low, high))
+
     def command(self):
         return list(struct.unpack("<64H", self.node.data_store[0x2100][0]))
 
@@ -260,6 +269,11 @@ def objects() -> canopen.ObjectDictionary:
     snapshot.data_type = datatypes.UNSIGNED16
     record.add_member(snapshot)
     dictionary.add_object(record)
+    identity = ODRecord("identity", 0x1018)
+    serial = ODVariable("serial number", 0x1018, 4)
+    serial.data_type = datatypes.UNSIGNED32
+    identity.add_member(serial)
+    dictionary.add_object(identity)
     slots = ODArray("slots", 0x2200)
     for slot in range(1, 16):
         member = ODVariable(f"slot_{slot}", 0x2200, slot)

@@ -76,6 +76,20 @@ def test_every_slot_has_its_place(far_end, link):
         assert link.read_slot(slot) == tuple(word + slot for word in SLOT)
 
 
+def test_the_number_of_the_plc_is_the_same_four_words_on_every_link(far_end, link):
+    far_end.put_device(0xBEEF, 0x1234)
+    assert link.read_device() == (0xBEEF, 0x1234, 0x4110, 0xEDCB)
+
+
+@pytest.mark.parametrize("slots", [1460, 0x10000 - 15 * 36])
+def test_registers_without_that_number_are_a_refusal_and_the_link_goes_on(slots):
+    with modbus_tcp() as far_end:
+        with closing(open_mailbox_link(f"{far_end.url}&slots={slots}")) as link:
+            with pytest.raises(RejectedError):
+                link.read_device()
+            assert link.read_head().ack == 0
+
+
 def test_a_beat_is_the_heartbeat_word_alone(far_end, link):
     if isinstance(far_end, ModbusFarEnd):
         link.write_command(COMMAND)
@@ -98,12 +112,14 @@ def test_each_exchange_over_modbus_is_one_request(serial):
         link.read_head()
         link.read_response()
         link.read_slot(15)
+        link.read_device()
     assert far_end.requests == [
         (16, 0, 64),
         (16, 62, 1),
         (4, 0, 10),
         (4, 0, 112),
         (4, 112 + 14 * 36, 36),
+        (4, 652, 4),
     ]
 
 

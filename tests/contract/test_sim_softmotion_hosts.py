@@ -17,6 +17,7 @@ from robolink_simulators.softmotion.mailbox import (
     SoftMotionSimulator,
 )
 
+from robolink.controllers.softmotion import read_device_id
 from robolink.errors import (
     ConfigError,
     ConnectError,
@@ -290,3 +291,29 @@ def test_a_closed_host_answers_no_more(tmp_path):
         host.close()
         with pytest.raises(TransportError):
             open_mailbox_link(host.url, timeout_s=0.2)
+
+
+def test_one_plc_has_one_number_on_all_of_its_buses():
+    simulator = plc()
+    place = CanPlace("virtual", "one-number")
+    with (
+        serve_modbus_tcp(simulator) as tcp,
+        serve_modbus_rtu(simulator) as rtu,
+        serve_canopen(simulator, place) as can,
+    ):
+        found = []
+        for host in (tcp, rtu, can):
+            with closing(open_mailbox_link(host.url, timeout_s=2.0)) as link:
+                found.append(read_device_id(link))
+    assert found == [simulator.plc.memory.device_id] * 3
+
+
+def test_a_plc_whose_program_has_no_number_says_so_on_all_of_its_buses():
+    simulator = plc(identified=False)
+    with (
+        serve_modbus_tcp(simulator) as tcp,
+        serve_canopen(simulator, CanPlace("virtual", "no-number")) as can,
+    ):
+        for host in (tcp, can):
+            with closing(open_mailbox_link(host.url, timeout_s=2.0)) as link:
+                assert read_device_id(link) is None

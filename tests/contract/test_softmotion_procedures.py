@@ -13,8 +13,13 @@ from robolink.backup import (
     restore,
     take_backup,
 )
-from robolink.errors import NotReadyError, NotReadyReason, OutcomeUnknownError
-from robolink.model import ANY, EntryKind, ToolOffset, Verdict, WorkBox
+from robolink.errors import (
+    NotReadyError,
+    NotReadyReason,
+    OutcomeUnknownError,
+    TransportBrokenError,
+)
+from robolink.model import ANY, ControllerState, EntryKind, ToolOffset, Verdict, WorkBox
 from robolink.nozzle_change import ChangePlan, Limits, NozzleChange, ToolPlan
 from robolink.transaction import Wanted, change_tools, plan_undo, recover, undo
 from tests.contract._softmotion_cell import BACKENDS, OWNER_SILENCE_S, QUICK, above, served
@@ -55,6 +60,15 @@ def test_the_machine_is_named_and_its_start_is_numbered(cell, controller):
     cell.restart()
     with cell.connect() as again:
         assert again.mailbox_facts().boot_id == facts.boot_id + 1
+
+
+def test_a_start_of_the_plc_is_told_as_one_on_every_link(cell, controller):
+    cell.restart()
+    with pytest.raises(TransportBrokenError, match="started anew") as ended:
+        controller.status()
+    assert "no tool slot is selected" in ended.value.remedy
+    with cell.connect() as again:
+        assert again.status().state is ControllerState.DISABLED
 
 
 def test_without_the_permit_of_the_machine_nothing_is_changed(cell, controller):

@@ -156,13 +156,16 @@ def test_a_watchdog_that_zeroes_a_command_before_the_plc_saw_it_leaves_it_not_ap
         assert cell.slot_changes(SCRATCH) == 0
 
 
-def test_a_watchdog_that_zeroes_an_accepted_command_does_not_end_it():
+def test_a_watchdog_that_zeroes_what_was_written_ends_the_movement_at_once():
     fault = PlcFault(PlcFaultAction.ZERO_INPUTS, match="write_command MOVE_LINEAR", seconds=0.02)
     with plc_with(fault) as cell, cell.connect() as controller:
         group = controller.groups[0]
-        target = above(group.pose(), 0.3)
-        group.move_to(target, SLOW, box=ANYWHERE).wait(timeout_s=10)
-        assert group.pose().z_mm == pytest.approx(target.z_mm, abs=1e-6)
+        start = group.pose()
+        with pytest.raises(ControllerFaultError, match="heartbeat was missing") as end:
+            group.move_to(above(start, 0.3), SLOW, box=ANYWHERE).wait(timeout_s=10)
+        assert end.value.code == ErrorClass.HEARTBEAT_LOST
+        assert 0 < group.pose().z_mm - start.z_mm < 0.15
+        assert cell.open_requests == []
         assert cell.commands.count("MOVE_LINEAR") == 1
         assert cell.movements_started == 1
 

@@ -15,6 +15,7 @@ from robolink_cli._plc_export import plc_texts
 
 from robolink.protocols.mailbox import (
     COMMAND,
+    DEVICE,
     RESPONSE,
     SLOT,
     Opcode,
@@ -45,7 +46,9 @@ def test_the_register_map_counts_from_the_base():
     assert found["command", "seq_head"]["reference"] == "40101"
     assert found["response", "probe"]["reference"] == "30185"
     assert found["slot 15", "counter_tail"]["address"] == str(100 + 112 + 15 * 36 - 1)
-    assert len(rows) == len(COMMAND.fields) + len(RESPONSE.fields) + 15 * len(SLOT.fields)
+    assert found["device", "device_id"]["address"] == str(100 + 652)
+    blocks = len(COMMAND.fields) + len(RESPONSE.fields) + 15 * len(SLOT.fields) + len(DEVICE.fields)
+    assert len(rows) == blocks
 
 
 def test_the_registers_of_a_bank_follow_each_other():
@@ -56,7 +59,7 @@ def test_the_registers_of_a_bank_follow_each_other():
         for row in bank:
             assert int(row["address"]) == free
             free += int(row["words"])
-        assert free == {"4": 64, "3": 652}[kind]
+        assert free == {"4": 64, "3": 656}[kind]
 
 
 def test_the_page_of_the_tools_profile_names_no_motion():
@@ -69,6 +72,10 @@ def test_the_data_sheet_holds_the_blocks(objects):
     for index, access in ((0x2100, "rw"), (0x2101, "ro")):
         assert (objects[index].data_type, objects[index].access_type) == (datatypes.DOMAIN, access)
     assert [objects[0x2200][n].data_type for n in range(1, 16)] == [datatypes.DOMAIN] * 15
+    assert (objects[0x1018][4].name, objects[0x1018][4].data_type) == (
+        "serial number",
+        datatypes.UNSIGNED32,
+    )
     names = [objects[0x2102][n].name for n in range(1, 6)]
     assert names == ["version", "boot_id", "capabilities", "probe", "snapshot"]
     assert (objects[0x2102][4].default, objects[0x2102][5].access_type) == (12.3456, "rw")

@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 from robolink_simulators.clock import ManualClock
 
 from robolink.controllers.softmotion import SoftMotionController, open_softmotion
-from robolink.errors import RobolinkError, TransportClosedError, TransportTimeoutError
+from robolink.errors import ConnectError, RobolinkError, TransportClosedError, TransportTimeoutError
 from robolink.journal import memory_journal
 from robolink.model import Signature, new_operation
 from robolink.protocols.mailbox import encode_slot
@@ -25,6 +25,7 @@ class PlcLink:
     Each exchange takes a millisecond of the PLC's clock.
 
     Attributes:
+        reachable: Whether another link can be opened when this one has ended.
         recovers: Whether it can be used after a lost answer, like a serial line.
         sent: Every command block that was written, as it was written.
         beats: Every heartbeat word that was written alone.
@@ -36,7 +37,9 @@ class PlcLink:
         self.plc = plc
         self.clock = plc.clock
         self.identity = f"softmotion+sim://{new_operation()}"
+        self.place = self.identity.partition("://")[2]
         self.durable = False
+        self.reachable = False
         self.recovers = False
         self.closed = False
         self.sent: list[tuple[int, ...]] = []
@@ -101,10 +104,20 @@ class PlcLink:
         """Read a tool slot."""
         return self._exchange("read_slot", lambda: encode_slot(self.plc.slots[slot]))
 
+    def read_device(self) -> tuple[int, ...]:
+        """Read the device block; an old program has none."""
+        return self._exchange("read_device", lambda: self.plc.device)
+
     def beat(self, word: int) -> None:
         """Write the heartbeat."""
         self.beats.append(word)
         self._exchange("beat", lambda: self.plc.take_beat(word))
+
+    def reopened(self, *, timeout_s: float) -> "PlcLink":
+        """Open another link, unless the PLC cannot be reached."""
+        if not self.reachable:
+            raise ConnectError("no answer", remedy="connect again")
+        return PlcLink(self.plc)
 
     def close(self) -> None:
         """Close."""

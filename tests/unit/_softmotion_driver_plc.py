@@ -10,7 +10,6 @@ from dataclasses import replace
 from robolink_simulators.clock import ManualClock
 
 from robolink.protocols.mailbox import (
-    OPCODES,
     Answer,
     Bits,
     BlockError,
@@ -27,6 +26,7 @@ from robolink.protocols.mailbox import (
     beats_for,
     crc16,
     decode_command,
+    encode_device_id,
     encode_response,
     kinematics_word,
     next_number,
@@ -54,6 +54,9 @@ class Plc:
         frozen: Whether its heartbeat stands still.
         takes_tools: Whether the axis group really takes over a tool that is written.
         refusals: Opcodes that are refused, and how.
+        refuses: Refuses single commands: it returns how, 0 for none.
+        overhears: Which commands it never takes note of.
+        device: Its device block, which says which PLC it is.
         edge: Where the input switches on a movement that waits for it.
         executed: Every command that it accepted, in order.
     """
@@ -73,6 +76,7 @@ class Plc:
             state=CommandState.DONE,
         )
         self.slots = {number: Slot() for number in range(1, 16)}
+        self.device = encode_device_id(0x1234_BEEF)
         self.set_tool = IDENTITY
         self.owner = 0
         self.epoch = 65535
@@ -81,6 +85,8 @@ class Plc:
         self.takes_tools = True
         self.executed: list[Command] = []
         self.refusals: dict[Opcode, int] = {}
+        self.refuses: Callable[[Command], int] = lambda _command: 0
+        self.overhears: Callable[[Command], bool] = lambda _command: False
         self.inputs = {3: 1}
         self.outputs: dict[int, int] = {}
         self.edge: Six | None = None
@@ -119,7 +125,7 @@ class Plc:
             return
         self.take_beat(words[62])
         identity = (command.owner, command.sequence, crc16(words[:61]))
-        if identity == self._last or not self.answers:
+        if identity == self._last or not self.answers or self.overhears(command):
             return
         self._last = identity
         if command.owner == self.owner:
@@ -213,13 +219,12 @@ class Plc:
 
     def _carry_out(self, command: Command) -> tuple[CommandState, int]:
         opcode = Opcode(command.opcode)
-        facts = OPCODES[opcode]
-        error = command.refusal() or self.refusals.get(opcode, 0)
-        if not error and facts.needs_owner and command.owner != self.owner:
+        error = command.refusal() or self.refusals.get(opcode, 0) or self.refuses(command)
+        if not error and command.needs_owner and command.owner != self.owner:
             error = ErrorClass.NOT_OWNER
-        elif not error and facts.needs_owner and command.epoch != self.epoch:
+        elif not error and command.needs_owner and command.epoch != self.epoch:
             error = ErrorClass.STALE_EPOCH
-        if not error and facts.needs_permit and not self.now.bits & Bits.PERMITTED:
+        if not error and command.needs_permit and not self.now.bits & Bits.PERMITTED:
             error = ErrorClass.NOT_PERMITTED
         if error:
             return CommandState.ERROR, error
@@ -307,10 +312,12 @@ class Plc:
         return (CommandState.ACTIVE, 0) if goes else DONE
 
     def _stop(self, command: Command) -> Outcome:
+        self.now = replace(self.now, bits=self.now.bits & ~Bits.JOGGING)
         self.end_all()
         return self._enter(GroupState.STANDBY if command.operands[0] else GroupState.STOPPING)
 
     def _halt(self, _command: Command) -> Outcome:
+        self.now = replace(self.now, bits=self.now.bits & ~Bits.JOGGING)
         self.end_all()
         return DONE
 

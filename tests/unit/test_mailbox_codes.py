@@ -58,6 +58,7 @@ def test_only_stop_halt_and_ownership_need_no_owner():
 def test_what_reads_or_stops_needs_no_permit():
     free = {code for code, facts in OPCODES.items() if not facts.needs_permit}
     assert free == {
+        Opcode.INTERRUPT,
         Opcode.STOP,
         Opcode.HALT,
         Opcode.OWNERSHIP,

@@ -37,6 +37,7 @@ def link_to():
         link = CanopenMailboxLink(
             CanLine(bus, "softmotion+can://desk"),
             NODE,
+            lambda _timeout_s: link,
             identity=IDENTITY,
             durable=True,
             timeout_s=1.0,

@@ -128,6 +128,8 @@ def test_the_links_know_the_sizes_and_places_of_the_layout():
     assert _mailbox_link.COMMAND_WORDS == mailbox.COMMAND_WORDS
     assert _mailbox_link.RESPONSE_WORDS == mailbox.RESPONSE_WORDS
     assert _mailbox_link.SLOT_WORDS == mailbox.SLOT_WORDS
+    assert _mailbox_link.DEVICE_WORDS == mailbox.DEVICE_WORDS
+    assert _mailbox_link.RESPONSE_WORDS + 15 * _mailbox_link.SLOT_WORDS == mailbox.DEVICE_START
     assert list(range(1, _mailbox_link.SLOTS + 1)) == list(mailbox.SLOTS)
     assert mailbox.COMMAND.at("client_heartbeat").start == _mailbox_link.HEARTBEAT_WORD
     head = ("ack_head", "state", "error_class", "group_state", "plc_heartbeat")

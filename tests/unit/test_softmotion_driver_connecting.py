@@ -10,6 +10,7 @@ from robolink.errors import (
     ConnectError,
     RemoteProtocolError,
     TransportBrokenError,
+    TransportClosedError,
     TransportTimeoutError,
 )
 from robolink.model import ControllerState
@@ -139,6 +140,41 @@ def test_a_plc_that_started_anew_ends_the_session(cell):
     assert cell.link.closed
 
 
+def cut_by(cell, *, restarted):
+    """Let the link be cut, as TCP is by a start of the PLC, or for another reason."""
+
+    def mishap(_deliver):
+        if restarted:
+            cell.plc.restart()
+        cell.link.close()
+        raise TransportBrokenError("The connection was closed.", remedy="connect again")
+
+    return mishap
+
+
+@pytest.mark.parametrize(
+    ("restarted", "reachable", "sentence"),
+    [
+        (True, True, "started anew"),
+        (True, False, "connection was closed"),
+        (False, True, "connection was closed"),
+    ],
+)
+@pytest.mark.parametrize("method", ["read_response", "write_command"])
+def test_a_start_that_cuts_the_link_is_told_as_one_if_the_plc_answers_again(
+    cell, method, restarted, reachable, sentence
+):
+    controller = cell.met()
+    cell.link.reachable = reachable
+    cell.link.plan(method, cut_by(cell, restarted=restarted))
+    with pytest.raises(TransportBrokenError, match=sentence) as broken:
+        controller.take() if method == "write_command" else controller.status()
+    assert broken.value.controller == controller.identity
+    assert cell.plc.executed == []
+    with pytest.raises(TransportClosedError):
+        controller.status()
+
+
 def test_another_unit_of_length_ends_the_session(cell):
     controller = cell.met()
     cell.plc.now = replace(cell.plc.now, unit_um=25400.0)
@@ -149,18 +185,22 @@ def test_another_unit_of_length_ends_the_session(cell):
 @pytest.mark.parametrize(
     ("state", "bits", "expected"),
     [
-        (GroupState.STANDBY, Bits.PERMITTED, ControllerState.READY),
-        (GroupState.DISABLED, Bits.PERMITTED, ControllerState.READY),
+        (GroupState.STANDBY, Bits.PERMITTED | Bits.POWERED, ControllerState.READY),
+        (GroupState.DISABLED, Bits.PERMITTED | Bits.POWERED, ControllerState.DISABLED),
+        (GroupState.DISABLED, Bits.PERMITTED, ControllerState.NO_POWER),
+        (GroupState.STANDBY, Bits.PERMITTED, ControllerState.NO_POWER),
         (GroupState.STANDBY, Bits(0), ControllerState.NOT_REMOTE),
         (GroupState.ERRORSTOP, Bits.PERMITTED, ControllerState.FAULT),
         (GroupState.STOPPING, Bits.PERMITTED, ControllerState.PAUSED),
         (GroupState.STANDBY, Bits.PERMITTED | Bits.INTERRUPTED, ControllerState.PAUSED),
-        (GroupState.HOMING, Bits.PERMITTED, ControllerState.RUNNING),
+        (GroupState.HOMING, Bits.PERMITTED | Bits.POWERED, ControllerState.RUNNING),
     ],
 )
 def test_the_group_state_is_told_in_the_words_of_all_controllers(cell, state, bits, expected):
     cell.plc.now = replace(cell.plc.now, group_state=state, bits=bits)
-    assert cell.met().status().state is expected
+    status = cell.met().status()
+    assert status.state is expected
+    assert status.ready is (expected is ControllerState.READY)
 
 
 def test_the_facts_name_the_kinematics_and_the_version(cell):

@@ -44,6 +44,7 @@ class RegisterToolTable:
     ) -> None:
         self._registers = registers
         self._map = register_map
+        self._desk = desk
         self._lock = lock
         self._require_ready = require_ready
         self._slots = Slots(registers, register_map)
@@ -96,7 +97,9 @@ class RegisterToolTable:
         """Read one tool, ``None`` when it is undefined; tool 0 reads as all zeros."""
         if tool == 0 and not isinstance(tool, bool):
             return ToolOffset()
-        return self._slots.read(self._slot(tool))
+        found = self._slots.read(self._slot(tool))
+        self._desk.ledger.saw_tool(tool, found)
+        return found
 
     def write(self, tool: int, offset: ToolOffset, *, expected: Expected) -> ToolReceipt:
         """Write and read back; see :class:`robolink.model.ToolTable`.
@@ -150,7 +153,9 @@ class RegisterToolTable:
         """Return the number of the tool in force; ``None`` where the map does not name it."""
         if self._map.selected is None:
             return None
-        return self._registers.word(self._map.selected)
+        found = self._registers.word(self._map.selected)
+        self._desk.ledger.saw_selected(found)
+        return found
 
     def select(self, tool: int) -> None:
         """Refuse: which tool is in force is the machine's affair.

@@ -6,7 +6,6 @@ from robolink.model import ControllerStatus
 from robolink.protocols.mailbox import Bits, GroupState, Response, error_meaning
 
 _MOVING = frozenset({GroupState.MOVING, GroupState.HOMING})
-_AT_REST = frozenset({GroupState.DISABLED, GroupState.STANDBY})
 
 
 def is_moving(now: Response) -> bool:
@@ -18,13 +17,17 @@ def status_of(now: Response) -> ControllerStatus:
     """Translate a snapshot (design part 7).
 
     ``remote`` is the machine's permit, ``paused`` an interrupted movement or a held stop,
-    ``ready`` a group at rest, enabled or not. ``code`` is robolink's error class, given in the
-    error state only: elsewhere that word is about the last command.
+    ``ready`` a group at rest that could move: enabled, its drives with power. ``code`` is
+    robolink's error class, given in the error state only: elsewhere that word is about the last
+    command.
     """
     fault = now.group_state == GroupState.ERRORSTOP
+    powered = bool(now.bits & Bits.POWERED)
     return ControllerStatus(
         remote=bool(now.bits & Bits.PERMITTED),
-        ready=now.group_state in _AT_REST and not is_moving(now),
+        ready=now.group_state == GroupState.STANDBY and powered and not is_moving(now),
+        disabled=now.group_state == GroupState.DISABLED,
+        unpowered=not powered,
         running=is_moving(now),
         paused=bool(now.bits & Bits.INTERRUPTED) or now.group_state == GroupState.STOPPING,
         fault=fault,

@@ -13,6 +13,7 @@ from robolink.controllers.softmotion._io import SoftMotionIo
 from robolink.controllers.softmotion._mailbox import Mailbox
 from robolink.controllers.softmotion._preserve import Preserver
 from robolink.controllers.softmotion._resolve import SoftMotionResolver
+from robolink.controllers.softmotion._stopping import REST_S
 from robolink.controllers.softmotion._tools import SoftMotionToolTable
 from robolink.errors import ControllerFaultError, RobolinkError
 from robolink.messages import tr
@@ -21,6 +22,7 @@ from robolink.model import (
     Capabilities,
     ControllerFacts,
     ControllerStatus,
+    Ledger,
     Marker,
     MarkerKind,
     NewEntry,
@@ -34,6 +36,8 @@ from robolink.protocols.mailbox import (
     Opcode,
     Response,
 )
+from robolink.standing import note_standing
+from robolink.stop_latch import StopLatch
 from robolink.timing import Clock, Deadline
 
 _RESETS: Final = (
@@ -75,6 +79,11 @@ class SoftMotionController:
         return self._mailbox.identity
 
     @property
+    def device_id(self) -> int | None:
+        """The number that the PLC drew once, the same on every link; ``None`` where it has none."""
+        return self._mailbox.device_id
+
+    @property
     def clock(self) -> Clock:
         """The clock on which the PLC's time passes."""
         return self._mailbox.wire.clock
@@ -102,6 +111,11 @@ class SoftMotionController:
         return self._mailbox.desk.outcomes
 
     @property
+    def ledger(self) -> Ledger:
+        """What was done here since connecting, and how much of it is proved."""
+        return self._mailbox.desk.ledger
+
+    @property
     def resolver(self) -> SoftMotionResolver:
         """Settles what was begun and not proved finished."""
         return self._resolver
@@ -112,7 +126,10 @@ class SoftMotionController:
         return self._mailbox.wire.exchanges
 
     def status(self) -> ControllerStatus:
-        """Read the state; others see by it that this process is alive."""
+        """Read the state; others see by it that this process is alive.
+
+        It keeps nothing going: a movement or jog ends unless somebody waits on it.
+        """
         self._mailbox.desk.beat()
         return status_of(self._mailbox.snapshots.take())
 
@@ -122,7 +139,7 @@ class SoftMotionController:
 
     def mailbox_facts(self) -> MailboxFacts:
         """Read which machine and which mailbox program this is."""
-        return MailboxFacts.of(self._mailbox.snapshots.take())
+        return MailboxFacts.of(self._mailbox.snapshots.take(), device_id=self.device_id)
 
     def condition(self) -> dict[str, object]:
         """Read the meaning of an error, the tool in force, and what the mailbox shows beside."""
@@ -151,13 +168,21 @@ class SoftMotionController:
         """
         self._mailbox.orders.ownership.take(insist=insist)
 
-    def stop(self) -> None:
-        """Stop the group and hold it; ``reset_fault`` releases it.
+    @property
+    def latch(self) -> StopLatch:
+        """What holds everything back from :meth:`stop` until :meth:`release_stop`."""
+        return self._mailbox.wire.latch
 
-        May be called from any thread while another waits on a motion.
+    def stop(self) -> None:
+        """Stop the group and hold it; on the PLC ``reset_fault`` releases it.
+
+        May be called from any thread, whatever another one is doing. From its first instant on
+        no movement, jog or write leaves this process until :meth:`release_stop`; whoever is at
+        work gets StoppedError.
 
         Raises:
-            RobolinkError: It was not confirmed; the message says to use the emergency stop.
+            OutcomeUnknownError: Rest was not seen; the message says to use the emergency stop.
+            RobolinkError: It was not confirmed; the message says the same.
         """
         try:
             self._group.stop()
@@ -166,6 +191,10 @@ class SoftMotionController:
                 (tr("The stop is not confirmed: press the emergency stop."), error.remedy)
             )
             raise
+
+    def release_stop(self) -> None:
+        """Let this process act again after :meth:`stop`, because a person says so."""
+        self._mailbox.wire.latch.release()
 
     def reset_fault(self) -> None:
         """Clear the group's error and release a held stop, because a person asked for it.
@@ -179,7 +208,7 @@ class SoftMotionController:
         """
         mailbox = self._mailbox
         request = tr("reset")
-        with mailbox.lock.held(request):
+        with mailbox.lock.held(request, calming=True):
             now = mailbox.snapshots.take()
             for state, draft in _RESETS:
                 if now.group_state == state:
@@ -250,6 +279,7 @@ class SoftMotionController:
 
     def close(self) -> None:
         """Halt what nobody waited on, give the mailbox back, close. Idempotent."""
+        self.latch.await_stops(REST_S)
         try:
             if self._mailbox.wire.alive:
                 self._group.abort_unfinished()
@@ -270,6 +300,8 @@ class SoftMotionController:
         trace: TracebackType | None,
     ) -> None:
         self.close()
+        if error is not None:
+            note_standing(error, self.ledger.standing())
 
     def _left(self, state: GroupState, now: Response) -> Response:
         """Give the group the cycles that it needs to leave a state (softmotion.md 2.2)."""

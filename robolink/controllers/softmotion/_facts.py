@@ -30,6 +30,7 @@ class MailboxFacts:
         unit_um: Micrometres in a unit of length.
         capabilities: What the program can be told.
         boot_id: Number of the PLC start.
+        device_id: Number of the PLC, drawn once; ``None`` where its program has none.
     """
 
     version: str
@@ -39,9 +40,10 @@ class MailboxFacts:
     unit_um: float
     capabilities: Capability
     boot_id: int
+    device_id: int | None
 
     @classmethod
-    def of(cls, now: Response) -> "MailboxFacts":
+    def of(cls, now: Response, *, device_id: int | None) -> "MailboxFacts":
         """Return what a snapshot says."""
         return cls(
             version=f"{now.version >> 8}.{now.version & 0xFF}",
@@ -51,6 +53,7 @@ class MailboxFacts:
             unit_um=now.unit_um,
             capabilities=now.capabilities,
             boot_id=now.boot_id,
+            device_id=device_id,
         )
 
     def shared(self) -> ControllerFacts:
@@ -59,6 +62,7 @@ class MailboxFacts:
         model = " + ".join(name for name in blocks if name)
         return ControllerFacts(
             controller_type="CODESYS SoftMotion",
+            controller_serial=None if self.device_id is None else f"{self.device_id:08X}",
             firmware=tr("mailbox {version}", version=self.version),
             robot_models=(model,) if model else (),
         )
@@ -79,6 +83,7 @@ def set_kinematics(mailbox: Mailbox, position: Kinematics, orientation: Kinemati
             send=lambda: mailbox.orders.carry_out(draft),
             read=mailbox.snapshots.take,
         )
+        mailbox.desk.ledger.saw_selected(after.tool_slot)
     if after.kinematics != wanted or after.tool_slot:
         raise ReadBackError(
             tr(

@@ -19,14 +19,14 @@ from robolink.controllers.softmotion._movement import (
     SoftMotionMotionUntilInput,
 )
 from robolink.controllers.softmotion._starting import MovementStarter
-from robolink.errors import ConfigError, ReadBackError, RejectedError
+from robolink.controllers.softmotion._stopping import bring_group_to_rest
+from robolink.errors import ConfigError, ReadBackError
 from robolink.messages import tr
 from robolink.model import InputEdge, MotionProfile, MotionTerms, Path, Pose, WorkBox
 from robolink.protocols.mailbox import (
     BufferMode,
     Command,
     CoordinateSystem,
-    ErrorClass,
     GroupState,
     Opcode,
     Six,
@@ -135,13 +135,16 @@ class SoftMotionGroup:
     def stop(self) -> None:
         """Stop and hold; may be called from any thread, at any time, more than once.
 
-        Until ``reset_fault`` releases it nothing moves.
+        Until ``release_stop`` nothing acts from here, and until ``reset_fault`` nothing moves.
+
+        Raises:
+            OutcomeUnknownError: The group did not come to rest in time.
         """
-        try:
-            self._mailbox.orders.carry_out(Command(0, Opcode.STOP))
-        except RejectedError as error:
-            if error.code != ErrorClass.STOPPING:
-                raise
+        mailbox = self._mailbox
+        with mailbox.wire.latch.stopping():
+            bring_group_to_rest(
+                mailbox.orders, mailbox.snapshots, mailbox.wire.clock, controller=mailbox.identity
+            )
 
     def halt(self) -> None:
         """Bring the group to rest, ending every movement; it may be moved again at once."""
@@ -209,7 +212,7 @@ class SoftMotionGroup:
     def _switch(self, opcode: Opcode, *, enabled: bool) -> None:
         mailbox, draft = self._mailbox, Command(0, opcode)
         request = describe(draft)
-        with mailbox.lock.held(request):
+        with mailbox.lock.held(request, calming=not enabled):
             if self.motors_on() is enabled:
                 return
             now = mailbox.prepare(draft, request)

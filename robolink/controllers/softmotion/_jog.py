@@ -2,20 +2,44 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Final
 
-from robolink.controllers.softmotion._answers import describe
+from robolink.controllers.softmotion._answers import cut_short, describe, ended_badly
 from robolink.controllers.softmotion._condition import is_moving
 from robolink.controllers.softmotion._dynamics import factors, straight
 from robolink.controllers.softmotion._mailbox import Mailbox
+from robolink.controllers.softmotion._orders import is_own
+from robolink.controllers.softmotion._rides import has_ended
 from robolink.controllers.softmotion._snapshots import LOOK_S
-from robolink.errors import ConfigError, ControllerError, LimitError, TransportTimeoutError
+from robolink.errors import (
+    ConfigError,
+    ControllerError,
+    ControllerFaultError,
+    LimitError,
+    OutcomeUnknownError,
+    RobolinkError,
+    StoppedError,
+    TransportTimeoutError,
+)
 from robolink.messages import tr
 from robolink.model import Marker, MarkerKind, Pose, WorkBox
-from robolink.protocols.mailbox import Command, CoordinateSystem, Four, Opcode, Response
+from robolink.protocols.mailbox import (
+    Command,
+    CommandState,
+    CoordinateSystem,
+    ErrorClass,
+    Finished,
+    Four,
+    Opcode,
+    Response,
+)
 from robolink.timing import Deadline
 
 _REST_S = 5.0
 """Longest time in which a jog comes to rest."""
+
+_STRONGER: Final = (Command(0, Opcode.HALT), Command(0, Opcode.STOP))
+"""What brings the group to rest when the end of a jog is not taken."""
 
 _AXES = range(6)
 _LENGTHS = frozenset({0, 1, 2})
@@ -85,6 +109,7 @@ class JogWatch:
         self.draft = jog.draft(unit_um=mailbox.unit_um)
         self.request = describe(self.draft)
         self._marker: Marker | None = None
+        self._command: Command | None = None
 
     def run(self, duration_s: float) -> Pose:
         """Jog for a time and return where the tip is then.
@@ -94,20 +119,28 @@ class JogWatch:
 
         Raises:
             LimitError: The tip came out of the box; the jog was ended there.
-            RejectedError: The PLC refused it.
+            RejectedError: The PLC refused it, or ended it: the permit went, for example.
+            ControllerFaultError: The group went into error, or somebody stopped it.
+            StoppedError: A stop came.
             OutcomeUnknownError: No answer came.
         """
+        with self._mailbox.wire.latch.ending(self.request):
+            return self._jogged(duration_s)
+
+    def _jogged(self, duration_s: float) -> Pose:
         with self._mailbox.desk.doubt(self.request):
             try:
-                self._begin(duration_s)
-                outside = self._hold(duration_s)
-            except KeyboardInterrupt:
-                if self._marker is not None:
-                    self._end()
+                with self._mailbox.wire.attended():
+                    self._begin(duration_s)
+                    failure = self._hold(duration_s)
+            except BaseException:
+                if self._marker is not None and self._mailbox.wire.alive:
+                    self._bring_to_rest()
                 raise
-            now = self._end()
-        if outside is not None:
-            raise outside
+            now = self._bring_to_rest(ended=isinstance(failure, ControllerError))
+        if failure is not None:
+            failure.controller = failure.controller or self._mailbox.identity
+            raise failure
         return self._pose(now)
 
     def _begin(self, duration_s: float) -> None:
@@ -120,43 +153,112 @@ class JogWatch:
             self._marker = marker
             mailbox.wire.rides.jogging = True
             try:
-                mailbox.orders.start(self.draft)
-            except (ControllerError, ConfigError):
+                self._command = mailbox.orders.start(self.draft)
+            except (ControllerError, ConfigError, StoppedError):
                 mailbox.wire.rides.jogging = False
                 mailbox.desk.clear(marker)
+                self._marker = None
                 raise
 
-    def _hold(self, duration_s: float) -> LimitError | None:
+    def _hold(self, duration_s: float) -> LimitError | ControllerError | None:
+        """Keep it going for its time; return what ended it before, if anything did."""
         snapshots = self._mailbox.snapshots
         deadline = Deadline.after(self._mailbox.wire.clock, duration_s)
         now = snapshots.take()
-        while not deadline.expired:
+        while not deadline.expired and not self._mailbox.wire.latch.closed:
             try:
                 self._box.check(self._pose(now))
             except LimitError as error:
                 return error
+            ended = self._ended_by_plc(now)
+            if ended is not None:
+                return ended
             now = snapshots.news(now, wait_s=min(LOOK_S, deadline.remaining_s()))
-        return None
+        return self._ended_by_plc(now)
 
-    def _end(self) -> Response:
+    def _ended_by_plc(self, now: Response) -> ControllerError | None:
+        """Return why a jog that nobody here ended has ended all the same, ``None`` if it has not.
+
+        Its end stands in the head while it is the last command, and else among the last ends.
+        """
+        command = self._command
+        assert command is not None  # noqa: S101 - it was begun
+        ends = [end for end in now.finished if end.sequence == command.sequence]
+        if is_own(command, now) and has_ended(now.state):
+            ends.insert(0, Finished(command.sequence, now.state, now.error_class))
+        bad = (end for end in ends if end.state != CommandState.DONE)
+        end = next(bad, None)
+        if end is None:
+            return None
+        if end.error_class == ErrorClass.NONE:
+            return cut_short(command)
+        return ended_badly(self.request, now, end.error_class)
+
+    def _bring_to_rest(self, *, ended: bool = False) -> Response:
+        """End the jog, unless the PLC has, and see the group at rest. No beat goes out any more.
+
+        Where the PLC does not take the end, the group is halted, and where it does not take that
+        either, it is stopped and held; and without a beat it ends every jog by itself.
+        """
         mailbox = self._mailbox
         marker, self._marker = self._marker, None
         with mailbox.uninterrupted():
-            now = mailbox.orders.carry_out(self._end_draft)
-            deadline = Deadline.after(mailbox.wire.clock, _REST_S)
-            while is_moving(now):
-                if deadline.expired:
-                    raise mailbox.wire.ended(
-                        TransportTimeoutError(
-                            tr("The group did not come to rest after {jog}.", jog=self.request),
-                            remedy=tr("Press the emergency stop if the robot still moves."),
-                        )
-                    )
-                now = mailbox.snapshots.news(now)
+            refusal = None if ended else self._end()
+            now = self._await_rest()
             mailbox.wire.rides.jogging = False
             if marker is not None:
                 mailbox.desk.clear(marker)
+        if isinstance(refusal, ControllerError):
+            raise refusal
+        if refusal is not None:
+            raise ControllerFaultError(
+                tr(
+                    "The end of {jog} was not acknowledged. The group was halted in its place and "
+                    "stands still.",
+                    jog=self.request,
+                ),
+                remedy=tr("Look at the link to the PLC before the next jog."),
+                controller=mailbox.identity,
+                request=self.request,
+            ) from refusal
         return now
+
+    def _end(self) -> RobolinkError | None:
+        """Send the end of the jog, or what is stronger; return why the first was not taken."""
+        refusal: RobolinkError | None = None
+        for draft in (self._end_draft, *_STRONGER):
+            try:
+                self._mailbox.orders.carry_out(draft)
+            except (ControllerError, TransportTimeoutError) as error:
+                if not self._mailbox.wire.alive:
+                    raise
+                refusal = refusal or error
+            else:
+                return refusal
+        assert refusal is not None  # noqa: S101 - nothing was taken
+        raise self._mailbox.wire.ended(self._unproved(refusal))
+
+    def _await_rest(self) -> Response:
+        mailbox = self._mailbox
+        deadline = Deadline.after(mailbox.wire.clock, _REST_S)
+        now = mailbox.snapshots.take()
+        while is_moving(now):
+            if deadline.expired:
+                raise mailbox.wire.ended(self._unproved(None))
+            now = mailbox.snapshots.news(now)
+        return now
+
+    def _unproved(self, cause: RobolinkError | None) -> OutcomeUnknownError:
+        error = OutcomeUnknownError(
+            tr("The group did not come to rest after {jog}.", jog=self.request),
+            remedy=tr(
+                "Press the emergency stop if the robot still moves. Then run 'robolink recover'; "
+                "motion is blocked until then."
+            ),
+            request=self.request,
+        )
+        error.__cause__ = cause
+        return error
 
     def _pose(self, now: Response) -> Pose:
         return Pose(*self._mailbox.coordinates(now.tcp), tool=now.tool_slot)

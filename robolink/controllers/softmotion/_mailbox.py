@@ -6,6 +6,7 @@ from contextlib import AbstractContextManager
 from robolink.controllers._guarded import MarkerDesk, ProcedureLock
 from robolink.controllers._tool_writing import ToolWriter
 from robolink.controllers.softmotion._condition import require_permit
+from robolink.controllers.softmotion._identity import identity_of
 from robolink.controllers.softmotion._orders import Orders
 from robolink.controllers.softmotion._snapshots import Snapshots
 from robolink.controllers.softmotion._wire import MailboxWire
@@ -13,9 +14,7 @@ from robolink.errors import RemoteProtocolError
 from robolink.messages import tr
 from robolink.model import OutcomeLog, ToolOffset
 from robolink.protocols.mailbox import (
-    OPCODES,
     Command,
-    Opcode,
     Response,
     Six,
     frames_match,
@@ -37,14 +36,24 @@ class Mailbox:
         desk: Markers.
         lock: One procedure at a time.
         writer: Changes that are marked, sent once and read back.
+        device_id: The number of the PLC, the same on every link; ``None`` where it has none.
     """
 
-    def __init__(self, wire: MailboxWire, snapshots: Snapshots, outcomes: OutcomeLog) -> None:
+    def __init__(
+        self,
+        wire: MailboxWire,
+        snapshots: Snapshots,
+        outcomes: OutcomeLog,
+        *,
+        device_id: int | None,
+    ) -> None:
         self.wire = wire
+        self.device_id = device_id
+        outcomes.ask(lambda: identity_of(wire, device_id))
         self.snapshots = snapshots
         self.orders = Orders(wire, snapshots)
         self.desk = MarkerDesk(wire.identity, outcomes)
-        self.lock = ProcedureLock(wire.identity)
+        self.lock = ProcedureLock(wire.identity, wire.latch)
         # A refused command did nothing, whatever the reason (design part 7).
         self.writer = ToolWriter(
             self.desk,
@@ -82,10 +91,9 @@ class Mailbox:
             LeaseHeldError, LeaseLostError: Another client owns the mailbox.
         """
         now = now or self.snapshots.take()
-        facts = OPCODES[Opcode(draft.opcode)]
-        if facts.needs_permit:
+        if draft.needs_permit:
             require_permit(now, controller=self.identity, request=request)
-        if facts.needs_owner:
+        if draft.needs_owner:
             self.orders.ownership.require(request)
         return now
 

@@ -3,6 +3,7 @@
 import secrets
 
 from robolink.controllers.softmotion._controller import SoftMotionController
+from robolink.controllers.softmotion._device import read_device_id
 from robolink.controllers.softmotion._mailbox import Mailbox
 from robolink.controllers.softmotion._snapshots import Snapshots
 from robolink.controllers.softmotion._wire import MailboxWire
@@ -31,7 +32,8 @@ def open_softmotion(
     try:
         snapshots = Snapshots(wire)
         snapshots.meet()
-        return SoftMotionController(Mailbox(wire, snapshots, outcomes))
+        device_id = read_device_id(wire)
+        return SoftMotionController(Mailbox(wire, snapshots, outcomes, device_id=device_id))
     except BaseException:
         wire.close()
         raise

@@ -54,3 +54,7 @@ class ClientBeat:
         self._last_ns = now_ns
         self._count += 1
         return heartbeat_word(epoch, self._count)
+
+    def again(self, epoch: int) -> int:
+        """Return the last word once more, which is no sign of life; 0 would be an end."""
+        return heartbeat_word(epoch, self._count)

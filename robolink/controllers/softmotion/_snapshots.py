@@ -14,12 +14,20 @@ from robolink.controllers.softmotion._wire import MailboxWire
 from robolink.errors import (
     ConnectError,
     RemoteProtocolError,
+    RobolinkError,
     TransportBrokenError,
     TransportTimeoutError,
 )
 from robolink.messages import tr
-from robolink.protocols.mailbox import BlockError, Response, Slot, decode_slot
+from robolink.protocols.mailbox import (
+    BlockError,
+    Response,
+    Slot,
+    decode_response,
+    decode_slot,
+)
 from robolink.timing import NS_PER_S, Deadline
+from robolink.transport import MailboxLink
 
 POLL_S: Final = 0.02
 """Longest time from one look at the head of the response block to the next."""
@@ -79,6 +87,7 @@ class Snapshots:
                 )
             self._wire.clock.sleep(POLL_S)
         self._met = first
+        self._wire.look_back = self._look_back
 
     def take(self) -> Response:
         """Read a whole response block.
@@ -152,11 +161,27 @@ class Snapshots:
             )
         )
 
+    def _look_back(self, link: MailboxLink) -> RobolinkError | None:
+        """Return that the PLC has started anew, when it is that which ended the session.
+
+        A start cuts TCP connections, and nothing but the next look tells it from a cable.
+        """
+        try:
+            now = decode_response(link.read_response())
+        except BlockError:
+            return None
+        return self._other_plc(now)
+
     def _require_met(self, now: Response) -> None:
         """Refuse a PLC that is not, or no longer, the one that was met."""
+        error = self._other_plc(now)
+        if error is not None:
+            raise self._wire.ended(error)
+
+    def _other_plc(self, now: Response) -> TransportBrokenError | None:
         met = self._met
         if met is None or (now.boot_id, now.unit_um) == (met.boot_id, met.unit_um):
-            return
+            return None
         if now.boot_id != met.boot_id:
             what = tr("The PLC {identity} has started anew.", identity=self._wire.identity)
             remedy = tr(
@@ -166,4 +191,4 @@ class Snapshots:
         else:
             what = tr("The unit of length of {identity} changed.", identity=self._wire.identity)
             remedy = tr("Another program was loaded into the PLC. Connect again.")
-        raise self._wire.ended(TransportBrokenError(what, remedy=remedy))
+        return TransportBrokenError(what, remedy=remedy)

@@ -6,10 +6,12 @@ What ends the session ends it for good; a movement that was under way then is fo
 through its marker, not through this object.
 """
 
-from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from typing import Final, TypeVar
 
+from robolink.checkpoints import Point, checkpoint
 from robolink.controllers.softmotion._pulse import ClientBeat
 from robolink.controllers.softmotion._rides import Rides
 from robolink.errors import (
@@ -20,10 +22,13 @@ from robolink.errors import (
 )
 from robolink.interrupts import InterruptGate
 from robolink.messages import tr
+from robolink.stop_latch import StopLatch
 from robolink.timing import Clock
 from robolink.transport import MailboxHead, MailboxLink
 
 _READS: Final = 3
+_LOOK_BACK_S: Final = 1.0
+"""Longest time for a look at what ended the session."""
 
 T = TypeVar("T")
 ErrorT = TypeVar("ErrorT", bound=RobolinkError)
@@ -36,8 +41,11 @@ class MailboxWire:
         owner: This client's token, never 0.
         epoch: The epoch of our ownership, 0 while we have none.
         rides: The movements of this client.
+        latch: What holds commands back while a stop is in force.
         timeout_s: Longest wait for the PLC to acknowledge a command.
         exchanges: Requests sent so far.
+        look_back: Looks over another link at what ended the session; ``None`` before the
+            meeting.
     """
 
     def __init__(self, link: MailboxLink, *, owner: int, timeout_s: float) -> None:
@@ -45,17 +53,25 @@ class MailboxWire:
         self._gate = InterruptGate()
         self._gate.open()
         self._beat = ClientBeat()
+        self._here = threading.local()
         self._ended_by: RobolinkError | None = None
         self.owner = owner
         self.epoch = 0
         self.rides = Rides(owner)
+        self.latch = StopLatch(link.identity)
         self.timeout_s = timeout_s
         self.exchanges = 0
+        self.look_back: Callable[[MailboxLink], RobolinkError | None] | None = None
 
     @property
     def identity(self) -> str:
         """Which PLC this is."""
         return self._link.identity
+
+    @property
+    def place(self) -> str:
+        """Where it was reached, the same for each spelling of the URL."""
+        return self._link.place
 
     @property
     def clock(self) -> Clock:
@@ -91,6 +107,15 @@ class MailboxWire:
         self.beat()
         return self._ask(lambda: self._link.read_slot(slot))
 
+    def read_device(self) -> tuple[int, ...]:
+        """Read the device block, after a beat if one is due.
+
+        Raises:
+            RejectedError: There is none.
+        """
+        self.beat()
+        return self._ask(self._link.read_device)
+
     def write(self, words: Sequence[int]) -> None:
         """Write the command block, once.
 
@@ -103,18 +128,39 @@ class MailboxWire:
             self.exchanges += 1
             try:
                 self._link.write_command(words)
+                return
             except (TransportError, RemoteProtocolError) as error:
-                self.ended(error)
-                raise
+                lost = error
+        raise self._over(lost)
+
+    @contextmanager
+    def attended(self) -> Iterator[None]:
+        """Wait on what is unfinished: the exchanges of this thread keep it going meanwhile.
+
+        Nothing else does. A thread that only looks, or a program that does something else, would
+        else keep a robot moving that nobody watches (design part 7).
+        """
+        before = self._attends
+        self._here.attends = True
+        try:
+            yield
+        finally:
+            self._here.attends = before
 
     def next_beat(self) -> int:
         """Return the heartbeat word that goes with a command block."""
-        return self._beat.word(self.epoch, self.clock.now_ns())
+        if self._may_beat:
+            return self._beat.word(self.epoch, self.clock.now_ns())
+        return self._beat.again(self.epoch)
 
     def beat(self) -> None:
-        """Write the heartbeat alone, if we own the mailbox and it is due."""
+        """Write the heartbeat alone, if we own the mailbox and it is due.
+
+        While something is unfinished only who waits on it does (:meth:`attended`).
+        """
         now_ns = self.clock.now_ns()
-        if self.epoch and self._beat.due(now_ns, busy=self.rides.unfinished):
+        busy = self.rides.unfinished
+        if self.epoch and self._may_beat and self._beat.due(now_ns, busy=busy):
             word = self._beat.word(self.epoch, now_ns)
             self._ask(lambda: self._link.beat(word))
 
@@ -135,6 +181,14 @@ class MailboxWire:
         self._link.close()
         self._gate.close()
 
+    @property
+    def _attends(self) -> bool:
+        return getattr(self._here, "attends", False)
+
+    @property
+    def _may_beat(self) -> bool:
+        return self._attends or not self.rides.unfinished
+
     def _ask(self, exchange: Callable[[], T]) -> T:
         self._require_alive()
         lost: list[RobolinkError] = []
@@ -142,12 +196,37 @@ class MailboxWire:
             try:
                 with self._gate:
                     self.exchanges += 1
-                    return exchange()
+                    found = exchange()
+                checkpoint(Point.EXCHANGE, "read")
+                return found
             except (TransportError, RemoteProtocolError) as error:
                 lost.append(error)
                 if isinstance(error, TransportClosedError):
                     break  # the link cannot be used any more
-        raise self.ended(lost[0])
+        raise self._over(lost[0])
+
+    def _over(self, error: RobolinkError) -> RobolinkError:
+        """End the session because of ``error``, and return what is to be said about it."""
+        told = self._explained(error)
+        if told is not error:
+            told.__cause__ = error
+        return self.ended(told)
+
+    def _explained(self, error: RobolinkError) -> RobolinkError:
+        """Return why the link ended, if another look tells more; it only reads."""
+        if self.look_back is None or isinstance(error, RemoteProtocolError):
+            return error
+        self._link.close()
+        try:
+            link = self._link.reopened(timeout_s=_LOOK_BACK_S)
+        except RobolinkError:
+            return error
+        try:
+            return self.look_back(link) or error
+        except RobolinkError:
+            return error
+        finally:
+            link.close()
 
     def _require_alive(self) -> None:
         if self._ended_by is not None:

@@ -66,7 +66,7 @@ class Field:
 
 
 class Layout:
-    """The fields of one block, without gaps; its field ``crc`` guards the words before it.
+    """The fields of one block, without gaps; a field ``crc`` guards the words before it.
 
     Raises:
         ValueError: The fields leave a gap or overlap.
@@ -89,6 +89,11 @@ class Layout:
     def __getitem__(self, name: str) -> Field:
         return self._by_name[name]
 
+    @property
+    def guarded(self) -> bool:
+        """Whether a checksum guards it."""
+        return "crc" in self._by_name
+
     def at(self, name: str) -> slice:
         """Return where a field lies in the words of its block."""
         field = self._by_name[name]
@@ -105,9 +110,11 @@ class Layout:
             value = values.get(field.name, 0)
             parts += value if isinstance(value, tuple) else (value,)
         try:
-            words = self._registers.unpack(self._image.pack(*parts))
+            words: Words = self._registers.unpack(self._image.pack(*parts))
         except (struct.error, OverflowError) as error:
             raise BlockError(BlockFault.VALUE) from error
+        if not self.guarded:
+            return words
         crc = self._by_name["crc"]
         return (*words[: crc.word], crc16(words[: crc.word]), *words[crc.end :])
 

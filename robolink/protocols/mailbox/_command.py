@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Final
 
 from robolink.protocols.mailbox._blocks import (
     BlockError,
@@ -15,7 +16,10 @@ from robolink.protocols.mailbox._blocks import (
 from robolink.protocols.mailbox._codes import ErrorClass
 from robolink.protocols.mailbox._known import known
 from robolink.protocols.mailbox._layouts import COMMAND, VERSION
-from robolink.protocols.mailbox._opcodes import Opcode
+from robolink.protocols.mailbox._opcodes import OPCODES, Opcode
+
+_RELEASE: Final = 1
+"""Operand i0 of a stop that lets the group go."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +53,27 @@ class Command:
     boot_id: int = 0
     version: int = VERSION
     reserved: int = 0
+
+    @property
+    def only_ends(self) -> bool:
+        """Whether it can do nothing but bring something to rest; that is always allowed."""
+        if self.opcode == Opcode.JOG:
+            return not any(self.operands[:2])
+        if self.opcode == Opcode.STOP:
+            return self.operands[0] != _RELEASE
+        return self.opcode in (Opcode.INTERRUPT, Opcode.HALT)
+
+    @property
+    def needs_owner(self) -> bool:
+        """Whether only the owner of the mailbox may send it."""
+        if self.opcode == Opcode.STOP:
+            return self.operands[0] == _RELEASE
+        return OPCODES[Opcode(self.opcode)].needs_owner
+
+    @property
+    def needs_permit(self) -> bool:
+        """Whether the machine must permit it: it changes something, and does more than end it."""
+        return OPCODES[Opcode(self.opcode)].needs_permit and not self.only_ends
 
     def refusal(self) -> ErrorClass:
         """Return what a PLC answers to this block whatever the opcode, NONE when it is fit.

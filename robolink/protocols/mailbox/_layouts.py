@@ -106,11 +106,22 @@ SLOT: Final = Layout(
 )
 """PLC to client: one of fifteen, behind the response block."""
 
+DEVICE: Final = Layout(
+    Field(0, "device_id", UDINT, note="retained, drawn once, never 0; 0 in a program without it"),
+    Field(2, "device_id_complement", UDINT, note="its one's complement: every bit the other way"),
+)
+"""PLC to client, behind the last slot: which PLC this is, on whatever link it is reached."""
+
 COMMAND_WORDS: Final = COMMAND.words
 RESPONSE_WORDS: Final = RESPONSE.words
 SLOT_WORDS: Final = SLOT.words
+DEVICE_WORDS: Final = DEVICE.words
 
 
 def slot_start(slot: int) -> int:
     """Return the word of a slot's start, counted from the start of the response block."""
     return RESPONSE_WORDS + (slot - 1) * SLOT_WORDS
+
+
+DEVICE_START: Final = slot_start(SLOTS.stop)
+"""The word of the device block's start, counted likewise."""

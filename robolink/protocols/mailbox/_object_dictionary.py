@@ -137,6 +137,7 @@ MANDATORY_OBJECTS: Final = (
         Entry("vendor-ID", UNSIGNED32, default="0x00000000"),
         Entry("product code", UNSIGNED32, default="0x00000000"),
         Entry("revision number", UNSIGNED32, default=f"0x{VERSION:08X}"),
+        Entry("serial number", UNSIGNED32),
     ),
 )
 

@@ -46,7 +46,8 @@ class OpcodeFacts:
         operands: What the operands mean.
         answer: What stands in the answer words afterwards.
         needs_owner: Only the owner of the mailbox may send it.
-        needs_permit: It changes something, so the machine must permit it.
+        needs_permit: It changes something, so the machine must permit it; what only ends
+            something needs no permit (see :attr:`Command.needs_permit`).
     """
 
     does: str
@@ -65,7 +66,9 @@ OPCODES: Final[Mapping[Opcode, OpcodeFacts]] = MappingProxyType(
         Opcode.RESET: OpcodeFacts("reset the axis group's error", _MOTION),
         Opcode.DISABLE: OpcodeFacts("disable the axis group", _MOTION),
         Opcode.CONTINUE: OpcodeFacts("continue the interrupted movement", _MOTION),
-        Opcode.INTERRUPT: OpcodeFacts("interrupt the movement on its path", _MOTION),
+        Opcode.INTERRUPT: OpcodeFacts(
+            "interrupt the movement on its path", _MOTION, needs_permit=False
+        ),
         Opcode.STOP: OpcodeFacts(
             "stop",
             _MOTION,
@@ -78,7 +81,7 @@ OPCODES: Final[Mapping[Opcode, OpcodeFacts]] = MappingProxyType(
         Opcode.JOG: OpcodeFacts(
             "jog",
             _MOTION,
-            "i0 forward mask, i1 backward mask (bits 0..5; both 0 ends it), "
+            "i0 forward mask, i1 backward mask (bits 0..5; both 0 ends it, permit or not), "
             "i2 coordinate system, dyn",
         ),
         Opcode.MOVE_DIRECT: OpcodeFacts(
@@ -123,7 +126,7 @@ OPCODES: Final[Mapping[Opcode, OpcodeFacts]] = MappingProxyType(
         Opcode.OWNERSHIP: OpcodeFacts(
             "take or release the ownership",
             Capability(0),
-            "i0 1 take, 0 release; i1 1 a person insists",
+            "i0 1 take, 0 release (halts what is unfinished); i1 1 a person insists",
             "words 12-13 holder, word 14 epoch",
             needs_owner=False,
             needs_permit=False,

@@ -20,8 +20,10 @@ from robolink.protocols.mailbox._codes import (
 from robolink.protocols.mailbox._kinematics import Kinematics
 from robolink.protocols.mailbox._layouts import (
     COMMAND,
+    DEVICE,
+    DEVICE_START,
+    DEVICE_WORDS,
     RESPONSE,
-    RESPONSE_WORDS,
     SLOT,
     SLOT_WORDS,
     SLOTS,
@@ -46,6 +48,7 @@ def register_map_csv(base: int = 0) -> str:
     rows.writerows(_rows("response", RESPONSE, _INPUT, base))
     for slot in SLOTS:
         rows.writerows(_rows(f"slot {slot}", SLOT, _INPUT, base + slot_start(slot)))
+    rows.writerows(_rows("device", DEVICE, _INPUT, base + DEVICE_START))
     return text.getvalue()
 
 
@@ -72,6 +75,7 @@ def register_map_markdown(profile: Profile = Profile.FULL, base: int = 0) -> str
         _block("Command block", COMMAND, base, _HOLDING, "holding registers, one FC16"),
         _block("Response block", RESPONSE, base, _INPUT, "input registers, one FC04"),
         _block("Tool slot 1", SLOT, slots, _INPUT, f"each further slot {SLOT_WORDS} words on"),
+        _block("Device block", DEVICE, base + DEVICE_START, _INPUT, "behind the last slot"),
         _opcodes(profile),
         _codes("Command states", CommandState),
         _codes("Group states", GroupState),
@@ -91,7 +95,7 @@ Made by `robolink plc export`; not to be edited.
 
 Words of 16 bits. Values of several words stand low word first. Addresses count from 0, as they
 go over the wire; the reference in brackets counts from 1. The response block and the fifteen
-slots behind it take {RESPONSE_WORDS + len(SLOTS) * SLOT_WORDS} input registers.
+slots and the device block behind it take {DEVICE_START + DEVICE_WORDS} input registers.
 """
 
 

@@ -17,7 +17,15 @@ from robolink.protocols.mailbox._codes import (
     ReadMode,
 )
 from robolink.protocols.mailbox._kinematics import Kinematics
-from robolink.protocols.mailbox._layouts import COMMAND, PROBE, RESPONSE, SLOT, SLOTS, VERSION
+from robolink.protocols.mailbox._layouts import (
+    COMMAND,
+    DEVICE,
+    PROBE,
+    RESPONSE,
+    SLOT,
+    SLOTS,
+    VERSION,
+)
 from robolink.protocols.mailbox._opcodes import opcodes_of
 
 _HEAD: Final = """\
@@ -50,6 +58,7 @@ def structured_text_types(profile: Profile = Profile.FULL) -> str:
         *_block("RL_Command", COMMAND),
         *_block("RL_Response", RESPONSE),
         *_block("RL_Slot", SLOT),
+        *_block("RL_Device", DEVICE),
     )
     return "\n".join(parts)
 

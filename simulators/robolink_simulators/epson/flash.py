@@ -18,7 +18,7 @@ SCHEMA: Final = "robolink/sim-state/1"
 
 
 class Flash:
-    """Keeps the tools and the selected tool (spel.md 6.1), nothing else.
+    """Keeps the tools and the selected tool (spel.md 6.1), and which robot it is.
 
     Args:
         path: Where; ``None`` keeps nothing.
@@ -28,10 +28,13 @@ class Flash:
     def __init__(self, path: Path | None, machine: Machine) -> None:
         self._path = path
         self._machine = machine
-        self._written = self._mark()
+        # Nothing is written yet: a serial number that was drawn is kept at the first occasion.
+        self._written: tuple[int, int] | None = None
 
     def restore(self) -> None:
-        """Give the machine the tools of the file, if there is one.
+        """Give the machine the tools and the serial number of the file, if there is one.
+
+        A file of before serial numbers were drawn has none; the machine keeps its own then.
 
         Raises:
             ConfigError: The file cannot be read or is not of this robot.
@@ -44,6 +47,7 @@ class Flash:
             if state["schema"] != SCHEMA or state["robot"] != robot:
                 raise ValueError(state["robot"])
             self._machine.tools.restore(state["tools"])
+            serial = state.get("serial")
         except (OSError, KeyError, TypeError, ValueError) as error:
             raise ConfigError(
                 tr(
@@ -51,7 +55,9 @@ class Flash:
                 ),
                 remedy=tr("Name another file, or delete this one to start afresh."),
             ) from error
-        self._written = self._mark()
+        if serial is not None:
+            self._machine.serial = str(serial)
+            self._written = self._mark()
 
     def save_changes(self) -> None:
         """Write the file if a tool or the selection changed since it was written last.
@@ -68,6 +74,7 @@ class Flash:
         document = {
             "schema": SCHEMA,
             "robot": self._machine.model.name,
+            "serial": self._machine.serial,
             "tools": self._machine.tools.to_state(),
         }
         try:

@@ -23,7 +23,7 @@ class Machine:
         model: Which robot.
         joints: Where the arm stands.
         backlash_deg: See :class:`Arm`.
-        serial: What RobotSerial$ gives.
+        serial: What RobotSerial$ gives; the controller's own number follows from it.
 
     Attributes:
         arm: The arm in simulated time.
@@ -66,6 +66,11 @@ class Machine:
         self.power_high = False
         self.robot_number = 1
         self.control_device = REMOTE_ETHERNET
+
+    @property
+    def controller_serial(self) -> str:
+        """The serial number of the controller that drives it."""
+        return f"C-{self.serial}"
 
     @property
     def flash_writes(self) -> int:

@@ -17,6 +17,7 @@ class RefusalKind(StrEnum):
     MOTORS_OFF = "motors_off"
     TOOL_UNDEFINED = "tool_undefined"
     TOOL_ZERO_FIXED = "tool_zero_fixed"
+    TOOL_IN_FORCE = "tool_in_force"
     LOCAL_UNDEFINED = "local_undefined"
     POINT_UNDEFINED = "point_undefined"
     ABOVE_LIMZ = "above_limz"

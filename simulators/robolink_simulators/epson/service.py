@@ -80,7 +80,7 @@ class Service:
             case "Abort":
                 self._window.abort(exchange, now_ns)
             case "Login":
-                self._login(link, request.parameters[0], now_ns)
+                self._login(link, request, now_ns)
                 exchange.reply()
             case "Logout":
                 self._logout(link, now_ns)
@@ -88,7 +88,11 @@ class Service:
             case _:
                 exchange.reply(*self._desk.serve(request))
 
-    def _login(self, link: EpsonLink, password: str, now_ns: int) -> None:
+    def _login(self, link: EpsonLink, request: Request, now_ns: int) -> None:
+        bare = not request.parameters
+        if bare and self._options.login_without_parameter == "error_12":
+            raise Refused(ErrorCode.MALFORMED)
+        password = "" if bare else request.parameters[0]
         # That a controller without a password takes an empty one only is assumed.
         if password != self._password:
             raise Refused(ErrorCode.WRONG_PASSWORD)

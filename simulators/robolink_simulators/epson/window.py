@@ -91,7 +91,7 @@ class CommandWindow:
             exchange.reply_text(output.removesuffix("\r\n"))
 
     def _report(self, error: SpelError, exchange: Exchange) -> None:
-        if not self._aborted:
+        if not self._aborted and self._options.error_state_after_failed_execute:
             self._condition.raise_error(error.number)
         if self._options.execute_failure == "refusal":
             exchange.refuse(self._options.execute_failure_code)

@@ -12,6 +12,8 @@ from canopen.sdo.exceptions import SdoAbortedError
 from robolink.protocols.mailbox import (
     COMMAND,
     COMMAND_WORDS,
+    DEVICE_START,
+    DEVICE_WORDS,
     PROBE,
     RESPONSE_WORDS,
     SLOT_WORDS,
@@ -28,6 +30,7 @@ RESPONSE_OBJECT: Final = 0x2101
 MAILBOX_OBJECT: Final = 0x2102
 COMMAND_FIELDS_OBJECT: Final = 0x2110
 SLOT_OBJECT: Final = 0x2200
+SERIAL_NUMBER: Final = (0x1018, 4)
 HEARTBEAT_TIME_OBJECT: Final = 0x1017
 
 _BOOT_ID, _CAPABILITIES, _SNAPSHOT = 2, 3, 5
@@ -71,8 +74,10 @@ class MailboxObjects:
         """Return what an object holds, ``None`` where the dictionary itself knows."""
         if index == RESPONSE_OBJECT:
             return self._given(self._read_copy())
+        if (index, subindex) == SERIAL_NUMBER:
+            return self._given(self._read(DEVICE_START, DEVICE_WORDS), 2)
         if index == SLOT_OBJECT and subindex:
-            return self._given(self._read_slot(subindex))
+            return self._given(self._read(slot_start(subindex), SLOT_WORDS))
         with self._simulator.lock:
             command = self._simulator.plc.program.inbox.words
             if index == COMMAND_OBJECT:
@@ -112,18 +117,18 @@ class MailboxObjects:
                 self._copy = _unpacked(self.fresh(), RESPONSE_WORDS)
             return self._simulator.read_copy(self._copy, self._present())
 
-    def _read_slot(self, number: int) -> Served:
+    def _read(self, first: int, count: int) -> Served:
         with self._simulator.lock:
-            return self._simulator.read(slot_start(number), SLOT_WORDS, self._present())
+            return self._simulator.read(first, count, self._present())
 
     def _put(self, first: int, words: Words) -> None:
         with self._simulator.lock:
             served = self._simulator.write(first, words, self._present())
         self._answering.let_go(served)
 
-    def _given(self, served: Served) -> bytes:
+    def _given(self, served: Served, count: int | None = None) -> bytes:
         self._answering.let_go(served)
-        return packed(served.words)
+        return packed(served.words[:count])
 
     def _constant(self, subindex: int) -> int | float | None:
         plc = self._simulator.plc

@@ -12,6 +12,8 @@ from robolink.errors import (
 from robolink.messages import tr
 from robolink.protocols.mailbox import (
     COMMAND,
+    DEVICE_START,
+    DEVICE_WORDS,
     RESPONSE_WORDS,
     SLOT_WORDS,
     Words,
@@ -56,6 +58,11 @@ class InProcessMailboxLink:
         return self._identity
 
     @property
+    def place(self) -> str:
+        """See :attr:`robolink.transport.MailboxLink.place`."""
+        return self._identity.partition("://")[2]
+
+    @property
     def durable(self) -> bool:
         """Whether the simulator keeps its slots in a file."""
         return self._simulator.durable
@@ -83,9 +90,19 @@ class InProcessMailboxLink:
         first = slot_start(slot)
         return self._exchange(lambda now_ns: self._simulator.read(first, SLOT_WORDS, now_ns))
 
+    def read_device(self) -> Words:
+        """See :meth:`robolink.transport.MailboxLink.read_device`."""
+        return self._exchange(
+            lambda now_ns: self._simulator.read(DEVICE_START, DEVICE_WORDS, now_ns)
+        )
+
     def beat(self, word: int) -> None:
         """See :meth:`robolink.transport.MailboxLink.beat`."""
         self._exchange(lambda now_ns: self._simulator.write(_HEARTBEAT, (word,), now_ns))
+
+    def reopened(self, *, timeout_s: float) -> "InProcessMailboxLink":
+        """See :meth:`robolink.transport.MailboxLink.reopened`."""
+        return InProcessMailboxLink(self._identity, self._simulator, self._clock, timeout_s)
 
     def close(self) -> None:
         """See :meth:`robolink.transport.MailboxLink.close`."""

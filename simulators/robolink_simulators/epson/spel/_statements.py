@@ -81,7 +81,9 @@ def _wrapped(angle_deg: float) -> float:
 
 def _tlclr(evaluator: Evaluator, command: Command) -> Outcome:
     (tool,) = _expect(command, 1)
-    evaluator.session.machine.tools.clear(evaluator.integer(tool))
+    session = evaluator.session
+    in_force = session.options.clear_selected_tool
+    session.machine.tools.clear(evaluator.integer(tool), in_force=in_force)
     return Outcome()
 
 

@@ -5,8 +5,10 @@ motion starts, because the motion is; an input that is switched by hand is seen 
 brakes with the motion's own deceleration (documented).
 """
 
+from collections.abc import Callable
 from typing import Final
 
+from robolink_simulators.epson.input_bits import InputsAsked
 from robolink_simulators.epson.points import Point
 from robolink_simulators.epson.spel._evaluate import Evaluator
 from robolink_simulators.epson.spel._tree import Binary, Expression, Literal, Name, Until
@@ -46,11 +48,12 @@ class Watch:
         """Find out when the motion that has just been started meets the condition."""
         if not self._evaluator.session.machine.inputs.connected:
             return
+        scan = _Scan(self)
         before_ns = start_ns
         while before_ns < end_ns:
             after_ns = min(before_ns + _SAMPLE_NS, end_ns)
-            if self.holds(after_ns):
-                self._edge_ns = self._between(before_ns, after_ns)
+            if scan.holds(after_ns):
+                self._edge_ns = _first_between(before_ns, after_ns, scan.holds)
                 return
             before_ns = after_ns
 
@@ -69,12 +72,47 @@ class Watch:
         machine.found = Point.at(machine.tip())
         return None
 
-    def _between(self, before_ns: int, after_ns: int) -> int:
-        """Return the first instant at which the condition holds, to the nanosecond."""
-        while after_ns - before_ns > 1:
-            middle_ns = (before_ns + after_ns) // 2
-            if self.holds(middle_ns):
-                after_ns = middle_ns
-            else:
-                before_ns = middle_ns
-        return after_ns
+    def value_and_inputs(self, instant_ns: int) -> tuple[bool, InputsAsked]:
+        """Return whether the condition holds, and the inputs on which that hangs.
+
+        Raises:
+            Refusal: It cannot be evaluated.
+        """
+        with self._evaluator.session.machine.inputs.noting() as asked:
+            return self.holds(instant_ns), asked
+
+    def still(self, asked: InputsAsked, instant_ns: int) -> bool:
+        """Tell whether those inputs show at an instant what they showed."""
+        inputs = self._evaluator.session.machine.inputs
+        with inputs.as_at(instant_ns):
+            return all(inputs.get(number) is on for number, on in asked.items())
+
+
+class _Scan:
+    """Looks at a condition again and again while nothing but the robot moves.
+
+    The expression is worked out anew only when an input that it asked for has changed: of the
+    thousands of instants of a slow search all but a few are alike.
+    """
+
+    def __init__(self, watch: Watch) -> None:
+        self._watch = watch
+        self._held = False
+        self._asked: InputsAsked | None = None
+
+    def holds(self, instant_ns: int) -> bool:
+        """Tell whether the condition holds at an instant of the motion under way."""
+        if self._asked is None or not self._watch.still(self._asked, instant_ns):
+            self._held, self._asked = self._watch.value_and_inputs(instant_ns)
+        return self._held
+
+
+def _first_between(before_ns: int, after_ns: int, holds: Callable[[int], bool]) -> int:
+    """Return the first instant at which something holds, to the nanosecond."""
+    while after_ns - before_ns > 1:
+        middle_ns = (before_ns + after_ns) // 2
+        if holds(middle_ns):
+            after_ns = middle_ns
+        else:
+            before_ns = middle_ns
+    return after_ns

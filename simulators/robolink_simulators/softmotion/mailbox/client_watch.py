@@ -34,6 +34,11 @@ class ClientWatch:
             self._since_ns = now_ns
 
     @property
+    def zeroed(self) -> bool:
+        """Whether the word is 0: no client sends that, a fieldbus's watchdog leaves it."""
+        return self._word == 0
+
+    @property
     def deadline_ns(self) -> int | None:
         """When patience ends, ``None`` while nothing is supervised."""
         if self._since_ns is None:

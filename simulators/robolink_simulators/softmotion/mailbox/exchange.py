@@ -8,6 +8,8 @@ from typing import Final
 from robolink.protocols.mailbox import (
     COMMAND,
     COMMAND_WORDS,
+    DEVICE_START,
+    DEVICE_WORDS,
     RESPONSE_WORDS,
     SLOT_WORDS,
     Words,
@@ -40,6 +42,8 @@ def shown_read(first: int, count: int) -> str:
     """Return a read in words, by what of response and slots it covers."""
     if first == 0 and count in (_HEAD_WORDS, RESPONSE_WORDS):
         return "read_head" if count == _HEAD_WORDS else "read_response"
+    if (first, count) == (DEVICE_START, DEVICE_WORDS):
+        return "read_device"
     slot, offset = divmod(first - RESPONSE_WORDS, SLOT_WORDS)
     if slot >= 0 and offset == 0 and count == SLOT_WORDS:
         return f"read_slot {slot + 1}"

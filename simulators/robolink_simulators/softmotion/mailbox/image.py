@@ -25,7 +25,7 @@ def arranged(layout: Layout, words: Sequence[int], order: WordOrder) -> Words:
             moved[start : start + count] = order.arrange(piece)
         elif order is not WordOrder.HALVES_SWAPPED:
             moved[start : start + count] = piece[::-1]
-    if layout.intact(words):
+    if layout.guarded and layout.intact(words):
         end = layout["crc"].word
         moved[end] = crc16(moved[:end])
     return tuple(moved)

@@ -13,6 +13,7 @@ from robolink_simulators.softmotion.options import GroupOptions, SmcNumbers
 
 _NUMBERS: Final = "numbers."
 _LONGEST_CYCLE_US: Final = 1_000_000
+_LARGEST_UDINT: Final = 0xFFFF_FFFF
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +57,11 @@ def options_from_text(pairs: Mapping[str, str]) -> PlcOptions:
         ("cycle_us", group.cycle_us),
     ):
         _require_positive(name, value)
+    if mailbox.device_id > _LARGEST_UDINT:
+        raise ConfigError(
+            tr("No PLC has the number {device_id}.", device_id=mailbox.device_id),
+            remedy=tr("Give device_id from 1 to {most}; 0 draws one.", most=_LARGEST_UDINT),
+        )
     require_places(mailbox)
     return PlcOptions(group, mailbox)
 

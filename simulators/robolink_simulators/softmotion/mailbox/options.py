@@ -28,6 +28,9 @@ class MailboxOptions:
         slots: Modbus address of tool slot 1 [project]; 0 puts the slots behind the response.
         snapshot_latched: Whether CANopen object 2101h stands still between snapshots, as the
             mailbox demands; a stack without that refreshes it in the middle of an upload [U].
+        device_id: The number that this PLC drew once, up to 2**32 - 1; 0 draws one that no
+            other has [ours]. A state file keeps what was drawn.
+        identified: Whether the program has that number; an earlier one has zeros in its place.
     """
 
     profile: Literal["full", "tools"] = "full"
@@ -41,3 +44,5 @@ class MailboxOptions:
     response: int = 0
     slots: int = 0
     snapshot_latched: bool = True
+    device_id: int = 0
+    identified: bool = True

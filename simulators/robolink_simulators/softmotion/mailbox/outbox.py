@@ -1,6 +1,8 @@
 """What the mailbox program gives out: the response block and the tool slots (design part 7)."""
 
 from robolink.protocols.mailbox import (
+    DEVICE,
+    DEVICE_WORDS,
     RESPONSE,
     SLOT,
     SLOTS,
@@ -11,6 +13,7 @@ from robolink.protocols.mailbox import (
     Response,
     WordOrder,
     Words,
+    encode_device_id,
     encode_response,
     encode_slot,
 )
@@ -32,6 +35,7 @@ class Outbox:
         tools: Knows slot and kinematics.
         units: Of the mailbox.
         order: How the program lays values of several words.
+        identified: Whether it gives out the PLC's own number.
     """
 
     def __init__(
@@ -42,18 +46,20 @@ class Outbox:
         units: UserUnits,
         *,
         order: WordOrder,
+        identified: bool,
     ) -> None:
         self._group = group
         self._memory = memory
         self._tools = tools
         self._units = units
         self._order = order
+        self._identified = identified
 
     def words(self, program: MailboxProgram, heartbeat: int) -> Words:
-        """Return response and slots, one behind the other."""
+        """Return response, slots and device block, one behind the other."""
         response = self.response(program, heartbeat)
         slots = (word for number in SLOTS for word in self.slot(number))
-        return (*response, *slots)
+        return (*response, *slots, *self.device())
 
     def response(self, program: MailboxProgram, heartbeat: int) -> Words:
         """Return the response block."""
@@ -63,6 +69,12 @@ class Outbox:
     def slot(self, number: int) -> Words:
         """Return a tool slot."""
         return arranged(SLOT, encode_slot(self._memory.slot(number)), self._order)
+
+    def device(self) -> Words:
+        """Return the device block; zeros where the program has none."""
+        if not self._identified:
+            return (0,) * DEVICE_WORDS
+        return arranged(DEVICE, encode_device_id(self._memory.device_id), self._order)
 
     def _response(self, program: MailboxProgram, heartbeat: int) -> Response:
         group, jobs = self._group, program.jobs
@@ -110,7 +122,4 @@ class Outbox:
             Bits.INTERRUPTED: status.interrupted_movement != 0,
             Bits.PERMITTED: program.permitted,
         }
-        bits = Bits(0)
-        for bit, on in shown.items():
-            bits |= bit if on else Bits(0)
-        return bits
+        return Bits(sum(bit.value for bit, on in shown.items() if on))

@@ -2,23 +2,13 @@
 
 from typing import Final
 
-from robolink.protocols.mailbox import (
-    OPCODES,
-    Answer,
-    Command,
-    ErrorClass,
-    Opcode,
-    next_number,
-)
+from robolink.protocols.mailbox import Answer, Command, ErrorClass, next_number
 from robolink.timing import NS_PER_S
 from robolink_simulators.softmotion.mailbox.complaints import Rejected
 from robolink_simulators.softmotion.mailbox.retained import RetainedMemory
 
 SILENCE_NS: Final = 10 * NS_PER_S
 """After this long without a sign of its owner a mailbox may be taken, if nothing moves."""
-
-_RELEASE: Final = 1
-"""Operand i0 of a stop that lets the group go."""
 
 
 class Ownership:
@@ -57,8 +47,7 @@ class Ownership:
         Raises:
             Rejected: NOT_OWNER, or STALE_EPOCH.
         """
-        releases = command.opcode == Opcode.STOP and command.operands[0] == _RELEASE
-        if not (OPCODES[Opcode(command.opcode)].needs_owner or releases):
+        if not command.needs_owner:
             return
         if self.holder == 0 or command.owner != self.holder:
             raise Rejected(ErrorClass.NOT_OWNER)

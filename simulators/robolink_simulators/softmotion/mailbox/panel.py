@@ -44,7 +44,7 @@ class PlcPanel:
             self._plc.program.permitted = True
 
     def withdraw_permit(self) -> None:
-        """Let the machine permit them no longer; what moves goes on (assumed)."""
+        """Let the machine permit them no longer; what moves ends in the next cycle."""
         with self._acting():
             self._plc.program.permitted = False
 
@@ -104,8 +104,8 @@ class PlcPanel:
 
     def zero_inputs(self) -> None:
         """Let the fieldbus zero what clients have written, as its watchdog does."""
-        with self._acting():
-            self._plc.program.inbox.zero()
+        with self._acting() as now_ns:
+            self._plc.program.zero_inputs(now_ns)
 
     def freeze(self) -> None:
         """Let the mailbox program stand still, its heartbeat too; what moves goes on."""

@@ -7,14 +7,19 @@ from typing import Final
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink.protocols.mailbox import COMMAND_WORDS, RESPONSE_WORDS, SLOT_WORDS, SLOTS
+from robolink.protocols.mailbox import (
+    COMMAND_WORDS,
+    DEVICE_START,
+    DEVICE_WORDS,
+    RESPONSE_WORDS,
+)
 from robolink_simulators.softmotion.mailbox.options import MailboxOptions
 
 REGISTERS: Final = 4096
 """Holding registers, and input registers: the most that CODESYS offers (documented)."""
 
-OUTPUT_WORDS: Final = RESPONSE_WORDS + len(SLOTS) * SLOT_WORDS
-"""Response and slots, one behind the other."""
+OUTPUT_WORDS: Final = DEVICE_START + DEVICE_WORDS
+"""Response, slots and device block, one behind the other."""
 
 
 class Bank(Enum):
@@ -51,7 +56,7 @@ class Place:
 
 
 def places_of(options: MailboxOptions) -> tuple[Place, ...]:
-    """Return where command, response and slots stand."""
+    """Return where command, response, and the slots with the device block stand."""
     bank = Bank.HOLDING if options.registers == "holding" else Bank.INPUT
     slots = options.slots or options.response + RESPONSE_WORDS
     return (

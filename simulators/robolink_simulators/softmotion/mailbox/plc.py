@@ -3,7 +3,14 @@
 from collections.abc import Mapping
 from typing import Final
 
-from robolink.protocols.mailbox import RESPONSE_WORDS, SLOT_WORDS, WordOrder, Words, next_number
+from robolink.protocols.mailbox import (
+    DEVICE_START,
+    RESPONSE_WORDS,
+    SLOT_WORDS,
+    WordOrder,
+    Words,
+    next_number,
+)
 from robolink_simulators.softmotion.catalogue import MachineModel
 from robolink_simulators.softmotion.condition import GroupState
 from robolink_simulators.softmotion.coordinates import CoordRef
@@ -41,7 +48,7 @@ class Plc:
         self._options = options
         self._kinematics = model.kinematics
         self.group = AxisGroup(model.kinematics, model.limits, options.group)
-        self.memory = RetainedMemory()
+        self.memory = RetainedMemory(options.mailbox.device_id)
         self._units = UserUnits(options.mailbox.unit_um)
         self.tools = ToolDesk(self.group, self.memory, self._units, parameters)
         self._outbox = Outbox(
@@ -50,6 +57,7 @@ class Plc:
             self.tools,
             self._units,
             order=WordOrder[options.mailbox.word_order.upper()],
+            identified=options.mailbox.identified,
         )
         self.starts = 0
         self.estop_pressed = False
@@ -108,7 +116,7 @@ class Plc:
         return min((change for change in changes if change is not None), default=None)
 
     def output(self, now_ns: int) -> Words:
-        """Return response and slots, one behind the other."""
+        """Return response, slots and device block, one behind the other."""
         return self._frozen or self._outbox.words(self.program, self._heartbeat(now_ns))
 
     def response(self, now_ns: int) -> Words:
@@ -118,10 +126,12 @@ class Plc:
         return self._outbox.response(self.program, self._heartbeat(now_ns))
 
     def read(self, first: int, count: int, now_ns: int) -> Words:
-        """Return words of response and slots."""
+        """Return words of response, slots and device block."""
         slot, offset = divmod(first - RESPONSE_WORDS, SLOT_WORDS)
         if first + count <= RESPONSE_WORDS:
             return self.response(now_ns)[first : first + count]
+        if first >= DEVICE_START:
+            return self._outbox.device()[first - DEVICE_START :][:count]
         if slot >= 0 and offset + count <= SLOT_WORDS:
             return self._outbox.slot(slot + 1)[offset : offset + count]
         return self.output(now_ns)[first : first + count]

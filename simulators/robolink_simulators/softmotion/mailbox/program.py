@@ -10,7 +10,6 @@ from collections.abc import Mapping, Sequence
 from typing import Final
 
 from robolink.protocols.mailbox import (
-    OPCODES,
     Answer,
     Command,
     CommandState,
@@ -102,8 +101,7 @@ class MailboxProgram:
     def write(self, first: int, words: Sequence[int], now_ns: int) -> None:
         """Take what a client writes; it is looked at in the next cycle."""
         self.inbox.write(first, words)
-        if self._look_ns is None:
-            self._look_ns = (now_ns // self._cycle_ns + 1) * self._cycle_ns
+        self._plan_look(now_ns)
 
     def run(self, now_ns: int) -> None:
         """Do what is due now."""
@@ -117,11 +115,17 @@ class MailboxProgram:
         self._supervise(now_ns)
         self._follow()
 
+    def zero_inputs(self, now_ns: int) -> None:
+        """Take the zeros that a fieldbus leaves when its watchdog expires."""
+        self.inbox.zero()
+        self._plan_look(now_ns)
+
     def next_change(self, now_ns: int) -> int | None:
         """Return when :meth:`run` will next do something by itself, if ever."""
         deadline_ns = self._watch.deadline_ns
-        if deadline_ns is not None and deadline_ns <= now_ns:
-            deadline_ns = now_ns + self._cycle_ns  # a halt was refused: try again
+        if self.jobs.moving and self._reason_to_end(now_ns):
+            # The permit went since the last cycle, or a halt was refused: try again.
+            deadline_ns = self._next_cycle_ns(now_ns)
         changes = (self._look_ns, deadline_ns)
         return min((change for change in changes if change is not None), default=None)
 
@@ -159,7 +163,7 @@ class MailboxProgram:
         if command.boot_id not in (0, self._memory.boot_id):
             raise Rejected(ErrorClass.OTHER_BOOT)
         self.ownership.require(command)
-        if not self.permitted and OPCODES[Opcode(command.opcode)].needs_permit:
+        if not self.permitted and command.needs_permit:
             raise Rejected(ErrorClass.NOT_PERMITTED)
 
     def _carried_out(self, command: Command, now_ns: int) -> Told:
@@ -167,8 +171,9 @@ class MailboxProgram:
             moving = not self._group.motion.resting or any(
                 axis.moving_alone for axis in self._group.axes
             )
+            told = self._halted_for_release(command)
             self.ownership.carry_out(command, now_ns, moving=moving)
-            return done()
+            return told
         return self._handlers[command.opcode](command)
 
     def _note_beat(self, now_ns: int) -> None:
@@ -176,18 +181,38 @@ class MailboxProgram:
         if heard and self.ownership.holder:
             self.ownership.heard(now_ns)
 
+    def _halted_for_release(self, command: Command) -> Told:
+        """Halt what is unfinished before its owner leaves; done when the group is at rest."""
+        leaves = not any(command.operands[:2]) and self.ownership.owns(command)
+        return Told(self._group.halt()) if leaves and self.jobs.moving else done()
+
     def _supervise(self, now_ns: int) -> None:
-        """Halt what moves when its client has fallen silent; the tool stays."""
+        """Halt what moves when nobody stands behind it any more; the tool stays."""
         moving = self.jobs.moving
         self._watch.watch(moving=bool(moving), now_ns=now_ns)
-        deadline_ns = self._watch.deadline_ns
-        if deadline_ns is None or now_ns < deadline_ns:
+        cause = self._reason_to_end(now_ns)
+        if not moving or not cause:
             return
         for job in moving:
-            job.cause = ErrorClass.HEARTBEAT_LOST
+            job.cause = job.cause or cause
         self._group.halt()
         self._follow()
         self._watch.watch(moving=bool(self.jobs.moving), now_ns=now_ns)
+
+    def _reason_to_end(self, now_ns: int) -> ErrorClass:
+        """Return why nothing may go on moving, NONE when it may."""
+        if not self.permitted:
+            return ErrorClass.NOT_PERMITTED
+        deadline_ns = self._watch.deadline_ns
+        late = deadline_ns is not None and now_ns >= deadline_ns
+        return ErrorClass.HEARTBEAT_LOST if late or self._watch.zeroed else ErrorClass.NONE
+
+    def _plan_look(self, now_ns: int) -> None:
+        if self._look_ns is None:
+            self._look_ns = self._next_cycle_ns(now_ns)
+
+    def _next_cycle_ns(self, now_ns: int) -> int:
+        return (now_ns // self._cycle_ns + 1) * self._cycle_ns
 
     def _handlers_of(self, profile: Profile) -> Mapping[int, Handler]:
         handlers: dict[int, Handler] = {**self._tools.opcodes, **self._motion.opcodes}

@@ -1,6 +1,7 @@
-"""What a PLC keeps over a restart: the tool slots, and two counters."""
+"""What a PLC keeps over a restart: its number, the tool slots, and two counters."""
 
 import json
+import secrets
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -10,7 +11,14 @@ from robolink.durable_files import sync_folder, write_whole
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.named_files import read_named
-from robolink.protocols.mailbox import SLOTS, Six, Slot, encode_slot, next_number
+from robolink.protocols.mailbox import (
+    SLOTS,
+    Six,
+    Slot,
+    encode_device_id,
+    encode_slot,
+    next_number,
+)
 
 SCHEMA: Final = "robolink/plc-state/1"
 
@@ -21,9 +29,14 @@ class RetainedMemory:
     Attributes:
         boot_id: Counts PLC starts; 0 before the first.
         epoch: Counts owners.
+        device_id: The PLC's own number, never 0.
+
+    Args:
+        device_id: Its number; 0 draws one that no other has.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, device_id: int = 0) -> None:
+        self.device_id = device_id or 1 + secrets.randbelow(0xFFFF_FFFF)
         self.boot_id = 0
         self.epoch = 0
         self._slots = dict.fromkeys(SLOTS, Slot())
@@ -55,7 +68,12 @@ class RetainedMemory:
     def to_state(self) -> dict[str, object]:
         """Return all of it, ready for JSON."""
         slots = {str(number): asdict(slot) for number, slot in self._slots.items() if slot.counter}
-        return {"boot_id": self.boot_id, "epoch": self.epoch, "slots": slots}
+        return {
+            "boot_id": self.boot_id,
+            "epoch": self.epoch,
+            "device_id": self.device_id,
+            "slots": slots,
+        }
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Take over what :meth:`to_state` gave.
@@ -68,6 +86,10 @@ class RetainedMemory:
             raise ValueError(sorted(slots))
         self._slots.update(slots)
         self.boot_id, self.epoch = int(state["boot_id"]), int(state["epoch"])
+        # A file of an earlier simulator has none; the one that was drawn stays and is kept.
+        device_id = int(state.get("device_id", self.device_id))
+        encode_device_id(device_id)
+        self.device_id = device_id
 
 
 def _slot(held: Mapping[str, Any]) -> Slot:

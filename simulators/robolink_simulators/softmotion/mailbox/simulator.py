@@ -23,6 +23,7 @@ from robolink_simulators.softmotion.mailbox.exchange import (
     shown_write,
 )
 from robolink_simulators.softmotion.mailbox.faults import PlcFault, PlcFaultAction
+from robolink_simulators.softmotion.mailbox.fieldbus_watchdog import FieldbusWatchdog
 from robolink_simulators.softmotion.mailbox.mishaps import Mishaps
 from robolink_simulators.softmotion.mailbox.option_text import PlcOptions
 from robolink_simulators.softmotion.mailbox.panel import PlcPanel
@@ -95,6 +96,7 @@ class SoftMotionSimulator:
         self.seed = seed
         self.durable = state_path is not None
         self.options = options or PlcOptions()
+        self._watchdog = FieldbusWatchdog(self.options.mailbox.watchdog_ms)
         self.exchanges = 0
         self.log: deque[tuple[int, str, str]] = deque(maxlen=_LOG_LINES)
         self.on_request: RequestHook | None = None
@@ -102,7 +104,6 @@ class SoftMotionSimulator:
         self.watchers: list[Callable[[], None]] = []
         self.present_ns: Callable[[], int] | None = None
         self._now_ns = 0
-        self._heard_ns = 0
         self._stepping = False
         self._requests = 0
         self.faults = WireFaults(faults, seed)
@@ -152,7 +153,11 @@ class SoftMotionSimulator:
 
     def next_change(self) -> int | None:
         """Return when :meth:`advance` will next do something by itself, if ever."""
-        changes = (self.plc.next_change(self._now_ns), self._mishaps.next_change())
+        changes = (
+            self.plc.next_change(self._now_ns),
+            self._mishaps.next_change(),
+            self._watchdog.deadline_ns,
+        )
         return min((change for change in changes if change is not None), default=None)
 
     def read(self, first: int, count: int, now_ns: int) -> Served:
@@ -174,12 +179,9 @@ class SoftMotionSimulator:
         return self._serve(shown_read(0, len(words)), now_ns, lambda _: words)
 
     def hear(self, now_ns: int) -> None:
-        """Note a valid request; after too long a silence what clients wrote is zeroed."""
+        """Note a valid request, for the fieldbus's watchdog."""
         self.advance(now_ns)
-        watchdog_ns = self.options.mailbox.watchdog_ms * 1_000_000
-        if watchdog_ns and now_ns - self._heard_ns > watchdog_ns:
-            self.plc.program.inbox.zero()
-        self._heard_ns = now_ns
+        self._watchdog.hear(self._now_ns)
 
     def _make_ready(self) -> None:
         x_mm, y_mm, z_mm, *_ = self.world.stored.components()
@@ -230,6 +232,8 @@ class SoftMotionSimulator:
         try:
             self.plc.advance(now_ns)
             self._mishaps.carry_out(now_ns)
+            if self._watchdog.expires(now_ns):
+                self.plc.program.zero_inputs(now_ns)
             self._file.save_changes()
         finally:
             self._stepping = False

@@ -1,0 +1,122 @@
+"""A jog on a simulated PLC: whatever happens meanwhile, the robot stands afterwards, and stays."""
+
+import math
+import threading
+
+import pytest
+from robolink_simulators.softmotion.mailbox import PlcFault, PlcFaultAction
+
+from robolink.controllers.softmotion import Jog
+from robolink.controllers.softmotion._wire import MailboxWire
+from robolink.errors import ControllerFaultError, LimitError, RejectedError
+from robolink.model import WorkBox
+from robolink.protocols.mailbox import ErrorClass
+from tests.contract._softmotion_cell import SLOW, above, served
+
+ANYWHERE = WorkBox()
+BACK_ALONG_X = Jog(backward=frozenset({0}), speed_mm_s=10.0)
+
+
+@pytest.fixture(params=["sim", "modbus-tcp"])
+def cell(request):
+    with served(request.param) as cell:
+        yield cell
+
+
+@pytest.fixture
+def controller(cell):
+    with cell.connect() as controller:
+        yield controller
+
+
+def box_around(pose, half_mm):
+    return WorkBox.around(pose, xy_mm=half_mm, below_mm=half_mm, above_mm=half_mm)
+
+
+def distance_mm(controller, since):
+    """Return how far the tip has come since it was there."""
+    here = controller.groups[0].pose().coordinates()
+    return math.dist(here[:3], since.coordinates()[:3])
+
+
+def look_for(cell, controller, seconds):
+    """Look at the state again and again for so long."""
+    for _ in range(round(seconds / 0.1)):
+        controller.status()
+        cell.clock.advance(0.1)
+
+
+def test_a_permit_that_is_withdrawn_ends_the_jog_and_no_status_moves_it_on(cell, controller):
+    group, simulator = controller.groups[0], cell.simulator
+    start = group.pose()
+    simulator.faults.add(
+        PlcFault(PlcFaultAction.WITHDRAW_PERMIT, match="write_command JOG", seconds=0.4)
+    )
+    with pytest.raises(RejectedError, match="does not permit") as refusal:
+        group.jog(BACK_ALONG_X, duration_s=2.0, box=box_around(start, 30.0))
+    assert refusal.value.code == ErrorClass.NOT_PERMITTED
+    moved_mm = distance_mm(controller, start)
+    assert 2.0 < moved_mm < 6.0
+    look_for(cell, controller, 40.0)
+    assert distance_mm(controller, start) == pytest.approx(moved_mm, abs=0.01)
+    assert not controller.status().running
+    assert cell.open_requests == []
+
+
+def test_a_stop_from_another_thread_ends_the_jog_and_is_no_success(cell, controller, monkeypatch):
+    group = controller.groups[0]
+    start = group.pose()
+    read_head, heads = MailboxWire.read_head, []
+
+    def stop_meanwhile(wire):
+        heads.append(threading.current_thread())
+        if len(heads) == 20:
+            stopper = threading.Thread(target=controller.stop)
+            stopper.start()
+            stopper.join(timeout=10)
+        return read_head(wire)
+
+    monkeypatch.setattr(MailboxWire, "read_head", stop_meanwhile)
+    with pytest.raises(ControllerFaultError):
+        group.jog(BACK_ALONG_X, duration_s=20.0, box=ANYWHERE)
+    assert distance_mm(controller, start) < 20.0
+    assert controller.status().paused
+    assert cell.commands == ["JOG", "STOP"]
+    assert cell.open_requests == []
+
+
+def test_a_jog_that_leaves_the_box_while_the_permit_goes_stands_still(cell, controller):
+    group = controller.groups[0]
+    start = group.pose()
+    cell.simulator.faults.add(PlcFault(PlcFaultAction.WITHDRAW_PERMIT, match="JOG", on_exchange=1))
+    box = box_around(start, 1.0)
+    with pytest.raises(LimitError):
+        group.jog(BACK_ALONG_X, duration_s=20.0, box=box)
+    moved_mm = distance_mm(controller, start)
+    look_for(cell, controller, 5.0)
+    assert distance_mm(controller, start) == pytest.approx(moved_mm, abs=0.01)
+    assert cell.open_requests == []
+
+
+def test_looking_from_the_thread_that_began_a_movement_does_not_keep_it_going(cell, controller):
+    group = controller.groups[0]
+    start = group.pose()
+    motion = group.move_to(above(start, 20.0), SLOW, box=ANYWHERE)
+    for _ in range(20):
+        controller.status()
+        controller.tools.read(1)
+        cell.clock.advance(0.1)
+    assert distance_mm(controller, start) < 2.0
+    with pytest.raises(ControllerFaultError, match="heartbeat was missing"):
+        motion.wait(timeout_s=10)
+    assert cell.open_requests == []
+
+
+def test_a_client_that_closes_leaves_nothing_moving(cell):
+    with cell.connect() as controller:
+        start = controller.groups[0].pose()
+        controller.groups[0].move_to(above(start, 20.0), SLOW, box=ANYWHERE)
+    with cell.connect() as later:
+        assert not later.status().running
+        assert distance_mm(later, start) < 2.0
+    assert cell.commands[-1] == "HALT"

@@ -18,7 +18,7 @@ from robolink_cli._cell import (
     require_expected_robot,
 )
 from robolink_cli._exit import is_cut_off
-from robolink_cli._notices import note_unsettled
+from robolink_cli._notices import note_at_work, note_unsettled
 from robolink_cli._people import signature_of
 from robolink_cli._recording import recording
 from robolink_cli._render import emit_json, json_is_on, note, say
@@ -192,7 +192,6 @@ def open_controller(
     unhindered = looks or calms
     if context.doubt is not None and not unhindered:
         raise context.doubt
-    named = context.cell.name if context.cell else url
     password = password_of(context)
     signature = replace(
         signature_of(context.operator, context.cell, changes=changes),
@@ -215,37 +214,55 @@ def open_controller(
     ):
         click.get_current_context().meta.update({WATCHED: controller, REACHED: url})
         remember_address(context)
-        with listening_for_stop(controller, context):
-            trouble = controller.outcomes.trouble
-            if trouble is not None and not unhindered:
-                raise trouble
-            found = _open_markers(controller, lenient=unhindered)
-            for remark in controller.outcomes.remarks:
-                note(remark)
-            if not quiet:
-                note_unsettled(controller, found, named)
-            if context.cell and not calms:
-                _check_robot(controller, context.cell, looks=looks)
-            if found and not quiet and not calms:
-                from robolink_cli._offering import offer_to_restore
-
-                offer_to_restore(controller, found)
-            try:
-                yield controller
-            except KeyboardInterrupt:
-                # The last line says which tool is selected: as it is now, not as it was once.
-                with suppress(RobolinkError):
-                    controller.tools.selected()
-                raise
-            finally:
-                left = _open_markers(controller, lenient=unhindered)
-                note_unsettled(controller, [m for m in left if m not in found], named)
-                if trouble is not None:
-                    # After the work: nothing that the journal has to say stands before it.
-                    note(f"{trouble.what} {_unrecorded()}")
+        with (
+            listening_for_stop(controller, context),
+            _saying_what_is_left(controller, context, quiet=quiet, looks=looks, calms=calms),
+        ):
+            yield controller
     if not unhindered:
         # A stop that came while the connection was closed: nobody may take this for a success.
         controller.latch.require_open(tr("The command"))
+
+
+@contextmanager
+def _saying_what_is_left(
+    controller: "Controller", context: CliContext, *, quiet: bool, looks: bool, calms: bool
+) -> Iterator[None]:
+    """Say before the work what others left on the controller, and after it what this left.
+
+    Raises:
+        RobolinkError: The journal or the robot is not as the command needs it.
+    """
+    named = context.cell.name if context.cell else context.require_url()
+    lenient = looks or calms
+    trouble = controller.outcomes.trouble
+    if trouble is not None and not lenient:
+        raise trouble
+    found = _open_markers(controller, lenient=lenient)
+    for remark in controller.outcomes.remarks:
+        note(remark)
+    beside = not quiet and note_at_work(controller.outcomes, named)
+    if not (quiet or beside):
+        note_unsettled(controller, found, named)
+    if context.cell and not calms:
+        _check_robot(controller, context.cell, looks=looks)
+    if found and not (quiet or calms or beside):
+        from robolink_cli._offering import offer_to_restore
+
+        offer_to_restore(controller, found)
+    try:
+        yield
+    except KeyboardInterrupt:
+        # The last line says which tool is selected: as it is now, not as it was once.
+        with suppress(RobolinkError):
+            controller.tools.selected()
+        raise
+    finally:
+        left = _open_markers(controller, lenient=lenient)
+        note_unsettled(controller, [m for m in left if m not in found], named)
+        if trouble is not None:
+            # After the work: nothing that the journal has to say stands before it.
+            note(f"{trouble.what} {_unrecorded()}")
 
 
 @contextmanager

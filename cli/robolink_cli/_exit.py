@@ -19,14 +19,16 @@ DIFFERENT: Final = 1
 USAGE: Final = 2
 UNKNOWN: Final = 6
 BUG: Final = 70
+HUNG_UP: Final = 129
 INTERRUPTED: Final = 130
 READER_LEFT: Final = 141
+TERMINATED: Final = 143
 
 _ENDINGS: Final = {
-    EndedBy.HUNG_UP: 129,
+    EndedBy.HUNG_UP: HUNG_UP,
     EndedBy.CTRL_C: INTERRUPTED,
     EndedBy.OUTPUT_CLOSED: READER_LEFT,
-    EndedBy.TERMINATED: 143,
+    EndedBy.TERMINATED: TERMINATED,
 }
 """The four clean up alike; 6 comes before them."""
 
@@ -43,10 +45,10 @@ MEANINGS: Final[dict[int, str]] = {
     9: "a person said no, or was not there to say yes",
     10: "a stop ended it",
     BUG: "a defect in robolink",
-    129: "the window was closed, or the line to it is gone (SIGHUP)",
+    HUNG_UP: "the window was closed, or the line to it is gone (SIGHUP)",
     INTERRUPTED: "interrupted (Ctrl-C)",
     READER_LEFT: "whoever read the output has left",
-    143: "terminated (SIGTERM)",
+    TERMINATED: "terminated (SIGTERM)",
 }
 """What each exit code says; docs/exit-codes.md has the same table."""
 

@@ -9,7 +9,7 @@ from robolink_cli._render import note
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from robolink.model import Controller, Marker, ToolOffset
+    from robolink.model import Controller, Marker, OutcomeLog, ToolOffset
 
 
 def note_unsettled(controller: "Controller", markers: "Sequence[Marker]", url: str) -> None:
@@ -22,13 +22,33 @@ def note_unsettled(controller: "Controller", markers: "Sequence[Marker]", url: s
     """
     from robolink.model import MarkerKind
 
-    if not markers:
+    if not markers or note_at_work(controller.outcomes, url):
         return
     for marker in markers:
         if marker.kind is MarkerKind.SELECTION:
             note(_unfinished(marker, url, _selected_now(controller, marker)))
         else:
             note(marker_notice(marker, url))
+
+
+def note_at_work(outcomes: "OutcomeLog", url: str) -> bool:
+    """Say who else is working on a controller; return whether somebody is.
+
+    What is open then is not left behind: whoever began it puts it back himself.
+    """
+    from robolink.errors import JournalError
+
+    working = ""
+    with suppress(JournalError):
+        working = outcomes.at_work()
+    if working:
+        what = tr(
+            "What it has begun it ends itself; there is nothing to recover. Wait for it, or "
+            "'robolink -c {url} stop'.",
+            url=url,
+        )
+        note(f"{working}\n  {what}")
+    return bool(working)
 
 
 def marker_notice(marker: "Marker", url: str) -> str:

@@ -128,11 +128,14 @@ class Telling:
                 return []
             journal = open_journal(read_only=True)
             address = parse_url(self._outcome.url).address if self._outcome.keys else ""
-            open_now = journal.log(address).open_markers()
+            log = journal.log(address)
+            open_now = log.open_markers()
         except JournalError as error:
             return [error.what]
-        from robolink_cli._notices import marker_notice
+        from robolink_cli._notices import marker_notice, note_at_work
 
+        if open_now and note_at_work(log, self._request.named):
+            return []
         return [marker_notice(marker, self._request.named) for marker in open_now]
 
 

@@ -17,6 +17,7 @@ from robolink_cli._lazy import LazyGroup
 from robolink_cli._output import watched_output
 from robolink_cli._render import dumps, note, print_document, say
 from robolink_cli._shared_options import shared_options
+from robolink_cli._sink import hand_over
 
 if TYPE_CHECKING:
     from robolink_cli._stop_first import StopOutcome
@@ -156,7 +157,7 @@ def _tell_stop(request: "StopRequest", outcome: "StopOutcome") -> int:
     if outcome.error is not None:
         code = report(outcome.error, as_json=request.json)
     elif request.json:
-        click.echo(dumps("robolink/stop/1", telling.payload()))
+        hand_over(dumps("robolink/stop/1", telling.payload()))
     else:
         say(telling.sentence())
     sys.stdout.flush()

@@ -84,6 +84,27 @@ class Lease:
         if not self.held:
             self._seen, self._lost = self._judged(self._sight()), False
 
+    def at_work(self) -> str:
+        """Return who else holds it and lives, in sentences; empty for nobody.
+
+        A holder on another computer is not watched for that, so whether he lives stays open.
+
+        Raises:
+            JournalError: It cannot be read.
+        """
+        seen = self._sight()
+        if seen.token in (FREE, self._token):
+            return ""
+        who = seen.who()
+        if not self._holder.shares_clock_with(who):
+            return seen.at_work(tr("Whether it still works shows when it is watched for a while."))
+        silent_s = max(0, self._clock.now_ns() - seen.beat_ns) / NS_PER_S
+        if silent_s >= LEASE_S or self._holder.proves_gone(who):
+            return ""
+        return seen.at_work(
+            tr("It is alive: its last sign of life is {seconds:.0f} s old.", seconds=silent_s)
+        )
+
     def prepare(self) -> None:
         """Look, unless that was done or the lease is held; outside of any transaction."""
         if not self.held and not self._lost and self._seen is None:

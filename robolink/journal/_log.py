@@ -184,6 +184,16 @@ class JournalOutcomeLog:
             # up after it is not for this process any more.
             self._lease.look(afresh=not self._begun)
 
+    def at_work(self) -> str:
+        """Return who else is working on the controller, in sentences; empty for nobody.
+
+        Raises:
+            JournalError: It cannot be read.
+        """
+        with self._lock:
+            self._named()
+            return self._lease.at_work()
+
     @contextmanager
     def hold(self, purpose: str) -> Iterator[None]:
         """Keep the lease for the whole of a block, markers or not.

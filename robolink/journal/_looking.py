@@ -110,6 +110,13 @@ class LookingLog:
         """Refuse: whoever looks at the lease is about to change something."""
         self._refuse()
 
+    def at_work(self) -> str:
+        """Return who else is working on the controller, as far as the journal can be read."""
+        try:
+            return "" if self._reader is None else self._reader.at_work()
+        except JournalError:
+            return ""
+
     @contextmanager
     def hold(self, purpose: str) -> Iterator[None]:  # noqa: ARG002
         """Refuse; see :meth:`begin`."""

@@ -114,6 +114,13 @@ class OutcomeLog(Protocol):
             BusyError: Another process has the controller.
         """
 
+    def at_work(self) -> str:
+        """Return who else is working on the controller, in sentences; empty for nobody.
+
+        Raises:
+            ConfigError: The record cannot be read.
+        """
+
     def hold(self, purpose: str) -> AbstractContextManager[None]:
         """Keep the lease for the whole of a block, markers or not.
 

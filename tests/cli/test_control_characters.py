@@ -32,7 +32,7 @@ OF_CONTROLLERS = {
 def evil(simulator):
     """A controller whose every text is meant for the terminal."""
     card = simulator.card
-    card.name = card.number = card.kind = card.project = card.robot_name = EVIL.replace("\r", "")
+    card.name = card.kind = card.project = card.robot_name = EVIL.replace("\r", "")
     simulator.machine.serial = card.name
     card.messages[4002] = card.name
     simulator.variables.declare("g_text$", VariableType.STRING, value=card.name)

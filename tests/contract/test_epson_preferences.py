@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.epson.options import EpsonOptions
+from robolink_simulators.epson.option_text import options_from_text
 
 from robolink import ToolOffset
 from robolink.errors import NotReadyError, NotReadyReason
@@ -47,9 +47,11 @@ HELD_BACK = [
 ]
 
 
-@pytest.mark.parametrize(("habit", "act"), HELD_BACK, ids=str)
+@pytest.mark.parametrize(
+    ("habit", "act"), HELD_BACK, ids=lambda value: getattr(value, "__name__", value)
+)
 def test_what_an_unreal_cell_would_falsify_is_held_back_before_it_is_sent(habit, act):
-    simulator = EpsonSimulator(seed=3, options=EpsonOptions(**{habit: True}))
+    simulator = EpsonSimulator(seed=3, options=options_from_text({habit: "yes"}))
     with served("sim", simulator) as cell, cell.connect() as controller:
         with pytest.raises(NotReadyError) as caught:
             act(controller)
@@ -63,7 +65,7 @@ def test_what_an_unreal_cell_would_falsify_is_held_back_before_it_is_sent(habit,
 
 @pytest.mark.parametrize("habit", UNREAL)
 def test_firmware_that_does_not_tell_is_not_suspected(habit):
-    options = EpsonOptions(extended_queries=False, **{habit: True})
+    options = options_from_text({"extended_queries": "no", habit: "yes"})
     with served("sim", EpsonSimulator(seed=3, options=options)) as cell:
         with cell.connect() as controller:
             assert controller.preferences() is None
@@ -78,6 +80,7 @@ def test_they_are_asked_for_once_and_not_before_a_stop():
         controller.status()
         controller.tools.read(1)
         assert not any("GetContSettings" in text for _, _, text in simulator.log)
+        controller.release_stop()
         write(controller)
         with controller.preserved("a measurement"):
             move(controller)

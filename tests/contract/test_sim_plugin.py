@@ -18,7 +18,7 @@ def test_the_served_one_answers(epson_tcp):
 def test_the_one_in_process_has_a_url(epson_sim):
     from robolink.transport import open_transport
     open_transport(epson_sim.url).close()
-    assert epson_sim.seed == 7
+    assert epson_sim.simulator.seed == 7
 
 def test_a_crash_leaves_its_marker_to_nobody(epson_tcp, robolink_state):
     import robolink

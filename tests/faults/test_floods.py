@@ -107,17 +107,23 @@ def test_a_modbus_server_that_floods_costs_one_time_out():
             client.read_input(0, 1)
 
 
-def test_a_can_node_that_floods_is_named_before_anything_is_sent():
+def test_a_can_node_that_floods_is_named_before_anything_is_sent(monkeypatch):
     clock = FakeClock()
     bus = ScriptedBus(clock, node_with(0))
     line = CanLine(bus, "softmotion+can://desk")  # type: ignore[arg-type]
     link = CanopenMailboxLink(
-        line, NODE, identity=IDENTITY, durable=True, timeout_s=1.0, clock=clock
+        line,
+        NODE,
+        lambda _timeout_s: link,
+        identity=IDENTITY,
+        durable=True,
+        timeout_s=1.0,
+        clock=clock,
     )
     link.meet(start=True)
     sent = len(bus.sent)
     frame = can.Message(arbitration_id=SDO_ANSWER, data=bytes(8), is_extended_id=False)
-    bus.recv = lambda timeout: frame
+    monkeypatch.setattr(bus, "recv", lambda timeout: frame)
     with little_is_held(), pytest.raises(RemoteProtocolError, match="without a pause"):
         link.beat(0x0101)
     assert len(bus.sent) == sent

@@ -196,7 +196,7 @@ def unclear():
 @pytest.mark.parametrize("how", UNCLEAR)
 def test_a_write_whose_acknowledgement_was_garbled_is_told_as_that(serve, unclear, how):
     simulator = unclear(WRITE, *UNCLEAR[how])
-    told = []
+    told: list[str] = []
     with serve(simulator) as url, robolink.connect(url, timeout_s=0.5) as controller:
         old = controller.tools.read(1)
         with pytest.raises(UnclearAnswerError, match="neither that it ran nor") as caught:
@@ -238,6 +238,18 @@ def test_a_selection_whose_acknowledgement_was_garbled_is_read_and_put_back(serv
         ):
             controller.tools.select(0)
         assert simulator.machine.tools.selected == 1
+        assert controller.outcomes.open_markers() == ()
+
+
+def test_a_garbled_acknowledgement_keeps_nothing_from_being_put_back(serve, unclear):
+    simulator = unclear("Speed 5, 5, 5", 9, "#Execute,")
+    with serve(simulator) as url, robolink.connect(url, timeout_s=0.5) as controller:
+        simulator.machine.power_high = True
+        with controller.preserved("a procedure"):
+            lift(controller).wait(timeout_s=60)
+            assert not simulator.machine.power_high
+        assert simulator.machine.power_high
+        assert simulator.faults.fired
         assert controller.outcomes.open_markers() == ()
 
 

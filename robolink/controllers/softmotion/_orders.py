@@ -118,6 +118,8 @@ class Orders:
             if now.state == CommandState.ERROR:
                 self._wire.rides.forget(command.sequence)
                 raise self._refusal(command, now, now.error_class)
+            # On a slow line the answer took its time; who waits now begins with a whole patience.
+            self._wire.beat()
             return command
 
     def _possess(self, draft: Command) -> None:
@@ -130,6 +132,12 @@ class Orders:
         return refused(command, now, error_class)
 
     def _to_end(self, draft: Command) -> Ended:
+        if draft.only_ends:
+            with self._wire.ahead():
+                return self._seen_to_end(draft)
+        return self._seen_to_end(draft)
+
+    def _seen_to_end(self, draft: Command) -> Ended:
         command, now = self._send(draft)
         deadline = Deadline.after(self._wire.clock, COMPLETION_S)
         while (end := self._end_of(command, now)) is None:

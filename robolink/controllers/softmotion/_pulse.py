@@ -8,8 +8,11 @@ from robolink.timing import NS_PER_S
 FROZEN_S: Final = 1.0
 """A motion task counts every few milliseconds; after this long without a count it is dead."""
 
-BUSY_BEAT_S: Final = 0.1
-"""Between beats while something moves: the PLC halts it after 0.5 s without one."""
+BUSY_BEAT_S: Final = 0.05
+"""Between beats while something moves: the PLC halts it after 0.5 s without one.
+
+The rest of that half second is for a computer that has something else to do.
+"""
 
 IDLE_BEAT_S: Final = 1.0
 """Between beats otherwise: an owner that is silent for 10 s may be displaced."""

@@ -8,12 +8,13 @@ through its marker, not through this object.
 
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Final, TypeVar
 
 from robolink.checkpoints import Point, checkpoint
 from robolink.controllers.softmotion._pulse import ClientBeat
 from robolink.controllers.softmotion._rides import Rides
+from robolink.controllers.softmotion._turns import Turns
 from robolink.errors import (
     RemoteProtocolError,
     RobolinkError,
@@ -54,6 +55,7 @@ class MailboxWire:
         self._gate.open()
         self._beat = ClientBeat()
         self._here = threading.local()
+        self._turns = Turns()
         self._ended_by: RobolinkError | None = None
         self.owner = owner
         self.epoch = 0
@@ -94,17 +96,14 @@ class MailboxWire:
 
     def read_head(self) -> MailboxHead:
         """Read the beginning of the response block, after a beat if one is due."""
-        self.beat()
         return self._ask(self._link.read_head)
 
     def read_response(self) -> tuple[int, ...]:
         """Read the response block, after a beat if one is due."""
-        self.beat()
         return self._ask(self._link.read_response)
 
     def read_slot(self, slot: int) -> tuple[int, ...]:
         """Read a tool slot, after a beat if one is due."""
-        self.beat()
         return self._ask(lambda: self._link.read_slot(slot))
 
     def read_device(self) -> tuple[int, ...]:
@@ -113,7 +112,6 @@ class MailboxWire:
         Raises:
             RejectedError: There is none.
         """
-        self.beat()
         return self._ask(self._link.read_device)
 
     def write(self, words: Sequence[int]) -> None:
@@ -124,7 +122,7 @@ class MailboxWire:
             TransportError, RemoteProtocolError: The session is over; it may have arrived.
         """
         self._require_alive()
-        with self._gate:
+        with self._turn(), self._gate:
             self.exchanges += 1
             try:
                 self._link.write_command(words)
@@ -140,12 +138,25 @@ class MailboxWire:
         Nothing else does. A thread that only looks, or a program that does something else, would
         else keep a robot moving that nobody watches (design part 7).
         """
-        before = self._attends
-        self._here.attends = True
+        if self._attends:
+            yield
+            return
+        with self.ahead(), self._turns.kept():
+            self._here.attends = True
+            try:
+                yield
+            finally:
+                self._here.attends = False
+
+    @contextmanager
+    def ahead(self) -> Iterator[None]:
+        """Let the exchanges of this thread wait for no other's turn: it stops a movement."""
+        before = self._goes_first
+        self._here.goes_first = True
         try:
             yield
         finally:
-            self._here.attends = before
+            self._here.goes_first = before
 
     def next_beat(self) -> int:
         """Return the heartbeat word that goes with a command block."""
@@ -154,15 +165,10 @@ class MailboxWire:
         return self._beat.again(self.epoch)
 
     def beat(self) -> None:
-        """Write the heartbeat alone, if we own the mailbox and it is due.
-
-        While something is unfinished only who waits on it does (:meth:`attended`).
-        """
-        now_ns = self.clock.now_ns()
-        busy = self.rides.unfinished
-        if self.epoch and self._may_beat and self._beat.due(now_ns, busy=busy):
-            word = self._beat.word(self.epoch, now_ns)
-            self._ask(lambda: self._link.beat(word))
+        """Write the heartbeat alone, if it is due."""
+        self._require_alive()
+        with self._turn():
+            self._beat_if_due()
 
     def ended(self, error: ErrorT) -> ErrorT:
         """End the session because of ``error``, and return it to be raised."""
@@ -186,11 +192,34 @@ class MailboxWire:
         return getattr(self._here, "attends", False)
 
     @property
+    def _goes_first(self) -> bool:
+        return getattr(self._here, "goes_first", False)
+
+    def _turn(self) -> AbstractContextManager[None]:
+        return nullcontext() if self._goes_first else self._turns.taken()
+
+    @property
     def _may_beat(self) -> bool:
         return self._attends or not self.rides.unfinished
 
     def _ask(self, exchange: Callable[[], T]) -> T:
         self._require_alive()
+        with self._turn():
+            self._beat_if_due()
+            if self._attends and self._turns.let_one_in():
+                self._beat_if_due()
+            return self._asked(exchange)
+
+    def _beat_if_due(self) -> None:
+        """Write the heartbeat alone, if we own the mailbox and it is due.
+
+        While something is unfinished only who waits on it does (:meth:`attended`).
+        """
+        busy = self.rides.unfinished
+        if self.epoch and self._may_beat and self._beat.due(self.clock.now_ns(), busy=busy):
+            self._asked(lambda: self._link.beat(self.next_beat()))
+
+    def _asked(self, exchange: Callable[[], T]) -> T:
         lost: list[RobolinkError] = []
         while len(lost) < _READS:
             try:

@@ -9,7 +9,6 @@ class ControllerCard:
 
     Attributes:
         name: Its name, ``0`` if none was given.
-        number: Its serial number.
         kind: Its type.
         project: The project in it.
         robot_name: The name of its robot.
@@ -20,7 +19,6 @@ class ControllerCard:
     """
 
     name: str = "SIMULATED"
-    number: str = "1"
     kind: str = "SIMULATOR"
     project: str = "robolink"
     robot_name: str = "Robot1"

@@ -54,7 +54,6 @@ class CommandDesk:
             "pause": lambda: self._turn(Task.PAUSED),
             "continue": lambda: self._turn(Task.RUNNING),
             "reset": self._reset,
-            "home": self._home,
         }
 
     def admit(self, command: Command, *, logged_in: bool, executing: bool) -> None:
@@ -92,6 +91,14 @@ class CommandDesk:
             return self._served[request.name.lower()](*request.parameters)
         except Refusal as refusal:
             raise malformed() from refusal
+
+    def check_home(self, robot: tuple[str, ...]) -> None:
+        """Check what a Home names.
+
+        Raises:
+            Refused: There is no such robot, or no number where one is needed.
+        """
+        self._check_robot(robot)
 
     def status(self, *, executing: bool) -> Fields:
         """Answer GetStatus; whether an Execute shows is an option."""
@@ -135,15 +142,8 @@ class CommandDesk:
         self._condition.reset()
         self._machine.reset_motion_parameters()
         if self._options.reset_outputs_off:
-            self._machine.outputs.clear()
+            self._machine.clear_outputs()
         return ()
-
-    def _home(self, *robot: str) -> Fields:
-        # No HomeSet can be given to this controller, and Home without one is error 2228
-        # (spel.md 10). How the request itself is answered then is assumed.
-        self._check_robot(robot)
-        self._condition.raise_error(self._options.numbers.home_undefined)
-        raise Refused(ErrorCode.SYSTEM)
 
 
 @lru_cache(maxsize=512)

@@ -135,7 +135,14 @@ class EpsonSimulator:
         self.alarms = Alarms()
         self.card = ControllerCard()
         self.condition = Condition(monitoring_only=self.options.monitoring_only)
-        interpreter = Interpreter(self.machine, self.options, random.Random(f"arm {self.seed}"))
+        interpreter = Interpreter(
+            self.machine,
+            self.options,
+            random.Random(f"arm {self.seed}"),
+            condition=self.condition,
+            variables=self.variables,
+            messages=self.card.messages,
+        )
         self._window = CommandWindow(interpreter, self.condition, self.options)
         self._slot = ClientSlot(self.options.remote_timeout_s)
         self._desk = CommandDesk(
@@ -206,6 +213,7 @@ class EpsonSimulator:
             self._window.next_change(),
             self._slot.deadline(unfinished=self._service.unfinished),
             self._mishaps.next_change(),
+            self.machine.timed_bits.next_change(),
             *(link.next_change() for link in self._links),
         ]
         return min((change for change in changes if change is not None), default=None)
@@ -220,6 +228,7 @@ class EpsonSimulator:
             self._mishaps.forget()
             self.condition.restart()
             forget_volatile(self.machine, self._now_ns)
+            self._window.restart()
 
     def push(self, data: bytes) -> None:
         """Send every client bytes that nobody asked for (F10)."""
@@ -276,6 +285,7 @@ class EpsonSimulator:
         self._stepping = True
         try:
             self.machine.arm.advance(now_ns)
+            self.machine.timed_bits.advance(now_ns)
             self._window.advance(now_ns)
             self._mishaps.carry_out(now_ns)
             if self._companion is not None and self.condition.task is Task.RUNNING:

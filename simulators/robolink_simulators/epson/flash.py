@@ -13,6 +13,7 @@ from robolink.messages import tr
 from robolink.named_files import read_named
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.points import LocalTable, PointTable
+from robolink_simulators.epson.robot_settings import RobotSettings
 
 SCHEMA: Final = "robolink/sim-state/1"
 
@@ -94,12 +95,14 @@ class Flash:
 
 
 def forget_volatile(machine: Machine, now_ns: int) -> None:
-    """Let a machine forget what a power cycle takes: all but its tools and its place."""
+    """Let a machine forget what a power cycle takes: all but tools, HomeSet and its place."""
     machine.arm.halt(now_ns)
     machine.switch_motors(False)
     machine.reset_motion_parameters()
     machine.outputs.clear()
     machine.memory.clear()
+    machine.timed_bits.clear()
+    machine.settings = RobotSettings(home_pulses=machine.settings.home_pulses)
     machine.points, machine.locals = PointTable(), LocalTable()
 
 

@@ -11,15 +11,26 @@ from typing import Literal
 
 @dataclass(frozen=True, slots=True)
 class SpelNumbers:
-    """Error numbers that the language reference does not give [U]; any number would do."""
+    """Error numbers. Those with a section stand in the language reference; the others do not
+    [U], and any number would do: each reason has one of its own.
+    """  # noqa: D205 - one sentence over two lines
 
     syntax: int = 2100
     not_allowed_here: int = 2119
-    value_out_of_range: int = 4002
+    function_only: int = 2120
+    name_undefined: int = 2121
+    not_simulated: int = 2199
+    wait_timed_out: int = 2280  # spel.md 4.6
+    value_out_of_range: int = 4002  # spel.md 10, for AvoidSingularity
     out_of_reach: int = 4001
     motors_off: int = 4023
     emergency_stop: int = 4025
     guard_open: int = 4026
+    joint_free: int = 4027
+    other_robot: int = 4028
+    arm_undefined: int = 4012
+    ecp_undefined: int = 4013
+    pallet_undefined: int = 4014
     tool_undefined: int = 4015
     tool_zero_fixed: int = 4016
     tool_in_force: int = 4017

@@ -77,6 +77,10 @@ class Service:
                 exchange.reply(*self._desk.status(executing=self._window.busy))
             case "Execute":
                 self._window.start(request.parameters[0], exchange, now_ns)
+            case "Home":
+                # It answers when the arm is there, as a motion of Execute does (assumed).
+                self._desk.check_home(request.parameters)
+                self._window.start("Home", exchange, now_ns)
             case "Abort":
                 self._window.abort(exchange, now_ns)
             case "Login":

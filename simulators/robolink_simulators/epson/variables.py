@@ -122,6 +122,19 @@ class Variables:
         variable.set(subscripts, _parsed(variable.kind, text))
         return ()
 
+    def holds(self, name: str) -> bool:
+        """Tell whether the project declares a variable."""
+        return name.lower() in self._variables
+
+    def read(self, name: str) -> Value:
+        """Return a scalar as a program reads it.
+
+        Raises:
+            Refused: There is no such scalar.
+        """
+        variable, subscripts = self._find(name)
+        return variable.get(subscripts)
+
     def _find(self, reference: str) -> tuple[_Variable, tuple[int, ...]]:
         match = _REFERENCE.fullmatch(reference.strip())
         variable = self._variables.get(match[1].lower()) if match else None

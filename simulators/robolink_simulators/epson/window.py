@@ -63,6 +63,10 @@ class CommandWindow:
             self._running[0].abort(now_ns)
             self._settle()
 
+    def restart(self) -> None:
+        """Forget what statements before have set: stored conditions, TMOut, TW."""
+        self._interpreter.forget()
+
     def fail(self, number: int, text: str, now_ns: int) -> None:
         """End the statement where the arm is, with an error."""
         if self._running is not None:

@@ -3,6 +3,7 @@
 import os
 import select
 import threading
+import time
 from typing import Final
 
 from robolink.errors import ConnectError
@@ -12,17 +13,22 @@ PTY_LINE: Final = {"baud": "115200", "parity": "none"}
 """A pseudo terminal knows no parity and refuses to be set to one."""
 
 _CHUNK_BYTES: Final = 4096
+_CHARACTER_BITS: Final = 10
+"""Start, eight data bits, stop: a pseudo terminal has no parity."""
 
 
 class SerialCable:
     """Carries bytes between two device paths until it is closed; needs a Unix.
+
+    Args:
+        baud: As slowly as a line at this rate, one way at a time; 0 carries them at once.
 
     Attributes:
         near: Path for one end.
         far: Path for the other end.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, baud: int = 0) -> None:
         import tty  # not on Windows, where this module must still be importable
 
         pairs = [os.openpty() for _ in range(2)]
@@ -31,6 +37,7 @@ class SerialCable:
         self.near, self.far = (os.ttyname(device) for device in self._devices)
         for device in self._devices:
             tty.setraw(device)
+        self._character_s = _CHARACTER_BITS / baud if baud else 0.0
         self._stop, self._stopped = os.pipe()
         self._thread = threading.Thread(target=self._carry, name="serial cable", daemon=True)
         self._thread.start()
@@ -50,6 +57,7 @@ class SerialCable:
                 return
             for end in ready:
                 data = os.read(end, _CHUNK_BYTES)
+                time.sleep(len(data) * self._character_s)
                 os.write(other if end == one else one, data)
 
 

@@ -114,6 +114,7 @@ def serve_modbus_rtu(
     simulator: SoftMotionSimulator,
     *,
     unit: int = _DEFAULT_UNIT,
+    baud: int = 0,
     clock: ScaledClock | None = None,
 ) -> ModbusHost:
     """Serve a PLC over Modbus RTU on a pseudo terminal; other units are not answered.
@@ -121,6 +122,7 @@ def serve_modbus_rtu(
     Args:
         simulator: The PLC.
         unit: Its number on the line.
+        baud: As slowly as a line at this rate, in real time; 0 carries everything at once.
         clock: The simulated time; real time by default.
 
     Raises:
@@ -128,12 +130,14 @@ def serve_modbus_rtu(
     """
     clock = _presented(simulator, clock)
     try:
-        cable = SerialCable()
+        cable = SerialCable(baud)
         port = SerialPort(cable.far, unit)
         server = ModbusServerThread(PlcRegisters(simulator, clock), clock, port)
     except (ImportError, AttributeError, OSError) as error:
         raise no_pseudo_terminal(error) from error
     options = {**PTY_LINE, **_client_options(simulator.options.mailbox)}
+    if baud:
+        options["baud"] = str(baud)
     if unit != _DEFAULT_UNIT:
         options["unit"] = str(unit)
     url = f"softmotion+modbus-rtu://{cable.near}{_query(options)}"

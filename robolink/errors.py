@@ -29,6 +29,7 @@
     ├── StoppedError                       a stop ended it, from another thread or terminal
     ├── ToolError
     │   ├── ToolIndexError · ReservedToolError · UndefinedToolError
+    │   ├── SelectedToolError              it is in force, so it was not cleared
     │   ├── ToolChangedError               not the value that was expected; nothing was written
     │   └── ReadBackError                  written, but another value came back
     ├── CalibrationError                   the data do not give a trustworthy result (.code)
@@ -258,6 +259,10 @@ class ToolError(RobolinkError):
 
 class ToolIndexError(ToolError, ValueError):
     """No such tool number."""
+
+
+class SelectedToolError(ToolError):
+    """The tool in force was not cleared: nobody said which one takes its place."""
 
 
 class ReservedToolError(ToolError):

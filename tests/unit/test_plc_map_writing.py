@@ -17,6 +17,7 @@ from robolink.errors import (
     ToolError,
 )
 from robolink.model import ANY, ToolOffset, Verdict
+from robolink.nozzle_change import ChangePlan, GivenPoses, NozzleChange, ToolPlan
 from robolink.register_maps import Table
 from robolink.transaction import Wanted, change_tools, recover
 from tests.unit._plc_bench import COMMIT_BIT, LEVEL, NO_HANDSHAKE, Bench
@@ -385,6 +386,16 @@ def test_an_unconfirmed_map_is_refused_before_anything_else_is_looked_at():
                     act()
         assert controller.exchanges == before
     assert bench.plc.writes == []
+
+
+def test_an_unconfirmed_map_is_refused_before_a_person_has_measured_anything():
+    def measured():
+        raise AssertionError("nobody was to measure")
+
+    plan = ChangePlan((ToolPlan(1, GivenPoses(measured)),), ask_before_write=False)
+    with bench_of(NO_HANDSHAKE, confirmed=False).connect() as controller:
+        with pytest.raises(ConfigError, match="nobody has confirmed it"):
+            NozzleChange(controller, plan, operator=None).run(write=True)
 
 
 def test_a_number_that_cannot_be_true_is_not_taken_for_an_offset(commit_bit):

@@ -24,8 +24,14 @@ demo: $(VENV)/.installed ## Install robolink and show a nozzle change on a simul
 	$(BIN)/robolink demo
 
 .PHONY: test
-test: check ## Install everything, check the sources and run all tests.
+test: check ## Install everything, check the sources and run the tests.
 	$(BIN)/python -m pytest -n 2
+
+# What takes many minutes or asks a package index; docs/contributing.md says what stands for it
+# in `make test`.
+.PHONY: soak
+soak: $(VENV)/.installed-dev ## Run the tests that make test leaves out for their length.
+	$(BIN)/python -m pytest -n 2 -m soak
 
 # Their files are called judge_*.py: a plain pytest, which takes test_*.py, leaves them out.
 .PHONY: peers
@@ -81,9 +87,10 @@ clean: ## Remove everything that was made.
 	rm -rf $(VENV) $(WHEELHOUSE) dist build .pytest_cache .mypy_cache .ruff_cache .hypothesis
 
 # A stamp is written last, so that a set-up that was interrupted is made again.
-$(VENV)/.installed-dev: $(VENV)/.installed
-	$(BIN)/python -m pip install --quiet --editable '.[dev]'
-	touch $@
+# What is never imported need not be compiled: Python does the rest at the first import.
+$(VENV)/.installed-dev: pyproject.toml $(VENV)/.created
+	$(BIN)/python -m pip install --quiet --no-compile --editable '.[dev]'
+	touch $@ $(VENV)/.installed
 
 $(VENV)/.installed: pyproject.toml $(VENV)/.created
 	$(BIN)/python -m pip install --quiet --editable .

@@ -14,7 +14,8 @@
     │   └── TransportBrokenError           they, or the cable, did
     ├── ProtocolError                      never raised as such
     │   ├── LocalProtocolError             we asked for something illegal
-    │   └── RemoteProtocolError            what they sent makes no sense; the session is dead
+    │   ├── RemoteProtocolError            what they sent makes no sense; the session is dead
+    │   └── UnclearAnswerError             neither done nor refused; it may or may not have run
     ├── ControllerError                    a well-formed "no"
     │   ├── RejectedError                  the controller refused the request
     │   │   └── LoginRefusedError          wrong password, or one is demanded
@@ -26,6 +27,7 @@
     │       ├── LeaseHeldError             another program or person is changing the controller
     │       └── LeaseLostError             another did so meanwhile
     ├── OutcomeUnknownError                sent, not answered: the machine may or may not have acted
+    ├── StoppedError                       a stop ended it, from another thread or terminal
     ├── ToolError
     │   ├── ToolIndexError · ReservedToolError · UndefinedToolError
     │   ├── ToolChangedError               not the value that was expected; nothing was written
@@ -36,11 +38,14 @@
         └── NotAllowedError                it takes an engineer
 
 Each error says what happened (:attr:`~RobolinkError.what`) and what to do next
-(:attr:`~RobolinkError.remedy`); ``str(error)`` is both. Foreign exceptions are converted
-at the transport boundary only, always ``from`` the original.
+(:attr:`~RobolinkError.remedy`); ``str(error)`` is both. What it left on the controller is
+:attr:`~RobolinkError.controller_state`. Foreign exceptions are converted at the transport
+boundary only, always ``from`` the original.
 """
 
 from enum import StrEnum
+
+from robolink.standing import UNTOUCHED, Standing
 
 
 class RobolinkError(Exception):
@@ -52,6 +57,11 @@ class RobolinkError(Exception):
         controller: Identity or URL of the controller concerned, without any password.
         request: The request under way, as it may be shown to a person.
         raw: The bytes that were read and could not be used.
+
+    Attributes:
+        controller_state: What stands on the controller now, of what was done to it in the block
+            that this error ended: a write, a change, a procedure or a whole connection, whichever
+            was the outermost that it has left.
     """
 
     def __init__(
@@ -64,6 +74,7 @@ class RobolinkError(Exception):
         raw: bytes = b"",
     ) -> None:
         super().__init__(what)
+        self.controller_state: Standing = UNTOUCHED
         self.what = what
         self.remedy = remedy
         self.controller = controller
@@ -126,6 +137,15 @@ class RemoteProtocolError(ProtocolError):
     """The far side sent something that makes no sense. The session is over."""
 
 
+class UnclearAnswerError(ProtocolError):
+    """An answer in its place that says neither that a command ran nor that it was refused.
+
+    One garbled character makes it (``#Execute,1``), and so does a controller that gives up a
+    statement half-way without an error state (``!Execute,99``). The session goes on, so what
+    became of the command can be read.
+    """
+
+
 class ControllerError(RobolinkError):
     """The controller, or a check of its state, said no.
 
@@ -173,6 +193,8 @@ class NotReadyReason(StrEnum):
     WRONG_TOOL = "wrong_tool"
     NO_REMOTE_TIMEOUT = "no_remote_timeout"
     EDGE_PASSED = "edge_passed"
+    DRY_RUN = "dry_run"
+    VIRTUAL_IO = "virtual_io"
 
 
 class NotReadyError(ControllerError):
@@ -227,6 +249,14 @@ class OutcomeUnknownError(RobolinkError):
     """A command went out and no answer came: it may or may not have run.
 
     Motion on that controller is blocked until ``resolve``; nothing is sent again.
+    """
+
+
+class StoppedError(RobolinkError):
+    """A stop came: from another thread, another terminal or a person.
+
+    What was under way was ended by it, and nothing that moves or writes leaves this process
+    until the stop is released.
     """
 
 

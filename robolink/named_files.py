@@ -1,6 +1,8 @@
-"""Files that a person named: never written over unasked, whole or not there at all."""
+"""Files that a person named: read only when they are files, never written over unasked."""
 
+import errno
 import os
+import stat
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Final
@@ -9,7 +11,34 @@ from robolink.durable_files import sync_folder, write_whole
 from robolink.errors import ConfigError
 from robolink.messages import tr
 
+MOST_BYTES: Final = 4_000_000
+"""No cell file, recipe, map, backup or list of poses is nearly as long."""
+
 _ANYONE: Final = 0o666
+
+
+def read_named(path: Path, *, most_bytes: int = MOST_BYTES) -> bytes:
+    """Return what is in a regular file; nothing is waited for and no memory filled by another.
+
+    A pipe would be waited on for ever, and a device may never end: a mistake in a name must not
+    hold up a command on which a person, or a machine, waits.
+
+    Args:
+        path: The file; a link is followed.
+        most_bytes: Longest file that is read.
+
+    Raises:
+        OSError: It cannot be read, is no regular file, or is too long; ``strerror`` says which in
+            a person's language. The caller says which file, and what it is for.
+    """
+    descriptor = os.open(path, os.O_RDONLY | _AT_ONCE)
+    with os.fdopen(descriptor, "rb") as file:
+        if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+            raise OSError(errno.EINVAL, tr("it is no regular file"))
+        data = file.read(most_bytes + 1)
+    if len(data) > most_bytes:
+        raise OSError(errno.EFBIG, tr("it is longer than {most:g} MB", most=most_bytes / 1_000_000))
+    return data
 
 
 def require_free(path: Path, *, replace: bool = False) -> None:
@@ -41,6 +70,12 @@ def save_named(path: Path, data: bytes | Iterable[bytes], *, replace: bool = Fal
         raise _taken(path) from error
     except OSError as error:
         raise _unwritable(path, str(error.strerror or error)) from error
+
+
+_AT_ONCE: Final = (
+    getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOCTTY", 0) | getattr(os, "O_BINARY", 0)
+)
+"""Opening a pipe that nobody writes to does not wait, and a terminal does not become ours."""
 
 
 def _taken(path: Path) -> ConfigError:

@@ -1,8 +1,41 @@
 """What all tests have in common."""
 
+import gc
+import os
+import signal
 import sys
 
 import pytest
+
+# Before anything imports numpy: threads for matrices of six rows cost far more than they bring,
+# the more so the more cores a machine has.
+for _library in ("OPENBLAS", "OMP", "MKL"):
+    os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
+
+
+def pytest_sessionstart():
+    """Let Ctrl-C interrupt: a shell starts what runs in the background with it ignored."""
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def pytest_collection_modifyitems(config, items):
+    """Leave out what ``make soak`` is for, unless the command line speaks of it."""
+    # Two processes share the tests by their names, so a name may hold no address in memory.
+    if changing := [item.nodeid for item in items if " at 0x" in item.nodeid]:
+        raise pytest.UsageError(f"give this test ids that are alike in each run: {changing[0]}")
+    if "soak" in config.option.markexpr:
+        return
+    left_out = [item for item in items if item.get_closest_marker("soak")]
+    if left_out:
+        config.hook.pytest_deselected(items=left_out)
+        items[:] = [item for item in items if not item.get_closest_marker("soak")]
+
+
+def pytest_collection_finish():
+    """Leave thousands of collected tests out of each later search for garbage."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture(autouse=True)

@@ -1,5 +1,5 @@
 """``python -m robolink_cli`` does what ``robolink`` does."""
 
-from robolink_cli.main import main
+from robolink_cli.entry import main
 
 main()

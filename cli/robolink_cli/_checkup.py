@@ -128,6 +128,7 @@ def check_journal() -> Iterator[Remark]:
         return
     yield Remark("journal", Level.OK, journal.location)
     for identity, marker in unsettled:
+        where = next(iter(journal.addresses_of(identity)), identity)
         yield Remark(
             "unsettled",
             Level.WARN,
@@ -137,7 +138,7 @@ def check_journal() -> Iterator[Remark]:
                 when=marker.begun_at,
                 request=marker.request,
             ),
-            tr("Run: robolink -c {identity} recover", identity=identity),
+            journal.log(identity).at_work() or tr("Run: robolink -c {where} recover", where=where),
         )
     if not unsettled:
         yield Remark("unsettled", Level.OK, tr("nothing was left unfinished."))

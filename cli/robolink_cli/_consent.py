@@ -8,7 +8,7 @@ import click
 
 from robolink.errors import DeclinedError
 from robolink.messages import tr
-from robolink_cli._context import WATCHED
+from robolink_cli._context import REACHED, WATCHED
 
 if TYPE_CHECKING:
     from robolink.model import Controller
@@ -58,8 +58,14 @@ def agree_to_motion(question: str, *, yes: bool) -> None:
     """Ask before the robot moves; without a terminal only ``--yes`` is consent.
 
     Raises:
+        StoppedError: Somebody stopped this controller, and nobody has released it since.
         DeclinedError: The answer was no, or nobody could be asked.
     """
+    controller = click.get_current_context().meta.get(REACHED)
+    if controller is not None:
+        from robolink_cli._stop_notes import heed_stop
+
+        heed_stop(controller, yes=yes)
     if yes:
         return
     if not on_terminal():
@@ -73,8 +79,15 @@ def agree_to_motion(question: str, *, yes: bool) -> None:
 def motion_question(
     controller: "Controller", purpose: str, *, speed_mm_s: float, box_mm: float
 ) -> str:
-    """Return the question before something moves: what, how fast, how far, what for."""
-    terms = controller.groups[0].terms()
+    """Return the question before something moves: what, how fast, how far, what for.
+
+    Raises:
+        NotReadyError: Nothing can move now, for example because the motors are off; nobody is
+            asked then.
+    """
+    group = controller.groups[0]
+    group.require_able(purpose)
+    terms = group.terms()
     return tr(
         "{who} will move at most {speed:g} mm/s fast, within {box:g} mm, {purpose}. {watch} "
         "Is the cell clear?",
@@ -87,21 +100,44 @@ def motion_question(
 
 
 def asked(question: str) -> bool:
-    """Ask with a prompt that can be polled, and read the status between polls.
+    """Ask for a yes; anything else is a no (:func:`robolink.runner.ask_yes_no` says what is)."""
+    from robolink.runner import ask_yes_no
+    from robolink_cli._operator import terminal
+
+    return ask_yes_no(terminal(), question, _answer)
+
+
+def asked_for_text(question: str) -> str:
+    """Ask for a line of text.
+
+    Raises:
+        DeclinedError: None was typed, or ``q``.
+    """
+    from robolink.runner import Question
+    from robolink_cli._operator import terminal
+
+    terminal().ask(question, Question.TEXT)
+    text = _answer().strip()
+    if text in ("", "q"):
+        raise DeclinedError(tr("No answer was given."), remedy=tr("Nothing was sent."))
+    return text
+
+
+def _answer() -> str:
+    """Return the next line, reading the status between polls of the prompt.
 
     An idle client is cut off after the remote time-out (epson.md 1.1), and a person may take
     longer than that to look into the cell.
     """
-    from robolink.runner import POLL_S, Question
+    from robolink.runner import POLL_S
     from robolink_cli._operator import terminal
 
     controller = click.get_current_context().meta.get(WATCHED)
     operator = terminal()
-    operator.ask(question, Question.YES_NO)
     while (line := operator.poll(POLL_S)) is None:
         if controller is not None:
             controller.status()
-    return line.strip().lower() in ("y", "yes")
+    return line
 
 
 def _require_yes(question: str) -> None:

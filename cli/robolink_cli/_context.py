@@ -1,7 +1,7 @@
 """What every command that talks to a controller has in common."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from functools import wraps
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -11,25 +11,31 @@ import click
 import robolink
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink.standing import UNTOUCHED, note_standing, standing_after
 from robolink_cli._cell import (
     is_cell_name,
     link_options,
     require_expected_robot,
 )
-from robolink_cli._notices import note_unsettled
+from robolink_cli._notices import note_at_work, note_unsettled
 from robolink_cli._people import signature_of
 from robolink_cli._recording import recording
 from robolink_cli._render import emit_json, json_is_on, note, say
 from robolink_cli._shared_options import GIVEN, shared_options
 from robolink_cli._shared_options import json_option as json_option
 from robolink_cli._shared_options import origin_of as origin_of
+from robolink_cli._stop_request import StopRequest
+from robolink_cli._stopping_beside import listening_for_stop, remember_address
 
 if TYPE_CHECKING:
     from robolink.config import Cell
-    from robolink.model import Controller, OutcomeLog, Secret
+    from robolink.model import Controller, Marker, Secret
 
 WATCHED = "robolink.watched"
 """Where a prompt finds the controller whose status it must read while a person thinks."""
+
+REACHED = "robolink.reached"
+"""Where it finds by which URL that controller was reached."""
 
 
 class CliContext(NamedTuple):
@@ -46,6 +52,7 @@ class CliContext(NamedTuple):
         nozzle: Id of the nozzle or needle that is mounted.
         lot: Its lot.
         station: Name of the station where it is measured.
+        doubt: What is wrong with the cell files, when they were not needed so far.
     """
 
     url: str | None = None
@@ -58,6 +65,7 @@ class CliContext(NamedTuple):
     nozzle: str = ""
     lot: str = ""
     station: str = ""
+    doubt: ConfigError | None = None
 
     def with_nozzle(self, nozzle: str | None, lot: str | None) -> "CliContext":
         """Return the same with what is mounted, for the record."""
@@ -89,15 +97,38 @@ class CliContext(NamedTuple):
         note(text)
 
     def emit(self, kind: str, payload: Mapping[str, object], show: Callable[[], None]) -> None:
-        """Give the result: the document ``robolink/KIND/1`` to a machine, else ``show()``."""
-        if self.json:
-            emit_json(f"robolink/{kind}/1", payload)
-        else:
-            show()
+        """Give the result; see :func:`emit`."""
+        emit(kind, payload, show)
 
     def show_requests(self, requests: Sequence[str]) -> None:
-        """Give the requests that a dry run would have sent, as they stand on the wire."""
-        self.emit("dry-run", {"requests": list(requests)}, lambda: say("\n".join(requests)))
+        """Give the requests of a dry run; see :func:`show_requests`."""
+        show_requests(requests)
+
+
+def emit(kind: str, payload: Mapping[str, object], show: Callable[[], None]) -> None:
+    """Give the result: the document ``robolink/KIND/1`` to a machine, else ``show()``."""
+    if json_is_on():
+        emit_json(f"robolink/{kind}/1", payload)
+    else:
+        show()
+
+
+def show_requests(requests: Sequence[str]) -> None:
+    """Give the requests that a dry run would have sent, as they stand on the wire."""
+    emit("dry-run", {"requests": list(requests)}, lambda: say("\n".join(requests)))
+
+
+def stop_request() -> StopRequest:
+    """Return what a command that must not depend on any file was told."""
+    given = click.get_current_context().meta.get(GIVEN, {})
+    return StopRequest(
+        named=given.get("url") or "",
+        json=json_is_on(),
+        password_file=given.get("password_file") or "",
+        timeout_s=given.get("timeout_s", 3.0),
+        operator=given.get("operator") or "",
+        record=given.get("record") or "",
+    )
 
 
 def controller_options(command: Callable[..., int | None]) -> Callable[..., int | None]:
@@ -114,12 +145,28 @@ def controller_options(command: Callable[..., int | None]) -> Callable[..., int 
     return shared_options(with_context)
 
 
+def calming_options(command: Callable[..., int | None]) -> Callable[..., int | None]:
+    """As :func:`controller_options`, for a command that looks or calms.
+
+    It is not kept from a person by a cell file: where that is wrong, the address is taken from
+    it, or from the last connection, and what is wrong is said.
+    """
+
+    @wraps(command)
+    def with_context(*args: object, **kwargs: object) -> int | None:
+        given = click.get_current_context().meta.get(GIVEN, {})
+        return command(_calming_context_from(given), *args, **kwargs)
+
+    return shared_options(with_context)
+
+
 @contextmanager
 def open_controller(
     context: CliContext,
     *,
     quiet: bool = False,
-    any_robot: bool = False,
+    looks: bool = False,
+    calms: bool = False,
     changes: bool = False,
 ) -> "Iterator[Controller]":
     """Connect to the controller and, unless ``quiet``, say what was left unfinished there.
@@ -127,8 +174,9 @@ def open_controller(
     Args:
         context: What the command was told.
         quiet: Whether the command itself deals with what was left unfinished.
-        any_robot: Whether it goes on at once, without a look at the model that the cell file
-            names, without a question, and without a journal if it must.
+        looks: Whether it only looks, so that no file keeps it back: without a journal if it
+            must, and whatever robot the cell file names.
+        calms: Whether it calms, so that it goes on as one that looks, and asks nothing.
         changes: Whether it may change something, so that a badge is asked for where the cell
             names people.
 
@@ -137,9 +185,12 @@ def open_controller(
             not the cell's.
         ConnectError: It is not reached.
         LoginRefusedError: Wrong or missing password.
+        StoppedError: A stop came, at the end or before.
     """
     url = context.require_url()
-    named = context.cell.name if context.cell else url
+    unhindered = looks or calms
+    if context.doubt is not None and not unhindered:
+        raise context.doubt
     password = password_of(context)
     signature = replace(
         signature_of(context.operator, context.cell, changes=changes),
@@ -148,6 +199,7 @@ def open_controller(
         station=context.station,
     )
     with (
+        _only_what_was_touched(always=changes),
         recording(context.record, url.partition("?")[0]) as trace,
         robolink.connect(
             url,
@@ -156,24 +208,66 @@ def open_controller(
             remote_timeout_s=context.remote_timeout_s,
             trace=trace,
             signature=signature,
-            outcomes=_journal_or_memory(url) if any_robot else None,
         ) as controller,
+        nullcontext() if calms else controller.latch.ending(tr("The command")),
     ):
-        click.get_current_context().meta[WATCHED] = controller
-        found = controller.outcomes.open_markers()
-        if not quiet:
-            note_unsettled(controller, found, named)
-        if context.cell and not any_robot:
-            require_expected_robot(controller, context.cell)
-        if found and not quiet and not any_robot:
-            from robolink_cli._offering import offer_to_restore
-
-            offer_to_restore(controller, found)
-        try:
+        click.get_current_context().meta.update({WATCHED: controller, REACHED: url})
+        remember_address(context)
+        with (
+            listening_for_stop(controller, context),
+            _saying_what_is_left(controller, context, quiet=quiet, looks=looks, calms=calms),
+        ):
             yield controller
-        finally:
-            left = controller.outcomes.open_markers()
-            note_unsettled(controller, [m for m in left if m not in found], named)
+    if not unhindered:
+        # A stop that came while the connection was closed: nobody may take this for a success.
+        controller.latch.require_open(tr("The command"))
+
+
+@contextmanager
+def _saying_what_is_left(
+    controller: "Controller", context: CliContext, *, quiet: bool, looks: bool, calms: bool
+) -> Iterator[None]:
+    """Say before the work what others left on the controller, and after it what this left.
+
+    Raises:
+        RobolinkError: The journal or the robot is not as the command needs it.
+    """
+    named = context.cell.name if context.cell else context.require_url()
+    lenient = looks or calms
+    trouble = controller.outcomes.trouble
+    if trouble is not None and not lenient:
+        raise trouble
+    found = _open_markers(controller, lenient=lenient)
+    for remark in controller.outcomes.remarks:
+        note(remark)
+    beside = not quiet and note_at_work(controller.outcomes, named)
+    if not (quiet or beside):
+        note_unsettled(controller, found, named)
+    if context.cell and not calms:
+        _check_robot(controller, context.cell, looks=looks)
+    if found and not (quiet or calms or beside):
+        from robolink_cli._offering import offer_to_restore
+
+        offer_to_restore(controller, found)
+    try:
+        yield
+    finally:
+        left = _open_markers(controller, lenient=lenient)
+        note_unsettled(controller, [m for m in left if m not in found], named)
+        if trouble is not None:
+            # After the work: nothing that the journal has to say stands before it.
+            note(f"{trouble.what} {_unrecorded()}")
+
+
+@contextmanager
+def _only_what_was_touched(*, always: bool) -> Iterator[None]:
+    """Let an error tell what stands on the controller, if the command might have changed it."""
+    try:
+        yield
+    except BaseException as error:
+        if not always and standing_after(error).untouched:
+            note_standing(error, UNTOUCHED)
+        raise
 
 
 def password_of(context: CliContext) -> "Secret | None":
@@ -194,6 +288,15 @@ def password_of(context: CliContext) -> "Secret | None":
     )
 
 
+def _check_robot(controller: "Controller", cell: "Cell", *, looks: bool) -> None:
+    try:
+        require_expected_robot(controller, cell)
+    except ConfigError as error:
+        if not looks:
+            raise
+        note(str(error))
+
+
 def _context_from(given: Mapping[str, Any]) -> CliContext:
     name = given.get("url")
     if name is None or not is_cell_name(name):
@@ -204,15 +307,38 @@ def _context_from(given: Mapping[str, Any]) -> CliContext:
     return CliContext(**{**link_options(cell), **given, "url": cell.url, "cell": cell})
 
 
-def _journal_or_memory(url: str) -> "OutcomeLog | None":
-    """Return ``None`` for the journal, or a log in memory where the journal is out of order."""
+def _calming_context_from(given: Mapping[str, Any]) -> CliContext:
+    try:
+        return _context_from(given)
+    except ConfigError as error:
+        name = given.get("url")
+        if name is None or not is_cell_name(name):
+            raise
+        from robolink.config import reach_cell
+
+        try:
+            reach = reach_cell(name)
+        except ConfigError:
+            raise error from None
+        note(reach.doubt or error.what)
+        password_file = given.get("password_file") or reach.password_file or None
+        return CliContext(
+            **{**given, "url": reach.url, "password_file": password_file, "doubt": error}
+        )
+
+
+def _unrecorded() -> str:
+    return tr("So what is unfinished may not show, and nothing can be changed until it is mended.")
+
+
+def _open_markers(controller: "Controller", *, lenient: bool) -> "tuple[Marker, ...]":
+    """Return what is unsettled; a journal that broke meanwhile keeps nobody from looking."""
     from robolink.errors import JournalError
-    from robolink.journal import default_location, may_exist, memory_journal, open_journal
 
     try:
-        if may_exist(default_location()):
-            open_journal()
+        return controller.outcomes.open_markers()
     except JournalError as error:
-        note(str(error))
-        return memory_journal(url).log(url)
-    return None
+        if not lenient:
+            raise
+        note(error.what)
+        return ()

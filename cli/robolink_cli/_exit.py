@@ -1,38 +1,43 @@
-"""The one place where errors become exit codes and text.
+"""The one place where errors become exit codes and text."""
 
-====  =====================================================================
-code  meaning
-====  =====================================================================
-0     done
-1     ``compare`` found a difference
-2     usage or configuration is wrong; nothing was sent
-3     the controller is not reached, or the link broke
-4     the two sides do not understand each other
-5     the controller, or a check of its state, said no
-6     outcome unknown: sent, not answered
-7     the measurements do not support a result
-8     verification failed; the old value was put back
-9     a person declined
-70    a defect in robolink
-130   interrupted
-141   whoever read the output has left
-====  =====================================================================
-"""
-
+import io
 import os
-import sys
 from typing import Final
 
 import click
 
 from robolink import errors
 from robolink.messages import tr
+from robolink.standing import standing_after
 from robolink_cli._render import dumps
+from robolink_cli._sink import hand_over, show
+from robolink_cli._standing import standing_payload, tell_standing
 
+DONE: Final = 0
+DIFFERENT: Final = 1
 USAGE: Final = 2
+UNKNOWN: Final = 6
 BUG: Final = 70
 INTERRUPTED: Final = 130
 READER_LEFT: Final = 141
+
+MEANINGS: Final[dict[int, str]] = {
+    DONE: "done",
+    DIFFERENT: "`compare` found a difference; `journal verify` found a damaged record",
+    USAGE: "the command, a file, a setting or the journal is wrong",
+    3: "the controller is not reached, or the link broke",
+    4: "the two sides do not understand each other",
+    5: "the controller, or a check of its state, said no",
+    UNKNOWN: "a write or a movement stands unproved; `robolink recover` comes next",
+    7: "the measurements do not support a result",
+    8: "the proof failed; the old value was put back",
+    9: "a person said no, or was not there to say yes",
+    10: "a stop ended it",
+    BUG: "a defect in robolink",
+    INTERRUPTED: "interrupted (Ctrl-C)",
+    READER_LEFT: "whoever read the output has left",
+}
+"""What each exit code says; docs/exit-codes.md has the same table."""
 
 # The first class that fits decides. A tool number that does not exist is a mistake in the
 # command (2). A tool that was changed meanwhile, is undefined, or did not keep what was
@@ -41,7 +46,8 @@ EXIT_CODES: Final[tuple[tuple[type[errors.RobolinkError], int], ...]] = (
     (errors.DeclinedError, 9),
     (errors.VerifyError, 8),
     (errors.CalibrationError, 7),
-    (errors.OutcomeUnknownError, 6),
+    (errors.OutcomeUnknownError, UNKNOWN),
+    (errors.StoppedError, 10),
     (errors.ToolIndexError, USAGE),
     (errors.ReservedToolError, USAGE),
     (errors.ToolError, 5),
@@ -53,7 +59,13 @@ EXIT_CODES: Final[tuple[tuple[type[errors.RobolinkError], int], ...]] = (
 
 
 def exit_code(error: BaseException) -> int:
-    """Return the exit code that ``error`` stands for."""
+    """Return the exit code that ``error`` stands for.
+
+    What it left on the controller comes first: where a write or a movement may stand unproved,
+    it is 6 whatever broke afterwards.
+    """
+    if not standing_after(error).settled:
+        return UNKNOWN
     if isinstance(error, (KeyboardInterrupt, EOFError, click.Abort)):
         return INTERRUPTED
     if isinstance(error, click.ClickException):
@@ -67,16 +79,20 @@ def report(error: BaseException, *, as_json: bool) -> int:
     if os.environ.get("ROBOLINK_DEBUG"):
         import traceback  # here, because --help needs none
 
-        traceback.print_exception(error)
+        show("".join(traceback.format_exception(error)), beside=True)
     if as_json:
-        click.echo(error_document(error))
+        hand_over(error_document(error))
     elif isinstance(error, click.ClickException):
-        error.show(file=sys.stderr)
+        usage = io.StringIO()
+        error.show(file=usage)  # it repeats what was typed
+        show(usage.getvalue().rstrip("\n"), beside=True)
     else:
         what, remedy = _sentences(error)
-        click.echo(f"robolink: {what}", file=sys.stderr)
+        show(f"robolink: {what}", beside=True)
         if remedy:
-            click.echo(f"  {remedy}", file=sys.stderr)
+            show(f"  {remedy}", beside=True)
+    if not as_json:
+        tell_standing(standing_after(error))
     return code
 
 
@@ -89,12 +105,15 @@ def error_body(error: BaseException) -> dict[str, object]:
     """Return what is known about ``error``, as plain JSON."""
     what, remedy = _sentences(error)
     ours = isinstance(error, errors.RobolinkError)
+    standing = standing_after(error)
     return {
         "kind": type(error).__name__,
         "what": what,
         "remedy": remedy,
         "reason": getattr(error, "reason", None) if ours else None,
         "code": (getattr(error, "code", None) or None) if ours else None,
+        "controller_state": standing.effect,
+        "stands": standing_payload(standing),
     }
 
 

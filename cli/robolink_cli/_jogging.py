@@ -1,5 +1,7 @@
 """Jogging through the runner, so that its limits and its watch hold."""
 
+from dataclasses import replace
+
 from robolink.messages import tr
 from robolink.model import Controller, MotionProfile, Pose, WorkBox
 from robolink.runner import Operator, Runner, RunSettings, ask_for_pose, jog_target
@@ -11,7 +13,7 @@ from robolink_cli._render import say
 
 def jog_by_steps(controller: Controller, steps: str, speed_mm_s: float, box_mm: float) -> Pose:
     """Make one move of ``steps`` and return where the tool is then."""
-    return _runner(controller, TerminalOperator(_silent), speed_mm_s, box_mm).jog(steps)
+    return _runner(controller, TerminalOperator(say), speed_mm_s, box_mm).jog(steps)
 
 
 def jog_on_terminal(controller: Controller, speed_mm_s: float, box_mm: float) -> Pose:
@@ -23,7 +25,8 @@ def jog_on_terminal(controller: Controller, speed_mm_s: float, box_mm: float) ->
 def jog_by_keys(controller: Controller, keys: Keyboard, speed_mm_s: float, box_mm: float) -> Pose:
     """Let a person jog by keys until q or ENTER, and return where the tool is then."""
     group = controller.groups[0]
-    settings = _settings(group.pose(), speed_mm_s, box_mm)
+    # The operator of the keys shows after each step where the tool is, and the size of steps.
+    settings = replace(_settings(group.pose(), speed_mm_s, box_mm), tell_jogs=False)
     operator = KeyOperator(keys, group.pose, settings.box, say)
     return Runner(controller, group, operator, settings).run(ask_for_pose(tr("Jog the tool.")))
 
@@ -46,7 +49,3 @@ def _runner(controller: Controller, operator: Operator, speed_mm_s: float, box_m
 def _settings(start: Pose, speed_mm_s: float, box_mm: float) -> RunSettings:
     box = WorkBox.around(start, xy_mm=box_mm, below_mm=box_mm, above_mm=box_mm)
     return RunSettings(box, speed_mm_s=speed_mm_s)
-
-
-def _silent(text: str) -> None:
-    """Show nothing: the result is shown by the command."""

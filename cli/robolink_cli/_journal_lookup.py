@@ -34,7 +34,9 @@ def journal_to_read() -> "Journal":
 
 
 def controller_meant(named: str | None) -> str | None:
-    """Return the identity of the controller that was named here or before the command.
+    """Return the address of the controller that was named here or before the command.
+
+    The journal knows who was met there last.
 
     Args:
         named: A cell or a URL; ``None`` for what ``robolink -c`` said.
@@ -51,7 +53,7 @@ def controller_meant(named: str | None) -> str | None:
         from robolink.config import find_cell
 
         chosen = find_cell(chosen).url
-    return parse_url(chosen).identity
+    return parse_url(chosen).address
 
 
 def entries_named(journal: "Journal", name: str) -> "list[Recorded]":
@@ -82,7 +84,9 @@ def entries_of_change(
         JournalError: The journal cannot be read.
     """
     entry = _entry_numbered(journal, name)
-    wanted = id_of_change(entry) if entry and controller in (None, entry.controller) else ""
+    names = None if controller is None else journal.names_of(controller)
+    meant = entry is not None and (names is None or entry.controller in names)
+    wanted = id_of_change(entry) if entry and meant else ""
     if not wanted:
         wanted = change_named(journal.entries(controller=controller), name)
     found = list(journal.entries(controller=controller, change=wanted, newest_first=False))

@@ -61,6 +61,13 @@ def show_list(entries: Sequence[Recorded], *, all_controllers: bool) -> None:
     """Print entries as a table."""
     if not entries:
         say(tr("The journal has no such entry."))
+        if not all_controllers:
+            say(
+                tr(
+                    "It knows a controller by the addresses at which it was met: 'robolink -c URL "
+                    "status' makes one known."
+                )
+            )
         return
     columns = [tr("number"), tr("time (UTC)"), tr("change"), tr("tool"), tr("kind")]
     columns += [tr("value or verdict"), tr("who")]

@@ -9,6 +9,7 @@ from robolink.model import Pose, WorkBox
 from robolink.runner import POLL_S, Question
 from robolink_cli._keyboard import Keyboard
 from robolink_cli._keys import Key
+from robolink_cli._lines import QUIET_S
 from robolink_cli._render import note
 
 STEPS: Final = (0.01, 0.1, 1.0, 5.0)
@@ -26,18 +27,32 @@ _AXES: Final = {
 }
 _SIZES: Final = {Key.PLUS: 1, Key.MINUS: -1}
 
+_BURST: Final = 30
+"""So many keys are waited out before a question: one that is held down never ends."""
+
 
 def agree_by_key(question: str, keys: Keyboard, *, watch: Callable[[], object]) -> None:
     """Ask for y or n, calling ``watch`` meanwhile; the line prompt would keep the input.
 
+    What was pressed before counts for nothing; what is neither, or comes in a burst as from a
+    scanner, is asked once more and is a no then.
+
     Raises:
-        DeclinedError: Any key but y, or the terminal is gone.
+        DeclinedError: It was not a y, or the terminal is gone.
     """
-    note(tr("{question} [y or n]", question=question))
-    while not (pressed := _read(keys, POLL_S)):
-        watch()
-    if pressed != [Key.YES]:
-        raise DeclinedError(tr("You said no."), remedy=tr("Nothing was sent."))
+    for _ in range(2):
+        for _dropped in range(_BURST):
+            if not _read(keys, QUIET_S):
+                break
+        note(tr("{question} [y or n]", question=question))
+        while not (pressed := _read(keys, POLL_S)):
+            watch()
+        pressed += _read(keys, QUIET_S)
+        if pressed == [Key.YES]:
+            return
+        if Key.NO in pressed:
+            break
+    raise DeclinedError(tr("You said no."), remedy=tr("Nothing was sent."))
 
 
 class KeyOperator:

@@ -35,6 +35,8 @@ PLAIN: Final = {
     "-": Key.MINUS,
     "y": Key.YES,
     "Y": Key.YES,
+    "j": Key.YES,
+    "J": Key.YES,
     "n": Key.NO,
     "N": Key.NO,
     "q": Key.END,

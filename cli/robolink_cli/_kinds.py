@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from robolink.controllers.softmotion import SoftMotionController
     from robolink.model import Controller, DigitalIo
     from robolink.nozzle_change import PointReader
+    from robolink.protocols.epson_text import Preference
 
 
 def require_epson(controller: "Controller", what: str) -> "EpsonController":
@@ -64,6 +65,13 @@ def io_of(controller: "Controller") -> "DigitalIo":
     if io is None:
         raise _without(controller, tr("inputs and outputs"))
     return io
+
+
+def preferences_of(controller: "Controller") -> "frozenset[Preference] | None":
+    """Return the preferences set in a controller, ``None`` for one that does not tell."""
+    from robolink.controllers.epson import EpsonController
+
+    return controller.preferences() if isinstance(controller, EpsonController) else None
 
 
 def _without(controller: "Controller", what: str) -> ConfigError:

@@ -1,5 +1,6 @@
 """What a person must know about something that was begun and not proved finished."""
 
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from robolink.messages import tr
@@ -8,7 +9,7 @@ from robolink_cli._render import note
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from robolink.model import Controller, Marker, ToolOffset
+    from robolink.model import Controller, Marker, OutcomeLog, ToolOffset
 
 
 def note_unsettled(controller: "Controller", markers: "Sequence[Marker]", url: str) -> None:
@@ -21,13 +22,33 @@ def note_unsettled(controller: "Controller", markers: "Sequence[Marker]", url: s
     """
     from robolink.model import MarkerKind
 
-    if not markers:
+    if not markers or note_at_work(controller.outcomes, url):
         return
     for marker in markers:
         if marker.kind is MarkerKind.SELECTION:
             note(_unfinished(marker, url, _selected_now(controller, marker)))
         else:
             note(marker_notice(marker, url))
+
+
+def note_at_work(outcomes: "OutcomeLog", url: str) -> bool:
+    """Say who else is working on a controller; return whether somebody is.
+
+    What is open then is not left behind: whoever began it puts it back himself.
+    """
+    from robolink.errors import JournalError
+
+    working = ""
+    with suppress(JournalError):
+        working = outcomes.at_work()
+    if working:
+        what = tr(
+            "What it has begun it ends itself; there is nothing to recover. Wait for it, or "
+            "'robolink -c {url} stop'.",
+            url=url,
+        )
+        note(f"{working}\n  {what}")
+    return bool(working)
 
 
 def marker_notice(marker: "Marker", url: str) -> str:
@@ -44,7 +65,7 @@ def marker_notice(marker: "Marker", url: str) -> str:
             url=url,
         )
     return tr(
-        "Sent {when} and never answered: {request}. It may or may not have run, so motion is "
+        "Sent {when} without a clear answer: {request}. It may or may not have run, so motion is "
         "blocked.\n  'robolink -c {url} recover' settles what reading can, 'resolve' the rest.",
         when=marker.begun_at,
         request=marker.request,
@@ -54,11 +75,14 @@ def marker_notice(marker: "Marker", url: str) -> str:
 
 def note_change(controller: "Controller", tool: int, now: "ToolOffset | None") -> None:
     """Say when a tool does not hold what was last proved to be in it, and the usual causes."""
+    from robolink.errors import JournalError
     from robolink.transaction import changed_since
 
-    change = changed_since(controller, tool, now)
-    if change is not None:
-        note(change.sentence)
+    # What is wrong with the journal is said once, when the command is done.
+    with suppress(JournalError):
+        change = changed_since(controller, tool, now)
+        if change is not None:
+            note(change.sentence)
 
 
 def _selected_now(controller: "Controller", marker: "Marker") -> str:

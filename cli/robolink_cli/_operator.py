@@ -1,9 +1,6 @@
 """The person at the terminal, and the simulator's stand-in for one."""
 
 import math
-import queue
-import sys
-import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
@@ -12,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 from robolink.errors import DeclinedError
 from robolink.messages import tr
 from robolink.runner import Operator, Question
+from robolink_cli._lines import QUIET_S, Lines, open_lines
 from robolink_cli._render import note
 
 if TYPE_CHECKING:
@@ -20,29 +18,33 @@ if TYPE_CHECKING:
 WAY_MM: Final = 60.0
 """How far the stand-in jogs to show an axis."""
 
+MOST_STEPS: Final = 300
+"""So many answers to one question are enough for 1.5 m of jogging: the stand-in gives up then."""
+
 
 class TerminalOperator:
     """Asks on the terminal, with a prompt that can be polled.
 
-    Lines are read by a thread of its own, so that the caller can look after the controller
-    while the person takes their time; ``input()`` could not be left.
+    The caller can look after the controller while the person takes their time; ``input()`` could
+    not be left. What was typed before something was shown is no answer to it: see :mod:`._lines`.
     """
 
     def __init__(self, show: Callable[[str], None]) -> None:
         self._show = show
-        self._lines: queue.SimpleQueue[str | None] = queue.SimpleQueue()
-        self._reader: threading.Thread | None = None
+        self._lines: Lines | None = None
 
     def tell(self, text: str) -> None:
         """Show a line."""
+        if self._lines is not None:
+            self._forget(0.0)
         self._show(text)
 
     def ask(self, question: str, kind: Question) -> None:
         """Show what is wanted and how to answer."""
+        if self._lines is None:
+            self._lines = open_lines()
+        self._forget(QUIET_S)
         self._show(f"{question} [{_how(kind)}]")
-        if self._reader is None:
-            self._reader = threading.Thread(target=self._read, name="prompt", daemon=True)
-            self._reader.start()
 
     def poll(self, wait_s: float) -> str | None:
         """Return the next line; the end of input counts as a no.
@@ -50,23 +52,20 @@ class TerminalOperator:
         Raises:
             DeclinedError: There is nobody to answer.
         """
+        assert self._lines is not None  # noqa: S101 - a question is shown before it is answered
         try:
-            line = self._lines.get(timeout=wait_s)
-        except queue.Empty:
-            return None
-        if line is None:
+            return self._lines.next(wait_s)
+        except EOFError as error:
             raise DeclinedError(
                 tr("The input ended before the question was answered."),
                 remedy=tr("Run it on a terminal, or with --assist on a simulator."),
-            )
-        return line
+            ) from error
 
-    def _read(self) -> None:
-        try:
-            for line in sys.stdin:
-                self._lines.put(line)
-        finally:
-            self._lines.put(None)
+    def _forget(self, quiet_s: float) -> None:
+        assert self._lines is not None  # noqa: S101 - looked at by whoever calls
+        for line in self._lines.forget(quiet_s):
+            if line.strip():
+                self._show(tr("Typed too early, so it was not taken: {line!r}", line=line))
 
 
 def _how(kind: Question) -> str:
@@ -116,6 +115,7 @@ class AssistedOperator:
         self._satisfied_mm = satisfied_mm
         self._kind = Question.PLACE
         self._ahead: list[str] = []
+        self._answers = 0
 
     def tell(self, text: str) -> None:
         """Echo a line."""
@@ -124,11 +124,25 @@ class AssistedOperator:
     def ask(self, question: str, kind: Question) -> None:
         """Echo the question."""
         self._kind = kind
+        self._answers = 0
         self._ahead = list(self._steps_along(kind))
         self._show(question)
 
     def poll(self, wait_s: float) -> str | None:  # noqa: ARG002 - it answers at once
-        """Answer: the jog steps still needed, or done."""
+        """Answer: the jog steps still needed, or done.
+
+        Raises:
+            DeclinedError: It has answered this question so often that it will never get there.
+        """
+        self._answers += 1
+        if self._answers > MOST_STEPS:
+            raise DeclinedError(
+                tr(
+                    "The simulated operator did not get there in {count} steps.",
+                    count=MOST_STEPS,
+                ),
+                remedy=tr("Look where pin and tip are: robolink sim assist URL truth"),
+            )
         if self._kind is Question.YES_NO:
             return "y"
         if self._kind is Question.TEXT:

@@ -32,17 +32,31 @@ def find_password(
     Raises:
         ConfigError: The file cannot be read, or others than its owner may read it.
     """
-    stored = _from_keyring(identity)
+    stored = from_keyring(identity)
     if stored is not None:
         return stored
     path = password_file or os.environ.get("ROBOLINK_PASSWORD_FILE") or cell_file
+    return from_places(path, cell_variable)
+
+
+def from_places(path: str | None, variable: str | None) -> Secret | None:
+    """Return the password of a file or else of the environment, None where neither has one.
+
+    Args:
+        path: The file, if one is named.
+        variable: The variable, in place of ROBOLINK_PASSWORD.
+
+    Raises:
+        ConfigError: The file cannot be read, or others than its owner may read it.
+    """
     if path:
         return _from_file(Path(path))
-    value = os.environ.get(cell_variable or "ROBOLINK_PASSWORD")
+    value = os.environ.get(variable or "ROBOLINK_PASSWORD")
     return None if value is None else Secret(value)
 
 
-def _from_keyring(identity: str) -> Secret | None:
+def from_keyring(identity: str) -> Secret | None:
+    """Return the password that the system's keyring has, None where it has none."""
     try:
         import keyring
         from keyring.errors import KeyringError

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from robolink.errors import ConfigError, DeclinedError
+from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink_cli._line import LINE
 from robolink_cli._render import json_is_on
 
 if TYPE_CHECKING:
@@ -23,9 +24,10 @@ def nozzle_options(function: F) -> F:
         click.option(
             "--nozzle",
             metavar="ID",
+            type=LINE,
             help=tr("Id of the nozzle or needle that is mounted, for the record."),
         ),
-        click.option("--lot", metavar="LOT", help=tr("Its lot, for the record.")),
+        click.option("--lot", metavar="LOT", type=LINE, help=tr("Its lot, for the record.")),
     )
     for option in reversed(options):
         function = option(function)
@@ -45,6 +47,7 @@ def signature_of(operator: str | None, cell: "Cell | None", *, changes: bool) ->
 
     Raises:
         ConfigError: The cell names people, and this is none of them.
+        DeclinedError: Nobody gave a name.
     """
     from robolink import __version__
     from robolink.journal import signature_here
@@ -67,11 +70,8 @@ def signature_of(operator: str | None, cell: "Cell | None", *, changes: bool) ->
 
 
 def _asked_for_badge() -> str:
-    from robolink_cli._consent import on_terminal
+    from robolink_cli._consent import asked_for_text, on_terminal
 
     if json_is_on() or not on_terminal():
         return ""
-    try:
-        return str(click.prompt(tr("Who works here (badge or name)"), err=True)).strip()
-    except click.Abort as end:
-        raise DeclinedError(tr("No name was given."), remedy=tr("Nothing was sent.")) from end
+    return LINE.convert(asked_for_text(tr("Who works here (badge or name)?")), None, None)

@@ -105,26 +105,32 @@ class Recalibration:
         )
 
     def _consent(self, controller: Controller, run: RecipeRun) -> None:
-        """Have the person agree to what is about to happen; back up before it does."""
+        """Have the person agree to what is about to happen; back up before it does.
+
+        Raises:
+            NotReadyError: Nothing can move now; nobody was asked anything.
+            DeclinedError: The answer was no, or nobody could be asked.
+        """
+        question = self._question(controller, run) if run.plan.moves else None
         if run.takes_reference and not self._take_reference:
             self._explain_reference()
         back_up_first(controller)
-        if not run.plan.moves:
+        if question is None:
             self._require_writer(run)
             return
+        agree_to_motion(question, yes=self._answers.yes)
+
+    def _question(self, controller: Controller, run: RecipeRun) -> str:
         limits = run.plan.limits
-        agree_to_motion(
-            motion_question(
-                controller,
-                tr(
-                    "as {recipe!r} says for tool {tools}",
-                    recipe=self._loaded.name,
-                    tools=", ".join(str(plan.tool) for plan in run.plan.tools),
-                ),
-                speed_mm_s=limits.speed_mm_s,
-                box_mm=limits.box_mm,
+        return motion_question(
+            controller,
+            tr(
+                "as {recipe!r} says for tool {tools}",
+                recipe=self._loaded.name,
+                tools=", ".join(str(plan.tool) for plan in run.plan.tools),
             ),
-            yes=self._answers.yes,
+            speed_mm_s=limits.speed_mm_s,
+            box_mm=limits.box_mm,
         )
 
     def _explain_reference(self) -> None:

@@ -14,6 +14,7 @@ from robolink.nozzle_change import Bench, Listener, Moment, Proposal
 from robolink.runner import StepDone
 from robolink_cli._exit import error_body, exit_code
 from robolink_cli._render import note, switch_json_on
+from robolink_cli._sink import hand_over
 from robolink_cli._views import (
     pose_payload,
     proposal_payload,
@@ -39,7 +40,7 @@ class EventStream:
         """Write one event."""
         if self.on:
             line = {"schema": "robolink/recalibration-event/1", "event": event, **payload}
-            click.echo(json.dumps(line, allow_nan=False))
+            hand_over(json.dumps(line, allow_nan=False))
 
     @contextmanager
     def closing(self) -> Iterator[None]:

@@ -38,16 +38,16 @@ def find_change(journal: Journal, name: str | None, *, controller: str | None) -
         ConfigError: There is no such change.
         JournalError: The journal cannot be read.
     """
-    identity = controller_meant(controller)
+    meant = controller_meant(controller)
     if name is None:
-        newest = next(journal.entries(controller=identity, kinds=_OF_A_CHANGE), None)
+        newest = next(journal.entries(controller=meant, kinds=_OF_A_CHANGE), None)
         if newest is None:
             raise ConfigError(
                 tr("No tool change is on record."),
                 remedy=tr("'robolink journal list' shows what is; -c names another cell."),
             )
         name = id_of_change(newest)
-    return entries_of_change(journal, name, controller=identity)
+    return entries_of_change(journal, name, controller=meant)
 
 
 def reports_from(

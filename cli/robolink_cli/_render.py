@@ -6,10 +6,11 @@ it over, and it is printed once, when the command has ended well; an error print
 document instead.
 """
 
-import sys
 from collections.abc import Iterable, Mapping, Sequence
 
 import click
+
+from robolink_cli._sink import hand_over, show, visible
 
 _JSON = "robolink.json"
 _DOCUMENT = "robolink.document"
@@ -28,14 +29,12 @@ def switch_json_on(context: click.Context) -> None:
 
 def say(text: str = "") -> None:
     """Show a person a line: on stdout, or on stderr when stdout is for machines."""
-    # The stream is named, because click takes an ASCII console for a misunderstanding and
-    # would send it UTF-8.
-    click.echo(text, file=sys.stderr if json_is_on() else sys.stdout)
+    show(text, beside=json_is_on())
 
 
 def note(text: str) -> None:
     """Show a person a remark beside the result; always on stderr."""
-    click.echo(text, file=sys.stderr)
+    show(text, beside=True)
 
 
 def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
@@ -45,13 +44,13 @@ def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[object]]) 
     from rich.table import Table
     from rich.text import Text
 
-    cells = [[str(cell) for cell in row] for row in rows]
-    shown = Table(title=Text(title), title_justify="left", box=box.SIMPLE_HEAD)
+    cells = [[visible(str(cell)) for cell in row] for row in rows]
+    shown = Table(title=Text(visible(title)), title_justify="left", box=box.SIMPLE_HEAD)
     for number, column in enumerate(columns):
         if all(_is_figure(row[number]) for row in cells):
-            shown.add_column(Text(column), justify="right", no_wrap=True)
+            shown.add_column(Text(visible(column)), justify="right", no_wrap=True)
         else:
-            shown.add_column(Text(column), overflow="fold")
+            shown.add_column(Text(visible(column)), overflow="fold")
     for row in cells:
         shown.add_row(*(Text(cell) for cell in row))
     console = Console(stderr=json_is_on(), highlight=False)
@@ -82,7 +81,7 @@ def emit_json(schema: str, payload: Mapping[str, object]) -> None:
 def print_document(context: click.Context) -> None:
     """Print what :func:`emit_json` was given, if anything."""
     if _DOCUMENT in context.meta:
-        click.echo(context.meta[_DOCUMENT])
+        hand_over(context.meta[_DOCUMENT])
 
 
 def dumps(schema: str, payload: Mapping[str, object]) -> str:

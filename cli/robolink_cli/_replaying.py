@@ -10,6 +10,7 @@ from click.core import ParameterSource
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_cli._render import json_is_on, note
+from robolink_cli._sink import hand_over, show
 
 _OF_A_REPLAY = frozenset({"address", "replay", "allow_remote"})
 
@@ -54,15 +55,15 @@ def _announce(url: str, recording: Path, connections: int) -> None:
             "connections": connections,
             "simulated": True,
         }
-        lines = [json.dumps(document)]
-    else:
-        lines = [
-            tr(
-                "REPLAY of {path} ({count} connections). No robot moves.",
-                path=recording,
-                count=connections,
-            ),
-            tr("  controller  {url}", url=url),
-            tr("Ctrl-C ends it."),
-        ]
-    click.echo("\n".join(lines))
+        hand_over(json.dumps(document))
+        return
+    lines = (
+        tr(
+            "REPLAY of {path} ({count} connections). No robot moves.",
+            path=recording,
+            count=connections,
+        ),
+        tr("  controller  {url}", url=url),
+        tr("Ctrl-C ends it."),
+    )
+    show("\n".join(lines))

@@ -7,11 +7,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-import click
-
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_cli._render import json_is_on
+from robolink_cli._sink import hand_over, show
 
 if TYPE_CHECKING:
     from robolink_simulators.world_parameters import WorldParameters
@@ -45,9 +44,9 @@ def announce(document: dict[str, object], lines: Sequence[str]) -> None:
     """
     if json_is_on():
         document = {"schema": "robolink/sim/1", **document, "simulated": True}
-        click.echo(json.dumps(document))
+        hand_over(json.dumps(document))
     else:
-        click.echo("\n".join(lines))
+        show("\n".join(lines))
 
 
 def host_and_port(address: str, option: str) -> tuple[str, int]:

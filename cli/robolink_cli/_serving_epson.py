@@ -5,12 +5,15 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
+import click
+from click.core import ParameterSource
 from robolink_simulators.assist import serve_assist
 from robolink_simulators.clock import ScaledClock
 from robolink_simulators.epson import EpsonOptions, EpsonSimulator
 from robolink_simulators.epson.option_text import options_from_text
 from robolink_simulators.epson.profile import read_profile
 from robolink_simulators.hosting.tcp import serve_tcp
+from robolink_simulators.serial_numbers import drawn_serial
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
@@ -59,6 +62,16 @@ def habits(options: Sequence[str], profile: Path | None) -> EpsonOptions:
     pairs = named_values(options, "--option terminator=cr")
     settled = {} if profile is None else read_profile(profile)
     return options_from_text({**settled, **pairs})
+
+
+def serial_of(seed: int) -> str:
+    """Return the serial number of a simulated robot: another one each time, but for a given seed.
+
+    Two simulators that were started alike are two controllers all the same, unless a person
+    asked for the very same one.
+    """
+    given = click.get_current_context().get_parameter_source("seed")
+    return drawn_serial(f"seed {seed}" if given is ParameterSource.COMMANDLINE else "")
 
 
 def _announce(url: str, assist_url: str, robot: str, seed: int) -> None:

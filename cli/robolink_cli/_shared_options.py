@@ -8,6 +8,7 @@ from click.core import ParameterSource
 
 from robolink.messages import tr
 from robolink_cli._cell import complete_cell
+from robolink_cli._line import LINE
 from robolink_cli._render import switch_json_on
 
 CommandT = TypeVar("CommandT", bound=Callable[..., Any])
@@ -88,6 +89,7 @@ def _link_options(command: CommandT) -> CommandT:
         click.option(
             "--operator",
             metavar="ID",
+            type=LINE,
             envvar="ROBOLINK_OPERATOR",
             show_envvar=True,
             expose_value=False,

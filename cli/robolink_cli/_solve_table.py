@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Final
 
 from robolink.messages import tr
+from robolink.named_files import read_named
 from robolink_cli._solve_case import Node, unusable
 
 COLUMNS: Final = ("x", "y", "z", "u", "v", "w", "qx", "qy", "qz", "qs", "hand")
@@ -30,9 +31,10 @@ def table_case(
         ConfigError: It cannot be read or is laid out in another way.
     """
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = read_named(path).decode("utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
-        raise unusable(str(path), tr("it cannot be read ({error})", error=error)) from error
+        cause = str(error) if isinstance(error, UnicodeDecodeError) else error.strerror
+        raise unusable(str(path), tr("it cannot be read ({error})", error=cause)) from error
     rows = [_cells(line) for line in text.splitlines() if line.strip()]
     names = _cells(columns) if columns is not None else (rows.pop(0) if rows else [])
     unknown = [name for name in names if name not in COLUMNS]

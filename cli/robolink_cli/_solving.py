@@ -6,6 +6,7 @@ from typing import Final
 
 from robolink.errors import CalibrationError
 from robolink.messages import tr
+from robolink.named_files import read_named
 from robolink_cli._solve_case import Node, read_poses, unusable
 from robolink_cli._solve_methods import FROM_POSES
 from robolink_cli._solve_more import MORE_METHODS
@@ -15,6 +16,8 @@ METHODS: Final = {**FROM_POSES, **MORE_METHODS}
 
 _GAINS_OF: Final = ("two_pose", "two_pose_general", "n_angle", "n_angle_robust")
 _SEVERITY: Final = ("ok", "warn", "error")
+_MOST_BYTES: Final = 64_000_000
+"""A file of many cases is longer than anything else that is named."""
 
 
 def load(path: Path) -> Node:
@@ -26,9 +29,10 @@ def load(path: Path) -> Node:
     import json
 
     try:
-        value = json.loads(path.read_text(encoding="utf-8-sig"))
+        value = json.loads(read_named(path, most_bytes=_MOST_BYTES).decode("utf-8-sig"))
     except OSError as error:
-        raise unusable(str(path), tr("it cannot be read ({error})", error=error)) from error
+        cause = error.strerror or str(error)
+        raise unusable(str(path), tr("it cannot be read ({error})", error=cause)) from error
     except (ValueError, RecursionError) as error:
         raise unusable(str(path), tr("it is not JSON ({error})", error=error)) from error
     return Node(value, "")

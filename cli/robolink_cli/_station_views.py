@@ -99,8 +99,8 @@ def _entries(context: CliContext) -> Iterable[Recorded]:
     from robolink.journal import default_location, may_exist, open_journal
     from robolink.transport import parse_url
 
-    identity = parse_url(context.require_url()).identity
+    address = parse_url(context.require_url()).address
     if not may_exist(default_location()):
         return ()
     journal = open_journal(read_only=True)
-    return journal.entries(controller=identity, kinds=(EntryKind.STATION,))
+    return journal.entries(controller=address, kinds=(EntryKind.STATION,))

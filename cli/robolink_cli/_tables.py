@@ -32,6 +32,7 @@ def _show_epson(payload: Mapping[str, object]) -> None:
     alarms = payload["alarms"]
     if isinstance(alarms, Sequence) and alarms:
         say(tr("  alarms: {numbers}", numbers=", ".join(str(number) for number in alarms)))
+    _show_preferences(payload["preferences"])
     if payload["selected_tool"] is not None:
         say(
             tr(
@@ -43,6 +44,19 @@ def _show_epson(payload: Mapping[str, object]) -> None:
         )
     elif payload["published_selected_tool"] is not None:
         say(tr("  tool in force, as published: {tool}", tool=payload["published_selected_tool"]))
+
+
+def _show_preferences(told: object) -> None:
+    """Warn of what makes the cell unreal, and name what switches outputs off."""
+    if not isinstance(told, Mapping):
+        return  # older firmware does not tell, and nothing is assumed
+    if told["dry_run"]:
+        say(tr("  DRY RUN is set: the robot does not move. Nothing can be measured."))
+    if told["virtual_io"]:
+        say(tr("  VIRTUAL I/O is set: no input is real. Nothing can be measured."))
+    causes = {"reset_outputs_off": tr("reset"), "outputs_off_at_estop": tr("emergency stop")}
+    if named := [cause for name, cause in causes.items() if told[name]]:
+        say(tr("  outputs go off at: {causes}", causes=", ".join(named)))
 
 
 def show_pose(payload: Mapping[str, object]) -> None:

@@ -52,11 +52,14 @@ def jog(
     moves are dropped. A step that has begun goes on when the key is released; Ctrl-C aborts
     it, and only the emergency stop is an emergency stop.
     """
+    from robolink.runner import parse_steps
     from robolink_cli._jogging import jog_by_keys, jog_by_steps, jog_on_terminal, plan_jog
     from robolink_cli._key_jog import agree_by_key
     from robolink_cli._tables import show_pose
     from robolink_cli._views import pose_payload
 
+    if steps:
+        parse_steps(" ".join(steps))  # a slip of the fingers is told before anything is asked
     typed = {"speed_mm_s": speed_mm_s, "box_mm": box_mm}
     speed_mm_s, box_mm = with_cell_limits(context.cell, typed, _CELL_KEYS).values()
     with (

@@ -58,7 +58,7 @@ class _Wanted:
     """Which entries the options mean.
 
     Attributes:
-        controller: Identity of the controller, ``None`` for all.
+        controller: Address of the controller, ``None`` for all.
     """
 
     def __init__(

@@ -2,8 +2,8 @@
 
 import os
 import sys
-from collections.abc import Sequence
-from typing import Final, NoReturn
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Final, NoReturn
 
 import click
 
@@ -12,8 +12,13 @@ from robolink.messages import tr
 from robolink_cli._console import colour_wanted, help_width, leave_pipe, tolerate_any_console
 from robolink_cli._exit import READER_LEFT, report
 from robolink_cli._lazy import LazyGroup
-from robolink_cli._render import print_document
+from robolink_cli._render import dumps, note, print_document, say
 from robolink_cli._shared_options import shared_options
+from robolink_cli._sink import hand_over
+
+if TYPE_CHECKING:
+    from robolink_cli._stop_first import StopOutcome
+    from robolink_cli._stop_request import StopRequest
 
 COMMANDS: Final = {
     "demo": (
@@ -24,6 +29,10 @@ COMMANDS: Final = {
     "status": ("robolink_cli.operate:status", tr("What the controller is doing.")),
     "where": ("robolink_cli.operate:where", tr("Where the robot is, and with which tool.")),
     "stop": ("robolink_cli.operate:stop", tr("Stop every motion.")),
+    "release": (
+        "robolink_cli.operate:release",
+        tr("Let the robot be moved again after a stop."),
+    ),
     "reset": ("robolink_cli.operate:reset", tr("Clear an error of the controller.")),
     "motors": ("robolink_cli.operate:motors", tr("Switch the motors on or off.")),
     "enable": ("robolink_cli.operate:enable", tr("Enable the axis group of a PLC.")),
@@ -113,13 +122,39 @@ def main() -> NoReturn:
 
 def run(arguments: Sequence[str]) -> int:
     """Run one command line; return the exit code (the table is in ``_exit``)."""
+    return _guarded(lambda: _answer(arguments))
+
+
+def tell_stop(request: "StopRequest", outcome: "StopOutcome") -> int:
+    """Tell how a stop ended that needed no click so far; return the exit code."""
+    return _guarded(lambda: _tell_stop(request, outcome))
+
+
+def _guarded(speak: Callable[[], int]) -> int:
     tolerate_any_console()
     try:
-        code = _answer(arguments)
+        code = speak()
         sys.stdout.flush()
     except BrokenPipeError:
         leave_pipe()
         return READER_LEFT
+    return code
+
+
+def _tell_stop(request: "StopRequest", outcome: "StopOutcome") -> int:
+    from robolink_cli._stop_telling import Telling
+
+    telling, code = Telling(request, outcome), 0
+    telling.explain_the_holder()
+    if outcome.error is not None:
+        code = report(outcome.error, as_json=request.json)
+    elif request.json:
+        hand_over(dumps("robolink/stop/1", telling.payload()))
+    else:
+        say(telling.sentence())
+    sys.stdout.flush()
+    for remark in telling.remarks():
+        note(remark)
     return code
 
 

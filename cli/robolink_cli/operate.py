@@ -1,36 +1,56 @@
 """status, where, stop, reset, motors, resolve: looking at a controller and calming it."""
 
+from typing import TYPE_CHECKING
+
 import click
 
-from robolink.errors import ConnectError
 from robolink.messages import tr
 from robolink.model import Act
-from robolink_cli._consent import agree, agree_to_motion, dry_run_option, yes_option
-from robolink_cli._context import CliContext, controller_options, open_controller
-from robolink_cli._kinds import require_epson, require_softmotion
-from robolink_cli._render import say
+from robolink_cli._consent import (
+    agree,
+    agree_to_motion,
+    dry_run_option,
+    on_terminal,
+    yes_option,
+)
+from robolink_cli._context import (
+    CliContext,
+    calming_options,
+    controller_options,
+    emit,
+    open_controller,
+    show_requests,
+    stop_request,
+)
+from robolink_cli._kinds import preferences_of, require_epson, require_softmotion
+from robolink_cli._render import note, say
+from robolink_cli._shared_options import shared_options
+from robolink_cli._stop_notes import forget_stop
+
+if TYPE_CHECKING:
+    from robolink.model import Controller
 
 
 @click.command()
-@controller_options
+@calming_options
 def status(context: CliContext) -> None:
     """Show what the controller is doing. Reads only; legal while production runs."""
     from robolink_cli._tables import show_status
     from robolink_cli._views import status_payload
 
-    with open_controller(context) as controller:
+    with open_controller(context, looks=True) as controller:
         payload = status_payload(controller)
     context.emit("status", payload, lambda: show_status(payload))
 
 
 @click.command()
-@controller_options
+@calming_options
 def where(context: CliContext) -> None:
     """Show where the tool in force is (measured), and the joints."""
     from robolink_cli._tables import show_pose
     from robolink_cli._views import pose_payload
 
-    with open_controller(context) as controller:
+    with open_controller(context, looks=True) as controller:
         group = controller.groups[0]
         pose, axes = group.pose(), group.axes()
     payload = pose_payload(pose) | {name: list(values) for name, values in axes.items()}
@@ -38,45 +58,71 @@ def where(context: CliContext) -> None:
 
 
 @click.command()
-@controller_options
+@shared_options
 @dry_run_option
-def stop(context: CliContext, dry_run: bool) -> None:
-    """Stop the controller's tasks. Not an emergency stop, and no substitute for one."""
-    try:
-        # Whatever robot it is: a stop does not wait for a look at the model.
-        with open_controller(context, any_robot=True) as controller:
-            if dry_run:
-                context.show_requests(controller.preview(Act.STOP))
-                return
-            controller.stop()
-            state = controller.status().state
-    except ConnectError as error:
-        error.remedy = f"{tr('To stop the robot now, press the emergency stop.')} {error.remedy}"
-        raise
-    payload: dict[str, object] = {"stopped": True, "state": state}
-    context.emit(
-        "stop",
+def stop(dry_run: bool) -> None:
+    """Bring the robot to rest, whoever moves it. Not an emergency stop, and no substitute for one.
+
+    Nothing is asked and no file is waited for. What may move next is asked about, until 'robolink
+    reset' or 'robolink release'.
+    """
+    from robolink_cli._stop_first import stop_first
+    from robolink_cli._stop_telling import Telling, requests_of
+
+    request = stop_request()
+    if dry_run:
+        show_requests(requests_of(request))
+        return
+    outcome = stop_first(request)
+    telling = Telling(request, outcome)
+    telling.explain_the_holder()
+    if outcome.error is None:
+        emit("stop", telling.payload(), lambda: say(telling.sentence()))
+    for remark in telling.remarks():
+        note(remark)
+    if outcome.error is not None:
+        raise outcome.error
+
+
+@click.command()
+@shared_options
+@yes_option
+def release(yes: bool) -> None:
+    """Let the robot be moved again after a stop: shows who stopped it and when, and asks.
+
+    Nothing is sent: a PLC that is held by a stop, and a controller in error, want 'reset'.
+    """
+    from robolink_cli._stop_notes import release_stop
+
+    payload = release_stop(stop_request(), yes=yes)
+    emit(
+        "release",
         payload,
-        lambda: say(tr("Stop was accepted; the controller is: {state}.", state=state)),
+        lambda: say(
+            tr("Released: the robot may be moved again.")
+            if payload["released"]
+            else tr("No stop is noted here; there is nothing to release.")
+        ),
     )
 
 
 @click.command()
-@controller_options
+@calming_options
 @dry_run_option
 @yes_option
 def reset(context: CliContext, dry_run: bool, yes: bool) -> None:
     """Clear an error. May switch outputs off: a gripper may drop its part."""
-    with open_controller(context) as controller:
+    with open_controller(context, calms=True) as controller:
         if dry_run:
             context.show_requests(controller.preview(Act.RESET))
             return
-        agree(
-            tr("Reset may switch outputs off (vacuum, gripper). Go on?"),
-            yes=yes,
-        )
+        effect, told = _effect_of_reset(controller)
+        if told and (yes or not on_terminal()):
+            note(effect)  # nobody is asked, so it is said before it is sent
+        agree(tr("{effect} Go on?", effect=effect), yes=yes)
         controller.reset_fault()
         state = controller.status().state
+    forget_stop(context)
     payload: dict[str, object] = {"state": state}
     context.emit(
         "reset",
@@ -85,15 +131,27 @@ def reset(context: CliContext, dry_run: bool, yes: bool) -> None:
     )
 
 
+def _effect_of_reset(controller: "Controller") -> tuple[str, bool]:
+    """Return what a reset does to the outputs, and whether the controller told that."""
+    from robolink.protocols.epson_text import Preference
+
+    told = preferences_of(controller)
+    if told is None:
+        return tr("Reset may switch outputs off (vacuum, gripper)."), False
+    if Preference.RESET_OUTPUTS_OFF in told:
+        return tr("Reset SWITCHES THE OUTPUTS OFF (vacuum, gripper): a part may drop."), True
+    return tr("Reset clears the error; the outputs stay as they are."), True
+
+
 @click.command()
 @click.argument("switch", type=click.Choice(["on", "off"]))
-@controller_options
+@calming_options
 @dry_run_option
 @yes_option
 def motors(context: CliContext, switch: str, dry_run: bool, yes: bool) -> None:
     """Switch the robot's motors on or off, and prove it."""
     on = switch == "on"
-    with open_controller(context) as controller:
+    with open_controller(context, calms=not on) as controller:
         if dry_run:
             context.show_requests(controller.preview(Act.MOTORS_ON if on else Act.MOTORS_OFF))
             return

@@ -78,13 +78,14 @@ def epson(
     from robolink_simulators.epson import EpsonSimulator
 
     from robolink_cli._serving import world_from
-    from robolink_cli._serving_epson import habits, password_in, serve_epson
+    from robolink_cli._serving_epson import habits, password_in, serial_of, serve_epson
 
     simulator = EpsonSimulator(
         robot,
         seed=seed,
         password=password_in(password_env),
         options=habits(options, profile),
+        serial=serial_of(seed),
         state_path=state,
         world=world_from(world),
     )

@@ -26,7 +26,7 @@ def list_tools(context: CliContext, published: bool) -> None:
     from robolink_cli._tool_source import find_tools
     from robolink_cli._views import offset_payload
 
-    with open_controller(context) as controller:
+    with open_controller(context, looks=True) as controller:
         found = find_tools(controller, published=published)
     tools = {str(number): offset_payload(offset) for number, offset in found.tools.items()}
     payload: dict[str, object] = {"selected_tool": found.selected, "tools": tools}
@@ -56,7 +56,7 @@ def get(context: CliContext, number: int | None, mode: str | None) -> None:
     if number is None:
         _get_by_mode(context, str(mode))
         return
-    with open_controller(context) as controller:
+    with open_controller(context, looks=True) as controller:
         offset, selected = controller.tools.read(number), controller.tools.selected()
         if number:
             note_change(controller, number, offset)
@@ -78,7 +78,7 @@ def _get_by_mode(context: CliContext, mode: str) -> None:
     from robolink_cli._views import offset_payload
 
     modes = {"set": ReadMode.SET, "active": ReadMode.ACTIVE, "last": ReadMode.LAST_COMMANDED}
-    with open_controller(context) as controller:
+    with open_controller(context, looks=True) as controller:
         offset = require_softmotion(controller).tools.read_mode(modes[mode])
     value = offset_payload(offset)
     payload: dict[str, object] = {"mode": mode, "offset": value}

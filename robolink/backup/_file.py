@@ -16,7 +16,7 @@ from robolink.backup._values import COMPONENTS, TOOLS, Backup, ToolState
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import ControllerFacts, ToolOffset
-from robolink.named_files import save_named
+from robolink.named_files import read_named, save_named
 
 SCHEMA: Final = "robolink/backup/1"
 
@@ -41,8 +41,7 @@ def load(path: Path) -> Backup:
         ConfigError: It cannot be read, or it is no backup; names the place in the file.
     """
     try:
-        with path.open(encoding="utf-8-sig") as file:
-            text = file.read(_LONGEST)
+        text = read_named(path, most_bytes=_LONGEST).decode("utf-8-sig")
     except (OSError, UnicodeError) as error:
         cause = error.strerror if isinstance(error, OSError) else tr("it is not UTF-8 text")
         raise ConfigError(

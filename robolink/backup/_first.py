@@ -10,7 +10,11 @@ from robolink.messages import tr
 
 
 def first_backup_path(identity: str) -> Path:
-    """Return where the first backup of a controller stands, in the user's state folder."""
+    """Return where the first backup of a controller stands, in the user's state folder.
+
+    Args:
+        identity: Who the controller is, as its record calls it; not its URL.
+    """
     return state_folder("backups") / file_name(identity)
 
 
@@ -28,8 +32,9 @@ def keep_first_backup(controller: ToolHolder) -> Path | None:
     """
     if not controller.outcomes.durable:
         return None
-    path = first_backup_path(controller.identity)
-    if path.exists():
+    identity, *former = controller.outcomes.names
+    path = first_backup_path(identity)
+    if any(first_backup_path(name).exists() for name in (identity, *former)):
         return None
     backup = take_backup(controller)
     try:

@@ -65,7 +65,7 @@ class RestorePlan:
 def require_same_controller(backup: Backup, identity: str, facts: ControllerFacts) -> None:
     """Refuse a controller that is not the one the backup came from.
 
-    Serial numbers decide where both sides know them; where they do not, the URL does.
+    Serial numbers decide where both sides know one; where they do not, the URL does.
 
     Raises:
         ConfigError: It is another one, or that cannot be told.
@@ -82,7 +82,9 @@ def require_same_controller(backup: Backup, identity: str, facts: ControllerFact
             raise _another(
                 tr("{name} {saved} in the backup, {found} here", name=name, saved=a, found=b)
             )
-    told_apart = saved.robot_serials and facts.robot_serials
+    told_apart = (saved.robot_serials and facts.robot_serials) or (
+        saved.controller_serial and facts.controller_serial
+    )
     if not told_apart and backup.controller != identity:
         raise _another(
             tr(

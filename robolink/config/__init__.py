@@ -5,12 +5,29 @@ checked by pydantic, which is imported when the first file is loaded and not bef
 :func:`cell_names` does without it.
 """
 
-from robolink.config._cells import Cell as Cell
-from robolink.config._cells import cell_names as cell_names
-from robolink.config._cells import check_file as check_file
-from robolink.config._cells import find_cell as find_cell
-from robolink.config._cells import load_cells as load_cells
-from robolink.config._files import ConfigFile as ConfigFile
-from robolink.config._files import Source as Source
-from robolink.config._files import config_files as config_files
+from typing import TYPE_CHECKING
+
+from robolink.lazy_exports import lazy_exports
 from robolink.toml_files import Problem as Problem
+
+if TYPE_CHECKING:
+    from robolink.config._cells import Cell as Cell
+    from robolink.config._cells import cell_names as cell_names
+    from robolink.config._cells import check_file as check_file
+    from robolink.config._cells import find_cell as find_cell
+    from robolink.config._cells import load_cells as load_cells
+    from robolink.config._files import ConfigFile as ConfigFile
+    from robolink.config._files import Source as Source
+    from robolink.config._files import config_files as config_files
+    from robolink.config._reach import Reach as Reach
+    from robolink.config._reach import reach_cell as reach_cell
+    from robolink.config._reach import remember_reach as remember_reach
+else:
+    __getattr__ = lazy_exports(
+        __name__,
+        {
+            "_cells": "Cell cell_names check_file find_cell load_cells",
+            "_files": "ConfigFile Source config_files",
+            "_reach": "Reach reach_cell remember_reach",
+        },
+    )

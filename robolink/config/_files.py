@@ -7,6 +7,7 @@ from pathlib import Path
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink.named_files import read_named
 from robolink.toml_files import NotTomlError, parse_toml
 
 _NAME = "robolink.toml"
@@ -60,7 +61,7 @@ def read_document(path: Path) -> dict[str, object]:
         ConfigError: It cannot be read, or is no TOML.
     """
     try:
-        return parse_toml(path.read_bytes())
+        return parse_toml(read_named(path))
     except OSError as error:
         cause = error.strerror or str(error)
     except NotTomlError as error:

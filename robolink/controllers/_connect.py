@@ -1,11 +1,13 @@
 """From a URL to a controller."""
 
+from contextlib import suppress
+
 from robolink import __version__
 from robolink.controllers.epson import open_epson
 from robolink.controllers.plc_map import PlcMapController, open_plc_map
 from robolink.controllers.softmotion import SoftMotionController, open_softmotion
-from robolink.errors import ConfigError, LoginUnansweredError
-from robolink.journal import memory_journal, open_journal, signature_here
+from robolink.errors import ConfigError, JournalError, LoginUnansweredError
+from robolink.journal import open_log, signature_here
 from robolink.messages import tr
 from robolink.model import Controller, OutcomeLog, Secret, Signature
 from robolink.timing import Clock
@@ -46,7 +48,9 @@ def connect(
         trace: Called with (time in ns, "sent" or "received", bytes) for all traffic but the
             login frame; of an EPSON controller only.
         outcomes: Where outcomes are recorded; by default the journal of this user, or memory
-            for a simulator that dies with this process.
+            for a simulator that dies with this process. A journal that cannot be used keeps
+            nobody from looking and stopping: ``outcomes.trouble`` says what is wrong with it,
+            and what would change something raises it.
         signature: Who works here, and with what; by default the user of this computer.
 
     Raises:
@@ -83,8 +87,10 @@ def connect(
             remote_timeout_s=remote_timeout_s,
         )
     except LoginUnansweredError:
-        # One client at a time is served (epson.md 1.1). The lease may say who that is.
-        kept.look()
+        # One client at a time is served (epson.md 1.1). The lease may say who that is, if the
+        # journal can be read.
+        with suppress(JournalError):
+            kept.look()
         raise
 
 
@@ -124,7 +130,7 @@ def _connect_plc(
 
     def record(identity: str) -> OutcomeLog:
         signed = signature or signature_here(__version__)
-        return outcomes or open_journal().log(identity, signature=signed)
+        return outcomes or open_log(identity, durable=True, signature=signed)
 
     return open_plc_map(url, outcomes=record, timeout_s=timeout_s, clock=clock)
 
@@ -132,8 +138,8 @@ def _connect_plc(
 def _outcomes(link: Transport | MailboxLink, signature: Signature | None) -> OutcomeLog:
     """Open the record of a controller; the link is closed when that fails."""
     try:
-        journal = open_journal() if link.durable else memory_journal(link.identity)
-        return journal.log(link.identity, signature=signature or signature_here(__version__))
+        signed = signature or signature_here(__version__)
+        return open_log(link.identity, durable=link.durable, signature=signed)
     except BaseException:
         link.close()
         raise

@@ -17,37 +17,53 @@ move, and a lost answer leaves nothing that the next connection would not set ag
 
 import threading
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from typing import Final
 
+from robolink.checkpoints import Point, checkpoint
 from robolink.errors import (
     BusyError,
     OutcomeUnknownError,
     RemoteProtocolError,
+    StoppedError,
     TransportError,
 )
 from robolink.messages import tr
-from robolink.model import Marker, MarkerKind, NewEntry, OutcomeLog, new_operation
+from robolink.model import Ledger, Marker, MarkerKind, NewEntry, OutcomeLog, new_operation
+from robolink.standing import note_standing
+from robolink.stop_latch import StopLatch
 from robolink.timing import wall_label
 
 _PROCEDURES: Final = frozenset({MarkerKind.SELECTION, MarkerKind.CHANGE})
 
 
 class ProcedureLock:
-    """Lets one thread at a time run a procedure on a controller; others are told at once."""
+    """Lets one thread at a time run a procedure on a controller; others are told at once.
 
-    def __init__(self, identity: str) -> None:
+    Args:
+        identity: Which controller.
+        latch: Under which no procedure begins, and none ends well.
+    """
+
+    def __init__(self, identity: str, latch: StopLatch) -> None:
         self._lock = threading.RLock()
         self._identity = identity
+        self._latch = latch
 
     @contextmanager
-    def held(self, request: str) -> Iterator[None]:
+    def held(self, request: str, *, calming: bool = False) -> Iterator[None]:
         """Hold the procedure lock.
+
+        Args:
+            request: What it is held for.
+            calming: Whether that may go on while a stop is in force, as a reset may.
 
         Raises:
             BusyError: Another thread holds it.
+            StoppedError: A stop is in force, or came meanwhile.
         """
+        checkpoint(Point.PROCEDURE, request)
         if not self._lock.acquire(blocking=False):
             raise BusyError(
                 tr("{request} has to wait: another operation is under way.", request=request),
@@ -56,7 +72,8 @@ class ProcedureLock:
                 request=request,
             )
         try:
-            yield
+            with nullcontext() if calming else self._latch.watching(request):
+                yield
         finally:
             self._lock.release()
 
@@ -66,6 +83,7 @@ class MarkerDesk:
 
     Attributes:
         outcomes: Where they are kept.
+        ledger: What became of what was begun here; it is told before they are.
 
     Args:
         identity: Which controller.
@@ -75,6 +93,7 @@ class MarkerDesk:
     def __init__(self, identity: str, outcomes: OutcomeLog) -> None:
         self._identity = identity
         self.outcomes = outcomes
+        self.ledger = Ledger()
         self._procedures: dict[MarkerKind, Marker] = {}
 
     def look(self) -> None:
@@ -112,16 +131,28 @@ class MarkerDesk:
         name = operation or new_operation()
         marker = Marker(name, kind, request, wall_label(), dict(details))
         self.outcomes.begin(marker)
+        self.ledger.begin(marker)
         if kind in _PROCEDURES:
             self._procedures[kind] = marker
         return marker
 
     def clear(self, marker: Marker, *entries: NewEntry) -> None:
-        """Forget a marker whose outcome is proved, and journal how it ended."""
+        """Forget a marker whose outcome is known, and journal how it ended."""
+        self.ledger.ended(marker)
         self.outcomes.clear(marker.operation, *entries)
+        self.ledger.recorded(marker)
         known = self._procedures.get(marker.kind)
         if known is not None and known.operation == marker.operation:
             del self._procedures[marker.kind]
+
+    @contextmanager
+    def unless_stopped(self, marker: Marker) -> Iterator[None]:
+        """Surround the sending of what ``marker`` stands for; a stop that forbids it settles it."""
+        try:
+            yield
+        except StoppedError:
+            self.clear(marker)  # it was never sent
+            raise
 
     @property
     def changing(self) -> bool:
@@ -187,9 +218,9 @@ class MarkerDesk:
         try:
             yield
         except (TransportError, RemoteProtocolError) as error:
-            raise OutcomeUnknownError(
+            doubt = OutcomeUnknownError(
                 tr(
-                    "No answer came to {request!r}: it may or may not have run ({cause})",
+                    "No clear answer came to {request!r}: it may or may not have run ({cause})",
                     request=request,
                     cause=error.what,
                 ),
@@ -200,4 +231,6 @@ class MarkerDesk:
                 controller=self._identity,
                 request=request,
                 raw=error.raw,
-            ) from error
+            )
+            note_standing(doubt, self.ledger.standing())
+            raise doubt from error

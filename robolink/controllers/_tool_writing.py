@@ -12,7 +12,13 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from robolink.controllers._guarded import MarkerDesk
-from robolink.errors import ReadBackError, RejectedError, ToolChangedError
+from robolink.errors import (
+    ControllerFaultError,
+    ReadBackError,
+    RejectedError,
+    ToolChangedError,
+    UnclearAnswerError,
+)
 from robolink.messages import tr
 from robolink.model import (
     ANY,
@@ -43,6 +49,7 @@ class ToolWrite:
         read: Reads what is stored.
         read_back: Reads it after the controller has accepted the write, where that is another
             question.
+        read_doubted: Reads it when the answer told nothing, where that is another question.
     """
 
     tool: int
@@ -51,6 +58,7 @@ class ToolWrite:
     send: Callable[[], object]
     read: Callable[[], ToolOffset | None]
     read_back: Callable[[], ToolOffset | None] | None = None
+    read_doubted: Callable[[], ToolOffset | None] | None = None
 
 
 class ToolWriter:
@@ -72,7 +80,7 @@ class ToolWriter:
         not_executed: Callable[[RejectedError], bool],
     ) -> None:
         self._desk = desk
-        self._same = same
+        self._same = desk.ledger.same = same
         self._uninterrupted = uninterrupted
         self._not_executed = not_executed
 
@@ -83,6 +91,7 @@ class ToolWriter:
             require_engineer(self._desk.outcomes, tr("write tool {tool} blindly", tool=tool))
         self._desk.look()
         before = write.read()
+        self._desk.ledger.saw_tool(tool, before)
         if self._same(before, requested):
             return ToolReceipt(
                 tool, before, requested, before, skipped=True, unconditional=unconditional
@@ -125,24 +134,52 @@ class ToolWriter:
         *,
         send: Callable[[], object],
         read: Callable[[], T],
+        tell: Callable[[T], str] | None = None,
         entries: Callable[[Marker, T], Iterable[NewEntry]] = lambda _marker, _found: (),
     ) -> T:
         """Send something that is marked, and return what ``read`` finds then.
 
         Ctrl-C waits for that. A plain refusal settles the marker; a fault does not, because a
-        controller in error may refuse to show the value that would prove what happened.
+        controller in error may refuse to show the value that would prove what happened. After
+        an answer that says neither yes nor no, reading settles it.
+
+        Args:
+            request: What is sent, as a person may read it.
+            details: What is needed to settle it later.
+            send: Sends it.
+            read: Reads what it changes.
+            tell: Says what the value that was read means, when the answer did not; only a
+                controller that may answer so needs it.
+            entries: What is put on record together with the end of the marker.
+
+        Raises:
+            UnclearAnswerError: The answer told nothing; the message says what was read.
         """
-        with self._uninterrupted():
+        ledger = self._desk.ledger
+        with self._uninterrupted(), ledger.block():
             marker = self._desk.begin(MarkerKind.SET, request, details)
+            unclear: UnclearAnswerError | None = None
             with self._desk.doubt(request):
                 try:
-                    send()
-                except RejectedError as error:
-                    if self._not_executed(error):
+                    with self._desk.unless_stopped(marker):
+                        send()
+                    ledger.answered(marker)
+                except (RejectedError, ControllerFaultError) as error:
+                    ledger.answered(marker)
+                    if isinstance(error, RejectedError) and self._not_executed(error):
                         self._desk.clear(marker, _refusal(marker, error))
                     raise
+                except UnclearAnswerError as error:
+                    ledger.answered(marker)
+                    unclear = error
                 found = read()
+            ledger.proved(marker, found)
             self._desk.clear(marker, *entries(marker, found))
+        if unclear is not None:
+            # What such a link says is not relied on, so this ends as a failure in any case.
+            if tell is not None:
+                unclear.remedy = tell(found)
+            raise unclear
         return found
 
     def _write(
@@ -160,23 +197,51 @@ class ToolWriter:
         if self._desk.changing:
             details["part"] = True
 
+        acknowledged = False
+
+        def send() -> None:
+            nonlocal acknowledged
+            write.send()
+            acknowledged = True
+
+        def read() -> ToolOffset | None:
+            another = write.read_back if acknowledged else write.read_doubted
+            return (another or write.read)()
+
+        def ends(found: ToolOffset | None) -> Iterator[EntryKind]:
+            if not acknowledged and self._same(found, before):
+                yield EntryKind.NOT_APPLIED
+                return
+            yield EntryKind.WRITE
+            yield EntryKind.READ_BACK
+            if not self._same(found, write.requested):
+                yield EntryKind.CONFLICT
+            elif acknowledged and not self._desk.changing:
+                # A change of several steps says itself, at its end, whether it is done.
+                yield EntryKind.DONE
+
         def entries(marker: Marker, found: ToolOffset | None) -> Iterator[NewEntry]:
             now = {**details, "value": plain_offset(found)}
-            for kind in self._ends(found, write.requested):
+            for kind in ends(found):
                 said = {"request": write.request} if kind is EntryKind.WRITE else now
                 yield NewEntry(kind, operation=marker.operation, tool=write.tool, details=said)
 
-        read = write.read_back or write.read
-        return self.carry_out(write.request, details, send=write.send, read=read, entries=entries)
+        return self.carry_out(
+            write.request,
+            details,
+            send=send,
+            read=read,
+            tell=lambda found: self._told(write, before, found),
+            entries=entries,
+        )
 
-    def _ends(self, found: ToolOffset | None, requested: ToolOffset | None) -> Iterator[EntryKind]:
-        yield EntryKind.WRITE
-        yield EntryKind.READ_BACK
-        if not self._same(found, requested):
-            yield EntryKind.CONFLICT
-        elif not self._desk.changing:
-            # A change of several steps says itself, at its end, whether it is done.
-            yield EntryKind.DONE
+    def _told(self, write: ToolWrite, before: ToolOffset | None, found: ToolOffset | None) -> str:
+        tool = write.tool
+        if self._same(found, write.requested):
+            return tr("Reading tool {tool} back shows that it did run.", tool=tool)
+        if self._same(found, before):
+            return tr("Reading tool {tool} back shows that it did not run.", tool=tool)
+        return tr("Tool {tool} reads back as {found}.", tool=tool, found=describe_offset(found))
 
 
 def _refusal(marker: Marker, error: RejectedError) -> NewEntry:

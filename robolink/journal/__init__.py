@@ -6,9 +6,11 @@ and 8). Importing this package loads no database code; opening a journal does.
 
 from robolink.journal._journal import Journal as Journal
 from robolink.journal._log import JournalOutcomeLog as JournalOutcomeLog
+from robolink.journal._looking import LookingLog as LookingLog
 from robolink.journal._opening import close_files as close_files
 from robolink.journal._opening import memory_journal as memory_journal
 from robolink.journal._opening import open_journal as open_journal
+from robolink.journal._opening import open_log as open_log
 from robolink.journal._places import default_location as default_location
 from robolink.journal._places import may_exist as may_exist
 from robolink.journal._processes import Holder as Holder

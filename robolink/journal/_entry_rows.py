@@ -123,11 +123,13 @@ def _listing(wanted: Filter) -> Select[Any]:
     columns = ENTRIES.c
     order = columns.number.desc() if wanted.newest_first else columns.number
     listing = select(ENTRIES).order_by(order)
-    if wanted.controller is not None:
+    if wanted.controllers:
         # A change has few entries and an index of its own. SQLite prefers the index that gives
         # the order, and would walk through all that the controller has on record.
         controller = func.coalesce(columns.controller, "") if wanted.change else columns.controller
-        listing = listing.where(controller == storable(wanted.controller))
+        names = [storable(name) for name in wanted.controllers]
+        one = len(names) == 1
+        listing = listing.where(controller == names[0] if one else controller.in_(names))
     if wanted.tool is not None:
         listing = listing.where(columns.tool == wanted.tool)
     if wanted.proved_tool is not None:

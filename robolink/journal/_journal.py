@@ -45,9 +45,17 @@ class Journal:
         """Whether it outlives this process."""
         return self._store.durable
 
+    def require_usable(self) -> None:
+        """Make sure that it can be opened as it is now.
+
+        Raises:
+            JournalError: It cannot.
+        """
+        self._store.open()
+
     def log(
         self,
-        identity: str,
+        controller: str,
         *,
         signature: Signature | None = None,
         holder: Holder | None = None,
@@ -56,7 +64,8 @@ class Journal:
         """Return the log of one controller.
 
         Args:
-            identity: Which controller; any text.
+            controller: Which controller: its identity, an address at which it was met, or any
+                other text.
             signature: Who works here, and with what.
             holder: Who holds the lease; by default this process.
             clock: In which signs of life are stamped and watched; by default the time since
@@ -65,7 +74,7 @@ class Journal:
         return JournalOutcomeLog(
             self,
             self._store,
-            identity,
+            controller,
             signature=signature or Signature(),
             holder=holder,
             clock=clock,
@@ -86,7 +95,8 @@ class Journal:
         """Yield entries, read page by page.
 
         Args:
-            controller: Of this controller only.
+            controller: Of this controller only: its identity, or an address at which it was
+                met, or a name of before.
             tool: About this tool only.
             change: Of this tool change only.
             kinds: Of these kinds only; empty for all.
@@ -98,7 +108,8 @@ class Journal:
         Raises:
             JournalError: It cannot be read.
         """
-        wanted = Filter(controller, tool, change, tuple(kinds), newest_first=newest_first)
+        names = () if controller is None else self.names_of(controller)
+        wanted = Filter(names, tool, change, tuple(kinds), newest_first=newest_first)
         for page in self._pages(wanted, before=before, after=after, limit=limit):
             yield from map(_entry, page)
 
@@ -116,7 +127,7 @@ class Journal:
         Raises:
             JournalError: It cannot be read.
         """
-        wanted = Filter(controller, proved_tool=tool)
+        wanted = Filter(self.names_of(controller), proved_tool=tool)
         for page in self._pages(wanted, limit=1):
             for row in page:
                 return _entry(row)
@@ -154,6 +165,31 @@ class Journal:
         """
         with self._store.read() as tables:
             return tables.entries.count()
+
+    def names_of(self, controller: str) -> tuple[str, ...]:
+        """Return the names under which a controller is on record, its identity first.
+
+        Args:
+            controller: Its identity, an address at which it was met, or a name of before.
+
+        Raises:
+            JournalError: It cannot be read.
+        """
+        with self._store.read() as tables:
+            identity = tables.names.meant(controller)
+            return (identity, *tables.names.former(identity))
+
+    def addresses_of(self, controller: str) -> tuple[str, ...]:
+        """Return the URLs, without options, at which a controller was met, the latest first.
+
+        Args:
+            controller: Its identity.
+
+        Raises:
+            JournalError: It cannot be read.
+        """
+        with self._store.read() as tables:
+            return tables.names.addresses_of(controller)
 
     def open_markers(self) -> tuple[tuple[str, Marker], ...]:
         """Return what is unsettled on any controller, with the controller's identity.

@@ -42,6 +42,9 @@ class Grip:
 class Lease:
     """The lease of one controller, as one log sees it.
 
+    Attributes:
+        controller: Identity of the controller.
+
     Args:
         store: The journal's database.
         controller: Identity of the controller.
@@ -50,8 +53,8 @@ class Lease:
     """
 
     def __init__(self, store: "Store", controller: str, holder: Holder, clock: Clock) -> None:
+        self.controller = controller
         self._store = store
-        self._controller = controller
         self._holder = holder
         self._clock = clock
         self._token = new_operation()
@@ -81,6 +84,27 @@ class Lease:
         if not self.held:
             self._seen, self._lost = self._judged(self._sight()), False
 
+    def at_work(self) -> str:
+        """Return who else holds it and lives, in sentences; empty for nobody.
+
+        A holder on another computer is not watched for that, so whether he lives stays open.
+
+        Raises:
+            JournalError: It cannot be read.
+        """
+        seen = self._sight()
+        if seen.token in (FREE, self._token):
+            return ""
+        who = seen.who()
+        if not self._holder.shares_clock_with(who):
+            return seen.at_work(tr("Whether it still works shows when it is watched for a while."))
+        silent_s = max(0, self._clock.now_ns() - seen.beat_ns) / NS_PER_S
+        if silent_s >= LEASE_S or self._holder.proves_gone(who):
+            return ""
+        return seen.at_work(
+            tr("It is alive: its last sign of life is {seconds:.0f} s old.", seconds=silent_s)
+        )
+
     def prepare(self) -> None:
         """Look, unless that was done or the lease is held; outside of any transaction."""
         if not self.held and not self._lost and self._seen is None:
@@ -94,7 +118,7 @@ class Lease:
             LeaseLostError: Somebody else took it from this log, or held it meanwhile.
         """
         now_ns = self._clock.now_ns()
-        if self.held and rows.renew(self._controller, self._epoch, self._token, now_ns):
+        if self.held and rows.renew(self.controller, self._epoch, self._token, now_ns):
             self._beaten_ns = now_ns
             return Grip(self._epoch)
         if self.held or self._lost or self._seen is None:
@@ -102,9 +126,9 @@ class Lease:
             raise self._lost_error()
         (seen, because), self._seen = self._seen, None
         claim = self._claim(purpose, operator, now_ns)
-        epoch = rows.take(self._controller, seen, claim)
+        epoch = rows.take(self.controller, seen, claim)
         if epoch == 0:
-            now = rows.sight(self._controller)
+            now = rows.sight(self.controller)
             raise self._held_error(now) if now.token != FREE else self._lost_error()
         self._beaten_ns = now_ns
         return Grip(epoch, (seen.taken_entry(because),) if because else ())
@@ -124,14 +148,14 @@ class Lease:
             return
         self._beaten_ns = now_ns
         with self._store.write() as tables:
-            kept = tables.leases.renew(self._controller, self._epoch, self._token, now_ns)
+            kept = tables.leases.renew(self.controller, self._epoch, self._token, now_ns)
         if not kept:
             self._lose()
 
     def release(self, rows: "LeaseRows") -> None:
         """Free it inside the caller's transaction; one that was lost is left alone."""
         if self.held:
-            rows.release(self._controller, self._epoch, self._token)
+            rows.release(self.controller, self._epoch, self._token)
 
     def forget(self) -> None:
         """Note, after the commit, that it was freed; what was seen before is of no use now."""
@@ -143,10 +167,10 @@ class Lease:
         Returns:
             What is put on record; ``None`` when this log holds it itself.
         """
-        seen = rows.sight(self._controller)
+        seen = rows.sight(self.controller)
         if seen.token == self._token:
             return None
-        rows.end(self._controller)
+        rows.end(self.controller)
         return seen.taken_entry(reason)
 
     def _judged(self, seen: Sighting) -> tuple[Sighting, str]:
@@ -178,7 +202,7 @@ class Lease:
 
     def _sight(self) -> Sighting:
         with self._store.read(tr("The controller was not touched.")) as tables:
-            return tables.leases.sight(self._controller)
+            return tables.leases.sight(self.controller)
 
     def _claim(self, purpose: str, operator: str, now_ns: int) -> dict[str, object]:
         return {
@@ -200,16 +224,16 @@ class Lease:
             sign = tr("{seconds:.0f} s ago", seconds=silent_s)
         else:
             sign = tr("while it was watched just now")
-        return seen.held_error(self._controller, sign)
+        return seen.held_error(self.controller, sign)
 
     def _lost_error(self) -> LeaseLostError:
         return LeaseLostError(
-            tr("Another took over {controller} meanwhile.", controller=self._controller),
+            tr("Another took over {controller} meanwhile.", controller=self.controller),
             remedy=tr(
                 "Nothing was sent. Read the tool again before you write: 'robolink journal list' "
                 "shows who did what."
             ),
-            controller=self._controller,
+            controller=self.controller,
         )
 
 

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Final
 
 from robolink.errors import JournalError, OutcomeUnknownError
 from robolink.journal._leases import Lease
+from robolink.journal._naming import Names, Naming
 from robolink.journal._processes import BootClock, Holder, this_process
 from robolink.messages import tr
-from robolink.model import EntryKind, Marker, MarkerKind, NewEntry, Recorded, Signature
+from robolink.model import EntryKind, Marker, MarkerKind, NewEntry, Recorded, Signature, Who
 from robolink.timing import Clock
 
 if TYPE_CHECKING:
@@ -31,15 +32,17 @@ class JournalOutcomeLog:
     Attributes:
         signature: Who works here, and with what.
         change: Id of the tool change under way, empty for none; it goes with every entry.
-        identity: Identity of the controller.
         durable: Whether what is recorded outlives this process.
+        trouble: ``None``: this record can be kept, as far as is known.
     """
+
+    trouble: JournalError | None = None
 
     def __init__(
         self,
         journal: "Journal",
         store: "Store",
-        identity: str,
+        controller: str,
         *,
         signature: Signature,
         holder: Holder | None = None,
@@ -47,14 +50,45 @@ class JournalOutcomeLog:
     ) -> None:
         self.signature = signature
         self.change = ""
-        self.identity = identity
         self.durable = store.durable
         self._journal = journal
         self._store = store
         self._lock = threading.RLock()
-        self._lease = Lease(store, identity, holder or this_process(), clock or BootClock())
+        self._naming = Naming(store, controller)
+        self._holder, self._clock = holder or this_process(), clock or BootClock()
+        self._lease = Lease(store, controller, self._holder, self._clock)
+        self._names = Names(controller)
         self._begun: set[str] = set()
         self._holds = 0
+
+    @property
+    def identity(self) -> str:
+        """Who the controller is; it is asked if it was not asked yet.
+
+        Raises:
+            JournalError: The journal cannot be read.
+            TransportError, RemoteProtocolError: The link failed.
+        """
+        return self._named().identity
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Every name under which the controller is on record, its identity first.
+
+        Raises:
+            JournalError, TransportError, RemoteProtocolError: As for :attr:`identity`.
+        """
+        return self._named().all
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What a person should know about who the controller is, once, in sentences."""
+        return self._naming.remarks
+
+    def ask(self, who: Who) -> None:
+        """Let the controller say who it is, at the next use of this log and not before."""
+        with self._lock:
+            self._naming.ask(who)
 
     def begin(self, marker: Marker) -> None:
         """Store ``marker`` in one durable transaction that also proves or takes the lease.
@@ -65,12 +99,13 @@ class JournalOutcomeLog:
             LeaseLostError: Somebody else was, since :meth:`look` or since the lease was taken.
         """
         with self._lock:
+            name = self._named().identity
             self._lease.prepare()
             with self._store.write(_untouched()) as tables:
                 grip = self._lease.secure(tables.leases, marker.request, self.signature.operator)
-                first = tables.markers.put(self.identity, marker)
+                first = tables.markers.put(name, marker)
                 entries = (*grip.entries, *_beginning(marker, first=first))
-                tables.entries.append(self.identity, self.signature, self.change, entries)
+                tables.entries.append(name, self.signature, self.change, entries)
             self._begun.add(marker.operation)
             self._lease.settle(grip)
 
@@ -83,14 +118,15 @@ class JournalOutcomeLog:
                 was true here need not be true any more.
         """
         with self._lock:
+            name = self._named().identity
             last = not self._holds and not self._begun - {operation}
             with self._store.write(_left_open()) as tables:
                 if last:
                     self._lease.release(tables.leases)
-                known = tables.markers.remove(self.identity, operation)
+                known = tables.markers.remove(name, operation)
                 if operation in self._begun and not known:
                     raise self._settled_by_another()
-                tables.entries.append(self.identity, self.signature, self.change, entries)
+                tables.entries.append(name, self.signature, self.change, entries)
             self._begun.discard(operation)
             if last:
                 self._lease.forget()
@@ -101,8 +137,9 @@ class JournalOutcomeLog:
         Raises:
             JournalError: It is not stored.
         """
+        name = self._named().identity
         with self._store.write() as tables:
-            tables.entries.append(self.identity, self.signature, self.change, entries)
+            tables.entries.append(name, self.signature, self.change, entries)
 
     def open_markers(self) -> tuple[Marker, ...]:
         """Return what is unsettled on this controller, oldest first, whoever began it.
@@ -110,8 +147,9 @@ class JournalOutcomeLog:
         Raises:
             JournalError: It cannot be read.
         """
+        names = self._named().all
         with self._store.read() as tables:
-            return tables.markers.of(self.identity)
+            return tables.markers.of(*names)
 
     def recorded(
         self, *, tool: int | None = None, change: str = "", kinds: Collection[EntryKind] = ()
@@ -141,9 +179,20 @@ class JournalOutcomeLog:
             JournalError: It cannot be read.
         """
         with self._lock:
+            self._named()
             # While something that it began is open, a lease that was lost stays lost: clearing
             # up after it is not for this process any more.
             self._lease.look(afresh=not self._begun)
+
+    def at_work(self) -> str:
+        """Return who else is working on the controller, in sentences; empty for nobody.
+
+        Raises:
+            JournalError: It cannot be read.
+        """
+        with self._lock:
+            self._named()
+            return self._lease.at_work()
 
     @contextmanager
     def hold(self, purpose: str) -> Iterator[None]:
@@ -155,10 +204,11 @@ class JournalOutcomeLog:
             JournalError: It cannot be stored.
         """
         with self._lock:
+            name = self._named().identity
             self._lease.prepare()
             with self._store.write(_untouched()) as tables:
                 grip = self._lease.secure(tables.leases, purpose, self.signature.operator)
-                tables.entries.append(self.identity, self.signature, self.change, grip.entries)
+                tables.entries.append(name, self.signature, self.change, grip.entries)
             self._lease.settle(grip)
             self._holds += 1
         try:
@@ -191,17 +241,28 @@ class JournalOutcomeLog:
             LeaseHeldError: Yet another has taken it at once.
         """
         with self._lock:
+            name = self._named().identity
             with self._store.write(_untouched()) as tables:
                 ended = self._lease.end(tables.leases, reason)
                 entries = () if ended is None else (ended,)
-                tables.entries.append(self.identity, self.signature, self.change, entries)
+                tables.entries.append(name, self.signature, self.change, entries)
             self._lease.look()
+
+    def _named(self) -> Names:
+        with self._lock:
+            if self._begun or self._holds:
+                return self._names  # whoever works on it is not asked in between
+            names = self._naming.known(self.signature)
+            if names.identity != self._lease.controller:
+                self._lease = Lease(self._store, names.identity, self._holder, self._clock)
+            self._names = names
+            return names
 
     def _settled_by_another(self) -> OutcomeUnknownError:
         return OutcomeUnknownError(
-            tr("Another settled meanwhile what was begun on {name}.", name=self.identity),
+            tr("Another settled meanwhile what was begun on {name}.", name=self._names.identity),
             remedy=tr("Read the tools again: 'robolink journal list' shows who did what."),
-            controller=self.identity,
+            controller=self._names.identity,
         )
 
     def close(self) -> None:

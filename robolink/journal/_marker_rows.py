@@ -71,10 +71,13 @@ class MarkerRows:
         """Forget a marker; return whether it was there."""
         return self._runner.run(_DELETE, _same(controller, operation)) == 1
 
-    def of(self, controller: str) -> tuple[Marker, ...]:
-        """Return the markers of a controller, oldest first."""
-        rows = self._runner.rows(_SELECT, {"of_controller": storable(controller)})
-        return tuple([_marker(_Stored(*row)) for row in rows])
+    def of(self, *names: str) -> tuple[Marker, ...]:
+        """Return the markers of a controller, under each of its names, oldest first."""
+        found: list[Marker] = []
+        for name in names:
+            rows = self._runner.rows(_SELECT, {"of_controller": storable(name)})
+            found += [_marker(_Stored(*row)) for row in rows]
+        return tuple(found)
 
     def of_all(self) -> tuple[tuple[str, Marker], ...]:
         """Return every marker with the identity of its controller, oldest first."""

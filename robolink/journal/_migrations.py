@@ -21,6 +21,8 @@ from sqlalchemy import (
     text,
     update,
 )
+from sqlalchemy.schema import CreateIndex, CreateTable
+from sqlalchemy.sql.ddl import DDLElement
 
 from robolink.errors import JournalError
 from robolink.journal._chain import FIRST
@@ -30,8 +32,34 @@ from robolink.messages import tr
 # SQLite keeps a table in the order of its key only if the key is called INTEGER.
 _NUMBER: Final = BigInteger().with_variant(Integer, "sqlite")
 
+_MAKERS: Final[dict[tuple[Callable[[], MetaData], str], tuple[str, ...]]] = {}
+"""The statements that make some tables in a kind of database."""
+
+
+def _create(connection: Connection, tables: Callable[[], MetaData]) -> None:
+    """Make tables that are not there yet.
+
+    The statements are put together once: each simulated controller keeps a journal of its own.
+    """
+    dialect = connection.dialect
+    key = (tables, dialect.name)
+    if key not in _MAKERS:
+        wanted = tables().sorted_tables
+        indexes = {str(index.name): index for table in wanted for index in table.indexes}
+        makers: list[DDLElement] = [CreateTable(table, if_not_exists=True) for table in wanted]
+        makers += [CreateIndex(indexes[name], if_not_exists=True) for name in sorted(indexes)]
+        _MAKERS[key] = tuple(str(maker.compile(dialect=dialect)) for maker in makers)
+    for statement in _MAKERS[key]:
+        connection.exec_driver_sql(statement)
+
 
 def _first_tables(connection: Connection) -> None:
+    _create(connection, _first_metadata)
+    connection.execute(insert(HEAD).values(number=0, hash=FIRST))
+    connection.execute(insert(SCHEMA_VERSION).values(version=0))
+
+
+def _first_metadata() -> MetaData:
     metadata = MetaData()
     _entries(metadata)
     Table("schema_version", metadata, Column("version", Integer, nullable=False))
@@ -59,9 +87,7 @@ def _first_tables(connection: Connection) -> None:
         Column("beat_ns", BigInteger, nullable=False),
         *map(_text, ("token", "holder", "boot", "taken_at", "purpose")),
     )
-    metadata.create_all(connection)
-    connection.execute(insert(HEAD).values(number=0, hash=FIRST))
-    connection.execute(insert(SCHEMA_VERSION).values(version=0))
+    return metadata
 
 
 def _entries(metadata: MetaData) -> None:
@@ -99,7 +125,26 @@ def _text(name: str) -> Column[str]:
     return Column(name, Text, nullable=False)
 
 
-MIGRATIONS: tuple[Callable[[Connection], None], ...] = (_first_tables,)
+def _names(connection: Connection) -> None:
+    """Let a controller be known by what it says of itself, not by how its URL is spelled.
+
+    Entries are chained and stay as they are: whose they are stands in ``former_names``.
+    """
+    metadata = MetaData()
+    Table(
+        "addresses",
+        metadata,
+        Column("address", Text, primary_key=True),
+        *map(_text, ("controller", "met_at")),
+    )
+    Table("former_names", metadata, Column("name", Text, primary_key=True), _text("controller"))
+    metadata.create_all(connection)
+
+
+MIGRATIONS: tuple[Callable[[Connection], None], ...] = (_first_tables, _names)
+
+NAMED: Final = 2
+"""From this version on a journal tells names from addresses."""
 
 
 def stored_version(connection: Connection, name: str) -> int:
@@ -146,14 +191,9 @@ def newer_error(name: str, found: int) -> JournalError:
     )
 
 
-def older_error(name: str, found: int) -> JournalError:
-    """Return the error about tables that would have to be migrated before they can be read."""
-    if found == 0:
-        return JournalError(
-            tr("The journal {name} is empty.", name=name),
-            remedy=tr("The first change that robolink makes starts it."),
-        )
+def empty_error(name: str) -> JournalError:
+    """Return the error about a database in which nobody has made the tables yet."""
     return JournalError(
-        tr("The journal {name} has the older form {found}.", name=name, found=found),
-        remedy=tr("Open it once for writing; that brings it up to date."),
+        tr("The journal {name} is empty.", name=name),
+        remedy=tr("The first change that robolink makes starts it."),
     )

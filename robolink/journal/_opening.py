@@ -3,8 +3,11 @@
 import threading
 from typing import Final
 
+from robolink.errors import JournalError
 from robolink.journal._journal import Journal
+from robolink.journal._looking import LookingLog
 from robolink.journal._places import Place, default_location, memory_place, place_of
+from robolink.model import OutcomeLog, Signature
 
 _lock: Final = threading.Lock()
 _opened: Final[dict[tuple[str, bool], Journal]] = {}
@@ -41,6 +44,32 @@ def memory_journal(identity: str) -> Journal:
         if known is None:
             known = _in_memory[identity] = _open(memory_place(identity), read_only=False)
         return known
+
+
+def open_log(address: str, *, durable: bool, signature: Signature) -> OutcomeLog:
+    """Return the record of a controller, which may be one that cannot be kept.
+
+    Looking at a controller and calming it needs no record: a journal that cannot be opened
+    raises here nothing, but at the first use that would have to be recorded.
+
+    Args:
+        address: How the controller is reached.
+        durable: Whether it outlives this process, so that its record must too.
+        signature: Who works here.
+    """
+    if not durable:
+        return memory_journal(address).log(address, signature=signature)
+    try:
+        journal = open_journal()
+        journal.require_usable()  # one that was opened before may have been broken since
+        return journal.log(address, signature=signature)
+    except JournalError as error:
+        return LookingLog(
+            error,
+            lambda: open_journal(read_only=True).log(address, signature=signature),
+            address=address,
+            signature=signature,
+        )
 
 
 def close_files() -> None:

@@ -23,7 +23,7 @@ class Filter:
     """Which entries are wanted.
 
     Attributes:
-        controller: Of this controller only.
+        controllers: Of the controller with these names only; empty for all.
         tool: About this tool only.
         change: Of this tool change only.
         kinds: Of these kinds only; empty for all.
@@ -31,7 +31,7 @@ class Filter:
         proved_tool: Those only that prove what this tool holds.
     """
 
-    controller: str | None = None
+    controllers: tuple[str, ...] = ()
     tool: int | None = None
     change: str | None = None
     kinds: tuple[EntryKind, ...] = ()

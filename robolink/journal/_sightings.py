@@ -70,6 +70,20 @@ class Sighting:
             controller=controller,
         )
 
+    def at_work(self, alive: str) -> str:
+        """Return the sentences about a holder who is at it.
+
+        Args:
+            alive: Whether he lives, one sentence.
+        """
+        said = tr(
+            "{holder} is at work on this controller since {since}: {purpose}.",
+            holder=describe(self.who()),
+            since=self.taken_at,
+            purpose=self.purpose,
+        )
+        return f"{said} {alive}"
+
     def taken_entry(self, because: str) -> NewEntry:
         """Return what is put on record when this lease was ended by another.
 

@@ -8,6 +8,7 @@ from contextlib import AbstractContextManager, contextmanager
 from sqlalchemy import Connection, Engine
 from sqlalchemy.exc import SQLAlchemyError
 
+from robolink.checkpoints import Point, checkpoint
 from robolink.errors import JournalError
 from robolink.journal import _migrations
 from robolink.journal._engines import Backend, backend_of
@@ -15,6 +16,7 @@ from robolink.journal._entry_rows import EntryRows
 from robolink.journal._failures import journal_error
 from robolink.journal._lease_rows import LeaseRows
 from robolink.journal._marker_rows import MarkerRows
+from robolink.journal._name_rows import NameRows
 from robolink.journal._places import Place
 from robolink.journal._prepared import Runner
 from robolink.messages import tr
@@ -29,16 +31,18 @@ class Tables:
         entries: The append-only record.
         markers: What is not settled.
         leases: Who may change which controller.
+        names: Who is meant by a name or an address.
         newer: Whether a newer robolink made the tables.
     """
 
-    def __init__(self, connection: Connection, *, newer: bool) -> None:
+    def __init__(self, connection: Connection, version: int) -> None:
         self.connection = connection
         self.runner = Runner(connection)
         self.entries = EntryRows(connection, self.runner)
         self.markers = MarkerRows(self.runner)
         self.leases = LeaseRows(self.runner)
-        self.newer = newer
+        self.names = NameRows(self.runner, known=version >= _migrations.NAMED)
+        self.newer = version > len(_migrations.MIGRATIONS)
 
 
 class Store:
@@ -107,6 +111,8 @@ class Store:
 
     @contextmanager
     def _use(self, consequence: str, *, writing: bool) -> Iterator[Tables]:
+        if writing:
+            checkpoint(Point.COMMIT, "before")
         with self._lock:
             try:
                 backend, tables = self._connected(to_write=writing)
@@ -128,6 +134,8 @@ class Store:
             except (SQLAlchemyError, OSError) as error:
                 self._drop()
                 raise journal_error(error, self._place.name, consequence) from error
+        if writing:
+            checkpoint(Point.COMMIT, "after")
 
     def _connected(self, *, to_write: bool) -> tuple[Backend, Tables]:
         if self._backend is None:
@@ -160,22 +168,23 @@ class Store:
     def _tables_of(self, engine: Engine, backend: Backend) -> Tables:
         connection = engine.connect()
         try:
-            newer = self._bring_up_to_date(connection, backend)
+            version = self._bring_up_to_date(connection, backend)
         except BaseException:
             connection.close()
             raise
-        return Tables(connection, newer=newer)
+        return Tables(connection, version)
 
-    def _bring_up_to_date(self, connection: Connection, backend: Backend) -> bool:
+    def _bring_up_to_date(self, connection: Connection, backend: Backend) -> int:
+        """Return the version of the tables; older ones that are only read stay as they are."""
         own, name = len(_migrations.MIGRATIONS), self._place.name
         with connection.begin():
             found = _migrations.stored_version(connection, name)
         if found > own and not self._read_only:
             raise _migrations.newer_error(name, found)
-        if found >= own:
-            return found > own
+        if found >= own or (self._read_only and found):
+            return found
         if self._read_only:
-            raise _migrations.older_error(name, found)
+            raise _migrations.empty_error(name)
         with connection.begin():
             connection.exec_driver_sql(backend.begin_migrating)
             # Another process may have been faster while this one waited for the lock.
@@ -183,7 +192,7 @@ class Store:
             if found > own:
                 raise _migrations.newer_error(name, found)
             _migrations.migrate(connection, found)
-        return False
+        return max(own, found)
 
     def _file_now(self) -> tuple[int, int] | None:
         if self._place.path is None:

@@ -54,4 +54,13 @@ LEASES: Final = table(
     column("purpose", Text),
 )
 
+ADDRESSES: Final = table(
+    "addresses",
+    column("address", Text),
+    column("controller", Text),
+    column("met_at", Text),
+)
+
+FORMER_NAMES: Final = table("former_names", column("name", Text), column("controller", Text))
+
 SCHEMA_VERSION: Final = table("schema_version", column("version", Integer))

@@ -1,49 +1,84 @@
 """Values and interfaces. No I/O."""
 
-from robolink.model._controller import Act as Act
-from robolink.model._controller import Capabilities as Capabilities
-from robolink.model._controller import Controller as Controller
-from robolink.model._controller import ControllerState as ControllerState
-from robolink.model._controller import ControllerStatus as ControllerStatus
-from robolink.model._facts import ControllerFacts as ControllerFacts
-from robolink.model._findings import Finding as Finding
-from robolink.model._findings import Resolver as Resolver
-from robolink.model._findings import Verdict as Verdict
-from robolink.model._geometry import Hand as Hand
-from robolink.model._geometry import Pose as Pose
-from robolink.model._geometry import angle_difference_deg as angle_difference_deg
-from robolink.model._geometry import rotate_xy as rotate_xy
-from robolink.model._io import DigitalIo as DigitalIo
-from robolink.model._journal_entries import EntryKind as EntryKind
-from robolink.model._journal_entries import NewEntry as NewEntry
-from robolink.model._journal_entries import Recorded as Recorded
-from robolink.model._journal_entries import Signature as Signature
-from robolink.model._motion import Motion as Motion
-from robolink.model._motion import MotionGroup as MotionGroup
-from robolink.model._motion import MotionOutcome as MotionOutcome
-from robolink.model._motion import MotionProfile as MotionProfile
-from robolink.model._motion import MotionTerms as MotionTerms
-from robolink.model._motion import Path as Path
-from robolink.model._motion import WorkBox as WorkBox
-from robolink.model._outcomes import Marker as Marker
-from robolink.model._outcomes import MarkerKind as MarkerKind
-from robolink.model._outcomes import OutcomeLog as OutcomeLog
-from robolink.model._outcomes import new_operation as new_operation
-from robolink.model._people import Role as Role
-from robolink.model._people import require_engineer as require_engineer
-from robolink.model._secret import Secret as Secret
-from robolink.model._tip_sensor import TIP as TIP
-from robolink.model._tip_sensor import Spot as Spot
-from robolink.model._tip_sensor import SpotUnit as SpotUnit
-from robolink.model._tip_sensor import TipSensor as TipSensor
-from robolink.model._tools import ANY as ANY
-from robolink.model._tools import Expect as Expect
-from robolink.model._tools import Expected as Expected
-from robolink.model._tools import ToolOffset as ToolOffset
-from robolink.model._tools import ToolReceipt as ToolReceipt
-from robolink.model._tools import ToolTable as ToolTable
-from robolink.model._tools import describe_offset as describe_offset
-from robolink.model._tools import plain_offset as plain_offset
-from robolink.model._tools import read_offset as read_offset
-from robolink.model._until_input import InputEdge as InputEdge
-from robolink.model._until_input import MotionUntilInput as MotionUntilInput
+from typing import TYPE_CHECKING
+
+from robolink.lazy_exports import lazy_exports
+
+if TYPE_CHECKING:
+    from robolink.model._controller import Act as Act
+    from robolink.model._controller import Capabilities as Capabilities
+    from robolink.model._controller import Controller as Controller
+    from robolink.model._controller import ControllerState as ControllerState
+    from robolink.model._controller import ControllerStatus as ControllerStatus
+    from robolink.model._facts import ControllerFacts as ControllerFacts
+    from robolink.model._findings import Finding as Finding
+    from robolink.model._findings import Resolver as Resolver
+    from robolink.model._findings import Verdict as Verdict
+    from robolink.model._geometry import Hand as Hand
+    from robolink.model._geometry import Pose as Pose
+    from robolink.model._geometry import angle_difference_deg as angle_difference_deg
+    from robolink.model._geometry import rotate_xy as rotate_xy
+    from robolink.model._identity import Identity as Identity
+    from robolink.model._identity import Who as Who
+    from robolink.model._io import DigitalIo as DigitalIo
+    from robolink.model._journal_entries import EntryKind as EntryKind
+    from robolink.model._journal_entries import NewEntry as NewEntry
+    from robolink.model._journal_entries import Recorded as Recorded
+    from robolink.model._journal_entries import Signature as Signature
+    from robolink.model._ledger import Account as Account
+    from robolink.model._ledger import Ledger as Ledger
+    from robolink.model._motion import Motion as Motion
+    from robolink.model._motion import MotionGroup as MotionGroup
+    from robolink.model._motion import MotionOutcome as MotionOutcome
+    from robolink.model._motion import MotionProfile as MotionProfile
+    from robolink.model._motion import MotionTerms as MotionTerms
+    from robolink.model._motion import Path as Path
+    from robolink.model._motion import WorkBox as WorkBox
+    from robolink.model._outcomes import Marker as Marker
+    from robolink.model._outcomes import MarkerKind as MarkerKind
+    from robolink.model._outcomes import OutcomeLog as OutcomeLog
+    from robolink.model._outcomes import new_operation as new_operation
+    from robolink.model._people import Role as Role
+    from robolink.model._people import require_engineer as require_engineer
+    from robolink.model._secret import Secret as Secret
+    from robolink.model._standing_words import describe_standing as describe_standing
+    from robolink.model._tip_sensor import TIP as TIP
+    from robolink.model._tip_sensor import Spot as Spot
+    from robolink.model._tip_sensor import SpotUnit as SpotUnit
+    from robolink.model._tip_sensor import TipSensor as TipSensor
+    from robolink.model._tools import ANY as ANY
+    from robolink.model._tools import Expect as Expect
+    from robolink.model._tools import Expected as Expected
+    from robolink.model._tools import ToolOffset as ToolOffset
+    from robolink.model._tools import ToolReceipt as ToolReceipt
+    from robolink.model._tools import ToolTable as ToolTable
+    from robolink.model._tools import describe_offset as describe_offset
+    from robolink.model._tools import plain_offset as plain_offset
+    from robolink.model._tools import read_offset as read_offset
+    from robolink.model._until_input import InputEdge as InputEdge
+    from robolink.model._until_input import MotionUntilInput as MotionUntilInput
+else:
+    __getattr__ = lazy_exports(
+        __name__,
+        {
+            "_controller": "Act Capabilities Controller ControllerState ControllerStatus",
+            "_facts": "ControllerFacts",
+            "_findings": "Finding Resolver Verdict",
+            "_geometry": "Hand Pose angle_difference_deg rotate_xy",
+            "_identity": "Identity Who",
+            "_io": "DigitalIo",
+            "_journal_entries": "EntryKind NewEntry Recorded Signature",
+            "_ledger": "Account Ledger",
+            "_motion": "Motion MotionGroup MotionOutcome MotionProfile MotionTerms Path WorkBox",
+            "_outcomes": "Marker MarkerKind OutcomeLog new_operation",
+            "_people": "Role require_engineer",
+            "_secret": "Secret",
+            "_standing_words": "describe_standing",
+            "_tip_sensor": "Spot SpotUnit TIP TipSensor",
+            "_tools": (
+                "ANY Expect Expected ToolOffset ToolReceipt ToolTable describe_offset "
+                "plain_offset read_offset"
+            ),
+            "_until_input": "InputEdge MotionUntilInput",
+        },
+    )

@@ -10,9 +10,11 @@ from typing import Protocol, Self
 from robolink.model._facts import ControllerFacts
 from robolink.model._findings import Resolver
 from robolink.model._journal_entries import NewEntry
+from robolink.model._ledger import Ledger
 from robolink.model._motion import MotionGroup
 from robolink.model._outcomes import Marker, MarkerKind, OutcomeLog
 from robolink.model._tools import ToolTable
+from robolink.stop_latch import StopLatch
 from robolink.timing import Clock
 
 
@@ -131,6 +133,10 @@ class Controller(Protocol):
         """The doubtful outcomes and the unfinished procedures of this controller."""
 
     @property
+    def ledger(self) -> Ledger:
+        """What was done to it since connecting, and how much of that is proved."""
+
+    @property
     def resolver(self) -> Resolver:
         """Settles what was begun here and not proved finished."""
 
@@ -149,8 +155,24 @@ class Controller(Protocol):
     def facts(self) -> ControllerFacts:
         """Read which controller and robots these are."""
 
+    @property
+    def latch(self) -> StopLatch:
+        """What holds everything back from :meth:`stop` until :meth:`release_stop`."""
+
     def stop(self) -> None:
-        """Stop everything; from any thread, at any time, more than once."""
+        """Stop everything; from any thread, at any time, more than once.
+
+        It sets the latch before it waits for anything: until :meth:`release_stop` no movement,
+        jog, write or program start leaves this process. Only the tool, power and speed of
+        before may be put back, and each tool of an open change once. Whoever was at work gets
+        StoppedError. It returns when the controller has shown that it is at rest.
+
+        Raises:
+            OutcomeUnknownError: Rest was not seen; the message says to use the emergency stop.
+        """
+
+    def release_stop(self) -> None:
+        """Let this process act again after :meth:`stop`, because a person says so."""
 
     def reset_fault(self) -> None:
         """Clear an error because a person asked for it."""

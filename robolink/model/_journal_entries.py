@@ -25,6 +25,7 @@ class EntryKind(StrEnum):
     RAW = "raw statement"
     LEASE = "lease"
     STATION = "station"
+    IDENTITY = "identity"
 
 
 @dataclass(frozen=True, slots=True)

@@ -153,6 +153,19 @@ class MotionGroup(Protocol):
     def requests_for(self, target: Pose, profile: MotionProfile) -> tuple[str, ...]:
         """Return what :meth:`move_to` would send besides its reads, as it stands on the wire."""
 
+    def require_able(self, purpose: str) -> None:
+        """Refuse what no movement could begin in now; reads only.
+
+        For whoever asks a person first: nobody is asked whether the cell is clear, and then told
+        that the motors are off.
+
+        Args:
+            purpose: What it is to move for, in words.
+
+        Raises:
+            NotReadyError: The motors are off, or the state forbids every movement.
+        """
+
     def terms(self) -> MotionTerms:
         """Read what a person must know before it moves."""
 

@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Protocol
 
+from robolink.errors import ConfigError
+from robolink.model._identity import Who
 from robolink.model._journal_entries import EntryKind, NewEntry, Recorded, Signature
 
 
@@ -51,14 +53,35 @@ class OutcomeLog(Protocol):
     Attributes:
         signature: Who works here, and with what.
         change: Id of the tool change under way, empty for none; it goes with every entry.
+        trouble: Why nothing can be recorded, so that nothing may be changed; ``None`` for a
+            record that is as it should be.
     """
 
     signature: Signature
     change: str
 
     @property
+    def trouble(self) -> ConfigError | None:
+        """See above."""
+
+    @property
     def durable(self) -> bool:
         """Whether what is recorded outlives this process."""
+
+    @property
+    def identity(self) -> str:
+        """Who the controller is; it is asked if it was not asked yet."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Every name under which the controller is on record, its identity first."""
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What a person should know about who the controller is, once, in sentences."""
+
+    def ask(self, who: Who) -> None:
+        """Let the controller say who it is, at the next use and not before."""
 
     def begin(self, marker: Marker) -> None:
         """Store ``marker``; it is durable when this returns.
@@ -89,6 +112,13 @@ class OutcomeLog(Protocol):
 
         Raises:
             BusyError: Another process has the controller.
+        """
+
+    def at_work(self) -> str:
+        """Return who else is working on the controller, in sentences; empty for nobody.
+
+        Raises:
+            ConfigError: The record cannot be read.
         """
 
     def hold(self, purpose: str) -> AbstractContextManager[None]:

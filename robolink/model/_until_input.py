@@ -38,7 +38,8 @@ class MotionUntilInput(Protocol):
             beam, and both directions, are late by the same amount then.
 
         Raises:
-            ControllerFaultError: It was stopped before, or the controller went into error.
+            StoppedError: It was stopped before.
+            ControllerFaultError: The controller went into error.
             OutcomeUnknownError: The link fell silent; the movement may go on.
             MotionTimeoutError: It did not end in time and was aborted.
         """

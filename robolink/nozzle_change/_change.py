@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 
 from robolink.calibration import VerifyResult
-from robolink.errors import CalibrationError, DeclinedError, VerifyError
+from robolink.errors import CalibrationError, DeclinedError, StoppedError, VerifyError
 from robolink.messages import tr
 from robolink.model import Controller, ToolReceipt, new_operation, require_engineer
 from robolink.nozzle_change._listener import Listener, Moment
@@ -64,6 +64,7 @@ class NozzleChange:
         Raises:
             CalibrationError: A measurement is not trusted; nothing was written.
             DeclinedError: The person said no; nothing was written.
+            StoppedError: A stop came; what was written was put back, unless it was kept already.
             VerifyError: A tip drifts too far; the old values were put back.
             RobolinkError: Anything else that ended it, with the state it left.
         """
@@ -73,9 +74,12 @@ class NozzleChange:
         controller.outcomes.change = new_operation()
         try:
             controller.require_settled(reason)
-            with controller.preserved(reason) if self._plan.moves else nullcontext():
+            with (
+                controller.latch.watching(reason),
+                controller.preserved(reason) if self._plan.moves else nullcontext(),
+            ):
                 return self._carry_out(write=write)
-        except KeyboardInterrupt:
+        except (KeyboardInterrupt, StoppedError):
             if self._written is not None and self._written.kept:
                 self._tell(tr("Tool {tool} keeps the new value.", tool=numbers))
             raise

@@ -4,23 +4,17 @@ from pathlib import Path
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-
-_MAX_BYTES = 4_000_000
-"""A thousand points take half a megabyte; more than this is not a file of poses."""
+from robolink.named_files import read_named
 
 
 def read_text(path: Path, *, encoding: str) -> str:
-    """Return the text of a file of at most 4 MB.
+    """Return the text of a regular file; a thousand points take half a megabyte of at most 4.
 
     Raises:
         ConfigError: It cannot be read, is too large, or is not text in this encoding.
     """
     try:
-        with path.open("rb") as file:
-            data = file.read(_MAX_BYTES + 1)
-        if len(data) > _MAX_BYTES:
-            raise unusable(path, tr("it is larger than 4 MB"))
-        return data.decode(encoding)
+        return read_named(path).decode(encoding)
     except OSError as error:
         raise unusable(path, error.strerror or str(error)) from error
     except UnicodeDecodeError as error:

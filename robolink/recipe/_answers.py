@@ -8,7 +8,7 @@ from robolink.messages import tr
 from robolink.nozzle_change import Bench
 from robolink.recipe._recipe import Recipe
 from robolink.recipe._tables import Prompt
-from robolink.runner import parse_decimal
+from robolink.runner import MOST_REFUSED, parse_decimal
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,9 +84,13 @@ def ask_prompt(bench: Bench, prompt: Prompt) -> str:
 
 
 def ask_height(bench: Bench, tool: int, name: str) -> float:
-    """Ask for Z of a new tip, mm from the flange, until it is a number."""
+    """Ask for Z of a new tip, mm from the flange.
+
+    Raises:
+        DeclinedError: No number was typed, however often it was asked.
+    """
     runner = bench.runner()
-    while True:
+    for _ in range(MOST_REFUSED):
         text = runner.ask_text(
             tr(
                 "Z of the new tip of tool {tool} {name} in mm from the flange?",
@@ -98,6 +102,10 @@ def ask_height(bench: Bench, tool: int, name: str) -> float:
             return parse_decimal(text)
         except ConfigError as error:
             bench.operator.tell(str(error))
+    raise DeclinedError(
+        tr("No number was typed for Z of tool {tool}, however often it was asked.", tool=tool),
+        remedy=tr("Nothing was written. Start again with the length of the new tip at hand."),
+    )
 
 
 def confirm_height(bench: Bench, tool: int, name: str) -> None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink.named_files import read_named
 from robolink.toml_files import NotTomlError, Problem, parse_toml
 
 if TYPE_CHECKING:
@@ -79,7 +80,7 @@ def _checked(document: dict[str, object]) -> tuple["Recipe | None", tuple[Proble
 
 def _content(path: Path) -> bytes:
     try:
-        return path.read_bytes()
+        return read_named(path)
     except OSError as error:
         raise _unreadable(path, error.strerror or str(error)) from error
 

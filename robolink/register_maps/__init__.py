@@ -28,5 +28,6 @@ from robolink.register_maps._numbers import NumberType as NumberType
 from robolink.register_maps._places import Signal as Signal
 from robolink.register_maps._places import Table as Table
 from robolink.register_maps._places import Word as Word
+from robolink.register_maps._places import Words as Words
 from robolink.register_maps._places import describe_place as describe_place
 from robolink.toml_files import Problem as Problem

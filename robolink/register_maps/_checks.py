@@ -161,6 +161,8 @@ def _claims(file: MapFile, found: RegisterMap) -> Iterator[_Claim]:
         yield _of_number(f"flange.{name}", number)
     if found.probe is not None:
         yield _of_number("probe", found.probe.number)
+    if found.device_id is not None:
+        yield _Claim("device_id", found.device_id.table, found.device_id.registers)
     for where, signal in _all_signals(file, found):
         ours = signal is found.commit.request or (where.endswith(".defined") and signal.writable)
         yield _Claim(

@@ -26,6 +26,7 @@ from typing import Final
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink.named_files import read_named
 from robolink.register_maps._map import COMPONENTS
 from robolink.register_maps._places import LAST_ADDRESS, Table
 from robolink.register_maps._variable_names import component_of
@@ -116,7 +117,7 @@ def draft_from_csv(path: Path) -> Draft:
 
 def _rows(path: Path) -> Iterator[tuple[int, dict[str, str]]]:
     try:
-        text = path.read_bytes()[:_MOST_BYTES].decode("utf-8-sig")
+        text = read_named(path, most_bytes=_MOST_BYTES).decode("utf-8-sig")
     except OSError as error:
         raise _unusable(path, error.strerror or str(error)) from error
     except UnicodeError as error:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink.named_files import read_named
 from robolink.register_maps._map import RegisterMap
 from robolink.register_maps._problems import problems_of, refusal
 from robolink.toml_files import NotTomlError, Problem, parse_toml
@@ -53,7 +54,7 @@ def _checked(path: Path) -> tuple[RegisterMap | None, list[Problem]]:
 
 def _content(path: Path) -> bytes:
     try:
-        return path.read_bytes()
+        return read_named(path)
     except OSError as error:
         raise _unreadable(path, error.strerror or str(error)) from error
 

@@ -6,7 +6,7 @@ from enum import StrEnum
 from typing import Final
 
 from robolink.register_maps._numbers import Number
-from robolink.register_maps._places import Signal, Table, Word
+from robolink.register_maps._places import Signal, Table, Word, Words
 
 COMPONENTS: Final = ("x", "y", "z", "u", "v", "w")
 """Components of a tool offset and of a pose, in the order of :class:`robolink.model.Pose`."""
@@ -131,6 +131,8 @@ class RegisterMap:
         probe: The constant to compare before anything is believed, if there is one.
         permit: On while offsets may be written, if there is such a signal.
         selected: Number of the tool in force, if the PLC tells it.
+        device_id: Where a number stands that tells this machine from every other one, if it
+            has one.
         flange: Where the flange is, by component; empty where the PLC does not tell.
         inputs: Inputs by number.
         all_zero: What a slot of zeros means.
@@ -144,6 +146,7 @@ class RegisterMap:
     probe: Probe | None = None
     permit: Signal | None = None
     selected: Word | None = None
+    device_id: Words | None = None
     flange: Mapping[str, Number] = field(default_factory=dict)
     inputs: Mapping[int, Input] = field(default_factory=dict)
     all_zero: AllZero = AllZero.REFUSE

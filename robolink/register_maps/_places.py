@@ -91,3 +91,17 @@ class Word:
     def place(self) -> str:
         """The place as a person reads it."""
         return describe_place(self.table, self.address)
+
+
+@dataclass(frozen=True, slots=True)
+class Words:
+    """Registers in a row that hold a number of the machine's own."""
+
+    table: Table
+    address: int
+    count: int
+
+    @property
+    def registers(self) -> range:
+        """Which ones."""
+        return range(self.address, self.address + self.count)

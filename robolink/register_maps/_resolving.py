@@ -17,7 +17,7 @@ from robolink.register_maps._map import (
     Slot,
 )
 from robolink.register_maps._numbers import Number, NumberType
-from robolink.register_maps._places import Signal, Table, Word
+from robolink.register_maps._places import Signal, Table, Word, Words
 from robolink.register_maps._tables import (
     CommitBitKeys,
     FlangeKeys,
@@ -28,6 +28,7 @@ from robolink.register_maps._tables import (
     SignalKeys,
     ToolKeys,
     WordKeys,
+    WordsKeys,
 )
 from robolink.toml_files import Problem
 
@@ -62,6 +63,7 @@ class Resolving:
             probe=probe,
             permit=_signal(file.permit),
             selected=_word(file.selected),
+            device_id=_words(file.device_id),
             flange=flange,
             inputs={
                 keys.number: Input(keys.number, keys.name, _some_signal(keys))
@@ -176,3 +178,7 @@ def _some_signal(keys: SignalKeys) -> Signal:
 
 def _word(keys: WordKeys | None) -> Word | None:
     return None if keys is None else Word(Table(keys.table), keys.address)
+
+
+def _words(keys: WordsKeys | None) -> Words | None:
+    return None if keys is None else Words(Table(keys.table), keys.address, keys.words)

@@ -75,6 +75,12 @@ class WordKeys(Keys):
     table: RegisterTable = "holding"
 
 
+class WordsKeys(WordKeys):
+    """``[device_id]``: registers in a row that tell this machine from every other one."""
+
+    words: Annotated[int, Field(ge=1, le=8)] = 2
+
+
 class ToolKeys(Keys):
     """One ``[[tools]]``: the components that the PLC has."""
 
@@ -157,6 +163,7 @@ class MapFile(Keys):
     probe: ProbeKeys | None = None
     permit: SignalKeys | None = None
     selected: WordKeys | None = None
+    device_id: WordsKeys | None = None
     flange: FlangeKeys | None = None
     inputs: list[InputKeys] = Field(default_factory=list)
 
@@ -167,6 +174,7 @@ KEYS: Final = {
         MapFile,
         NumberDefaults,
         ProbeKeys,
+        WordsKeys,
         InputKeys,
         ToolKeys,
         CommitBitKeys,

@@ -12,8 +12,11 @@ from robolink.runner._jog_steps import parse_decimal as parse_decimal
 from robolink.runner._jog_steps import parse_steps as parse_steps
 from robolink.runner._operator import Operator as Operator
 from robolink.runner._operator import Question as Question
+from robolink.runner._runner import MOST_REFUSED as MOST_REFUSED
 from robolink.runner._runner import POLL_S as POLL_S
 from robolink.runner._runner import Runner as Runner
 from robolink.runner._runner import StepDone as StepDone
 from robolink.runner._runner import ask_for_pose as ask_for_pose
 from robolink.runner._settings import RunSettings as RunSettings
+from robolink.runner._yes_no import ask_yes_no as ask_yes_no
+from robolink.runner._yes_no import yes_or_no as yes_or_no

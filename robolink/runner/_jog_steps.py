@@ -1,16 +1,33 @@
 """Jog steps as a person types them, and where they lead."""
 
+import math
 import re
 from dataclasses import replace
+from typing import Final
 
 from robolink.errors import ConfigError, LimitError
 from robolink.messages import tr
-from robolink.model import Path, Pose
+from robolink.model import Path, Pose, angle_difference_deg
 from robolink.runner._settings import RunSettings
 
-_STEP = re.compile(r"([xyzu])([+-][0-9]{1,4}(?:\.[0-9]{1,3})?)", re.ASCII)
+_STEP: Final = re.compile(
+    r"\s*([xyzu])\s*([+-])\s*([0-9]{1,4}(?:[.,][0-9]{1,3})?)"
+    r"(?=[\s;xyzu]|,(?![0-9])|$)\s*[,;]?",
+    re.ASCII,
+)
+"""Axis, sign, number; a comma before a digit is a decimal comma, any other parts two steps."""
 
-_DECIMAL = re.compile(r"[+-]?[0-9]{1,5}(?:\.[0-9]{1,6})?", re.ASCII)
+_PLAIN: Final = str.maketrans(
+    dict.fromkeys("\u2010\u2011\u2012\u2013\u2014\u2212", "-")
+    | {chr(0xFEE0 + code): chr(code) for code in range(0x21, 0x7F)}
+    | {"\u3000": " "}
+)
+"""Minus signs of other keyboards, and the wide letters and digits of Chinese input methods."""
+
+_TURNED_DEG: Final = 0.005
+"""Less than this is what a position reads besides, not a turn."""
+
+_DECIMAL: Final = re.compile(r"[+-]?[0-9]{1,5}(?:\.[0-9]{1,6})?", re.ASCII)
 
 
 def jog_target(here: Pose, steps: str, settings: RunSettings) -> tuple[Pose, Path]:
@@ -39,6 +56,32 @@ def jog_target(here: Pose, steps: str, settings: RunSettings) -> tuple[Pose, Pat
     return target, Path.JOINT if "u" in deltas else Path.STRAIGHT
 
 
+def way_in_words(before: Pose, after: Pose) -> str:
+    """Say that a jog is done, how far it went (measured), and where the tool is now.
+
+    Args:
+        before: Where it was, mm and degrees.
+        after: Where it is.
+    """
+    way_mm = math.dist(before.coordinates()[:3], after.coordinates()[:3])
+    turned_deg = angle_difference_deg(after.u_deg, before.u_deg)
+    where = tr(
+        "X {x:.3f} Y {y:.3f} Z {z:.3f} U {u:.3f}",
+        x=after.x_mm,
+        y=after.y_mm,
+        z=after.z_mm,
+        u=after.u_deg,
+    )
+    if abs(turned_deg) < _TURNED_DEG:
+        return tr("  done: moved {way:.3f} mm. Now at {where}", way=way_mm, where=where)
+    return tr(
+        "  done: moved {way:.3f} mm and turned {turned:+.3f} degrees. Now at {where}",
+        way=way_mm,
+        turned=turned_deg,
+        where=where,
+    )
+
+
 def parse_decimal(text: str) -> float:
     """Read a decimal number that a person typed: ``-120.35``.
 
@@ -56,21 +99,35 @@ def parse_decimal(text: str) -> float:
 def parse_steps(text: str) -> dict[str, float]:
     """Read jog steps like ``x+0.1 y-0.05 u+5``: axis, sign, decimal number.
 
+    Blanks may stand anywhere between them, the number may have a decimal comma, and minus signs
+    and letters may be those of any keyboard: ``x + 0,1``. The sign is never left out, because a
+    number without one may be meant as a position.
+
     Raises:
         ConfigError: Anything else, or an axis twice.
     """
+    plain = text.translate(_PLAIN).lower().strip()
     deltas: dict[str, float] = {}
-    for word in text.lower().split():
-        match = _STEP.fullmatch(word)
-        if match is None or match[1] in deltas:
-            raise ConfigError(
-                tr("{word!r} is not a jog step.", word=word),
-                remedy=tr(
-                    "Type an axis x, y, z or u, a sign and a number, for example x+0.1 z-0.5; "
-                    "ENTER when the tip is on the pin, q to end."
-                ),
-            )
-        deltas[match[1]] = float(match[2])
+    at = 0
+    while at < len(plain):
+        match = _STEP.match(plain, at)
+        if match is None:
+            raise _no_step(plain[at:].strip())
+        axis, sign, number = match.groups()
+        if axis in deltas:
+            raise _no_step(match[0].strip())
+        deltas[axis] = float(sign + number.replace(",", "."))
+        at = match.end()
     if not deltas:
         raise ConfigError(tr("No jog step was given."), remedy=tr("For example: x+0.1 z-0.5"))
     return deltas
+
+
+def _no_step(word: str) -> ConfigError:
+    return ConfigError(
+        tr("{word!r} is not a jog step.", word=word),
+        remedy=tr(
+            "Type an axis x, y, z or u, a sign and a number, for example x+0.1 z-0.5; "
+            "ENTER when the tip is on the pin, q to end."
+        ),
+    )

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Final, TypeVar
 
 from robolink.calibration import Ask, Look, Move, Offer, Procedure, Seek, SeenAt, Shown, Step, Tell
+from robolink.checkpoints import Point, checkpoint
 from robolink.errors import (
     CalibrationError,
     ConfigError,
@@ -14,6 +15,7 @@ from robolink.errors import (
     HeartbeatLostError,
     NotReadyError,
     NotReadyReason,
+    StoppedError,
 )
 from robolink.messages import tr
 from robolink.model import (
@@ -27,9 +29,10 @@ from robolink.model import (
     Pose,
     TipSensor,
 )
-from robolink.runner._jog_steps import jog_target
+from robolink.runner._jog_steps import jog_target, way_in_words
 from robolink.runner._operator import Operator, Question
 from robolink.runner._settings import RunSettings
+from robolink.runner._yes_no import ask_yes_no
 from robolink.sensing import seen_once
 
 POLL_S = 1.0
@@ -37,6 +40,10 @@ POLL_S = 1.0
 
 _MOST_REPEATS: Final = 2
 """Steps of one procedure that may be repeated: a computer busier than that has to be looked at."""
+
+MOST_REFUSED: Final = 10
+"""So many answers in a row that lead nowhere end a question: whoever answers, a person or what
+stands in for one, would go on like that."""
 
 T = TypeVar("T")
 
@@ -104,6 +111,7 @@ class Runner:
         """Take the procedure's steps until it returns; its result is a proposal.
 
         Raises:
+            StoppedError: A stop came, at whatever step.
             DeclinedError: The person ended it.
             CalibrationError: The procedure refuses its measurements.
             ControllerFaultError, NotReadyError, OutcomeUnknownError: From the controller.
@@ -111,6 +119,8 @@ class Runner:
         try:
             step = next(procedure)
             while True:
+                checkpoint(Point.STEP, type(step).__name__)
+                self._require_going()
                 try:
                     done = self._take(step)
                 except CalibrationError as error:
@@ -122,6 +132,7 @@ class Runner:
                 step = procedure.send(_answer(done))
         except StopIteration as finished:
             result: T = finished.value
+            self._require_going()
             return result
         finally:
             procedure.close()
@@ -130,7 +141,7 @@ class Runner:
         """Move once and return where the frame is then.
 
         Raises:
-            ControllerFaultError: It was stopped before it arrived.
+            StoppedError: It was stopped before it arrived.
         """
         profile = MotionProfile(path, self._settings.speed_percent, self._settings.speed_mm_s)
 
@@ -140,7 +151,7 @@ class Runner:
 
         outcome = self._seen_through(go, target)
         if outcome is not MotionOutcome.ARRIVED:
-            raise ControllerFaultError(
+            raise StoppedError(
                 tr("The movement was stopped before it arrived."),
                 remedy=tr("Nothing goes on by itself; start again when the cell is clear."),
                 controller=self._controller.identity,
@@ -150,12 +161,18 @@ class Runner:
     def jog(self, steps: str) -> Pose:
         """Move by typed steps, for example ``x+0.1 z-0.5``, in one straight move.
 
+        How far it went and where it is then is told to the operator, unless the settings spare it.
+
         Raises:
             ConfigError: The text is not a list of steps.
             LimitError: A step is too large, or its target lies outside the box.
         """
-        target, path = jog_target(self._group.pose(), steps, self._settings)
-        return self.move(target, path)
+        before = self._group.pose()
+        target, path = jog_target(before, steps, self._settings)
+        after = self.move(target, path)
+        if self._settings.tell_jogs:
+            self._operator.tell(way_in_words(before, after))
+        return after
 
     def _take(self, step: Step) -> StepDone:
         if isinstance(step, Tell):
@@ -211,15 +228,13 @@ class Runner:
 
     def _ask(self, step: Ask) -> Pose:
         self._operator.ask(step.instruction, _QUESTIONS[step.shown])
+        refused = 0
         while True:
             word = self._answer()
             if word in ("", "done"):
                 return self._group.pose()
             if word in ("q", "quit", "abort"):
-                raise DeclinedError(
-                    tr("The procedure was ended by the operator."),
-                    remedy=tr("Nothing was written."),
-                )
+                raise _ended_by_operator()
             repeats_left = self._repeats_left
             try:
                 self.jog(word)
@@ -227,7 +242,12 @@ class Runner:
                     self._operator.ask(step.instruction, _QUESTIONS[step.shown])
             except ConfigError as error:
                 # A typing mistake ends nothing; the limits held and nothing was sent.
+                refused += 1
+                if refused == MOST_REFUSED:
+                    raise self._gets_nowhere(error) from error
                 self._operator.tell(str(error))
+            else:
+                refused = 0
 
     def _seen_through(self, go: Callable[[], T], target: Pose) -> T:
         """Move, and once more from where the robot stands if this computer was too busy to.
@@ -260,26 +280,39 @@ class Runner:
             return False
 
     def confirm(self, question: str) -> bool:
-        """Ask a yes-or-no question under the same watch; anything but a yes is a no."""
-        self._operator.ask(question, Question.YES_NO)
-        return self._answer() in ("y", "yes")
+        """Ask a yes-or-no question under the same watch; see :func:`ask_yes_no`."""
+        return ask_yes_no(self._operator, question, self._line)
 
     def ask_text(self, question: str) -> str:
-        """Ask for a line of text under the same watch, until there is one.
+        """Ask for a line of text under the same watch.
 
         Raises:
-            DeclinedError: The person ended it with ``q``.
+            DeclinedError: The person ended it with ``q``, or gave none however often asked.
         """
-        while True:
+        for _ in range(MOST_REFUSED):
             self._operator.ask(question, Question.TEXT)
             text = self._line().strip()
             if text == "q":
-                raise DeclinedError(
-                    tr("The procedure was ended by the operator."),
-                    remedy=tr("Nothing was written."),
-                )
+                raise _ended_by_operator()
             if text:
                 return text
+        raise DeclinedError(
+            tr("Nothing was typed, {count} times in a row.", count=MOST_REFUSED),
+            remedy=tr("Start again when somebody is there to answer."),
+        )
+
+    def _gets_nowhere(self, error: ConfigError) -> DeclinedError:
+        return DeclinedError(
+            tr(
+                "{count} jogs in a row were refused; the last one: {cause}",
+                count=MOST_REFUSED,
+                cause=error.what,
+            ),
+            remedy=" ".join(
+                (error.remedy, tr("The robot stands where the last jog left it; start again."))
+            ).strip(),
+            controller=self._controller.identity,
+        )
 
     def _answer(self) -> str:
         return self._line().strip().lower()
@@ -288,11 +321,16 @@ class Runner:
         """Return the next line typed, reading the status at least once a second meanwhile."""
         while True:
             line = self._operator.poll(POLL_S)
+            checkpoint(Point.QUESTION, line or "")
             self._watch()
             if line is not None:
                 return line
 
+    def _require_going(self) -> None:
+        self._controller.latch.require_open(tr("The procedure"))
+
     def _watch(self) -> None:
+        self._require_going()
         obstacle = _ended_by(self._controller.status())
         if obstacle:
             raise ControllerFaultError(
@@ -300,6 +338,13 @@ class Runner:
                 remedy=tr("Clear the cause and start again; nothing goes on by itself."),
                 controller=self._controller.identity,
             )
+
+
+def _ended_by_operator() -> DeclinedError:
+    return DeclinedError(
+        tr("The procedure was ended by the operator."),
+        remedy=tr("Nothing was written."),
+    )
 
 
 def _answer(done: StepDone) -> Pose | bool | None:

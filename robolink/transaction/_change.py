@@ -8,7 +8,7 @@ until :meth:`ToolChange.keep`; whatever ends it earlier puts the old values back
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import TracebackType
 from typing import Self
 
@@ -28,6 +28,7 @@ from robolink.errors import (
 from robolink.messages import tr
 from robolink.model import (
     ANY,
+    Account,
     Controller,
     EntryKind,
     Expected,
@@ -40,6 +41,7 @@ from robolink.model import (
     new_operation,
     plain_offset,
 )
+from robolink.standing import note_standing
 from robolink.transaction._put_back import PutBack, Step, put_back
 
 _OUT_OF_REACH = (OutcomeUnknownError, TransportError, RemoteProtocolError, LeaseLostError)
@@ -94,9 +96,11 @@ class ToolChange:
         self._begun: list[Step] = []
         self._receipts: tuple[ToolReceipt, ...] = ()
         self._spoiled: int | None = None
+        self._account: Account | None = None
         self.kept = False
 
     def __enter__(self) -> Self:
+        self._account = self._controller.ledger.open()
         if not self._controller.outcomes.change:
             self._controller.outcomes.change = new_operation()
             self._own_id = True
@@ -115,6 +119,7 @@ class ToolChange:
         finally:
             if self._own_id:
                 self._controller.outcomes.change = ""
+            self._settle_account(error)
 
     def write(self) -> tuple[ToolReceipt, ...]:
         """Write everything and read it back.
@@ -125,8 +130,10 @@ class ToolChange:
             ReadBackError: Another value came back; the old ones are put back.
             ConfigError: The intent cannot be stored; nothing was written.
             BusyError: Another process has the controller.
+            StoppedError: A stop came; what was written is put back.
         """
-        self._controller.require_settled(self._request())
+        self._controller.latch.require_open(self.request)
+        self._controller.require_settled(self.request)
         steps = self._compare()
         if self._several_steps and any(self._differs(step) for step in steps):
             tools = {
@@ -142,7 +149,7 @@ class ToolChange:
                 "change": self._controller.outcomes.change,
             }
             with self._controller.uninterrupted():
-                self._marker = self._controller.begin(MarkerKind.CHANGE, self._request(), details)
+                self._marker = self._controller.begin(MarkerKind.CHANGE, self.request, details)
         self._receipts = tuple(
             self._write(wanted, step) for wanted, step in zip(self._wanted, steps, strict=True)
         )
@@ -156,7 +163,9 @@ class ToolChange:
 
         Raises:
             ConfigError: It cannot be recorded; the change stays open for ``recover``.
+            StoppedError: A stop came before; what was written is put back.
         """
+        self._controller.latch.require_open(self.request)
         if self._marker is None:
             # Each write said itself that it is done; this says what the values rest on.
             if any(wanted.details for wanted in self._wanted):
@@ -185,7 +194,9 @@ class ToolChange:
             for wanted, receipt in zip(self._wanted, self._receipts, strict=True)
         ]
 
-    def _request(self) -> str:
+    @property
+    def request(self) -> str:
+        """What is done, as a person may read it."""
         numbers = ", ".join(str(wanted.tool) for wanted in self._wanted)
         return tr("change of tool {numbers}", numbers=numbers)
 
@@ -240,7 +251,7 @@ class ToolChange:
         if isinstance(error, _OUT_OF_REACH):
             self._leave_open(error)
             return
-        done = put_back(self._controller.tools, self._begun, spoiled=self._spoiled)
+        done = put_back(self._controller, self._begun, spoiled=self._spoiled)
         for result in done:
             self._tell(result.sentence)
         if isinstance(error, RobolinkError):
@@ -248,16 +259,39 @@ class ToolChange:
             error.remedy = " ".join((error.remedy, *sentences)).strip()
         self._record(done)
 
+    def _settle_account(self, error: BaseException | None) -> None:
+        """Let whoever is told of ``error`` know what stands, and which tool is selected."""
+        ledger, account = self._controller.ledger, self._account
+        assert account is not None  # noqa: S101 - __enter__ opened it
+        try:
+            if error is not None:
+                # A link that is gone has told what it knew.
+                with suppress(RobolinkError):
+                    self._controller.tools.selected()
+        finally:
+            ledger.close(account, kept=self.kept)
+            if error is not None:
+                note_standing(error, ledger.standing(account))
+
     def _leave_open(self, error: RobolinkError) -> None:
-        """Say what stands in the journal for ``recover``."""
-        if not self._begun:
+        """Say what stands in the journal for ``recover``; nothing where no write was sent."""
+        tools = self._controller.ledger.standing(self._account).tools
+        stand = [number for number, tool in tools.items() if tool.differs or not tool.known]
+        if not stand:
             return
-        numbers = ", ".join(str(step.tool) for step in self._begun)
-        sentence = tr(
-            "Tool {numbers} may hold the new value, which nobody verified; 'robolink recover' "
-            "puts the old one back.",
-            numbers=numbers,
-        )
+        numbers = ", ".join(map(str, stand))
+        if self._marker is None:
+            sentence = tr(
+                "Tool {numbers} may hold the new value, which nobody verified; 'robolink recover' "
+                "reads what it holds.",
+                numbers=numbers,
+            )
+        else:
+            sentence = tr(
+                "Tool {numbers} may hold the new value, which nobody verified; 'robolink recover' "
+                "puts the old one back.",
+                numbers=numbers,
+            )
         self._tell(sentence)
         error.remedy = f"{error.remedy} {sentence}".strip()
 
@@ -266,10 +300,23 @@ class ToolChange:
         # The error under way matters more than that it cannot be recorded; what is not
         # recorded stays open.
         with suppress(ConfigError):
+            for result in done:
+                self._close_writes(result)
             if self._marker is not None and all(result.restored for result in done):
                 self._controller.finish(self._marker, *entries)
             else:
                 self._controller.outcomes.append(*entries)
+
+    def _close_writes(self, result: PutBack) -> None:
+        """Forget the markers of writes whose value is known to be gone again.
+
+        They stand open where a fault of the controller, or of the journal, came between write
+        and record.
+        """
+        if result.restored:
+            for marker in self._controller.ledger.open_writes(result.tool):
+                entry = replace(result.entry, operation=marker.operation)
+                self._controller.finish(marker, entry)
 
 
 def change_tools(
@@ -289,7 +336,8 @@ def change_tools(
         RobolinkError: As :meth:`ToolChange.write`; the old values are back, or the error says
             that they are not.
     """
-    with ToolChange(controller, wanted, tell=tell) as change:
+    change = ToolChange(controller, wanted, tell=tell)
+    with controller.latch.watching(change.request), change:
         receipts = change.write()
         change.keep()
     return receipts

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from robolink.errors import ReadBackError, RobolinkError
 from robolink.messages import tr
 from robolink.model import (
+    Controller,
     EntryKind,
     NewEntry,
     ToolOffset,
-    ToolTable,
     describe_offset,
     plain_offset,
 )
@@ -50,31 +50,36 @@ class PutBack:
 
 
 def put_back(
-    tools: ToolTable, steps: Sequence[Step], *, spoiled: int | None = None
+    controller: Controller, steps: Sequence[Step], *, spoiled: int | None = None
 ) -> list[PutBack]:
     """Give each tool its old value back, the last one first, with one write each at most.
 
+    A stop does not hinder it, once for each tool (design part 4).
+
     Args:
-        tools: The table.
+        controller: Whose tools they are.
         steps: What the change was to do.
         spoiled: A tool whose write was read back as something else, so that what it holds is
             this change's own doing.
     """
-    return [_put_one_back(tools, step, spoiled=step.tool == spoiled) for step in reversed(steps)]
+    return [
+        _put_one_back(controller, step, spoiled=step.tool == spoiled) for step in reversed(steps)
+    ]
 
 
-def _put_one_back(tools: ToolTable, step: Step, *, spoiled: bool) -> PutBack:
-    tool, before = step.tool, step.before
+def _put_one_back(controller: Controller, step: Step, *, spoiled: bool) -> PutBack:
+    tools, tool, before = controller.tools, step.tool, step.before
     try:
         now = tools.read(tool)
         if tools.same(now, before):
             return _restored(step, tr("Tool {tool} holds its old value.", tool=tool), written=False)
         if not (spoiled or tools.same(now, step.requested)):
             return _conflict(step, now)
-        if before is None:
-            tools.clear(tool, expected=now)
-        else:
-            tools.write(tool, before, expected=now)
+        with controller.latch.putting_back(tool):
+            if before is None:
+                tools.clear(tool, expected=now)
+            else:
+                tools.write(tool, before, expected=now)
     except RobolinkError as error:
         return _failed(step, error)
     sentence = tr("The old value of tool {tool} was written back.", tool=tool)

@@ -97,7 +97,7 @@ class Settler:
         self._controller.begin(
             marker.kind, marker.request, marker.details, operation=marker.operation
         )
-        done = put_back(self._controller.tools, _steps(marker))
+        done = put_back(self._controller, _steps(marker))
         failures = [result for result in done if not result.restored]
         entries = [result.entry for result in done]
         if not failures:

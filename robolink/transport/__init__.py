@@ -1,23 +1,47 @@
 """Moves bytes to and from a far end; knows no protocol."""
 
-from robolink.transport._base import Transport as Transport
-from robolink.transport._dialogue import Dialogue as Dialogue
-from robolink.transport._dialogue import DialogueLog as DialogueLog
-from robolink.transport._dialogue import Passage as Passage
-from robolink.transport._dialogue import format_dialogue as format_dialogue
-from robolink.transport._dialogue import opening_line as opening_line
-from robolink.transport._dialogue import parse_dialogues as parse_dialogues
-from robolink.transport._dialogue import passage_line as passage_line
-from robolink.transport._mailbox_link import MailboxHead as MailboxHead
-from robolink.transport._mailbox_link import MailboxLink as MailboxLink
-from robolink.transport._registry import TRANSPORTS_GROUP as TRANSPORTS_GROUP
-from robolink.transport._registry import TransportOpener as TransportOpener
-from robolink.transport._registry import open_mailbox_link as open_mailbox_link
-from robolink.transport._registry import open_modbus as open_modbus
-from robolink.transport._registry import open_transport as open_transport
-from robolink.transport._trace import SECRET_PLACEHOLDER as SECRET_PLACEHOLDER
-from robolink.transport._trace import Direction as Direction
-from robolink.transport._trace import TraceSink as TraceSink
-from robolink.transport._trace import TracingTransport as TracingTransport
-from robolink.transport._url import LinkUrl as LinkUrl
-from robolink.transport._url import parse_url as parse_url
+from typing import TYPE_CHECKING
+
+from robolink.lazy_exports import lazy_exports
+
+if TYPE_CHECKING:
+    from robolink.transport._base import Transport as Transport
+    from robolink.transport._dialogue import Dialogue as Dialogue
+    from robolink.transport._dialogue import DialogueLog as DialogueLog
+    from robolink.transport._dialogue import Passage as Passage
+    from robolink.transport._dialogue import format_dialogue as format_dialogue
+    from robolink.transport._dialogue import opening_line as opening_line
+    from robolink.transport._dialogue import parse_dialogues as parse_dialogues
+    from robolink.transport._dialogue import passage_line as passage_line
+    from robolink.transport._mailbox_link import MailboxHead as MailboxHead
+    from robolink.transport._mailbox_link import MailboxLink as MailboxLink
+    from robolink.transport._registry import TRANSPORTS_GROUP as TRANSPORTS_GROUP
+    from robolink.transport._registry import TransportOpener as TransportOpener
+    from robolink.transport._registry import open_mailbox_link as open_mailbox_link
+    from robolink.transport._registry import open_modbus as open_modbus
+    from robolink.transport._registry import open_stop_link as open_stop_link
+    from robolink.transport._registry import open_transport as open_transport
+    from robolink.transport._trace import SECRET_PLACEHOLDER as SECRET_PLACEHOLDER
+    from robolink.transport._trace import Direction as Direction
+    from robolink.transport._trace import TraceSink as TraceSink
+    from robolink.transport._trace import TracingTransport as TracingTransport
+    from robolink.transport._url import LinkUrl as LinkUrl
+    from robolink.transport._url import parse_url as parse_url
+else:
+    __getattr__ = lazy_exports(
+        __name__,
+        {
+            "_base": "Transport",
+            "_dialogue": (
+                "Dialogue DialogueLog Passage format_dialogue opening_line "
+                "parse_dialogues passage_line"
+            ),
+            "_mailbox_link": "MailboxHead MailboxLink",
+            "_registry": (
+                "TRANSPORTS_GROUP TransportOpener "
+                "open_mailbox_link open_modbus open_stop_link open_transport"
+            ),
+            "_trace": "SECRET_PLACEHOLDER Direction TraceSink TracingTransport",
+            "_url": "LinkUrl parse_url",
+        },
+    )

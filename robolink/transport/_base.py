@@ -21,6 +21,10 @@ class Transport(Protocol):
         """Which far end this is: the URL without its options."""
 
     @property
+    def place(self) -> str:
+        """Where the far end was reached: the same, however a host name is spelled."""
+
+    @property
     def durable(self) -> bool:
         """Whether the far end outlives this process, so that markers about it must too."""
 

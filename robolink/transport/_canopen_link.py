@@ -115,6 +115,11 @@ class CanopenMailboxLink:
         return self._identity
 
     @property
+    def place(self) -> str:
+        """The bus and the node."""
+        return self._identity.partition("://")[2]
+
+    @property
     def durable(self) -> bool:
         """False on a virtual bus, which lives in this process; else True."""
         return self._durable

@@ -7,7 +7,7 @@ import struct
 from collections import deque
 from typing import Final
 
-from robolink.errors import TransportBrokenError
+from robolink.errors import RemoteProtocolError, TransportBrokenError
 from robolink.messages import tr
 from robolink.timing import NS_PER_S, Clock, Deadline
 from robolink.transport._can_bus import CanLine
@@ -28,6 +28,12 @@ _HEAD: Final = struct.Struct("<HBBHH")
 """TPDO1: ack, state, group_state, error_class, heartbeat (softmotion.md 4.8)."""
 _MISSED: Final = 3
 _SHORTEST_LOSS_S: Final = 0.5
+
+_MOST_WAITING: Final = 10_000
+"""Frames that may have come while nobody listened: more than a second of a full bus at 1 Mbit/s
+(about 9,000), and a reader is many times faster than that."""
+_MOST_ANSWERS: Final = 64
+"""SDO answers kept; each transfer begins with none and asks for one at a time."""
 
 
 def identifiers(node: int) -> tuple[int, ...]:
@@ -53,7 +59,7 @@ class NodeWatch:
         self._period_s = 0.0
         self._heard_ns = 0
         self._head: MailboxHead | None = None
-        self.answers: deque[bytes] = deque()
+        self.answers: deque[bytes] = deque(maxlen=_MOST_ANSWERS)
 
     def expect_heartbeat(self, period_s: float) -> None:
         """Supervise a heartbeat of this period from now on; 0 means there is none."""
@@ -66,10 +72,26 @@ class NodeWatch:
         return head
 
     def drain(self) -> None:
-        """Sort what has arrived while nobody listened. Raises as :meth:`pump`."""
-        while self._take(Deadline(self._clock, 0)):
-            pass
-        self._require_heartbeat()
+        """Sort what has arrived while nobody listened.
+
+        Raises:
+            RemoteProtocolError: It does not end.
+            TransportError: As :meth:`pump`.
+        """
+        for _ in range(_MOST_WAITING):
+            if not self._take(Deadline(self._clock, 0)):
+                self._require_heartbeat()
+                return
+        raise RemoteProtocolError(
+            tr(
+                "Node {node} of {identity} sends without a pause: {count} frames were waiting.",
+                node=self._node,
+                identity=self._identity,
+                count=_MOST_WAITING,
+            ),
+            remedy=tr("Look for a second device with its node number, or one that is defective."),
+            controller=self._identity,
+        )
 
     def pump(self, deadline: Deadline) -> None:
         """Sort what arrives within a short slice of time.

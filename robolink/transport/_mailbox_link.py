@@ -52,6 +52,10 @@ class MailboxLink(Protocol):
         """Which far end this is: the URL, without the options that do not name one."""
 
     @property
+    def place(self) -> str:
+        """Where the far end was reached, the same for each spelling of the URL."""
+
+    @property
     def durable(self) -> bool:
         """Whether the far end outlives this process, so that markers about it must too."""
 

@@ -90,6 +90,12 @@ class ModbusClient:
         return self._identity
 
     @property
+    def place(self) -> str:
+        """Where it was reached; the unit only where it is not the usual one."""
+        unit = self._identity.partition("?")[2]
+        return f"{self._transport.place}?{unit}" if unit else self._transport.place
+
+    @property
     def clock(self) -> Clock:
         """The clock on which deadlines are kept."""
         return self._transport.clock

@@ -8,7 +8,7 @@ and on a serial line throw away what follows a frame.
 
 import logging
 import struct
-from typing import Final, Protocol
+from typing import Final
 
 from pymodbus.framer import FramerRTU, FramerSocket
 from pymodbus.pdu import DecodePDU, ModbusPDU
@@ -23,6 +23,7 @@ from pymodbus.pdu.register_message import (
     WriteMultipleRegistersRequest,
 )
 
+from robolink.transport._modbus_framing import FrameError
 from robolink.transport._modbus_messages import (
     WRITE_COIL,
     WRITE_REGISTERS,
@@ -36,32 +37,6 @@ logging.getLogger("pymodbus").addHandler(logging.NullHandler())
 _READS_REGISTERS: Final = frozenset({3, 4})
 _REFUSED: Final = 0x80
 _MOST_BYTES_COUNTED: Final = 254  # unit and PDU, in the header of a TCP frame
-
-
-class FrameError(Exception):
-    """Bytes that are no frame of this framing. Internal to the package.
-
-    Attributes:
-        raw: The bytes.
-    """
-
-    def __init__(self, raw: bytes) -> None:
-        super().__init__(raw.hex(" "))
-        self.raw = raw
-
-
-class Framing(Protocol):
-    """How frames are wrapped."""
-
-    def pack(self, request: ModbusRequest, transaction: int) -> bytes:
-        """Return the frame of ``request``."""
-
-    def take(self, buffer: bytearray) -> ModbusReply | None:
-        """Take one frame off the front of ``buffer``, ``None`` while it is incomplete.
-
-        Raises:
-            FrameError: The front is no frame.
-        """
 
 
 class TcpFraming:

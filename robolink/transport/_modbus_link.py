@@ -49,7 +49,7 @@ class MailboxPlaces:
 
 
 def open_modbus_link(
-    url: LinkUrl, *, timeout_s: float, clock: Clock | None = None
+    url: LinkUrl, *, timeout_s: float, clock: Clock | None = None, to_stop: bool = False
 ) -> "ModbusMailboxLink":
     """Open a mailbox over Modbus TCP or RTU.
 
@@ -59,6 +59,7 @@ def open_modbus_link(
             (``holding`` reads response and slots from holding registers, function 3).
         timeout_s: Longest wait for the connection, and for each answer.
         clock: Keeps the deadlines.
+        to_stop: Whether it is opened for a stop alone, so that nothing may be loaded for it.
 
     Raises:
         ConfigError: The URL or an option is wrong.
@@ -68,7 +69,9 @@ def open_modbus_link(
     options = UrlOptions(url)
     places = _take_places(options)
     probe = Probe(places.area, places.response)
-    client = open_client(url, options, probe=probe, timeout_s=timeout_s, clock=clock)
+    client = open_client(
+        url, options, probe=probe, timeout_s=timeout_s, clock=clock, to_stop=to_stop
+    )
 
     def again(timeout_s: float) -> ModbusMailboxLink:
         return open_modbus_link(url, timeout_s=timeout_s, clock=clock)
@@ -92,9 +95,12 @@ class ModbusMailboxLink:
     @property
     def identity(self) -> str:
         """The client's, and which of a unit's mailboxes when it is not the usual one."""
-        name, command = self._client.identity, self._places.command
-        joint = "&" if "?" in name else "?"
-        return f"{name}{joint}command={command}" if command else name
+        return self._which(self._client.identity)
+
+    @property
+    def place(self) -> str:
+        """The client's, and which of a unit's mailboxes when it is not the usual one."""
+        return self._which(self._client.place)
 
     @property
     def durable(self) -> bool:
@@ -147,6 +153,10 @@ class ModbusMailboxLink:
     def close(self) -> None:
         """See :meth:`robolink.transport.MailboxLink.close`."""
         self._client.close()
+
+    def _which(self, name: str) -> str:
+        command, joint = self._places.command, "&" if "?" in name else "?"
+        return f"{name}{joint}command={command}" if command else name
 
     def _read(self, address: int, count: int) -> tuple[int, ...]:
         if self._places.area is Area.HOLDING:

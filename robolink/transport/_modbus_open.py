@@ -8,8 +8,10 @@ from robolink.messages import tr
 from robolink.timing import Clock, Deadline, SystemClock
 from robolink.transport._dial import dial
 from robolink.transport._modbus import ModbusClient
+from robolink.transport._modbus_framing import Framing
 from robolink.transport._modbus_messages import Area
 from robolink.transport._modbus_rtu import RtuExchange, RtuLine
+from robolink.transport._modbus_stop_frames import StopRtuFraming, StopTcpFraming
 from robolink.transport._modbus_tcp import TcpExchange
 from robolink.transport._serial import SerialSettings, open_serial
 from robolink.transport._tcp import TcpTransport
@@ -74,15 +76,35 @@ def open_client(
     probe: Probe,
     timeout_s: float,
     clock: Clock | None,
+    to_stop: bool = False,
 ) -> ModbusClient:
-    """Open a client; ``options`` are those that the caller has left. See :func:`open_modbus`."""
+    """Open a client; ``options`` are those that the caller has left. See :func:`open_modbus`.
+
+    With ``to_stop`` it reads and writes registers and nothing else, and loads no pymodbus.
+    """
     clock = clock or SystemClock()
     if url.medium == TCP_MEDIUM:
-        return _open_tcp(url, options, timeout_s=timeout_s, clock=clock)
-    return _open_rtu(url, options, probe=probe, timeout_s=timeout_s, clock=clock)
+        wrapped: Framing = StopTcpFraming() if to_stop else _tcp_framing()
+        return _open_tcp(url, options, wrapped, timeout_s=timeout_s, clock=clock)
+    wrapped = StopRtuFraming() if to_stop else _rtu_framing()
+    return _open_rtu(url, options, wrapped, probe=probe, timeout_s=timeout_s, clock=clock)
 
 
-def _open_tcp(url: LinkUrl, options: UrlOptions, *, timeout_s: float, clock: Clock) -> ModbusClient:
+def _tcp_framing() -> Framing:
+    from robolink.transport._modbus_frames import TcpFraming  # here, because it loads pymodbus
+
+    return TcpFraming()
+
+
+def _rtu_framing() -> Framing:
+    from robolink.transport._modbus_frames import RtuFraming  # here, because it loads pymodbus
+
+    return RtuFraming()
+
+
+def _open_tcp(
+    url: LinkUrl, options: UrlOptions, framing: Framing, *, timeout_s: float, clock: Clock
+) -> ModbusClient:
     unit = options.take_int("unit", _DEFAULT_UNITS[TCP_MEDIUM], 0, 255)
     options.finish()
     if not url.host or url.path:
@@ -94,12 +116,18 @@ def _open_tcp(url: LinkUrl, options: UrlOptions, *, timeout_s: float, clock: Clo
     deadline = Deadline.after(clock, timeout_s)
     transport = TcpTransport(dial(server, timeout_s=timeout_s, deadline=deadline), server, clock)
     identity = _identity(server, unit)
-    exchange = TcpExchange(transport, identity)
+    exchange = TcpExchange(transport, identity, framing)
     return ModbusClient(transport, exchange, identity=identity, unit=unit, timeout_s=timeout_s)
 
 
 def _open_rtu(
-    url: LinkUrl, options: UrlOptions, *, probe: Probe, timeout_s: float, clock: Clock
+    url: LinkUrl,
+    options: UrlOptions,
+    framing: Framing,
+    *,
+    probe: Probe,
+    timeout_s: float,
+    clock: Clock,
 ) -> ModbusClient:
     unit = options.take_int("unit", _DEFAULT_UNITS[RTU_MEDIUM], 1, 247)
     settings = _take_settings(options)
@@ -115,7 +143,7 @@ def _open_rtu(
     )
     transport = open_serial(url, settings, timeout_s=timeout_s, clock=clock)
     identity = _identity(url, unit)
-    exchange = RtuExchange(transport, identity, line)
+    exchange = RtuExchange(transport, identity, line, framing)
     try:
         exchange.get_in_step(unit, Deadline.after(clock, timeout_s))
     except TransportTimeoutError as error:

@@ -16,7 +16,7 @@ from robolink.messages import tr
 from robolink.timing import NS_PER_S, Deadline
 from robolink.transport import _modbus_errors as errors
 from robolink.transport._base import Transport
-from robolink.transport._modbus_frames import FrameError, RtuFraming
+from robolink.transport._modbus_framing import FrameError, Framing
 from robolink.transport._modbus_messages import WRITE_COIL, Area, ModbusReply, ModbusRequest
 
 
@@ -55,11 +55,13 @@ class RtuExchange:
     # Lengths that nothing else on a mailbox reads, so that each names its own question.
     _UNUSUAL: Final = range(3, 3 + 2 * (_REMEMBERED + 1), 2)
 
-    def __init__(self, transport: Transport, identity: str, line: RtuLine) -> None:
+    def __init__(
+        self, transport: Transport, identity: str, line: RtuLine, framing: Framing
+    ) -> None:
         self._transport = transport
         self._identity = identity
         self._line = line
-        self._framing = RtuFraming()
+        self._framing = framing
         self._buffer = bytearray()
         self._doubts: deque[ModbusRequest] = deque(maxlen=self._REMEMBERED)
         self._in_step: set[int] = set()

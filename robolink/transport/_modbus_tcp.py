@@ -6,7 +6,7 @@ from robolink.errors import TransportTimeoutError
 from robolink.timing import Deadline
 from robolink.transport import _modbus_errors as errors
 from robolink.transport._base import Transport
-from robolink.transport._modbus_frames import FrameError, TcpFraming
+from robolink.transport._modbus_framing import FrameError, Framing
 from robolink.transport._modbus_messages import ModbusReply, ModbusRequest
 
 
@@ -16,10 +16,10 @@ class TcpExchange:
     recovers: Final = False
     units: Final = range(256)
 
-    def __init__(self, transport: Transport, identity: str) -> None:
+    def __init__(self, transport: Transport, identity: str, framing: Framing) -> None:
         self._transport = transport
         self._identity = identity
-        self._framing = TcpFraming()
+        self._framing = framing
         self._buffer = bytearray()
         self._transaction = 0
 

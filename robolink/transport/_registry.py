@@ -80,6 +80,23 @@ def open_mailbox_link(
     return opened
 
 
+def open_stop_link(
+    url: str | LinkUrl, *, timeout_s: float = 3.0, clock: Clock | None = None
+) -> MailboxLink:
+    """Open a link to a PLC mailbox for a stop and nothing else; as :func:`open_mailbox_link`.
+
+    Over Modbus it has its own frames, because loading pymodbus takes longer than the stop.
+    """
+    link = parse_url(url) if isinstance(url, str) else url
+    opener = _find(link, _MAILBOX_MEDIA)
+    if link.medium not in _REGISTER_MEDIA:
+        opened: MailboxLink = opener(link, timeout_s=timeout_s, clock=clock)
+        return opened
+    from robolink.transport._modbus_link import open_modbus_link
+
+    return open_modbus_link(link, timeout_s=timeout_s, clock=clock, to_stop=True)
+
+
 def open_modbus(
     url: str | LinkUrl, *, timeout_s: float = 3.0, clock: Clock | None = None
 ) -> "ModbusClient":

@@ -137,6 +137,11 @@ class SerialTransport:
         return self._url.identity
 
     @property
+    def place(self) -> str:
+        """Which port; two names of one port are two places."""
+        return self._url.place
+
+    @property
     def durable(self) -> bool:
         """True: what is wired to a port outlives this process."""
         return True

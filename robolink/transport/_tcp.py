@@ -14,6 +14,7 @@ read that ends in an exception.
 import contextlib
 import socket
 import struct
+from ipaddress import ip_address
 
 from robolink.errors import (
     TransportBrokenError,
@@ -54,6 +55,7 @@ class TcpTransport:
     def __init__(self, connection: socket.socket, url: LinkUrl, clock: Clock) -> None:
         self._socket = connection
         self._identity = url.identity
+        self._place = url.place
         self._clock = clock
         self._closed = False
         self._look = looker(connection)
@@ -73,6 +75,11 @@ class TcpTransport:
     def identity(self) -> str:
         """The URL: it names the far end."""
         return self._identity
+
+    @property
+    def place(self) -> str:
+        """The address that answers, and its port."""
+        return _peer(self._socket) or self._place
 
     @property
     def durable(self) -> bool:
@@ -175,3 +182,16 @@ class TcpTransport:
             remedy=tr("Check the controller's power and the cable, then connect again."),
             controller=self._identity,
         )
+
+
+def _peer(connection: socket.socket) -> str:
+    """Return address and port of the far end, empty when it has gone already."""
+    try:
+        host, port, *_ = connection.getpeername()
+    except (OSError, ValueError):
+        return ""
+    address = ip_address(host.partition("%")[0])
+    if address.version == 6 and (address.ipv4_mapped or address.is_loopback):
+        # One machine: a name may lead to either, and the port is the same.
+        address = address.ipv4_mapped or ip_address("127.0.0.1")
+    return f"[{address}]:{port}" if address.version == 6 else f"{address}:{port}"

@@ -37,6 +37,11 @@ class TracingTransport:
         return self._inner.identity
 
     @property
+    def place(self) -> str:
+        """The inner transport's."""
+        return self._inner.place
+
+    @property
     def durable(self) -> bool:
         """The inner transport's."""
         return self._inner.durable

@@ -1,11 +1,20 @@
 """URLs that name a controller: ``KIND+MEDIUM://HOST:PORT/PATH?OPTION=VALUE``."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Final
 from urllib.parse import parse_qsl, urlsplit
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
+
+_MODBUS_PORT: Final = 502
+_USUAL_UNITS: Final = {"modbus-tcp": "255", "modbus-rtu": "1"}
+_TELLING: Final = {
+    "modbus-tcp": ("unit", "command"),
+    "modbus-rtu": ("unit", "command"),
+    "can": ("node",),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +48,29 @@ class LinkUrl:
         host = f"[{self.host}]" if ":" in self.host else self.host
         port = "" if self.port is None else f":{self.port}"
         return f"{self.scheme}://{host}{port}{self.path}"
+
+    @property
+    def address(self) -> str:
+        """The URL as a link calls its far end: with those options only that tell far ends apart.
+
+        Nothing is opened, and an option that makes no sense stays as it is written.
+        """
+        usual_unit = _USUAL_UNITS.get(self.medium, "")
+        telling = {
+            name: value
+            for name, value in self.options.items()
+            if (name, value) not in (("unit", usual_unit), ("command", "0"))
+            if name in _TELLING.get(self.medium, ())
+        }
+        port = _MODBUS_PORT if self.medium == "modbus-tcp" and self.port is None else self.port
+        told = "&".join(f"{name}={telling[name]}" for name in sorted(telling, reverse=True))
+        identity = replace(self, port=port).identity
+        return f"{identity}?{told}" if told else identity
+
+    @property
+    def place(self) -> str:
+        """Where it leads, without the scheme; see :attr:`Transport.place`."""
+        return self.identity.partition("://")[2]
 
 
 def parse_url(text: str) -> LinkUrl:

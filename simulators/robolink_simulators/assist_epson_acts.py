@@ -44,7 +44,7 @@ def _change_nozzle(simulator: EpsonSimulator, request: Parameters) -> Answer:
 
 
 def _set_input(simulator: EpsonSimulator, request: Parameters) -> Answer:
-    simulator.machine.inputs.set(whole_number(request, "bit"), bool(request.get("on", True)))
+    simulator.panel.switch_input(whole_number(request, "bit"), bool(request.get("on", True)))
     return {}
 
 

@@ -1,14 +1,19 @@
 """Pytest fixtures that bring a simulated controller; tests connect by URL themselves.
 
+What robolink would keep about a controller in the tester's own state folder (journal, markers,
+backups) goes into a folder of the test's own.
+
 Importing this module costs next to nothing: every pytest run of an environment in which
 robolink is installed imports it.
 """
 
+import os
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import pytest
 
@@ -16,20 +21,25 @@ if TYPE_CHECKING:
     from robolink_simulators.epson.device import EpsonSimulator
     from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 
+_STATE: Final = ("ROBOLINK_STATE_DIR", "ROBOLINK_JOURNAL")
+"""What says where the journal, the backups and the like are kept."""
+
+_OF_THE_DEVELOPER: Final = {name: os.environ.get(name) for name in _STATE}
+
 
 @dataclass(frozen=True, slots=True)
 class ServedEpson:
-    """A simulated EPSON controller on a loopback port.
+    """A simulated EPSON controller.
 
     Attributes:
-        url: ``epson+tcp://127.0.0.1:PORT``.
-        assist: ``assist+tcp://127.0.0.1:PORT``.
+        url: Where to connect to: ``epson+sim://NAME``, or ``epson+tcp://127.0.0.1:PORT``.
         simulator: The device; hold its ``lock`` while touching it.
+        assist: ``assist+tcp://127.0.0.1:PORT``; ``None`` without a port.
     """
 
     url: str
-    assist: str
     simulator: "EpsonSimulator"
+    assist: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,20 +73,49 @@ def pytest_report_header(config: pytest.Config) -> str:
 
 
 @pytest.fixture
-def epson_sim(request: pytest.FixtureRequest) -> Iterator["EpsonSimulator"]:
-    """A simulated EPSON controller in this process; connect to its ``url``."""
+def robolink_state(
+    monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Path]:
+    """The folder in which robolink keeps journal, markers and backups during this test.
+
+    It is the test's own, so that nothing is left in the developer's journal. A test that named
+    one itself, through ROBOLINK_STATE_DIR or ROBOLINK_JOURNAL, keeps it.
+    """
+    now = {name: os.environ.get(name) for name in _STATE}
+    folder = now["ROBOLINK_STATE_DIR"]
+    if now == _OF_THE_DEVELOPER or folder is None:
+        folder = str(tmp_path_factory.mktemp("robolink-state"))
+        monkeypatch.setenv("ROBOLINK_STATE_DIR", folder)
+    if now["ROBOLINK_JOURNAL"] == _OF_THE_DEVELOPER["ROBOLINK_JOURNAL"]:
+        monkeypatch.delenv("ROBOLINK_JOURNAL", raising=False)
+    yield Path(folder)
+    if "robolink.journal" in sys.modules:
+        from robolink.journal import close_files
+
+        close_files()
+
+
+@pytest.fixture
+def epson_sim(
+    request: pytest.FixtureRequest,
+    robolink_state: Path,  # noqa: ARG001 - the state of the test, not the tester's
+) -> Iterator[ServedEpson]:
+    """A simulated EPSON controller in this process, whose time passes only while you wait."""
     from robolink_simulators.epson.device import EpsonSimulator
     from robolink_simulators.hosting.in_process import register, unregister
 
     simulator = EpsonSimulator(seed=request.config.getoption("--robolink-seed"))
     name = f"pytest-{id(simulator):x}"
-    register(name, simulator)
-    yield simulator
+    url = register(name, simulator)
+    yield ServedEpson(url, simulator)
     unregister(name)
 
 
 @pytest.fixture
-def epson_tcp(request: pytest.FixtureRequest) -> Iterator[ServedEpson]:
+def epson_tcp(
+    request: pytest.FixtureRequest,
+    robolink_state: Path,  # noqa: ARG001 - the state of the test, not the tester's
+) -> Iterator[ServedEpson]:
     """A simulated EPSON controller on a loopback TCP port, with its assist port."""
     from robolink_simulators.assist import serve_assist
     from robolink_simulators.clock import ScaledClock
@@ -88,11 +127,14 @@ def epson_tcp(request: pytest.FixtureRequest) -> Iterator[ServedEpson]:
     with ExitStack() as stack:
         tcp = stack.enter_context(serve_tcp(simulator, clock=clock))
         assist = stack.enter_context(serve_assist(simulator, clock=clock))
-        yield ServedEpson(tcp.url, assist.url, simulator)
+        yield ServedEpson(tcp.url, simulator, assist.url)
 
 
 @pytest.fixture
-def softmotion_sim(request: pytest.FixtureRequest) -> Iterator[ServedSoftMotion]:
+def softmotion_sim(
+    request: pytest.FixtureRequest,
+    robolink_state: Path,  # noqa: ARG001 - the state of the test, not the tester's
+) -> Iterator[ServedSoftMotion]:
     """A simulated SoftMotion PLC in this process.
 
     Parametrize it indirectly for other ways to reach it: ``sim``, ``modbus-tcp``,
@@ -125,7 +167,9 @@ def _serve(simulator: "SoftMotionSimulator", medium: str, stack: ExitStack) -> N
 
 
 @pytest.fixture
-def epson_replay() -> Iterator[Callable[[Path], str]]:
+def epson_replay(
+    robolink_state: Path,  # noqa: ARG001 - the state of the test, not the tester's
+) -> Iterator[Callable[[Path], str]]:
     """A maker of replays: give it a recording, connect to the URL that it returns.
 
     The test fails when a client asked otherwise than recorded, or did not connect as often.

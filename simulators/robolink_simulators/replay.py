@@ -12,6 +12,7 @@ from typing import Final
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink.named_files import read_named
 from robolink.transport import Dialogue, Passage, parse_dialogues
 from robolink_simulators.clock import ScaledClock
 from robolink_simulators.hosting._tcp_host import TcpHost
@@ -176,6 +177,10 @@ class ReplayLink:
         )
 
 
+_MOST_BYTES: Final = 256_000_000
+"""A recording of a whole shift, at ten exchanges a second."""
+
+
 def read_recording(path: Path) -> tuple[Dialogue, ...]:
     """Read a file that ``--record`` wrote.
 
@@ -183,13 +188,17 @@ def read_recording(path: Path) -> tuple[Dialogue, ...]:
         ConfigError: It cannot be read, or is no recording.
     """
     try:
-        text = path.read_text(encoding="ascii")
+        text = read_named(path, most_bytes=_MOST_BYTES).decode("ascii")
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigError(
-            tr("The recording {path} cannot be read: {cause}.", path=path, cause=error),
+            tr("The recording {path} cannot be read: {cause}.", path=path, cause=_cause(error)),
             remedy=tr("Give a file that --record or --transcript has written."),
         ) from error
     return parse_dialogues(text, source=str(path))
+
+
+def _cause(error: OSError | UnicodeDecodeError) -> str:
+    return error.strerror or str(error) if isinstance(error, OSError) else str(error)
 
 
 def serve_replay(

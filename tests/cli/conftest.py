@@ -58,7 +58,7 @@ def state_folder(tmp_path, monkeypatch):
 @pytest.fixture
 def simulator(tmp_path, state_folder):
     """A simulated controller that keeps its tools in a file, as a real one does."""
-    simulator = EpsonSimulator(seed=4, state_path=tmp_path / "flash.json")
+    simulator = EpsonSimulator(seed=4, serial="SIM00001", state_path=tmp_path / "flash.json")
     name = f"cli-{next(_numbers)}"
     register(name, simulator)
     yield simulator

@@ -169,7 +169,7 @@ def test_another_controller_is_refused_unless_told(run, simulator, golden):
     simulator.machine.tools.set(1, ToolOffset(99))
     code, _, err = run("restore", golden)
     assert code == 2
-    assert "SIM00001 in the backup, SIM00002 here" in err
+    assert "C-SIM00001 in the backup, C-SIM00002 here" in err
     assert simulator.machine.tools.get(1) == ToolOffset(99)
     assert run("restore", golden, "--other-controller")[0] == 0
     assert simulator.machine.tools.get(1).x_mm == 12

@@ -244,13 +244,37 @@ def test_a_terminal_that_is_gone_ends_it():
         operator.poll(1.0)
 
 
+NOTHING: list[Key] = []
+QUIET = NOTHING
+"""Nothing waits in the input when the question is shown."""
+
+
 def test_consent_is_a_y_and_the_status_is_read_until_it_comes():
     reads: list[int] = []
-    agree_by_key("Is the cell clear?", Pressed([], [], [Key.YES]), watch=lambda: reads.append(1))
+    keys = Pressed(QUIET, NOTHING, NOTHING, [Key.YES])
+    agree_by_key("Is the cell clear?", keys, watch=lambda: reads.append(1))
     assert len(reads) == 2
 
 
-@pytest.mark.parametrize("keys", [[Key.NO], [Key.END], [Key.UP], [Key.YES, Key.UP]])
-def test_any_other_key_is_a_no(keys):
+@pytest.mark.parametrize(
+    "pressed",
+    [
+        ([Key.NO],),
+        ([Key.END], NOTHING, QUIET, [Key.NO]),
+        ([Key.UP], NOTHING, QUIET, [Key.END]),
+        ([Key.YES, Key.UP], NOTHING, QUIET, [Key.UP]),
+        ([Key.YES], [Key.END], QUIET, [Key.YES], [Key.END]),  # bursts, as from a scanner
+    ],
+)
+def test_any_other_key_is_asked_once_more_and_is_a_no_then(pressed):
     with pytest.raises(DeclinedError):
-        agree_by_key("Is the cell clear?", Pressed(keys), watch=list)
+        agree_by_key("Is the cell clear?", Pressed(QUIET, *pressed), watch=list)
+
+
+def test_a_y_pressed_before_the_question_is_shown_is_no_answer_to_it():
+    with pytest.raises(DeclinedError):
+        agree_by_key("Is the cell clear?", Pressed([Key.YES], QUIET, [Key.NO]), watch=list)
+
+
+def test_a_y_to_the_repeated_question_is_a_yes():
+    agree_by_key("Clear?", Pressed(QUIET, [Key.END], NOTHING, QUIET, [Key.YES]), watch=list)

@@ -27,7 +27,8 @@ def test_monitor_only_commands_disturb_no_production(run, simulator, golden):
             assert simulator.condition.task is Task.RUNNING
         assert not simulator.condition.error
     asked = {text.partition(",")[0] for _, way, text in simulator.log if way == ">"}
-    assert asked == {"$Login", "$GetStatus", "$GetAlm", "$GetVariable"}
+    looking = {"$Login", "$GetStatus", "$GetAlm", "$GetContSettings", "$GetVariable"}
+    assert asked == looking | {"$GetContNo", "$GetRobotSerial"}
 
 
 def test_status_shows_the_published_tool_where_execute_is_not_available(run, simulator):

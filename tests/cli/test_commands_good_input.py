@@ -31,7 +31,7 @@ def cell(tmp_path, monkeypatch):
 COMMANDS = {
     "status": (["status"], "robolink/status/1", "tool in force: 1"),
     "where": (["where"], "robolink/where/1", "tool 1 in local 0"),
-    "stop": (["stop"], "robolink/stop/1", "Stop was accepted"),
+    "stop": (["stop"], "robolink/stop/1", "stands; its state is: ready"),
     "reset": (["reset", "--yes"], "robolink/reset/1", "ready"),
     "motors on": (["motors", "on", "--yes"], "robolink/motors/1", "The motors are on."),
     "motors off": (["motors", "off"], "robolink/motors/1", "The motors are off."),
@@ -54,7 +54,7 @@ COMMANDS = {
 }
 
 REQUESTS = {
-    "stop": ["$Stop"],
+    "stop": ["$Abort", "$Stop"],
     "reset": ["$Reset"],
     "motors on": ["$SetMotorsOn,1"],
     "motors off": ["$SetMotorsOff,1"],
@@ -146,6 +146,7 @@ def test_the_dry_run_of_a_calibration_shows_every_step_and_writes_nothing(cell):
 
 
 def test_the_dry_run_of_resolve_says_what_is_true_and_settles_nothing(cell):
+    assert cell.run("status").code == 0
     log = open_journal().log(cell.url)
     details = {"tool": 1, "before": [12.0, -3.5, -20.0, 0.0, 0.0, 0.0], "requested": [1.0] * 6}
     marker = Marker("a", MarkerKind.SET, "TLSet 1, XY(1)", "2026-01-01T00:00:00+00:00", details)

@@ -193,13 +193,14 @@ def test_jog_takes_its_limits_from_the_cell(cell, simulator, monkeypatch, option
 
 def test_what_was_left_unfinished_is_resolved_by_the_cell_s_name(cell, simulator, capsys):
     cell()
+    assert main.run(["-c", "a", "status"]) == 0
     log = memory_journal(URL).log(URL)
     log.begin(Marker("a", MarkerKind.SET, "TLSet 3, XY(1,2,3,0)", "2026-01-01T00:00:00+00:00"))
     try:
         assert main.run(["-c", "a", "status"]) == 0
         assert "robolink -c a recover" in capsys.readouterr().err
     finally:
-        log.clear("a")
+        memory_journal(URL).log(URL).clear("a")
 
 
 @pytest.mark.parametrize("module", [_options, jog])

@@ -93,6 +93,7 @@ BAD = {
     "status": (["--timeout", "-1"], "-1"),
     "where": (["here"], "unexpected extra argument"),
     "stop": (["now"], "unexpected extra argument"),
+    "release": (["now"], "unexpected extra argument"),
     "reset": (["--force"], "No such option"),
     "recalibrate": (["missing.toml"], "missing.toml"),
     "enable": (["--yes"], "no SoftMotion axis group"),

@@ -28,7 +28,7 @@ def plain_environment(tmp_path, monkeypatch):
 
 @pytest.fixture
 def simulator():
-    simulator = EpsonSimulator(seed=7)
+    simulator = EpsonSimulator(seed=7, serial="SIM00001")
     simulator.machine.points.store(1, Point.at(Pose(250, 200, -30, 0)))
     simulator.machine.points.store(3, Point.at(Pose(250, 210, -30, 90)))
     return simulator

@@ -12,7 +12,8 @@ from robolink import ANY, ToolOffset
 from robolink.errors import (
     ControllerFaultError,
     NotReadyError,
-    RejectedError,
+    StoppedError,
+    UnclearAnswerError,
     UndefinedToolError,
 )
 from robolink.model import InputEdge, MotionOutcome, MotionProfile, Path, WorkBox
@@ -47,7 +48,19 @@ HABITS: list[dict[str, Any]] = [
     {"real_pos_noise_mm": 0.0},
     {"till_already_met": "starts"},
     {"angle_wrap": True},
-    {"requests_end_with_segment": True},
+    {"number_lead_blank": True, "requests_end_with_silence": False, "terminator": "lf"},
+    {"error_state_after_failed_execute": False, "clear_selected_tool": "keeps"},
+    {
+        "clear_selected_tool": "error",
+        "login_without_parameter": "error_12",
+        "missing_robot_number": "current",
+        "robot_zero": "error_12",
+        "accel_max": 100,
+        "outputs_off_at_estop": False,
+        "maintenance_data": True,
+        "variable_assignment": "refused",
+        "single_line_if": "runs",
+    },
 ]
 
 
@@ -61,6 +74,8 @@ def test_every_option_with_named_values_is_varied_here():
         "monitoring_only",
         "monitoring_timeout",
         "companion",
+        "dry_run",
+        "virtual_io",
         "login_timeout_s",
         "remote_timeout_s",
         "numbers",
@@ -110,9 +125,11 @@ def test_an_abort_and_a_failed_statement_are_understood_with_every_habit(serve, 
         target = replace(here, z_mm=here.z_mm + 30)
         motion = group.move_to(target, MotionProfile(Path.STRAIGHT, 1, 1.0), box=WorkBox())
         controller.stop()
-        assert motion.wait(timeout_s=60) is MotionOutcome.STOPPED
+        with pytest.raises(StoppedError):
+            motion.wait(timeout_s=60)
+        controller.release_stop()
         beyond = replace(group.pose(), x_mm=5000.0)
-        with pytest.raises((ControllerFaultError, RejectedError)) as caught:
+        with pytest.raises((ControllerFaultError, UnclearAnswerError)) as caught:
             group.move_to(beyond, MotionProfile(), box=WorkBox()).wait(timeout_s=60)
         assert "Go XY(5000.000" in str(caught.value)
         assert controller.outcomes.open_markers() == ()

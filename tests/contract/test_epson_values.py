@@ -269,16 +269,17 @@ def test_alarms_that_contradict_their_count_are_not_taken(simulator, connected):
         connected.alarms.list()
 
 
-def test_facts_name_the_controller_and_the_robot(connected):
+def test_facts_name_the_controller_and_the_robot(simulator, connected):
+    serial = simulator.machine.serial
     assert connected.facts() == ControllerFacts(
         controller_name="SIMULATED",
         controller_type="SIMULATOR",
-        controller_serial="1",
+        controller_serial=f"C-{serial}",
         firmware="7.5.4.0",
         project="robolink",
         robot_number=1,
         robot_models=("T6-602S",),
-        robot_serials=("SIM00001",),
+        robot_serials=(serial,),
     )
 
 
@@ -286,7 +287,8 @@ def test_older_firmware_prints_its_robot_and_hides_the_rest(serve, options):
     simulator = EpsonSimulator(options=options(extended_queries=False))
     with serve(simulator) as cell, cell.connect() as controller:
         facts = controller.facts()
-        assert (facts.robot_models, facts.robot_serials) == (("T6-602S",), ("SIM00001",))
+        assert facts.robot_models == ("T6-602S",)
+        assert facts.robot_serials == (simulator.machine.serial,)
         assert (facts.firmware, facts.controller_serial, facts.robot_number) == (None, None, 1)
         simulator.panel.start_production()
         assert controller.facts() == ControllerFacts(robot_number=1)

@@ -1,10 +1,6 @@
 """Jogging by keys: the real command on a real terminal pair, against a served simulator."""
 
-import os
-import re
-import select
 import signal
-import subprocess
 import sys
 import termios
 import time
@@ -15,63 +11,12 @@ from robolink_simulators.clock import ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.tcp import serve_tcp
 
+from tests.contract._terminal import LONGEST_S, Terminal
+
 RIGHT, PAGE_DOWN = b"\x1b[C", b"\x1b[6~"
-LONGEST_S = 20.0
 SPEED = 40.0
 REMOTE_TIMEOUT_S = 60.0 / SPEED
 """The controller's own, in real seconds."""
-
-
-class Terminal:
-    """The far end of a pseudo terminal on which a command runs."""
-
-    def __init__(self, *words):
-        self.descriptor, near = os.openpty()
-        self.before = termios.tcgetattr(near)
-        paths = os.pathsep.join(path for path in sys.path if path)
-        environment = {**os.environ, "PYTHONPATH": paths, "COLUMNS": "200", "TERM": "dumb"}
-        self.command = subprocess.Popen(
-            [sys.executable, "-m", "robolink_cli", *words],
-            stdin=near,
-            stdout=near,
-            stderr=near,
-            env=environment,
-            start_new_session=True,
-        )
-        os.close(near)
-        self.shown = ""
-
-    def wait_for(self, pattern):
-        """Read until ``pattern`` has been shown, and forget what was shown up to there."""
-        end_s = time.monotonic() + LONGEST_S
-        while not (found := re.search(pattern, self.shown)):
-            ready, _, _ = select.select([self.descriptor], [], [], 0.1)
-            assert ready or time.monotonic() < end_s, f"{pattern!r} is not in {self.shown!r}"
-            if ready:
-                self.shown += self._read()
-        self.shown = self.shown[found.end() :]
-        return found
-
-    def press(self, keys):
-        os.write(self.descriptor, keys)
-
-    def end(self):
-        """Read to the end and return the exit code."""
-        while True:
-            try:
-                self.shown += self._read()
-            except OSError:  # the near end is closed
-                break
-        return self.command.wait(LONGEST_S)
-
-    def close(self):
-        if self.command.poll() is None:
-            self.command.kill()
-            self.command.wait()
-        os.close(self.descriptor)
-
-    def _read(self):
-        return os.read(self.descriptor, 4096).decode("utf-8", "replace")
 
 
 @pytest.fixture

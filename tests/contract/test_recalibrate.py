@@ -419,7 +419,11 @@ def test_a_raw_statement_is_for_engineers_and_on_record(cell, tmp_path, monkeypa
     (entry,) = journal(cell, EntryKind.RAW)
     assert (entry.signature.operator, entry.signature.role) == ("anna", "engineer")
     assert entry.details["request"] == "Print TLDef(1)"
-    assert cell.run("execute-raw", "Tool 9", "--yes", "-c", "a", "--operator", "anna").code == 5
+    # A statement that put the controller in error: nobody knows what it did before.
+    failed = cell.run("execute-raw", "Tool 9", "--yes", "-c", "a", "--operator", "anna", "--json")
+    error = json.loads(failed.out)["error"]
+    assert (failed.code, error["kind"]) == (6, "ControllerFaultError")
+    assert (error["controller_state"], error["stands"]["doubtful"]) == ("unknown", ["Tool 9"])
 
 
 def test_a_calibration_without_a_recipe_names_nozzle_and_lot_too(cell):

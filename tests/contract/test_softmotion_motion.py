@@ -15,6 +15,7 @@ from robolink.errors import (
     NotReadyError,
     NotReadyReason,
     RejectedError,
+    StoppedError,
 )
 from robolink.model import MotionOutcome, MotionProfile, Path, WorkBox
 from robolink.protocols.mailbox import CoordinateSystem, ErrorClass
@@ -118,8 +119,12 @@ def test_a_stop_from_another_thread_gets_in_holds_and_is_released_by_a_reset(
         return read_head(wire)
 
     monkeypatch.setattr(MailboxWire, "read_head", stop_meanwhile)
-    assert motion.wait(timeout_s=20) is MotionOutcome.STOPPED
+    with pytest.raises(StoppedError):
+        motion.wait(timeout_s=20)
     assert got_in == [True]
+    with pytest.raises(StoppedError, match="ended by a stop"):
+        group.move_to(target, QUICK, box=ANYWHERE)
+    controller.release_stop()
     with pytest.raises(NotReadyError, match="held by a stop"):
         group.move_to(target, QUICK, box=ANYWHERE)
     controller.reset_fault()

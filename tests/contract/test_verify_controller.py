@@ -33,8 +33,11 @@ HABITS = [
     {"extended_queries": False},
     {"rc_plus": 5},
     {"rc_plus": 8},
-    {"requests_end_with_segment": True},
-    {"requests_end_with_segment": True, "terminator": "cr", "print_crlf_inside_quotes": False},
+    {"requests_end_with_silence": False},
+    {"requests_end_with_silence": False, "terminator": "cr", "print_crlf_inside_quotes": False},
+    {"number_lead_blank": True},
+    {"dry_run": True, "virtual_io": True, "maintenance_data": True},
+    {"outputs_off_at_estop": False},
     {"abort_reply_first": False},
     {"second_client": "closed"},
     {"execute_on_disconnect": "stops"},
@@ -53,14 +56,24 @@ ALWAYS_SETTLED = {
     "extended_queries",
     "flags_during_execute",
     "monitoring_only",
+    "number_lead_blank",
     "point_coordinates",
     "print_crlf_inside_quotes",
-    "requests_end_with_segment",
+    "requests_end_with_silence",
     "status_flags",
     "terminator",
     "tool_listing",
     "true_value",
     "where_width",
+}
+
+
+PREFERENCES = {
+    "dry_run",
+    "maintenance_data",
+    "outputs_off_at_estop",
+    "reset_outputs_off",
+    "virtual_io",
 }
 
 
@@ -87,7 +100,9 @@ def test_the_profile_names_exactly_the_option_values_in_force(cell, habit):
         in_force["extended_queries"] = False  # RC+ 5 has none, whatever the option says
     assert found == in_force
     assert set(found) >= ALWAYS_SETTLED
-    assert ("rc_plus" in found) is options.extended_queries
+    told = {"rc_plus", *PREFERENCES} if options.extended_queries else set()
+    told = {"rc_plus"} if options.rc_plus == 5 else told
+    assert {"rc_plus", *PREFERENCES} & set(found) == told
 
 
 def test_a_profile_makes_a_simulator_with_the_same_habits(cell, tmp_path):
@@ -135,9 +150,10 @@ def test_where_production_may_run_only_queries_are_sent(cell, monitoring_only, r
     assert simulator.condition.code == 0
     asked = [text for _, direction, text in simulator.log if direction == ">"]
     assert not any("Execute" in text or "Logout" in text for text in asked)
-    assert set(found.options) == {"status_flags", "extended_queries", "rc_plus", "terminator"}
+    always = {"status_flags", "extended_queries", "rc_plus", "terminator"}
+    assert set(found.options) == always | PREFERENCES
     why = {fact.option: fact.finding for fact in found.facts}
-    assert "program" in why["requests_end_with_segment"]
+    assert "program" in why["requests_end_with_silence"]
 
 
 def test_without_a_tool_what_tools_show_is_not_settled(cell):
@@ -200,11 +216,11 @@ def test_a_redacted_transcript_names_no_serial_number_and_no_address(cell, exten
 
 
 def test_a_controller_on_a_socket_is_verified_as_well():
-    options = EpsonOptions(terminator="cr", requests_end_with_segment=True)
+    options = EpsonOptions(terminator="cr", requests_end_with_silence=True)
     with serve_tcp(EpsonSimulator(options=options)) as host:
         found = verify_epson(host.url).options
     assert found["terminator"] == "cr"
-    assert found["requests_end_with_segment"] is True
+    assert found["requests_end_with_silence"] is True
     assert found["flags_during_execute"] == "running"
 
 

@@ -145,6 +145,11 @@ class ChangeCell(ABC):
             (named,) = [marker for marker in markers if marker.kind is MarkerKind.SELECTION]
             assert named.details["tool"] == 1
 
+    def meet(self) -> None:
+        """Let the journal know who the controller is: not each of many programs stores it."""
+        with robolink.connect(self.url, outcomes=self.journal.log(self.url)) as controller:
+            assert controller.outcomes.open_markers() == ()
+
     def check_all_is_settled(self) -> None:
         """Nothing is open, the record says what is true, and the cell's own tool is selected."""
         assert self.journal.open_markers() == ()
@@ -232,6 +237,7 @@ def change_cell(
     simulator.machine.tools.flash_writes = 0
     with serve_tcp(simulator, clock=ScaledClock(200.0)) as host:
         cell = EpsonChangeCell(simulator, host.url, folder)
+        cell.meet()
         try:
             yield cell
         finally:

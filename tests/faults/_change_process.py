@@ -100,7 +100,9 @@ def acknowledged(folder: Path) -> list[tuple[int, str]]:
     """Return number and hash of the newest entry after each transaction that was acknowledged."""
     noted = folder / "acknowledged"
     lines = noted.read_text().splitlines() if noted.exists() else []
-    return [(int(number), last_hash) for number, last_hash in map(str.split, lines)]
+    # Before the first entry there is no hash: who the controller is was stored, and no more.
+    pairs = [line.partition(" ") for line in lines]
+    return [(int(number), last_hash) for number, _, last_hash in pairs]
 
 
 def _run(program: str, url: str, folder: str, kill_at: CommitStep | None) -> None:

@@ -73,6 +73,10 @@ class EpsonRecipeCell(RecipeCell):
         """Whether the robot moves."""
         return self.simulator.status_flags().running
 
+    def where(self) -> object:
+        """Return where the flange is, past the wire."""
+        return self._machine.arm.joints
+
     def writes(self) -> list[int]:
         """Return the tools that were written so far, in order, as the controller counts them."""
         return list(self._written)

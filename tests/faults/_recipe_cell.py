@@ -105,6 +105,10 @@ class RecipeCell(ABC):
         """Whether the robot moves."""
 
     @abstractmethod
+    def where(self) -> object:
+        """Return where the flange is, past the wire."""
+
+    @abstractmethod
     def writes(self) -> list[int]:
         """Return the tools that were written so far, in order, as the controller counts them."""
 

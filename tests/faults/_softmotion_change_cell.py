@@ -101,6 +101,7 @@ def plc_change_cell(folder: Path, clock: ScaledClock | None = None) -> Iterator[
     with serve_modbus_tcp(simulator, clock=clock or ScaledClock(_SPEED)) as host:
         cell = PlcChangeCell(simulator, host.url, folder)
         assert cell.tools == OLD
+        cell.meet()
         try:
             yield cell
         finally:

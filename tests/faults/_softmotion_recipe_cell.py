@@ -76,6 +76,10 @@ class PlcRecipeCell(RecipeCell):
         """Whether the robot moves."""
         return not self._plc.group.motion.resting
 
+    def where(self) -> object:
+        """Return where the axes are, past the wire."""
+        return self._plc.group.motion.values
+
     def writes(self) -> list[int]:
         """Return the slots that were written so far, in order, as the PLC counts them."""
         return list(self._written)

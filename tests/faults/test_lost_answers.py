@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.faults import Fault, FaultAction
+from robolink_simulators.faults import Fault, FaultAction, FaultPlan
 
 import robolink
 from robolink import ToolOffset
@@ -15,8 +15,10 @@ from robolink.errors import (
     RobolinkError,
     TransportClosedError,
     TransportError,
+    UnclearAnswerError,
 )
 from robolink.model import MotionProfile, Path, Verdict, WorkBox
+from robolink.transaction import Wanted, change_tools
 
 NEW = ToolOffset(12.75, -3.25, -20)
 WRITE = "TLSet 1, XY"
@@ -165,3 +167,127 @@ def test_an_answer_in_pieces_is_the_same_answer(serve):
     with serve(simulator) as url, robolink.connect(url) as controller:
         assert controller.tools.read_all()[1] == simulator.machine.tools.get(1)
         assert controller.tools.read(1) == simulator.machine.tools.get(1)
+
+
+UNCLEAR = {
+    # One bit of "#Execute,0" is flipped; the seed decides which.
+    "the digit is another": (9, "#Execute,"),
+    "the refusal sign stands before it": (0, "!Execute,0"),
+}
+
+
+@pytest.fixture
+def unclear():
+    """A simulator whose first acknowledgement of a request is bent into no acknowledgement."""
+
+    def make(match, position, shown):
+        for seed in range(100):
+            plan = FaultPlan(seed=seed)
+            fault = Fault(FaultAction.GARBLE_REPLY, match=match, position=position)
+            ((_, bent),) = plan.departures(b"#Execute,0\r\n", [fault])
+            assert bent is not None
+            if bent.startswith(shown.encode()) and bent[9:10].isdigit():
+                return EpsonSimulator(seed=seed, faults=[fault])
+        raise AssertionError("no seed bends it so")
+
+    return make
+
+
+@pytest.mark.parametrize("how", UNCLEAR)
+def test_a_write_whose_acknowledgement_was_garbled_is_told_as_that(serve, unclear, how):
+    simulator = unclear(WRITE, *UNCLEAR[how])
+    told: list[str] = []
+    with serve(simulator) as url, robolink.connect(url, timeout_s=0.5) as controller:
+        old = controller.tools.read(1)
+        with pytest.raises(UnclearAnswerError, match="neither that it ran nor") as caught:
+            change_tools(controller, [Wanted(1, NEW, old)], tell=told.append)
+        assert simulator.machine.tools.get(1) == old
+        assert controller.outcomes.open_markers() == ()
+    assert "did run. The old value of tool 1 was written back." in str(caught.value)
+    assert told == ["The old value of tool 1 was written back."]
+    assert len([text for _, _, text in simulator.log if WRITE in text]) == 2
+
+
+def test_a_write_that_was_ignored_with_a_garbled_acknowledgement_is_told_as_that(serve, unclear):
+    simulator = unclear(WRITE, 9, "#Execute,")
+    simulator.faults.add(Fault(FaultAction.IGNORE_WRITE, match=WRITE))
+    with serve(simulator) as url, robolink.connect(url, timeout_s=0.5) as controller:
+        old = controller.tools.read(1)
+        with pytest.raises(UnclearAnswerError) as caught:
+            change_tools(controller, [Wanted(1, NEW, old)])
+        assert simulator.machine.tools.get(1) == old
+        assert controller.outcomes.open_markers() == ()
+    assert "did not run. Tool 1 holds its old value." in str(caught.value)
+
+
+def test_a_tool_whose_first_definition_was_garbled_and_ignored_reads_as_undefined(serve, unclear):
+    simulator = unclear("TLSet 2, XY", 9, "#Execute,")
+    simulator.faults.add(Fault(FaultAction.IGNORE_WRITE, match="TLSet 2, XY"))
+    with serve(simulator) as url, robolink.connect(url, timeout_s=0.5) as controller:
+        with pytest.raises(UnclearAnswerError, match="did not run"):
+            controller.tools.write(2, NEW, expected=None)
+        assert controller.outcomes.open_markers() == ()
+
+
+def test_a_selection_whose_acknowledgement_was_garbled_is_read_and_put_back(serve, unclear):
+    simulator = unclear("Tool 0", 9, "#Execute,")
+    with serve(simulator) as url, robolink.connect(url, timeout_s=0.5) as controller:
+        with (
+            pytest.raises(UnclearAnswerError, match="Tool 0 is selected now"),
+            controller.preserved("a procedure"),
+        ):
+            controller.tools.select(0)
+        assert simulator.machine.tools.selected == 1
+        assert controller.outcomes.open_markers() == ()
+
+
+def test_a_garbled_acknowledgement_keeps_nothing_from_being_put_back(serve, unclear):
+    simulator = unclear("Speed 5, 5, 5", 9, "#Execute,")
+    with serve(simulator) as url, robolink.connect(url, timeout_s=0.5) as controller:
+        simulator.machine.power_high = True
+        with controller.preserved("a procedure"):
+            lift(controller).wait(timeout_s=60)
+            assert not simulator.machine.power_high
+        assert simulator.machine.power_high
+        assert simulator.faults.fired
+        assert controller.outcomes.open_markers() == ()
+
+
+def test_a_movement_whose_end_was_garbled_is_not_called_refused(serve, unclear):
+    simulator = unclear(MOVE, 9, "#Execute,")
+    with serve(simulator) as url, robolink.connect(url, timeout_s=0.5) as controller:
+        with pytest.raises(UnclearAnswerError, match="Read what it should have changed"):
+            lift(controller).wait(timeout_s=60)
+        assert simulator.machine.arm.moves_started == 1
+
+
+def seed_that_bends_digits(position):
+    """Return a seed with which a digit at ``position`` becomes another digit."""
+    fault = Fault(FaultAction.GARBLE_REPLY, position=position)
+    for seed in range(100):
+        ((_, bent),) = FaultPlan(seed=seed).departures(b"5" * (position + 1), [fault])
+        if bent is not None and bent.isdigit():
+            return seed
+    raise AssertionError("no seed bends it so")
+
+
+@pytest.mark.parametrize(
+    "query", ["Print Speed(1)", "Print SpeedS(2)", "Print Power", "Print Tool"]
+)
+@pytest.mark.parametrize("which", [0, 1])
+def test_what_is_put_back_is_read_twice_before_it_is_trusted(serve, query, which):
+    """One digit is bent into another digit: a value like any other, but for the second look."""
+    position = len('#Execute,"')
+    fault = Fault(FaultAction.GARBLE_REPLY, which, match=query, position=position)
+    simulator = EpsonSimulator(seed=seed_that_bends_digits(position))
+    simulator.faults.add(fault)
+    with serve(simulator) as url, robolink.connect(url, timeout_s=0.5) as controller:
+        with (
+            pytest.raises(RemoteProtocolError, match=r"not the same twice: Tool .* Nothing was"),
+            controller.preserved("a procedure"),
+        ):
+            raise AssertionError("the procedure ran")
+        assert controller.outcomes.open_markers() == ()
+        with controller.preserved("a procedure"):
+            controller.tools.select(0)
+        assert simulator.machine.tools.selected == 1

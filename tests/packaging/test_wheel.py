@@ -78,7 +78,7 @@ def test_the_wheel_installs_the_command_and_the_simulator(wheel, names):
     (path,) = (name for name in names if name.endswith(".dist-info/entry_points.txt"))
     entries = configparser.ConfigParser(delimiters=("=",))
     entries.read_string(wheel.read(path).decode())
-    assert dict(entries["console_scripts"]) == {"robolink": "robolink_cli.main:main"}
+    assert dict(entries["console_scripts"]) == {"robolink": "robolink_cli.entry:main"}
     assert "epson+sim" in entries["robolink.transports"]
     assert callable(main.main)
 

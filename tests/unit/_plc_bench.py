@@ -23,6 +23,7 @@ class LocalClient:
     def __init__(self, plc, identity):
         self.plc = plc
         self.identity = identity
+        self.place = identity.partition("://")[2]
         self.clock = ManualClock()
         self.lose = set()
         self.refuse = set()

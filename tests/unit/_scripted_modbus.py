@@ -26,6 +26,7 @@ class ScriptedLine:
     """
 
     identity = url = IDENTITY
+    place = IDENTITY.partition("://")[2]
     durable = True
 
     def __init__(self, *steps):

@@ -37,6 +37,7 @@ class PlcLink:
         self.plc = plc
         self.clock = plc.clock
         self.identity = f"softmotion+sim://{new_operation()}"
+        self.place = self.identity.partition("://")[2]
         self.durable = False
         self.reachable = False
         self.recovers = False

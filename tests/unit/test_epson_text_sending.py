@@ -132,16 +132,16 @@ def test_no_representation_and_no_error_shows_a_password():
 
 
 def test_a_segment_ends_a_request_where_that_is_agreed():
-    codec = EpsonTextCodec(Role.DEVICE, segments=True)
+    codec = EpsonTextCodec(Role.DEVICE, unterminated=True)
     codec.receive_data(b"$Login,,terminator")
     assert codec.next_event() is NEED_DATA
-    codec.end_of_segment()
+    codec.end_of_request()
     assert codec.next_event() == Request("Login", ("",))
     codec.receive_data(b"$Stop\r")
-    codec.end_of_segment()
+    codec.end_of_request()
     codec.receive_data(b"\n$Abort")
-    codec.end_of_segment()
-    codec.end_of_segment()
+    codec.end_of_request()
+    codec.end_of_request()
     events = [codec.next_event() for _ in range(3)]
     assert events == [Request("Stop"), Request("Abort"), NEED_DATA]
 
@@ -150,7 +150,7 @@ def test_a_segment_ends_nothing_where_that_is_not_agreed():
     codec = EpsonTextCodec(Role.DEVICE)
     codec.receive_data(b"$Stop")
     with pytest.raises(LocalProtocolError):
-        codec.end_of_segment()
+        codec.end_of_request()
     assert codec.next_event() is NEED_DATA
 
 
@@ -168,7 +168,7 @@ def test_bytes_after_the_end_of_the_stream_are_refused():
     [
         (Role.HOST, {"terminator": b""}),
         (Role.HOST, {"terminator": b"\n\r"}),
-        (Role.HOST, {"segments": True}),
+        (Role.HOST, {"unterminated": True}),
         (Role.HOST, {"encoding": "utf-16"}),
         (Role.HOST, {"encoding": "no such"}),
     ],

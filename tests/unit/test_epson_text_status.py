@@ -89,7 +89,7 @@ def test_every_error_code_has_its_own_meaning():
 
 
 def test_every_command_is_found_in_any_case_and_stands_once():
-    assert len({command.name.lower() for command in COMMANDS}) == len(COMMANDS) == 52
+    assert len({command.name.lower() for command in COMMANDS}) == len(COMMANDS) == 54
     for command in COMMANDS:
         assert find_command(command.name.swapcase()) is command
     assert find_command("Nope") is None

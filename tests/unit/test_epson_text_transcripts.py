@@ -74,9 +74,9 @@ def test_an_answer_is_read_by_the_host_and_written_by_the_device(exchange, termi
 
 def test_the_login_without_terminator_is_read_at_the_end_of_its_segment():
     [exchange] = [e for e in EXCHANGES if e["vector"] == 21]
-    codec = EpsonTextCodec(Role.DEVICE, segments=True)
+    codec = EpsonTextCodec(Role.DEVICE, unterminated=True)
     codec.receive_data(exchange["request"].encode())
-    codec.end_of_segment()
+    codec.end_of_request()
     assert codec.next_event() == Request("Login", ("",))
 
 

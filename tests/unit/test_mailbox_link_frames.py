@@ -9,8 +9,10 @@ from hypothesis import strategies as st
 from pymodbus.framer import FramerRTU, FramerSocket
 from pymodbus.pdu import DecodePDU
 
-from robolink.transport._modbus_frames import FrameError, RtuFraming, TcpFraming
+from robolink.transport._modbus_frames import RtuFraming, TcpFraming
+from robolink.transport._modbus_framing import FrameError
 from robolink.transport._modbus_messages import Area, ModbusRequest
+from robolink.transport._modbus_stop_frames import StopRtuFraming, StopTcpFraming
 
 READ = ModbusRequest(unit=5, function=4, area=Area.INPUT, address=0, count=3)
 WRITE = ModbusRequest(unit=5, function=16, area=Area.HOLDING, address=7, count=2, values=(1, 2))
@@ -144,3 +146,53 @@ def test_requests_are_what_the_standard_prints():
 )
 def test_addresses_have_the_numbers_that_manuals_print(area, address, reference):
     assert area.reference(address) == reference
+
+
+REQUESTS = st.builds(
+    lambda function, unit, address, words: ModbusRequest(
+        unit=unit,
+        function=function,
+        area=Area.INPUT if function == 4 else Area.HOLDING,
+        address=address,
+        count=len(words),
+        values=tuple(words) if function == 16 else (),
+    ),
+    st.sampled_from([3, 4, 16]),
+    st.integers(1, 247),
+    st.integers(0, 0xFFFF - 123),
+    st.lists(st.integers(0, 0xFFFF), min_size=1, max_size=123),
+)
+
+
+@settings(max_examples=60, deadline=None)
+@given(request=REQUESTS, transaction=st.integers(1, 0xFFFF))
+def test_a_stop_sends_the_bytes_that_pymodbus_sends(request, transaction):
+    assert StopTcpFraming().pack(request, transaction) == TcpFraming().pack(request, transaction)
+    assert StopRtuFraming().pack(request, 0) == RtuFraming().pack(request, 0)
+
+
+PAYLOADS = st.one_of(
+    st.lists(st.integers(0, 0xFFFF), min_size=1, max_size=112).map(read_answer),
+    st.tuples(st.integers(0, 0xFFFF), st.integers(1, 123)).map(
+        lambda pair: b"\x10" + pair[0].to_bytes(2, "big") + pair[1].to_bytes(2, "big")
+    ),
+    st.tuples(st.sampled_from([0x83, 0x84, 0x90]), st.integers(1, 11)).map(bytes),
+)
+
+
+@settings(max_examples=120, deadline=None)
+@given(payload=PAYLOADS, serial=st.booleans(), place=st.integers(0, 300), flip=st.integers(0, 255))
+def test_a_stop_takes_what_pymodbus_takes_and_nothing_else(payload, serial, place, flip):
+    frame = bytearray(rtu(payload) if serial else tcp(payload, 77))
+    # The bytes that say which function it is and how long: another function is for pymodbus.
+    if place < len(frame) and place not in ((1, 2) if serial else (7, 8)):
+        frame[place] ^= flip
+    kinds = (StopRtuFraming(), RtuFraming()) if serial else (StopTcpFraming(), TcpFraming())
+    seen: list[object] = []
+    for framing in kinds:
+        buffer = bytearray(frame)
+        try:
+            seen.append((framing.take(buffer), bytes(buffer)))
+        except FrameError:
+            seen.append("no frame")
+    assert seen[0] == seen[1]

@@ -6,6 +6,7 @@ import pytest
 
 from robolink.errors import ConfigError, RemoteProtocolError, TransportTimeoutError
 from robolink.transport._modbus import ModbusClient
+from robolink.transport._modbus_frames import RtuFraming
 from robolink.transport._modbus_messages import Area
 from robolink.transport._modbus_rtu import RtuExchange, RtuLine
 from tests.unit._scripted_modbus import IDENTITY, ScriptedLine, rtu, words
@@ -27,7 +28,7 @@ def over_rtu(*steps, echo=False):
     settings = RtuLine(
         silence_s=0.002, quiet_s=0.02, echo=echo, probe_area=Area.INPUT, probe_address=0
     )
-    exchange = RtuExchange(line, IDENTITY, settings)
+    exchange = RtuExchange(line, IDENTITY, settings, RtuFraming())
     return line, ModbusClient(line, exchange, identity=IDENTITY, unit=1, timeout_s=1.0)
 
 

@@ -12,13 +12,14 @@ from robolink.errors import (
     TransportTimeoutError,
 )
 from robolink.transport._modbus import ModbusClient
+from robolink.transport._modbus_frames import TcpFraming
 from robolink.transport._modbus_tcp import TcpExchange
 from tests.unit._scripted_modbus import IDENTITY, ScriptedLine, tcp, words
 
 
 def over_tcp(*steps):
     line = ScriptedLine(*steps)
-    exchange = TcpExchange(line, IDENTITY)
+    exchange = TcpExchange(line, IDENTITY, TcpFraming())
     return line, ModbusClient(line, exchange, identity=IDENTITY, unit=255, timeout_s=1.0)
 
 

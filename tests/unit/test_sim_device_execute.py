@@ -184,11 +184,15 @@ def state(tmp_path):
 
 
 def test_tools_and_the_selection_outlive_the_simulator(login, state):
-    client = login(EpsonSimulator(state_path=state))
+    simulator = EpsonSimulator(state_path=state)
     assert not state.exists()
+    client = login(simulator)
+    # Who was seen once is the same after a restart.
+    assert EpsonSimulator(state_path=state).machine.serial == simulator.machine.serial
     client.ask('$Execute,"TLSet 3, XY(1,2,3,4)"')
     client.ask('$Execute,"Tool 3"')
     reborn = EpsonSimulator(state_path=state)
+    assert reborn.machine.serial == simulator.machine.serial
     assert reborn.machine.tools.get(3) == ToolOffset(1, 2, 3, 4)
     assert reborn.machine.tools.selected == 3
     assert [name.name for name in state.parent.iterdir()] == ["cell.json"]
@@ -196,6 +200,7 @@ def test_tools_and_the_selection_outlive_the_simulator(login, state):
 
 def test_only_a_change_of_the_tools_is_written(login, state):
     client = login(EpsonSimulator(state_path=state))
+    state.unlink()
     client.ask('$Execute,"Move Here +X(-1)"')
     client.wait(5)
     client.ask("$SetIO,0,1")

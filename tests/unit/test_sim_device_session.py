@@ -37,10 +37,18 @@ def test_surplus_parameters_of_a_login_are_ignored(connect):
     assert connect(EpsonSimulator()).ask("$Login,,terminator") == "#Login,0"
 
 
-def test_a_request_may_end_with_its_segment(connect):
-    simulator = options(requests_end_with_segment=True)
-    client = connect(simulator)
+def test_a_request_may_end_with_silence(connect):
+    client = connect(EpsonSimulator())
     client.link.receive(b"$Login,,terminator", 0)
+    assert client.wait(0.09) == ""
+    assert client.wait(0.02) == "#Login,0"
+
+
+def test_a_request_may_have_to_end_with_a_line(connect):
+    client = connect(options(requests_end_with_silence=False))
+    client.link.receive(b"$Login,", 0)
+    assert client.wait(5) == ""
+    client.link.receive(b"\r", client.simulator.now_ns)
     assert client.heard() == "#Login,0"
 
 

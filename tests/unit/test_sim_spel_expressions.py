@@ -180,12 +180,11 @@ def test_keywords_are_read_in_any_case_and_comments_are_skipped():
         ("Abs(P1)", NUMBERS.point_undefined),
         ("Abs(Here)", NUMBERS.type_mismatch),
         ("CX(1)", NUMBERS.type_mismatch),
-        ("nothing", NUMBERS.syntax),
+        ("nothing", NUMBERS.name_undefined),
         ("Abs(1, 2)", NUMBERS.syntax),
         ("XY(1, 2)", NUMBERS.syntax),
         ("1 +", NUMBERS.syntax),
         ("1 2", NUMBERS.syntax),
-        ('"open', NUMBERS.syntax),
     ],
 )
 def test_a_value_that_cannot_be_had_is_an_error(expression, number):
@@ -206,8 +205,12 @@ def test_a_keyword_inside_a_string_is_no_statement():
     assert refused('Print "; If x" Then') == NUMBERS.syntax
 
 
-def test_variables_need_a_program():
-    assert refused("a = 1; b = 2") == NUMBERS.not_allowed_here
+def test_a_literal_that_is_still_open_at_the_end_ends_there():
+    assert printed('"open') == "open"
+
+
+def test_a_variable_that_no_project_declares_is_named_as_that():
+    assert refused("a = 1; b = 2") == NUMBERS.name_undefined
 
 
 def test_error_numbers_come_from_the_options():

@@ -278,7 +278,7 @@ def test_settings_without_a_value_show_what_is_set(cell, statement, shown):
 
 @pytest.mark.parametrize(
     "statement",
-    ["Speed 0", "Speed 101", "SpeedS 2001", "SpeedR 0", "Accel 101, 5", "LimZ 1", "AccelS 0"],
+    ["Speed 0", "Speed 101", "SpeedS 2001", "SpeedR 0", "Accel 121, 5", "LimZ 1", "AccelS 0"],
 )
 def test_a_setting_outside_its_range_is_refused(cell, statement):
     assert cell.error(statement) == NUMBERS.value_out_of_range

@@ -246,7 +246,8 @@ def test_bits_are_switched_and_read(window):
     window.machine.inputs.set(9, True)
     assert window("Print Sw(9), Sw(8), In(1)") == "1 0 2\r\n"
     assert window.error("On 512") == NUMBERS.value_out_of_range
-    assert window.error("On 1, 5") == NUMBERS.syntax
+    assert window.error("On 1, 11") == NUMBERS.value_out_of_range
+    assert window.error("MemOn 1, 5") == NUMBERS.syntax
 
 
 def test_reset_switches_outputs_off_if_the_preference_says_so():

@@ -18,6 +18,7 @@ from robolink.errors import (
     NotReadyReason,
     OutcomeUnknownError,
     RejectedError,
+    StoppedError,
 )
 from robolink.model import InputEdge, MotionOutcome, MotionProfile, Path, Pose, Verdict, WorkBox
 from robolink.protocols.mailbox import (
@@ -209,7 +210,8 @@ def test_a_stop_from_another_thread_ends_the_wait(cell, plc, controller, group):
         stopped.append(True)
 
     cell.link.before("read_head", stop, nth=2)
-    assert motion.wait(timeout_s=5) is MotionOutcome.STOPPED
+    with pytest.raises(StoppedError):
+        motion.wait(timeout_s=5)
     assert stopped
     assert plc.now.group_state == GroupState.STOPPING
 
@@ -348,7 +350,7 @@ def test_a_touch_without_an_edge_gives_nothing(cell, plc, group):
 def test_a_touch_that_is_stopped_is_no_measurement(cell, plc, group):
     motion = group.move_until_input(TARGET, InputEdge(4), speed_mm_s=2, box=ANYWHERE)
     cell.link.before("read_head", plc.end_all)
-    with pytest.raises(ControllerFaultError, match="stopped before the input"):
+    with pytest.raises(StoppedError, match="stopped before the input"):
         motion.wait(timeout_s=5)
 
 

@@ -97,7 +97,7 @@ def test_what_is_neither_old_nor_new_is_a_conflict_that_takes_a_person(cell, con
     assert (finding.verdict, done.settled) == (Verdict.CONFLICT, ())
     assert told == [(finding, False)]
     assert "Tool 2 holds X 1.000 Y 2.000 Z 3.000 U 0.000; before the change" in finding.sentence
-    assert cell.journal.open_markers() == ((cell.identity, marker),)
+    assert cell.journal.open_markers() == ((controller.outcomes.identity, marker),)
     assert cell.writes == 0
     # A person who has looked says that it may stay.
     Settler(controller).settle(finding)

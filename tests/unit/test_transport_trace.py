@@ -24,6 +24,7 @@ class ScriptedTransport:
 
     url = "epson+desk://cell-a?seed=1"
     identity = "epson+desk://cell-a"
+    place = "cell-a"
     durable = False
 
     def __init__(self, *answers):

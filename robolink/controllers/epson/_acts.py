@@ -4,7 +4,6 @@ from robolink.controllers._guarded import ProcedureLock
 from robolink.controllers.epson._answers import require_ready
 from robolink.controllers.epson._as_sent import as_sent
 from robolink.controllers.epson._motion import EpsonGroup
-from robolink.controllers.epson._movement import request_abort
 from robolink.controllers.epson._session import EpsonSession
 from robolink.controllers.epson._window import CommandWindow
 from robolink.errors import (
@@ -38,7 +37,7 @@ class EpsonActs:
     def stop(self) -> None:
         """See :meth:`~robolink.controllers.epson.EpsonController.stop`."""
         try:
-            request_abort(self._session)
+            self._group.stop()
         except RobolinkError as error:
             error.remedy = " ".join(
                 (tr("The stop is not confirmed: press the emergency stop."), error.remedy)
@@ -47,7 +46,7 @@ class EpsonActs:
 
     def reset(self) -> None:
         """See :meth:`~robolink.controllers.epson.EpsonController.reset_fault`."""
-        with self._lock.held("Reset"):
+        with self._lock.held("Reset", calming=True), self._session.latch.restoring():
             self._require_resettable(self._window.status())
             self._session.exchange("Reset")
             status = self._window.status()
@@ -73,7 +72,7 @@ class EpsonActs:
     def motors(self, on: bool) -> None:
         """See :meth:`~robolink.controllers.epson.EpsonController.motors`."""
         name = "SetMotorsOn" if on else "SetMotorsOff"
-        with self._lock.held(name):
+        with self._lock.held(name, calming=not on):
             self._window.require_ready(name)
             self._session.exchange(name, str(self.robot_number()))
             if on:
@@ -93,8 +92,10 @@ class EpsonActs:
 
     def preview(self, act: Act) -> tuple[str, ...]:
         """Return the requests of an act, as they stand on the wire."""
-        if act is Act.STOP or act is Act.RESET:
-            return (as_sent(Request("Stop" if act is Act.STOP else "Reset")),)
+        if act is Act.STOP:
+            return tuple(as_sent(Request(request)) for request in ("Abort", "Stop"))
+        if act is Act.RESET:
+            return (as_sent(Request("Reset")),)
         name = "SetMotorsOn" if act is Act.MOTORS_ON else "SetMotorsOff"
         return (as_sent(Request(name, (str(self.robot_number()),))),)
 

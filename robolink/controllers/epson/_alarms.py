@@ -49,7 +49,7 @@ class EpsonAlarms:
                 remedy=tr("'robolink status' shows the alarms that stand."),
             )
         request = f"ResetAlm,{number}"
-        with self._lock.held(request):
+        with self._lock.held(request, calming=True):
             self._window.require_ready(request)
             self._session.exchange("ResetAlm", str(number))
             if number in self.list():

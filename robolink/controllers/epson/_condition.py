@@ -2,14 +2,25 @@
 
 from collections.abc import Callable
 from contextlib import suppress
+from typing import Final
 
 from robolink.controllers.epson._alarms import EpsonAlarms
 from robolink.controllers.epson._motion import EpsonGroup
+from robolink.controllers.epson._preferences import Preferences
 from robolink.controllers.epson._published import PublishedTools
 from robolink.controllers.epson._tools import EpsonToolTable
 from robolink.controllers.epson._window import CommandWindow
 from robolink.errors import RejectedError, ToolError
 from robolink.model import ControllerState
+from robolink.protocols.epson_text import Preference
+
+_TOLD: Final = (
+    Preference.DRY_RUN,
+    Preference.VIRTUAL_IO,
+    Preference.RESET_OUTPUTS_OFF,
+    Preference.OUTPUTS_OFF_AT_ESTOP,
+)
+"""The preferences that matter for tool work."""
 
 
 class ConditionReader:
@@ -22,7 +33,9 @@ class ConditionReader:
         alarms: EpsonAlarms,
         tools: EpsonToolTable,
         group: EpsonGroup,
+        preferences: Preferences,
     ) -> None:
+        self._preferences = preferences
         self._window = window
         self._alarms = alarms
         self._tools = tools
@@ -44,6 +57,7 @@ class ConditionReader:
             "published_selected_tool": None,
             "motors_on": None,
             "power": None,
+            "preferences": self._told(),
         }
         with suppress(RejectedError):  # older firmware has no alarms
             found["alarms"] = list(self._alarms.list())
@@ -59,3 +73,7 @@ class ConditionReader:
                 table = published()
                 found["published_selected_tool"] = table.selected if table else None
         return found
+
+    def _told(self) -> dict[str, bool] | None:
+        on = self._preferences.read()
+        return None if on is None else {p.name.lower(): p in on for p in _TOLD}

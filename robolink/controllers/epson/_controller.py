@@ -10,15 +10,18 @@ from robolink.controllers.epson._acts import EpsonActs
 from robolink.controllers.epson._alarms import EpsonAlarms
 from robolink.controllers.epson._condition import ConditionReader
 from robolink.controllers.epson._facts import FactReader
+from robolink.controllers.epson._identity import IdentityReader
 from robolink.controllers.epson._io import EpsonIo
 from robolink.controllers.epson._motion import EpsonGroup
 from robolink.controllers.epson._points import EpsonPoints
+from robolink.controllers.epson._preferences import Preferences
 from robolink.controllers.epson._preserve import Preserver
 from robolink.controllers.epson._published import PublishedReader, PublishedTools
 from robolink.controllers.epson._raw import RawStatements
 from robolink.controllers.epson._resolve import EpsonResolver
 from robolink.controllers.epson._session import EpsonSession
 from robolink.controllers.epson._setter import ValueSetter
+from robolink.controllers.epson._stopping import REST_S
 from robolink.controllers.epson._tools import EpsonToolTable
 from robolink.controllers.epson._value_doubts import ValueDoubts
 from robolink.controllers.epson._variables import EpsonVariables
@@ -31,11 +34,15 @@ from robolink.model import (
     Capabilities,
     ControllerFacts,
     ControllerStatus,
+    Ledger,
     Marker,
     MarkerKind,
     NewEntry,
     OutcomeLog,
 )
+from robolink.protocols.epson_text import Preference
+from robolink.standing import note_standing
+from robolink.stop_latch import StopLatch
 from robolink.timing import Clock
 
 
@@ -60,14 +67,29 @@ class EpsonController:
         self._session = session
         self._outcomes = outcomes
         self._window = CommandWindow(session)
-        self._lock = ProcedureLock(session.identity)
+        outcomes.ask(IdentityReader(session, self._window).read)
+        self._lock = ProcedureLock(session.identity, session.latch)
         self._desk = MarkerDesk(session.identity, outcomes)
+        self._preferences = Preferences(session)
         self._group = EpsonGroup(
-            session, self._window, self._desk, self._lock, remote_timeout_s=remote_timeout_s
+            session,
+            self._window,
+            self._desk,
+            self._lock,
+            preferences=self._preferences,
+            remote_timeout_s=remote_timeout_s,
         )
-        self._tools = EpsonToolTable(self._window, self._desk, self._lock, self._group.robot)
+        self._tools = EpsonToolTable(
+            self._window, self._desk, self._lock, self._group.robot, self._preferences
+        )
         self._preserver = Preserver(
-            session, self._window, self._desk, self._lock, tools=self._tools, group=self._group
+            session,
+            self._window,
+            self._desk,
+            self._lock,
+            self._preferences,
+            tools=self._tools,
+            group=self._group,
         )
         self._acts = EpsonActs(session, self._window, self._lock, self._group)
         setter = ValueSetter(session, self._window, self._desk, self._lock)
@@ -85,7 +107,7 @@ class EpsonController:
 
     @property
     def identity(self) -> str:
-        """The URL without its options."""
+        """The URL without its options; who answers there is ``outcomes.identity``."""
         return self._session.identity
 
     @property
@@ -130,6 +152,11 @@ class EpsonController:
         return self._outcomes
 
     @property
+    def ledger(self) -> Ledger:
+        """What was done here since connecting, and how much of it is proved."""
+        return self._desk.ledger
+
+    @property
     def resolver(self) -> EpsonResolver:
         """Settles what was begun and not proved finished."""
         return self._resolver
@@ -152,15 +179,27 @@ class EpsonController:
         """Return the controller's own text for an error number, empty where it has none."""
         return self._window.error_text(code)
 
-    def stop(self) -> None:
-        """Stop: abort our own movement, else stop the controller's tasks.
+    @property
+    def latch(self) -> StopLatch:
+        """What holds everything back from :meth:`stop` until :meth:`release_stop`."""
+        return self._session.latch
 
-        May be called from any thread while another waits on a motion.
+    def stop(self) -> None:
+        """Bring everything to rest: Abort, Stop, and a status that shows it.
+
+        May be called from any thread, whatever another one is doing. From its first instant on
+        no movement, write or program start leaves this process until :meth:`release_stop`;
+        whoever is at work gets StoppedError.
 
         Raises:
-            RobolinkError: It was not confirmed; the message says to use the emergency stop.
+            OutcomeUnknownError: Rest was not seen; the message says to use the emergency stop.
+            RobolinkError: It was not confirmed; the message says the same.
         """
         self._acts.stop()
+
+    def release_stop(self) -> None:
+        """Let this process act again after :meth:`stop`, because a person says so."""
+        self._session.latch.release()
 
     def reset_fault(self) -> None:
         """Send Reset because a person asked for it; it may switch outputs off.
@@ -211,10 +250,22 @@ class EpsonController:
         """
         return self._raw.execute(statement)
 
+    def preferences(self) -> frozenset[Preference] | None:
+        """Read the preferences that are on; asked once a connection.
+
+        Returns:
+            ``None`` where the firmware does not tell them.
+        """
+        return self._preferences.read()
+
     def condition(self) -> dict[str, object]:
-        """Read the error's text, the alarms, the tool in force, motors and power."""
+        """Read error text, alarms, preferences, the tool in force, motors and power."""
         reader = ConditionReader(
-            self._window, alarms=self.alarms, tools=self._tools, group=self._group
+            self._window,
+            alarms=self.alarms,
+            tools=self._tools,
+            group=self._group,
+            preferences=self._preferences,
         )
         return reader.read(published=self.published_tools)
 
@@ -256,6 +307,7 @@ class EpsonController:
         the connection is just closed then. So it is when another device starts the cell: a
         task could begin between the look and the logout.
         """
+        self._session.latch.await_stops(REST_S)
         try:
             if self._session.alive:
                 self._group.abort_unfinished()
@@ -278,3 +330,5 @@ class EpsonController:
         trace: TracebackType | None,
     ) -> None:
         self.close()
+        if error is not None:
+            note_standing(error, self.ledger.standing())

@@ -5,18 +5,20 @@ from collections.abc import Callable
 from robolink.controllers._edge_ahead import require_edge_ahead
 from robolink.controllers._guarded import MarkerDesk, ProcedureLock
 from robolink.controllers.epson._as_sent import executes
-from robolink.controllers.epson._movement import EpsonMotion, MovementParts, request_abort
+from robolink.controllers.epson._movement import EpsonMotion, MovementParts
 from robolink.controllers.epson._position import read_position
+from robolink.controllers.epson._preferences import Preferences
 from robolink.controllers.epson._robot import RobotFacts
 from robolink.controllers.epson._session import EpsonSession
 from robolink.controllers.epson._settings import Settings
+from robolink.controllers.epson._stopping import bring_to_rest
 from robolink.controllers.epson._until import (
     EpsonMotionUntilInput,
     read_input,
     statement_until,
 )
 from robolink.controllers.epson._window import CommandWindow
-from robolink.errors import NotReadyError, NotReadyReason
+from robolink.errors import NotReadyError, NotReadyReason, StoppedError
 from robolink.messages import tr
 from robolink.model import InputEdge, MarkerKind, MotionProfile, MotionTerms, Path, Pose, WorkBox
 from robolink.protocols import spel
@@ -32,8 +34,10 @@ class EpsonGroup:
         desk: MarkerDesk,
         lock: ProcedureLock,
         *,
+        preferences: Preferences,
         remote_timeout_s: float,
     ) -> None:
+        self._preferences = preferences
         self._parts = MovementParts(session, window, desk)
         self._lock = lock
         self._robot = RobotFacts(window)
@@ -85,6 +89,7 @@ class EpsonGroup:
         statement = self._statement_until(target, edge)
 
         def look_at_input() -> None:
+            self._preferences.require_real_inputs(statement)
             on = read_input(window, edge.number)
             require_edge_ahead(edge, on, controller=session.identity, request=statement)
 
@@ -103,6 +108,12 @@ class EpsonGroup:
         """Return what :meth:`move_to` would send besides its reads, as it stands on the wire."""
         return executes((*self._settings.statements(profile), self._statement_for(target, profile)))
 
+    def require_able(self, purpose: str) -> None:
+        """Refuse what no movement could begin in now; see :class:`robolink.model.MotionGroup`."""
+        self._require_supervision(purpose)
+        self._parts.window.require_ready(purpose)
+        self._require_motors(purpose)
+
     def terms(self) -> MotionTerms:
         """Read what a person must know before the robot moves."""
         (number,) = self._parts.session.exchange("GetCurRobot").fields
@@ -120,8 +131,15 @@ class EpsonGroup:
         return {"joints": tuple(printed.joints), "pulses": tuple(printed.pulses)}
 
     def stop(self) -> None:
-        """Abort the movement of this session, or stop the controller's tasks."""
-        request_abort(self._parts.session)
+        """Bring everything to rest; from here on nothing acts before ``release_stop``.
+
+        Raises:
+            RejectedError: The controller takes no Stop from here.
+            OutcomeUnknownError: It did not come to rest in time.
+        """
+        with self._parts.session.latch.stopping():
+            session = self._parts.session
+            bring_to_rest(session.exchange, session.clock, controller=session.identity)
 
     def abort_unfinished(self) -> None:
         """Abort the last movement if nobody has seen its end."""
@@ -137,22 +155,23 @@ class EpsonGroup:
         last_look: Callable[[], None] = lambda: None,
     ) -> EpsonMotion:
         session, window, desk = self._parts.session, self._parts.window, self._parts.desk
-        with self._lock.held(statement):
-            desk.require_settled(statement)
-            self._require_supervision(statement)
-            window.require_ready(statement)
-            self._require_motors(statement)
-            self._require_tool(target, statement)
-            self._settings.slow_down(profile)
-            last_look()
-            try:
+        try:
+            with self._lock.held(statement):
+                desk.require_settled(statement)
+                self._require_supervision(statement)
+                window.require_ready(statement)
+                self._preferences.require_real_motion(statement)
+                self._require_motors(statement)
+                self._require_tool(target, statement)
+                self._settings.slow_down(profile)
+                last_look()
                 with session.uninterrupted():
                     self._current = self._started(target, statement)
-            except KeyboardInterrupt:
-                # Nobody will be given this motion to wait on.
-                self.abort_unfinished()
-                raise
-            return self._current
+                return self._current
+        except (KeyboardInterrupt, StoppedError):
+            # Nobody will be given this motion to wait on.
+            self.abort_unfinished()
+            raise
 
     def _started(self, target: Pose, statement: spel.Statement) -> EpsonMotion:
         session, desk = self._parts.session, self._parts.desk
@@ -162,7 +181,7 @@ class EpsonGroup:
             # Ctrl-C came while the marker was stored: nothing begins to move after it.
             desk.clear(marker)
             raise KeyboardInterrupt
-        with desk.doubt(statement):
+        with desk.doubt(statement), desk.unless_stopped(marker):
             pending = session.start_execute(statement)
         return EpsonMotion(target, pending, marker, parts=self._parts)
 

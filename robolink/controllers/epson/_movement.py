@@ -7,11 +7,11 @@ from robolink.controllers.epson._pending import PendingExecute
 from robolink.controllers.epson._session import EpsonSession
 from robolink.controllers.epson._window import CommandWindow
 from robolink.errors import (
-    ControllerFaultError,
     MotionTimeoutError,
     RejectedError,
     TransportError,
     TransportTimeoutError,
+    UnclearAnswerError,
 )
 from robolink.messages import tr
 from robolink.model import Marker, MotionOutcome, Pose
@@ -62,7 +62,15 @@ class EpsonMotion:
         return self._parts.session.pending is not self._pending
 
     def wait(self, *, timeout_s: float) -> MotionOutcome:
-        """Wait for the end; see :class:`robolink.model.Motion`."""
+        """Wait for the end; see :class:`robolink.model.Motion`.
+
+        Raises:
+            StoppedError: A stop came, whatever the movement did.
+        """
+        with self._parts.session.latch.ending(self._pending.statement):
+            return self._awaited(timeout_s)
+
+    def _awaited(self, timeout_s: float) -> MotionOutcome:
         try:
             with self._parts.desk.doubt(self._pending.statement):
                 arrived = self._watch(Deadline.after(self._parts.session.clock, timeout_s))
@@ -95,7 +103,7 @@ class EpsonMotion:
                 if self._pending.answer is None:
                     # A refusal may mean that it has just ended by itself; its end is awaited.
                     with suppress(RejectedError):
-                        request_abort(session)
+                        session.exchange("Abort")
                     self._end_within(session.timeout_s)
             self._take_answer()
 
@@ -143,21 +151,9 @@ class EpsonMotion:
         window = self._parts.window
         try:
             window.check(statement, answer)
-        except (RejectedError, ControllerFaultError) as error:
-            if self._pending.abort_requested and isinstance(error, RejectedError):
+        except (RejectedError, UnclearAnswerError):
+            # How an aborted statement is answered is not documented (epson.md 1.6).
+            if self._pending.abort_requested:
                 return MotionOutcome.STOPPED
             raise
         return MotionOutcome.STOPPED if self._pending.abort_requested else MotionOutcome.ARRIVED
-
-
-def request_abort(session: EpsonSession) -> None:
-    """Stop: Abort our own running statement, or Stop the controller's tasks.
-
-    Abort ends what Execute runs; Stop ends tasks (epson.md 1.2). Both may be repeated.
-    """
-    pending = session.pending
-    if pending is not None and pending.answer is None:
-        pending.abort_requested = True
-        session.exchange("Abort")
-    else:
-        session.exchange("Stop")

@@ -12,11 +12,12 @@ from dataclasses import dataclass
 
 from robolink.controllers._guarded import MarkerDesk, ProcedureLock
 from robolink.controllers.epson._motion import EpsonGroup
+from robolink.controllers.epson._preferences import Preferences
 from robolink.controllers.epson._session import EpsonSession
 from robolink.controllers.epson._settings import PowerAndSpeed
 from robolink.controllers.epson._tools import EpsonToolTable
 from robolink.controllers.epson._window import CommandWindow
-from robolink.errors import ConfigError, RobolinkError
+from robolink.errors import ConfigError, RemoteProtocolError, RobolinkError
 from robolink.messages import tr
 from robolink.model import Marker, MarkerKind
 
@@ -37,6 +38,13 @@ class InForce:
             "speed_percent": list(self.settings.speed_percent),
             "speed_s_mm_s": list(self.settings.speed_s_mm_s),
         }
+
+    def shown(self) -> str:
+        """Return it in one line, as the controller's own words."""
+        power = "High" if self.settings.power_high else "Low"
+        speeds = (self.settings.speed_percent, self.settings.speed_s_mm_s)
+        speed, speed_s = (", ".join(f"{value:g}" for value in values) for values in speeds)
+        return f"Tool {self.tool}, Power {power}, Speed {speed}, SpeedS {speed_s}"
 
     @classmethod
     def from_marker(cls, marker: Marker) -> "InForce":
@@ -72,6 +80,7 @@ class Preserver:
         window: CommandWindow,
         desk: MarkerDesk,
         lock: ProcedureLock,
+        preferences: Preferences,
         *,
         tools: EpsonToolTable,
         group: EpsonGroup,
@@ -80,17 +89,19 @@ class Preserver:
         self._window = window
         self._desk = desk
         self._lock = lock
+        self._preferences = preferences
         self._tools = tools
         self._group = group
 
     @contextmanager
     def preserved(self, reason: str) -> Iterator[None]:
         """See :meth:`robolink.model.Controller.preserved`."""
-        with self._lock.held(reason):
+        with self._lock.held(reason), self._desk.ledger.block():
             self._desk.look()
             self._desk.require_settled(reason)
             self._window.require_ready(reason)
-            before = InForce(self._tools.selected(), self._group.settings.read())
+            self._preferences.require_real(reason)
+            before = self._in_force(reason)
             marker: Marker | None = None
             try:
                 with self._session.uninterrupted():
@@ -102,9 +113,39 @@ class Preserver:
                 raise
             self.restore(before, marker)
 
+    def _in_force(self, reason: str) -> InForce:
+        """Read what is to be put back, twice.
+
+        Every other value here is proved by what was sent; these have nothing to be compared
+        with. One bent digit would be put back at the end as the cell's own speed or tool, and
+        be proved by reading.
+
+        Raises:
+            RemoteProtocolError: The two differ; nothing was changed.
+        """
+        first, second = (
+            InForce(self._tools.selected(), self._group.settings.read()) for _ in range(2)
+        )
+        if first != second:
+            raise RemoteProtocolError(
+                tr(
+                    "What the controller says about its tool, power and speed is not the same "
+                    "twice: {first}, then {second}.",
+                    first=first.shown(),
+                    second=second.shown(),
+                ),
+                remedy=tr(
+                    "Nothing was changed. Check the cable and what stands between this PC and "
+                    "the controller, and that no other program sets them."
+                ),
+                controller=self._session.identity,
+                request=reason,
+            )
+        return first
+
     def restore(self, before: InForce, marker: Marker) -> None:
         """Put ``before`` back, read it back, and forget ``marker``; Ctrl-C waits for the end."""
-        with self._session.uninterrupted():
+        with self._session.uninterrupted(), self._session.latch.restoring():
             self._group.abort_unfinished()
             self._tools.select(before.tool)
             self._group.settings.restore(before.settings)

@@ -31,11 +31,13 @@ class RawStatements:
             require_engineer(
                 self._desk.outcomes, tr("run {statement!r} as typed", statement=statement)
             )
-            with self._window.uninterrupted():
+            with self._window.uninterrupted(), self._desk.ledger.block():
                 marker = self._desk.begin(MarkerKind.SET, statement, {"raw": True})
                 with self._desk.doubt(statement):
-                    answer = self._session.execute(statement)
+                    with self._desk.unless_stopped(marker):
+                        answer = self._session.execute(statement)
                     self._check(statement, answer, marker)
+                self._desk.ledger.proved(marker, None)
                 printed = answer.text or "" if isinstance(answer, Reply) else ""
                 self._desk.clear(marker, _entry(marker, verdict=tr("carried out"), said=printed))
         return printed

@@ -13,14 +13,16 @@ bytes die with the connection and can never be taken for the answer to a later q
 """
 
 import threading
-from contextlib import AbstractContextManager
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager
 
+from robolink.checkpoints import Point, checkpoint
 from robolink.controllers.epson._answers import rejected
+from robolink.controllers.epson._command_classes import command_class_of
+from robolink.controllers.epson._login import PASSWORD_REFUSALS, refused, unanswered
 from robolink.controllers.epson._pending import PendingExecute
 from robolink.errors import (
     BusyError,
-    LoginRefusedError,
-    LoginUnansweredError,
     RemoteProtocolError,
     RobolinkError,
     TransportBrokenError,
@@ -42,14 +44,19 @@ from robolink.protocols.epson_text import (
     find_command,
 )
 from robolink.protocols.spel import Statement
+from robolink.stop_latch import StopLatch
 from robolink.timing import Clock, Deadline
 from robolink.transport import Transport
 
-_LOGIN_REFUSED = (13, 98)
+_SHOWN = 120
+"""Characters of an unexpected answer in a sentence; a text may be thousands long."""
 
 
 class EpsonSession:
     """Requests and answers on one connection.
+
+    Attributes:
+        latch: What holds requests back while a stop is in force.
 
     Args:
         transport: An open transport; the session owns it from here on.
@@ -64,6 +71,7 @@ class EpsonSession:
         self._gate.open()
         self._pending: PendingExecute | None = None
         self._ended_by: RobolinkError | None = None
+        self.latch = StopLatch(transport.identity)
         self.timeout_s = timeout_s
         self.exchanges = 0
 
@@ -71,6 +79,11 @@ class EpsonSession:
     def identity(self) -> str:
         """Which controller this is."""
         return self._transport.identity
+
+    @property
+    def place(self) -> str:
+        """Where it was reached, the same for each spelling of the URL."""
+        return self._transport.place
 
     @property
     def clock(self) -> Clock:
@@ -98,29 +111,11 @@ class EpsonSession:
         try:
             answer = self._ask(request, secret=True)
         except (TransportTimeoutError, TransportBrokenError) as error:
-            raise LoginUnansweredError(
-                tr("{identity} is reached but does not answer the login.", identity=self.identity),
-                remedy=tr(
-                    "Only one client may be logged in: close the other one. If there is none, "
-                    "check that this port is the controller's Remote Ethernet port."
-                ),
-                controller=self.identity,
-                request="Login",
-            ) from error
+            raise unanswered(self.identity) from error
         if isinstance(answer, Refusal):
             self.close()
-            if answer.code in _LOGIN_REFUSED:
-                raise LoginRefusedError(
-                    tr("The controller refused the login (code {code}).", code=answer.code),
-                    code=answer.code,
-                    remedy=tr(
-                        "Give the password set in the controller's Remote Ethernet page by "
-                        "keyring, --password-file or ROBOLINK_PASSWORD. No second attempt was "
-                        "made."
-                    ),
-                    controller=self.identity,
-                    request="Login",
-                )
+            if answer.code in PASSWORD_REFUSALS:
+                raise refused(answer.code, self.identity)
             raise rejected(answer, controller=self.identity)
 
     def exchange(self, name: str, *parameters: str) -> Reply:
@@ -143,8 +138,7 @@ class EpsonSession:
     def start_execute(self, statement: Statement) -> PendingExecute:
         """Send a statement that takes its time; its answer is collected by name later."""
         request = Request("Execute", (statement,))
-        with self._gate, self._wire:
-            self._check_usable(request)
+        with self._exchanging(request):
             pending = PendingExecute(statement)
             try:
                 self._expect_silence()
@@ -197,9 +191,25 @@ class EpsonSession:
                     self._end(error)
                     raise
 
+    @contextmanager
+    def _exchanging(self, request: Request) -> Iterator[None]:
+        """Hold the exchange lock for ``request``, once it is legal and no stop forbids it."""
+        what = _shown(request)
+        checkpoint(Point.LOCK, what)
+        try:
+            with self._gate, self._wire:
+                checkpoint(Point.HELD, what)
+                self._check_usable(request)
+                self.latch.admit(command_class_of(request), what)
+                if self._pending is not None and request.name == "Abort":
+                    # Whatever ends it from here on was asked for.
+                    self._pending.abort_requested = True
+                yield
+        finally:
+            checkpoint(Point.EXCHANGE, what)
+
     def _ask(self, request: Request, *, secret: bool = False) -> Reply | Refusal:
-        with self._gate, self._wire:
-            self._check_usable(request)
+        with self._exchanging(request):
             try:
                 self._expect_silence()
                 return self._receive(request, self._send(request, secret=secret))
@@ -254,11 +264,18 @@ class EpsonSession:
         return isinstance(event, Refusal) and not name and self._pending is None
 
     def _expect_silence(self) -> None:
-        """Read what has arrived unasked; only the pending Execute may answer by itself."""
+        """Read what has arrived unasked; only the pending Execute may answer by itself.
+
+        Each piece is judged before the next is read. So a far end that never stops sending is
+        noticed at its first whole message, or at the codec's limit for one, and not when
+        memory is full.
+        """
+        self._judge_unasked()
         while (data := self._transport.receive_waiting()) is not None:
             self._codec.receive_data(data)
-            if not data:
-                break
+            self._judge_unasked()
+
+    def _judge_unasked(self) -> None:
         while (event := self._codec.next_event()) is not NEED_DATA:
             self._take_aside(event)
 
@@ -282,7 +299,10 @@ class EpsonSession:
             pending.answer = event
             return
         raise RemoteProtocolError(
-            tr("The controller sent an answer to a question nobody asked: {event}.", event=event),
+            tr(
+                "The controller sent an answer to a question nobody asked: {event}.",
+                event=repr(event)[:_SHOWN],
+            ),
             remedy=tr(
                 "The connection is closed, because later answers could be mistaken. Connect "
                 "again; if it happens twice, look for a second program on this controller."
@@ -297,3 +317,8 @@ class EpsonSession:
             if self._ended_by is None:
                 self._ended_by = error
             self._transport.close()
+
+
+def _shown(request: Request) -> str:
+    """Return a request as a person may read it; a login, with its password, is never held back."""
+    return request.parameters[0] if request.name == "Execute" else request.name

@@ -110,15 +110,17 @@ class ValueSetter:
 
     def _set(self, change: Change[ValueT], request: str, before: ValueT) -> ValueT:
         details = {"item": list(change.item), "before": before, "requested": change.requested}
-        with self._session.uninterrupted():
+        with self._session.uninterrupted(), self._desk.ledger.block():
             marker = self._desk.begin(MarkerKind.SET, request, details)
             with self._desk.doubt(request):
                 try:
-                    self._session.exchange(change.request.name, *change.request.parameters)
+                    with self._desk.unless_stopped(marker):
+                        self._session.exchange(change.request.name, *change.request.parameters)
                 except RejectedError as error:
                     if error.code in NOT_EXECUTED:
                         self._desk.clear(marker)
                     raise
                 found = change.read()
+            self._desk.ledger.proved(marker, found)
             self._desk.clear(marker)
         return found

@@ -1,9 +1,10 @@
 """Power and speed: set and read back, remembered and put back."""
 
+from contextlib import suppress
 from dataclasses import dataclass
 
 from robolink.controllers.epson._window import CommandWindow
-from robolink.errors import NotReadyError, NotReadyReason
+from robolink.errors import NotReadyError, NotReadyReason, UnclearAnswerError
 from robolink.messages import tr
 from robolink.model import MotionProfile
 from robolink.protocols import spel
@@ -82,9 +83,14 @@ class Settings:
         """
         if self.read() == before:
             return
-        self._window.command(spel.speed(*before.speed_percent))
-        self._window.command(spel.speed_s(*before.speed_s_mm_s))
-        self._window.command(spel.power_high() if before.power_high else spel.power_low())
+        for statement in (
+            spel.speed(*before.speed_percent),
+            spel.speed_s(*before.speed_s_mm_s),
+            spel.power_high() if before.power_high else spel.power_low(),
+        ):
+            # One garbled acknowledgement must not keep the rest from being put back.
+            with suppress(UnclearAnswerError):
+                self._window.command(statement)
         if self.read() != before:
             raise NotReadyError(
                 tr("The power mode and speed of before could not be put back."),

@@ -7,6 +7,7 @@ from robolink.controllers._guarded import MarkerDesk, ProcedureLock
 from robolink.controllers._tool_writing import ToolWrite, ToolWriter
 from robolink.controllers.epson._answers import NOT_EXECUTED
 from robolink.controllers.epson._as_sent import executes
+from robolink.controllers.epson._preferences import Preferences
 from robolink.controllers.epson._robot import RobotFacts
 from robolink.controllers.epson._window import CommandWindow
 from robolink.errors import (
@@ -36,8 +37,14 @@ class EpsonToolTable:
     """
 
     def __init__(
-        self, window: CommandWindow, desk: MarkerDesk, lock: ProcedureLock, robot: RobotFacts
+        self,
+        window: CommandWindow,
+        desk: MarkerDesk,
+        lock: ProcedureLock,
+        robot: RobotFacts,
+        preferences: Preferences,
     ) -> None:
+        self._preferences = preferences
         self._window = window
         self._desk = desk
         self._lock = lock
@@ -69,7 +76,9 @@ class EpsonToolTable:
         """Read one tool, ``None`` when it is undefined; Tool 0 reads as all zeros."""
         self._check_index(tool, lowest=0)
         self._window.require_ready(f"TLSet {tool}")
-        return self._read(tool)
+        found = self._read(tool)
+        self._desk.ledger.saw_tool(tool, found)
+        return found
 
     def write(self, tool: int, offset: ToolOffset, *, expected: Expected) -> ToolReceipt:
         """Write and read back; see :class:`robolink.model.ToolTable`."""
@@ -77,6 +86,7 @@ class EpsonToolTable:
         requested = offset.rounded(DECIMALS)
         with self._lock.held(f"TLSet {tool}"):
             six_axes = self._robot.read(f"TLSet {tool}").six_axes
+            self._preferences.require_real(f"TLSet {tool}")
             self._check_axes(requested, six_axes=six_axes)
             statement = spel.set_tool(tool, requested, six_axes=six_axes)
             return self._set(tool, requested, expected, statement)
@@ -106,12 +116,13 @@ class EpsonToolTable:
         """Clear and read back; see :class:`robolink.model.ToolTable`."""
         self.require_writable(tool)
         with self._lock.held(f"TLClr {tool}"):
+            self._preferences.require_real(f"TLClr {tool}")
             return self._set(tool, None, expected, spel.clear_tool(tool))
 
     def selected(self) -> int:
         """Read which tool is in force; the selection survives power-off (epson.md 3.1)."""
         self._window.require_ready("Print Tool")
-        return self._selected()
+        return self._selected_now()
 
     def select(self, tool: int) -> None:
         """Put ``tool`` in force and read the selection back."""
@@ -119,7 +130,7 @@ class EpsonToolTable:
         statement = spel.select_tool(tool)
         with self._lock.held(statement):
             self._window.require_ready(statement)
-            before = self._selected()
+            before = self._selected_now()
             if before == tool:
                 return
             self._require_defined(tool)
@@ -129,7 +140,18 @@ class EpsonToolTable:
                 self._window.command(statement)
                 self._desk.note_selection(tool)
 
-            found = self._writer.carry_out(statement, details, send=send, read=self._selected)
+            def read() -> int:
+                found = self._selected()
+                self._desk.note_selection(found)
+                return found
+
+            found = self._writer.carry_out(
+                statement,
+                details,
+                send=send,
+                read=read,
+                tell=lambda found: tr("Tool {tool} is selected now.", tool=found),
+            )
             if found != tool:
                 raise ReadBackError(
                     tr(
@@ -153,6 +175,7 @@ class EpsonToolTable:
             read=lambda: self._before(tool, requested, expected),
             # A tool that was set just now is defined.
             read_back=lambda: self._read(tool) if requested is None else self._printed(tool),
+            read_doubted=lambda: self._read(tool),
         )
         return self._writer.change(write, expected)
 
@@ -196,6 +219,12 @@ class EpsonToolTable:
                 remedy=tr("Define it first, with a calibration or 'robolink tool set'."),
                 request=spel.select_tool(tool),
             )
+
+    def _selected_now(self) -> int:
+        """Read the selection outside of a change of it."""
+        found = self._selected()
+        self._desk.ledger.saw_selected(found)
+        return found
 
     def _selected(self) -> int:
         return spel.parse_integer(self._window.printed(spel.print_selected_tool()))

@@ -3,7 +3,7 @@
 from robolink.controllers.epson._movement import EpsonMotion
 from robolink.controllers.epson._position import read_position
 from robolink.controllers.epson._window import CommandWindow
-from robolink.errors import ControllerFaultError
+from robolink.errors import StoppedError
 from robolink.messages import tr
 from robolink.model import InputEdge, MotionOutcome, Pose
 from robolink.protocols import spel
@@ -27,7 +27,7 @@ class EpsonMotionUntilInput:
     def wait(self, *, timeout_s: float) -> Pose | None:
         """Wait for the end; see :class:`robolink.model.MotionUntilInput`."""
         if self._motion.wait(timeout_s=timeout_s) is not MotionOutcome.ARRIVED:
-            raise ControllerFaultError(
+            raise StoppedError(
                 tr("The movement was stopped before the input switched."),
                 remedy=tr("Nothing goes on by itself; start again when the cell is clear."),
                 controller=self._identity,

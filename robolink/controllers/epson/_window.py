@@ -11,7 +11,12 @@ from robolink.controllers.epson._answers import (
     status_from_flags,
 )
 from robolink.controllers.epson._session import EpsonSession
-from robolink.errors import ControllerFaultError, RejectedError, RemoteProtocolError
+from robolink.errors import (
+    ControllerFaultError,
+    RejectedError,
+    RemoteProtocolError,
+    UnclearAnswerError,
+)
 from robolink.messages import tr
 from robolink.model import ControllerStatus
 from robolink.protocols.epson_text import Refusal, Reply, parse_status
@@ -78,6 +83,7 @@ class CommandWindow:
         Raises:
             RejectedError: It was refused and not carried out.
             ControllerFaultError: It failed and put the controller in error.
+            UnclearAnswerError: The answer says neither.
         """
         self.check(statement, self._session.execute(statement))
 
@@ -105,7 +111,7 @@ class CommandWindow:
                 controller=self._session.identity,
                 request=query,
             )
-        raise self.failure(query, answer)
+        raise self.failure(query, answer, asked=True)
 
     def check(self, statement: Statement, answer: Reply | Refusal) -> None:
         """Raise unless ``answer`` says that ``statement`` ran."""
@@ -113,9 +119,15 @@ class CommandWindow:
             raise self.failure(statement, answer)
 
     def failure(
-        self, statement: Statement, answer: Reply | Refusal
-    ) -> RejectedError | ControllerFaultError:
-        """Find out why ``statement`` did not run."""
+        self, statement: Statement, answer: Reply | Refusal, *, asked: bool = False
+    ) -> RejectedError | ControllerFaultError | UnclearAnswerError:
+        """Find out what became of ``statement``, which was not answered as it should be.
+
+        Args:
+            statement: What was sent.
+            answer: What came.
+            asked: Whether it only asks, so that nothing is in doubt but its answer.
+        """
         self._was_ready = False
         controller = self._session.identity
         code = answer.code if isinstance(answer, Refusal) else 0
@@ -127,10 +139,22 @@ class CommandWindow:
             return self.fault(status, statement)
         if code in NOT_EXECUTED and isinstance(answer, Refusal):
             return rejected(answer, controller=controller, request=statement)
-        return RejectedError(
-            tr("The controller did not run {statement!r}.", statement=statement),
-            code=code or status.code,
-            remedy=tr("It answered: {answer}.", answer=_shown(answer)),
+        if asked:
+            return RejectedError(
+                tr("The controller did not answer {statement!r}.", statement=statement),
+                code=code or status.code,
+                remedy=tr("It said: {answer}.", answer=_shown(answer)),
+                controller=controller,
+                request=statement,
+            )
+        return UnclearAnswerError(
+            tr(
+                "The answer to {statement!r} says neither that it ran nor that it was refused: "
+                "{answer}.",
+                statement=statement,
+                answer=_shown(answer),
+            ),
+            remedy=tr("Nothing was repeated. Read what it should have changed before you go on."),
             controller=controller,
             request=statement,
         )
@@ -181,4 +205,5 @@ def _status(reply: Reply) -> ControllerStatus:
 def _shown(answer: Reply | Refusal) -> str:
     if isinstance(answer, Refusal):
         return f"!{answer.name},{answer.code}"
-    return answer.text if answer.text is not None else ",".join(answer.fields)
+    said = f'"{answer.text}"' if answer.text is not None else ",".join(answer.fields)
+    return f"#{answer.name},{said}"

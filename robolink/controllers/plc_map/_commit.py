@@ -18,6 +18,7 @@ from robolink.errors import (
 )
 from robolink.messages import tr
 from robolink.register_maps import Commit, CommitKind, Signal
+from robolink.stop_latch import CommandClass
 from robolink.timing import Deadline
 
 _POLL_S: Final = 0.02
@@ -46,7 +47,7 @@ class Handshake:
         """
         asked = self._commit.request
         if asked is not None and self._registers.is_on(asked):
-            self._registers.switch(asked, on=False)
+            self._registers.switch(asked, on=False, kind=CommandClass.CALM)
         deadline = Deadline.after(self._registers.clock, self._commit.timeout_s)
         while (hindrance := self._hindrance(request)) is not None:
             if deadline.expired:
@@ -119,7 +120,7 @@ class Handshake:
             The number of an error that came instead of the answer, ``None`` for none.
         """
         code = self._answer(asked, request)
-        self._registers.switch(asked, on=False)
+        self._registers.switch(asked, on=False, kind=CommandClass.CALM)
         if code is None and self._commit.kind is CommitKind.COMMIT_BIT:
             self._let_go(request)
         return code
@@ -133,7 +134,7 @@ class Handshake:
                 return code
             if deadline.expired:
                 with suppress(RobolinkError):  # what is said below holds in any case
-                    self._registers.switch(asked, on=False)
+                    self._registers.switch(asked, on=False, kind=CommandClass.CALM)
                 raise self._unknown(
                     tr("It did not answer the request within {timeout:g} s.", timeout=timeout_s),
                     request,

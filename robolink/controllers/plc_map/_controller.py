@@ -7,6 +7,7 @@ from typing import Self
 
 from robolink.controllers._guarded import MarkerDesk, ProcedureLock
 from robolink.controllers.plc_map._flange import FlangeReader, no_motion
+from robolink.controllers.plc_map._identity import IdentityReader
 from robolink.controllers.plc_map._inputs import MappedInputs
 from robolink.controllers.plc_map._probe import require_probe
 from robolink.controllers.plc_map._registers import RegisterClient, Registers
@@ -19,12 +20,15 @@ from robolink.model import (
     Capabilities,
     ControllerFacts,
     ControllerStatus,
+    Ledger,
     Marker,
     MarkerKind,
     NewEntry,
     OutcomeLog,
 )
 from robolink.register_maps import RegisterMap, confirmation_of
+from robolink.standing import note_standing
+from robolink.stop_latch import StopLatch
 from robolink.timing import Clock
 
 
@@ -49,7 +53,8 @@ class PlcMapController:
         self.register_map = register_map
         self._registers = Registers(client)
         self._outcomes = outcomes
-        self._lock = ProcedureLock(client.identity)
+        outcomes.ask(IdentityReader(self._registers, register_map).read)
+        self._lock = ProcedureLock(client.identity, self._registers.latch)
         self._desk = MarkerDesk(client.identity, outcomes)
         self._tools = RegisterToolTable(
             self._registers,
@@ -94,6 +99,11 @@ class PlcMapController:
     def outcomes(self) -> OutcomeLog:
         """Open markers of this PLC."""
         return self._outcomes
+
+    @property
+    def ledger(self) -> Ledger:
+        """What was done here since connecting, and how much of it is proved."""
+        return self._desk.ledger
 
     @property
     def resolver(self) -> RegisterResolver:
@@ -152,13 +162,23 @@ class PlcMapController:
         """Refuse; see :meth:`stop`."""
         raise no_motion(self.identity)
 
+    @property
+    def latch(self) -> StopLatch:
+        """What holds every write back from :meth:`stop` until :meth:`release_stop`."""
+        return self._registers.latch
+
     def stop(self) -> None:
-        """Refuse: nothing here can stop the machine.
+        """Write nothing from here on; the machine itself nothing here can stop.
 
         Raises:
             RejectedError: Always; the message says to use the emergency stop.
         """
+        self._registers.latch.close()
         raise no_motion(self.identity)
+
+    def release_stop(self) -> None:
+        """Let this process write again after :meth:`stop`, because a person says so."""
+        self._registers.latch.release()
 
     def reset_fault(self) -> None:
         """Refuse; see :meth:`stop`."""
@@ -198,7 +218,7 @@ class PlcMapController:
     @contextmanager
     def preserved(self, reason: str) -> Iterator[None]:
         """Keep other procedures out; nothing is selected or moved, so nothing is put back."""
-        with self._lock.held(reason):
+        with self._lock.held(reason), self._desk.ledger.block():
             self._desk.look()
             self._desk.require_settled(reason)
             yield
@@ -218,6 +238,8 @@ class PlcMapController:
         trace: TracebackType | None,
     ) -> None:
         self.close()
+        if error is not None:
+            note_standing(error, self.ledger.standing())
 
     @property
     def _permitted(self) -> bool:

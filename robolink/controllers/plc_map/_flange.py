@@ -62,7 +62,7 @@ class FlangeReader:
         """
         raise no_motion(self._registers.identity)
 
-    move_until_input = requests_until = requests_for = terms = stop = move_to
+    move_until_input = requests_until = requests_for = require_able = terms = stop = move_to
 
 
 def no_motion(identity: str) -> RejectedError:

@@ -1,12 +1,16 @@
 """Reads and writes the places of a map, one exchange at a time."""
 
-from collections.abc import Sequence
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import Final, Protocol
 
+from robolink.checkpoints import Point, checkpoint
 from robolink.errors import RemoteProtocolError
 from robolink.interrupts import InterruptGate
 from robolink.messages import tr
 from robolink.register_maps import Signal, Table, Word, describe_place
+from robolink.stop_latch import CommandClass, StopLatch
 from robolink.timing import Clock
 
 _TRIES: Final = 3
@@ -18,6 +22,10 @@ class RegisterClient(Protocol):
     @property
     def identity(self) -> str:
         """Which PLC this is."""
+
+    @property
+    def place(self) -> str:
+        """Where it was reached, the same for each spelling of the URL."""
 
     @property
     def clock(self) -> Clock:
@@ -51,6 +59,7 @@ class Registers:
     Attributes:
         exchanges: Requests sent so far.
         gate: Holds Ctrl-C back inside an exchange, and inside whatever else enters it.
+        latch: What holds writes back while a stop is in force.
     """
 
     def __init__(self, client: RegisterClient) -> None:
@@ -58,11 +67,18 @@ class Registers:
         self.exchanges = 0
         self.gate = InterruptGate()
         self.gate.open()
+        self.latch = StopLatch(client.identity)
+        self._writing = threading.Lock()
 
     @property
     def identity(self) -> str:
         """Which PLC this is."""
         return self._client.identity
+
+    @property
+    def place(self) -> str:
+        """Where it was reached, the same for each spelling of the URL."""
+        return self._client.place
 
     @property
     def clock(self) -> Clock:
@@ -120,10 +136,19 @@ class Registers:
             found = found >> signal.bit & 1
         return found == signal.on
 
-    def switch(self, signal: Signal, on: bool) -> None:
-        """Switch a coil, or write a whole register."""
+    def switch(self, signal: Signal, on: bool, *, kind: CommandClass = CommandClass.WRITE) -> None:
+        """Switch a coil, or write a whole register.
+
+        Args:
+            signal: Which one.
+            on: Whether on.
+            kind: What that does to the machine; a request that is taken back calms.
+
+        Raises:
+            StoppedError: A stop forbids it; it was not sent.
+        """
         value = signal.on if on else signal.off
-        with self.gate:
+        with self._admitted(signal.place, kind):
             self.exchanges += 1
             if signal.table is Table.COIL:
                 self._client.write_coil(signal.address, bool(value))
@@ -131,8 +156,8 @@ class Registers:
                 self._client.write_registers(signal.address, [value])
 
     def write(self, address: int, words: Sequence[int]) -> None:
-        """Write holding registers in one request (function 16)."""
-        with self.gate:
+        """Write holding registers in one request (function 16); raises like :meth:`switch`."""
+        with self._admitted(describe_place(Table.HOLDING, address), CommandClass.WRITE):
             self.exchanges += 1
             self._client.write_registers(address, words)
 
@@ -140,3 +165,16 @@ class Registers:
         """Close the link. Idempotent."""
         self._client.close()
         self.gate.close()
+
+    @contextmanager
+    def _admitted(self, place: str, kind: CommandClass) -> Iterator[None]:
+        """Hold the lock of a write that no stop forbids."""
+        request = tr("the write to {place}", place=place)
+        checkpoint(Point.LOCK, request)
+        try:
+            with self.gate, self._writing:
+                checkpoint(Point.HELD, request)
+                self.latch.admit(kind, request)
+                yield
+        finally:
+            checkpoint(Point.EXCHANGE, request)

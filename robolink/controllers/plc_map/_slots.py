@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from robolink.controllers.plc_map._commit import Handshake
 from robolink.controllers.plc_map._registers import Registers
 from robolink.controllers.plc_map._values import OffsetValues, Words, runs
-from robolink.errors import OutcomeUnknownError, RejectedError, ToolError
+from robolink.errors import OutcomeUnknownError, RejectedError, StoppedError, ToolError
 from robolink.messages import tr
 from robolink.model import ToolOffset
 from robolink.register_maps import AllZero, RegisterMap, Slot, Table, describe_place
@@ -113,11 +113,13 @@ class Slots:
         self._or_put_back(slot, kept, lambda: self.handshake.carry_out(slot.tool, request))
 
     def _or_put_back(self, slot: Slot, kept: SlotContent, act: Callable[[], None]) -> None:
-        """Act; if it is refused, let the registers show again what is in force."""
+        """Act; if it is refused or stopped, let the registers show again what is in force."""
         try:
             act()
-        except RejectedError as error:
-            if not self._restored(slot, kept):
+        except (RejectedError, StoppedError) as error:
+            with self._registers.latch.putting_back(slot.tool):
+                restored = self._restored(slot, kept)
+            if not restored:
                 raise OutcomeUnknownError(
                     tr(
                         "{refusal} The registers of tool {tool} could not be put back.",

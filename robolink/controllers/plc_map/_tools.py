@@ -46,6 +46,7 @@ class RegisterToolTable:
     ) -> None:
         self._registers = registers
         self._map = register_map
+        self._desk = desk
         self._lock = lock
         self._require_confirmed = require_confirmed
         self._require_ready = require_ready
@@ -101,7 +102,9 @@ class RegisterToolTable:
         """Read one tool, ``None`` when it is undefined; tool 0 reads as all zeros."""
         if tool == 0 and not isinstance(tool, bool):
             return ToolOffset()
-        return self._slots.read(self._slot(tool))
+        found = self._slots.read(self._slot(tool))
+        self._desk.ledger.saw_tool(tool, found)
+        return found
 
     def write(self, tool: int, offset: ToolOffset, *, expected: Expected) -> ToolReceipt:
         """Write and read back; see :class:`robolink.model.ToolTable`.
@@ -141,7 +144,9 @@ class RegisterToolTable:
         """Return the number of the tool in force; ``None`` where the map does not name it."""
         if self._map.selected is None:
             return None
-        return self._registers.word(self._map.selected)
+        found = self._registers.word(self._map.selected)
+        self._desk.ledger.saw_selected(found)
+        return found
 
     def select(self, tool: int) -> None:
         """Refuse: which tool is in force is the machine's affair.

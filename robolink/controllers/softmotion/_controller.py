@@ -13,6 +13,7 @@ from robolink.controllers.softmotion._io import SoftMotionIo
 from robolink.controllers.softmotion._mailbox import Mailbox
 from robolink.controllers.softmotion._preserve import Preserver
 from robolink.controllers.softmotion._resolve import SoftMotionResolver
+from robolink.controllers.softmotion._stopping import REST_S
 from robolink.controllers.softmotion._tools import SoftMotionToolTable
 from robolink.errors import ControllerFaultError, RobolinkError
 from robolink.messages import tr
@@ -21,6 +22,7 @@ from robolink.model import (
     Capabilities,
     ControllerFacts,
     ControllerStatus,
+    Ledger,
     Marker,
     MarkerKind,
     NewEntry,
@@ -34,6 +36,8 @@ from robolink.protocols.mailbox import (
     Opcode,
     Response,
 )
+from robolink.standing import note_standing
+from robolink.stop_latch import StopLatch
 from robolink.timing import Clock, Deadline
 
 _RESETS: Final = (
@@ -107,6 +111,11 @@ class SoftMotionController:
         return self._mailbox.desk.outcomes
 
     @property
+    def ledger(self) -> Ledger:
+        """What was done here since connecting, and how much of it is proved."""
+        return self._mailbox.desk.ledger
+
+    @property
     def resolver(self) -> SoftMotionResolver:
         """Settles what was begun and not proved finished."""
         return self._resolver
@@ -159,13 +168,21 @@ class SoftMotionController:
         """
         self._mailbox.orders.ownership.take(insist=insist)
 
-    def stop(self) -> None:
-        """Stop the group and hold it; ``reset_fault`` releases it.
+    @property
+    def latch(self) -> StopLatch:
+        """What holds everything back from :meth:`stop` until :meth:`release_stop`."""
+        return self._mailbox.wire.latch
 
-        May be called from any thread while another waits on a motion.
+    def stop(self) -> None:
+        """Stop the group and hold it; on the PLC ``reset_fault`` releases it.
+
+        May be called from any thread, whatever another one is doing. From its first instant on
+        no movement, jog or write leaves this process until :meth:`release_stop`; whoever is at
+        work gets StoppedError.
 
         Raises:
-            RobolinkError: It was not confirmed; the message says to use the emergency stop.
+            OutcomeUnknownError: Rest was not seen; the message says to use the emergency stop.
+            RobolinkError: It was not confirmed; the message says the same.
         """
         try:
             self._group.stop()
@@ -174,6 +191,10 @@ class SoftMotionController:
                 (tr("The stop is not confirmed: press the emergency stop."), error.remedy)
             )
             raise
+
+    def release_stop(self) -> None:
+        """Let this process act again after :meth:`stop`, because a person says so."""
+        self._mailbox.wire.latch.release()
 
     def reset_fault(self) -> None:
         """Clear the group's error and release a held stop, because a person asked for it.
@@ -187,7 +208,7 @@ class SoftMotionController:
         """
         mailbox = self._mailbox
         request = tr("reset")
-        with mailbox.lock.held(request):
+        with mailbox.lock.held(request, calming=True):
             now = mailbox.snapshots.take()
             for state, draft in _RESETS:
                 if now.group_state == state:
@@ -258,6 +279,7 @@ class SoftMotionController:
 
     def close(self) -> None:
         """Halt what nobody waited on, give the mailbox back, close. Idempotent."""
+        self.latch.await_stops(REST_S)
         try:
             if self._mailbox.wire.alive:
                 self._group.abort_unfinished()
@@ -278,6 +300,8 @@ class SoftMotionController:
         trace: TracebackType | None,
     ) -> None:
         self.close()
+        if error is not None:
+            note_standing(error, self.ledger.standing())
 
     def _left(self, state: GroupState, now: Response) -> Response:
         """Give the group the cycles that it needs to leave a state (softmotion.md 2.2)."""

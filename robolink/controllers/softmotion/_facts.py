@@ -83,6 +83,7 @@ def set_kinematics(mailbox: Mailbox, position: Kinematics, orientation: Kinemati
             send=lambda: mailbox.orders.carry_out(draft),
             read=mailbox.snapshots.take,
         )
+        mailbox.desk.ledger.saw_selected(after.tool_slot)
     if after.kinematics != wanted or after.tool_slot:
         raise ReadBackError(
             tr(

@@ -4,7 +4,12 @@ import math
 
 from robolink.controllers._edge_ahead import require_edge_ahead
 from robolink.controllers.softmotion._answers import describe
-from robolink.controllers.softmotion._condition import require_still
+from robolink.controllers.softmotion._condition import (
+    require_enabled,
+    require_permit,
+    require_power,
+    require_still,
+)
 from robolink.controllers.softmotion._dynamics import dynamics_of, up_to_an_edge
 from robolink.controllers.softmotion._io import SoftMotionIo
 from robolink.controllers.softmotion._jog import Jog, JogWatch
@@ -14,14 +19,14 @@ from robolink.controllers.softmotion._movement import (
     SoftMotionMotionUntilInput,
 )
 from robolink.controllers.softmotion._starting import MovementStarter
-from robolink.errors import ConfigError, ReadBackError, RejectedError
+from robolink.controllers.softmotion._stopping import bring_group_to_rest
+from robolink.errors import ConfigError, ReadBackError
 from robolink.messages import tr
 from robolink.model import InputEdge, MotionProfile, MotionTerms, Path, Pose, WorkBox
 from robolink.protocols.mailbox import (
     BufferMode,
     Command,
     CoordinateSystem,
-    ErrorClass,
     GroupState,
     Opcode,
     Six,
@@ -50,6 +55,14 @@ class SoftMotionGroup:
         """Read the axes of the machine, in the PLC's units and degrees."""
         now = self._mailbox.snapshots.take()
         return {"axes": now.axes[: now.axis_count]}
+
+    def require_able(self, purpose: str) -> None:
+        """Refuse what no movement could begin in now; see :class:`robolink.model.MotionGroup`."""
+        identity = self._mailbox.identity
+        now = self._mailbox.snapshots.take()
+        require_permit(now, controller=identity, request=purpose)
+        require_enabled(now, controller=identity, request=purpose)
+        require_power(now, controller=identity, request=purpose)
 
     def terms(self) -> MotionTerms:
         """Read what a person must know before the group moves."""
@@ -122,13 +135,16 @@ class SoftMotionGroup:
     def stop(self) -> None:
         """Stop and hold; may be called from any thread, at any time, more than once.
 
-        Until ``reset_fault`` releases it nothing moves.
+        Until ``release_stop`` nothing acts from here, and until ``reset_fault`` nothing moves.
+
+        Raises:
+            OutcomeUnknownError: The group did not come to rest in time.
         """
-        try:
-            self._mailbox.orders.carry_out(Command(0, Opcode.STOP))
-        except RejectedError as error:
-            if error.code != ErrorClass.STOPPING:
-                raise
+        mailbox = self._mailbox
+        with mailbox.wire.latch.stopping():
+            bring_group_to_rest(
+                mailbox.orders, mailbox.snapshots, mailbox.wire.clock, controller=mailbox.identity
+            )
 
     def halt(self) -> None:
         """Bring the group to rest, ending every movement; it may be moved again at once."""
@@ -196,7 +212,7 @@ class SoftMotionGroup:
     def _switch(self, opcode: Opcode, *, enabled: bool) -> None:
         mailbox, draft = self._mailbox, Command(0, opcode)
         request = describe(draft)
-        with mailbox.lock.held(request):
+        with mailbox.lock.held(request, calming=not enabled):
             if self.motors_on() is enabled:
                 return
             now = mailbox.prepare(draft, request)

@@ -18,6 +18,7 @@ from robolink.errors import (
     LimitError,
     OutcomeUnknownError,
     RobolinkError,
+    StoppedError,
     TransportTimeoutError,
 )
 from robolink.messages import tr
@@ -120,8 +121,13 @@ class JogWatch:
             LimitError: The tip came out of the box; the jog was ended there.
             RejectedError: The PLC refused it, or ended it: the permit went, for example.
             ControllerFaultError: The group went into error, or somebody stopped it.
+            StoppedError: A stop came.
             OutcomeUnknownError: No answer came.
         """
+        with self._mailbox.wire.latch.ending(self.request):
+            return self._jogged(duration_s)
+
+    def _jogged(self, duration_s: float) -> Pose:
         with self._mailbox.desk.doubt(self.request):
             try:
                 with self._mailbox.wire.attended():
@@ -148,7 +154,7 @@ class JogWatch:
             mailbox.wire.rides.jogging = True
             try:
                 self._command = mailbox.orders.start(self.draft)
-            except (ControllerError, ConfigError):
+            except (ControllerError, ConfigError, StoppedError):
                 mailbox.wire.rides.jogging = False
                 mailbox.desk.clear(marker)
                 self._marker = None
@@ -159,7 +165,7 @@ class JogWatch:
         snapshots = self._mailbox.snapshots
         deadline = Deadline.after(self._mailbox.wire.clock, duration_s)
         now = snapshots.take()
-        while not deadline.expired:
+        while not deadline.expired and not self._mailbox.wire.latch.closed:
             try:
                 self._box.check(self._pose(now))
             except LimitError as error:

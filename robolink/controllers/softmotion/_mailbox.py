@@ -6,6 +6,7 @@ from contextlib import AbstractContextManager
 from robolink.controllers._guarded import MarkerDesk, ProcedureLock
 from robolink.controllers._tool_writing import ToolWriter
 from robolink.controllers.softmotion._condition import require_permit
+from robolink.controllers.softmotion._identity import identity_of
 from robolink.controllers.softmotion._orders import Orders
 from robolink.controllers.softmotion._snapshots import Snapshots
 from robolink.controllers.softmotion._wire import MailboxWire
@@ -48,10 +49,11 @@ class Mailbox:
     ) -> None:
         self.wire = wire
         self.device_id = device_id
+        outcomes.ask(lambda: identity_of(wire, device_id))
         self.snapshots = snapshots
         self.orders = Orders(wire, snapshots)
         self.desk = MarkerDesk(wire.identity, outcomes)
-        self.lock = ProcedureLock(wire.identity)
+        self.lock = ProcedureLock(wire.identity, wire.latch)
         # A refused command did nothing, whatever the reason (design part 7).
         self.writer = ToolWriter(
             self.desk,

@@ -11,6 +11,7 @@ from robolink.errors import (
     MotionTimeoutError,
     RejectedError,
     RemoteProtocolError,
+    StoppedError,
     TransportTimeoutError,
 )
 from robolink.messages import tr
@@ -53,11 +54,16 @@ class SoftMotionMotion:
         return self._end is not None
 
     def wait(self, *, timeout_s: float) -> MotionOutcome:
-        """Wait for the end; see :class:`robolink.model.Motion`."""
-        end = self.await_end(timeout_s)
-        if end.state == CommandState.DONE:
-            return MotionOutcome.ARRIVED
-        return self._stopped(end)
+        """Wait for the end; see :class:`robolink.model.Motion`.
+
+        Raises:
+            StoppedError: A stop came, whatever the movement did.
+        """
+        with self._mailbox.wire.latch.ending(self._request):
+            end = self.await_end(timeout_s)
+            if end.state == CommandState.DONE:
+                return MotionOutcome.ARRIVED
+            return self._stopped(end)
 
     def abort(self) -> None:
         """Halt the group once and await the end of the movement.
@@ -73,9 +79,11 @@ class SoftMotionMotion:
         ):
             if self._end is None and mailbox.wire.rides.end_of(self._command.sequence) is None:
                 self._halted = True
-                # It may have just ended by itself, or by a stop; its end is awaited.
-                with suppress(RejectedError, ControllerFaultError):
-                    mailbox.orders.carry_out(Command(0, Opcode.HALT))
+                # It may have just ended by itself, or by a stop; its end is awaited. A stop that is
+                # under way ends it too, and a halt after it would only hide the end of the stop.
+                if not mailbox.wire.latch.closed:
+                    with suppress(RejectedError, ControllerFaultError):
+                        mailbox.orders.carry_out(Command(0, Opcode.HALT))
             if not self._watch(Deadline.after(mailbox.wire.clock, _HALT_S)):
                 raise mailbox.wire.ended(
                     TransportTimeoutError(
@@ -185,11 +193,12 @@ class SoftMotionMotionUntilInput:
             ControllerError: It was stopped, refused, or ended by an error.
             MotionTimeoutError, OutcomeUnknownError: As for any movement.
         """
-        end = self._motion.await_end(timeout_s)
+        with self._mailbox.wire.latch.ending(describe(self._motion.command)):
+            end = self._motion.await_end(timeout_s)
         if end.error_class == ErrorClass.NO_EDGE:
             return None
         if self._motion.wait(timeout_s=timeout_s) is not MotionOutcome.ARRIVED:
-            raise ControllerFaultError(
+            raise StoppedError(
                 tr("The movement was stopped before the input switched."),
                 remedy=tr("Nothing goes on by itself; start again when the cell is clear."),
                 controller=self._mailbox.identity,

@@ -7,10 +7,14 @@ PLC counts one more damaged block and has acknowledged nothing since. Never afte
 """
 
 import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import Final
 
+from robolink.checkpoints import Point, checkpoint
 from robolink.controllers.softmotion._answers import Ended, cut_short, describe, refused
+from robolink.controllers.softmotion._command_classes import command_class_of
 from robolink.controllers.softmotion._ownership import Ownership
 from robolink.controllers.softmotion._rides import has_ended
 from robolink.controllers.softmotion._snapshots import Snapshots
@@ -19,7 +23,9 @@ from robolink.errors import (
     ConfigError,
     RejectedError,
     RemoteProtocolError,
+    StoppedError,
     TransportTimeoutError,
+    UnclearAnswerError,
 )
 from robolink.messages import tr
 from robolink.protocols.mailbox import (
@@ -28,6 +34,7 @@ from robolink.protocols.mailbox import (
     Command,
     CommandState,
     ErrorClass,
+    Finished,
     Opcode,
     Response,
     Words,
@@ -40,6 +47,9 @@ COMPLETION_S: Final = 10.0
 """Longest time between the acknowledgement and the end of what is not a movement."""
 
 _WRITES: Final = 3
+_OVERTAKEN: Final = frozenset({Opcode.STOP, Opcode.HALT})
+"""Commands whose end another stop or halt may hide: it does the same, and rest is looked for."""
+
 _DISPOSSESSED: Final = frozenset({ErrorClass.NOT_OWNER, ErrorClass.STALE_EPOCH})
 
 
@@ -70,11 +80,30 @@ class Orders:
         with self._wire.uninterrupted():
             self._possess(draft)
             end = self._to_end(draft)
-            if end.state == CommandState.ERROR:
-                raise self._refusal(end.command, end.now, end.error_class)
-            if end.state == CommandState.ABORTED:
-                raise cut_short(end.command)
-            return end.now
+            return self._taken(end)
+
+    def stop(self) -> Callable[[Response], bool]:
+        """Send 2003, and return what tells by a later snapshot whether it is done.
+
+        What it returns raises like :meth:`carry_out`.
+        """
+        with self._wire.uninterrupted():
+            command, now = self._send(Command(0, Opcode.STOP))
+
+        def done(now: Response) -> bool:
+            end = self._end_of(command, now)
+            return end is not None and self._taken(end) is not None
+
+        done(now)
+        return done
+
+    def _taken(self, end: Ended) -> Response:
+        """Return the snapshot of a command that is done; raise for one that is not."""
+        if end.state == CommandState.ERROR:
+            raise self._refusal(end.command, end.now, end.error_class)
+        if end.state == CommandState.ABORTED:
+            raise cut_short(end.command)
+        return end.now
 
     def start(self, draft: Command) -> Command:
         """Send a movement or a jog and return it as it was accepted; raises like the other.
@@ -126,13 +155,17 @@ class Orders:
             return Ended(command, CommandState.DONE, ErrorClass.NONE, now)
         if now.ack_owner != command.owner:
             raise self._wire.ended(self._overtaken(command, now))
-        # Our own stop was accepted after it, from another thread.
+        # Our own stop or halt was accepted after it, from another thread.
         ends = (end for end in now.finished if end.sequence == command.sequence)
-        return next((Ended(command, end.state, end.error_class, now) for end in ends), None)
+        end = next((Ended(command, end.state, end.error_class, now) for end in ends), None)
+        if end is None and command.opcode not in _OVERTAKEN:
+            raise self._unseen(command)
+        return end or Ended(command, CommandState.DONE, ErrorClass.NONE, now)
 
     def _send(self, draft: Command, *, ride: bool = False) -> tuple[Command, Response]:
         """Write a command and return it with the snapshot that acknowledges it."""
-        with self._lock:
+        request = describe(draft)
+        with self._exchanging(request):
             before = self._snapshots.take()
             self._require_able(draft, before)
             command = self._addressed(draft, before)
@@ -143,11 +176,16 @@ class Orders:
                 self._wire.rides.begin(command.sequence)
             for _ in range(_WRITES):
                 try:
+                    self._wire.latch.admit(command_class_of(command), request)
                     self._wire.write(words)
+                except (RejectedError, StoppedError):
+                    self._wire.rides.forget(command.sequence)
+                    raise
+                try:
+                    before, accepted = self._await_acknowledgement(command, before)
                 except RejectedError:
                     self._wire.rides.forget(command.sequence)
                     raise
-                before, accepted = self._await_acknowledgement(command, before)
                 if accepted:
                     return command, before
             raise self._wire.ended(
@@ -157,6 +195,17 @@ class Orders:
                 )
             )
 
+    @contextmanager
+    def _exchanging(self, request: str) -> Iterator[None]:
+        """Hold the lock from the look at the latch to the acknowledgement."""
+        checkpoint(Point.LOCK, request)
+        try:
+            with self._lock:
+                checkpoint(Point.HELD, request)
+                yield
+        finally:
+            checkpoint(Point.EXCHANGE, request)
+
     def _await_acknowledgement(self, command: Command, before: Response) -> tuple[Response, bool]:
         """Return the snapshot that shows the acknowledgement, or the damage, of a block."""
         deadline = Deadline.after(self._wire.clock, self._wire.timeout_s)
@@ -165,6 +214,8 @@ class Orders:
             now = self._snapshots.news(now)
             if is_own(command, now) or _has_taken(command, now):
                 return now, True
+            if _came_too_early(command, before, now):
+                raise refused(command, now, ErrorClass.BUSY)
             if (now.ack_head, now.ack_owner) != (before.ack_head, before.ack_owner):
                 raise self._wire.ended(self._overtaken(command, now))
             if now.rejected != before.rejected:
@@ -211,6 +262,16 @@ class Orders:
             request=describe(command),
         )
 
+    def _unseen(self, command: Command) -> UnclearAnswerError:
+        # Only what a stop ends is kept among the last ends; what had ended before it, well or
+        # not, is not shown any more (design part 7).
+        return UnclearAnswerError(
+            tr("A stop came before the end of {request!r} was read.", request=describe(command)),
+            remedy=tr("Read again what it was to change."),
+            controller=self._wire.identity,
+            request=describe(command),
+        )
+
     def _overtaken(self, command: Command, now: Response) -> RemoteProtocolError:
         return RemoteProtocolError(
             tr(
@@ -232,6 +293,15 @@ def is_own(command: Command, now: Response) -> bool:
         command.sequence,
         command.opcode,
     )
+
+
+def _came_too_early(command: Command, before: Response, now: Response) -> bool:
+    """Whether the PLC held a command back, which it then never carries out (design part 7).
+
+    Its number was in none of the ends when it was sent, so an end of that number is its own.
+    """
+    early = Finished(command.sequence, CommandState.ERROR, ErrorClass.BUSY)
+    return early in now.finished and early not in before.finished
 
 
 def _has_taken(command: Command, now: Response) -> bool:

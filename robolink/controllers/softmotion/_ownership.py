@@ -6,12 +6,17 @@ client that slept through it is refused (design part 7; faults_and_speed.md F46,
 """
 
 from collections.abc import Callable
+from typing import Final
 
 from robolink.controllers.softmotion._answers import Ended
 from robolink.controllers.softmotion._wire import MailboxWire
-from robolink.errors import LeaseHeldError, LeaseLostError
+from robolink.errors import LeaseHeldError, LeaseLostError, RejectedError
 from robolink.messages import tr
-from robolink.protocols.mailbox import Command, CommandState, Opcode
+from robolink.protocols.mailbox import Command, CommandState, ErrorClass, Opcode
+from robolink.timing import Deadline
+
+_LONGEST_STOP_S: Final = 1.0
+_AGAIN_S: Final = 0.05
 
 
 class Ownership:
@@ -82,5 +87,18 @@ class Ownership:
         if self._wire.epoch:
             if self._wire.rides.unfinished:
                 self._send(Command(0, Opcode.HALT))
-            self._send(Command(0, Opcode.OWNERSHIP))
+            self._give_back()
             self._wire.epoch = 0
+
+    def _give_back(self) -> None:
+        """Release the ownership, after the stop of another client that may be in work yet."""
+        deadline = Deadline.after(self._wire.clock, _LONGEST_STOP_S)
+        while True:
+            try:
+                self._send(Command(0, Opcode.OWNERSHIP))
+            except RejectedError as error:
+                if error.code != ErrorClass.BUSY or deadline.expired:
+                    raise
+                self._wire.clock.sleep(_AGAIN_S)
+            else:
+                return

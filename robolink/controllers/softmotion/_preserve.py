@@ -30,7 +30,7 @@ class Preserver:
     def preserved(self, reason: str) -> Iterator[None]:
         """See :meth:`robolink.model.Controller.preserved`."""
         mailbox = self._mailbox
-        with mailbox.lock.held(reason):
+        with mailbox.lock.held(reason), mailbox.desk.ledger.block():
             mailbox.desk.require_settled(reason)
             tool = self._tools.selected()
             marker: Marker | None = None
@@ -48,7 +48,7 @@ class Preserver:
     def restore(self, marker: Marker) -> None:
         """Select the tool that ``marker`` names, and forget it; Ctrl-C waits for the end."""
         tool = tool_before(marker)
-        with self._mailbox.uninterrupted():
+        with self._mailbox.uninterrupted(), self._mailbox.wire.latch.restoring():
             self._group.abort_unfinished()
             self._tools.select(tool)
             self._mailbox.desk.clear(marker)

@@ -8,7 +8,13 @@ from robolink.controllers.softmotion._condition import (
 )
 from robolink.controllers.softmotion._mailbox import Mailbox
 from robolink.controllers.softmotion._movement import SoftMotionMotion
-from robolink.errors import ConfigError, ControllerError, NotReadyError, NotReadyReason
+from robolink.errors import (
+    ConfigError,
+    ControllerError,
+    NotReadyError,
+    NotReadyReason,
+    StoppedError,
+)
 from robolink.messages import tr
 from robolink.model import MarkerKind, Pose
 from robolink.protocols.mailbox import Command, Response
@@ -30,19 +36,19 @@ class MovementStarter:
     def start(self, target: Pose, draft: Command) -> SoftMotionMotion:
         """Start a movement that lies inside the limits; see ``MotionGroup.move_to``."""
         mailbox, request = self._mailbox, describe(draft)
-        with mailbox.lock.held(request):
-            mailbox.wire.rides.require_room(request, controller=mailbox.identity)
-            now = self.require_startable(draft, request)
-            self._require_tool(target, now, request)
-            try:
+        try:
+            with mailbox.lock.held(request):
+                mailbox.wire.rides.require_room(request, controller=mailbox.identity)
+                now = self.require_startable(draft, request)
+                self._require_tool(target, now, request)
                 with mailbox.uninterrupted():
                     motion = self._started(target, draft, request)
                     self._current = [*(m for m in self._current if not m.settled), motion]
-            except KeyboardInterrupt:
-                # Nobody will be given this motion to wait on.
-                self.abort_unfinished()
-                raise
-            return motion
+                return motion
+        except (KeyboardInterrupt, StoppedError):
+            # Nobody will be given this motion to wait on.
+            self.abort_unfinished()
+            raise
 
     def _started(self, target: Pose, draft: Command, request: str) -> SoftMotionMotion:
         mailbox = self._mailbox
@@ -51,7 +57,7 @@ class MovementStarter:
         with mailbox.desk.doubt(request):
             try:
                 command = mailbox.orders.start(draft)
-            except (ControllerError, ConfigError, KeyboardInterrupt):
+            except (ControllerError, ConfigError, StoppedError, KeyboardInterrupt):
                 mailbox.desk.clear(marker)  # it was not sent, or refused
                 raise
         return SoftMotionMotion(target, command, marker, mailbox)

@@ -72,7 +72,9 @@ class SoftMotionToolTable:
         self._check_index(tool)
         if tool == 0:
             return ToolOffset()
-        return self._value(self._mailbox.snapshots.slot(tool))
+        found = self._value(self._mailbox.snapshots.slot(tool))
+        self._mailbox.desk.ledger.saw_tool(tool, found)
+        return found
 
     def name(self, tool: int) -> str:
         """Read the name of a slot, empty when it has none."""
@@ -122,7 +124,9 @@ class SoftMotionToolTable:
 
     def selected(self) -> int:
         """Read which slot is in force; after a PLC start and a new kinematics it is 0."""
-        return self._mailbox.snapshots.take().tool_slot
+        found = self._mailbox.snapshots.take().tool_slot
+        self._mailbox.desk.ledger.saw_selected(found)
+        return found
 
     def select(self, tool: int) -> None:
         """Put a slot in force, and prove it by the slot number and the group's own tool."""

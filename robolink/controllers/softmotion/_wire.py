@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Final, TypeVar
 
+from robolink.checkpoints import Point, checkpoint
 from robolink.controllers.softmotion._pulse import ClientBeat
 from robolink.controllers.softmotion._rides import Rides
 from robolink.controllers.softmotion._turns import Turns
@@ -22,6 +23,7 @@ from robolink.errors import (
 )
 from robolink.interrupts import InterruptGate
 from robolink.messages import tr
+from robolink.stop_latch import StopLatch
 from robolink.timing import Clock
 from robolink.transport import MailboxHead, MailboxLink
 
@@ -40,6 +42,7 @@ class MailboxWire:
         owner: This client's token, never 0.
         epoch: The epoch of our ownership, 0 while we have none.
         rides: The movements of this client.
+        latch: What holds commands back while a stop is in force.
         timeout_s: Longest wait for the PLC to acknowledge a command.
         exchanges: Requests sent so far.
         look_back: Looks over another link at what ended the session; ``None`` before the
@@ -57,6 +60,7 @@ class MailboxWire:
         self.owner = owner
         self.epoch = 0
         self.rides = Rides(owner)
+        self.latch = StopLatch(link.identity)
         self.timeout_s = timeout_s
         self.exchanges = 0
         self.look_back: Callable[[MailboxLink], RobolinkError | None] | None = None
@@ -65,6 +69,11 @@ class MailboxWire:
     def identity(self) -> str:
         """Which PLC this is."""
         return self._link.identity
+
+    @property
+    def place(self) -> str:
+        """Where it was reached, the same for each spelling of the URL."""
+        return self._link.place
 
     @property
     def clock(self) -> Clock:
@@ -216,7 +225,9 @@ class MailboxWire:
             try:
                 with self._gate:
                     self.exchanges += 1
-                    return exchange()
+                    found = exchange()
+                checkpoint(Point.EXCHANGE, "read")
+                return found
             except (TransportError, RemoteProtocolError) as error:
                 lost.append(error)
                 if isinstance(error, TransportClosedError):

@@ -24,7 +24,7 @@ from robolink.protocols.epson_text._events import (
     Request,
 )
 from robolink.protocols.epson_text._framing import MessageBuffer
-from robolink.protocols.epson_text._reading import read_answer, read_request
+from robolink.protocols.epson_text._reading import next_request, read_answer, read_request
 from robolink.protocols.epson_text._writing import write_refusal, write_reply, write_request
 
 _TERMINATORS: Final = (b"\r\n", b"\r", b"\n")
@@ -56,8 +56,9 @@ class EpsonTextCodec:
         encoding: Of names and texts. Controllers print in the code page of their language
             (cp1252, Shift-JIS, GB18030, Big5; epson.md 1.1); the default, latin-1, loses no
             byte. A byte outside the encoding is shown as ``\xNN``.
-        segments: DEVICE only: :meth:`end_of_segment` may end a request that has no
-            terminator, as one controller was seen to do (epson.md 1.1).
+        unterminated: DEVICE only: a request may lack its terminator, as one controller was
+            seen to accept (epson.md 1.1). It ends where the next one begins, or with
+            :meth:`end_of_request`.
 
     Raises:
         ConfigError: An argument is none of these.
@@ -70,8 +71,8 @@ class EpsonTextCodec:
         "_ended",
         "_failure",
         "_role",
-        "_segments",
         "_terminator",
+        "_unterminated",
     )
 
     def __init__(
@@ -81,17 +82,21 @@ class EpsonTextCodec:
         terminator: bytes = b"\r\n",
         max_line: int = 65536,
         encoding: str = "latin-1",
-        segments: bool = False,
+        unterminated: bool = False,
     ) -> None:
         if terminator not in _TERMINATORS:
             _misconfigured(tr("{value!r} is not CR, LF or CRLF.", value=terminator))
-        if segments and role is Role.HOST:
-            _misconfigured(tr("Only a device can take segments for requests."))
+        if unterminated and role is Role.HOST:
+            _misconfigured(tr("Only a device can take requests without a line end."))
         self._role = role
         self._terminator = terminator
         self._encoding = _known_encoding(encoding)
-        self._segments = segments
-        self._buffer = MessageBuffer(max_line, quoted_replies=role is Role.HOST)
+        self._unterminated = unterminated
+        self._buffer = MessageBuffer(
+            max_line,
+            quoted_replies=role is Role.HOST,
+            next_message=next_request if unterminated else None,
+        )
         self._blank_allowed = False
         self._ended = False
         self._failure: RemoteProtocolError | None = None
@@ -146,18 +151,20 @@ class EpsonTextCodec:
         else:
             self._buffer.append(data)
 
-    def end_of_segment(self) -> None:
-        """Take what is held for a complete request; see ``segments``.
+    def end_of_request(self) -> None:
+        """Take what is held for a complete request, since nothing has followed for a while.
+
+        A line end that follows all the same belongs to that request.
 
         Raises:
-            LocalProtocolError: The codec was made without ``segments``.
+            LocalProtocolError: The codec was made without ``unterminated``.
             RemoteProtocolError: The codec is dead.
         """
         self._check_alive()
-        if not self._segments:
+        if not self._unterminated:
             raise LocalProtocolError(
-                tr("This codec does not end requests at segments."),
-                remedy=tr("Make it with segments=True."),
+                tr("This codec takes no request without its line end."),
+                remedy=tr("Make it with unterminated=True."),
             )
         self._buffer.end_message()
 

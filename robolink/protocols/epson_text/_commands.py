@@ -16,8 +16,9 @@ class ParameterForm(Enum):
     """How the text after the name is cut into parameters.
 
     ``NUMBERS`` unsigned decimal integers; ``VARIABLE`` a variable name, whose subscripts may
-    hold commas, then plain text; ``PASSWORD`` plain text, anything after a further comma is
-    ignored (seen on a controller, epson.md 7 vector 21); ``STATEMENT`` one quoted text.
+    hold commas, then plain text; ``PASSWORD`` plain text up to a comma; ``STATEMENT`` one text
+    between the first and the last quote. What a device does with more of them than a command
+    takes is said in ``_parameters``.
     """
 
     NUMBERS = auto()
@@ -54,6 +55,8 @@ class Command:
         during_execute: RC+ version from which it is served while an Execute runs.
         since: RC+ version that introduced it.
         extended: Not in the public command table; older firmware answers 11 (epson.md 1.8).
+        bare: Clients send it without its parameter too (epson_corrections.md 1.2); a device
+            decides what that means.
     """
 
     name: str
@@ -67,6 +70,7 @@ class Command:
     during_execute: int | None = None
     since: int = 5
     extended: bool = False
+    bare: bool = False
 
     def allowed_during_execute(self, rc_plus: int) -> bool:
         """Tell whether RC+ version ``rc_plus`` serves it while an Execute runs."""
@@ -112,18 +116,18 @@ _VARIABLE: Final = ParameterForm.VARIABLE
 _STATEMENT: Final = ParameterForm.STATEMENT
 
 COMMANDS: Final[tuple[Command, ...]] = (
-    Command("Login", 1, 1, form=ParameterForm.PASSWORD, in_monitoring=True),
+    Command("Login", 1, 1, form=ParameterForm.PASSWORD, in_monitoring=True, bare=True),
     Command("Logout", in_monitoring=True),
     Command("Start", 1, 1, _READY, _UNFIT),
     Command("Stop", needs=_AUTO),
     Command("Pause", needs=frozenset({"auto", "running"})),
     Command("Continue", needs=frozenset({"auto", "paused"})),
     Command("Reset", needs=_READY),
-    Command("SetMotorsOn", 1, 1, _READY, _UNSAFE),
-    Command("SetMotorsOff", 1, 1, _READY),
+    Command("SetMotorsOn", 1, 1, _READY, _UNSAFE, bare=True),
+    Command("SetMotorsOff", 1, 1, _READY, bare=True),
     Command("SetCurRobot", 1, 1, _READY),
     _query("GetCurRobot"),
-    Command("Home", 1, 1, _READY, _UNFIT),
+    Command("Home", 1, 1, _READY, _UNFIT, bare=True),
     _query("GetIO", 1),
     _query("GetMemIO", 1),
     _output("SetIO", _READY_ONLY),
@@ -155,6 +159,8 @@ COMMANDS: Final[tuple[Command, ...]] = (
     _extended("GetPrjName"),
     _extended("GetCpuLoad"),
     _extended("GetContSettings"),
+    _extended("GetCameraModel"),
+    _extended("GetForceSerial"),
     _extended("GetRobotInfo"),
     _extended("GetRobotName", 1),
     _extended("GetRobotSerial", 1),

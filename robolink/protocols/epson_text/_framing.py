@@ -10,6 +10,7 @@ A reply whose payload starts with a quote may hold line ends of its own. It last
 quote is directly followed by a line end (epson.md 1.5).
 """
 
+from collections.abc import Callable
 from typing import Final
 
 from robolink.errors import RemoteProtocolError
@@ -30,17 +31,36 @@ class MessageBuffer:
     Args:
         max_line: Most bytes of one message.
         quoted_replies: Whether messages may be replies with a quoted payload.
+        next_message: Finds where, from an index on, the next message begins that follows
+            without a line end; -1 for nowhere. None: no message does.
     """
 
-    __slots__ = ("_data", "_max_line", "_opening", "_quoted_replies", "_scanned", "_skip_lf")
+    __slots__ = (
+        "_data",
+        "_ended",
+        "_max_line",
+        "_next_message",
+        "_opening",
+        "_quoted_replies",
+        "_scanned",
+        "_skip_lf",
+    )
 
-    def __init__(self, max_line: int, *, quoted_replies: bool) -> None:
+    def __init__(
+        self,
+        max_line: int,
+        *,
+        quoted_replies: bool,
+        next_message: Callable[[bytearray, int], int] | None = None,
+    ) -> None:
         self._data = bytearray()
         self._max_line = max_line
         self._quoted_replies = quoted_replies
         self._scanned = 0  # nothing before this index can end the message
         self._opening = 0  # index of the opening quote, 0 while none is known
         self._skip_lf = False  # the last message ended in CR; its LF may still come
+        self._next_message = next_message
+        self._ended = False  # the last message ended without a line end, which may still come
 
     @property
     def held(self) -> bytes:
@@ -52,6 +72,10 @@ class MessageBuffer:
 
     def append(self, data: bytes) -> None:
         """Add what was received."""
+        if self._ended and data:
+            self._ended = False
+            self._skip_lf = data[0] == _CR
+            data = data[1:] if data[0] in (_CR, _LF) else data
         if self._skip_lf and data:
             self._skip_lf = False
             if data[0] == _LF:
@@ -62,6 +86,7 @@ class MessageBuffer:
         """Make what is held a complete message, as if its terminator had come."""
         if self._data and self._data[-1] not in (_CR, _LF):
             self._data.append(_LF)
+            self._ended = True
 
     def take(self) -> bytes | None:
         """Return the next whole message, ``None`` when there is none yet.
@@ -86,7 +111,7 @@ class MessageBuffer:
                 return -1
             self._opening = self._opening_quote(end)
             if not self._opening:
-                return end
+                return self._sooner(end)
             self._scanned = self._opening + 1
         closing = self._earliest(b'"\r', b'"\n')
         if closing < 0:
@@ -94,6 +119,13 @@ class MessageBuffer:
             self._scanned = max(self._opening + 1, len(self._data) - 1)
             return -1
         return closing + 1
+
+    def _sooner(self, end: int) -> int:
+        """Return where a message that has no line end of its own ends before ``end``."""
+        if self._next_message is None:
+            return end
+        following = self._next_message(self._data, 1)
+        return following if 0 < following < end else end
 
     def _earliest(self, first: bytes, second: bytes) -> int:
         one = self._data.find(first, self._scanned)
@@ -113,7 +145,7 @@ class MessageBuffer:
     def _cut(self, end: int) -> bytes:
         data = self._data
         message = bytes(data[:end])
-        used = end + 1
+        used = end + (data[end] in (_CR, _LF))
         if data[end] == _CR:
             if used == len(data):
                 self._skip_lf = True

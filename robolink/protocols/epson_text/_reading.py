@@ -5,20 +5,25 @@ codec admits, the bytes of ``# ! $ , "`` and of line ends never occur inside a l
 character.
 """
 
+import re
 from functools import lru_cache
 from typing import Final
 
 from robolink.errors import RemoteProtocolError
 from robolink.messages import tr
 from robolink.protocols.epson_text._codes import ErrorCode
-from robolink.protocols.epson_text._commands import find_command
+from robolink.protocols.epson_text._commands import COMMANDS, find_command
 from robolink.protocols.epson_text._events import BadRequest, Refusal, Reply, Request
-from robolink.protocols.epson_text._parameters import split_parameters
+from robolink.protocols.epson_text._parameters import read_parameters
 
 _UNDECODABLE: Final = "backslashreplace"
 """A byte outside the encoding stays visible as ``\\xNN`` and ends no session."""
 
 _MAX_CODE_DIGITS: Final = 5
+
+_A_REQUEST: Final = rb"(\$(?:%s)(?=[,\r\n]))" % b"|".join(c.name.encode() for c in COMMANDS)
+_BEHIND_REQUEST: Final = re.compile(_A_REQUEST, re.IGNORECASE)
+_BEHIND_STATEMENT: Final = re.compile(rb'"' + _A_REQUEST, re.IGNORECASE)
 
 
 @lru_cache(maxsize=256)
@@ -60,12 +65,23 @@ def read_request(line: bytes, encoding: str) -> Request | BadRequest:
     command = find_command(name)
     if command is None:
         return BadRequest(_echo(text[1:]), ErrorCode.UNKNOWN_COMMAND)
-    if not comma and command.min_parameters == 0:
+    if not comma and (command.min_parameters == 0 or command.bare):
         return Request(name)
-    parameters = split_parameters(command, payload) if comma else None
+    parameters = read_parameters(command, payload) if comma else None
     if parameters is None:
         return BadRequest(name, ErrorCode.MALFORMED)
     return Request(name, parameters)
+
+
+def next_request(data: bytes | bytearray, start: int) -> int:
+    """Return where, from ``start`` on, the next request begins in ``data``, -1 for nowhere.
+
+    That is a ``$``, the name of a command, and what ends a name; a lone ``$`` ends names of
+    strings. Behind an Execute it follows the closing quote, for a statement may print anything.
+    """
+    pattern = _BEHIND_STATEMENT if data[:9].lower() == b"$execute," else _BEHIND_REQUEST
+    found = pattern.search(data, start)
+    return -1 if found is None else found.start(1)
 
 
 def _echo(text: str) -> str:

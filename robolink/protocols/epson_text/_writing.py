@@ -8,7 +8,7 @@ from robolink.errors import LocalProtocolError
 from robolink.messages import tr
 from robolink.protocols.epson_text._commands import Command, ParameterForm, find_command
 from robolink.protocols.epson_text._events import Refusal, Reply, Request
-from robolink.protocols.epson_text._parameters import MAX_TEXT, QUOTE, split_parameters
+from robolink.protocols.epson_text._parameters import MAX_TEXT, QUOTE, write_parameters
 
 _MAX_CODE = 99_999
 
@@ -29,12 +29,11 @@ def write_request(request: Request) -> bytes:
     parameters = request.parameters
     if not parameters and command.min_parameters == 0:
         return f"${request.name}".encode("ascii")
-    payload = ",".join(parameters)
-    if not (payload.isascii() and payload.isprintable()):
+    written = ",".join(parameters)
+    if not (written.isascii() and written.isprintable()):
         raise _refused(request, tr("it holds a character that is not printable ASCII"))
-    if command.form is ParameterForm.STATEMENT:
-        payload = f"{QUOTE}{payload}{QUOTE}"
-    if split_parameters(command, payload) != parameters:
+    payload = write_parameters(command, parameters)
+    if payload is None:
         raise _refused(request, _misfit(command, parameters))
     return f"${request.name},{payload}".encode("ascii")
 

@@ -59,12 +59,20 @@ class _Travel:
         return _Travel(self.start_ns, tuple(kept))
 
     def joints_at(self, now_ns: int) -> Joints:
+        leg, elapsed_ns = self._leg_at(now_ns)
+        return leg.joints_at(elapsed_ns)
+
+    def flange_at(self, now_ns: int) -> Pose:
+        leg, elapsed_ns = self._leg_at(now_ns)
+        return leg.flange_at(elapsed_ns)
+
+    def _leg_at(self, now_ns: int) -> tuple[Leg, int]:
         elapsed_ns = max(0, now_ns - self.start_ns)
         for leg in self.legs[:-1]:
             if elapsed_ns < leg.duration_ns:
-                return leg.joints_at(elapsed_ns)
+                return leg, elapsed_ns
             elapsed_ns -= leg.duration_ns
-        return self.legs[-1].joints_at(elapsed_ns)
+        return self.legs[-1], elapsed_ns
 
 
 class Arm:
@@ -121,6 +129,8 @@ class Arm:
         """Return where the flange will really be, or was, in the motion under way."""
         if self._travel is None:
             return self.true_flange()
+        if not self.backlash_deg and not self.backlash_mm:
+            return self._travel.flange_at(now_ns)  # a search asks each millisecond
         before, then = (self._travel.joints_at(t) for t in (now_ns - _LOOK_BACK_NS, now_ns))
         return forward(self.model, self._trailing(then, self._ways(before, then)))
 

@@ -35,6 +35,7 @@ class Condition:
         guard_open: Whether the safety door is open.
         task: What the production program is doing.
         code: Error or warning number, 0 for none.
+        program_error: The last error that ended a running program, 0 for none.
     """
 
     def __init__(self, *, monitoring_only: bool) -> None:
@@ -44,6 +45,7 @@ class Condition:
         self.guard_open = False
         self.task = Task.NONE
         self.code = 0
+        self.program_error = 0
         self._estop_latched = False
         self._error = False
         self._serious = False
@@ -76,6 +78,8 @@ class Condition:
 
     def raise_error(self, number: int, *, serious: bool = False) -> None:
         """Go into the error state; the production task ends (assumed)."""
+        if self.task is Task.RUNNING:
+            self.program_error = number % 10_000
         self._error = True
         self._serious = self._serious or serious
         self._warning = False
@@ -102,7 +106,7 @@ class Condition:
         """Switch off and on: only what stands outside the controller stays as it is."""
         self._estop_latched = self.estop_pressed
         self._error = self._serious = self._warning = False
-        self.code = 0
+        self.code = self.program_error = 0
         self.task = Task.NONE
 
     def flags(self, *, executing: bool = False) -> StatusFlags:

@@ -9,6 +9,7 @@ from robolink.protocols.epson_text import (
     StatusFlags,
     status_fields,
 )
+from robolink_simulators.epson.card import ControllerCard
 from robolink_simulators.epson.condition import Condition, Task
 from robolink_simulators.epson.io_desk import Fields, Served, io_commands
 from robolink_simulators.epson.machine import Machine
@@ -30,6 +31,7 @@ class CommandDesk:
         condition: Condition,
         variables: Variables,
         alarms: Alarms,
+        card: ControllerCard,
         *,
         options: EpsonOptions,
     ) -> None:
@@ -38,21 +40,20 @@ class CommandDesk:
         self._options = options
         self._served: dict[str, Served] = {
             **io_commands(machine),
-            **query_commands(machine, options),
+            **query_commands(machine, condition, card, options),
             "getvariable": variables.get,
             "setvariable": variables.set,
             "getalm": alarms.get,
             "resetalm": alarms.reset,
             "getcurrobot": lambda: (str(machine.robot_number),),
             "setcurrobot": self._set_current_robot,
-            "setmotorson": lambda robot: self._switch_motors(robot, True),
-            "setmotorsoff": lambda robot: self._switch_motors(robot, False),
+            "setmotorson": lambda *robot: self._switch_motors(robot, on=True),
+            "setmotorsoff": lambda *robot: self._switch_motors(robot, on=False),
             "start": self._start,
             "stop": self._stop,
             "pause": lambda: self._turn(Task.PAUSED),
             "continue": lambda: self._turn(Task.RUNNING),
             "reset": self._reset,
-            "home": self._home,
         }
 
     def admit(self, command: Command, *, logged_in: bool, executing: bool) -> None:
@@ -91,6 +92,14 @@ class CommandDesk:
         except Refusal as refusal:
             raise malformed() from refusal
 
+    def check_home(self, robot: tuple[str, ...]) -> None:
+        """Check what a Home names.
+
+        Raises:
+            Refused: There is no such robot, or no number where one is needed.
+        """
+        self._check_robot(robot)
+
     def status(self, *, executing: bool) -> Fields:
         """Answer GetStatus; whether an Execute shows is an option."""
         shown = executing and self._options.flags_during_execute == "running"
@@ -98,12 +107,19 @@ class CommandDesk:
         return status_fields(flags, self._condition.code, self._options.status_flags)
 
     def _set_current_robot(self, robot: str) -> Fields:
-        if number(robot, 1) == 0:
+        if number(robot, 1) == 0 and self._options.robot_zero == "error_12":
             raise malformed()
         return ()
 
-    def _switch_motors(self, robot: str, on: bool) -> Fields:
-        check_robot(robot)
+    def _check_robot(self, robot: tuple[str, ...]) -> None:
+        """Accept robot 1, 0 for all, or no number where that means one of them."""
+        if robot:
+            check_robot(*robot)
+        elif self._options.missing_robot_number == "error_12":
+            raise malformed()
+
+    def _switch_motors(self, robot: tuple[str, ...], *, on: bool) -> Fields:
+        self._check_robot(robot)
         self._machine.switch_motors(on)
         return ()
 
@@ -126,15 +142,8 @@ class CommandDesk:
         self._condition.reset()
         self._machine.reset_motion_parameters()
         if self._options.reset_outputs_off:
-            self._machine.outputs.clear()
+            self._machine.clear_outputs()
         return ()
-
-    def _home(self, robot: str) -> Fields:
-        # No HomeSet can be given to this controller, and Home without one is error 2228
-        # (spel.md 10). How the request itself is answered then is assumed.
-        check_robot(robot)
-        self._condition.raise_error(self._options.numbers.home_undefined)
-        raise Refused(ErrorCode.SYSTEM)
 
 
 @lru_cache(maxsize=512)

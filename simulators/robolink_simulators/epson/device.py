@@ -16,6 +16,7 @@ from typing import Final
 
 from robolink.model import Secret
 from robolink.protocols.epson_text import BadRequest, ErrorCode, Request, StatusFlags
+from robolink_simulators.epson.card import ControllerCard
 from robolink_simulators.epson.client_slot import ClientSlot
 from robolink_simulators.epson.companion import Companion
 from robolink_simulators.epson.condition import Condition, Mode, Task
@@ -35,6 +36,7 @@ from robolink_simulators.epson.variables import project_variables
 from robolink_simulators.epson.window import CommandWindow
 from robolink_simulators.epson.wire_text import shown_reply, shown_request
 from robolink_simulators.faults import Departure, Fault, FaultAction, FaultPlan
+from robolink_simulators.serial_numbers import drawn_serial
 from robolink_simulators.world import World
 from robolink_simulators.world_parameters import WorldParameters
 
@@ -49,10 +51,12 @@ class EpsonSimulator:
 
     Args:
         robot: Name of a SCARA model.
-        seed: Decides the world and every scatter; the same seed gives the same run.
+        seed: Decides the world and every scatter; the same seed gives the same run, but for
+            the serial number.
         password: Of Remote Ethernet; none means an empty one.
         options: The controller's habits.
-        state_path: File that keeps what the controller's flash keeps.
+        serial: Serial number of the robot; by default one that no other simulator has.
+        state_path: File that keeps what the controller's flash keeps, the serial number too.
         faults: What is planned to go wrong.
         world: What goes wrong around the robot.
 
@@ -68,6 +72,7 @@ class EpsonSimulator:
         condition: What GetStatus shows.
         panel: What a person, or the rest of the cell, can do to the controller.
         alarms: The alarms that stand.
+        card: What it says of itself.
         variables: The Global Preserve variables.
         world: The truth, and the person at the cell.
         faults: What is planned to go wrong.
@@ -91,6 +96,7 @@ class EpsonSimulator:
         seed: int = 1,
         password: Secret | None = None,
         options: EpsonOptions | None = None,
+        serial: str = "",
         state_path: Path | None = None,
         faults: Iterable[Fault] = (),
         world: WorldParameters | None = None,
@@ -110,7 +116,7 @@ class EpsonSimulator:
         self.on_reply: RequestHook | None = None
         self._requests = 0
         self._links: list[EpsonLink] = []
-        self.machine = Machine(find_robot(robot))
+        self.machine = Machine(find_robot(robot), serial=serial or drawn_serial())
         self.machine.switch_motors(True)
         self.world = World.seeded(
             self.machine,
@@ -127,12 +133,25 @@ class EpsonSimulator:
             Companion(self.machine, self.variables) if self.options.companion else None
         )
         self.alarms = Alarms()
+        self.card = ControllerCard()
         self.condition = Condition(monitoring_only=self.options.monitoring_only)
-        interpreter = Interpreter(self.machine, self.options, random.Random(f"arm {self.seed}"))
+        interpreter = Interpreter(
+            self.machine,
+            self.options,
+            random.Random(f"arm {self.seed}"),
+            condition=self.condition,
+            variables=self.variables,
+            messages=self.card.messages,
+        )
         self._window = CommandWindow(interpreter, self.condition, self.options)
         self._slot = ClientSlot(self.options.remote_timeout_s)
         self._desk = CommandDesk(
-            self.machine, self.condition, self.variables, self.alarms, options=self.options
+            self.machine,
+            self.condition,
+            self.variables,
+            self.alarms,
+            self.card,
+            options=self.options,
         )
         self._service = Service(
             self._desk,
@@ -194,6 +213,7 @@ class EpsonSimulator:
             self._window.next_change(),
             self._slot.deadline(unfinished=self._service.unfinished),
             self._mishaps.next_change(),
+            self.machine.timed_bits.next_change(),
             *(link.next_change() for link in self._links),
         ]
         return min((change for change in changes if change is not None), default=None)
@@ -208,6 +228,7 @@ class EpsonSimulator:
             self._mishaps.forget()
             self.condition.restart()
             forget_volatile(self.machine, self._now_ns)
+            self._window.restart()
 
     def push(self, data: bytes) -> None:
         """Send every client bytes that nobody asked for (F10)."""
@@ -264,6 +285,7 @@ class EpsonSimulator:
         self._stepping = True
         try:
             self.machine.arm.advance(now_ns)
+            self.machine.timed_bits.advance(now_ns)
             self._window.advance(now_ns)
             self._mishaps.carry_out(now_ns)
             if self._companion is not None and self.condition.task is Task.RUNNING:

@@ -10,14 +10,16 @@ from typing import Final
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink.named_files import read_named
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.points import LocalTable, PointTable
+from robolink_simulators.epson.robot_settings import RobotSettings
 
 SCHEMA: Final = "robolink/sim-state/1"
 
 
 class Flash:
-    """Keeps the tools and the selected tool (spel.md 6.1), nothing else.
+    """Keeps the tools and the selected tool (spel.md 6.1), and which robot it is.
 
     Args:
         path: Where; ``None`` keeps nothing.
@@ -27,10 +29,13 @@ class Flash:
     def __init__(self, path: Path | None, machine: Machine) -> None:
         self._path = path
         self._machine = machine
-        self._written = self._mark()
+        # Nothing is written yet: a serial number that was drawn is kept at the first occasion.
+        self._written: tuple[int, int] | None = None
 
     def restore(self) -> None:
-        """Give the machine the tools of the file, if there is one.
+        """Give the machine the tools and the serial number of the file, if there is one.
+
+        A file of before serial numbers were drawn has none; the machine keeps its own then.
 
         Raises:
             ConfigError: The file cannot be read or is not of this robot.
@@ -39,10 +44,11 @@ class Flash:
             return
         robot = self._machine.model.name
         try:
-            state = json.loads(self._path.read_text(encoding="utf-8"))
+            state = json.loads(read_named(self._path))
             if state["schema"] != SCHEMA or state["robot"] != robot:
                 raise ValueError(state["robot"])
             self._machine.tools.restore(state["tools"])
+            serial = state.get("serial")
         except (OSError, KeyError, TypeError, ValueError) as error:
             raise ConfigError(
                 tr(
@@ -50,7 +56,9 @@ class Flash:
                 ),
                 remedy=tr("Name another file, or delete this one to start afresh."),
             ) from error
-        self._written = self._mark()
+        if serial is not None:
+            self._machine.serial = str(serial)
+            self._written = self._mark()
 
     def save_changes(self) -> None:
         """Write the file if a tool or the selection changed since it was written last.
@@ -67,6 +75,7 @@ class Flash:
         document = {
             "schema": SCHEMA,
             "robot": self._machine.model.name,
+            "serial": self._machine.serial,
             "tools": self._machine.tools.to_state(),
         }
         try:
@@ -86,12 +95,14 @@ class Flash:
 
 
 def forget_volatile(machine: Machine, now_ns: int) -> None:
-    """Let a machine forget what a power cycle takes: all but its tools and its place."""
+    """Let a machine forget what a power cycle takes: all but tools, HomeSet and its place."""
     machine.arm.halt(now_ns)
     machine.switch_motors(False)
     machine.reset_motion_parameters()
     machine.outputs.clear()
     machine.memory.clear()
+    machine.timed_bits.clear()
+    machine.settings = RobotSettings(home_pulses=machine.settings.home_pulses)
     machine.points, machine.locals = PointTable(), LocalTable()
 
 

@@ -8,6 +8,9 @@ from robolink_simulators.epson.bits import BitBank
 Sense = Callable[[int | None], bool]
 """Tells what an input shows at an instant of the motion under way, ``None`` for the present."""
 
+InputsAsked = dict[int, bool]
+"""What was shown by the inputs that somebody asked for, by their numbers."""
+
 
 class InputBits(BitBank):
     """Inputs of a controller."""
@@ -16,6 +19,7 @@ class InputBits(BitBank):
         super().__init__(size)
         self._senses: dict[int, Sense] = {}
         self._instant_ns: int | None = None
+        self._asked: InputsAsked | None = None
 
     @property
     def connected(self) -> bool:
@@ -34,7 +38,10 @@ class InputBits(BitBank):
     def get(self, number: int) -> bool:
         """Return one bit; see :class:`BitBank`."""
         sense = self._senses.get(number)
-        return super().get(number) if sense is None else sense(self._instant_ns)
+        on = super().get(number) if sense is None else sense(self._instant_ns)
+        if self._asked is not None:
+            self._asked[number] = on
+        return on
 
     def set(self, number: int, on: bool) -> None:
         """Switch one bit by hand; what it was connected to is taken off."""
@@ -49,3 +56,12 @@ class InputBits(BitBank):
             yield
         finally:
             self._instant_ns = None
+
+    @contextmanager
+    def noting(self) -> Iterator[InputsAsked]:
+        """Note which inputs are read inside the block, and what they showed."""
+        self._asked = asked = InputsAsked()
+        try:
+            yield asked
+        finally:
+            self._asked = None

@@ -20,6 +20,9 @@ from robolink_simulators.epson.exchange import Exchange
 from robolink_simulators.epson.options import EpsonOptions
 from robolink_simulators.faults import Departure
 
+_SILENCE_NS: Final = 100_000_000
+"""How long nothing must come for a request without a line end to be whole (inferred)."""
+
 _TERMINATORS: Final = {"crlf": b"\r\n", "cr": b"\r", "lf": b"\n"}
 
 
@@ -61,11 +64,12 @@ class EpsonLink:
         self._codec = EpsonTextCodec(
             Role.DEVICE,
             terminator=_TERMINATORS[options.terminator],
-            segments=options.requests_end_with_segment,
+            unterminated=options.requests_end_with_silence,
         )
         self._outbox: deque[tuple[int, bytes | None]] = deque()
         self._over = False
         self._anonymous_since_ns: int | None = now_ns
+        self._silent_from_ns: int | None = None
 
     @property
     def closed(self) -> bool:
@@ -108,10 +112,15 @@ class EpsonLink:
         leaving = self._outbox[0][0] if self._outbox else None
         if leaving is not None and leaving > self._controller.now_ns:
             return leaving
-        return self._login_deadline()
+        deadlines = (self._login_deadline(), self._silent_from_ns)
+        return min((at_ns for at_ns in deadlines if at_ns is not None), default=None)
 
     def supervise(self, now_ns: int) -> None:
-        """Cut the connection when nobody logged in for too long."""
+        """End a request after which nothing came; cut whoever did not log in for too long."""
+        if self._silent_from_ns is not None and now_ns >= self._silent_from_ns:
+            self._silent_from_ns = None
+            self._codec.end_of_request()
+            self._serve()
         deadline = self._login_deadline()
         if deadline is not None and now_ns >= deadline:
             self.cut()
@@ -159,8 +168,11 @@ class EpsonLink:
 
     def _read(self, data: bytes) -> None:
         self._codec.receive_data(data)
-        if self._controller.options.requests_end_with_segment:
-            self._codec.end_of_segment()
+        self._serve()
+        begun = self._controller.options.requests_end_with_silence and self._codec.bytes_held
+        self._silent_from_ns = self._controller.now_ns + _SILENCE_NS if begun else None
+
+    def _serve(self) -> None:
         while not self._over and (event := self._codec.next_event()) is not NEED_DATA:
             if isinstance(event, (Request, BadRequest)):
                 self._controller.take(self, event)
@@ -171,7 +183,7 @@ class EpsonLink:
 
     def _end(self) -> None:
         self._over = True
-        self._anonymous_since_ns = None
+        self._anonymous_since_ns = self._silent_from_ns = None
         self._controller.forget(self)
 
     def _login_deadline(self) -> int | None:

@@ -7,9 +7,12 @@ from robolink_simulators.epson.arm import REST, Arm
 from robolink_simulators.epson.bits import IO_BITS, MEMORY_BITS, BitBank
 from robolink_simulators.epson.input_bits import InputBits
 from robolink_simulators.epson.kinematics import Joints, flange_of, inverse, tip_of
+from robolink_simulators.epson.pallets import PalletTable
 from robolink_simulators.epson.parameters import MotionParameters
 from robolink_simulators.epson.points import LocalTable, Point, PointTable
+from robolink_simulators.epson.robot_settings import RobotSettings
 from robolink_simulators.epson.robots import ScaraModel
+from robolink_simulators.epson.timed_bits import TimedBits
 from robolink_simulators.epson.tool_memory import ToolMemory
 
 REMOTE_ETHERNET = 26
@@ -23,7 +26,7 @@ class Machine:
         model: Which robot.
         joints: Where the arm stands.
         backlash_deg: See :class:`Arm`.
-        serial: What RobotSerial$ gives.
+        serial: What RobotSerial$ gives; the controller's own number follows from it.
 
     Attributes:
         arm: The arm in simulated time.
@@ -34,6 +37,10 @@ class Machine:
         outputs: Output bits.
         memory: Memory bits.
         parameters: Speeds, accelerations, LimZ.
+        settings: What it is told about its load, its arm and its joints.
+        pallets: Pallets 0 to 15.
+        timed_bits: Outputs and memory bits that switch back by themselves.
+        sensed: Whether the last Jump was stopped by its Sense.
         till_met: Whether the last motion was stopped by its Till.
         found: Where the last Find met its condition, the selected tool's tip.
         motors_on: Whether the motors are on.
@@ -60,12 +67,21 @@ class Machine:
         self.outputs = BitBank(IO_BITS)
         self.memory = BitBank(MEMORY_BITS)
         self.parameters = MotionParameters()
+        self.settings = RobotSettings()
+        self.pallets = PalletTable()
+        self.timed_bits = TimedBits()
+        self.sensed = False
         self.till_met = False
         self.found: Point | None = None
         self.motors_on = False
         self.power_high = False
         self.robot_number = 1
         self.control_device = REMOTE_ETHERNET
+
+    @property
+    def controller_serial(self) -> str:
+        """The serial number of the controller that drives it."""
+        return f"C-{self.serial}"
 
     @property
     def flash_writes(self) -> int:
@@ -102,10 +118,16 @@ class Machine:
         if on:
             self.reset_motion_parameters()
 
+    def clear_outputs(self) -> None:
+        """Switch every output off, and forget which were to switch back."""
+        self.outputs.clear()
+        self.timed_bits.clear()
+
     def reset_motion_parameters(self) -> None:
         """Set the defaults and low power: start-up, Motor On, Reset ... (spel.md 6.3)."""
         self.parameters = MotionParameters()
         self.power_high = False
+        self.settings.reset()
 
     def _tip_of(self, flange: Pose) -> Pose:
         return tip_of(flange, self.offset, tool=self.tools.selected)

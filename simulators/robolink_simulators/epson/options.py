@@ -11,17 +11,29 @@ from typing import Literal
 
 @dataclass(frozen=True, slots=True)
 class SpelNumbers:
-    """Error numbers that the language reference does not give [U]; any number would do."""
+    """Error numbers. Those with a section stand in the language reference; the others do not
+    [U], and any number would do: each reason has one of its own.
+    """  # noqa: D205 - one sentence over two lines
 
     syntax: int = 2100
     not_allowed_here: int = 2119
-    value_out_of_range: int = 4002
+    function_only: int = 2120
+    name_undefined: int = 2121
+    not_simulated: int = 2199
+    wait_timed_out: int = 2280  # spel.md 4.6
+    value_out_of_range: int = 4002  # spel.md 10, for AvoidSingularity
     out_of_reach: int = 4001
     motors_off: int = 4023
     emergency_stop: int = 4025
     guard_open: int = 4026
+    joint_free: int = 4027
+    other_robot: int = 4028
+    arm_undefined: int = 4012
+    ecp_undefined: int = 4013
+    pallet_undefined: int = 4014
     tool_undefined: int = 4015
     tool_zero_fixed: int = 4016
+    tool_in_force: int = 4017
     local_undefined: int = 4010
     point_undefined: int = 7007  # spel.md 10, sample handler
     above_limz: int = 4005  # spel.md 10
@@ -61,9 +73,30 @@ class EpsonOptions:
         tool_listing: Layout of the TLSet listing [I].
         tlset_of_undefined: What the function TLSet(n) gives for an undefined tool [U].
         where_width: Width of the value field of Where [open].
-        requests_end_with_segment: A request may lack its terminator; it ends with the piece of
-            stream in which it came [R, one controller].
+        requests_end_with_silence: A request may lack its terminator; it ends where the next
+            one begins, or when nothing has come for 0.1 s [R, one controller; the time is I].
+        login_without_parameter: What ``$Login`` without a comma is [U, three clients send it].
+        missing_robot_number: What SetMotorsOn, SetMotorsOff and Home without a number act on;
+            12 is inferred, since the manual lists the number as needed [U].
+        robot_zero: What SetCurRobot,0 does, which was seen answered [R; the meaning is U].
+        error_state_after_failed_execute: A failed statement leaves the controller in error
+            [U: one client resets before it goes on, another does not].
+        number_lead_blank: Print shows a blank before a number that begins its text [R, one
+            client reads it so].
+        accel_max: Highest Accel in percent; AccelMax gives it [D: usually 100, R: 120].
+        clear_selected_tool: What TLClr does to the tool in force: Tool 0 is selected, the
+            number stays selected without a definition, or it is an error [U].
         reset_outputs_off: Preference "Reset turns off outputs" [D].
+        outputs_off_at_estop: Preference "Outputs off at emergency stop" [D; that it is on as
+            delivered is assumed].
+        dry_run: Preference "Dry run": the robot is not moved, though all answers look as if
+            it were [D].
+        virtual_io: Preference "Virtual I/O": no input is a real one [D].
+        maintenance_data: Preference "Robot maintenance data" [R].
+        variable_assignment: ``a=1`` sets a variable of the project, or is refused as for
+            programs only [open: one client sends it, the appendix is silent].
+        single_line_if: ``If ... Then`` runs, or is refused as the appendix has it [D; one client
+            sends it].
         companion: The project holds robolink_tools.prg and its production task calls it [ours].
         extended_queries: Firmware knows GetContVer and its kin; older answers 11 [R].
         rc_plus: Command set: 5, 7 or 8.
@@ -96,8 +129,21 @@ class EpsonOptions:
     tool_listing: Literal["plain", "padded", "four"] = "plain"
     tlset_of_undefined: Literal["zeros", "error"] = "zeros"
     where_width: Literal[9, 8] = 9
-    requests_end_with_segment: bool = False
+    requests_end_with_silence: bool = True
+    login_without_parameter: Literal["empty_password", "error_12"] = "empty_password"
+    missing_robot_number: Literal["error_12", "current", "all"] = "error_12"
+    robot_zero: Literal["keeps", "error_12"] = "keeps"
+    error_state_after_failed_execute: bool = True
+    number_lead_blank: bool = False
+    accel_max: int = 120
+    clear_selected_tool: Literal["selects_zero", "keeps", "error"] = "selects_zero"
     reset_outputs_off: bool = True
+    outputs_off_at_estop: bool = True
+    dry_run: bool = False
+    virtual_io: bool = False
+    maintenance_data: bool = False
+    variable_assignment: Literal["project", "refused"] = "project"
+    single_line_if: Literal["refused", "runs"] = "refused"
     companion: bool = True
     extended_queries: bool = True
     rc_plus: Literal[5, 7, 8] = 7

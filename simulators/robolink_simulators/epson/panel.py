@@ -42,12 +42,15 @@ class Panel:
         self._slot = slot
         self._alarms = alarms
         self._numbers = options.numbers
+        self._outputs_off_at_estop = options.outputs_off_at_estop
         self._acting = acting
 
     def press_estop(self) -> None:
         """Press the emergency stop: the arm stands, the motors are off, an Execute fails."""
         with self._acting() as now_ns:
             self._condition.press_estop()
+            if self._outputs_off_at_estop:
+                self._machine.clear_outputs()
             self._cut_power(self._numbers.emergency_stop, "Emergency stop", now_ns)
 
     def release_estop(self) -> None:
@@ -86,6 +89,15 @@ class Panel:
         """Add an alarm to what GetAlm lists."""
         with self._acting():
             self._alarms.raise_alarm(alarm)
+
+    def switch_input(self, number: int, on: bool) -> None:
+        """Switch an input by hand; whatever waits for it goes on.
+
+        Raises:
+            Refusal: There is no such input.
+        """
+        with self._acting():
+            self._machine.inputs.set(number, on)
 
     def teach(self) -> None:
         """Turn the mode selector to TEACH."""

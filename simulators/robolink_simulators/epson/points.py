@@ -121,6 +121,16 @@ class PointTable:
 
     def __init__(self) -> None:
         self._points: dict[int, Point] = {}
+        self._labels: dict[str, int] = {}
+
+    def label(self, number: int, name: str) -> None:
+        """Give a point a name; where it was the name of another point, it is moved."""
+        self.defined(number)
+        self._labels[name.lower()] = number
+
+    def labelled(self, name: str) -> int | None:
+        """Return the number of the point with a name."""
+        return self._labels.get(name.lower())
 
     def get(self, number: int) -> Point:
         """Return a stored point.

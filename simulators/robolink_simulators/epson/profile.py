@@ -7,6 +7,7 @@ from typing import Final
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink.named_files import read_named
 
 PROFILE_SCHEMA: Final = "robolink/epson-profile/1"
 
@@ -20,7 +21,7 @@ def read_profile(path: Path) -> Mapping[str, str]:
         ConfigError: The file cannot be read, or is no profile.
     """
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
+        document = json.loads(read_named(path))
         if document["schema"] != PROFILE_SCHEMA:
             raise ValueError(document["schema"])
         return {str(name): str(value) for name, value in document["options"].items()}

@@ -77,10 +77,14 @@ class Service:
                 exchange.reply(*self._desk.status(executing=self._window.busy))
             case "Execute":
                 self._window.start(request.parameters[0], exchange, now_ns)
+            case "Home":
+                # It answers when the arm is there, as a motion of Execute does (assumed).
+                self._desk.check_home(request.parameters)
+                self._window.start("Home", exchange, now_ns)
             case "Abort":
                 self._window.abort(exchange, now_ns)
             case "Login":
-                self._login(link, request.parameters[0], now_ns)
+                self._login(link, request, now_ns)
                 exchange.reply()
             case "Logout":
                 self._logout(link, now_ns)
@@ -88,7 +92,11 @@ class Service:
             case _:
                 exchange.reply(*self._desk.serve(request))
 
-    def _login(self, link: EpsonLink, password: str, now_ns: int) -> None:
+    def _login(self, link: EpsonLink, request: Request, now_ns: int) -> None:
+        bare = not request.parameters
+        if bare and self._options.login_without_parameter == "error_12":
+            raise Refused(ErrorCode.MALFORMED)
+        password = "" if bare else request.parameters[0]
         # That a controller without a password takes an empty one only is assumed.
         if password != self._password:
             raise Refused(ErrorCode.WRONG_PASSWORD)

@@ -1,12 +1,15 @@
 """The tool definitions a controller keeps, and what each change costs."""
 
 from collections.abc import Mapping
-from typing import Final
+from typing import Final, Literal, TypeAlias
 
 from robolink.model import ToolOffset
 from robolink_simulators.epson.refusals import Refusal, RefusalKind
 
 HIGHEST_TOOL: Final = 15
+
+ClearInForce: TypeAlias = Literal["selects_zero", "keeps", "error"]
+"""What TLClr does to the tool in force."""
 
 
 class ToolMemory:
@@ -50,15 +53,24 @@ class ToolMemory:
         self._offsets[tool] = offset
         self.flash_writes += 1
 
-    def clear(self, tool: int) -> None:
-        """Forget a definition; clearing the tool in force selects Tool 0 (assumed).
+    def clear(self, tool: int, *, in_force: ClearInForce = "selects_zero") -> None:
+        """Forget a definition.
+
+        Args:
+            tool: Number of the tool.
+            in_force: What happens when it is the tool in force. Neither the language reference
+                nor a transcript says (spel.md 6.1): Tool 0 is selected; or the number stays
+                selected, and targets are the flange's; or nothing is cleared.
 
         Raises:
-            Refusal: Tool 0, or no such tool number.
+            Refusal: Tool 0, no such tool number, or the tool in force where that is an error.
         """
         self._check_writable(tool)
+        selected = self._selected == tool
+        if selected and in_force == "error":
+            raise Refusal(RefusalKind.TOOL_IN_FORCE, f"Tool {tool} is selected")
         self._offsets.pop(tool, None)
-        if self._selected == tool:
+        if selected and in_force == "selects_zero":
             self._selected = 0
         self.flash_writes += 1
 
@@ -92,7 +104,8 @@ class ToolMemory:
                 offsets = {int(tool): ToolOffset(*values) for tool, values in saved.items()}
             case _:
                 raise ValueError("not a tool memory's state")
-        if not {*offsets, selected} <= {0, *offsets} & set(range(HIGHEST_TOOL + 1)):
+        # A tool that was cleared while it was selected may still be (option of TLClr).
+        if not {*offsets, selected} <= set(range(HIGHEST_TOOL + 1)):
             raise ValueError(f"no such tools: {sorted(offsets)}, selected {selected}")
         self._offsets, self._selected, self.flash_writes = offsets, selected, n
 

@@ -11,7 +11,7 @@ from typing import Final, Protocol
 
 from robolink.model import Hand, Pose, ToolOffset
 from robolink.timing import NS_PER_S
-from robolink_simulators.epson.kinematics import Joints, check_ranges, flange_of, solve
+from robolink_simulators.epson.kinematics import Joints, check_ranges, flange_of, forward, solve
 from robolink_simulators.epson.ramps import BrakedRamp, Ramp, TimeLaw
 from robolink_simulators.epson.refusals import Refusal, RefusalKind
 from robolink_simulators.epson.robots import ScaraModel
@@ -56,6 +56,9 @@ class Leg(Protocol):
     def joints_at(self, elapsed_ns: int) -> Joints:
         """Return the joints that long after its start; its end from the duration on."""
 
+    def flange_at(self, elapsed_ns: int) -> Pose:
+        """Return the pose of the flange that those joints give."""
+
     def braked(self, elapsed_ns: int) -> "Leg":
         """Return the same leg, left that long after its start to come to rest."""
 
@@ -76,6 +79,7 @@ def _braked(ramp: TimeLaw | None, elapsed_ns: int) -> TimeLaw | None:
 class JointLeg:
     """Straight in joint space; all joints start and stop together."""
 
+    model: ScaraModel
     start: Joints
     end: Joints
     ramp: TimeLaw | None
@@ -84,6 +88,10 @@ class JointLeg:
     def duration_ns(self) -> int:
         """How long it takes."""
         return _duration_ns(self.ramp)
+
+    def flange_at(self, elapsed_ns: int) -> Pose:
+        """Return the pose of the flange that long after the start."""
+        return forward(self.model, self.joints_at(elapsed_ns))
 
     def joints_at(self, elapsed_ns: int) -> Joints:
         """Return the joints that long after the start."""
@@ -122,16 +130,25 @@ class LineLeg:
         """Return the same leg, left to come to rest."""
         return replace(self, ramp=_braked(self.ramp, elapsed_ns))
 
+    def flange_at(self, elapsed_ns: int) -> Pose:
+        """Return the pose of the flange that long after the start."""
+        return self._flange_after(_share(self.ramp, min(elapsed_ns, self.duration_ns)))
+
     def joints_after(self, share: float) -> Joints:
         """Return the joints after a share of the line."""
+        return solve(self.model, self._flange_after(share), self.hand)
+
+    def _flange_after(self, share: float) -> Pose:
         a, b = self.start, self.end
+        if share >= 1:
+            return flange_of(b, self.offset)
         tip = Pose(
             a.x_mm + (b.x_mm - a.x_mm) * share,
             a.y_mm + (b.y_mm - a.y_mm) * share,
             a.z_mm + (b.z_mm - a.z_mm) * share,
             a.u_deg + (b.u_deg - a.u_deg) * share,
         )
-        return solve(self.model, flange_of(b if share >= 1 else tip, self.offset), self.hand)
+        return flange_of(tip, self.offset)
 
 
 def plan_go(
@@ -154,13 +171,13 @@ def plan_go(
     shares = [abs(d) / top for d, top in zip(deltas, model.top_speed, strict=True)]
     longest = max(shares)
     if longest < _STILL:
-        return JointLeg(start, end, None)
+        return JointLeg(model, start, end, None)
     rate = pace.speed_percent / 100 / longest
     if pace.tip_limit_mm_s is not None:
         rate = min(rate, pace.tip_limit_mm_s / _tip_travel_bound(model, deltas, radius_mm))
     accel_unit = 1 / (100 * FULL_SPEED_AFTER_S * longest)
     rise, fall = pace.accel_percent * accel_unit, pace.decel_percent * accel_unit
-    return JointLeg(start, end, Ramp.fastest(rate, rise, fall))
+    return JointLeg(model, start, end, Ramp.fastest(rate, rise, fall))
 
 
 def _tip_travel_bound(model: ScaraModel, deltas: list[float], radius_mm: float) -> float:

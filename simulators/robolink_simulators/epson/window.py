@@ -63,6 +63,10 @@ class CommandWindow:
             self._running[0].abort(now_ns)
             self._settle()
 
+    def restart(self) -> None:
+        """Forget what statements before have set: stored conditions, TMOut, TW."""
+        self._interpreter.forget()
+
     def fail(self, number: int, text: str, now_ns: int) -> None:
         """End the statement where the arm is, with an error."""
         if self._running is not None:
@@ -91,7 +95,7 @@ class CommandWindow:
             exchange.reply_text(output.removesuffix("\r\n"))
 
     def _report(self, error: SpelError, exchange: Exchange) -> None:
-        if not self._aborted:
+        if not self._aborted and self._options.error_state_after_failed_execute:
             self._condition.raise_error(error.number)
         if self._options.execute_failure == "refusal":
             exchange.refuse(self._options.execute_failure_code)

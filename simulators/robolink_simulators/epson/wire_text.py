@@ -12,7 +12,7 @@ def shown_request(event: Request | BadRequest) -> str:
         case "login":
             return f"${name},***"
         case "execute":
-            return f'${name},"{event.parameters[0]}"'
+            return f'${name},"{event.parameters[0]}"'  # quotes inside stand as they came
         case _:
             return ",".join((f"${name}", *event.parameters))
 

@@ -58,6 +58,11 @@ class InProcessMailboxLink:
         return self._identity
 
     @property
+    def place(self) -> str:
+        """See :attr:`robolink.transport.MailboxLink.place`."""
+        return self._identity.partition("://")[2]
+
+    @property
     def durable(self) -> bool:
         """Whether the simulator keeps its slots in a file."""
         return self._simulator.durable

@@ -36,6 +36,7 @@ class InProcessTransport:
         splitter: random.Random | None = None,
     ) -> None:
         self._identity = link_url.identity
+        self._place = link_url.place
         options = "&".join(f"{name}={value}" for name, value in link_url.options.items())
         self._url = f"{self._identity}?{options}" if options else self._identity
         self._device = device
@@ -57,6 +58,11 @@ class InProcessTransport:
     def identity(self) -> str:
         """Which simulator."""
         return self._identity
+
+    @property
+    def place(self) -> str:
+        """Its name."""
+        return self._place
 
     @property
     def durable(self) -> bool:

@@ -14,6 +14,7 @@ from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.option_text import option_names, options_from_text
 from robolink_simulators.hosting._named import NamedSimulators, seed_from_text
 from robolink_simulators.hosting._transport import InProcessTransport
+from robolink_simulators.serial_numbers import drawn_serial
 from robolink_simulators.world_parameters import from_options, plain
 
 _OWN_OPTIONS: Final = ("robot", "seed", "state", "split")
@@ -48,7 +49,7 @@ def open_epson(
             tr("The option split cannot be {value!r}.", value=split),
             remedy=tr("Give 1 to cut what arrives into pieces, or leave it out."),
         )
-    named = _named.open(link_url, options, clock, _made)
+    named = _named.open(link_url, options, clock, lambda given: _made(link_url.host, given))
     simulator = named.simulator
     return InProcessTransport(
         link_url,
@@ -92,7 +93,7 @@ def clock_of(name: str) -> ManualClock:
     return _named.find(name).clock
 
 
-def _made(options: Mapping[str, str]) -> EpsonSimulator:
+def _made(name: str, options: Mapping[str, str]) -> EpsonSimulator:
     known = {key: options[key] for key in _OWN_OPTIONS if key in options}
     habits = {key: value for key, value in plain(options).items() if key not in _OWN_OPTIONS}
     unknown = sorted(set(habits) - set(option_names()))
@@ -102,9 +103,11 @@ def _made(options: Mapping[str, str]) -> EpsonSimulator:
             remedy=tr("Known are: {names}.", names=", ".join((*_OWN_OPTIONS, *option_names()))),
         )
     state = known.get("state")
+    seed = seed_from_text(known.get("seed", "1"))
     return EpsonSimulator(
         known.get("robot", "T6-602S"),
-        seed=seed_from_text(known.get("seed", "1")),
+        seed=seed,
+        serial=drawn_serial(f"{name.lower()} {seed}"),
         options=options_from_text(habits),
         state_path=Path(state) if state else None,
         world=from_options(options),

@@ -7,6 +7,7 @@ from robolink.register_maps import ANGLES, CommitKind, Number, RegisterMap, Slot
 from robolink.timing import NS_PER_S
 from robolink_simulators.plc.frames import decode, encode
 from robolink_simulators.plc.memory import Memory
+from robolink_simulators.serial_numbers import drawn_number
 
 Components = dict[str, float]
 """Components of an offset or a pose by name, mm and degrees; those that the map has."""
@@ -20,6 +21,7 @@ class PlcProgram:
         takeovers: How often values were taken over on a request.
         answer_s: How long the program takes to answer a request, simulated seconds.
         refuse_with: Error number with which it refuses the next request, ``None`` for none.
+        device_id: What tells this machine from every other one, kept over a restart.
         silent: Whether it lets requests stand without an answer.
 
     Args:
@@ -35,6 +37,7 @@ class PlcProgram:
         self.answer_s = 0.005
         self.refuse_with: int | None = None
         self.silent = False
+        self.device_id = drawn_number()
         self._answer_at_ns: int | None = None
         chance = random.Random(f"plc {seed}")
         for slot in register_map.slots.values():
@@ -105,6 +108,11 @@ class PlcProgram:
         if self._map.probe is not None:
             number = self._map.probe.number
             self.memory.write(number.table, number.address, encode(number, self._map.probe.value))
+        place = self._map.device_id
+        if place is not None:
+            shifts = range(16 * (place.count - 1), -1, -16)
+            words = [self.device_id >> shift & 0xFFFF for shift in shifts]
+            self.memory.write(place.table, place.address, words)
         commit = self._map.commit
         for signal in (commit.answer, commit.busy, commit.error):
             self.memory.switch(signal, False)
@@ -144,6 +152,8 @@ def _used(register_map: RegisterMap) -> Iterator[tuple[Table, range]]:
     if register_map.probe is not None:
         numbers.append(register_map.probe.number)
     yield from ((number.table, number.registers) for number in numbers)
+    if register_map.device_id is not None:
+        yield register_map.device_id.table, register_map.device_id.registers
     single = [
         commit.request,
         commit.answer,

@@ -1,6 +1,6 @@
 """A position kinematics with an axis behind it that turns the flange."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from robolink_simulators.softmotion.frames import Frame, Matrix, subtract, turned
 from robolink_simulators.softmotion.kinematics import (
@@ -51,17 +51,17 @@ class Coupled:
     c_axis: CAxis = CAxis()
     c_index: int = 3
     own_name: str = ""
+    kinds: tuple[AxisKind, ...] = field(init=False, repr=False, compare=False)
+    """The axes, a0 first."""
+
+    def __post_init__(self) -> None:
+        carried, at = self.position.kinds, self.c_index
+        object.__setattr__(self, "kinds", (*carried[:at], AxisKind.ROTARY, *carried[at:]))
 
     @property
     def name(self) -> str:
         """Name of the function block, or of both."""
         return self.own_name or f"{self.position.name}+Kin_CAxis"
-
-    @property
-    def kinds(self) -> tuple[AxisKind, ...]:
-        """The axes, a0 first."""
-        kinds = self.position.kinds
-        return (*kinds[: self.c_index], AxisKind.ROTARY, *kinds[self.c_index :])
 
     def flange(self, axes: AxisValues) -> Frame:
         """Return where the flange is."""

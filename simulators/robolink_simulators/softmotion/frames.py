@@ -47,7 +47,10 @@ def cross(a: Vector, b: Vector) -> Vector:
 
 def turned(rotation: Matrix, vector: Vector) -> Vector:
     """Return the vector after the rotation."""
-    return (dot(rotation[0], vector), dot(rotation[1], vector), dot(rotation[2], vector))
+    # Written out, here and below: every cycle of a simulated movement does it many times.
+    (a, b, c), (d, e, f), (g, h, i) = rotation
+    x, y, z = vector
+    return (a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z)
 
 
 def transposed(rotation: Matrix) -> Matrix:
@@ -58,8 +61,13 @@ def transposed(rotation: Matrix) -> Matrix:
 
 def product(a: Matrix, b: Matrix) -> Matrix:
     """Return ``a b``: first ``b``, then ``a``, both about fixed axes."""
-    columns = transposed(b)
-    return (turned(columns, a[0]), turned(columns, a[1]), turned(columns, a[2]))
+    (j, k, m), (n, o, p), (q, r, s) = b
+    (x1, y1, z1), (x2, y2, z2), (x3, y3, z3) = a
+    return (
+        (x1 * j + y1 * n + z1 * q, x1 * k + y1 * o + z1 * r, x1 * m + y1 * p + z1 * s),
+        (x2 * j + y2 * n + z2 * q, x2 * k + y2 * o + z2 * r, x2 * m + y2 * p + z2 * s),
+        (x3 * j + y3 * n + z3 * q, x3 * k + y3 * o + z3 * r, x3 * m + y3 * p + z3 * s),
+    )
 
 
 def about(axis: Vector, angle_deg: float) -> Matrix:

@@ -112,15 +112,20 @@ class GroupCore:
         """Return where the flange is, in MCS."""
         return self.kinematics.flange(self.values)
 
+    @property
+    def interrupted_movement(self) -> int:
+        """Number of the movement that was interrupted first and may go on, 0 for none."""
+        held_back = self.motion.interrupted
+        return held_back[0].number if held_back else 0
+
     def status(self) -> GroupStatus:
         """``MC_GroupReadStatus``, ``MC_GroupReadError`` and the power of the drives."""
         active = self.motion.queue.active
-        held_back = self.motion.interrupted
         return GroupStatus(
             state=self.state,
             active_movement=0 if active is None else active.number,
-            unfinished=len(self.motion.queue.unfinished) + len(held_back),
-            interrupted_movement=held_back[0].number if held_back else 0,
+            unfinished=len(self.motion.queue.unfinished) + len(self.motion.interrupted),
+            interrupted_movement=self.interrupted_movement,
             jogging=self.motion.jog is not None,
             powered=all(axis.powered for axis in self.axes),
             error=self.machine.error,

@@ -12,6 +12,7 @@ def not_tried() -> tuple[Fact, ...]:
     setup = tr("cannot be read over the wire: look at the controller's setup")
     monitoring = tr("not tried: no command is sent in that mode")
     disturbing = tr("not tried: it could end this connection")
+    writing = tr("not tried: it would change something")
     many = tr("not tried: it takes many readings")
     why_not = (
         (tr("TLSet(n) of an undefined tool"), error, "tlset_of_undefined"),
@@ -24,7 +25,18 @@ def not_tried() -> tuple[Fact, ...]:
         (tr("Move ... Till whose input is on already"), moving, "till_already_met"),
         (tr("remote time-out while only monitoring"), minutes, "monitoring_timeout"),
         (tr("a second client"), disturbing, "second_client"),
-        (tr("Reset switches outputs off"), setup, "reset_outputs_off"),
+        (tr("TLClr of the tool in force"), writing, "clear_selected_tool"),
+        (
+            tr("a failed statement without the error state"),
+            error,
+            "error_state_after_failed_execute",
+        ),
+        (tr("Login without a parameter"), disturbing, "login_without_parameter"),
+        (tr("a robot's number left out"), writing, "missing_robot_number"),
+        (tr("SetCurRobot,0"), writing, "robot_zero"),
+        (tr("assignment to a variable"), writing, "variable_assignment"),
+        (tr("If ... Then in a statement"), error, "single_line_if"),
+        (tr("Accel above 100 percent"), error, "accel_max"),
         (tr("time allowed before the login"), minutes, "login_timeout_s"),
         (tr("remote time-out"), setup, "remote_timeout_s"),
         (tr("noise of the measured position"), many, "real_pos_noise_mm"),

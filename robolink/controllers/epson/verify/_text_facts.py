@@ -33,6 +33,17 @@ def closing_quote(interview: Interview) -> Fact:
     return Fact(name, finding, option, inside, repr(answer[0])[1:])
 
 
+def number_lead_blank(interview: Interview) -> Fact:
+    """Whether Print shows a blank before a number (epson_corrections.md 3)."""
+
+    def read(text: str) -> tuple[str, OptionValue]:
+        blank = text.startswith(" ")
+        return tr("a blank") if blank else tr("nothing"), blank
+
+    query, name = spel.print_selected_tool(), tr("before a printed number")
+    return _fact(interview, query, name, "number_lead_blank", read)
+
+
 def point_coordinates(interview: Interview) -> Fact:
     """Whether a point of four coordinates prints with six (epson.md 3.3)."""
 

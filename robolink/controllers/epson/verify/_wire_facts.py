@@ -5,8 +5,9 @@ from typing import Final
 
 from robolink.controllers.epson.verify._interview import Interview
 from robolink.controllers.epson.verify._verification import Fact
+from robolink.errors import RemoteProtocolError
 from robolink.messages import tr
-from robolink.protocols.epson_text import ErrorCode
+from robolink.protocols.epson_text import ErrorCode, Preference, parse_preferences
 
 _STATUS: Final = re.compile(rb"#GetStatus,[01]+,[0-9]{4}(\r\n|\r|\n)")
 _TERMINATORS: Final = {b"\r\n": "crlf", b"\r": "cr", b"\n": "lf"}
@@ -56,6 +57,39 @@ def command_set(interview: Interview) -> Fact:
     return Fact(name, tr("7 or 8: the firmware does not say its version"), option)
 
 
+def preferences(interview: Interview) -> tuple[Fact, ...]:
+    """The preferences that matter for tools (epson_corrections.md 5.1)."""
+    names = {
+        Preference.RESET_OUTPUTS_OFF: (tr("Reset switches outputs off"), "reset_outputs_off"),
+        Preference.OUTPUTS_OFF_AT_ESTOP: (
+            tr("an emergency stop switches outputs off"),
+            "outputs_off_at_estop",
+        ),
+        Preference.DRY_RUN: (tr("dry run"), "dry_run"),
+        Preference.VIRTUAL_IO: (tr("virtual I/O"), "virtual_io"),
+        Preference.MAINTENANCE_DATA: (tr("maintenance data"), "maintenance_data"),
+    }
+    answer = interview.ask("GetContSettings")
+    if isinstance(answer, int):
+        why = tr("this firmware does not tell its preferences: look at the controller's setup")
+        return tuple(Fact(name, why, option) for name, option in names.values())
+    told = ",".join(answer)
+    try:
+        on = parse_preferences(told)
+    except RemoteProtocolError as error:
+        return tuple(Fact(name, error.what, option) for name, option in names.values())
+    return tuple(
+        Fact(
+            name,
+            tr("on") if preference in on else tr("off"),
+            option,
+            preference in on,
+            f"GetContSettings -> {told}",
+        )
+        for preference, (name, option) in names.items()
+    )
+
+
 def terminator(interview: Interview) -> Fact:
     """Which line end the controller sends (epson.md 1.1)."""
     name, option = tr("line end"), "terminator"
@@ -68,7 +102,7 @@ def terminator(interview: Interview) -> Fact:
 
 def unfinished_request(early: bool | None) -> Fact:
     """Whether a request without its line end is served (epson.md 1.1)."""
-    name, option = tr("request without its line end"), "requests_end_with_segment"
+    name, option = tr("request without its line end"), "requests_end_with_silence"
     if early is None:
         return Fact(name, tr("not tried: Logout could stop a program"), option)
     finding = tr("is answered") if early else tr("is waited for")

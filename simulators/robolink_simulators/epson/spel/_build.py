@@ -5,12 +5,16 @@ from typing import Any, cast
 from lark import Token, Transformer, v_args
 
 from robolink_simulators.epson.spel._tree import (
+    AssignCoordinate,
     AssignPoint,
     AssignVariable,
+    Base,
     Binary,
     Command,
     Coordinates,
     Expression,
+    If,
+    LabelledPoint,
     Literal,
     Modifier,
     ModifierKind,
@@ -27,7 +31,6 @@ from robolink_simulators.epson.spel._tree import (
 )
 
 Items = tuple[Expression, ...]
-Base = StoredPoint | PointFunction
 
 _RADIX = {"&h": 16, "&o": 8, "&b": 2}
 _HIGHEST_INT32 = 2**31 - 1
@@ -69,13 +72,15 @@ class TreeBuilder(Transformer[Token, tuple[Statement, ...]]):
         """Build a keyword statement."""
         return Command(word.lower(), items or (), trailing is not None)
 
-    def motion(self, verb: Token, target: PointExpression, *options: MotionOptions) -> Motion:
+    def motion(self, verb: Token, *parts: PointExpression | MotionOptions) -> Motion:
         """Build a motion and join its options, which stand in any order."""
+        targets = tuple(part for part in parts if isinstance(part, PointExpression))
+        options = [part for part in parts if isinstance(part, MotionOptions)]
         words = frozenset[str]().union(*(option.words for option in options))
         limz = next((option.limz for option in options if option.limz is not None), None)
         untils = [option.until for option in options if option.until is not None]
         until = untils[0] if untils else None
-        return Motion(verb.lower(), target, MotionOptions(words, limz, until))
+        return Motion(verb.lower(), targets, MotionOptions(words, limz, until))
 
     def plain_option(self, word: Token) -> MotionOptions:
         """Build CP, ROT, LJM or an arch number."""
@@ -103,6 +108,35 @@ class TreeBuilder(Transformer[Token, tuple[Statement, ...]]):
     def assign_variable(self, word: Token, value: Expression | Coordinates) -> AssignVariable:
         """Build ``name = ...``."""
         return AssignVariable(word.lower(), value)
+
+    def assign_coordinate(
+        self, word: Token, point: PointExpression, value: Expression
+    ) -> AssignCoordinate:
+        """Build ``CX(P1) = ...``."""
+        return AssignCoordinate(word[1:].upper(), point, value)
+
+    def branch(self, *statements: Statement) -> tuple[Statement, ...]:
+        """Collect the statements of one branch."""
+        return statements
+
+    def if_line(
+        self,
+        _if: Token,
+        condition: Expression,
+        _then: Token,
+        then: tuple[Statement, ...],
+        *otherwise: Any,  # noqa: ANN401 - the word Else and its branch, or nothing
+    ) -> If:
+        """Build a single-line If."""
+        return If(condition, then, otherwise[-1] if otherwise and otherwise[-1] else ())
+
+    def labelled(self, word: Token, *modifiers: Modifier) -> PointExpression:
+        """Build a point that is named in a motion."""
+        return PointExpression(LabelledPoint(word.lower()), modifiers=modifiers)
+
+    def error_on(self, _: Token) -> Name:
+        """Build ``Error On``, which a client writes for ErrorOn."""
+        return Name("erroron")
 
     def coordinates(self, *values: Expression) -> Coordinates:
         """Build a coordinate list; flags were read as divisions, and are tried first.
@@ -173,8 +207,9 @@ class TreeBuilder(Transformer[Token, tuple[Statement, ...]]):
         return Literal(number_value(word))
 
     def text(self, word: Token) -> Literal:
-        """Build a string."""
-        return Literal(word[1:-1])
+        """Build a string; one that is still open at the end ends there."""
+        closed = len(word) > 1 and word.endswith('"')
+        return Literal(word[1:-1] if closed else word[1:])
 
     def name(self, word: Token, items: Items | None) -> Name:
         """Build a constant, a variable or a call."""

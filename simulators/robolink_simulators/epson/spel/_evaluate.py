@@ -6,18 +6,25 @@ from typing import Final
 from robolink.model import Hand, rotate_xy
 from robolink_simulators.epson.points import AXES, HIGHEST_LOCAL, Point
 from robolink_simulators.epson.refusals import Refusal, RefusalKind
+from robolink_simulators.epson.refused import Refused
 from robolink_simulators.epson.spel._functions import PLAIN_FUNCTIONS
 from robolink_simulators.epson.spel._machine_functions import (
     MACHINE_FUNCTIONS,
+    OF_JOINTS,
     POINT_FUNCTIONS,
+    SIX_JOINTS,
     coordinates_of,
+    printed_pulses,
 )
 from robolink_simulators.epson.spel._operators import binary, unary
 from robolink_simulators.epson.spel._session import Session
+from robolink_simulators.epson.spel._state_functions import STATE_FUNCTIONS
 from robolink_simulators.epson.spel._tree import (
+    Base,
     Binary,
     Coordinates,
     Expression,
+    LabelledPoint,
     Literal,
     Modifier,
     ModifierKind,
@@ -46,6 +53,14 @@ CONSTANTS: Final[dict[str, Value]] = {
     "low": 0,
     "righty": 1,
     "lefty": 2,
+    "above": 1,
+    "below": 2,
+    "noflip": 1,
+    "flip": 2,
+    "j1": 1,
+    "j2": 2,
+    "j3": 4,
+    "j4": 8,
     "cr": "\r",
     "lf": "\n",
     "crlf": "\r\n",
@@ -81,6 +96,15 @@ class Evaluator:
                 return binary(operator, self.value(left), self.value(right))
             case PointExpression():
                 return self.point(expression)
+
+    def shown(self, expression: Expression) -> Value:
+        """Return what an expression is worth to Print; AglToPls shows as pulses there."""
+        match expression:
+            case PointExpression(PointFunction("agltopls", arguments), 0, None, ()):
+                self.value(expression)
+                return printed_pulses(self.session, [self.value(a) for a in arguments])
+            case _:
+                return self.value(expression)
 
     def integer(self, expression: Expression) -> int:
         """Return a whole number."""
@@ -119,7 +143,29 @@ class Evaluator:
             _check_count(name, given, counts)
             values = [self.value(argument) for argument in given]
             return checked(function(self.session, values))
-        raise Refusal(RefusalKind.SYNTAX, f"Nothing is called {name}")
+        if name in STATE_FUNCTIONS:
+            counts, state = STATE_FUNCTIONS[name]
+            _check_count(name, given, counts)
+            return checked(state(self.session, [self.value(argument) for argument in given]))
+        if arguments is None:
+            return self._of_the_project(name)
+        raise Refusal(RefusalKind.NAME_UNDEFINED, f"Nothing is called {name}")
+
+    def _of_the_project(self, name: str) -> Value:
+        """Return a point by its label, or a variable.
+
+        Raises:
+            Refusal: Nothing is called so; labels of inputs and outputs are not simulated.
+        """
+        number = self.session.machine.points.labelled(name)
+        if number is not None:
+            return self.session.machine.points.get(number)
+        if self.session.variables.holds(name):
+            try:
+                return self.session.variables.read(name)
+            except Refused as refused:
+                raise Refusal(RefusalKind.SUBSCRIPT, f"{name} is an array") from refused
+        raise Refusal(RefusalKind.NAME_UNDEFINED, f"Nothing is called {name}")
 
     def _point_number(self, argument: Expression) -> int:
         # PDef(P1), PDef(P(n)) and PDef(1) all name point 1 (spel.md 5.1).
@@ -139,10 +185,14 @@ class Evaluator:
             case _:
                 raise Refusal(RefusalKind.SYNTAX, "A stored point such as P1 is needed")
 
-    def _base(self, base: StoredPoint | PointFunction) -> Point:
+    def _base(self, base: Base) -> Point:
         if isinstance(base, StoredPoint):
             return self.session.machine.points.get(self.integer(base.number))
+        if isinstance(base, LabelledPoint):
+            return as_point(self._named(base.name, None))
         counts, function = POINT_FUNCTIONS[base.name]
+        if base.name in OF_JOINTS and len(base.arguments) == SIX_JOINTS:
+            raise Refusal(RefusalKind.OTHER_ROBOT, "This robot has four joints")
         _check_count(base.name, base.arguments, counts)
         return function(self.session, [self.value(argument) for argument in base.arguments])
 

@@ -1,12 +1,14 @@
 """Functions that look at the robot, its tools, points and bits."""
 
+import math
 from collections.abc import Callable, Sequence
 from typing import Final
 
 from robolink.model import Hand, ToolOffset
+from robolink_simulators.epson.bits import BitBank
 from robolink_simulators.epson.kinematics import Joints, check_ranges, forward, tip_of
 from robolink_simulators.epson.points import AXES, Point
-from robolink_simulators.epson.refusals import Refusal, RefusalKind
+from robolink_simulators.epson.refusals import OutOfReach, Refusal, RefusalKind
 from robolink_simulators.epson.spel._session import Session
 from robolink_simulators.epson.spel._values import (
     Value,
@@ -22,6 +24,12 @@ PointFunction = Callable[[Session, Arguments], Point]
 
 SCARA: Final = 3
 """RobotType (spel.md 9)."""
+
+OF_JOINTS: Final = frozenset({"ja", "pulse"})
+"""Functions of one value for each joint."""
+
+SIX_JOINTS: Final = 6
+_JOINTS: Final = 4
 
 _HAND_NUMBERS = {Hand.RIGHT: 1, Hand.LEFT: 2}
 
@@ -51,6 +59,41 @@ def _tool_defined(session: Session, arguments: Arguments) -> Value:
     return session.machine.tools.get(tool) is not None or tool == 0
 
 
+def _word(bank: BitBank, arguments: Arguments) -> int:
+    low = 2 * as_integer(arguments[0])
+    return bank.get_byte(low + 1) << 8 | bank.get_byte(low)
+
+
+def _reachable(session: Session, arguments: Arguments) -> Value:
+    try:
+        session.machine.joints_for(as_point(arguments[0]))
+    except OutOfReach:
+        return False
+    return True
+
+
+def _distance(_: Session, arguments: Arguments) -> Value:
+    a, b = (as_point(argument).coordinates[:3] for argument in arguments)
+    return math.dist(a, b)
+
+
+def _at_home(session: Session, _: Arguments) -> Value:
+    home = session.machine.settings.home_pulses
+    return home is not None and list(home) == pulses_of(session, session.machine.arm.joints)
+
+
+def _home(session: Session, arguments: Arguments) -> Value:
+    home = session.machine.settings.home_pulses
+    if home is None:
+        raise Refusal(RefusalKind.HOME_UNDEFINED, "No home position is set")
+    return _item(home, arguments)
+
+
+def _of_a_scara(value: int) -> MachineFunction:
+    """A robot without elbow, wrist and joint flags (assumed: what a flag is unless stated)."""
+    return lambda *_: value
+
+
 def _pulses(session: Session, arguments: Arguments) -> Value:
     return _item(pulses_of(session, session.machine.arm.joints), arguments)
 
@@ -72,6 +115,34 @@ MACHINE_FUNCTIONS: Final[dict[str, tuple[range, MachineFunction]]] = {
     "memsw": (range(1, 2), lambda s, a: int(s.machine.memory.get(as_integer(a[0])))),
     "in": (range(1, 2), lambda s, a: s.machine.inputs.get_byte(as_integer(a[0]))),
     "out": (range(1, 2), lambda s, a: s.machine.outputs.get_byte(as_integer(a[0]))),
+    "inw": (range(1, 2), lambda s, a: _word(s.machine.inputs, a)),
+    "outw": (range(1, 2), lambda s, a: _word(s.machine.outputs, a)),
+    "memin": (range(1, 2), lambda s, a: s.machine.memory.get_byte(as_integer(a[0]))),
+    "meminw": (range(1, 2), lambda s, a: _word(s.machine.memory, a)),
+    "elbow": (range(2), _of_a_scara(1)),
+    "wrist": (range(2), _of_a_scara(1)),
+    "j1flag": (range(2), _of_a_scara(0)),
+    "j2flag": (range(2), _of_a_scara(0)),
+    "j4flag": (range(2), _of_a_scara(0)),
+    "j6flag": (range(2), _of_a_scara(0)),
+    "realpls": (range(1, 2), _pulses),
+    "targetok": (range(1, 2), _reachable),
+    "dist": (range(2, 3), _distance),
+    "js": (range(1), lambda s, _: s.machine.sensed),
+    "athome": (range(2), _at_home),
+    "homedef": (range(1), lambda s, _: s.machine.settings.home_pulses is not None),
+    "homeset": (range(1, 2), _home),
+    "accelmax": (range(1, 2), lambda s, _: s.options.accel_max),
+    "speedfactor": (range(1), lambda s, _: s.machine.settings.speed_factor),
+    "cp": (range(1), lambda s, _: int(s.machine.settings.continuous_path)),
+    "fine": (range(1, 2), lambda s, a: _item(s.machine.settings.fine_pulses, a)),
+    "weight": (range(1, 2), lambda s, a: _item(load_of(s), a)),
+    "inertia": (range(2), lambda s, a: _item(inertia_of(s), [as_number(x) + 1 for x in a])),
+    "sfree": (range(1, 2), lambda s, a: int(as_integer(a[0]) in s.machine.settings.free_joints)),
+    "arm": (range(1), lambda *_: 0),
+    "armdef": (range(1, 2), lambda _, a: as_integer(a[0]) == 0),
+    "ecp": (range(1), lambda *_: 0),
+    "ecpdef": (range(1, 2), lambda *_: False),
     "agl": (range(1, 2), lambda s, a: _item(s.machine.arm.joints.values(), a)),
     "pls": (range(1, 2), _pulses),
     "tillon": (range(1), lambda s, _: s.machine.till_met),
@@ -82,6 +153,7 @@ MACHINE_FUNCTIONS: Final[dict[str, tuple[range, MachineFunction]]] = {
     "speeds": (range(2), lambda s, a: _item(s.machine.parameters.speed_s, a)),
     "speedr": (range(1), lambda s, _: s.machine.parameters.speed_r),
     "accel": (range(1, 2), lambda s, a: _item(s.machine.parameters.accel, a)),
+    "accelr": (range(2), lambda s, _: s.machine.parameters.accel_r),
     "accels": (range(1, 2), lambda s, a: _item(s.machine.parameters.accel_s, a)),
     "limz": (range(1), lambda s, _: s.machine.parameters.limz_mm),
     "robot": (range(1), lambda s, _: s.machine.robot_number),
@@ -91,6 +163,16 @@ MACHINE_FUNCTIONS: Final[dict[str, tuple[range, MachineFunction]]] = {
     "ctrldev": (range(1), lambda s, _: s.machine.control_device),
 }
 """Name to the numbers of arguments allowed and the function."""
+
+
+def load_of(session: Session) -> tuple[float, float]:
+    """Return Weight: kg, mm."""
+    return session.machine.settings.weight_kg, session.machine.settings.weight_at_mm
+
+
+def inertia_of(session: Session) -> tuple[float, float]:
+    """Return Inertia: kg m2, mm."""
+    return session.machine.settings.inertia_kg_m2, session.machine.settings.eccentricity_mm
 
 
 def coordinates_of(values: Sequence[float]) -> Point:
@@ -125,10 +207,30 @@ def _ja(session: Session, arguments: Arguments) -> Point:
     return _joint_point(session, [float(as_number(argument)) for argument in arguments])
 
 
+def _angles_to_pulses(session: Session, arguments: Arguments) -> Point:
+    # EPSON's own jog panel gives a SCARA six angles too; what there is no joint for is dropped.
+    return _ja(session, arguments[:_JOINTS])
+
+
+def printed_pulses(session: Session, arguments: Arguments) -> str:
+    """Return what Print shows of AglToPls.
+
+    A label and a whole number for each joint with blanks between: EPSON's own jog panel takes
+    every second word for pulses. What the label is, is not known.
+    """
+    joints = Joints(*(float(as_number(argument)) for argument in arguments[:_JOINTS]))
+    return " ".join(f"{i}: {n}" for i, n in enumerate(pulses_of(session, joints), start=1))
+
+
 def _pulse(session: Session, arguments: Arguments) -> Point:
     scales = session.machine.model.pulses_per_unit
     pairs = zip(arguments, scales, strict=True)
     return _joint_point(session, [as_integer(count) / scale for count, scale in pairs])
+
+
+def _on_pallet(session: Session, arguments: Arguments) -> Point:
+    number, *place = (as_integer(argument) for argument in arguments)
+    return session.machine.pallets.get(number).place(*place)
 
 
 def _here(session: Session, _: Arguments) -> Point:
@@ -163,7 +265,9 @@ def _local_point(session: Session, arguments: Arguments) -> Point:
 POINT_FUNCTIONS: Final[dict[str, tuple[range, PointFunction]]] = {
     "xy": (range(4, 7), _xy),
     "ja": (range(4, 5), _ja),
+    "agltopls": (range(4, 7), _angles_to_pulses),
     "pulse": (range(4, 5), _pulse),
+    "pallet": (range(2, 4), _on_pallet),
     "here": (range(1), _here),
     "curpos": (range(1), _here),
     "realpos": (range(1), _real_position),

@@ -1,20 +1,21 @@
-"""Go, Move, Jump and their relatives (spel.md 7.1)."""
+"""Go, Move, Jump, Arc and their relatives (spel.md 7.1)."""
 
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import pairwise
 from typing import Final
 
-from robolink.model import Pose, rotate_xy
-from robolink_simulators.epson.kinematics import Joints
+from robolink.model import rotate_xy
 from robolink_simulators.epson.machine import Machine
-from robolink_simulators.epson.parameters import LIMZ_MARGIN_MM, Phase
 from robolink_simulators.epson.points import Coordinates, Point
 from robolink_simulators.epson.refusals import Refusal, RefusalKind
 from robolink_simulators.epson.spel._evaluate import Evaluator
+from robolink_simulators.epson.spel._gates import jump, jump3
+from robolink_simulators.epson.spel._legs import arc_leg, go_leg, line_leg, pose_of
 from robolink_simulators.epson.spel._tree import Motion
 from robolink_simulators.epson.spel._values import out_of_range
-from robolink_simulators.epson.trajectory import JointLeg, Leg, plan_go
+from robolink_simulators.epson.trajectory import Leg
 
 _SAME_MM = 0.001
 _SAME_DEG = 0.001
@@ -23,15 +24,21 @@ _SAME_DEG = 0.001
 # LJM leaves a SCARA's point unchanged (documented). C0 to C7 all rise to LimZ, as C7 does.
 _UNTIL_WORDS: Final = frozenset({"till", "find"})
 _LINE_WORDS: Final = frozenset({"cp", "rot"}) | _UNTIL_WORDS
+_GATE_WORDS: Final = frozenset({"cp", "sense", *(f"c{n}" for n in range(8))}) | _UNTIL_WORDS
 _WORDS: Final = {
     "go": frozenset({"cp", "ljm"}) | _UNTIL_WORDS,
     "tgo": frozenset({"cp"}) | _UNTIL_WORDS,
     "bgo": frozenset({"cp"}) | _UNTIL_WORDS,
+    "pass": frozenset({"cp", "ljm"}),
     "move": _LINE_WORDS,
     "tmove": _LINE_WORDS,
     "bmove": _LINE_WORDS,
-    "jump": frozenset({"cp", "limz", *(f"c{arch}" for arch in range(8))}) | _UNTIL_WORDS,
+    "arc": _LINE_WORDS,
+    "jump": frozenset({"limz"}) | _GATE_WORDS,
+    "jump3": frozenset({"ljm"}) | _GATE_WORDS,
+    "jump3cp": frozenset({"ljm", "rot"}) | _GATE_WORDS,
 }
+_WAYPOINTS: Final = {"arc": 2, "jump3": 3, "jump3cp": 3}
 
 
 def plan(evaluator: Evaluator, motion: Motion) -> list[Leg]:
@@ -40,24 +47,54 @@ def plan(evaluator: Evaluator, motion: Motion) -> list[Leg]:
     Targets are for the selected tool's tip.
 
     Raises:
-        Refusal: Motors off, a target out of reach, a wrong option ...
+        Refusal: Motors off, a free joint, a target out of reach, a wrong option ...
     """
     machine = evaluator.session.machine
     wrong = motion.options.words - _WORDS[motion.verb]
     if wrong:
         raise Refusal(RefusalKind.SYNTAX, f"{motion.verb} knows no {', '.join(sorted(wrong))}")
-    if motion.options.words >= _UNTIL_WORDS:
-        raise Refusal(RefusalKind.SYNTAX, "A motion takes one of Till and Find")
-    point = evaluator.point(motion.target)
+    if len(motion.options.words & {*_UNTIL_WORDS, "sense"}) > 1:
+        raise Refusal(RefusalKind.SYNTAX, "A motion takes one of Till, Find and Sense")
+    points = [evaluator.point(target) for target in motion.targets]
+    if motion.verb != "pass" and len(points) != _WAYPOINTS.get(motion.verb, 1):
+        raise Refusal(RefusalKind.SYNTAX, f"{motion.verb} does not take {len(points)} points")
+    require_drives(machine)
+    limz = motion.options.limz
+    match motion.verb:
+        case "jump":
+            height_mm = None if limz is None else float(evaluator.number(limz))
+            return jump(machine, points[0], height_mm)
+        case "jump3" | "jump3cp":
+            return jump3(machine, (points[0], points[1], points[2]))
+        case "arc":
+            return [arc_leg(machine, *(pose_of(machine, point) for point in points))]
+        case "pass":
+            return _passing(machine, points)
+        case verb:
+            target = _TARGETS[verb](machine, points[0])
+            if verb.endswith("move"):
+                return [_line(machine, target, rot="rot" in motion.options.words)]
+            return [go_leg(machine, machine.arm.joints, machine.joints_for(target))]
+
+
+def require_drives(machine: Machine) -> None:
+    """Hold a motion back that the drives would not carry out.
+
+    Raises:
+        Refusal: The motors are off, or a joint is free (documented for SFree, but not its
+            number).
+    """
     if not machine.motors_on:
         raise Refusal(RefusalKind.MOTORS_OFF, "Motors are off")
-    limz = motion.options.limz
-    if motion.verb == "jump":
-        return _jump(machine, point, None if limz is None else float(evaluator.number(limz)))
-    target = _TARGETS[motion.verb](machine, point)
-    if motion.verb.endswith("move"):
-        return [_line(machine, target, rot="rot" in motion.options.words)]
-    return [_go(machine, machine.arm.joints, machine.joints_for(target))]
+    if machine.settings.free_joints:
+        free = ", ".join(map(str, sorted(machine.settings.free_joints)))
+        raise Refusal(RefusalKind.JOINT_FREE, f"Joint {free} is free")
+
+
+def _passing(machine: Machine, points: list[Point]) -> list[Leg]:
+    """Go by each point; here each is stood at for an instant (assumed simplification)."""
+    joints = [machine.arm.joints, *(machine.joints_for(point) for point in points)]
+    return [go_leg(machine, a, b) for a, b in pairwise(joints)]
 
 
 def _absolute(_: Machine, point: Point) -> Point:
@@ -89,13 +126,6 @@ _TARGETS: Final[dict[str, Callable[[Machine, Point], Point]]] = {
 }
 
 
-def _go(machine: Machine, start: Joints, end: Joints, *, phase: Phase = Phase.TRAVEL) -> JointLeg:
-    pace = machine.parameters.joint_pace(power_high=machine.power_high, phase=phase)
-    offset = machine.offset
-    radius_mm = 0.0 if offset is None else math.hypot(offset.x_mm, offset.y_mm)
-    return plan_go(machine.model, start, end, pace, radius_mm=radius_mm)
-
-
 def _line(machine: Machine, target: Point, *, rot: bool) -> Leg:
     """Plan a straight motion.
 
@@ -103,41 +133,11 @@ def _line(machine: Machine, target: Point, *, rot: bool) -> Leg:
         Refusal: Only the orientation changes and ROT is missing, or ROT stands and nothing
             turns over a distance (both documented, spel.md 7.1; their numbers are not).
     """
-    base = machine.locals.to_base(target)
-    x, y, z, u, _, _ = base.coordinates
-    tip = machine.tip()
-    end = Pose(x, y, z, u, hand=base.hand)
+    end, tip = pose_of(machine, target), machine.tip()
     travels = math.dist(end.coordinates()[:3], tip.coordinates()[:3]) > _SAME_MM
-    turns = abs(u - tip.u_deg) > _SAME_DEG
+    turns = abs(end.u_deg - tip.u_deg) > _SAME_DEG
     if turns and not travels and not rot:
         raise out_of_range("The motion only turns the tool: ROT is needed")
     if rot and travels and not turns:
         raise out_of_range("ROT, but the tool does not turn")
-    pace = machine.parameters.line_pace(power_high=machine.power_high)
-    return machine.arm.plan_move(end, pace, offset=machine.offset)
-
-
-def _jump(machine: Machine, point: Point, limz_mm: float | None) -> list[Leg]:
-    """Plan a gate motion: up to LimZ, across, down (documented as C7, the default).
-
-    LimZ is compared with joint 3, not with the tip (assumed: its default of 0 would else be
-    out of reach under every tool that hangs down). The modifier's height counts in the
-    target's local (documented).
-
-    Raises:
-        Refusal: Start or target lie above LimZ; the start's number is documented (4005).
-    """
-    height_mm = machine.parameters.limz_mm
-    if limz_mm is not None:
-        height_mm = limz_mm + machine.locals.get(point.local).z_mm
-    start, end = machine.arm.joints, machine.joints_for(point)
-    for joints, what in ((start, "The motion starts"), (end, "The target lies")):
-        if joints.j3_mm > height_mm + LIMZ_MARGIN_MM:
-            raise Refusal(RefusalKind.ABOVE_LIMZ, f"{what} above LimZ")
-    up = replace(start, j3_mm=max(start.j3_mm, height_mm))
-    across = replace(end, j3_mm=max(end.j3_mm, height_mm))
-    return [
-        _go(machine, start, up, phase=Phase.DEPART),
-        _go(machine, up, across),
-        _go(machine, across, end, phase=Phase.APPROACH),
-    ]
+    return line_leg(machine, tip, end)

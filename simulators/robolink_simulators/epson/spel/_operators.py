@@ -27,6 +27,7 @@ _COMPARE: Final[dict[str, Callable[[Number, Number], bool]]] = {
 }
 _BITS: Final[dict[str, Callable[[int, int], int]]] = {
     "and": operator.and_,
+    "mask": operator.and_,
     "or": operator.or_,
     "xor": operator.xor,
 }

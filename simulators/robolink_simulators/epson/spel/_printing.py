@@ -65,6 +65,8 @@ def joined(values: Sequence[Value], options: EpsonOptions) -> str:
     text = ""
     for position, value in enumerate(values):
         is_number = isinstance(value, (int, float))
+        if is_number and not position and options.number_lead_blank:
+            text += " "
         if position and (is_number or options.comma_blank == "always"):
             text += " "
         text += value_text(value, options)

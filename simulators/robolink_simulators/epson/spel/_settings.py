@@ -16,9 +16,6 @@ from robolink_simulators.epson.spel._values import Number, out_of_range
 Numbers = Sequence[Number]
 Setting = Callable[[Machine, Numbers], str]
 
-HIGHEST_ACCEL: Final = 100
-"""AccelMax in percent, "usually 100" (spel.md 7.2)."""
-
 HIGHEST_ACCEL_S: Final = 25_000.0
 """AccelS in mm/s2 of most SCARA robots (spel.md 7.2)."""
 
@@ -78,11 +75,12 @@ def _speed_s(machine: Machine, values: Numbers) -> str:
     return ""
 
 
-def _accel(machine: Machine, values: Numbers) -> str:
+def accel(machine: Machine, values: Numbers, highest: int) -> str:
+    """Set or show Accel; the highest value is AccelMax's."""
     _expect(values, 0, 2, 6)
     if not values:
         return _rows(machine, machine.parameters.accel)
-    a, b, c, d, e, f = map(int, _filled(_checked(values, 1, HIGHEST_ACCEL), 6))
+    a, b, c, d, e, f = map(int, _filled(_checked(values, 1, highest), 6))
     machine.parameters.accel = (a, b, c, d, e, f)
     return ""
 
@@ -154,7 +152,6 @@ SETTINGS: Final[dict[str, Setting]] = {
     "speed": _speed,
     "speeds": _speed_s,
     "speedr": _speed_r,
-    "accel": _accel,
     "accels": _accel_s,
     "accelr": _accel_r,
     "limz": _limz,

@@ -1,29 +1,50 @@
-"""Keyword statements about tools, points, switches and time (spel.md 6, 7.2, 8)."""
+"""Keyword statements about tools, the home position, switches and conditions (spel.md 6 to 8)."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Final, NamedTuple
 
 from robolink.model import ToolOffset
 from robolink.protocols.spel import PrintedWhere, format_tool_listing, format_where
 from robolink.timing import NS_PER_S
-from robolink_simulators.epson.points import HIGHEST_POINT, Local, Point
+from robolink_simulators.epson.bits import BitBank
+from robolink_simulators.epson.kinematics import Joints
+from robolink_simulators.epson.machine import Machine
+from robolink_simulators.epson.points import Point
 from robolink_simulators.epson.refusals import Refusal, RefusalKind
 from robolink_simulators.epson.spel._evaluate import Evaluator
-from robolink_simulators.epson.spel._machine_functions import coordinates_of, pulses_of
-from robolink_simulators.epson.spel._printing import CRLF, number_text, point_line
-from robolink_simulators.epson.spel._settings import SETTINGS
+from robolink_simulators.epson.spel._legs import go_leg
+from robolink_simulators.epson.spel._machine_functions import SIX_JOINTS, pulses_of
+from robolink_simulators.epson.spel._motion import require_drives
+from robolink_simulators.epson.spel._point_statements import POINT_STATEMENTS, point_argument
+from robolink_simulators.epson.spel._printing import CRLF, number_text
+from robolink_simulators.epson.spel._robot_statements import ROBOT_SETTINGS
+from robolink_simulators.epson.spel._settings import SETTINGS, accel
 from robolink_simulators.epson.spel._tree import Command, Expression
 from robolink_simulators.epson.spel._values import out_of_range
+from robolink_simulators.epson.spel._waiting import is_condition, seconds_of, shown_condition
+from robolink_simulators.epson.trajectory import Leg
 
-LONGEST_WAIT_S: Final = 2_147_483
-"""Longest Wait (spel.md 4.6)."""
+SHORTEST_PULSE_S: Final = 0.01
+LONGEST_PULSE_S: Final = 10.0
+"""Times after which On and Off switch back (spel.md 8)."""
+
+
+class TimedBit(NamedTuple):
+    """A bit that changes some time after the statement began."""
+
+    bank: BitBank
+    number: int
+    on: bool
+    after_ns: int
 
 
 class Outcome(NamedTuple):
-    """What a statement printed, and how long it takes."""
+    """What a statement printed, how long it takes, and what moves meanwhile."""
 
     output: str = ""
     duration_ns: int = 0
+    legs: Sequence[Leg] = ()
+    timed: TimedBit | None = None
 
 
 def run_command(evaluator: Evaluator, command: Command) -> Outcome:
@@ -34,9 +55,15 @@ def run_command(evaluator: Evaluator, command: Command) -> Outcome:
     """
     if command.open_ended and command.name != "plist":
         raise Refusal(RefusalKind.SYNTAX, f"{command.name} does not end with a comma")
-    if command.name in SETTINGS:
+    session = evaluator.session
+    setting = SETTINGS.get(command.name) or ROBOT_SETTINGS.get(command.name)
+    if setting is not None or command.name == "accel":
         numbers = [evaluator.number(argument) for argument in command.arguments]
-        return Outcome(SETTINGS[command.name](evaluator.session.machine, numbers))
+        if setting is None:
+            return Outcome(accel(session.machine, numbers, session.options.accel_max))
+        return Outcome(setting(session.machine, numbers))
+    if command.name in POINT_STATEMENTS:
+        return Outcome(POINT_STATEMENTS[command.name](evaluator, command))
     return _HANDLERS[command.name](evaluator, command)
 
 
@@ -47,13 +74,6 @@ def _expect(command: Command, *counts: int) -> tuple[Expression, ...]:
             f"{command.name} does not take {len(command.arguments)} arguments here",
         )
     return command.arguments
-
-
-def _point_argument(evaluator: Evaluator, arguments: tuple[Expression, ...]) -> Point:
-    """Return a point, or the old list of bare numbers (spel.md 5.1)."""
-    if len(arguments) == 1:
-        return evaluator.point_of(arguments[0])
-    return coordinates_of([evaluator.number(argument) for argument in arguments])
 
 
 def _tlset(evaluator: Evaluator, command: Command) -> Outcome:
@@ -68,7 +88,7 @@ def _tlset(evaluator: Evaluator, command: Command) -> Outcome:
         listing = format_tool_listing(shown, layout=session.options.tool_listing)
         return Outcome(listing + CRLF if listing else "")
     # Flags and local of the point are ignored (documented, spel.md 6.1).
-    x, y, z, *angles = _point_argument(evaluator, arguments[1:]).coordinates
+    x, y, z, *angles = point_argument(evaluator, arguments[1:]).coordinates
     if session.options.angle_wrap:
         angles = [angle if -180 <= angle <= 180 else _wrapped(angle) for angle in angles]
     tools.set(evaluator.integer(arguments[0]), ToolOffset(x, y, z, *angles))
@@ -81,7 +101,9 @@ def _wrapped(angle_deg: float) -> float:
 
 def _tlclr(evaluator: Evaluator, command: Command) -> Outcome:
     (tool,) = _expect(command, 1)
-    evaluator.session.machine.tools.clear(evaluator.integer(tool))
+    session = evaluator.session
+    in_force = session.options.clear_selected_tool
+    session.machine.tools.clear(evaluator.integer(tool), in_force=in_force)
     return Outcome()
 
 
@@ -104,54 +126,25 @@ def _where(evaluator: Evaluator, command: Command) -> Outcome:
     return Outcome(format_where(printed, width=session.options.where_width) + CRLF)
 
 
-def _here(evaluator: Evaluator, command: Command) -> Outcome:
-    (target,) = _expect(command, 1)
-    machine = evaluator.session.machine
-    machine.points.store(evaluator.stored_number(target), Point.at(machine.tip()))
-    return Outcome()
-
-
-def _plist(evaluator: Evaluator, command: Command) -> Outcome:
-    arguments = _expect(command, 1) if command.open_ended else _expect(command, 0, 1, 2)
-    numbers = [evaluator.integer(argument) for argument in arguments]
-    first = numbers[0] if numbers else 0
-    last = first if len(numbers) == 1 else HIGHEST_POINT
-    if command.open_ended:
-        last = HIGHEST_POINT
-    if len(numbers) == 2:
-        last = numbers[1]
-    points = evaluator.session.machine.points
-    lines = [point_line(n, points.get(n)) + CRLF for n in points.numbers(first, last)]
-    return Outcome("".join(lines))
-
-
-def _pdel(evaluator: Evaluator, command: Command) -> Outcome:
-    numbers = [evaluator.integer(argument) for argument in _expect(command, 1, 2)]
-    evaluator.session.machine.points.delete(numbers[0], numbers[-1])
-    return Outcome()
-
-
-def _local(evaluator: Evaluator, command: Command) -> Outcome:
-    arguments = _expect(command, 1, 2, 5, 7)
-    number, locals_ = evaluator.integer(arguments[0]), evaluator.session.machine.locals
-    if len(arguments) == 1:
-        # The layout is not shown anywhere: as ArmSet prints (assumed).
-        local = locals_.get(number)
-        values = (local.x_mm, local.y_mm, local.z_mm, local.u_deg, 0.0, 0.0)
-        return Outcome(f"Local {number}: " + ", ".join(f"{v:.3f}" for v in values) + CRLF)
-    x, y, z, u, v, w = _point_argument(evaluator, arguments[1:]).coordinates
-    if v != 0 or w != 0:
-        raise out_of_range("V and W of a local are 0 on a SCARA")
-    locals_.define(number, Local(x, y, z, u))
-    return Outcome()
-
-
 def _switch(command: Command, evaluator: Evaluator, *, on: bool) -> Outcome:
-    (number,) = _expect(command, 1)
-    machine = evaluator.session.machine
+    """Switch a bit, for a time if one stands there (documented, spel.md 8)."""
+    arguments, machine = _expect(command, 1, 2, 3), evaluator.session.machine
     bank = machine.memory if command.name.startswith("mem") else machine.outputs
-    bank.set(evaluator.integer(number), on)
-    return Outcome()
+    number = evaluator.integer(arguments[0])
+    if len(arguments) == 1:
+        bank.set(number, on)
+        machine.timed_bits.forget(bank, number)
+        return Outcome()
+    if bank is machine.memory:
+        raise Refusal(RefusalKind.SYNTAX, "A memory bit takes no time")
+    seconds = float(evaluator.number(arguments[1]))
+    if not SHORTEST_PULSE_S <= seconds <= LONGEST_PULSE_S:
+        raise out_of_range(f"A time of {seconds} s")
+    goes_on = len(arguments) > 2 and evaluator.integer(arguments[2]) == 0
+    bank.set(number, on)
+    duration_ns = round(seconds * NS_PER_S)
+    pulse = TimedBit(bank, number, not on, duration_ns)
+    return Outcome(duration_ns=0 if goes_on else duration_ns, timed=pulse)
 
 
 def _on(evaluator: Evaluator, command: Command) -> Outcome:
@@ -162,17 +155,88 @@ def _off(evaluator: Evaluator, command: Command) -> Outcome:
     return _switch(command, evaluator, on=False)
 
 
-def _out(evaluator: Evaluator, command: Command) -> Outcome:
-    port, value = (evaluator.integer(argument) for argument in _expect(command, 2))
-    evaluator.session.machine.outputs.set_byte(port, value)
+def _port(evaluator: Evaluator, command: Command) -> Outcome:
+    """Set a byte or a word of outputs or memory bits."""
+    at, value = (evaluator.integer(argument) for argument in _expect(command, 2))
+    machine = evaluator.session.machine
+    bank = machine.memory if command.name.startswith("mem") else machine.outputs
+    if not command.name.endswith("w"):
+        bank.set_byte(at, value)
+        return Outcome()
+    if not 0 <= value <= 0xFFFF:
+        raise out_of_range(f"Not a word: {value}")
+    bank.set_byte(2 * at, value & 0xFF)
+    bank.set_byte(2 * at + 1, value >> 8)
     return Outcome()
 
 
-def _wait(evaluator: Evaluator, command: Command) -> Outcome:
-    seconds = evaluator.number(*_expect(command, 1))
-    if not 0 <= seconds <= LONGEST_WAIT_S:
-        raise out_of_range(f"Wait of {seconds} s")
-    return Outcome(duration_ns=round(seconds * NS_PER_S))
+def _wait_limit(evaluator: Evaluator, command: Command) -> Outcome:
+    memory = evaluator.session.memory
+    arguments = _expect(command, 0, 1)
+    if not arguments:
+        return Outcome(number_text(memory.wait_limit_s) + CRLF)
+    memory.wait_limit_s = int(seconds_of(evaluator, arguments[0]))
+    return Outcome()
+
+
+def _keep_condition(evaluator: Evaluator, command: Command) -> Outcome:
+    """Set the condition that a bare Till, Find or Sense stands for, or show it."""
+    memory, arguments = evaluator.session.memory, _expect(command, 0, 1)
+    if not arguments:
+        return Outcome(shown_condition(getattr(memory, command.name)) + CRLF)
+    if not is_condition(arguments[0]):
+        raise Refusal(RefusalKind.SYNTAX, f"{command.name} needs a condition")
+    setattr(memory, command.name, arguments[0])
+    return Outcome()
+
+
+def _pulse(evaluator: Evaluator, command: Command) -> Outcome:
+    """Show the pulses, or go point to point to pulses."""
+    if len(command.arguments) == SIX_JOINTS:
+        raise Refusal(RefusalKind.OTHER_ROBOT, "This robot has four joints")
+    arguments = _expect(command, 0, 4)
+    if not arguments:
+        return Outcome(_line_of_where(evaluator, 2))
+    machine = evaluator.session.machine
+    require_drives(machine)
+    counts = [evaluator.integer(argument) for argument in arguments]
+    return Outcome(legs=[_leg_to_pulses(machine, counts)])
+
+
+def _home(evaluator: Evaluator, command: Command) -> Outcome:
+    """Go to the home position, all joints at once (documented: in the order of Hordr)."""
+    _expect(command, 0)
+    machine = evaluator.session.machine
+    home = machine.settings.home_pulses
+    if home is None:
+        raise Refusal(RefusalKind.HOME_UNDEFINED, "No home position is set")
+    require_drives(machine)
+    return Outcome(legs=[_leg_to_pulses(machine, home)])
+
+
+def _leg_to_pulses(machine: Machine, counts: Sequence[int]) -> Leg:
+    scales = zip(counts, machine.model.pulses_per_unit, strict=True)
+    return go_leg(machine, machine.arm.joints, Joints(*(count / scale for count, scale in scales)))
+
+
+def _joint(evaluator: Evaluator, command: Command) -> Outcome:
+    _expect(command, 0)
+    return Outcome(_line_of_where(evaluator, 1))
+
+
+def _line_of_where(evaluator: Evaluator, line: int) -> str:
+    shown = _where(evaluator, Command("where", (), open_ended=False)).output
+    return shown.splitlines()[line] + CRLF
+
+
+def _base(evaluator: Evaluator, command: Command) -> Outcome:
+    """Show the base, or accept the one that there is."""
+    if not command.arguments:
+        values = ", ".join(["0.000"] * 6)
+        return Outcome(f"Base: {values}{CRLF}")
+    if any(point_argument(evaluator, command.arguments).coordinates):
+        raise Refusal(RefusalKind.NOT_SIMULATED, "The base cannot be moved here")
+    return Outcome()
 
 
 def _reset(evaluator: Evaluator, command: Command) -> Outcome:
@@ -181,7 +245,7 @@ def _reset(evaluator: Evaluator, command: Command) -> Outcome:
     session = evaluator.session
     session.machine.reset_motion_parameters()
     if session.options.reset_outputs_off:
-        session.machine.outputs.clear()
+        session.machine.clear_outputs()
     return Outcome()
 
 
@@ -190,15 +254,21 @@ _HANDLERS: Final[dict[str, Callable[[Evaluator, Command], Outcome]]] = {
     "tlclr": _tlclr,
     "tool": _tool,
     "where": _where,
-    "here": _here,
-    "plist": _plist,
-    "pdel": _pdel,
-    "local": _local,
+    "joint": _joint,
+    "base": _base,
+    "pulse": _pulse,
+    "home": _home,
     "on": _on,
     "off": _off,
     "memon": _on,
     "memoff": _off,
-    "out": _out,
-    "wait": _wait,
+    "out": _port,
+    "outw": _port,
+    "memout": _port,
+    "memoutw": _port,
+    "tmout": _wait_limit,
+    "till": _keep_condition,
+    "find": _keep_condition,
+    "sense": _keep_condition,
     "reset": _reset,
 }

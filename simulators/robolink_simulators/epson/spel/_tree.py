@@ -44,6 +44,13 @@ class StoredPoint:
 
 
 @dataclass(frozen=True, slots=True)
+class LabelledPoint:
+    """A point by its name; ``name`` is lower case."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
 class PointFunction:
     """XY, Here, TLSet(n) ...: a function that gives a point."""
 
@@ -73,9 +80,9 @@ class Modifier:
 class PointExpression:
     """A base point, another added or subtracted, and modifiers."""
 
-    base: StoredPoint | PointFunction
+    base: "Base"
     sign: int = 0
-    other: StoredPoint | PointFunction | None = None
+    other: "Base | None" = None
     modifiers: tuple[Modifier, ...] = ()
 
 
@@ -86,6 +93,9 @@ class Coordinates:
     values: "tuple[Expression, ...]"
     modifiers: tuple[Modifier, ...] = ()
 
+
+Base = StoredPoint | LabelledPoint | PointFunction
+"""What a point expression begins with."""
 
 Expression = Literal | Name | Unary | Binary | PointExpression
 
@@ -109,7 +119,7 @@ class Command:
 
 @dataclass(frozen=True, slots=True)
 class Until:
-    """``Till`` or ``Find`` behind a motion; without a condition it is the stored one."""
+    """``Till``, ``Find`` or ``Sense`` behind a motion; bare, its condition is the stored one."""
 
     word: str
     condition: Expression | None = None
@@ -126,10 +136,10 @@ class MotionOptions:
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """``Go``, ``Move``, ``Jump`` ... and their target; ``verb`` is lower case."""
+    """``Go``, ``Move``, ``Jump`` ... and their points; ``verb`` is lower case."""
 
     verb: str
-    target: PointExpression
+    targets: tuple[PointExpression, ...]
     options: MotionOptions
 
 
@@ -149,4 +159,22 @@ class AssignVariable:
     value: Expression | Coordinates
 
 
-Statement = Print | Command | Motion | AssignPoint | AssignVariable
+@dataclass(frozen=True, slots=True)
+class AssignCoordinate:
+    """``CX(P1) = ...``; ``axis`` is upper case."""
+
+    axis: str
+    point: PointExpression
+    value: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class If:
+    """``If condition Then statements Else statements`` on one line."""
+
+    condition: Expression
+    then: "tuple[Statement, ...]"
+    otherwise: "tuple[Statement, ...]" = ()
+
+
+Statement = Print | Command | Motion | AssignPoint | AssignVariable | AssignCoordinate | If

@@ -87,7 +87,7 @@ class Job:
 
     def _interrupted(self, group: AxisGroup) -> bool:
         number = self.execution.movement_number
-        return bool(number) and number == group.status().interrupted_movement
+        return bool(number) and number == group.interrupted_movement
 
 
 class Jobs:

@@ -122,7 +122,4 @@ class Outbox:
             Bits.INTERRUPTED: status.interrupted_movement != 0,
             Bits.PERMITTED: program.permitted,
         }
-        bits = Bits(0)
-        for bit, on in shown.items():
-            bits |= bit if on else Bits(0)
-        return bits
+        return Bits(sum(bit.value for bit, on in shown.items() if on))

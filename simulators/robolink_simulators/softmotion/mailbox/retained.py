@@ -10,6 +10,7 @@ from typing import Any, Final
 from robolink.durable_files import sync_folder, write_whole
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink.named_files import read_named
 from robolink.protocols.mailbox import (
     SLOTS,
     Six,
@@ -123,7 +124,7 @@ class RetainedFile:
         if self._path is None or not self._path.exists():
             return False
         try:
-            document = json.loads(self._path.read_text(encoding="utf-8"))
+            document = json.loads(read_named(self._path))
             if document["schema"] != SCHEMA or document["machine"] != self._machine:
                 raise ValueError(document["machine"])
             self._memory.restore(document["memory"])

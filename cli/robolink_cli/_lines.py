@@ -1,0 +1,181 @@
+"""Lines that a person types, and forgetting those typed before there was anything to answer.
+
+A barcode scanner ends with CR and LF, a key stays down, a line is pasted: what waits in the
+input when a question is shown was never meant for it. On a terminal it is dropped; where stdin
+is no terminal, a script has written its answers beforehand, and nothing is.
+"""
+
+import os
+import queue
+import sys
+import threading
+from importlib import import_module
+from types import ModuleType
+from typing import Any, Final, Protocol
+
+QUIET_S: Final = 0.035
+"""Two keys of a person are further apart; the characters of a scanner are not."""
+
+_BURST_S: Final = 1.0
+"""Longest time in which a burst is waited out: a key that is held down never ends."""
+
+
+class Lines(Protocol):
+    """Where typed lines come from."""
+
+    def next(self, wait_s: float) -> str | None:
+        """Return the next line, ``None`` if none comes within ``wait_s``.
+
+        Raises:
+            EOFError: The input has ended.
+        """
+
+    def forget(self, quiet_s: float) -> list[str]:
+        """Drop what was typed so far, and return the lines among it that were complete.
+
+        Args:
+            quiet_s: How long nothing may come until the input counts as empty; 0 drops what is
+                there and waits for nothing.
+        """
+
+
+def open_lines() -> Lines:
+    """Return the lines of this process's stdin."""
+    if sys.stdin is None or not sys.stdin.isatty():
+        return StreamLines()
+    console = _module("msvcrt")
+    if console is not None:
+        return ConsoleLines(console)
+    termios = _module("termios")
+    try:
+        descriptor = sys.stdin.fileno()
+    except (OSError, ValueError, AttributeError):
+        return StreamLines()
+    return StreamLines() if termios is None else TerminalLines(descriptor, termios)
+
+
+class TerminalLines:
+    """Lines of a POSIX terminal, read without a thread, so that none is taken behind our back."""
+
+    def __init__(self, descriptor: int, termios: Any) -> None:  # noqa: ANN401 - not on Windows
+        self._descriptor = descriptor
+        self._termios = termios
+        self._held = b""
+
+    def next(self, wait_s: float) -> str | None:
+        """Return the next line; see :class:`Lines`."""
+        if b"\n" not in self._held:
+            data = self._read(wait_s)
+            if data == b"":
+                raise EOFError
+            self._held += data or b""
+        line, newline, rest = self._held.partition(b"\n")
+        if not newline:
+            return None
+        self._held = rest
+        return _text(line)
+
+    def forget(self, quiet_s: float) -> list[str]:
+        """Drop what was typed; see :class:`Lines`."""
+        import time
+
+        dropped, self._held = self._held, b""
+        end_s = time.monotonic() + _BURST_S
+        while (data := self._read(quiet_s)) and time.monotonic() < end_s:
+            dropped += data
+        try:
+            # And what stands in a line that nobody has ended with ENTER.
+            self._termios.tcflush(self._descriptor, self._termios.TCIFLUSH)
+        except (OSError, self._termios.error):
+            return []  # the terminal is gone; the next read says so
+        return [_text(line) for line in dropped.split(b"\n")[:-1]]
+
+    def _read(self, wait_s: float) -> bytes | None:
+        """Return what is there, empty at the end of the input, ``None`` when nothing comes."""
+        import select
+
+        ready, _, _ = select.select([self._descriptor], [], [], wait_s)
+        if not ready:
+            return None
+        try:
+            return os.read(self._descriptor, 4096)
+        except OSError:  # EIO: the terminal is gone
+            return b""
+
+
+class StreamLines:
+    """Lines of a file or a pipe, read by a thread; nothing is ever dropped."""
+
+    def __init__(self) -> None:
+        self._queue: queue.SimpleQueue[str | None] = queue.SimpleQueue()
+        self._reader: threading.Thread | None = None
+
+    def next(self, wait_s: float) -> str | None:
+        """Return the next line; see :class:`Lines`."""
+        if self._reader is None:
+            self._reader = threading.Thread(target=self._read, name="prompt", daemon=True)
+            self._reader.start()
+        try:
+            line = self._queue.get(timeout=wait_s)
+        except queue.Empty:
+            return None
+        if line is None:
+            self._queue.put(None)  # it ends for whoever asks again, too
+            raise EOFError
+        return line
+
+    def forget(self, quiet_s: float) -> list[str]:  # noqa: ARG002 - there is nothing to wait for
+        """Drop nothing: these answers were written beforehand, on purpose."""
+        return []
+
+    def _read(self) -> None:
+        try:
+            for line in sys.stdin or ():
+                self._queue.put(line)
+        finally:
+            self._queue.put(None)
+
+
+class ConsoleLines(StreamLines):
+    """Lines of a Windows console: the console's own editing, and its queue of keys."""
+
+    def __init__(self, console: Any) -> None:  # noqa: ANN401 - the module exists on Windows only
+        super().__init__()
+        self._console = console
+
+    def forget(self, quiet_s: float) -> list[str]:
+        """Drop what was typed; see :class:`Lines`."""
+        import time
+
+        dropped: list[str] = []
+        end_s = time.monotonic() + _BURST_S
+        quiet_from_s = time.monotonic()
+        while time.monotonic() < end_s:
+            if self._console.kbhit():
+                self._console.getwch()
+                quiet_from_s = time.monotonic()
+            elif time.monotonic() - quiet_from_s >= quiet_s:
+                break
+            else:
+                time.sleep(0.005)
+        while True:
+            try:
+                line = self._queue.get_nowait()
+            except queue.Empty:
+                return dropped
+            if line is None:
+                self._queue.put(None)
+                return dropped
+            dropped.append(line.rstrip("\r\n"))
+
+
+def _text(line: bytes) -> str:
+    encoding = getattr(sys.stdin, "encoding", None) or "utf-8"
+    return line.decode(encoding, "backslashreplace").rstrip("\r")
+
+
+def _module(name: str) -> ModuleType | None:
+    try:
+        return import_module(name)
+    except ImportError:
+        return None

@@ -1,0 +1,31 @@
+"""Where a process of ``robolink`` begins: a stop goes its own way, all else goes to click.
+
+Nothing is imported here that a stop does not need before its frame (docs/decisions/0017).
+"""
+
+import sys
+from collections.abc import Sequence
+from typing import NoReturn
+
+
+def main() -> NoReturn:
+    """Run the command line of this process and exit."""
+    sys.exit(run(sys.argv[1:]))
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Run one command line; return the exit code (the table is in ``_exit``)."""
+    if "stop" in arguments:
+        from robolink_cli._stop_request import read_stop
+
+        request = read_stop(arguments)
+        if request is not None:
+            from robolink_cli._stop_first import stop_first
+
+            outcome = stop_first(request)
+            from robolink_cli.main import tell_stop
+
+            return tell_stop(request, outcome)
+    from robolink_cli.main import run as run_any
+
+    return run_any(arguments)

@@ -1,0 +1,64 @@
+"""Where another thread may come in between: locks, exchanges, commits, questions.
+
+A program that can be stopped from a second thread is right only if the stop may come at any of
+these points. They are named in the code that passes them, so that a test, or a scheduler that
+places threads on purpose, can let something happen at each one in turn instead of waiting for the
+worst microsecond by chance. Without an observer a checkpoint costs one comparison.
+"""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from enum import StrEnum
+
+
+class Point(StrEnum):
+    """What kind of point a thread passes."""
+
+    LOCK = "lock"
+    """Before it takes the lock of an exchange; it may wait there for another thread."""
+
+    HELD = "held"
+    """It has that lock: whoever else wants it waits. What is decided here cannot be overtaken."""
+
+    EXCHANGE = "exchange"
+    """An exchange is over and its lock is free again."""
+
+    PROCEDURE = "procedure"
+    """Before an operation of several exchanges begins."""
+
+    COMMIT = "commit"
+    """Before, and after, something is stored durably."""
+
+    QUESTION = "question"
+    """A person's answer, or its absence, has just been fetched."""
+
+    STEP = "step"
+    """Between two steps of a procedure."""
+
+
+Observer = Callable[[Point, str], None]
+"""Called by the thread that passes a point, with its kind and what goes on."""
+
+_observer: Observer | None = None
+
+
+def checkpoint(point: Point, what: str = "") -> None:
+    """Pass a point at which another thread may come in between.
+
+    Args:
+        point: Its kind.
+        what: What goes on there: a request, an operation, a question.
+    """
+    if _observer is not None:
+        _observer(point, what)
+
+
+@contextmanager
+def observed(observer: Observer) -> Iterator[None]:
+    """Let ``observer`` see every checkpoint that any thread of this process passes."""
+    global _observer  # noqa: PLW0603 - one process has one order of events
+    before, _observer = _observer, observer
+    try:
+        yield
+    finally:
+        _observer = before

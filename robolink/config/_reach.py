@@ -1,0 +1,124 @@
+"""How a cell is reached, when nothing but that matters.
+
+A stop may not be kept from the robot by a wrong key beside the URL. So of the cell files only the
+address and the place of the password are read here, and where a file cannot be read at all, the
+copy counts that the last successful connection left in the state folder.
+"""
+
+import json
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from robolink.config._files import config_files, read_document
+from robolink.durable_files import file_name, make_folder, state_folder, write_whole
+from robolink.errors import ConfigError
+from robolink.messages import tr
+
+_KIND = "cells"
+
+
+@dataclass(frozen=True, slots=True)
+class Reach:
+    """How a cell is reached.
+
+    Attributes:
+        url: The controller's URL.
+        password_file: File whose first line is the password; empty for none.
+        password_env: Environment variable that holds the password; empty for none.
+        doubt: What is wrong with the cell files, or with this; empty for nothing.
+    """
+
+    url: str
+    password_file: str = ""
+    password_env: str = ""
+    doubt: str = ""
+
+
+def reach_cell(name: str) -> Reach:
+    """Return how the cell ``name`` is reached, read from no more than has to be right for it.
+
+    Raises:
+        ConfigError: No file says it, and no connection has left a copy.
+    """
+    doubts: list[str] = []
+    said: dict[str, object] = {}
+    for file in config_files():
+        if not file.present:
+            continue
+        try:
+            table = _table(read_document(file.path), name)
+        except ConfigError as error:
+            doubts.append(error.what)
+            copy = _recall(name, file.path)
+            table = asdict(copy) if copy else {}
+            if copy:
+                doubts.append(
+                    tr("The address is that of the last connection: {url}.", url=copy.url)
+                )
+        else:
+            hinted = table.get("password_file")
+            if isinstance(hinted, str):
+                table["password_file"] = str(file.path.parent / Path(hinted).expanduser())
+        said = table | said
+        if isinstance(table.get("url"), str):
+            # Farther files speak of the robot at another address (``load_cells``).
+            return Reach(
+                url=str(said["url"]),
+                password_file=_text(said, "password_file"),
+                password_env=_text(said, "password_env"),
+                doubt=" ".join(doubts),
+            )
+    raise ConfigError(
+        " ".join([tr("No address is known for the cell {name!r}.", name=name), *doubts]),
+        remedy=tr(
+            "Give its URL in place of the name, for example -c epson+tcp://192.168.0.1:5000."
+        ),
+    )
+
+
+def remember_reach(name: str, origin: Path, reach: Reach) -> None:
+    """Keep how a cell was reached, for the day when its file cannot be read.
+
+    Args:
+        name: The cell.
+        origin: The file that gave its URL; the same name may mean another cell elsewhere.
+        reach: How it was reached. Nothing secret is in it.
+    """
+    kept = asdict(reach) | {"doubt": ""}
+    path = _copy_of(name, origin)
+    # A copy is a convenience: what keeps it from being written is told when it is missed.
+    with suppress(OSError):
+        if _read(path) != kept:
+            make_folder(path.parent)
+            write_whole(path, json.dumps(kept).encode())
+
+
+def _recall(name: str, origin: Path) -> Reach | None:
+    kept = _read(_copy_of(name, origin))
+    if kept is None or not isinstance(kept.get("url"), str):
+        return None
+    return Reach(str(kept["url"]), _text(kept, "password_file"), _text(kept, "password_env"))
+
+
+def _copy_of(name: str, origin: Path) -> Path:
+    return state_folder(_KIND) / file_name(f"{name} {origin.absolute()}")
+
+
+def _read(path: Path) -> dict[str, object] | None:
+    try:
+        kept = json.loads(path.read_bytes())
+    except (OSError, ValueError):
+        return None
+    return kept if isinstance(kept, dict) else None
+
+
+def _table(document: dict[str, object], name: str) -> dict[str, object]:
+    cells = document.get("cells")
+    table = cells.get(name) if isinstance(cells, dict) else None
+    return dict(table) if isinstance(table, dict) else {}
+
+
+def _text(said: dict[str, object], key: str) -> str:
+    value = said.get(key)
+    return value if isinstance(value, str) else ""

@@ -1,0 +1,86 @@
+"""Bringing an EPSON controller to rest, and knowing that it rests.
+
+Abort ends what Execute runs, whoever began it: also the Execute of a client that has died,
+which goes on without it where the controller's remote time-out is long (epson.md 1.7). Stop
+ends tasks. While an Execute runs only Abort and GetStatus are served (epson.md 1.5), so a Stop
+that was accepted shows, beside the Running flag, that no Execute is left: whether the flag is on
+during an Execute is not documented.
+
+It needs a codec, a transport and a clock; nothing here looks at a record or a file.
+"""
+
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Final
+
+from robolink.errors import BusyError, OutcomeUnknownError, RejectedError
+from robolink.messages import tr
+from robolink.protocols.epson_text import ErrorCode, Reply, StatusFlags, parse_status
+from robolink.timing import Clock, Deadline
+
+REST_S: Final = 5.0
+"""Longest time from the first Abort to a state that shows rest (design part 4)."""
+
+_POLL_S: Final = 0.02
+_AGAIN_S: Final = 1.0
+"""A movement that still goes on after this long is aborted again: stopping may be repeated."""
+
+Ask = Callable[[str], Reply]
+"""Sends the request of that name and returns its reply; a refusal is a ``RejectedError``."""
+
+
+def bring_to_rest(ask: Ask, clock: Clock, *, controller: str) -> tuple[StatusFlags, int]:
+    """Send Abort, then Stop, and return the flags and the code that show rest.
+
+    Args:
+        ask: Asks the controller.
+        clock: The clock on which its time passes.
+        controller: Its name in errors.
+
+    Raises:
+        RejectedError: The controller takes no Stop from here.
+        OutcomeUnknownError: It does not come to rest within :data:`REST_S`.
+        TransportError, RemoteProtocolError: The link is over; whether it stops is not known.
+    """
+    deadline = Deadline.after(clock, REST_S)
+    stopped = False
+    while not deadline.expired:
+        _abort(ask)
+        again = Deadline.after(clock, min(_AGAIN_S, deadline.remaining_s()))
+        while True:
+            stopped = stopped or _stop(ask)
+            flags, code = parse_status(ask("GetStatus"))
+            if stopped and not flags.running:
+                return flags, code
+            if again.expired:
+                break
+            clock.sleep(min(_POLL_S, again.remaining_s()))
+    raise OutcomeUnknownError(
+        tr(
+            "{controller} took the stop, but did not come to rest within {seconds:g} s.",
+            controller=controller,
+            seconds=REST_S,
+        ),
+        remedy=tr("It may still be moving."),
+        controller=controller,
+        request="Stop",
+    )
+
+
+def _abort(ask: Ask) -> None:
+    # Older firmware has none (epson.md 1.9); the Stop that follows tells what is so.
+    with suppress(RejectedError):
+        ask("Abort")
+
+
+def _stop(ask: Ask) -> bool:
+    """Send Stop; False while an Execute that is being aborted is in its way."""
+    try:
+        ask("Stop")
+    except BusyError:
+        return False
+    except RejectedError as error:
+        if error.code != ErrorCode.EXECUTE_RUNNING:
+            raise
+        return False
+    return True

@@ -1,0 +1,44 @@
+"""What counts as a yes and as a no, wherever a person is asked."""
+
+from collections.abc import Callable
+from typing import Final
+
+from robolink.messages import tr
+from robolink.runner._operator import Operator, Question
+
+_YES: Final = frozenset({"y", "yes", "j", "ja", "是"})
+_NO: Final = frozenset({"n", "no", "nein", "否"})
+
+
+def yes_or_no(line: str) -> bool | None:
+    """Return what a typed line says; ``None`` when it is neither a yes nor a no."""
+    word = line.strip().casefold()
+    if word in _YES:
+        return True
+    return False if word in _NO else None
+
+
+def ask_yes_no(operator: Operator, question: str, answer: Callable[[], str]) -> bool:
+    """Ask; what is neither yes nor no is asked once more, and then it is a no.
+
+    A barcode or a key held down is neither, and must not decide anything.
+
+    Args:
+        operator: Who is asked.
+        question: What a yes agrees to.
+        answer: Fetches the next line that the person types.
+    """
+    operator.ask(question, Question.YES_NO)
+    line = answer()
+    said = yes_or_no(line)
+    if said is None:
+        operator.tell(
+            tr(
+                "{line!r} is neither yes nor no. It is asked once more; then anything but a yes "
+                "counts as no.",
+                line=line.strip(),
+            )
+        )
+        operator.ask(question, Question.YES_NO)
+        said = yes_or_no(answer())
+    return said is True

@@ -1,0 +1,119 @@
+"""What stands on a controller after something was done to it, or was not.
+
+Every error carries one (:attr:`robolink.errors.RobolinkError.controller_state`), and so does
+whatever else ended a block in which a controller was used, Ctrl-C and a full disk included. It
+is about what a controller keeps: tool offsets, the selected tool, outputs and variables; and
+about whether the robot may still be moving. Power and speed are set before each movement and
+are not part of it.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+Components = tuple[float, ...] | None
+"""x, y, z in mm and u, v, w in degrees; ``None`` for an undefined tool."""
+
+
+class Effect(StrEnum):
+    """What became of the controller, in one word."""
+
+    UNCHANGED = "unchanged"
+    CHANGED = "changed"
+    UNKNOWN = "unknown"
+
+
+@dataclass(frozen=True, slots=True)
+class ToolStanding:
+    """One tool to which a write was sent.
+
+    Attributes:
+        before: What it held before the first of them, as it was read.
+        holds: What it holds now, as it was read after the last; without meaning while ``known``
+            is false.
+        requested: What the last write was to put there.
+        known: Whether it was read after the last write.
+        differs: Whether what it holds is another value than before, to this controller's
+            precision.
+    """
+
+    before: Components
+    holds: Components
+    requested: Components
+    known: bool = True
+    differs: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """What one block of work left on a controller.
+
+    Attributes:
+        tools: Tools to which a write was sent, by number.
+        selected: Number of the selected tool as it was read last; ``None`` when it was not.
+        selected_before: The same before the first selection; ``None`` when none was sent.
+        selection_known: Whether the selected tool was read after the last selection.
+        carried_out: Other requests that the controller has carried out: outputs, memory bits,
+            variables, typed statements.
+        doubtful: Other requests that may or may not have been carried out.
+        moved: Whether a movement was begun.
+        moving: Movements whose end was not seen.
+        settled: Whether no write and no movement is left unproved or unrecorded, and no change
+            that was neither kept nor taken back.
+        left_open: Whether ``recover`` has something to do: what is not settled, or another tool
+            than the cell's own that is still selected. The next command that moves or writes is
+            refused until then.
+    """
+
+    tools: Mapping[int, ToolStanding] = field(default_factory=dict)
+    selected: int | None = None
+    selected_before: int | None = None
+    selection_known: bool = True
+    carried_out: tuple[str, ...] = ()
+    doubtful: tuple[str, ...] = ()
+    moved: bool = False
+    moving: tuple[str, ...] = ()
+    settled: bool = True
+    left_open: bool = False
+
+    @property
+    def effect(self) -> Effect:
+        """What became of the controller, in one word."""
+        proved = self.selection_known and all(tool.known for tool in self.tools.values())
+        if self.doubtful or self.moving or not proved:
+            return Effect.UNKNOWN
+        written = any(tool.differs for tool in self.tools.values())
+        if self.selected_another or written or self.carried_out:
+            return Effect.CHANGED
+        return Effect.UNCHANGED
+
+    @property
+    def untouched(self) -> bool:
+        """Whether nothing was sent that changes or moves anything."""
+        return not (
+            self.tools
+            or self.carried_out
+            or self.doubtful
+            or self.moved
+            or self.selected_before is not None
+        )
+
+    @property
+    def selected_another(self) -> bool:
+        """Whether another tool is selected than before."""
+        return self.selected_before not in (None, self.selected)
+
+
+UNTOUCHED = Standing()
+"""Nothing was sent that changes or moves anything."""
+
+
+def standing_after(error: BaseException) -> Standing:
+    """Return what ``error``, of whatever kind, left on the controller."""
+    found = getattr(error, "controller_state", UNTOUCHED)
+    return found if isinstance(found, Standing) else UNTOUCHED
+
+
+def note_standing(error: BaseException, standing: Standing) -> None:
+    """Let ``error``, of whatever kind, say from now on what it left on the controller."""
+    error.controller_state = standing  # type: ignore[attr-defined]

@@ -1,0 +1,189 @@
+"""Stopped means stopped: the latch that everything passes on its way out of this process.
+
+``stop()`` closes the latch before it waits for anything. From then on, until a person opens it
+with ``release_stop()``, no movement, jog, write or program start leaves this process, whenever it
+was begun. Whoever sends asks :meth:`StopLatch.admit` while he holds the lock of the exchange, so
+that between the look and the send nothing fits: what was sent before the latch closed is met by
+the stop that follows under the same lock, what comes after it is refused.
+
+Two things are let through, and only in the thread that does them on purpose: the restoring of
+tool, power and speed at the end of a procedure, and one roll-back of each tool of an open change.
+"""
+
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from enum import Enum, auto
+
+from robolink.errors import ControllerError, StoppedError, UnclearAnswerError
+from robolink.messages import tr
+
+
+class CommandClass(Enum):
+    """What a request does to the machine."""
+
+    LOOK = auto()
+    """It reads, logs in or out, or shows that this side is alive."""
+
+    CALM = auto()
+    """It stops, ends, resets or switches off."""
+
+    RESTORE = auto()
+    """It selects a tool, or sets power or speed."""
+
+    WRITE = auto()
+    """It writes or clears a tool."""
+
+    ACT = auto()
+    """Anything else: it moves, starts a program, switches motors or an output on."""
+
+
+class StopLatch:
+    """Open until somebody stops; closed until somebody releases it.
+
+    Args:
+        controller: Identity of the controller, for the errors.
+    """
+
+    def __init__(self, controller: str) -> None:
+        self._controller = controller
+        self._closed = False
+        self._stops = threading.Condition()
+        self._under_way = 0
+        self._permits = threading.local()
+        self._put_back: set[int] = set()
+
+    @property
+    def closed(self) -> bool:
+        """Whether a stop is in force."""
+        return self._closed
+
+    def close(self) -> None:
+        """Hold everything back from now on; never waits."""
+        self._closed = True
+
+    @contextmanager
+    def stopping(self) -> Iterator[None]:
+        """Close the latch, and surround the dialogue that brings the machine to rest."""
+        self.close()
+        with self._stops:
+            self._under_way += 1
+        try:
+            yield
+        finally:
+            with self._stops:
+                self._under_way -= 1
+                self._stops.notify_all()
+
+    def await_stops(self, timeout_s: float) -> None:
+        """Let the stops that are under way in other threads end before the link is closed."""
+        with self._stops:
+            self._stops.wait_for(lambda: not self._under_way, timeout_s)
+
+    def release(self) -> None:
+        """Let things pass again, because a person says so."""
+        self._put_back.clear()
+        self._closed = False
+
+    def admit(self, kind: CommandClass, request: str) -> None:
+        """Hold ``request`` back if a stop forbids it; called under the lock of its exchange.
+
+        Raises:
+            StoppedError: It was not sent.
+        """
+        if not self._closed or kind in (CommandClass.LOOK, CommandClass.CALM):
+            return
+        if kind is CommandClass.RESTORE and self._restoring:
+            return
+        if kind is CommandClass.WRITE and self._permit("writing"):
+            return
+        raise StoppedError(
+            tr("{request} was not sent: the controller was stopped.", request=request),
+            remedy=_remedy(),
+            controller=self._controller,
+            request=request,
+        )
+
+    def require_open(self, request: str) -> None:
+        """Refuse to begin, or to go on with, an operation of several exchanges.
+
+        A thread that restores is let through; what it may send is decided by :meth:`admit`.
+
+        Raises:
+            StoppedError: A stop is in force.
+        """
+        if self._closed and not self._restoring:
+            raise StoppedError(
+                tr("{request}: ended by a stop.", request=request),
+                remedy=_remedy(),
+                controller=self._controller,
+                request=request,
+            )
+
+    @contextmanager
+    def watching(self, request: str) -> Iterator[None]:
+        """Surround an operation that must not begin under a stop, nor end well under one.
+
+        Raises:
+            StoppedError: A stop was in force at its beginning, or came meanwhile.
+        """
+        self.require_open(request)
+        with self.ending(request):
+            yield
+
+    @contextmanager
+    def ending(self, request: str) -> Iterator[None]:
+        """Surround what must not end well under a stop.
+
+        Raises:
+            StoppedError: A stop is in force at its end, be that a success or a "no" of the
+                controller, which the stop explains.
+        """
+        try:
+            yield
+        except (ControllerError, UnclearAnswerError):
+            self.require_open(request)
+            raise
+        self.require_open(request)
+
+    @contextmanager
+    def restoring(self) -> Iterator[None]:
+        """Let this thread select a tool and set power and speed although a stop is in force."""
+        before = self._restoring
+        self._permits.restoring = True
+        try:
+            yield
+        finally:
+            self._permits.restoring = before
+
+    @contextmanager
+    def putting_back(self, tool: int) -> Iterator[None]:
+        """Let this thread write the old value of ``tool`` although a stop is in force; once.
+
+        Raises:
+            StoppedError: That was done since the stop already.
+        """
+        if self._closed and tool in self._put_back:
+            self.admit(CommandClass.ACT, tr("Tool {tool}, put back once more,", tool=tool))
+        before = self._permit("writing")
+        self._permits.writing = True
+        try:
+            with self.restoring():
+                yield
+        finally:
+            self._permits.writing = before
+            if self._closed:
+                self._put_back.add(tool)
+
+    @property
+    def _restoring(self) -> bool:
+        return self._permit("restoring")
+
+    def _permit(self, name: str) -> bool:
+        return bool(self._permits.__dict__.get(name))
+
+
+def _remedy() -> str:
+    return tr(
+        "Nothing goes on by itself: when the cell is clear, release the stop and start again."
+    )

@@ -1,0 +1,31 @@
+"""A stop beside a running robolink: who has the controller, and what a stop leaves behind.
+
+``stop_now`` of :mod:`robolink.controllers` stops a controller that can be reached. Here is what
+stands around it: the listener of a process that holds one, how a second terminal finds and asks
+it, and the note by which the next command learns of the stop.
+"""
+
+from typing import TYPE_CHECKING
+
+from robolink.lazy_exports import lazy_exports
+
+if TYPE_CHECKING:
+    from robolink.stopping._asking import Holder as Holder
+    from robolink.stopping._asking import HolderGoneError as HolderGoneError
+    from robolink.stopping._asking import holders_of as holders_of
+    from robolink.stopping._far_end import far_end_of as far_end_of
+    from robolink.stopping._listener import StopListener as StopListener
+    from robolink.stopping._notes import StopNote as StopNote
+    from robolink.stopping._notes import clear_note as clear_note
+    from robolink.stopping._notes import find_note as find_note
+    from robolink.stopping._notes import leave_note as leave_note
+else:
+    __getattr__ = lazy_exports(
+        __name__,
+        {
+            "_asking": "Holder HolderGoneError holders_of",
+            "_far_end": "far_end_of",
+            "_listener": "StopListener",
+            "_notes": "StopNote clear_note find_note leave_note",
+        },
+    )

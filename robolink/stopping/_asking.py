@@ -1,0 +1,179 @@
+"""Asking the process that holds a controller to stop it."""
+
+import json
+import os
+import socket
+import time
+from collections.abc import Iterator, Set
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from robolink import errors
+from robolink.durable_files import state_folder
+from robolink.messages import tr
+
+KIND: Final = "holders"
+MOST_BYTES: Final = 65_536
+
+_TAKEN_S: Final = 1.0
+"""A process that does not even take the request in this time is no help."""
+
+_RESTS_S: Final = 8.0
+"""Longest wait for the end of a stop that was taken: five seconds to rest, and the exchanges."""
+
+
+@dataclass(frozen=True, slots=True)
+class Holder:
+    """A process on this computer that has a controller, and listens.
+
+    Attributes:
+        place: Path of its socket, or address and port.
+        token: What opens it.
+        pid: Its number.
+        who: Who it is, and what it does, as a person is told.
+        card: The file that says so.
+    """
+
+    place: str | tuple[str, int]
+    token: str
+    pid: int
+    who: str
+    card: Path
+
+    def ask_to_stop(self, who: str) -> str:
+        """Let it stop its controller; return the state that shows rest.
+
+        Args:
+            who: Who asks, as the person at the other terminal is told.
+
+        Raises:
+            HolderGoneError: It does not take the request; nothing was done.
+            OutcomeUnknownError: It took the request and did not say how it ended.
+            RobolinkError: What its stop raised.
+        """
+        try:
+            line = self._knock()
+        except OSError as error:
+            raise HolderGoneError(self.pid) from error
+        with line, line.makefile("rwb") as talk:
+            try:
+                talk.write(json.dumps({"token": self.token, "who": who}).encode() + b"\n")
+                talk.flush()
+                if not _answer(talk.readline(MOST_BYTES)).get("taken"):
+                    raise HolderGoneError(self.pid)
+            except OSError as error:
+                raise HolderGoneError(self.pid) from error
+            try:
+                line.settimeout(_RESTS_S)
+                end = _answer(talk.readline(MOST_BYTES))
+            except OSError:
+                end = {}
+        return self._state(end)
+
+    def _knock(self) -> socket.socket:
+        if isinstance(self.place, str):
+            line = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        else:
+            line = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+        line.settimeout(_TAKEN_S)
+        try:
+            line.connect(self.place)
+        except OSError:
+            line.close()
+            raise
+        return line
+
+    def _state(self, end: dict[str, object]) -> str:
+        if "state" in end:
+            return str(end["state"])
+        what, remedy = str(end.get("what", "")), str(end.get("remedy", ""))
+        kind = getattr(errors, str(end.get("error", "")), None)
+        if kind in _TOLD:
+            raise kind(what, remedy=remedy)
+        raise errors.OutcomeUnknownError(
+            what
+            or tr(
+                "The process that has the controller ({pid}) took the stop and did not say how it "
+                "ended.",
+                pid=self.pid,
+            ),
+            remedy=remedy or tr("It may still be moving."),
+        )
+
+
+_TOLD: Final = (
+    errors.ConnectError,
+    errors.TransportTimeoutError,
+    errors.TransportClosedError,
+    errors.TransportBrokenError,
+    errors.RemoteProtocolError,
+    errors.RejectedError,
+)
+
+
+class HolderGoneError(Exception):
+    """A process that was said to have the controller does not take a request."""
+
+    def __init__(self, pid: int) -> None:
+        super().__init__(pid)
+        self.pid = pid
+
+
+def holders_of(keys: Set[str]) -> Iterator[Holder]:
+    """Yield the processes on this computer that hold a far end, the latest first.
+
+    What a process that is gone has left is taken away.
+    """
+    folder = state_folder(KIND)
+    try:
+        cards = [Path(entry) for entry in os.scandir(folder) if entry.name.endswith(".json")]
+    except OSError:
+        return
+    for card in sorted(cards, key=_age):
+        holder = _read(card, keys)
+        if holder is not None:
+            yield holder
+
+
+def _read(card: Path, keys: Set[str]) -> Holder | None:
+    try:
+        said = json.loads(card.read_bytes())
+        held, place, pid = set(said["keys"]), said["place"], int(said["pid"])
+        if not held & keys:
+            return None
+        if _is_gone(pid):
+            card.unlink()
+            card.with_suffix(".sock").unlink(missing_ok=True)
+            return None
+        where = place if isinstance(place, str) else (str(place[0]), int(place[1]))
+        return Holder(where, str(said["token"]), pid, str(said["who"]), card)
+    except (OSError, ValueError, TypeError, KeyError, IndexError):
+        return None
+
+
+def _is_gone(pid: int) -> bool:
+    if os.name != "posix":
+        return False  # a signal of 0 would end it there
+    with suppress(PermissionError):
+        try:
+            os.kill(pid, 0)
+        except ProcessLookupError:
+            return True
+    return False
+
+
+def _age(card: Path) -> float:
+    try:
+        return time.time() - card.stat().st_mtime
+    except OSError:
+        return 0.0
+
+
+def _answer(line: bytes) -> dict[str, object]:
+    try:
+        told = json.loads(line)
+    except ValueError:
+        return {}
+    return told if isinstance(told, dict) else {}

@@ -1,0 +1,195 @@
+"""A process that holds a controller listens for the stop from a second terminal.
+
+EPSON serves one client (epson.md 1.1), a serial line is opened once, and a CANopen node answers
+one at a time. So whoever has the controller is the one who can stop it: it listens on a local
+socket, for its own user only, and stops on request. Where the system has no such sockets, or the
+path is too long for one, it listens on the loopback address, and a token in a file that only this
+user can read opens it.
+
+The thread that listens is the only one that robolink starts on its own; it does nothing but
+``controller.stop()``, which any thread may call.
+"""
+
+import json
+import os
+import secrets
+import select
+import socket
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from types import TracebackType
+from typing import Final, Protocol, Self
+
+from robolink.durable_files import make_folder, state_folder
+from robolink.errors import RobolinkError
+from robolink.messages import tr
+from robolink.model import ControllerStatus
+from robolink.stopping._far_end import far_end_of
+
+KIND: Final = "holders"
+MOST_BYTES: Final = 4096
+"""Nothing that is asked or answered here is longer."""
+
+_HEARD_S: Final = 1.0
+_LAST_STOP_S: Final = 10.0
+"""Longest wait for a stop under way before the controller is left."""
+
+_LONGEST_PATH: Final = 100
+"""Bytes of a socket's path; Linux takes 107, others 103."""
+
+
+class Stoppable(Protocol):
+    """What the listener needs of a controller."""
+
+    def stop(self) -> None:
+        """Bring it to rest; any thread may call it."""
+
+    def status(self) -> ControllerStatus:
+        """Read its state."""
+
+
+class StopListener:
+    """Listens while a controller is held; a context manager.
+
+    Leave it before the controller is closed: it then waits for a stop that is under way.
+
+    Args:
+        controller: What is stopped.
+        url: How it was reached.
+        who: Who holds it, and for what, as a person is told.
+        heard: Called with who stopped it, in the listener's thread, before the stop.
+
+    Raises:
+        OSError: There is no place to listen.
+    """
+
+    def __init__(
+        self,
+        controller: Stoppable,
+        url: str,
+        *,
+        who: str = "",
+        heard: Callable[[str], None] | None = None,
+    ) -> None:
+        self._controller = controller
+        self._heard = heard
+        self._token = secrets.token_hex(16)
+        folder = state_folder(KIND)
+        make_folder(folder)
+        name = f"{os.getpid()}-{self._token[:8]}"
+        self._card = folder / f"{name}.json"
+        self._socket, self._path = _listening(folder / f"{name}.sock")
+        self._wake, self._awake = socket.socketpair()
+        card: dict[str, object] = {
+            "keys": sorted(far_end_of(url)),
+            "place": self._path or list(self._socket.getsockname()),
+            "token": self._token,
+            "pid": os.getpid(),
+            "who": who,
+        }
+        self._publish(card)
+        self._thread = threading.Thread(target=self._listen, name="robolink-stop", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Stop listening, after a stop that is under way has been answered. Idempotent."""
+        with suppress(OSError):
+            self._wake.send(b"\0")
+        self._thread.join(_LAST_STOP_S)
+        self._card.unlink(missing_ok=True)
+        if self._path:
+            Path(self._path).unlink(missing_ok=True)
+        for one in (self._socket, self._wake, self._awake):
+            one.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def _publish(self, card: dict[str, object]) -> None:
+        """Write where to knock; not synced to the disk, because it dies with the process."""
+        try:
+            draft = self._card.with_suffix(".new")
+            descriptor = os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+            with open(descriptor, "w", encoding="utf-8") as file:
+                json.dump(card, file)
+            os.replace(draft, self._card)
+        except OSError:
+            self._socket.close()
+            raise
+
+    def _listen(self) -> None:
+        while True:
+            ready, _, _ = select.select([self._socket, self._awake], [], [])
+            if self._awake in ready:
+                return
+            with suppress(OSError):  # whoever knocked has left
+                caller, _ = self._socket.accept()
+                with caller:
+                    caller.settimeout(_HEARD_S)
+                    self._serve(caller)
+
+    def _serve(self, caller: socket.socket) -> None:
+        asked = _read_line(caller)
+        if not secrets.compare_digest(str(asked.get("token", "")), self._token):
+            return
+        _tell(caller, {"taken": True})
+        if self._heard:
+            self._heard(str(asked.get("who", "")))
+        try:
+            self._controller.stop()
+            _tell(caller, {"state": str(self._controller.status().state)})
+        except RobolinkError as error:
+            _tell(
+                caller,
+                {"error": type(error).__name__, "what": error.what, "remedy": error.remedy},
+            )
+        except Exception as error:
+            what = tr(
+                "A defect in robolink: {kind}: {error}", kind=type(error).__name__, error=error
+            )
+            _tell(caller, {"error": "OutcomeUnknownError", "what": what, "remedy": ""})
+
+
+def _listening(path: Path) -> tuple[socket.socket, str]:
+    """Return a listening socket, and its path where it has one."""
+    family = getattr(socket, "AF_UNIX", None)
+    if family is not None and len(os.fsencode(path)) <= _LONGEST_PATH:
+        listening = socket.socket(family, socket.SOCK_STREAM)
+        try:
+            listening.bind(str(path))
+            path.chmod(0o600)  # the folder was its owner's alone before
+            listening.listen()
+        except OSError:
+            listening.close()
+        else:
+            return listening, str(path)
+    return socket.create_server(("127.0.0.1", 0)), ""
+
+
+def _read_line(caller: socket.socket) -> dict[str, object]:
+    data = b""
+    while not data.endswith(b"\n") and len(data) < MOST_BYTES:
+        piece = caller.recv(MOST_BYTES - len(data))
+        if not piece:
+            break
+        data += piece
+    try:
+        asked = json.loads(data)
+    except ValueError:
+        return {}
+    return asked if isinstance(asked, dict) else {}
+
+
+def _tell(caller: socket.socket, answer: dict[str, object]) -> None:
+    with suppress(OSError):  # whoever asked has left; the stop goes on
+        caller.sendall(json.dumps(answer).encode() + b"\n")

@@ -1,0 +1,27 @@
+"""Numbers by which simulated controllers are told apart.
+
+Each simulator is a controller of its own: what was left unfinished on one is not for the next
+one on its port.
+"""
+
+import random
+import secrets
+from typing import Final
+
+_HIGHEST: Final = 0xFFFF_FFFF
+
+
+def drawn_number(origin: str = "") -> int:
+    """Return a number from 1 to 2^32 - 1.
+
+    Args:
+        origin: The same text draws the same number; empty draws another one each time.
+    """
+    if origin:
+        return random.Random(f"serial {origin}").randint(1, _HIGHEST)
+    return 1 + secrets.randbelow(_HIGHEST)
+
+
+def drawn_serial(origin: str = "") -> str:
+    """Return a serial number as :func:`drawn_number` draws it, marked as a simulator's."""
+    return f"SIM{drawn_number(origin):08X}"

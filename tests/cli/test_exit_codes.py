@@ -1,0 +1,55 @@
+"""The exit codes that are documented are those of the code, and 6 comes first."""
+
+import re
+from pathlib import Path
+
+import pytest
+from robolink_cli import _exit
+
+from robolink import errors
+from robolink.standing import Standing, ToolStanding, note_standing
+
+_PAGE = Path(__file__).parents[2] / "docs" / "exit-codes.md"
+_NAMED = {
+    value
+    for name, value in vars(_exit).items()
+    if name.isupper() and isinstance(value, int) and not isinstance(value, bool)
+}
+
+
+def test_the_page_has_the_table_of_the_code():
+    rows = re.findall(r"^\| (\d+) \| (.+) \|$", _PAGE.read_text(), re.MULTILINE)
+    assert {int(code): meaning for code, meaning in rows} == _exit.MEANINGS
+    assert [int(code) for code, _ in rows] == sorted(_exit.MEANINGS)
+
+
+def test_every_code_that_a_command_can_end_with_has_a_meaning():
+    assert _NAMED | {code for _, code in _exit.EXIT_CODES} == set(_exit.MEANINGS)
+
+
+OLD, NEW = (12.0, -3.5, -20.0, 0.0, 0.0, 0.0), (12.5, -3.5, -20.0, 0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        errors.TransportBrokenError("gone"),
+        errors.RemoteProtocolError("bent"),
+        errors.JournalError("full"),
+        errors.VerifyError("drifts"),
+        errors.StoppedError("stopped"),
+        OSError("no space left"),
+        KeyboardInterrupt(),
+    ],
+    ids=lambda error: type(error).__name__,
+)
+def test_what_is_not_settled_outranks_whatever_broke_afterwards(error):
+    settled = _exit.exit_code(error)
+    assert settled != 6
+    tools = {1: ToolStanding(before=OLD, holds=NEW, requested=NEW)}
+    note_standing(error, Standing(tools=tools, settled=False, left_open=True))
+    assert _exit.exit_code(error) == 6
+    body = _exit.error_body(error)
+    assert body["controller_state"] == "changed"
+    note_standing(error, Standing(tools=tools))
+    assert _exit.exit_code(error) == settled

@@ -1,0 +1,90 @@
+"""What is no regular file, or has no end, is refused at once by every command that reads one."""
+
+import json
+import os
+import resource
+import time
+from pathlib import Path
+
+import pytest
+from robolink_cli import main
+
+from robolink.named_files import MOST_BYTES, read_named
+
+pytestmark = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="POSIX pipes and devices")
+
+URL = "epson+sim://no-regular-files"
+MAP_URL = "plc+modbus-tcp://127.0.0.1:1?map={file}"
+COMMANDS = {
+    "backup": ["-c", URL, "restore", "{file}", "--yes"],
+    "compare": ["-c", URL, "compare", "{file}"],
+    "recipe": ["-c", URL, "recalibrate", "{file}", "--yes"],
+    "poses": ["-c", URL, "calibrate", "two-pose", "--tool", "1", "--poses", "{file}", "--yes"],
+    "points": ["-c", URL, "impact", "--tool", "1", "--x", "1", "--pts", "{file}"],
+    "map": ["-c", MAP_URL, "status"],
+    "map check": ["plc", "check-map", "{file}"],
+    "register list": ["plc", "check-map", "--from-csv", "{file}"],
+    "case": ["solve", "{file}"],
+    "table": ["solve", "{file}", "--method", "pivot"],
+    "recording": ["sim", "epson", "--tcp", "127.0.0.1:0", "--replay", "{file}"],
+    "profile": ["sim", "epson", "--tcp", "127.0.0.1:0", "--profile", "{file}"],
+    "state": ["sim", "epson", "--tcp", "127.0.0.1:0", "--state", "{file}"],
+    "PLC state": ["sim", "softmotion", "--modbus-tcp", "127.0.0.1:0", "--state", "{file}"],
+}
+
+
+@pytest.fixture(params=["pipe", "endless", "folder"])
+def no_file(request, tmp_path):
+    """A pipe that nobody writes to, a device that never ends, a folder."""
+    if request.param == "endless":
+        return Path("/dev/zero")
+    path = tmp_path / request.param
+    if request.param == "pipe":
+        os.mkfifo(path)
+    else:
+        path.mkdir()
+    return path
+
+
+@pytest.fixture(autouse=True)
+def _own_state_folder(state_folder):
+    return state_folder
+
+
+def run(words, capsys):
+    began_s, before_kb = time.monotonic(), _memory_kb()
+    code = main.run(["--json", *words])
+    document = json.loads(capsys.readouterr().out)
+    assert time.monotonic() - began_s < 10.0
+    assert _memory_kb() - before_kb < 200_000
+    return code, document["error"]["what"]
+
+
+def _memory_kb():
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_it_is_refused_and_not_waited_for(name, no_file, capsys):
+    words = [word.replace("{file}", str(no_file)) for word in COMMANDS[name]]
+    code, what = run(words, capsys)
+    assert code == 2, what
+    assert str(no_file) in what, what
+
+
+def test_a_cell_file_is_no_exception(no_file, capsys, monkeypatch):
+    monkeypatch.setenv("ROBOLINK_CONFIG", str(no_file))
+    code, what = run(["-c", "a", "status"], capsys)
+    assert code == 2
+    assert str(no_file) in what
+
+
+def test_a_file_that_is_too_long_is_refused_and_a_link_is_followed(tmp_path):
+    path, link = tmp_path / "long", tmp_path / "link"
+    path.write_bytes(b"x" * MOST_BYTES)
+    link.symlink_to(path)
+    assert len(read_named(link)) == MOST_BYTES
+    with path.open("ab") as file:
+        file.write(b"x")
+    with pytest.raises(OSError, match="longer than 4 MB"):
+        read_named(path)

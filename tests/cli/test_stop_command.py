@@ -1,0 +1,304 @@
+"""``robolink stop``: nothing keeps it back, and what was wrong is said when the robot stands."""
+
+import json
+import os
+import socket
+import subprocess
+import sys
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import click
+import pytest
+from robolink_cli import entry, main
+from robolink_cli._stop_request import FLAGS, VALUES, StopRequest, read_stop
+from robolink_simulators.clock import ScaledClock
+from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.hosting.modbus import serve_modbus_tcp
+from robolink_simulators.hosting.tcp import serve_tcp
+from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
+
+import robolink
+from robolink import Secret
+from robolink.controllers.epson import EpsonController
+from robolink.journal import close_files, open_journal
+from robolink.model import MotionProfile, WorkBox
+from robolink.model import Path as MovePath
+from robolink.stopping import far_end_of, find_note
+from robolink.transport import parse_url
+
+CREEPING = MotionProfile(MovePath.STRAIGHT, 5, 1.0)
+
+
+@pytest.fixture
+def moving(state_folder):
+    """An EPSON robot on the network that creeps for 30 s, left alone by its client."""
+    simulator = EpsonSimulator(seed=4)
+    with serve_tcp(simulator, clock=ScaledClock(1.0)) as host:
+        controller = robolink.connect(host.url)
+        controller.motors(True)
+        here = controller.groups[0].pose()
+        controller.groups[0].move_to(replace(here, z_mm=here.z_mm + 30), CREEPING, box=WorkBox())
+        assert isinstance(controller, EpsonController)
+        controller._session._transport.close()
+        controller.outcomes.close()  # the lease of the one who died
+        simulator.url = host.url
+        yield simulator
+        close_files()
+
+
+@pytest.fixture
+def stop(moving, capsys):
+    """Run ``stop`` and return the exit code and what was shown; the arm must stand."""
+
+    def ran(*arguments):
+        code = entry.run([*(arguments or ("-c", moving.url)), "stop"])
+        shown = capsys.readouterr()
+        assert not moving.machine.arm.moving, shown
+        return code, shown.out, shown.err
+
+    return ran
+
+
+def test_it_stops_and_says_that_it_stands(moving, stop):
+    code, out, err = stop()
+    assert code == 0
+    assert out == f"{moving.url} stands; its state is: ready.\n"
+    assert "Nothing moves with --yes before" in err
+    assert "without a clear answer" in err  # the movement of the client that died
+
+
+def test_its_document(moving, stop):
+    code, out, _ = stop("-c", moving.url, "--json")
+    assert code == 0
+    assert json.loads(out) == {
+        "schema": "robolink/stop/1",
+        "stopped": True,
+        "controller": moving.url,
+        "state": "ready",
+        "stopped_by": None,
+    }
+
+
+def test_a_journal_of_garbage_is_told_afterwards_and_truly(moving, stop, state_folder):
+    close_files()
+    for file in state_folder.glob("journal.db*"):
+        file.unlink()
+    (state_folder / "journal.db").write_bytes(b"no database" * 100)
+    code, out, err = stop()
+    assert code == 0
+    assert "stands" in out
+    assert "journal" in err
+    assert "None of this kept the stop back." in err
+    assert "not touched" not in out + err
+
+
+CELL = '[cells.a]\nurl = "{url}"\n{more}'
+
+
+@pytest.mark.parametrize(
+    "more", ["", "no_such_key = 1", "speed_mm_s = 'fast'", "[cells.b]\nurl = 7"]
+)
+def test_of_the_cell_file_only_the_address_has_to_be_right(moving, stop, more):
+    Path("robolink.toml").write_text(CELL.format(url=moving.url, more=more))
+    assert stop("-c", "a")[0] == 0
+
+
+def test_a_cell_file_that_is_broken_leaves_the_address_of_the_last_connection(moving, stop, capsys):
+    assert stop()[0] == 0
+    Path("robolink.toml").write_text(CELL.format(url=moving.url, more=""))
+    assert main.run(["-c", "a", "status"]) == 0
+    Path("robolink.toml").write_text(CELL.format(url=moving.url, more="[[["))
+    capsys.readouterr()
+    code, out, err = stop("-c", "a")
+    assert code == 0
+    assert moving.url in out
+    assert "robolink.toml cannot be read" in err
+    assert f"The address is that of the last connection: {moving.url}." in err
+
+
+@pytest.mark.parametrize("command", [["status"], ["where"], ["motors", "off"], ["reset", "--yes"]])
+def test_what_looks_or_calms_works_with_broken_files_too(
+    moving, stop, state_folder, command, capsys
+):
+    Path("robolink.toml").write_text(CELL.format(url=moving.url, more=""))
+    assert stop("-c", "a")[0] == 0
+    assert main.run(["-c", "a", "status"]) == 0
+    close_files()
+    for file in state_folder.glob("journal.db*"):
+        file.unlink()
+    (state_folder / "journal.db").write_bytes(b"no database" * 100)
+    Path("robolink.toml").write_text(CELL.format(url=moving.url, more="[[["))
+    capsys.readouterr()
+    assert main.run(["-c", "a", *command]) == 0
+    assert "cannot be read" in capsys.readouterr().err
+    assert main.run(["-c", "a", "motors", "on"]) == 2  # what stirs is kept back
+
+
+def test_a_lease_that_another_holds_is_no_matter(moving, stop):
+    identity = parse_url(moving.url).identity
+    with open_journal().log(identity).hold("a long change"):
+        assert stop()[0] == 0
+
+
+def test_a_state_folder_that_is_none_is_no_matter(moving, stop, tmp_path, monkeypatch):
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "file"))
+    code, out, err = stop()
+    assert (code, "stands" in out) == (0, True)
+    assert "The note of this stop could not be kept" in err
+
+
+def test_a_password_file_that_others_may_read_does_not_keep_it_back(moving, stop, tmp_path):
+    (tmp_path / "password").write_text("x")
+    (tmp_path / "password").chmod(0o644)
+    code, _, err = stop("-c", moving.url, "--password-file", str(tmp_path / "password"))
+    assert code == 0
+    assert "Others than its owner may read" in err
+
+
+def test_the_recording_is_written_afterwards(moving, stop, tmp_path):
+    assert stop("-c", moving.url, "--record", str(tmp_path / "talk"))[0] == 0
+    talk = (tmp_path / "talk").read_text()
+    assert talk.index("$Abort") < talk.index("$Stop") < talk.index("$GetStatus")
+    assert stop("-c", moving.url, "--record", str(tmp_path / "no" / "talk"))[0] == 0
+
+
+def test_a_wrong_password_in_the_environment_gives_way_to_the_keyring(
+    state_folder, monkeypatch, capsys
+):
+    keyring = SimpleNamespace(get_password=lambda service, user: "right")
+    monkeypatch.setitem(sys.modules, "keyring", keyring)
+    monkeypatch.setitem(sys.modules, "keyring.errors", SimpleNamespace(KeyringError=OSError))
+    monkeypatch.setenv("ROBOLINK_PASSWORD", "wrong")
+    with serve_tcp(EpsonSimulator(seed=4, password=Secret("right"))) as host:
+        assert entry.run(["-c", host.url, "stop"]) == 0
+        keyring.get_password = lambda service, user: None
+        assert entry.run(["-c", host.url, "stop"]) == 5
+    assert "refused the login" in capsys.readouterr().err
+
+
+def test_nobody_there_is_told_and_leaves_no_note(state_folder, capsys):
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        url = f"epson+tcp://127.0.0.1:{taken.getsockname()[1]}"
+        assert entry.run(["-c", url, "stop", "--timeout", "0.5"]) == 3
+        assert "press the emergency stop" in capsys.readouterr().err
+        assert find_note(far_end_of(url)) is None
+        assert entry.run(["-c", url, "stop", "--timeout", "0.5", "--json"]) == 3
+        assert json.loads(capsys.readouterr().out)["error"]["kind"] == "ConnectError"
+
+
+def test_a_note_holds_the_next_movement_until_somebody_releases_it(moving, stop, capsys):
+    assert stop("-c", moving.url, "--operator", "anna")[0] == 0
+    assert main.run(["-c", moving.url, "resolve", "--yes"]) == 0
+    localhost = moving.url.replace("127.0.0.1", "localhost")
+    jog = ["jog", "x+1", "--yes", "-c"]
+    started = moving.machine.arm.moves_started
+    capsys.readouterr()
+    for url in (moving.url, localhost):
+        assert main.run([*jog, url]) == 10
+        assert "anna (process" in capsys.readouterr().err
+    assert moving.machine.arm.moves_started == started
+    assert main.run(["-c", localhost, "release", "--yes", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["released"] is True
+    assert main.run([*jog, moving.url]) == 0
+    assert moving.machine.arm.moves_started == started + 1
+    assert main.run(["-c", localhost, "release"]) == 0
+    assert "No stop is noted" in capsys.readouterr().out
+
+
+def test_a_reset_takes_the_note_away_too(moving, stop):
+    assert stop()[0] == 0
+    assert find_note(far_end_of(moving.url)) is not None
+    assert main.run(["-c", moving.url, "reset", "--yes"]) == 0
+    assert find_note(far_end_of(moving.url)) is None
+
+
+def test_a_note_that_cannot_be_read_is_a_note(moving, stop, state_folder, capsys):
+    assert stop()[0] == 0
+    (note,) = (state_folder / "stops").iterdir()
+    note.write_bytes(b"{")
+    assert main.run(["-c", moving.url, "resolve", "--yes"]) == 0
+    assert main.run(["jog", "x+1", "--yes", "-c", moving.url]) == 10
+    assert "cannot be read" in capsys.readouterr().err
+
+
+def test_what_is_read_by_hand_is_what_click_knows():
+    context = click.Context(main.cli)
+    command = main.cli.get_command(context, "stop")
+    assert command is not None
+    options = {name: parameter for parameter in command.params for name in parameter.opts}
+    flags = {name for name, parameter in options.items() if getattr(parameter, "is_flag", False)}
+    assert set(VALUES) == set(options) - flags
+    assert set(FLAGS) == flags - {"--dry-run"}
+
+
+@pytest.mark.parametrize(
+    ("words", "read"),
+    [
+        ("stop", StopRequest()),
+        ("-c a stop", StopRequest("a")),
+        ("stop -c a --json", StopRequest("a", json=True)),
+        ("-c b stop --controller=a", StopRequest("a")),
+        ("--timeout 2 stop", StopRequest(timeout_s=2.0)),
+        ("--remote-timeout 5 stop --operator stop", StopRequest(operator="stop")),
+        ("stop --record x --password-file y", StopRequest(record="x", password_file="y")),
+        ("stop now", None),
+        ("stop --help", None),
+        ("stop --dry-run", None),
+        ("stop --timeout 0", None),
+        ("stop --timeout x", None),
+        ("stop -c", None),
+        ("jog stop", None),
+        ("-c stop status", None),
+        ("stop --no-such", None),
+        ("stop -ca", None),
+    ],
+)
+def test_how_a_command_line_is_read(words, read, monkeypatch):
+    monkeypatch.delenv("ROBOLINK_OPERATOR", raising=False)
+    assert read_stop(words.split()) == read
+
+
+def test_the_environment_names_the_controller(monkeypatch):
+    monkeypatch.setenv("ROBOLINK_CONTROLLER", "a")
+    monkeypatch.setenv("ROBOLINK_OPERATOR", "anna")
+    assert read_stop(["stop"]) == StopRequest("a", operator="anna")
+
+
+HEAVY = """
+can canopen click jinja2 keyring lark numpy pydantic pymodbus rich sqlalchemy sqlite3 logging
+asyncio robolink.journal robolink.calibration robolink.controllers.epson._controller
+robolink.controllers.softmotion._controller
+"""
+
+PROBE = """
+import sys
+from robolink_cli._stop_request import read_stop
+from robolink_cli._stop_first import stop_first
+outcome = stop_first(read_stop(["-c", "a", "stop"]))
+assert outcome.error is None, outcome.error
+print(*sorted(set(sys.argv[1:]) & set(sys.modules)), sep=",")
+"""
+
+
+@pytest.mark.parametrize("kind", ["epson", "modbus"])
+def test_nothing_heavy_is_loaded_before_the_robot_stands(state_folder, kind):
+    with ExitStack() as stack:
+        if kind == "epson":
+            url = stack.enter_context(serve_tcp(EpsonSimulator(seed=4))).url
+        else:
+            url = stack.enter_context(serve_modbus_tcp(SoftMotionSimulator(seed=4))).url
+        Path("robolink.toml").write_text(CELL.format(url=url, more=""))
+        done = subprocess.run(
+            [sys.executable, "-c", PROBE, *HEAVY.split()],
+            check=False,
+            capture_output=True,
+            text=True,
+            timeout=30,
+            env={**os.environ, "ROBOLINK_STATE_DIR": str(state_folder)},
+        )
+    assert (done.stdout, done.stderr) == ("\n", "")

@@ -1,0 +1,63 @@
+"""A pseudo terminal on which a real command runs, and what a person does at it."""
+
+import os
+import re
+import select
+import subprocess
+import sys
+import termios
+import time
+
+LONGEST_S = 20.0
+
+
+class Terminal:
+    """The far end of a pseudo terminal on which a command runs."""
+
+    def __init__(self, *words):
+        self.descriptor, near = os.openpty()
+        self.before = termios.tcgetattr(near)
+        paths = os.pathsep.join(path for path in sys.path if path)
+        environment = {**os.environ, "PYTHONPATH": paths, "COLUMNS": "200", "TERM": "dumb"}
+        self.command = subprocess.Popen(
+            [sys.executable, "-m", "robolink_cli", *words],
+            stdin=near,
+            stdout=near,
+            stderr=near,
+            env=environment,
+            start_new_session=True,
+        )
+        os.close(near)
+        self.shown = ""
+
+    def wait_for(self, pattern):
+        """Read until ``pattern`` has been shown, and forget what was shown up to there."""
+        end_s = time.monotonic() + LONGEST_S
+        while not (found := re.search(pattern, self.shown)):
+            ready, _, _ = select.select([self.descriptor], [], [], 0.1)
+            assert ready or time.monotonic() < end_s, f"{pattern!r} is not in {self.shown!r}"
+            if ready:
+                self.shown += self._read()
+        self.shown = self.shown[found.end() :]
+        return found
+
+    def press(self, keys):
+        os.write(self.descriptor, keys)
+
+    def end(self):
+        """Read to the end and return the exit code."""
+        while True:
+            try:
+                self.shown += self._read()
+            except OSError:  # the near end is closed
+                break
+        return self.command.wait(LONGEST_S)
+
+    def close(self):
+        if self.command.poll() is None:
+            self.command.kill()
+            self.command.wait()
+        os.close(self.descriptor)
+
+    def _read(self):
+        return os.read(self.descriptor, 4096).decode("utf-8", "replace")

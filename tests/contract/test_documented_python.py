@@ -1,0 +1,258 @@
+"""Every Python block of README and of the pages runs as it stands, against simulators.
+
+Only addresses are replaced, by those of simulators; what a block takes as given (a controller, an
+operator, a file) is brought by a maker of this file. A block without a maker fails.
+"""
+
+import re
+import shutil
+import textwrap
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+import sqlalchemy.dialects.sqlite  # noqa: F401 - pytester forgets imports; it bears one only
+from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.epson.kinematics import inverse
+from robolink_simulators.epson.variables import VariableType
+from robolink_simulators.hosting import in_process, plc_in_process
+from robolink_simulators.hosting.modbus import serve_modbus_tcp
+from robolink_simulators.sensing import LightBeam
+from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
+
+import robolink
+from robolink import ToolOffset
+from robolink.model import TIP, Hand, Pose, Secret, Spot, SpotUnit, WorkBox, rotate_xy
+from robolink.runner import RunSettings
+
+pytest_plugins = ["pytester"]
+
+ROOT = Path(__file__).parents[2]
+PAGES = [ROOT / "README.md", ROOT / "simulators" / "README.md", *sorted(ROOT.glob("docs/*.md"))]
+FENCED = re.compile(r"^```python\n(.*?)^```", re.MULTILINE | re.DOTALL)
+ADDRESS = re.compile(r"(epson\+tcp|softmotion\+modbus-tcp)://192\.168\.0\.\d+:\d+")
+
+
+def blocks() -> dict[str, str]:
+    """Return the blocks by page and place, such as ``README.md 2``, addresses replaced."""
+    found = {}
+    for page in PAGES:
+        for number, block in enumerate(FENCED.findall(page.read_text(encoding="utf-8")), start=1):
+            shown = page.relative_to(ROOT).as_posix().removeprefix("docs/")
+            found[f"{shown} {number}"] = ADDRESS.sub(simulated, block)
+    return found
+
+
+def simulated(address: re.Match[str]) -> str:
+    return {"epson+tcp": "epson+sim", "softmotion+modbus-tcp": "softmotion+sim"}[
+        address[1]
+    ] + "://documented"
+
+
+BLOCKS = blocks()
+
+
+@contextmanager
+def epson(**given: Any) -> Iterator[EpsonSimulator]:
+    simulator = EpsonSimulator(seed=3, **given)
+    in_process.register("documented", simulator)
+    try:
+        yield simulator
+    finally:
+        in_process.unregister("documented")
+
+
+@contextmanager
+def softmotion() -> Iterator[SoftMotionSimulator]:
+    simulator = SoftMotionSimulator(seed=3)
+    plc_in_process.register("documented", simulator)
+    try:
+        yield simulator
+    finally:
+        plc_in_process.unregister("documented")
+
+
+class Agrees:
+    """An operator who says yes."""
+
+    def tell(self, text: str) -> None:
+        """Hear a line."""
+
+    def ask(self, question: str, kind: object) -> None:
+        """Hear a question."""
+
+    def poll(self, wait_s: float) -> str:
+        """Answer."""
+        return "y"
+
+
+def with_password(stack: ExitStack) -> dict[str, Any]:
+    stack.enter_context(epson(password=Secret("...")))
+    return {}
+
+
+def two_tools(stack: ExitStack) -> dict[str, Any]:
+    simulator = stack.enter_context(epson())
+    controller = stack.enter_context(robolink.connect("epson+sim://documented"))
+    controller.tools.write(2, ToolOffset(5, 6, -70), expected=None)
+    looked = []
+    return {
+        "controller": controller,
+        "old_1": controller.tools.read(1),
+        "old_2": controller.tools.read(2),
+        "new_1": ToolOffset(12.25, -3.5, -20),
+        "new_2": ToolOffset(5.25, 6, -70),
+        "look_at_the_parts": lambda: looked.append(simulator.machine.tools.get(2)),
+        "then": lambda: looked[0].x_mm == 5.25 and simulator.machine.tools.get(1).x_mm == 12.25,
+    }
+
+
+def above_two_beams(stack: ExitStack) -> dict[str, Any]:
+    simulator = stack.enter_context(epson())
+    world, arm = simulator.world, simulator.machine.arm
+    for number, heading in ((3, 0.0), (4, 90.0)):
+        world.connect(number, LightBeam((300.2, 79.9, -60.0), heading))
+    pin = world.tips[1]
+    above = Pose(295 - pin.x_mm, 85 - pin.y_mm, -45 - pin.z_mm, 0.0)
+    arm.place(inverse(arm.model, above, Hand.RIGHT), 0)
+    controller = stack.enter_context(robolink.connect("epson+sim://documented"))
+    controller.tools.select(0)
+
+    def found() -> bool:
+        stored = simulator.machine.tools.get(1)
+        return abs(stored.x_mm - pin.x_mm) < 0.02 and abs(stored.y_mm - pin.y_mm) < 0.02
+
+    return {
+        "controller": controller,
+        "operator": Agrees(),
+        "settings": RunSettings(WorkBox()),
+        "pin": pin,
+        "then": found,
+    }
+
+
+def with_variables(stack: ExitStack) -> dict[str, Any]:
+    simulator = stack.enter_context(epson())
+    variables = simulator.variables
+    variables.declare("g_count", VariableType.LONG, value=3)
+    variables.declare("g_heights", VariableType.REAL, 3, 7)
+    variables.declare("g_offset", VariableType.REAL)
+    simulator.panel.raise_alarm(501)
+    return {"robolink": robolink, "then": lambda: simulator.machine.outputs.get(5)}
+
+
+def a_map(stack: ExitStack) -> dict[str, Any]:
+    path = ROOT / "examples" / "plc-maps" / "commit-bit.toml"
+    return {"robolink": robolink, "path": path}
+
+
+def a_recipe(stack: ExitStack) -> dict[str, Any]:
+    shutil.copy(ROOT / "examples" / "recipes" / "scara-pin.toml", Path.cwd())
+    return {}
+
+
+def a_journal(stack: ExitStack) -> dict[str, Any]:
+    with robolink.connect(stack.enter_context(serve_modbus_tcp(SoftMotionSimulator())).url) as plc:
+        plc.tools.write(1, ToolOffset(1, 2, 3), expected=plc.tools.read(1))
+    return {}
+
+
+def four_poses(stack: ExitStack) -> dict[str, Any]:
+    tip, given = ToolOffset(12.5, -3.25, -20), dict[str, Any]()
+    poses = []
+    for u_deg in (0.0, 90.0, 180.0, -90.0):
+        dx_mm, dy_mm = rotate_xy(tip.x_mm, tip.y_mm, u_deg)
+        poses.append(Pose(300 - dx_mm, 80 - dy_mm, -60, u_deg))
+    given |= {"poses": poses, "then": lambda: abs(given["result"].offset.x_mm - 12.5) < 1e-6}
+    return given
+
+
+def one_plc(stack: ExitStack) -> dict[str, Any]:
+    simulator = stack.enter_context(softmotion())
+    return {"then": lambda: list(simulator.truth()["stored"]["3"][:3]) == [1.25, -0.4, 60.0]}
+
+
+def a_connected_plc(stack: ExitStack) -> dict[str, Any]:
+    simulator = stack.enter_context(softmotion())
+    plc = stack.enter_context(robolink.connect("softmotion+sim://documented"))
+    return {"plc": plc, "then": lambda: simulator.plc.group.movements_started == 1}
+
+
+def nothing(stack: ExitStack) -> dict[str, Any]:
+    return {}
+
+
+MAKERS = {
+    "README.md 1": with_password,
+    "README.md 2": two_tools,
+    "simulators/README.md 1": nothing,
+    "backup.md 1": nothing,
+    "beams-and-probe.md 1": above_two_beams,
+    "beams-and-probe.md 2": nothing,
+    "camera-and-board.md 1": lambda stack: {"SpotUnit": SpotUnit, "Spot": Spot, "TIP": TIP},
+    "io-and-variables.md 1": with_variables,
+    "journal.md 1": a_journal,
+    "plc-maps.md 1": a_map,
+    "recipes.md 1": a_recipe,
+    "simulated-softmotion.md 1": nothing,
+    "simulated-softmotion.md 2": nothing,
+    "solvers.md 1": four_poses,
+    "softmotion-controller.md 1": one_plc,
+    "softmotion-controller.md 2": a_connected_plc,
+}
+
+TESTS = {name for name, block in BLOCKS.items() if "\ndef test_" in f"\n{block}"}
+
+
+def test_every_block_is_run_and_no_python_stands_outside_of_a_fence():
+    assert MAKERS.keys() | TESTS == BLOCKS.keys()
+    assert not MAKERS.keys() & TESTS
+    assert {"README.md 3", "README.md 4", "verify-controller.md 1"} == TESTS
+    for page in PAGES:
+        rest = FENCED.sub("", page.read_text(encoding="utf-8"))
+        assert not re.search(r"^    (with robolink|from robolink|import robolink)", rest, re.M), (
+            page
+        )
+
+
+@pytest.mark.parametrize("name", MAKERS)
+def test_a_block_runs(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with ExitStack() as stack:
+        given = MAKERS[name](stack)
+        then = given.pop("then", lambda: True)
+        exec(compile(BLOCKS[name], name, "exec"), given)  # what it is to do: run what is shown
+        assert then()
+
+
+def test_the_tests_of_readme_pass_in_somebody_else_s_run(pytester):
+    pytester.makepyfile(BLOCKS["README.md 3"] + BLOCKS["README.md 4"])
+    result = pytester.runpytest_inprocess("-p", "no:cacheprovider")
+    result.assert_outcomes(passed=4)
+
+
+def test_the_test_of_a_recording_passes_and_sees_a_difference(pytester):
+    recorded = textwrap.dedent(
+        """
+        import robolink
+        from pathlib import Path
+        from types import SimpleNamespace
+        from robolink.timing import wall_label
+        from robolink.transport import DialogueLog, format_dialogue
+
+        log = DialogueLog("a simulator", wall_label())
+        with robolink.connect("epson+sim://the-day", trace=log) as controller:
+            controller.status()
+        Path("day.jsonl").write_text(format_dialogue(log.dialogue))
+
+        def run(url):
+            with robolink.connect(url) as controller:
+                controller.status()
+
+        our_program = SimpleNamespace(run=run)
+        """
+    )
+    pytester.makepyfile(recorded + BLOCKS["verify-controller.md 1"])
+    pytester.runpytest_inprocess("-p", "no:cacheprovider").assert_outcomes(passed=1)

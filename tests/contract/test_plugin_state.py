@@ -1,0 +1,92 @@
+"""The fixtures of the pytest plugin keep out of the tester's own journal."""
+
+import os
+
+import pytest
+import sqlalchemy.dialects.sqlite  # noqa: F401 - pytester forgets imports; it bears one only
+
+import robolink
+from robolink import ToolOffset
+
+pytest_plugins = ["pytester"]
+
+THEIRS = """
+import pytest
+import robolink
+from robolink import ToolOffset
+from robolink.errors import OutcomeUnknownError
+from robolink_simulators.faults import Fault, FaultAction
+from robolink_simulators.softmotion.mailbox.faults import PlcFault, PlcFaultAction
+
+folders = []
+
+
+def cut_in_a_write(url, simulator, fault):
+    simulator.faults.add(fault)
+    with robolink.connect(url) as controller:
+        with pytest.raises(OutcomeUnknownError):
+            controller.tools.write(2, ToolOffset(1, 2, 3), expected=None)
+    with robolink.connect(url) as controller:
+        assert controller.outcomes.open_markers()
+
+
+def test_a_write_on_a_port_is_cut_in_the_middle(epson_tcp, robolink_state):
+    lost = Fault(FaultAction.DISCONNECT, match="TLSet 2, XY")
+    cut_in_a_write(epson_tcp.url, epson_tcp.simulator, lost)
+    assert [path.name for path in robolink_state.glob("journal.db")] == ["journal.db"]
+    folders.append(robolink_state)
+
+
+@pytest.mark.parametrize("softmotion_sim", ["modbus-tcp"], indirect=True)
+def test_a_write_on_a_bus_is_cut_in_the_middle(softmotion_sim, robolink_state):
+    lost = PlcFault(PlcFaultAction.DISCONNECT, match="WRITE_TOOL")
+    cut_in_a_write(softmotion_sim.url, softmotion_sim.simulator, lost)
+    folders.append(robolink_state)
+
+
+def test_the_next_starts_clean(epson_tcp, robolink_state):
+    assert robolink_state not in folders
+    assert not list(robolink_state.iterdir())
+    with robolink.connect(epson_tcp.url) as controller:
+        assert not controller.outcomes.open_markers()
+        controller.tools.write(2, ToolOffset(1, 2, 3), expected=None)
+"""
+
+
+@pytest.fixture
+def own_folder(tmp_path, monkeypatch):
+    """The state folder of the tester, with a journal that holds one write."""
+    folder = tmp_path / "own"
+    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(folder))
+    monkeypatch.delenv("ROBOLINK_JOURNAL", raising=False)
+    return folder
+
+
+def contents(folder):
+    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+@pytest.mark.parametrize("named_by", ["folder", "journal"])
+def test_a_write_that_is_cut_leaves_nothing_in_the_tester_s_own_folder(
+    pytester, own_folder, named_by, monkeypatch
+):
+    own_folder.mkdir()
+    (own_folder / "journal.db").write_bytes(b"precious")
+    if named_by == "journal":
+        monkeypatch.setenv("ROBOLINK_JOURNAL", str(own_folder / "journal.db"))
+    before = contents(own_folder)
+    pytester.makepyfile(THEIRS)
+    result = pytester.runpytest_inprocess("-p", "no:cacheprovider")
+    result.assert_outcomes(passed=3)
+    assert contents(own_folder) == before
+    assert os.environ["ROBOLINK_STATE_DIR"] == str(own_folder)
+
+
+def test_without_the_fixtures_it_would_be_there(own_folder):
+    """What the test above looks for is where it looks."""
+    from robolink_simulators.epson.device import EpsonSimulator
+    from robolink_simulators.hosting.tcp import serve_tcp
+
+    with serve_tcp(EpsonSimulator()) as host, robolink.connect(host.url) as controller:
+        controller.tools.write(2, ToolOffset(1, 2, 3), expected=None)
+    assert (own_folder / "journal.db") in contents(own_folder)

@@ -1,0 +1,187 @@
+"""After a stop nothing that acts leaves this process, on any controller, until it is released."""
+
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from typing import Any
+
+import pytest
+from robolink_simulators.epson.device import EpsonSimulator
+
+from robolink import ToolOffset
+from robolink.controllers.softmotion import Jog
+from robolink.errors import RejectedError, StoppedError
+from robolink.model import MotionProfile, Path, WorkBox
+from robolink.runner import Runner, RunSettings, ask_for_pose
+from tests.contract import _softmotion_cell as plcs
+from tests.contract.conftest import served
+from tests.contract.test_plc_map import Served as ServedMap
+from tests.faults._stop_placements import Placement, Placements
+
+ANYWHERE = WorkBox()
+GENTLE = MotionProfile(Path.STRAIGHT, 5, 20.0)
+NEW = ToolOffset(11.25, -3.125, -20.0)
+NEW_IN_PLANE = ToolOffset(11.25, -3.125)
+
+
+@dataclass
+class Bench:
+    """A controller, and what came in at its far end."""
+
+    controller: Any
+    requests: Any
+
+    @property
+    def group(self):
+        return self.controller.groups[0]
+
+
+@contextmanager
+def bench(backend: str) -> Iterator[Bench]:
+    """A controller that stands ready, and a look past the wire at what it is told."""
+    if backend.startswith("epson"):
+        simulator = EpsonSimulator(seed=7)
+        with served(backend.removeprefix("epson-"), simulator) as cell:
+            with cell.connect() as controller:
+                controller.motors(True)
+                yield Bench(controller, lambda: told(simulator.log, "$Get", '$Execute,"Print'))
+    else:
+        with plcs.served(backend) as plc, plc.connect() as controller:
+            yield Bench(controller, lambda: told(plc.simulator.log, "read_", "beat", "snapshot"))
+
+
+def told(log, *looks: str) -> list[str]:
+    """Return what a controller was told, without what only looks."""
+    sent = [text for _, direction, text in log if direction == ">"]
+    return [text for text in sent if not text.startswith(looks)]
+
+
+BACKENDS = ("epson-sim", "epson-tcp", *plcs.BACKENDS)
+
+
+@pytest.fixture(params=BACKENDS)
+def stopped(request):
+    with bench(request.param) as on:
+        on.controller.tools.write(2, ToolOffset(1.0), expected=on.controller.tools.read(2))
+        on.controller.stop()
+        yield on
+
+
+def acts(on: Bench):
+    """Return everything that may not leave any more, by name."""
+    here = on.group.pose()
+    up = replace(here, z_mm=here.z_mm + 5)
+    tools = on.controller.tools
+    found = {
+        "move": lambda: on.group.move_to(up, GENTLE, box=ANYWHERE),
+        "write": lambda: tools.write(1, NEW, expected=tools.read(1)),
+        "clear": lambda: tools.clear(2, expected=tools.read(2)),
+        "select": lambda: tools.select(2 if tools.selected() != 2 else 1),
+        "motors on": lambda: on.controller.motors(True),
+        "output": lambda: on.controller.io.set_output(8, True),
+    }
+    if hasattr(on.group, "jog"):
+        jog = Jog(forward=frozenset({2}))
+        found["jog"] = lambda: on.group.jog(jog, duration_s=0.2, box=ANYWHERE)
+    return found
+
+
+def test_nothing_that_acts_leaves_until_it_is_released(stopped):
+    where, before = stopped.group.pose(), stopped.requests()
+    for name, act in acts(stopped).items():
+        with pytest.raises(StoppedError):
+            act()
+            pytest.fail(f"{name} was let through")
+    assert stopped.requests() == before
+    assert stopped.group.pose().z_mm == pytest.approx(where.z_mm, abs=0.5)  # a move is 5 mm
+    assert stopped.controller.outcomes.open_markers() == ()
+
+
+def test_after_the_release_and_a_reset_it_moves_again(stopped):
+    controller, group = stopped.controller, stopped.group
+    controller.reset_fault()
+    with pytest.raises(StoppedError):  # a reset does not open the latch
+        acts(stopped)["move"]()
+    controller.release_stop()
+    here = group.pose()
+    motion = group.move_to(replace(here, z_mm=here.z_mm + 1), GENTLE, box=ANYWHERE)
+    motion.wait(timeout_s=20)
+    assert group.pose().z_mm == pytest.approx(here.z_mm + 1, abs=0.2)
+
+
+def test_motors_off_and_another_stop_are_always_let_through(stopped):
+    stopped.controller.stop()
+    if type(stopped.controller).__name__ == "EpsonController":
+        stopped.controller.motors(False)
+        assert not stopped.group.motors_on()
+
+
+class Person:
+    """Is asked, and is stopped while the answer is on its way."""
+
+    def __init__(self, controller, answer):
+        self._controller, self._answer = controller, answer
+
+    def tell(self, text):
+        pass
+
+    def ask(self, question, kind):
+        pass
+
+    def poll(self, wait_s):
+        stopper = threading.Thread(target=self._controller.stop)
+        stopper.start()
+        stopper.join(20)
+        assert not stopper.is_alive()
+        return self._answer
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize("asked", ["place", "yes or no", "text"])
+def test_an_answer_that_a_stop_overtakes_counts_no_more(backend, asked):
+    with bench(backend) as on:
+        runner = Runner(
+            on.controller, on.group, Person(on.controller, "y"), RunSettings(box=ANYWHERE)
+        )
+        before = on.requests()
+        with pytest.raises(StoppedError):
+            if asked == "place":
+                runner.run(ask_for_pose("Bring the tip onto the pin."))
+            elif asked == "text":
+                runner.ask_text("Which lot?")
+            else:
+                runner.confirm("Write this?")
+        assert {text.split(" ")[0] for text in set(on.requests()) - set(before)} <= {
+            *("$Abort", "$Stop", "write_command"),
+        }
+
+
+@pytest.mark.parametrize(("name", "points"), [("commit-bit", 9), ("no-handshake", 6)])
+def test_a_map_is_written_by_nobody_after_a_stop_wherever_it_falls(name, points):
+    whole = run_of_a_map(name, None)
+    assert len(whole) >= points
+    for at in whole:
+        run_of_a_map(name, at)
+
+
+def run_of_a_map(name: str, at: Placement | None) -> list[Placement]:
+    """Write a tool of a mapped PLC, with a stop at a point; return the points there are."""
+    with ServedMap(name) as cell, cell.connect() as controller:
+        old = controller.tools.read(1)
+        placements = Placements(at)
+        placements.place_on(controller)
+        with placements.watching():
+            if at is None:
+                controller.tools.write(1, NEW_IN_PLANE, expected=old)
+                return list(placements.distinct)
+            with pytest.raises(StoppedError):
+                controller.tools.write(1, NEW_IN_PLANE, expected=old)
+        assert isinstance(placements.refused, RejectedError)  # nothing here stops the machine
+        assert controller.outcomes.open_markers() == ()
+        held = controller.tools.read(1)
+        assert held in (old, NEW_IN_PLANE)
+        with pytest.raises(StoppedError):
+            controller.tools.write(1, ToolOffset(1.0), expected=held)
+        assert controller.tools.read(1) == held
+    return []

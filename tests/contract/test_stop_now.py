@@ -1,0 +1,164 @@
+"""A stop from outside brings any controller to rest, whoever moves it."""
+
+import socket
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.epson.options import EpsonOptions
+from robolink_simulators.faults import Fault, FaultAction
+
+from robolink import Secret
+from robolink.controllers import stop_now
+from robolink.errors import (
+    ConnectError,
+    LoginRefusedError,
+    LoginUnansweredError,
+    NotReadyError,
+    RejectedError,
+)
+from robolink.model import ControllerState, MotionProfile, Path, WorkBox
+from tests.contract._softmotion_cell import BACKENDS, SLOW, above
+from tests.contract._softmotion_cell import served as served_plc
+
+CREEPING = MotionProfile(Path.STRAIGHT, 5, 1.0)
+ANYWHERE = WorkBox()
+
+HABITS: tuple[dict[str, Any], ...] = (
+    {},
+    {"abort_reply_first": False},
+    {"flags_during_execute": "ready"},
+    {"status_flags": 10},
+    {"execute_on_disconnect": "stops"},
+    {"rc_plus": 5, "status_flags": 10},
+)
+
+
+def left_moving(cell, **options):
+    """Begin a slow movement of 30 mm and let its client vanish, as a killed process does."""
+    controller = cell.connect(**options)
+    controller.motors(True)
+    group = controller.groups[0]
+    here = group.pose()
+    group.move_to(replace(here, z_mm=here.z_mm + 30), CREEPING, box=ANYWHERE)
+    controller._session._transport.close()
+
+
+@pytest.mark.parametrize("habits", HABITS, ids=str)
+def test_a_movement_whose_client_died_is_brought_to_rest(serve, habits):
+    simulator = EpsonSimulator(seed=7, options=EpsonOptions(**habits))
+    with serve(simulator) as cell:
+        left_moving(cell)
+        begun = simulator.machine.arm.flange().z_mm
+        assert stop_now(cell.url).state is ControllerState.READY
+        assert not simulator.machine.arm.moving
+        # It was under way, and far from the end when it was stopped.
+        assert simulator.machine.arm.flange().z_mm < begun + 15
+        with cell.connect() as controller:  # nobody is left logged in
+            assert controller.status().state is ControllerState.READY
+
+
+@pytest.mark.parametrize("action", [FaultAction.DROP_REPLY, FaultAction.DISCONNECT])
+@pytest.mark.parametrize("request_", ["Abort", "Stop", "GetStatus"])
+def test_a_lost_answer_is_no_reason_to_leave_it_moving(serve, request_, action):
+    simulator = EpsonSimulator(seed=7)
+    with serve(simulator) as cell:
+        left_moving(cell)
+        simulator.faults.add(Fault(action, match=request_))
+        assert stop_now(cell.url, timeout_s=0.3).state is ControllerState.READY
+        assert not simulator.machine.arm.moving
+        assert simulator.faults.pending == ()
+
+
+def test_the_late_end_of_an_execute_does_not_disturb_a_stop(serve):
+    simulator = EpsonSimulator(seed=7)
+    with serve(simulator) as cell:
+        left_moving(cell)
+        simulator.faults.add(Fault(FaultAction.DUPLICATE_REPLY, match="Abort"))
+        simulator.faults.add(Fault(FaultAction.DUPLICATE_REPLY, match="Stop"))
+        assert stop_now(cell.url).state is ControllerState.READY
+
+
+@pytest.mark.parametrize("second", ["ignored", "closed"])
+def test_beside_a_client_that_is_logged_in_nobody_answers(serve, second):
+    simulator = EpsonSimulator(seed=7, options=EpsonOptions(second_client=second))
+    with serve(simulator) as cell, cell.connect():
+        with pytest.raises(LoginUnansweredError):
+            stop_now(cell.url, timeout_s=0.2)
+
+
+def test_a_password_is_given_once(serve):
+    simulator = EpsonSimulator(seed=7, password=Secret("right"))
+    with serve(simulator) as cell:
+        with pytest.raises(LoginRefusedError):
+            stop_now(cell.url, password=Secret("wrong"))
+        assert stop_now(cell.url, password=Secret("right")).ready
+
+
+def test_a_controller_that_takes_no_stop_from_here_says_so(serve):
+    simulator = EpsonSimulator(seed=7, options=EpsonOptions(monitoring_only=True))
+    with serve(simulator) as cell:
+        with pytest.raises(RejectedError):
+            stop_now(cell.url)
+
+
+def test_nobody_there():
+    with socket.socket() as taken:  # bound and not listening: nobody else gets the port
+        taken.bind(("127.0.0.1", 0))
+        with pytest.raises(ConnectError):
+            stop_now(f"epson+tcp://127.0.0.1:{taken.getsockname()[1]}", timeout_s=0.5)
+
+
+def test_a_map_has_no_stop():
+    with pytest.raises(RejectedError, match="neither moved nor stopped"):
+        stop_now("plc+modbus-tcp://127.0.0.1:1?map=x.toml")
+
+
+ONE_CLIENT_EACH = ("modbus-rtu", "can-virtual", "can-multicast")
+"""A serial line is opened once; a CANopen node answers one SDO client at a time."""
+
+
+@pytest.fixture(params=BACKENDS)
+def plc(request):
+    with served_plc(request.param) as cell:
+        yield cell
+
+
+@pytest.fixture(params=sorted(set(BACKENDS) - set(ONE_CLIENT_EACH)))
+def shared_plc(request):
+    with served_plc(request.param) as cell:
+        yield cell
+
+
+def test_a_group_that_another_moves_is_brought_to_rest_and_held(shared_plc):
+    with shared_plc.connect() as controller:
+        group = controller.groups[0]
+        here = group.pose()
+        group.move_to(above(here, 30), SLOW, box=ANYWHERE)
+        status = stop_now(shared_plc.url)
+        assert (status.running, status.paused) == (False, True)
+        stands = group.pose()
+        assert here.z_mm <= stands.z_mm < here.z_mm + 15
+        assert stop_now(shared_plc.url).running is False  # it may be repeated
+        with pytest.raises(NotReadyError, match="held by a stop"):
+            group.move_to(above(here, 30), SLOW, box=ANYWHERE)
+        assert group.pose().z_mm == pytest.approx(stands.z_mm, abs=1e-6)
+
+
+def test_a_group_whose_client_died_is_brought_to_rest_and_held(plc):
+    controller = plc.connect()
+    group = controller.groups[0]
+    here = group.pose()
+    group.move_to(above(here, 30), SLOW, box=ANYWHERE)
+    controller._mailbox.wire._link.close()
+    status = stop_now(plc.url)
+    assert (status.running, status.paused) == (False, True)
+    with plc.connect() as controller:
+        assert controller.groups[0].pose().z_mm < here.z_mm + 15
+
+
+def test_a_group_that_is_disabled_is_stopped_without_an_error(plc):
+    with plc.connect() as controller:
+        controller.motors(False)
+    assert stop_now(plc.url).running is False

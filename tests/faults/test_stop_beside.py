@@ -1,0 +1,98 @@
+"""``robolink stop`` beside a robolink that has the controller, or that was killed having it."""
+
+import time
+
+import pytest
+from robolink_cli import entry, main
+from robolink_simulators.clock import ScaledClock
+from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.hosting.modbus import serve_modbus_tcp
+from robolink_simulators.hosting.tcp import serve_tcp
+from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
+
+from robolink.stopping import far_end_of, holders_of
+from tests.faults._client_process import ClientProcess
+
+PATIENCE_S = 20.0
+
+
+@pytest.fixture
+def epson():
+    simulator = EpsonSimulator(seed=4)
+    simulator.machine.switch_motors(True)
+    with serve_tcp(simulator, clock=ScaledClock(1.0)) as host:
+        yield simulator, host.url
+
+
+@pytest.fixture
+def plc():
+    simulator = SoftMotionSimulator(seed=4)
+    with serve_modbus_tcp(simulator, clock=ScaledClock(1.0)) as host:
+        yield simulator, host.url
+
+
+@pytest.fixture
+def beside(tmp_path):
+    """Start a command in a process of its own."""
+
+    def started(*arguments):
+        return ClientProcess(
+            arguments, environment={"ROBOLINK_STATE_DIR": str(tmp_path / "state")}, folder=tmp_path
+        )
+
+    return started
+
+
+def await_that(condition, process):
+    deadline = time.monotonic() + PATIENCE_S
+    while not condition():
+        assert time.monotonic() < deadline, process.err
+        time.sleep(0.005)
+
+
+def test_a_second_terminal_stops_through_the_one_that_is_logged_in(epson, beside, capsys):
+    simulator, url = epson
+    began_mm = simulator.machine.arm.flange().x_mm
+    process = beside("-c", url, "jog", "x-5", "--speed", "1", "--yes")
+    await_that(lambda: simulator.machine.arm.moving, process)
+    assert entry.run(["-c", url.replace("127.0.0.1", "localhost"), "stop"]) == 0
+    assert not simulator.machine.arm.moving
+    assert simulator.machine.arm.flange().x_mm > began_mm - 3
+    shown = capsys.readouterr().out
+    assert "stands" in shown
+    assert "jog" in shown  # who had it, and for what
+    assert process.exit_code() == 10
+    assert "Stopped from another terminal by" in process.err
+    assert list(holders_of(far_end_of(url))) == []
+    assert main.run(["-c", url, "jog", "x+1", "--yes"]) == 10  # the note
+
+
+def test_a_second_terminal_stops_a_plc_itself(plc, beside, capsys):
+    simulator, url = plc
+    group = simulator.plc.group
+    process = beside("-c", url, "jog", "x-5", "--speed", "1", "--yes")
+    await_that(lambda: group.movements_started > 0, process)
+    assert entry.run(["-c", url.replace("127.0.0.1", "localhost"), "stop"]) == 0
+    assert "stands" in capsys.readouterr().out
+    assert process.exit_code() == 10
+    assert group.movements_started == 1
+    jog = ["-c", url, "jog", "x+1", "--yes"]
+    assert main.run(jog) == 5  # the PLC holds it
+    assert main.run(["-c", url, "release", "--yes"]) == 0
+    assert main.run(jog) == 5  # and still does: only a reset lets it go
+    assert group.movements_started == 1
+    assert main.run(["-c", url, "reset", "--yes"]) == 0
+    assert main.run(jog) == 0
+
+
+def test_a_movement_left_by_a_killed_jog_is_stopped(epson, beside, capsys):
+    simulator, url = epson
+    process = beside("-c", url, "jog", "x-5", "--speed", "1", "--yes")
+    await_that(lambda: simulator.machine.arm.moving, process)
+    process.kill()
+    assert simulator.machine.arm.moving
+    assert entry.run(["-c", url, "stop"]) == 0
+    assert not simulator.machine.arm.moving
+    assert "stands" in capsys.readouterr().out
+    # What the killed one left to be found is taken away.
+    assert list(holders_of(far_end_of(url))) == []

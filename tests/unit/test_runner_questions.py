@@ -1,0 +1,158 @@
+"""What a person may answer, how a jog step may be typed, and that no question is for ever."""
+
+from itertools import count
+
+import pytest
+from robolink_cli._operator import MOST_STEPS, AssistedOperator
+from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.hosting.in_process import register, unregister
+
+import robolink
+from robolink.errors import ConfigError, DeclinedError
+from robolink.model import WorkBox
+from robolink.runner import (
+    MOST_REFUSED,
+    Question,
+    Runner,
+    RunSettings,
+    ask_for_pose,
+    parse_steps,
+    yes_or_no,
+)
+
+_names = count()
+
+
+class Typist:
+    """Types lines, the last one for ever, and keeps what was shown."""
+
+    def __init__(self, *lines):
+        self.lines, self.shown, self.asked, self.polled = list(lines), [], [], 0
+
+    def tell(self, text):
+        self.shown.append(text)
+
+    def ask(self, question, kind):
+        self.asked.append((question, kind))
+
+    def poll(self, wait_s):
+        self.polled += 1
+        assert self.polled < 1000, "it is asked for ever"
+        return self.lines.pop(0) if len(self.lines) > 1 else self.lines[0]
+
+
+@pytest.fixture
+def simulator():
+    simulator = EpsonSimulator(seed=3)
+    name = f"runner-questions-{next(_names)}"
+    register(name, simulator)
+    yield simulator
+    unregister(name)
+
+
+@pytest.fixture
+def controller(simulator):
+    with robolink.connect(simulator.url) as controller:
+        yield controller
+
+
+def runner_with(controller, operator, *, below_mm=10.0):
+    group = controller.groups[0]
+    box = WorkBox.around(group.pose(), xy_mm=10, below_mm=below_mm, above_mm=10)
+    return Runner(controller, group, operator, RunSettings(box))
+
+
+@pytest.mark.parametrize("word", ["y", "YES", "j", "Ja", " y ", "是"])
+def test_these_are_a_yes(word):
+    assert yes_or_no(word) is True
+
+
+@pytest.mark.parametrize("word", ["n", "No", "nein", "NEIN", "否"])
+def test_these_are_a_no(word):
+    assert yes_or_no(word) is False
+
+
+@pytest.mark.parametrize("word", ["", "4006381333931", "yy", "jo", "1", "ok"])
+def test_anything_else_is_neither(word):
+    assert yes_or_no(word) is None
+
+
+@pytest.mark.parametrize(
+    ("lines", "accepted", "asked"),
+    [
+        (["y"], True, 1),
+        (["n", "y"], False, 1),
+        (["4006381333931", "ja"], True, 2),
+        (["", "nein"], False, 2),
+        (["", "", "y"], False, 2),
+    ],
+)
+def test_what_is_neither_is_asked_once_more_and_is_a_no_then(controller, lines, accepted, asked):
+    typist = Typist(*lines)
+    assert runner_with(controller, typist).confirm("Write it?") is accepted
+    assert typist.asked == [("Write it?", Question.YES_NO)] * asked
+    assert len(typist.shown) == asked - 1
+
+
+@pytest.mark.parametrize(
+    ("text", "deltas"),
+    [
+        ("x+0,1", {"x": 0.1}),
+        ("x + 0.1", {"x": 0.1}),
+        ("x +0.1 y-0.5", {"x": 0.1, "y": -0.5}),
+        ("X+1,Y-2", {"x": 1.0, "y": -2.0}),
+        ("x+0,5, z-0,25", {"x": 0.5, "z": -0.25}),
+        ("z\u22120.1", {"z": -0.1}),
+        ("\uff58\uff0b\uff10\uff0c\uff11\u3000\uff59\uff0d\uff11", {"x": 0.1, "y": -1.0}),
+    ],
+)
+def test_a_step_is_understood_however_it_is_spaced_and_signed(text, deltas):
+    assert parse_steps(text) == deltas
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["x0.1", "x+0.1\u00b2", "x+0,1234", "x+0.1.2", "x+1,  5", "+x1", "x+", "x+1 x+2", "x+-1", "y"],
+)
+def test_what_could_be_meant_otherwise_is_not_guessed(text):
+    with pytest.raises(ConfigError, match=r"is not a jog step\. Type an axis x, y, z or u, a sign"):
+        parse_steps(text)
+
+
+def test_after_each_jog_a_person_reads_that_it_is_done_how_far_and_where(controller):
+    typist = Typist("x + 0,5 z-1", "u+2", "")
+    before = controller.groups[0].pose()
+    after = runner_with(controller, typist).run(ask_for_pose("Jog."))
+    assert len(typist.shown) == 2
+    moved, turned = typist.shown
+    assert moved.startswith("  done: moved 1.1"), moved
+    assert f"X {before.x_mm + 0.5:.1f}" in moved
+    assert "turned +2.0" in turned
+    assert after.z_mm == pytest.approx(before.z_mm - 1.0, abs=0.05)
+
+
+def test_steps_that_are_refused_in_a_row_end_the_question_and_move_nothing(simulator, controller):
+    typist = Typist("z-5", "z-5", "z-5", "z-5", "z-5")
+    with pytest.raises(DeclinedError, match=f"{MOST_REFUSED} jogs in a row were refused"):
+        runner_with(controller, typist, below_mm=7).run(ask_for_pose("Jog."))
+    assert simulator.machine.arm.moves_started == 1
+    assert typist.polled == 1 + MOST_REFUSED
+
+
+def test_a_step_that_is_taken_makes_up_for_mistakes(controller):
+    lines = [*["oops"] * (MOST_REFUSED - 1), "z+0.1"] * 3
+    runner_with(controller, Typist(*lines, "")).run(ask_for_pose("Jog."))
+
+
+def test_a_text_that_never_comes_ends_the_question(controller):
+    with pytest.raises(DeclinedError, match="Nothing was typed"):
+        runner_with(controller, Typist("")).ask_text("Which lot?")
+
+
+def test_a_stand_in_that_sees_another_way_each_time_gives_up():
+    seen = [(1.0, 0.0, 0.0), (-1.0, 0.0, 0.0)]
+    operator = AssistedOperator(lambda: seen.append(seen.pop(0)) or seen[0], lambda _text: None)
+    operator.ask("Onto the pin.", Question.PLACE)
+    with pytest.raises(DeclinedError, match="did not get there"):
+        for _ in range(MOST_STEPS + 1):
+            operator.poll(0)

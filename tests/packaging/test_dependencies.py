@@ -113,7 +113,7 @@ def test_with_the_lowest_version_of_each_the_chosen_tests_pass(tmp_path):
         f"{wanted.name}{'[binary]' if wanted.extras else ''}=={lowest(wanted)}"
         for wanted in run_time_dependencies()
     ]
-    tools = ["hypothesis", "pytest", "pytest-timeout", "hatchling"]
+    tools = ["editables", "hatchling", "hypothesis", "pytest", "pytest-timeout"]
     run(python, "-m", "pip", "install", "--quiet", "--no-compile", *pinned, *tools)
     run(
         python,

@@ -68,7 +68,7 @@ def marker_notice(marker: "Marker", url: str) -> str:
         )
     return tr(
         "Sent {when} without a clear answer: {request}. It may or may not have run, so motion is "
-        "blocked.\n  'robolink -c {url} recover' settles what reading can, 'resolve' the rest.",
+        "blocked.\n  'robolink -c {url} recover' settles it.",
         when=marker.begun_at,
         request=marker.request,
         url=url,
@@ -137,9 +137,13 @@ def _unfinished(marker: "Marker", url: str, now: str) -> str:
                 tool=before,
             )
         )
-    remedy = tr(
-        "'robolink -c {url} recover' puts tool {tool} back, with the power mode and speed of then.",
-        url=url,
-        tool=before,
-    )
+    if now == before:
+        remedy = tr("'robolink -c {url} recover' settles it.", url=url)
+    else:
+        remedy = tr(
+            "'robolink -c {url} recover' puts tool {tool} back, with the power mode and speed of "
+            "then.",
+            url=url,
+            tool=before,
+        )
     return f"{' '.join(parts)}\n  {remedy}"

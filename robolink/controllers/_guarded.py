@@ -6,7 +6,7 @@ The command classes of design part 4 (faults_and_speed.md A3):
 class  on an EPSON controller                      when no answer comes
 =====  ==========================================  =======================================
 READ   GetStatus, Print ..., TLSet, Where          ask again on a new link
-SET    TLSet n, TLClr n, Tool n, SetIO ...         OutcomeUnknownError; read back, resolve
+SET    TLSet n, TLClr n, Tool n, SetIO ...         OutcomeUnknownError; read back, recover
 MOVE   Go, Move                                    OutcomeUnknownError; never sent again
 STOP   Abort, Stop                                 may be repeated
 =====  ==========================================  =======================================
@@ -209,10 +209,7 @@ class MarkerDesk:
                     earlier=marker.request,
                     when=marker.begun_at,
                 ),
-                remedy=tr(
-                    "Run 'robolink recover', or 'robolink resolve' to decide yourself; motion is "
-                    "blocked until then."
-                ),
+                remedy=tr("Run 'robolink recover'; motion is blocked until then."),
                 controller=self._identity,
                 request=request,
             )
@@ -253,7 +250,7 @@ class MarkerDesk:
                 ),
                 remedy=tr(
                     "It was not sent again. Look at the robot, connect again and run "
-                    "'robolink resolve'; motion is blocked until then."
+                    "'robolink recover'; motion is blocked until then."
                 ),
                 controller=self._identity,
                 request=request,
@@ -279,7 +276,7 @@ def what_is_left(failure: RobolinkError, tool: int) -> str:
         )
     return tr(
         "The tool of before, tool {tool}, could not be selected again ({cause}) 'robolink "
-        "resolve' offers it.",
+        "recover' selects it.",
         tool=tool,
         cause=failure.what,
     )

@@ -1,6 +1,6 @@
 """Settles open markers of every kind: those of the driver, and those of whole changes."""
 
-from robolink.errors import ConfigError, RobolinkError
+from robolink.errors import ConfigError, OutcomeUnknownError
 from robolink.messages import tr
 from robolink.model import (
     Controller,
@@ -101,16 +101,21 @@ class Settler:
         self._controller.begin(
             marker.kind, marker.request, marker.details, operation=marker.operation
         )
-        done = put_back(self._controller, _steps(marker))
+        selected = marker.details.get("selected")
+        done = put_back(
+            self._controller,
+            _steps(marker),
+            selected=selected if isinstance(selected, int) else None,
+        )
         failures = [result for result in done if not result.restored]
         entries = [result.entry for result in done]
         if not failures:
             self._controller.finish(marker, *entries)
             return
         self._controller.outcomes.append(*entries)
-        raise RobolinkError(
+        raise OutcomeUnknownError(
             " ".join(result.sentence for result in failures),
-            remedy=tr("The change stays open. Look at the controller, then 'robolink resolve'."),
+            remedy=tr("The change stays open. Look at the controller."),
             controller=self._controller.identity,
         )
 
@@ -193,5 +198,5 @@ def _steps(marker: Marker) -> list[Step]:
     except (KeyError, TypeError, ValueError) as error:
         raise ConfigError(
             tr("The marker of {when} cannot be understood.", when=marker.begun_at),
-            remedy=tr("Compare the tools with a backup, then 'robolink resolve --forget'."),
+            remedy=tr("Compare the tools with a backup, then 'robolink recover --forget'."),
         ) from error

@@ -66,7 +66,7 @@ class InForce:
         except (KeyError, TypeError, ValueError) as error:
             raise ConfigError(
                 tr("The marker of {when} cannot be understood.", when=marker.begun_at),
-                remedy=tr("Select the right tool by hand, then 'robolink resolve --forget'."),
+                remedy=tr("Select the right tool by hand, then 'robolink recover --forget'."),
             ) from error
         return cls(tool, PowerAndSpeed(bool(high), (a, b, c), (d, e, f)))
 

@@ -74,6 +74,6 @@ def tool_before(marker: Marker) -> int:
     if not isinstance(tool, int):
         raise ConfigError(
             tr("The marker of {when} cannot be understood.", when=marker.begun_at),
-            remedy=tr("Select the right tool by hand, then 'robolink resolve --forget'."),
+            remedy=tr("Select the right tool by hand, then 'robolink recover --forget'."),
         )
     return tool

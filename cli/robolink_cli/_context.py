@@ -209,6 +209,7 @@ def open_controller(
             remote_timeout_s=context.remote_timeout_s,
             trace=trace,
             signature=signature,
+            glance=unhindered,
         ) as controller,
         nullcontext() if calms else controller.latch.ending(tr("The command")),
     ):
@@ -221,7 +222,8 @@ def open_controller(
             yield controller
     if not unhindered:
         # A stop that came while the connection was closed: nobody may take this for a success.
-        controller.latch.require_open(tr("The command"))
+        with controller.ledger.telling():
+            controller.latch.require_open(tr("The command"))
 
 
 @contextmanager
@@ -259,7 +261,8 @@ def _saying_what_is_left(
         raise
     finally:
         left = _open_markers(controller, lenient=lenient)
-        note_unsettled(controller, [m for m in left if m not in found], named)
+        known = {marker.operation for marker in found}
+        note_unsettled(controller, [m for m in left if m.operation not in known], named)
         if trouble is not None:
             # After the work: nothing that the journal has to say stands before it.
             note(f"{trouble.what} {_unrecorded()}")

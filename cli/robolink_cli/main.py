@@ -41,11 +41,7 @@ COMMANDS: Final = {
     "enable": ("robolink_cli.operate:enable", tr("Enable the axis group of a PLC.")),
     "disable": ("robolink_cli.operate:disable", tr("Disable the axis group of a PLC.")),
     "recover": (
-        "robolink_cli.operate:recover",
-        tr("Settle what a crash left: finish or take back each tool change."),
-    ),
-    "resolve": (
-        "robolink_cli.operate:resolve",
+        "robolink_cli.recover:recover",
         tr("Settle what was begun and not proved finished."),
     ),
     "tool": ("robolink_cli.tools:tool", tr("Read, write, clear and select tool offsets.")),
@@ -102,10 +98,14 @@ COMMANDS: Final = {
 }
 """Name, where it is, one-line help; in the order of the help page."""
 
+ALIASES: Final = {"resolve": "robolink_cli.recover:resolve"}
+"""Names of before, which still work and are listed nowhere."""
+
 
 @click.group(
     cls=LazyGroup,
     lazy=COMMANDS,
+    aliases=ALIASES,
     context_settings={"help_option_names": ["-h", "--help"]},
     help=tr(
         "Measure, write and prove tool offsets on EPSON robots.\n\n"

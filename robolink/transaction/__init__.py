@@ -11,6 +11,7 @@ from robolink.transaction._last_known import ChangedSince as ChangedSince
 from robolink.transaction._put_back import PutBack as PutBack
 from robolink.transaction._put_back import Step as Step
 from robolink.transaction._recovery import Recovery as Recovery
+from robolink.transaction._recovery import look as look
 from robolink.transaction._recovery import recover as recover
 from robolink.transaction._settling import Settler as Settler
 from robolink.transaction._undo import Undone as Undone

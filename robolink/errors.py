@@ -21,6 +21,7 @@
     │   │   └── LoginRefusedError          wrong password, or one is demanded
     │   ├── NotReadyError                  refused here: the state would not allow it (.reason)
     │   ├── ControllerFaultError           the controller is in error
+    │   │   └── HeartbeatLostError         it halted a movement because we fell silent
     │   ├── MotionTimeoutError             a movement took too long and was aborted
     │   └── BusyError                      another operation is under way
     │       ├── LeaseHeldError             another program or person is changing the controller
@@ -220,6 +221,13 @@ class NotReadyError(ControllerError):
 
 class ControllerFaultError(ControllerError):
     """The controller went into, or is in, its error state."""
+
+
+class HeartbeatLostError(ControllerFaultError):
+    """The controller halted a movement because it heard nothing from this computer for too long.
+
+    Nothing else is wrong: the tool stays, and the movement may be commanded again.
+    """
 
 
 class MotionTimeoutError(ControllerError):

@@ -30,6 +30,8 @@ class RegisterToolTable:
         register_map: Where everything stands.
         desk: Keeps the markers.
         lock: One procedure at a time.
+        require_confirmed: Refuses every change while nobody knows the map to be right; sends
+            nothing.
         require_ready: Refuses a write that the machine or the map does not allow.
     """
 
@@ -40,12 +42,14 @@ class RegisterToolTable:
         desk: MarkerDesk,
         lock: ProcedureLock,
         *,
+        require_confirmed: Callable[[str], None],
         require_ready: Callable[[str], None],
     ) -> None:
         self._registers = registers
         self._map = register_map
         self._desk = desk
         self._lock = lock
+        self._require_confirmed = require_confirmed
         self._require_ready = require_ready
         self._slots = Slots(registers, register_map)
         self._writer = ToolWriter(
@@ -73,9 +77,11 @@ class RegisterToolTable:
         """Refuse a tool number that cannot be written; sends nothing.
 
         Raises:
+            ConfigError: The map has no probe, and nobody has confirmed it.
             ReservedToolError, ToolIndexError: As :meth:`write` would.
             ToolError: The PLC's offsets can only be read.
         """
+        self._require_confirmed(tr("tool {tool}", tool=tool))
         if tool == 0:
             raise ReservedToolError(
                 tr("Tool 0 is the flange itself and is never written."),

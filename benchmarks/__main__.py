@@ -6,6 +6,7 @@ from benchmarks.mailbox import measure_mailbox
 from benchmarks.nozzle_change import measure_nozzle_change
 from benchmarks.solvers import measure_solvers
 from benchmarks.start_up import measure_start_up
+from benchmarks.stopping import measure_stopping
 from benchmarks.table import print_table
 from benchmarks.transaction import measure_transaction
 
@@ -20,6 +21,7 @@ def main() -> None:
             *measure_journal(),
             *measure_nozzle_change(),
             *measure_start_up(),
+            *measure_stopping(),
             *measure_solvers(),
         ]
     )

@@ -30,6 +30,7 @@
     ├── StoppedError                       a stop ended it, from another thread or terminal
     ├── ToolError
     │   ├── ToolIndexError · ReservedToolError · UndefinedToolError
+    │   ├── SelectedToolError              it is in force, so it was not cleared
     │   ├── ToolChangedError               not the value that was expected; nothing was written
     │   └── ReadBackError                  written, but another value came back
     ├── CalibrationError                   the data do not give a trustworthy result (.code)
@@ -254,7 +255,7 @@ class LeaseLostError(BusyError):
 class OutcomeUnknownError(RobolinkError):
     """A command went out and no answer came: it may or may not have run.
 
-    Motion on that controller is blocked until ``resolve``; nothing is sent again.
+    Motion on that controller is blocked until ``recover``; nothing is sent again.
     """
 
 
@@ -272,6 +273,10 @@ class ToolError(RobolinkError):
 
 class ToolIndexError(ToolError, ValueError):
     """No such tool number."""
+
+
+class SelectedToolError(ToolError):
+    """The tool in force was not cleared: nobody said which one takes its place."""
 
 
 class ReservedToolError(ToolError):

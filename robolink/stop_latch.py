@@ -58,6 +58,11 @@ class StopLatch:
         """Whether a stop is in force."""
         return self._closed
 
+    @property
+    def restores(self) -> bool:
+        """Whether this thread is putting back what was in force before."""
+        return self._permit("restoring")
+
     def close(self) -> None:
         """Hold everything back from now on; never waits."""
         self._closed = True
@@ -93,7 +98,7 @@ class StopLatch:
         """
         if not self._closed or kind in (CommandClass.LOOK, CommandClass.CALM):
             return
-        if kind is CommandClass.RESTORE and self._restoring:
+        if kind is CommandClass.RESTORE and self.restores:
             return
         if kind is CommandClass.WRITE and self._permit("writing"):
             return
@@ -112,7 +117,7 @@ class StopLatch:
         Raises:
             StoppedError: A stop is in force.
         """
-        if self._closed and not self._restoring:
+        if self._closed and not self.restores:
             raise StoppedError(
                 tr("{request}: ended by a stop.", request=request),
                 remedy=_remedy(),
@@ -149,7 +154,7 @@ class StopLatch:
     @contextmanager
     def restoring(self) -> Iterator[None]:
         """Let this thread select a tool and set power and speed although a stop is in force."""
-        before = self._restoring
+        before = self.restores
         self._permits.restoring = True
         try:
             yield
@@ -174,10 +179,6 @@ class StopLatch:
             self._permits.writing = before
             if self._closed:
                 self._put_back.add(tool)
-
-    @property
-    def _restoring(self) -> bool:
-        return self._permit("restoring")
 
     def _permit(self, name: str) -> bool:
         return bool(self._permits.__dict__.get(name))

@@ -24,11 +24,19 @@ class LazyGroup(click.Group):
     Args:
         lazy: Command name to ``("package.module:object", one-line help)``, in the order in
             which they are listed.
+        aliases: Names of before to ``"package.module:object"``; they are listed nowhere.
     """
 
-    def __init__(self, *, lazy: Mapping[str, tuple[str, str]], **options: object) -> None:
+    def __init__(
+        self,
+        *,
+        lazy: Mapping[str, tuple[str, str]],
+        aliases: Mapping[str, str] | None = None,
+        **options: object,
+    ) -> None:
         super().__init__(**options)  # type: ignore[arg-type]
         self._lazy = lazy
+        self._aliases = aliases or {}
         self._listing = False
 
     def list_commands(self, ctx: click.Context) -> list[str]:
@@ -37,11 +45,14 @@ class LazyGroup(click.Group):
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """Return the command, or while listing its stand-in."""
-        if cmd_name not in self._lazy:
+        if cmd_name in self._aliases:
+            target = self._aliases[cmd_name]
+        elif cmd_name in self._lazy:
+            target, summary = self._lazy[cmd_name]
+            if self._listing:
+                return click.Command(cmd_name, short_help=summary)
+        else:
             return super().get_command(ctx, cmd_name)
-        target, summary = self._lazy[cmd_name]
-        if self._listing:
-            return click.Command(cmd_name, short_help=summary)
         module, name = target.split(":")
         return cast(click.Command, getattr(import_module(module), name))
 

@@ -57,6 +57,8 @@ def marker_notice(marker: "Marker", url: str) -> str:
 
     if marker.kind is MarkerKind.SELECTION:
         return _unfinished(marker, url, str(marker.details.get("now", "?")))
+    if marker.kind is MarkerKind.HISTORY:
+        return _record_missing(marker, url)
     if marker.kind is MarkerKind.CHANGE:
         return tr(
             "Not finished since {when}: {request}.\n  'robolink -c {url} recover' settles it.",
@@ -66,11 +68,29 @@ def marker_notice(marker: "Marker", url: str) -> str:
         )
     return tr(
         "Sent {when} without a clear answer: {request}. It may or may not have run, so motion is "
-        "blocked.\n  'robolink -c {url} recover' settles what reading can, 'resolve' the rest.",
+        "blocked.\n  'robolink -c {url} recover' settles it.",
         when=marker.begun_at,
         request=marker.request,
         url=url,
     )
+
+
+def _record_missing(marker: "Marker", url: str) -> str:
+    details = marker.details
+    journal, before = str(details.get("journal", "")), str(details.get("before", ""))
+    said = tr(
+        "This controller was changed from here before, but the journal {journal} knows nothing of "
+        "it: what was left unfinished does not show.",
+        journal=journal,
+    )
+    if before and before != journal:
+        said += " " + tr("Its record was kept in {before}.", before=before)
+    remedy = tr(
+        "Look at the selected tool and at the tools first. 'robolink -c {url} recover' shows them, "
+        "'resolve' begins a new record.",
+        url=url,
+    )
+    return f"{said}\n  {remedy}"
 
 
 def note_change(controller: "Controller", tool: int, now: "ToolOffset | None") -> None:
@@ -117,9 +137,13 @@ def _unfinished(marker: "Marker", url: str, now: str) -> str:
                 tool=before,
             )
         )
-    remedy = tr(
-        "'robolink -c {url} recover' puts tool {tool} back, with the power mode and speed of then.",
-        url=url,
-        tool=before,
-    )
+    if now == before:
+        remedy = tr("'robolink -c {url} recover' settles it.", url=url)
+    else:
+        remedy = tr(
+            "'robolink -c {url} recover' puts tool {tool} back, with the power mode and speed of "
+            "then.",
+            url=url,
+            tool=before,
+        )
     return f"{' '.join(parts)}\n  {remedy}"

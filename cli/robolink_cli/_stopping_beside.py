@@ -43,7 +43,7 @@ def listening_for_stop(controller: "Controller", context: "CliContext") -> Itera
 
 def remember_address(context: "CliContext") -> None:
     """Keep how the cell was reached, for a stop on the day when its file cannot be read."""
-    if context.cell is None:
+    if context.cell is None or "+sim://" in context.cell.url:
         return
     from robolink.config import Reach, remember_reach
 

@@ -1,28 +1,30 @@
 """What commands show: plain payloads, and the tables made from them."""
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
-from robolink.calibration import CalibrationResult, VerifyResult, chain_of
-from robolink.model import Controller, Finding, Pose, ToolOffset, ToolReceipt
-from robolink.nozzle_change import Proposal
+if TYPE_CHECKING:
+    from robolink.calibration import CalibrationResult, VerifyResult
+    from robolink.model import Controller, Finding, Pose, ToolOffset, ToolReceipt
+    from robolink.nozzle_change import Proposal
 
 COMPONENTS = ("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
 
 
-def offset_payload(offset: ToolOffset | None) -> dict[str, float] | None:
+def offset_payload(offset: "ToolOffset | None") -> dict[str, float] | None:
     """Return an offset with its units in the keys, ``None`` for an undefined tool."""
     if offset is None:
         return None
     return dict(zip(COMPONENTS, offset.components(), strict=True))
 
 
-def pose_payload(pose: Pose) -> dict[str, object]:
+def pose_payload(pose: "Pose") -> dict[str, object]:
     """Return a pose with its units in the keys."""
     payload: dict[str, object] = dict(zip(COMPONENTS, pose.coordinates(), strict=True))
     return payload | {"hand": pose.hand, "local": pose.local, "tool": pose.tool}
 
 
-def receipt_payload(receipt: ToolReceipt) -> dict[str, object]:
+def receipt_payload(receipt: "ToolReceipt") -> dict[str, object]:
     """Return what a write or clear did."""
     return {
         "tool": receipt.tool,
@@ -34,7 +36,7 @@ def receipt_payload(receipt: ToolReceipt) -> dict[str, object]:
     }
 
 
-def proposal_payload(proposal: Proposal) -> dict[str, object]:
+def proposal_payload(proposal: "Proposal") -> dict[str, object]:
     """Return a calibration's proposal next to what is stored."""
     result = proposal.result
     return {
@@ -56,8 +58,10 @@ def proposal_payload(proposal: Proposal) -> dict[str, object]:
     }
 
 
-def fit_payload(result: CalibrationResult) -> dict[str, object]:
+def fit_payload(result: "CalibrationResult") -> dict[str, object]:
     """Return how sure a measurement is; what nothing tells is ``None`` or empty."""
+    from robolink.calibration import chain_of  # here, because a status needs no numpy
+
     chain = chain_of(result)
     return {
         "half_width95": dict(zip(result.measured, result.half_width95, strict=False)),
@@ -74,7 +78,7 @@ def fit_payload(result: CalibrationResult) -> dict[str, object]:
     }
 
 
-def verification_payload(result: VerifyResult | None) -> dict[str, object] | None:
+def verification_payload(result: "VerifyResult | None") -> dict[str, object] | None:
     """Return the drift about the new tip."""
     if result is None:
         return None
@@ -95,7 +99,7 @@ def verification_payload(result: VerifyResult | None) -> dict[str, object] | Non
     }
 
 
-def finding_payload(finding: Finding) -> dict[str, object]:
+def finding_payload(finding: "Finding") -> dict[str, object]:
     """Return what was found out about an open marker."""
     return {
         "operation": finding.marker.operation,
@@ -108,7 +112,7 @@ def finding_payload(finding: Finding) -> dict[str, object]:
     }
 
 
-def status_payload(controller: Controller) -> dict[str, object]:
+def status_payload(controller: "Controller") -> dict[str, object]:
     """Return the flags, and what more can be read now."""
     status = controller.status()
     return {

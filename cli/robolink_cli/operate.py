@@ -1,4 +1,4 @@
-"""status, where, stop, reset, motors, resolve: looking at a controller and calming it."""
+"""status, where, stop, reset, motors: looking at a controller and calming it."""
 
 from typing import TYPE_CHECKING
 
@@ -194,33 +194,6 @@ def _switch_group(context: CliContext, *, on: bool, dry_run: bool, yes: bool) ->
     context.emit("group", payload, lambda: say(tr("The axis group is {state}.", state=state)))
 
 
-@click.command("recover")
-@controller_options
-@dry_run_option
-@click.option(
-    "--keep",
-    is_flag=True,
-    help="Keep new values that nobody verified; without it the old ones are written back.",
-)
-@click.option(
-    "--take-over",
-    metavar="REASON",
-    help="End the lease of another who has this controller, and record why.",
-)
-def recover(context: CliContext, dry_run: bool, keep: bool, take_over: str | None) -> int:
-    """Settle what a crash left: read the controller, finish or take back each tool change.
-
-    Each tool is written once at most, and nothing moves. What only a person can judge is left
-    for 'robolink resolve', with exit code 6. It may be run again at any time.
-    """
-    from robolink_cli._recovering import recover_all, show_end
-
-    with open_controller(context, quiet=True, changes=not dry_run) as controller:
-        payload = recover_all(controller, keep=keep, take_over=take_over, dry_run=dry_run)
-    context.emit("recover", payload, lambda: show_end(payload))
-    return 6 if payload["left"] else 0
-
-
 @click.command("execute-raw")
 @click.argument("statement")
 @controller_options
@@ -239,24 +212,3 @@ def execute_raw(context: CliContext, statement: str, yes: bool) -> None:
         printed = require_epson(controller, tr("SPEL+ statements")).execute_raw(statement)
     payload: dict[str, object] = {"statement": statement, "printed": printed}
     context.emit("execute-raw", payload, lambda: say(printed or tr("carried out")))
-
-
-@click.command()
-@controller_options
-@dry_run_option
-@yes_option
-@click.option(
-    "--forget",
-    is_flag=True,
-    help="Forget everything unsettled on your word, without looking or restoring.",
-)
-def resolve(context: CliContext, dry_run: bool, yes: bool, forget: bool) -> None:
-    """Settle what an earlier run left in doubt: look, say what is true, restore the tool.
-
-    Nothing that moved or was written is sent again.
-    """
-    from robolink_cli._resolve import resolve_all
-
-    with open_controller(context, quiet=True, changes=not dry_run) as controller:
-        payload = resolve_all(controller, dry_run=dry_run, yes=yes, forget=forget)
-    context.emit("resolve", payload, lambda: None)

@@ -7,6 +7,7 @@ from robolink.backup._values import ToolHolder, take_backup
 from robolink.durable_files import file_name, make_folder, state_folder
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink.model import EntryKind, NewEntry
 
 
 def first_backup_path(identity: str) -> Path:
@@ -53,4 +54,6 @@ def keep_first_backup(controller: ToolHolder) -> Path | None:
             ),
             controller=controller.identity,
         ) from error
+    # A backup that is not on record is a sign that the record was lost.
+    controller.outcomes.append(NewEntry(EntryKind.BACKUP, verdict=tr("saved in {path}", path=path)))
     return path

@@ -1,13 +1,11 @@
 """From a URL to a controller."""
 
 from contextlib import suppress
+from typing import TYPE_CHECKING
 
 from robolink import __version__
-from robolink.controllers.epson import open_epson
-from robolink.controllers.plc_map import PlcMapController, open_plc_map
-from robolink.controllers.softmotion import SoftMotionController, open_softmotion
 from robolink.errors import ConfigError, JournalError, LoginUnansweredError
-from robolink.journal import open_log, signature_here
+from robolink.journal import GlancingLog, open_log, signature_here
 from robolink.messages import tr
 from robolink.model import Controller, OutcomeLog, Secret, Signature
 from robolink.timing import Clock
@@ -22,6 +20,12 @@ from robolink.transport import (
     parse_url,
 )
 
+if TYPE_CHECKING:
+    from robolink.controllers.plc_map import PlcMapController
+    from robolink.controllers.softmotion import SoftMotionController
+
+# Drivers are imported where they are used: nobody waits for those of other controllers.
+
 
 def connect(
     url: str,
@@ -33,6 +37,7 @@ def connect(
     trace: TraceSink | None = None,
     outcomes: OutcomeLog | None = None,
     signature: Signature | None = None,
+    glance: bool = False,
 ) -> Controller:
     """Connect to a controller; log in where there is a login.
 
@@ -52,6 +57,9 @@ def connect(
             nobody from looking and stopping: ``outcomes.trouble`` says what is wrong with it,
             and what would change something raises it.
         signature: Who works here, and with what; by default the user of this computer.
+        glance: Whether this is for a look, so that a journal in which nothing is unfinished is
+            not opened before something has to be recorded. Who the controller says it is is
+            not asked then.
 
     Raises:
         ConfigError: The URL or an option is wrong.
@@ -63,21 +71,24 @@ def connect(
         LeaseHeldError: Nobody answers the login, and somebody else has the controller.
     """
     link = parse_url(url)
+    record = _Record(signature or signature_here(__version__), glance=glance)
     if link.kind == "softmotion":
         return _connect_softmotion(
-            link, timeout_s, clock=clock, trace=trace, outcomes=outcomes, signature=signature
+            link, timeout_s, clock=clock, trace=trace, outcomes=outcomes, record=record
         )
     if link.kind == "plc":
         return _connect_plc(
-            link, timeout_s, clock=clock, trace=trace, outcomes=outcomes, signature=signature
+            link, timeout_s, clock=clock, trace=trace, outcomes=outcomes, record=record
         )
     if link.kind != "epson":
         raise ConfigError(
             tr("robolink does not know controllers of the kind {kind!r}.", kind=link.kind),
             remedy=tr("Write for example epson+tcp://192.168.0.1:5000."),
         )
+    from robolink.controllers.epson import open_epson
+
     transport = open_transport(link, timeout_s=timeout_s, clock=clock)
-    kept = outcomes or _outcomes(transport, signature)
+    kept = outcomes or record.of(transport)
     try:
         return open_epson(
             transport if trace is None else TracingTransport(transport, trace),
@@ -101,15 +112,17 @@ def _connect_softmotion(
     clock: Clock | None,
     trace: TraceSink | None,
     outcomes: OutcomeLog | None,
-    signature: Signature | None,
-) -> SoftMotionController:
+    record: "_Record",
+) -> "SoftMotionController":
     if trace is not None:
         raise ConfigError(
             tr("The dialogue with a PLC mailbox cannot be recorded."),
             remedy=tr("Leave --record out; a network capture shows the registers."),
         )
+    from robolink.controllers.softmotion import open_softmotion
+
     link = open_mailbox_link(url, timeout_s=timeout_s, clock=clock)
-    kept = outcomes or _outcomes(link, signature)
+    kept = outcomes or record.of(link)
     return open_softmotion(link, outcomes=kept, timeout_s=timeout_s)
 
 
@@ -120,26 +133,44 @@ def _connect_plc(
     clock: Clock | None,
     trace: TraceSink | None,
     outcomes: OutcomeLog | None,
-    signature: Signature | None,
-) -> PlcMapController:
+    record: "_Record",
+) -> "PlcMapController":
     if trace is not None:
         raise ConfigError(
             tr("The dialogue with a PLC's registers cannot be recorded."),
             remedy=tr("Leave --record out; a network capture shows the registers."),
         )
 
-    def record(identity: str) -> OutcomeLog:
-        signed = signature or signature_here(__version__)
-        return outcomes or open_log(identity, durable=True, signature=signed)
+    from robolink.controllers.plc_map import open_plc_map
 
-    return open_plc_map(url, outcomes=record, timeout_s=timeout_s, clock=clock)
+    def log(identity: str) -> OutcomeLog:
+        return outcomes or record.at(identity, durable=True)
+
+    return open_plc_map(url, outcomes=log, timeout_s=timeout_s, clock=clock)
 
 
-def _outcomes(link: Transport | MailboxLink, signature: Signature | None) -> OutcomeLog:
-    """Open the record of a controller; the link is closed when that fails."""
-    try:
-        signed = signature or signature_here(__version__)
-        return open_log(link.identity, durable=link.durable, signature=signed)
-    except BaseException:
-        link.close()
-        raise
+class _Record:
+    """Opens the record of a controller.
+
+    Args:
+        signature: Who works here.
+        glance: Whether it is for a look only.
+    """
+
+    def __init__(self, signature: Signature, *, glance: bool) -> None:
+        self._signature = signature
+        self._glance = glance
+
+    def of(self, link: Transport | MailboxLink) -> OutcomeLog:
+        """Return the record of what a link leads to; the link is closed when that fails."""
+        try:
+            return self.at(link.identity, durable=link.durable)
+        except BaseException:
+            link.close()
+            raise
+
+    def at(self, address: str, *, durable: bool) -> OutcomeLog:
+        """Return the record of what is reached at an address."""
+        if self._glance and durable:
+            return GlancingLog(address, signature=self._signature)
+        return open_log(address, durable=durable, signature=self._signature)

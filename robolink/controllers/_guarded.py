@@ -6,7 +6,7 @@ The command classes of design part 4 (faults_and_speed.md A3):
 class  on an EPSON controller                      when no answer comes
 =====  ==========================================  =======================================
 READ   GetStatus, Print ..., TLSet, Where          ask again on a new link
-SET    TLSet n, TLClr n, Tool n, SetIO ...         OutcomeUnknownError; read back, resolve
+SET    TLSet n, TLClr n, Tool n, SetIO ...         OutcomeUnknownError; read back, recover
 MOVE   Go, Move                                    OutcomeUnknownError; never sent again
 STOP   Abort, Stop                                 may be repeated
 =====  ==========================================  =======================================
@@ -16,7 +16,7 @@ move, and a lost answer leaves nothing that the next connection would not set ag
 """
 
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from typing import Final
@@ -24,8 +24,10 @@ from typing import Final
 from robolink.checkpoints import Point, checkpoint
 from robolink.errors import (
     BusyError,
+    JournalError,
     OutcomeUnknownError,
     RemoteProtocolError,
+    RobolinkError,
     StoppedError,
     TransportError,
 )
@@ -88,10 +90,15 @@ class MarkerDesk:
     Args:
         identity: Which controller.
         outcomes: Where the markers are kept.
+        latch: Knows whether a thread puts back what was in force before. That goes on when the
+            journal fails in the middle: the marker of the procedure, which names what is to be
+            put back, is stored, and nothing but the old state comes of it.
     """
 
-    def __init__(self, identity: str, outcomes: OutcomeLog) -> None:
+    def __init__(self, identity: str, outcomes: OutcomeLog, latch: StopLatch) -> None:
         self._identity = identity
+        self._latch = latch
+        self._unstored: set[str] = set()
         self.outcomes = outcomes
         self.ledger = Ledger()
         self._procedures: dict[MarkerKind, Marker] = {}
@@ -102,7 +109,7 @@ class MarkerDesk:
         Raises:
             LeaseHeldError: Somebody else is changing this controller.
         """
-        self.outcomes.look()
+        self._recorded(self.outcomes.look)
 
     def beat(self) -> None:
         """Let others see that this process is alive."""
@@ -130,7 +137,8 @@ class MarkerDesk:
         """
         name = operation or new_operation()
         marker = Marker(name, kind, request, wall_label(), dict(details))
-        self.outcomes.begin(marker)
+        if not self._recorded(lambda: self.outcomes.begin(marker)):
+            self._unstored.add(name)
         self.ledger.begin(marker)
         if kind in _PROCEDURES:
             self._procedures[kind] = marker
@@ -139,8 +147,13 @@ class MarkerDesk:
     def clear(self, marker: Marker, *entries: NewEntry) -> None:
         """Forget a marker whose outcome is known, and journal how it ended."""
         self.ledger.ended(marker)
-        self.outcomes.clear(marker.operation, *entries)
-        self.ledger.recorded(marker)
+        cleared = True
+        if marker.kind in _PROCEDURES:
+            self.outcomes.clear(marker.operation, *entries)
+        else:
+            cleared = self._recorded(lambda: self.outcomes.clear(marker.operation, *entries))
+        if cleared or marker.operation in self._unstored:
+            self.ledger.recorded(marker)
         known = self._procedures.get(marker.kind)
         if known is not None and known.operation == marker.operation:
             del self._procedures[marker.kind]
@@ -171,7 +184,7 @@ class MarkerDesk:
         if marker is not None:
             noted = replace(marker, details={**marker.details, "now": tool})
             self._procedures[MarkerKind.SELECTION] = noted
-            self.outcomes.begin(noted)
+            self._recorded(lambda: self.outcomes.begin(noted))
 
     def require_settled(self, request: str) -> None:
         """Refuse to go on while something earlier is unsettled.
@@ -196,13 +209,24 @@ class MarkerDesk:
                     earlier=marker.request,
                     when=marker.begun_at,
                 ),
-                remedy=tr(
-                    "Run 'robolink recover', or 'robolink resolve' to decide yourself; motion is "
-                    "blocked until then."
-                ),
+                remedy=tr("Run 'robolink recover'; motion is blocked until then."),
                 controller=self._identity,
                 request=request,
             )
+
+    def _recorded(self, keep: Callable[[], object]) -> bool:
+        """Keep something on record; return whether that was possible.
+
+        Raises:
+            JournalError: It was not, and nothing is being put back for which that is no matter.
+        """
+        try:
+            keep()
+        except JournalError:
+            if not (self._latch.restores and self._procedures):
+                raise
+            return False
+        return True
 
     def _unsettled(self) -> list[Marker]:
         own = {
@@ -226,7 +250,7 @@ class MarkerDesk:
                 ),
                 remedy=tr(
                     "It was not sent again. Look at the robot, connect again and run "
-                    "'robolink resolve'; motion is blocked until then."
+                    "'robolink recover'; motion is blocked until then."
                 ),
                 controller=self._identity,
                 request=request,
@@ -234,3 +258,25 @@ class MarkerDesk:
             )
             note_standing(doubt, self.ledger.standing())
             raise doubt from error
+
+
+def what_is_left(failure: RobolinkError, tool: int) -> str:
+    """Return the sentence about a tool of before that a procedure meant to leave selected.
+
+    Args:
+        failure: What kept the end of the procedure from being recorded, or from happening.
+        tool: Its number.
+    """
+    if isinstance(failure, JournalError):
+        return tr(
+            "Tool {tool} is selected again, which could not be recorded ({cause}) 'robolink "
+            "recover' settles it.",
+            tool=tool,
+            cause=failure.what,
+        )
+    return tr(
+        "The tool of before, tool {tool}, could not be selected again ({cause}) 'robolink "
+        "recover' selects it.",
+        tool=tool,
+        cause=failure.what,
+    )

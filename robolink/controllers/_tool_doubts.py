@@ -1,4 +1,4 @@
-"""Judges the open markers of tools, written or selected, by what is there now."""
+"""Judges the open markers of tools, written or selected, and of movements."""
 
 from robolink.messages import tr
 from robolink.model import (
@@ -60,6 +60,16 @@ def examine_select(tools: ToolTable, marker: Marker) -> Finding:
     return Finding(marker, verdict, tr("Tool {now} is selected now.", now=now))
 
 
+def examine_move(marker: Marker) -> Finding:
+    """Return what can be told of a movement; whether it is as it should be, a person sees.
+
+    How far it is from its target is not told: the tool in which that was meant may hold another
+    value by now, or not be the selected one.
+    """
+    sentence = tr("It may have ended early. Look at the robot; nothing is sent again.")
+    return Finding(marker, Verdict.LOOK, sentence)
+
+
 def judge_selection(
     marker: Marker, *, now: int, before: int, restored: bool, action: str
 ) -> Finding:
@@ -75,12 +85,12 @@ def judge_selection(
     if restored:
         sentence = tr("Tool {tool} is selected, as it was before.", tool=now)
         return Finding(marker, Verdict.DONE, sentence)
-    sentence = tr(
-        "Tool {now} is selected; before {reason!r} it was tool {before}.",
-        now=now,
-        reason=marker.request,
-        before=before,
-    )
+    if now == before:
+        sentence = tr("Tool {tool} is selected, as before; power mode or speed are not.", tool=now)
+    else:
+        sentence = tr(
+            "Tool {now} is selected; before it was tool {before}.", now=now, before=before
+        )
     entry = NewEntry(EntryKind.SELECTION, tool=before, verdict=Verdict.NOT_RESTORED)
     return Finding(marker, Verdict.NOT_RESTORED, sentence, action, (entry,))
 

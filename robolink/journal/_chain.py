@@ -54,6 +54,13 @@ class ChainCheck:
         self.number = 0
         self._hash = FIRST
 
+    @classmethod
+    def before(cls, row: Mapping[str, Any]) -> "ChainCheck":
+        """Return a check that begins at an entry, and believes what that says of the one before."""
+        check = cls()
+        check.number, check._hash = row["number"] - 1, str(row["previous"])
+        return check
+
     def problems_of(self, row: Mapping[str, Any]) -> Iterator[str]:
         """Take the next entry and yield what is wrong with it."""
         number, expected = row["number"], self.number + 1

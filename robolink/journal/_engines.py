@@ -29,6 +29,9 @@ _SCHEMA_LOCK: Final = 0x726F626F  # any number that no other user of the databas
 
 _BEGIN: Final = "BEGIN IMMEDIATE"
 _BEGIN_WRITING: Final = Prepared(text(_BEGIN))
+_SELF_CHECKS: Final = tuple(
+    Prepared(text(f"PRAGMA quick_check({name})")) for name in ("markers", "leases", "head")
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,12 +43,15 @@ class Backend:
         last_resort: Makes connections to a file that the first one cannot read.
         begin_writing: Statement that takes the write lock at the start of a transaction.
         begin_migrating: Statement that keeps others from changing the tables.
+        self_checks: Statements by which it looks for damage in small tables; each answers
+            "ok". PostgreSQL checks each page that it reads.
     """
 
     engine: Engine
     last_resort: Engine | None = None
     begin_writing: Prepared | None = None
     begin_migrating: str = ""
+    self_checks: tuple[Prepared, ...] = ()
 
 
 def backend_of(place: Place, *, read_only: bool) -> Backend:
@@ -71,7 +77,12 @@ def backend_of(place: Place, *, read_only: bool) -> Backend:
 
 
 def _sqlite(engine: Engine) -> Backend:
-    return Backend(engine, begin_writing=_BEGIN_WRITING, begin_migrating=_BEGIN)
+    return Backend(
+        engine,
+        begin_writing=_BEGIN_WRITING,
+        begin_migrating=_BEGIN,
+        self_checks=_SELF_CHECKS,
+    )
 
 
 def _engine(connect: Callable[[], sqlite3.Connection], pool: type[Pool]) -> Engine:

@@ -19,6 +19,9 @@ _Head: TypeAlias = tuple[int, str]
 # The kinds whose value was read on the controller.
 _PROVING: Final = (EntryKind.READ_BACK, EntryKind.DONE, EntryKind.ROLLED_BACK)
 
+# What is recorded of a controller without anything being changed on it.
+_NO_HISTORY: Final = (EntryKind.IDENTITY, EntryKind.RECONNECT, EntryKind.LEASE)
+
 _SELECT_HEAD: Final = select(HEAD.c.number, HEAD.c.hash)
 _MOVE_HEAD: Final = Prepared(
     update(HEAD)
@@ -75,6 +78,16 @@ class EntryRows:
         if after is not None:
             statement = statement.where(ENTRIES.c.number > after)
         return [dict(row) for row in self._connection.execute(statement).mappings()]
+
+    def history(self, names: Sequence[str]) -> bool:
+        """Whether anything was changed, or decided, on the controller with these names."""
+        wanted = [storable(name) for name in names]
+        about = [str(kind) for kind in _NO_HISTORY]
+        columns = ENTRIES.c
+        statement = select(columns.number).where(
+            columns.controller.in_(wanted), columns.kind.not_in(about)
+        )
+        return self._connection.execute(statement.limit(1)).first() is not None
 
     def count(self) -> int:
         """Return how many there are."""

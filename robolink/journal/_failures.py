@@ -52,6 +52,21 @@ def journal_error(error: Exception, name: str, consequence: str) -> JournalError
     )
 
 
+def damaged_error(found: str, name: str, consequence: str) -> JournalError:
+    """Return what a person is told about damage that the database itself did not notice.
+
+    Args:
+        found: What was found, one sentence.
+        name: Which journal, as a person is told.
+        consequence: What it means for the controller, one sentence.
+    """
+    cause = tr("it is damaged ({text})", text=found.rstrip("."))
+    return JournalError(
+        tr("The journal {name} cannot be used: {cause}.", name=name, cause=cause),
+        remedy=f"{_move_it_away()} {consequence}",
+    )
+
+
 def _reason(error: BaseException) -> str:
     if isinstance(error, PermissionError):
         return "forbidden"

@@ -201,7 +201,7 @@ class Lease:
         return seen
 
     def _sight(self) -> Sighting:
-        with self._store.read(tr("The controller was not touched.")) as tables:
+        with self._store.read(tr("The command was not sent.")) as tables:
             return tables.leases.sight(self.controller)
 
     def _claim(self, purpose: str, operator: str, now_ns: int) -> dict[str, object]:

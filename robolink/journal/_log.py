@@ -9,6 +9,7 @@ from robolink.errors import JournalError, OutcomeUnknownError
 from robolink.journal._leases import Lease
 from robolink.journal._naming import Names, Naming
 from robolink.journal._processes import BootClock, Holder, this_process
+from robolink.journal._traces import leave_trace, traces_of
 from robolink.messages import tr
 from robolink.model import EntryKind, Marker, MarkerKind, NewEntry, Recorded, Signature, Who
 from robolink.timing import Clock
@@ -60,6 +61,9 @@ class JournalOutcomeLog:
         self._names = Names(controller)
         self._begun: set[str] = set()
         self._holds = 0
+        self._sound = False
+        self._has_history = False
+        self._traced = False
 
     @property
     def identity(self) -> str:
@@ -100,6 +104,7 @@ class JournalOutcomeLog:
         """
         with self._lock:
             name = self._named().identity
+            self._require_sound()
             self._lease.prepare()
             with self._store.write(_untouched()) as tables:
                 grip = self._lease.secure(tables.leases, marker.request, self.signature.operator)
@@ -108,6 +113,10 @@ class JournalOutcomeLog:
                 tables.entries.append(name, self.signature, self.change, entries)
             self._begun.add(marker.operation)
             self._lease.settle(grip)
+            self._has_history = True
+            if self.durable and not self._traced:
+                leave_trace(name, self._journal.location)
+                self._traced = True
 
     def clear(self, operation: str, *entries: NewEntry) -> None:
         """Forget a marker and record how it ended, in one durable transaction.
@@ -144,12 +153,20 @@ class JournalOutcomeLog:
     def open_markers(self) -> tuple[Marker, ...]:
         """Return what is unsettled on this controller, oldest first, whoever began it.
 
+        A journal that knows nothing of a controller which was changed from here before has lost
+        what was unfinished: that is unsettled too.
+
         Raises:
             JournalError: It cannot be read.
         """
         names = self._named().all
+        traces = traces_of(names) if self.durable and not self._has_history else None
         with self._store.read() as tables:
-            return tables.markers.of(*names)
+            found = tables.markers.of(*names)
+            if traces is None or found:
+                return found
+            self._has_history = tables.entries.history(names)
+        return () if self._has_history else (traces.marker(self._journal.location),)
 
     def recorded(
         self, *, tool: int | None = None, change: str = "", kinds: Collection[EntryKind] = ()
@@ -180,6 +197,7 @@ class JournalOutcomeLog:
         """
         with self._lock:
             self._named()
+            self._require_sound()
             # While something that it began is open, a lease that was lost stays lost: clearing
             # up after it is not for this process any more.
             self._lease.look(afresh=not self._begun)
@@ -205,6 +223,7 @@ class JournalOutcomeLog:
         """
         with self._lock:
             name = self._named().identity
+            self._require_sound()
             self._lease.prepare()
             with self._store.write(_untouched()) as tables:
                 grip = self._lease.secure(tables.leases, purpose, self.signature.operator)
@@ -258,6 +277,12 @@ class JournalOutcomeLog:
             self._names = names
             return names
 
+    def _require_sound(self) -> None:
+        """Look for damage, once, before the first change: a bent record is no record."""
+        if not self._sound:
+            self._store.require_sound(self._names.all)
+            self._sound = True
+
     def _settled_by_another(self) -> OutcomeUnknownError:
         return OutcomeUnknownError(
             tr("Another settled meanwhile what was begun on {name}.", name=self._names.identity),
@@ -298,7 +323,7 @@ def _beginning(marker: Marker, *, first: bool) -> tuple[NewEntry, ...]:
 
 
 def _untouched() -> str:
-    return tr("The controller was not touched.")
+    return tr("The command was not sent.")
 
 
 def _left_open() -> str:

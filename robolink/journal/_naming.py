@@ -94,7 +94,7 @@ class Naming:
         return self._settled
 
     def _looked_up(self, found: Identity | None) -> _Meeting:
-        with self._store.read(tr("The controller was not touched.")) as tables:
+        with self._store.read(tr("The command was not sent.")) as tables:
             rows = tables.names
             if found is None:
                 name = rows.meant(self._text)

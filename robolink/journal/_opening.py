@@ -1,20 +1,22 @@
 """Opening a journal: one connection for each place and process."""
 
 import threading
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from robolink.errors import JournalError
-from robolink.journal._journal import Journal
 from robolink.journal._looking import LookingLog
 from robolink.journal._places import Place, default_location, memory_place, place_of
 from robolink.model import OutcomeLog, Signature
 
+if TYPE_CHECKING:
+    from robolink.journal._journal import Journal
+
 _lock: Final = threading.Lock()
-_opened: Final[dict[tuple[str, bool], Journal]] = {}
-_in_memory: Final[dict[str, Journal]] = {}
+_opened: Final[dict[tuple[str, bool], "Journal"]] = {}
+_in_memory: Final[dict[str, "Journal"]] = {}
 
 
-def open_journal(location: str | None = None, *, read_only: bool = False) -> Journal:
+def open_journal(location: str | None = None, *, read_only: bool = False) -> "Journal":
     """Open a journal, or return the one that this process has open already.
 
     A new file is for its owner only, and so is a new folder.
@@ -37,7 +39,7 @@ def open_journal(location: str | None = None, *, read_only: bool = False) -> Jou
         return known
 
 
-def memory_journal(identity: str) -> Journal:
+def memory_journal(identity: str) -> "Journal":
     """Return the journal of a far end that dies with this process, such as a simulator in it."""
     with _lock:
         known = _in_memory.get(identity)
@@ -80,7 +82,8 @@ def close_files() -> None:
                 journal.close()
 
 
-def _open(place: Place, *, read_only: bool) -> Journal:
+def _open(place: Place, *, read_only: bool) -> "Journal":
+    from robolink.journal._journal import Journal
     from robolink.journal._store import Store  # here, because it loads SQLAlchemy
 
     store = Store(place, read_only=read_only)

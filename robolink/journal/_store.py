@@ -11,14 +11,15 @@ from sqlalchemy.exc import SQLAlchemyError
 from robolink.checkpoints import Point, checkpoint
 from robolink.errors import JournalError
 from robolink.journal import _migrations
+from robolink.journal._damage import damage
 from robolink.journal._engines import Backend, backend_of
 from robolink.journal._entry_rows import EntryRows
-from robolink.journal._failures import journal_error
+from robolink.journal._failures import damaged_error, journal_error
 from robolink.journal._lease_rows import LeaseRows
 from robolink.journal._marker_rows import MarkerRows
 from robolink.journal._name_rows import NameRows
 from robolink.journal._places import Place
-from robolink.journal._prepared import Runner
+from robolink.journal._prepared import Prepared, Runner
 from robolink.messages import tr
 
 
@@ -33,9 +34,12 @@ class Tables:
         leases: Who may change which controller.
         names: Who is meant by a name or an address.
         newer: Whether a newer robolink made the tables.
+        self_checks: Statements by which the database looks for damage.
     """
 
-    def __init__(self, connection: Connection, version: int) -> None:
+    def __init__(
+        self, connection: Connection, version: int, self_checks: tuple[Prepared, ...]
+    ) -> None:
         self.connection = connection
         self.runner = Runner(connection)
         self.entries = EntryRows(connection, self.runner)
@@ -43,6 +47,7 @@ class Tables:
         self.leases = LeaseRows(self.runner)
         self.names = NameRows(self.runner, known=version >= _migrations.NAMED)
         self.newer = version > len(_migrations.MIGRATIONS)
+        self.self_checks = self_checks
 
 
 class Store:
@@ -92,13 +97,28 @@ class Store:
         """
         return self._use(consequence, writing=False)
 
+    def require_sound(self, names: tuple[str, ...]) -> None:
+        """Make sure that what a change of a controller rests on is as it was stored.
+
+        Args:
+            names: Of the controller.
+
+        Raises:
+            JournalError: It is damaged, or was changed.
+        """
+        consequence = tr("The command was not sent.")
+        with self.read(consequence) as tables:
+            found = next(damage(tables, names), "")
+        if found:
+            raise damaged_error(found, self._place.name, consequence)
+
     def open(self) -> None:
         """Connect now, and bring older tables up to date.
 
         Raises:
             JournalError: That is impossible.
         """
-        with self.read(tr("The controller was not touched.")):
+        with self.read(tr("The command was not sent.")):
             pass
 
     def close(self) -> None:
@@ -172,7 +192,7 @@ class Store:
         except BaseException:
             connection.close()
             raise
-        return Tables(connection, version)
+        return Tables(connection, version, backend.self_checks)
 
     def _bring_up_to_date(self, connection: Connection, backend: Backend) -> int:
         """Return the version of the tables; older ones that are only read stay as they are."""

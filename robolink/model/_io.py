@@ -15,7 +15,7 @@ class DigitalIo(Protocol):
         Raises:
             NotReadyError: The state forbids it.
             RejectedError: It was refused; nothing was switched.
-            OutcomeUnknownError: No answer came; motion is blocked until ``resolve``.
+            OutcomeUnknownError: No answer came; motion is blocked until ``recover``.
         """
 
     def preview_output(self, bit: int, on: bool) -> tuple[str, ...]:

@@ -26,6 +26,7 @@ class EntryKind(StrEnum):
     LEASE = "lease"
     STATION = "station"
     IDENTITY = "identity"
+    BACKUP = "backup"
 
 
 @dataclass(frozen=True, slots=True)

@@ -170,6 +170,15 @@ class Ledger:
         finally:
             self.close(account)
 
+    @contextmanager
+    def telling(self) -> Iterator[None]:
+        """Let whatever leaves the block say what was left on the controller since connecting."""
+        try:
+            yield
+        except BaseException as error:
+            note_standing(error, self.standing())
+            raise
+
     def open(self) -> Account:
         """Begin an account of what is done from now on."""
         with self._lock:

@@ -19,6 +19,7 @@ class MarkerKind(StrEnum):
     MOVE = "move"
     SELECTION = "selection"
     CHANGE = "change"
+    HISTORY = "history"
 
 
 def new_operation() -> str:
@@ -34,7 +35,8 @@ class Marker:
         operation: Unique id of the command.
         kind: ``SET`` a value is being written, ``MOVE`` the robot was told to move,
             ``SELECTION`` another tool than the cell's own is in force meanwhile, ``CHANGE`` a
-            tool change is not finished: written and not verified, or not every tool of it.
+            tool change is not finished: written and not verified, or not every tool of it,
+            ``HISTORY`` the record of what was done here before is missing.
         request: What was sent or begun, as a person may read it.
         begun_at: Wall-clock label, ISO 8601 UTC.
         details: Plain JSON values needed to settle it.

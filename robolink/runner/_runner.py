@@ -13,6 +13,7 @@ from robolink.errors import (
     ControllerFaultError,
     DeclinedError,
     HeartbeatLostError,
+    JournalError,
     NotReadyError,
     NotReadyReason,
     StoppedError,
@@ -240,6 +241,8 @@ class Runner:
                 self.jog(word)
                 if self._repeats_left != repeats_left:  # another question came between
                     self._operator.ask(step.instruction, _QUESTIONS[step.shown])
+            except JournalError:
+                raise  # no mistake of the person's: the record cannot be kept any more
             except ConfigError as error:
                 # A typing mistake ends nothing; the limits held and nothing was sent.
                 refused += 1

@@ -1,6 +1,6 @@
 """Settles open markers of every kind: those of the driver, and those of whole changes."""
 
-from robolink.errors import ConfigError, RobolinkError
+from robolink.errors import ConfigError, OutcomeUnknownError
 from robolink.messages import tr
 from robolink.model import (
     Controller,
@@ -36,6 +36,8 @@ class Settler:
         Raises:
             ConfigError: The marker was written by something else.
         """
+        if marker.kind is MarkerKind.HISTORY:
+            return self._without_record(marker)
         if marker.kind is not MarkerKind.CHANGE:
             return self._controller.resolver.examine(marker)
         tools = self._controller.tools
@@ -72,7 +74,9 @@ class Settler:
         outcomes = self._controller.outcomes
         outcomes.change = str(finding.marker.details.get("change", ""))
         try:
-            if finding.marker.kind is not MarkerKind.CHANGE:
+            if finding.marker.kind is MarkerKind.HISTORY:
+                self._controller.finish(finding.marker, *finding.entries)
+            elif finding.marker.kind is not MarkerKind.CHANGE:
                 self._controller.resolver.settle(finding)
             elif finding.verdict is not Verdict.NOT_FINISHED:
                 self._controller.finish(finding.marker, *finding.entries)
@@ -97,18 +101,41 @@ class Settler:
         self._controller.begin(
             marker.kind, marker.request, marker.details, operation=marker.operation
         )
-        done = put_back(self._controller, _steps(marker))
+        selected = marker.details.get("selected")
+        done = put_back(
+            self._controller,
+            _steps(marker),
+            selected=selected if isinstance(selected, int) else None,
+        )
         failures = [result for result in done if not result.restored]
         entries = [result.entry for result in done]
         if not failures:
             self._controller.finish(marker, *entries)
             return
         self._controller.outcomes.append(*entries)
-        raise RobolinkError(
+        raise OutcomeUnknownError(
             " ".join(result.sentence for result in failures),
-            remedy=tr("The change stays open. Look at the controller, then 'robolink resolve'."),
+            remedy=tr("The change stays open. Look at the controller."),
             controller=self._controller.identity,
         )
+
+    def _without_record(self, marker: Marker) -> Finding:
+        selected = self._controller.tools.selected()
+        now = tr("unknown") if selected is None else str(selected)
+        sentence = tr(
+            "Tool {tool} is selected. Whether that is the cell's own, and whether each tool holds "
+            "what it should, only you can tell: nothing here knows what was unfinished.",
+            tool=now,
+        )
+        backup = marker.details.get("backup")
+        if backup:
+            sentence += " " + tr("'robolink compare {path}' shows what has changed.", path=backup)
+        entry = NewEntry(
+            EntryKind.DECISION,
+            verdict=tr("a person looked at the controller and begins a new record"),
+            details={**marker.details, "selected": selected},
+        )
+        return Finding(marker, Verdict.LOOK, sentence, entries=(entry,))
 
     def _conflict(
         self, marker: Marker, steps: list[Step], now: dict[int, ToolOffset | None]
@@ -171,5 +198,5 @@ def _steps(marker: Marker) -> list[Step]:
     except (KeyError, TypeError, ValueError) as error:
         raise ConfigError(
             tr("The marker of {when} cannot be understood.", when=marker.begun_at),
-            remedy=tr("Compare the tools with a backup, then 'robolink resolve --forget'."),
+            remedy=tr("Compare the tools with a backup, then 'robolink recover --forget'."),
         ) from error

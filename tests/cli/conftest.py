@@ -15,10 +15,11 @@ _numbers = count()
 
 
 @pytest.fixture(autouse=True)
-def plain_environment(monkeypatch):
+def plain_environment(monkeypatch, tmp_path):
     for name in [name for name in os.environ if name.startswith(("ROBOLINK", "_ROBOLINK"))]:
         monkeypatch.delenv(name)
     monkeypatch.setitem(sys.modules, "keyring", None)
+    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
 
 
 @pytest.fixture

@@ -1,5 +1,7 @@
 """A second terminal beside a session that works: who it is and what it does, nothing to recover."""
 
+from dataclasses import replace
+
 import pytest
 from robolink_cli import main
 from robolink_simulators.hosting.modbus import serve_modbus_tcp
@@ -42,7 +44,7 @@ class LateClock(BootClock):
 def session(plc, *, clock=None, **holder):
     """Return the log of another process that calibrates."""
     own = this_process()
-    other = Holder(**{"os_user": "ann", "host": "pc-7", "pid": own.pid, "boot": own.boot} | holder)
+    other = replace(Holder("ann", "pc-7", pid=own.pid, boot=own.boot), **holder)
     log = open_journal().log(
         plc, holder=other, clock=clock, signature=Signature(operator="Ann Lee")
     )

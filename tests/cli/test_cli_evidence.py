@@ -91,7 +91,7 @@ def test_a_recording_holds_the_dialogue_and_not_the_password(cell, tmp_path):
     assert "$GetIO,3" in text
 
 
-def test_a_recording_is_replayed_as_a_test(cell, tmp_path, epson_replay, capsys):
+def test_a_recording_is_replayed_as_a_test(cell, tmp_path, epson_replay, capsys, monkeypatch):
     recording = tmp_path / "day.jsonl"
     commands = [["status", "--json"], ["tool", "list", "--json"], ["var", "get", "VERSION$"]]
     live = []
@@ -100,6 +100,8 @@ def test_a_recording_is_replayed_as_a_test(cell, tmp_path, epson_replay, capsys)
         live.append(capsys.readouterr().out)
     url = epson_replay(recording)
     for arguments, shown in zip(commands, live, strict=True):
+        # A controller on a network is asked who it is by those who never met it.
+        monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / arguments[0]))
         assert main.run(["-c", url, *arguments]) == 0
         assert capsys.readouterr().out == shown.replace("epson+sim://cli-evidence", url)
 

@@ -40,7 +40,7 @@ def check(cell: NozzleCell, nth: int) -> bool:
     if cell.simulator.machine.flash_writes:
         assert "Tool 1 may hold the new value, which nobody verified" in cut.err
     check_the_next_command_says_what_is_left(cell, unknown=moving == [True])
-    check_motion_is_blocked_until_resolved(cell)
+    check_motion_is_blocked_until_recovered(cell)
     assert cell.moves_requested == nth + 1
     return moving == [True]
 
@@ -49,13 +49,13 @@ def check_the_outcome_is_called_unknown(cut):
     assert cut.code == 6, cut.err
     assert "may or may not have run" in cut.err
     assert "It was not sent again." in cut.err
-    assert "'robolink resolve'" in cut.err
+    assert "'robolink recover'" in cut.err
 
 
 def check_the_link_is_called_broken(cut, *, code):
     assert cut.code == code, cut.err
     assert "The tool of before, tool 1, could not be selected again" in cut.err
-    assert "'robolink resolve' offers it" in cut.err
+    assert "'robolink recover' selects it" in cut.err
 
 
 def check_the_next_command_says_what_is_left(cell, *, unknown):
@@ -69,13 +69,13 @@ def check_the_next_command_says_what_is_left(cell, *, unknown):
         assert "Tool 0 is selected now; it was tool 1 before" in shown.err
 
 
-def check_motion_is_blocked_until_resolved(cell):
+def check_motion_is_blocked_until_recovered(cell):
     for command in (("jog", "z+0.5", "--yes"), tuple(cell.calibration)):
         refused = cell.run(*command)
         assert refused.code == 6
-        assert "'robolink resolve' to decide yourself" in refused.err
-    resolved = cell.run("resolve", "--yes")
-    assert resolved.code == 0, resolved.err
+        assert "'robolink recover'" in refused.err
+    recovered = cell.run("recover", "--yes")
+    assert recovered.code == 0, recovered.err
     cell.check_settings_are_those_of_before()
     assert cell.open_markers() == ()
     cell.check_nothing_else_was_written()
@@ -83,7 +83,7 @@ def check_motion_is_blocked_until_resolved(cell):
     assert moved.code == 0, moved.err
 
 
-def test_cable_gone_during_each_move_is_unknown_is_not_resent_and_is_settled_by_resolve(
+def test_cable_gone_during_each_move_is_unknown_is_not_resent_and_is_settled_by_recover(
     tmp_path, monkeypatch
 ):
     with served_cell(tmp_path / "whole", monkeypatch) as cell:

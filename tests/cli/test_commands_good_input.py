@@ -190,7 +190,7 @@ def test_a_calibration_finds_the_true_offset_and_names_what_it_did_not_measure(c
 
 
 def test_the_demo_gives_truth_and_error_as_one_document(capsys):
-    assert main.run(["demo", "--json", "--speed", "100"]) == 0
+    assert main.run(["demo", "--json", "--speed", "20"]) == 0
     document = json.loads(capsys.readouterr().out)
     assert document["schema"] == "robolink/demo/2"
     assert [one["kind"] for one in document["controllers"]] == ["epson", "softmotion"]
@@ -201,7 +201,7 @@ def test_the_demo_gives_truth_and_error_as_one_document(capsys):
 
 
 def test_the_demo_shows_before_after_drift_and_what_was_sent_on_the_wire(capsys):
-    assert main.run(["demo", "--speed", "100"]) == 0
+    assert main.run(["demo", "--speed", "20"]) == 0
     shown = capsys.readouterr().out
     for words in ("before", "measured", "drifts", "sent on the wire", '> $Execute,"TLSet 1, XY('):
         assert words in shown

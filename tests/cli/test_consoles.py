@@ -20,7 +20,7 @@ robot = "机器人 é"
 COMMANDS = {
     ("--help",): 0,
     ("calibrate", "two-pose", "--help"): 0,
-    ("demo", "--speed", "100"): 0,
+    ("demo", "--speed", "20"): 0,
     ("-c", "三号线", "status"): 0,
     ("-c", "三号线", "status", "--json"): 0,
     ("-c", "三号线", "where"): 0,

@@ -197,10 +197,10 @@ class SensorCell:
 
 
 @contextmanager
-def sensor_cell(seed: int = 3) -> Iterator[SensorCell]:
-    """Set a cell up around an EPSON controller."""
+def sensor_cell(seed: int = 3, **habits: Any) -> Iterator[SensorCell]:
+    """Set a cell up around an EPSON controller; ``habits`` are arguments of its simulator."""
     clock, name = ManualClock(), f"sensors-{next(_names)}"
-    simulator = EpsonSimulator(seed=seed)
+    simulator = EpsonSimulator(seed=seed, **habits)
     url = register(name, simulator, clock=clock)
     try:
         yield SensorCell(simulator, url, clock)

@@ -164,7 +164,7 @@ def test_a_page_that_cannot_be_saved_changes_nothing_about_the_end(
 
 
 def live(simulator, capsys, *words):
-    clock = ScaledClock(200)
+    clock = ScaledClock(40)
     with serve_tcp(simulator, clock=clock) as host, serve_assist(simulator, clock=clock) as assist:
         assert main.run(["-c", host.url, "motors", "on", "--yes"]) == 0
         capsys.readouterr()

@@ -12,7 +12,7 @@ import robolink
 from robolink.errors import JournalError
 from robolink.journal import open_journal
 from robolink.model import Marker, MarkerKind, ToolOffset
-from tests.faults._nozzle_cell import OLD_TIP, NozzleCell, served_cell
+from tests.faults._nozzle_cell import OLD_TIP, served_cell
 from tests.faults._requests import changes
 
 UNREACHABLE = "postgresql+psycopg://nobody@127.0.0.1:1/journal"
@@ -49,7 +49,7 @@ def spoil(how, path, monkeypatch):
 
 
 @pytest.fixture(scope="module", params=SAID)
-def cell(request):
+def spoiled(request):
     """A cell whose journal held an open marker when it was spoiled."""
     folder = Path(tempfile.mkdtemp(prefix="robolink-looking-"))
     with pytest.MonkeyPatch.context() as monkeypatch:
@@ -64,41 +64,43 @@ def cell(request):
             for beside in folder.glob("journal.db-*"):
                 beside.unlink()
             spoil(request.param, path, monkeypatch)
-            cell.how = request.param
-            yield cell
+            yield cell, request.param
     shutil.rmtree(folder)
 
 
 @pytest.mark.parametrize("command", LOOKS)
-def test_looking_and_calming_go_on_and_say_it_when_they_are_done(cell: NozzleCell, command):
+def test_looking_and_calming_go_on_and_say_it_when_they_are_done(spoiled, command):
+    cell, how = spoiled
     shown = cell.run(*LOOKS[command])
     assert shown.code == 0, shown.err
-    assert SAID[cell.how] in shown.err.splitlines()[-1]
-    assert "was not touched" not in shown.err
+    assert SAID[how] in shown.err.splitlines()[-1]
+    assert "was not sent" not in shown.err
     # What can still be read of it is shown.
-    assert ("Move XY(1,2,3)" in shown.err) == (cell.how == "newer")
+    assert ("Move XY(1,2,3)" in shown.err) == (how == "newer")
 
 
 @pytest.mark.parametrize(
     "arguments", [["tool", "set", "1", "--x", "12.5", "--yes"], ["jog", "x+1", "--yes"]]
 )
-def test_changing_does_not(cell: NozzleCell, arguments):
+def test_changing_does_not(spoiled, arguments):
+    cell, how = spoiled
     asked = len(cell.requests)
     refused = cell.run(*arguments)
     assert refused.code == USAGE
-    assert SAID[cell.how] in refused.err
+    assert SAID[how] in refused.err
     assert changes(cell.requests[asked:]) == []
     assert cell.tool_1 == OLD_TIP
 
 
-def test_the_library_connects_looks_stops_and_refuses_the_rest(cell: NozzleCell):
+def test_the_library_connects_looks_stops_and_refuses_the_rest(spoiled):
+    cell, how = spoiled
     with robolink.connect(cell.url) as controller:
         assert controller.status().state
         assert controller.tools.read(1) == OLD_TIP
-        assert SAID[cell.how] in str(controller.outcomes.trouble)
+        assert SAID[how] in str(controller.outcomes.trouble)
         controller.stop()
         controller.release_stop()
-        with pytest.raises(JournalError, match=SAID[cell.how]):
+        with pytest.raises(JournalError, match=SAID[how]):
             controller.tools.write(1, ToolOffset(1), expected=OLD_TIP)
         with pytest.raises(JournalError), controller.preserved("a calibration"):
             pass

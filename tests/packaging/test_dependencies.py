@@ -120,7 +120,7 @@ def test_with_the_lowest_version_of_each_the_chosen_tests_pass(tmp_path):
     names = [wanted.name for wanted in run_time_dependencies()]
     installed = run(python, "-c", program, *names).split()
     assert [Version(text) for text in installed] == [lowest(w) for w in run_time_dependencies()]
-    run(python, "-m", "robolink_cli", "demo", "--speed", "100")
+    run(python, "-m", "robolink_cli", "demo", "--speed", "20")
     shown = run(
         *(python, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:xdist"), *CHOSEN
     )

@@ -128,7 +128,7 @@ def test_a_clean_computer_installs_and_runs_it_without_an_index(wheelhouse, tmp_
     run(python, "-m", "pip", *install, "robolink")
     run(python, "-m", "pip", "check")
     assert run(program, "--version") == f"robolink {robolink.__version__}\n"
-    document = json.loads(run(program, "demo", "--speed", "100", "--json"))
+    document = json.loads(run(program, "demo", "--speed", "20", "--json"))
     assert document["schema"] == "robolink/demo/2"
     assert document["controllers"][0]["verification"]["passed"]
     report = json.loads(run(program, "doctor", "--json"))

@@ -100,7 +100,7 @@ def test_the_platform_really_lacks_them():
 
 def test_the_demonstration_runs_without_posix():
     done = run(
-        "from robolink_cli.main import run\nsys.exit(run(['demo', '--speed', '100', '--json']))\n"
+        "from robolink_cli.main import run\nsys.exit(run(['demo', '--speed', '20', '--json']))\n"
     )
     assert done.returncode == 0, done.stderr
     assert '"passed": true' in done.stdout

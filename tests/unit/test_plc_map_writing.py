@@ -337,9 +337,9 @@ def test_all_zeros_are_a_lost_link_or_no_tool_as_the_map_says(no_handshake, leve
             controller.tools.clear(1, expected=ANY)
     level.program.memory.zero(Table.HOLDING)
     with level.connect() as controller:
-        assert controller.tools.read(1) is None
-        controller.tools.write(1, NEW, expected=None)
-        assert controller.tools.clear(1, expected=NEW).read_back is None
+        assert controller.tools.read(2) is None
+        controller.tools.write(2, NEW, expected=None)
+        assert controller.tools.clear(2, expected=NEW).read_back is None
 
 
 ZERO = ToolOffset()

@@ -69,7 +69,7 @@ class EpsonController:
         self._window = CommandWindow(session)
         outcomes.ask(IdentityReader(session, self._window).read)
         self._lock = ProcedureLock(session.identity, session.latch)
-        self._desk = MarkerDesk(session.identity, outcomes)
+        self._desk = MarkerDesk(session.identity, outcomes, session.latch)
         self._preferences = Preferences(session)
         self._group = EpsonGroup(
             session,

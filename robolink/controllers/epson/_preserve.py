@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-from robolink.controllers._guarded import MarkerDesk, ProcedureLock
+from robolink.controllers._guarded import MarkerDesk, ProcedureLock, what_is_left
 from robolink.controllers.epson._motion import EpsonGroup
 from robolink.controllers.epson._preferences import Preferences
 from robolink.controllers.epson._session import EpsonSession
@@ -66,7 +66,7 @@ class InForce:
         except (KeyError, TypeError, ValueError) as error:
             raise ConfigError(
                 tr("The marker of {when} cannot be understood.", when=marker.begun_at),
-                remedy=tr("Select the right tool by hand, then 'robolink resolve --forget'."),
+                remedy=tr("Select the right tool by hand, then 'robolink recover --forget'."),
             ) from error
         return cls(tool, PowerAndSpeed(bool(high), (a, b, c), (d, e, f)))
 
@@ -157,14 +157,4 @@ class Preserver:
             self.restore(before, marker)
         except RobolinkError as second:
             if isinstance(error, RobolinkError):
-                error.remedy = " ".join(
-                    (
-                        error.remedy,
-                        tr(
-                            "The tool of before, tool {tool}, could not be selected again "
-                            "({cause}) 'robolink resolve' offers it.",
-                            tool=before.tool,
-                            cause=second.what,
-                        ),
-                    )
-                ).strip()
+                error.remedy = f"{error.remedy} {what_is_left(second, before.tool)}".strip()

@@ -5,7 +5,12 @@ is looked at; the cell's own tool is selected again when a person says so.
 """
 
 from robolink.controllers._guarded import MarkerDesk
-from robolink.controllers._tool_doubts import examine_select, examine_write, judge_selection
+from robolink.controllers._tool_doubts import (
+    examine_move,
+    examine_select,
+    examine_write,
+    judge_selection,
+)
 from robolink.controllers.epson._motion import EpsonGroup
 from robolink.controllers.epson._preserve import InForce, Preserver
 from robolink.controllers.epson._tools import EpsonToolTable
@@ -13,7 +18,6 @@ from robolink.controllers.epson._value_doubts import ValueDoubts
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import Finding, Marker, MarkerKind, Verdict
-from robolink.protocols import spel
 
 
 class EpsonResolver:
@@ -38,7 +42,8 @@ class EpsonResolver:
         """Read what is needed to judge ``marker``; see :class:`robolink.model.Resolver`."""
         details = marker.details
         if marker.kind is MarkerKind.MOVE:
-            return self._examine_move(marker)
+            self._group.pose()  # refused while the robot moves
+            return examine_move(marker)
         if marker.kind is MarkerKind.SELECTION:
             return self._examine_selection(marker)
         if "select" in details:
@@ -51,7 +56,7 @@ class EpsonResolver:
             return examine_write(self._tools, marker)
         raise ConfigError(
             tr("The marker of {when} cannot be understood.", when=marker.begun_at),
-            remedy=tr("Look at the controller, then 'robolink resolve --forget'."),
+            remedy=tr("Look at the controller, then 'robolink recover --forget'."),
         )
 
     def settle(self, finding: Finding) -> None:
@@ -61,26 +66,15 @@ class EpsonResolver:
         else:
             self._desk.clear(finding.marker, *finding.entries)
 
-    def _examine_move(self, marker: Marker) -> Finding:
-        pose = self._group.pose()
-        sentence = tr(
-            "The robot stands still at X {x} Y {y} Z {z} U {u} (tool {tool}); the move went to "
-            "{target}. Look at it: nothing is sent again.",
-            x=spel.decimal(pose.x_mm),
-            y=spel.decimal(pose.y_mm),
-            z=spel.decimal(pose.z_mm),
-            u=spel.decimal(pose.u_deg),
-            tool=pose.tool,
-            target=marker.request,
-        )
-        return Finding(marker, Verdict.LOOK, sentence)
-
     def _examine_selection(self, marker: Marker) -> Finding:
         before, now = InForce.from_marker(marker), self._tools.selected()
         restored = now == before.tool and self._group.settings.read() == before.settings
-        action = tr(
-            "select tool {tool} again, with the power mode and speed of then", tool=before.tool
-        )
+        if now == before.tool:
+            action = tr("set power mode and speed as they were")
+        else:
+            action = tr(
+                "select tool {tool} again, with the power mode and speed of then", tool=before.tool
+            )
         return judge_selection(
             marker, now=now, before=before.tool, restored=restored, action=action
         )

@@ -85,7 +85,7 @@ class ValueSetter:
             NotReadyError: The state forbids it, monitoring only included.
             RejectedError: The controller refused; nothing was set.
             ReadBackError: Another value is there afterwards.
-            OutcomeUnknownError: No answer came; motion is blocked until ``resolve``.
+            OutcomeUnknownError: No answer came; motion is blocked until ``recover``.
         """
         request = as_sent(change.request)
         with self._lock.held(request):

@@ -32,7 +32,7 @@ class ValueDoubts:
             case _:
                 raise ConfigError(
                     tr("The marker of {when} cannot be understood.", when=marker.begun_at),
-                    remedy=tr("Look at the controller, then 'robolink resolve --forget'."),
+                    remedy=tr("Look at the controller, then 'robolink recover --forget'."),
                 )
         return _finding(marker, now, kind)
 

@@ -55,7 +55,7 @@ class PlcMapController:
         self._outcomes = outcomes
         outcomes.ask(IdentityReader(self._registers, register_map).read)
         self._lock = ProcedureLock(client.identity, self._registers.latch)
-        self._desk = MarkerDesk(client.identity, outcomes)
+        self._desk = MarkerDesk(client.identity, outcomes, self._registers.latch)
         self._tools = RegisterToolTable(
             self._registers,
             register_map,

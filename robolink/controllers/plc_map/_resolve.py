@@ -38,7 +38,7 @@ class RegisterResolver:
         if marker.kind is not MarkerKind.SET or "tool" not in marker.details:
             raise ConfigError(
                 tr("The marker of {when} cannot be understood.", when=marker.begun_at),
-                remedy=tr("Look at the machine, then 'robolink resolve --forget'."),
+                remedy=tr("Look at the machine, then 'robolink recover --forget'."),
             )
         finding = examine_write(self._tools, marker)
         if finding.verdict is not Verdict.DONE or not self._tools.handshake.answers:

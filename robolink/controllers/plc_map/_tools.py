@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 
+from robolink.controllers._clearing import clear_making_way, previewed
 from robolink.controllers._guarded import MarkerDesk, ProcedureLock
 from robolink.controllers._tool_writing import ToolWrite, ToolWriter
 from robolink.controllers.plc_map._commit import Handshake
@@ -117,10 +118,24 @@ class RegisterToolTable:
         self.require_writable(tool)
         return self._set(tool, self._slots.values.rounded(self._slot(tool), offset), expected)
 
-    def clear(self, tool: int, *, expected: Expected) -> ToolReceipt:
-        """Make a tool undefined, where the map says how; see :meth:`write`."""
+    def clear(
+        self, tool: int, *, expected: Expected, then_select: int | None = None
+    ) -> ToolReceipt:
+        """Make a tool undefined, where the map says how; see :meth:`write`.
+
+        Where the map does not tell which tool is in force, nobody can keep it from losing its
+        definition but who works at the machine.
+        """
         self.require_writable(tool)
-        return self._set(tool, None, expected)
+        return clear_making_way(
+            self,
+            tool,
+            lambda: self._set(tool, None, expected),
+            expected=expected,
+            then_select=then_select,
+            uninterrupted=lambda: self._registers.gate,
+            stays_selected=True,
+        )
 
     def preview_write(self, tool: int, offset: ToolOffset) -> tuple[str, ...]:
         """Return what :meth:`write` would send, in words; reads only.
@@ -130,10 +145,10 @@ class RegisterToolTable:
         self.require_writable(tool)
         return self._preview(tool, self._slots.values.rounded(self._slot(tool), offset))
 
-    def preview_clear(self, tool: int) -> tuple[str, ...]:
+    def preview_clear(self, tool: int, *, then_select: int | None = None) -> tuple[str, ...]:
         """Return what :meth:`clear` would send, in words."""
         self.require_writable(tool)
-        return self._preview(tool, None)
+        return previewed(self, tool, self._preview(tool, None), then_select)
 
     def preview_select(self, tool: int) -> tuple[str, ...]:
         """Refuse, as :meth:`select` does."""

@@ -34,7 +34,7 @@ class SoftMotionIo:
         Raises:
             NotReadyError: The machine does not permit it.
             RejectedError: There is no such output; nothing was written.
-            OutcomeUnknownError: No answer came; motion is blocked until ``resolve``.
+            OutcomeUnknownError: No answer came; motion is blocked until ``recover``.
         """
         draft = _set_draft(bit, on)
         mailbox, request = self._mailbox, describe(draft)

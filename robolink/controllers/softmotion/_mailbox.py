@@ -52,7 +52,7 @@ class Mailbox:
         outcomes.ask(lambda: identity_of(wire, device_id))
         self.snapshots = snapshots
         self.orders = Orders(wire, snapshots)
-        self.desk = MarkerDesk(wire.identity, outcomes)
+        self.desk = MarkerDesk(wire.identity, outcomes, wire.latch)
         self.lock = ProcedureLock(wire.identity, wire.latch)
         # A refused command did nothing, whatever the reason (design part 7).
         self.writer = ToolWriter(

@@ -8,6 +8,7 @@ back as selected (design part 4).
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from robolink.controllers._guarded import what_is_left
 from robolink.controllers.softmotion._group import SoftMotionGroup
 from robolink.controllers.softmotion._mailbox import Mailbox
 from robolink.controllers.softmotion._tools import SoftMotionToolTable
@@ -59,12 +60,7 @@ class Preserver:
             self.restore(marker)
         except RobolinkError as second:
             if isinstance(error, RobolinkError):
-                left = tr(
-                    "The tool of before, tool {tool}, could not be selected again ({cause}) "
-                    "'robolink resolve' offers it.",
-                    tool=tool_before(marker),
-                    cause=second.what,
-                )
+                left = what_is_left(second, tool_before(marker))
                 error.remedy = f"{error.remedy} {left}".strip()
 
 
@@ -78,6 +74,6 @@ def tool_before(marker: Marker) -> int:
     if not isinstance(tool, int):
         raise ConfigError(
             tr("The marker of {when} cannot be understood.", when=marker.begun_at),
-            remedy=tr("Select the right tool by hand, then 'robolink resolve --forget'."),
+            remedy=tr("Select the right tool by hand, then 'robolink recover --forget'."),
         )
     return tool

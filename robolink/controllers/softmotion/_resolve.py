@@ -4,7 +4,13 @@ Nothing is sent again. What was being written is read; a robot that was told to 
 at; the cell's own tool is selected again when a person says so.
 """
 
-from robolink.controllers._tool_doubts import examine_select, examine_write, judge_selection
+from robolink.controllers._tool_doubts import (
+    examine_move,
+    examine_select,
+    examine_write,
+    judge_selection,
+)
+from robolink.controllers.softmotion._condition import require_still
 from robolink.controllers.softmotion._group import SoftMotionGroup
 from robolink.controllers.softmotion._mailbox import Mailbox
 from robolink.controllers.softmotion._preserve import Preserver, tool_before
@@ -34,7 +40,9 @@ class SoftMotionResolver:
         """Read what is needed to judge ``marker``; see :class:`robolink.model.Resolver`."""
         details = marker.details
         if marker.kind is MarkerKind.MOVE:
-            return self._examine_move(marker)
+            now = self._mailbox.snapshots.take()
+            require_still(now, controller=self._mailbox.identity, request=tr("recover"))
+            return examine_move(marker)
         if marker.kind is MarkerKind.SELECTION:
             return self._examine_selection(marker)
         if "select" in details:
@@ -47,7 +55,7 @@ class SoftMotionResolver:
             return examine_write(self._tools, marker)
         raise ConfigError(
             tr("The marker of {when} cannot be understood.", when=marker.begun_at),
-            remedy=tr("Look at the PLC, then 'robolink resolve --forget'."),
+            remedy=tr("Look at the PLC, then 'robolink recover --forget'."),
         )
 
     def settle(self, finding: Finding) -> None:
@@ -62,20 +70,6 @@ class SoftMotionResolver:
         done = now == marker.details["kinematics"]
         sentence = tr("Kinematics {now:#06x} is in force now.", now=now)
         return Finding(marker, Verdict.DONE if done else Verdict.NOT_APPLIED, sentence)
-
-    def _examine_move(self, marker: Marker) -> Finding:
-        pose = self._group.pose()
-        sentence = tr(
-            "The robot is at X {x:.3f} Y {y:.3f} Z {z:.3f} U {u:.3f} (tool {tool}); it had been "
-            "told {request!r}. Look at it: nothing is sent again.",
-            x=pose.x_mm,
-            y=pose.y_mm,
-            z=pose.z_mm,
-            u=pose.u_deg,
-            tool=pose.tool,
-            request=marker.request,
-        )
-        return Finding(marker, Verdict.LOOK, sentence)
 
     def _examine_selection(self, marker: Marker) -> Finding:
         before, now = tool_before(marker), self._tools.selected()

@@ -103,7 +103,7 @@ def test_a_journal_that_is_not_there_is_not_made_by_reading(path, open_anew):
 def test_a_folder_that_cannot_be_made_is_told(tmp_path, open_anew):
     (tmp_path / "file").write_text("in the way")
     path = tmp_path / "file" / "journal.db"
-    refused(lambda: open_anew(str(path)), path, "ROBOLINK_JOURNAL", "not touched")
+    refused(lambda: open_anew(str(path)), path, "ROBOLINK_JOURNAL", "was not sent")
 
 
 @pytest.mark.parametrize(
@@ -115,7 +115,7 @@ def test_a_file_of_something_else_is_left_as_it_is(path, open_anew, content):
     path.parent.mkdir()
     path.write_bytes(content)
     refused(
-        lambda: open_anew(str(path)), path, "it is not a journal", "Move it away", "not touched"
+        lambda: open_anew(str(path)), path, "it is not a journal", "Move it away", "was not sent"
     )
     refused(lambda: open_anew(str(path), read_only=True), path, "it is not a journal")
     assert path.read_bytes() == content
@@ -186,7 +186,7 @@ def test_nothing_is_sent_when_the_intent_finds_no_space(filled):
         check=True,
     )
     assert "the disk" in shown.stdout
-    assert "The controller was not touched." in shown.stdout
+    assert "The command was not sent." in shown.stdout
     journal = open_journal(str(filled))
     assert [known.operation for known in journal.log("other").open_markers()] == ["before"]
     assert journal.verify() == Verification(201, ())
@@ -224,7 +224,7 @@ def test_what_may_not_be_written_is_read(public, open_anew, of_folder, of_file, 
     def write():
         open_anew(str(public)).log("cell").begin(marker("b"))
 
-    refused(write, public, "may not write", "Make the file and its folder writable", "not touched")
+    refused(write, public, "may not write", "Make the file and its folder writable", "was not sent")
     reader = open_anew(str(public), read_only=True)
     assert reader.verify() == Verification(200, ())
     assert [known.operation for known in reader.log("cell").open_markers()] == ["left open"]
@@ -237,7 +237,7 @@ def test_a_locked_journal_is_read_and_not_written(filled, open_anew, monkeypatch
         holder.execute("PRAGMA locking_mode = EXCLUSIVE")
         holder.execute("BEGIN EXCLUSIVE")
         holder.execute("UPDATE head SET number = number")
-        refused(lambda: open_anew(str(filled)), filled, "keeps it locked", "Wait", "not touched")
+        refused(lambda: open_anew(str(filled)), filled, "keeps it locked", "Wait", "was not sent")
         assert open_anew(str(filled), read_only=True).count() == 200
     finally:
         holder.close()

@@ -214,7 +214,7 @@ def test_a_write_that_another_program_holds_up_is_refused_in_time(location, open
         tables.connection.exec_driver_sql("UPDATE head SET hash = hash")
         with pytest.raises(JournalError, match="another program keeps it locked") as caught:
             journal.log(CELLS[0]).begin(marker("a"))
-    assert "The controller was not touched." in caught.value.remedy
+    assert "The command was not sent." in caught.value.remedy
     journal.log(CELLS[0]).begin(marker("a"))
 
 
@@ -227,7 +227,7 @@ def test_a_server_that_was_restarted_is_found_again(server, open_anew):
         for _ in range(2):
             with pytest.raises(JournalError, match="is not reached") as caught:
                 log.begin(marker("a"))
-            assert "The controller was not touched." in caught.value.remedy
+            assert "The command was not sent." in caught.value.remedy
     finally:
         server.start()
     log.begin(marker("a"))

@@ -1,0 +1,166 @@
+"""The record of a controller for somebody who only looks: opened when there is a reason to.
+
+Nearly always nothing is unfinished, and SQLAlchemy takes several times as long to load as a look
+at a controller. So an SQLite file is asked by itself: is anything unfinished or at work, on any
+controller, and has this address been met before? No and yes are believed; all else, and any
+trouble with the file, opens the journal as for everybody.
+"""
+
+import sqlite3
+from collections.abc import Collection, Iterator
+from contextlib import AbstractContextManager, closing
+from typing import Final
+
+from robolink.errors import ConfigError
+from robolink.journal._opening import open_log
+from robolink.journal._places import default_location, place_of
+from robolink.model import EntryKind, Marker, NewEntry, OutcomeLog, Recorded, Signature, Who
+
+_QUESTION: Final = """
+    SELECT
+        EXISTS (SELECT 1 FROM markers) OR EXISTS (SELECT 1 FROM leases WHERE token <> ''),
+        EXISTS (SELECT 1 FROM addresses WHERE address = ?)
+"""
+_WAIT_S: Final = 1.0
+"""Longest wait for another process that writes; after it the journal says what is the matter."""
+
+
+class GlancingLog:
+    """Stands in for a log until something is unfinished, or has to be recorded.
+
+    Attributes:
+        signature: Who works here, and with what.
+
+    Args:
+        address: How the controller is reached.
+        signature: Who works here.
+    """
+
+    def __init__(self, address: str, *, signature: Signature) -> None:
+        self.signature = signature
+        self._address = address
+        self._who: Who | None = None
+        self._opened: OutcomeLog | None = None
+
+    @property
+    def change(self) -> str:
+        """Id of the tool change under way; see the model."""
+        return "" if self._opened is None else self._opened.change
+
+    @change.setter
+    def change(self, change: str) -> None:
+        self._log().change = change
+
+    @property
+    def trouble(self) -> ConfigError | None:
+        """Why nothing can be recorded, as far as anybody had to know."""
+        if self._opened is None and nothing_is_open(self._address):
+            return None
+        return self._log().trouble
+
+    @property
+    def durable(self) -> bool:
+        """True: only such a record is glanced at."""
+        return True
+
+    @property
+    def identity(self) -> str:
+        """See the model."""
+        return self._log().identity
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """See the model."""
+        return self._log().names
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """Nothing, unless the journal was opened."""
+        return () if self._opened is None else self._opened.remarks
+
+    def ask(self, who: Who) -> None:
+        """Let the controller say who it is, when the journal is opened."""
+        self._who = who
+        if self._opened is not None:
+            self._opened.ask(who)
+
+    def open_markers(self) -> tuple[Marker, ...]:
+        """Return what is unsettled; the journal is opened if anything is."""
+        if self._opened is None and nothing_is_open(self._address):
+            return ()
+        return self._log().open_markers()
+
+    def at_work(self) -> str:
+        """Return who else is working on the controller; empty for nobody."""
+        if self._opened is None and nothing_is_open(self._address):
+            return ""
+        return self._log().at_work()
+
+    def begin(self, marker: Marker) -> None:
+        """See the model."""
+        self._log().begin(marker)
+
+    def clear(self, operation: str, *entries: NewEntry) -> None:
+        """See the model."""
+        self._log().clear(operation, *entries)
+
+    def append(self, *entries: NewEntry) -> None:
+        """See the model."""
+        self._log().append(*entries)
+
+    def look(self) -> None:
+        """See the model."""
+        self._log().look()
+
+    def hold(self, purpose: str) -> AbstractContextManager[None]:
+        """See the model."""
+        return self._log().hold(purpose)
+
+    def take_over(self, reason: str) -> None:
+        """See the model."""
+        self._log().take_over(reason)
+
+    def beat(self) -> None:
+        """See the model; nobody waits for the sign of one who has begun nothing."""
+        if self._opened is not None:
+            self._opened.beat()
+
+    def recorded(
+        self, *, tool: int | None = None, change: str = "", kinds: Collection[EntryKind] = ()
+    ) -> Iterator[Recorded]:
+        """See the model."""
+        return self._log().recorded(tool=tool, change=change, kinds=kinds)
+
+    def close(self) -> None:
+        """See the model."""
+        if self._opened is not None:
+            self._opened.close()
+
+    def _log(self) -> OutcomeLog:
+        if self._opened is None:
+            self._opened = open_log(self._address, durable=True, signature=self.signature)
+            if self._who is not None:
+                self._opened.ask(self._who)
+        return self._opened
+
+
+def nothing_is_open(address: str) -> bool:
+    """Tell whether the journal is a readable file that has nothing to say about a look.
+
+    Args:
+        address: How the controller is reached. One that was not met there before is asked who
+            it is, and what follows from that is said.
+
+    Returns:
+        False also where that cannot be told; a server is not asked.
+    """
+    try:
+        path = place_of(default_location()).path
+        if path is None or not path.exists():
+            return False
+        uri = f"{path.absolute().as_uri()}?mode=ro"
+        with closing(sqlite3.connect(uri, uri=True, timeout=_WAIT_S)) as file:
+            ((unfinished, known),) = file.execute(_QUESTION, (address,))
+    except (ConfigError, OSError, ValueError, sqlite3.Error):
+        return False
+    return bool(known and not unfinished)

@@ -8,7 +8,7 @@ import click
 
 from robolink.errors import DeclinedError
 from robolink.messages import tr
-from robolink_cli._context import REACHED, WATCHED
+from robolink_cli._context import CELL, REACHED, WATCHED
 
 if TYPE_CHECKING:
     from robolink.model import Controller
@@ -67,18 +67,28 @@ def agree(question: str, *, yes: bool) -> None:
         _require_yes(question)
 
 
-def agree_to_motion(question: str, *, yes: bool) -> None:
+def agree_to_motion(question: str, *, yes: bool, in_tool: bool = True) -> None:
     """Ask before the robot moves; without a terminal only ``--yes`` is consent.
+
+    Args:
+        question: What will happen.
+        yes: Whether the answer was given beforehand.
+        in_tool: Whether it matters which tool is selected.
 
     Raises:
         StoppedError: Somebody stopped this controller, and nobody has released it since.
-        DeclinedError: The answer was no, or nobody could be asked.
+        DeclinedError: The answer was no, or nobody could be asked; or the selected tool may be
+            a wrong one.
     """
-    controller = click.get_current_context().meta.get(REACHED)
-    if controller is not None:
+    meta = click.get_current_context().meta
+    if REACHED in meta:
         from robolink_cli._stop_notes import heed_stop
 
-        heed_stop(controller, yes=yes)
+        heed_stop(meta[REACHED], yes=yes)
+    if in_tool and WATCHED in meta:
+        from robolink_cli._selected_tool import heed_selection
+
+        heed_selection(meta[WATCHED], meta.get(CELL), yes=yes)
     if yes:
         return
     if not on_terminal():

@@ -35,6 +35,9 @@ if TYPE_CHECKING:
 WATCHED = "robolink.watched"
 """Where a prompt finds the controller whose status it must read while a person thinks."""
 
+CELL = "robolink.cell"
+"""Where it finds the cell that was named, ``None`` for none."""
+
 REACHED = "robolink.reached"
 """Where it finds by which URL that controller was reached."""
 
@@ -213,7 +216,9 @@ def open_controller(
         ) as controller,
         nullcontext() if calms else controller.latch.ending(tr("The command")),
     ):
-        click.get_current_context().meta.update({WATCHED: controller, REACHED: url})
+        click.get_current_context().meta.update(
+            {WATCHED: controller, REACHED: url, CELL: context.cell}
+        )
         remember_address(context)
         with (
             listening_for_stop(controller, context),

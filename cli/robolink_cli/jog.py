@@ -55,6 +55,7 @@ def jog(
     from robolink.runner import parse_steps
     from robolink_cli._jogging import jog_by_keys, jog_by_steps, jog_on_terminal, plan_jog
     from robolink_cli._key_jog import agree_by_key
+    from robolink_cli._selected_tool import heed_selection
     from robolink_cli._tables import show_pose
     from robolink_cli._views import pose_payload
 
@@ -77,7 +78,9 @@ def jog(
         )
         if board is None:
             agree_to_motion(question, yes=yes)
-        elif not yes:
+        else:
+            heed_selection(controller, context.cell, yes=yes)
+        if board is not None and not yes:
             agree_by_key(question, board, watch=controller.status)
         with controller.preserved(tr("jog")):
             if board is not None:

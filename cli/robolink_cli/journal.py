@@ -195,11 +195,23 @@ def export(
 @journal.command("verify")
 @json_option
 def verify() -> int:
-    """Check that no entry was changed and none is missing; exit code 1 when one was."""
+    """Check that no entry was changed and none is missing; exit code 1 when one was.
+
+    The chain of hashes has no key. It shows what a disk, a program or a person did to single
+    entries. It cannot show that somebody who may write the whole journal made all of it anew,
+    or took the newest entries off and set the note of the last one back: for that, keep the
+    number and hash that this prints where that person cannot write, and compare.
+    """
     opened = journal_to_read()
     with _progress(opened) as progress:
         found = opened.verify(progress)
-    payload = {"entry_count": found.checked, "problems": list(found.problems)}
+    payload = {
+        "entry_count": found.checked,
+        "problems": list(found.problems),
+        "last_number": found.last_number,
+        "last_hash": found.last_hash,
+        "keyed": False,
+    }
     if json_is_on():
         emit_json("robolink/journal-verified/1", payload)
     else:
@@ -209,6 +221,15 @@ def verify() -> int:
         whole = tr("nothing was changed and nothing is missing")
         end = said if found.problems else whole
         say(tr("{count} entries checked: {end}.", count=found.checked, end=end))
+        if found.last_number:
+            say(
+                tr(
+                    "The last one is {number}, {hash}. Without a key this shows no journal that "
+                    "somebody made anew as a whole: compare that hash with one kept elsewhere.",
+                    number=found.last_number,
+                    hash=found.last_hash,
+                )
+            )
     return 1 if found.problems else 0
 
 

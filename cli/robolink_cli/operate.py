@@ -35,11 +35,13 @@ if TYPE_CHECKING:
 @calming_options
 def status(context: CliContext) -> None:
     """Show what the controller is doing. Reads only; legal while production runs."""
+    from robolink_cli._selected_tool import note_doubts
     from robolink_cli._tables import show_status
     from robolink_cli._views import status_payload
 
     with open_controller(context, looks=True) as controller:
         payload = status_payload(controller)
+        note_doubts(payload, controller, context.cell)
     context.emit("status", payload, lambda: show_status(payload))
 
 
@@ -208,6 +210,7 @@ def execute_raw(context: CliContext, statement: str, yes: bool) -> None:
         agree_to_motion(
             tr("Send {statement!r} as it stands? It may do anything.", statement=statement),
             yes=yes,
+            in_tool=False,
         )
         printed = require_epson(controller, tr("SPEL+ statements")).execute_raw(statement)
     payload: dict[str, object] = {"statement": statement, "printed": printed}

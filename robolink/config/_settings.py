@@ -21,6 +21,7 @@ class CellSettings(BaseModel):
     Attributes:
         url: The controller's URL.
         robot: Model of the robot that must be found there.
+        tool: Number of the tool that is selected whenever nothing is being measured.
         password_file: File whose first line is the password, seen from the cell file.
         password_env: Environment variable that holds the password.
         timeout_s: Longest wait for one answer.
@@ -47,6 +48,7 @@ class CellSettings(BaseModel):
 
     url: Text | None = None
     robot: Text | None = None
+    tool: Annotated[int, Field(ge=0, le=15)] | None = None
     password_file: Text | None = None
     password_env: Annotated[str, Field(pattern="^ROBOLINK_PASSWORD[A-Z0-9_]*$")] | None = None
     timeout_s: Positive | None = None

@@ -47,18 +47,19 @@ class ChainCheck:
     Attributes:
         checked: How many entries were seen.
         number: Number of the last one.
+        hash: Its hash.
     """
 
     def __init__(self) -> None:
         self.checked = 0
         self.number = 0
-        self._hash = FIRST
+        self.hash = FIRST
 
     @classmethod
     def before(cls, row: Mapping[str, Any]) -> "ChainCheck":
         """Return a check that begins at an entry, and believes what that says of the one before."""
         check = cls()
-        check.number, check._hash = row["number"] - 1, str(row["previous"])
+        check.number, check.hash = row["number"] - 1, str(row["previous"])
         return check
 
     def problems_of(self, row: Mapping[str, Any]) -> Iterator[str]:
@@ -68,11 +69,11 @@ class ChainCheck:
             yield _missing(expected, number - 1)
         if not _is_unchanged(row):
             yield tr("Entry {number} was changed after it was stored.", number=number)
-        elif number <= expected and row["previous"] != self._hash:
+        elif number <= expected and row["previous"] != self.hash:
             yield tr("Entry {number} does not follow the one before it.", number=number)
         self.checked += 1
         self.number = number
-        self._hash = str(row["hash"])
+        self.hash = str(row["hash"])
 
     def problems_at_end(self, head: tuple[int, str] | None) -> Iterator[str]:
         """Compare the end with number and hash of the entry that was stored last."""
@@ -88,7 +89,7 @@ class ChainCheck:
                 number=number,
                 last=self.number,
             )
-        elif self._hash != last_hash:
+        elif self.hash != last_hash:
             yield tr("Entry {number} is not the one that was stored last.", number=number)
 
 

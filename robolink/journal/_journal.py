@@ -155,7 +155,7 @@ class Journal:
             if progress is not None:
                 progress(check.checked, max(last, check.checked))
         problems += check.problems_at_end(head)
-        return Verification(check.checked, tuple(problems))
+        return Verification(check.checked, tuple(problems), check.number, check.hash)
 
     def count(self) -> int:
         """Return how many entries there are.

@@ -109,12 +109,13 @@ class JournalOutcomeLog:
             with self._store.write(_untouched()) as tables:
                 grip = self._lease.secure(tables.leases, marker.request, self.signature.operator)
                 first = tables.markers.put(name, marker)
-                entries = (*grip.entries, *_beginning(marker, first=first))
+                told = _beginning(marker, first=first)
+                entries = (*grip.entries, *told)
                 tables.entries.append(name, self.signature, self.change, entries)
             self._begun.add(marker.operation)
             self._lease.settle(grip)
-            self._has_history = True
-            if self.durable and not self._traced:
+            if told and self.durable and not self._traced:
+                # Only beside what is on record: a trace without a record means a lost one.
                 leave_trace(name, self._journal.location)
                 self._traced = True
 

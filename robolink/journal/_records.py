@@ -1,6 +1,6 @@
 """What the journal is asked for, and what it gives back."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from robolink.model import EntryKind
 
@@ -12,10 +12,15 @@ class Verification:
     Attributes:
         checked: How many entries were read.
         problems: What is wrong, one sentence each, with the number of the entry.
+        last_number: Number of the last entry, 0 for none.
+        last_hash: Its hash. The chain has no key, so only a hash that is kept elsewhere shows
+            that the whole journal was not made anew.
     """
 
     checked: int
     problems: tuple[str, ...]
+    last_number: int = field(default=0, compare=False)
+    last_hash: str = field(default="", compare=False)
 
 
 @dataclass(frozen=True, slots=True)

@@ -98,6 +98,7 @@ BAD = {
     "recalibrate": (["missing.toml"], "missing.toml"),
     "enable": (["--yes"], "no SoftMotion axis group"),
     "disable": (["now"], "unexpected extra argument"),
+    "take-ownership": (["--yes"], "no SoftMotion axis group"),
     "recover": (["all"], "unexpected extra argument"),
     "execute-raw": (["--yes", "Print\u20ac"], "printable ASCII"),
     "plc export": (["golden.json"], "is a file"),

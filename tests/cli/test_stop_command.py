@@ -46,6 +46,7 @@ def moving(state_folder):
         controller.outcomes.close()  # the lease of the one who died
         simulator.url = host.url
         yield simulator
+        controller._session.close()  # what it watches for Ctrl-C is given back
         close_files()
 
 

@@ -202,6 +202,8 @@ MAKERS = {
     "solvers.md 1": four_poses,
     "softmotion-controller.md 1": one_plc,
     "softmotion-controller.md 2": a_connected_plc,
+    "stopping.md 1": with_password,
+    "stopping.md 2": with_password,
 }
 
 TESTS = {name for name, block in BLOCKS.items() if "\ndef test_" in f"\n{block}"}

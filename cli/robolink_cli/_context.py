@@ -29,7 +29,7 @@ from robolink_cli._stop_request import StopRequest
 from robolink_cli._stopping_beside import listening_for_stop, remember_address
 
 if TYPE_CHECKING:
-    from robolink.config import Cell
+    from robolink.config import Cell, Reach
     from robolink.model import Controller, Marker, Secret
 
 WATCHED = "robolink.watched"
@@ -57,6 +57,7 @@ class CliContext(NamedTuple):
         lot: Its lot.
         station: Name of the station where it is measured.
         doubt: What is wrong with the cell files, when they were not needed so far.
+        reach: How the cell is reached all the same.
     """
 
     url: str | None = None
@@ -70,6 +71,7 @@ class CliContext(NamedTuple):
     lot: str = ""
     station: str = ""
     doubt: ConfigError | None = None
+    reach: "Reach | None" = None
 
     def with_nozzle(self, nozzle: str | None, lot: str | None) -> "CliContext":
         """Return the same with what is mounted, for the record."""
@@ -302,7 +304,7 @@ def password_of(context: CliContext) -> "Secret | None":
     from robolink.transport import parse_url
     from robolink_cli._password import find_password
 
-    settings = context.cell.settings if context.cell else None
+    settings = context.cell.settings if context.cell else context.reach
     return find_password(
         parse_url(context.require_url()).identity,
         password_file=context.password_file,
@@ -344,10 +346,7 @@ def _calming_context_from(given: Mapping[str, Any]) -> CliContext:
         except ConfigError:
             raise error from None
         note(reach.doubt or error.what)
-        password_file = given.get("password_file") or reach.password_file or None
-        return CliContext(
-            **{**given, "url": reach.url, "password_file": password_file, "doubt": error}
-        )
+        return CliContext(**{**given, "url": reach.url, "doubt": error, "reach": reach})
 
 
 def _unrecorded() -> str:

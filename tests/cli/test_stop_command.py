@@ -160,6 +160,36 @@ def test_a_password_file_that_others_may_read_does_not_keep_it_back(moving, stop
     assert "Others than its owner may read" in err
 
 
+@pytest.mark.parametrize(
+    "how", ["password_file = 'secret'", "password_env = 'ROBOLINK_PASSWORD_A'"]
+)
+@pytest.mark.parametrize("broken", [False, True])
+def test_the_password_is_where_the_cell_says(state_folder, tmp_path, monkeypatch, how, broken):
+    (tmp_path / "secret").write_text("right\n")
+    (tmp_path / "secret").chmod(0o600)
+    monkeypatch.setenv("ROBOLINK_PASSWORD", "another cell's")
+    monkeypatch.setenv("ROBOLINK_PASSWORD_A", "right")
+    with serve_tcp(EpsonSimulator(seed=4, password=Secret("right"))) as host:
+        cell = Path("robolink.toml")
+        cell.write_text(CELL.format(url=host.url, more=how))
+        assert main.run(["-c", "a", "status"]) == 0
+        if broken:
+            cell.write_text(CELL.format(url=host.url, more="[["))
+        assert entry.run(["-c", "a", "stop"]) == 0
+        assert main.run(["-c", "a", "status"]) == 0
+    close_files()
+
+
+def test_the_password_file_of_the_environment_counts_with_a_url(
+    state_folder, tmp_path, monkeypatch
+):
+    (tmp_path / "secret").write_text("right\n")
+    (tmp_path / "secret").chmod(0o600)
+    monkeypatch.setenv("ROBOLINK_PASSWORD_FILE", str(tmp_path / "secret"))
+    with serve_tcp(EpsonSimulator(seed=4, password=Secret("right"))) as host:
+        assert entry.run(["-c", host.url, "stop"]) == 0
+
+
 def test_the_recording_is_written_afterwards(moving, stop, tmp_path):
     assert stop("-c", moving.url, "--record", str(tmp_path / "talk"))[0] == 0
     talk = (tmp_path / "talk").read_text()

@@ -12,7 +12,7 @@ from types import SimpleNamespace
 
 import click
 import pytest
-from robolink_cli import entry, main
+from robolink_cli import _consent, _operator, entry, main
 from robolink_cli._stop_request import FLAGS, VALUES, StopRequest, read_stop
 from robolink_simulators.clock import ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
@@ -239,6 +239,38 @@ def test_a_note_holds_the_next_movement_until_somebody_releases_it(moving, stop,
     assert moving.machine.arm.moves_started == started + 1
     assert main.run(["-c", localhost, "release"]) == 0
     assert "No stop is noted" in capsys.readouterr().out
+
+
+class Person:
+    """Somebody at a terminal who answers every question alike."""
+
+    def __init__(self, answer):
+        self.answer, self.questions = answer, []
+
+    def ask(self, question, kind):
+        self.questions.append(question)
+
+    def poll(self, wait_s):
+        return self.answer
+
+
+@pytest.mark.parametrize(("answer", "code"), [("n", 9), ("y", 0)])
+def test_a_person_is_shown_who_stopped_it_and_asked(
+    moving, stop, capsys, monkeypatch, answer, code
+):
+    assert stop("-c", moving.url, "--operator", "anna")[0] == 0
+    assert main.run(["-c", moving.url, "resolve", "--yes"]) == 0
+    started, person = moving.machine.arm.moves_started, Person(answer)
+    monkeypatch.setattr(_consent, "on_terminal", lambda: True)
+    monkeypatch.setattr(_operator, "terminal", lambda: person)
+    capsys.readouterr()
+    assert main.run(["jog", "x+1", "-c", moving.url]) == code
+    assert "anna (process" in capsys.readouterr().err
+    assert "may the robot move again" in person.questions[0]
+    moves = answer == "y"
+    assert len(person.questions) == (2 if moves else 1)  # the second is that of every movement
+    assert moving.machine.arm.moves_started == started + moves
+    assert (find_note(far_end_of(moving.url)) is None) is moves
 
 
 def test_a_reset_takes_the_note_away_too(moving, stop):

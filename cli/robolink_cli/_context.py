@@ -166,6 +166,20 @@ def calming_options(command: Callable[..., int | None]) -> Callable[..., int | N
     return shared_options(with_context)
 
 
+def looking_options(command: Callable[..., int | None]) -> Callable[..., int | None]:
+    """As :func:`calming_options`, for a command that only looks.
+
+    Cell files that were right at the last connection, and are the same, are not checked anew.
+    """
+
+    @wraps(command)
+    def with_context(*args: object, **kwargs: object) -> int | None:
+        given = click.get_current_context().meta.get(GIVEN, {})
+        return command(_looking_context_from(given), *args, **kwargs)
+
+    return shared_options(with_context)
+
+
 @contextmanager
 def open_controller(
     context: CliContext,
@@ -330,6 +344,19 @@ def _context_from(given: Mapping[str, Any]) -> CliContext:
 
     cell = find_cell(name)
     return CliContext(**{**link_options(cell), **given, "url": cell.url, "cell": cell})
+
+
+def _looking_context_from(given: Mapping[str, Any]) -> CliContext:
+    name = given.get("url")
+    if name is None or not is_cell_name(name):
+        return _context_from(given)
+    from robolink.config import glance_at_cell
+
+    reach = glance_at_cell(name)
+    if reach is None:
+        return _calming_context_from(given)
+    said = {"timeout_s": reach.timeout_s} if reach.timeout_s else {}
+    return CliContext(**{**said, **given, "url": reach.url, "reach": reach})
 
 
 def _calming_context_from(given: Mapping[str, Any]) -> CliContext:

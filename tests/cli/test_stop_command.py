@@ -22,6 +22,7 @@ from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 import robolink
 from robolink import Secret
+from robolink.config import glance_at_cell
 from robolink.controllers.epson import EpsonController
 from robolink.journal import close_files, open_journal
 from robolink.model import MotionProfile, WorkBox
@@ -365,3 +366,22 @@ def test_nothing_heavy_is_loaded_before_the_robot_stands(state_folder, kind):
             env={**os.environ, "ROBOLINK_STATE_DIR": str(state_folder)},
         )
     assert (done.stdout, done.stderr) == ("\n", "")
+
+
+@pytest.mark.parametrize("more", ["", "robot = 'T6-602S'", "timeout_s = 2.5"])
+def test_a_cell_file_is_checked_anew_for_a_look_when_it_changed(moving, stop, capsys, more):
+    assert stop()[0] == 0
+    cell = Path("robolink.toml")
+    cell.write_text(CELL.format(url=moving.url, more=more))
+    assert glance_at_cell("a") is None
+    for _ in range(2):
+        assert main.run(["-c", "a", "status"]) == 0
+        assert (glance_at_cell("a") is None) is ("robot" in more)
+    cell.write_text(CELL.format(url=moving.url, more=more + "\nno_such_key = 1"))
+    assert glance_at_cell("a") is None
+    capsys.readouterr()
+    assert main.run(["-c", "a", "status"]) == 0
+    assert "no_such_key" in capsys.readouterr().err
+    cell.write_text(CELL.format(url=moving.url, more="robot = 'LS10-B'"))
+    assert main.run(["-c", "a", "status"]) == 0
+    assert "has a robot LS10-B" in capsys.readouterr().err

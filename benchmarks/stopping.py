@@ -1,9 +1,8 @@
 """``robolink stop`` up to its frame, and ``robolink status`` as a whole, against ``import click``.
 
 The far ends are simulators behind a listener that notes when each piece came in and how long
-the simulator took for its answer; that time is the peer's and is subtracted. For a stop the cell
-file names the controller; a status by the name of a cell also waits for pydantic, which checks that
-file. The journal, the state folder and bytecode are there, as after a day of work.
+the simulator took for its answer; that time is the peer's and is subtracted. The cell file names
+the controller, and the journal, the state folder and bytecode are there, as after a day of work.
 """
 
 import os
@@ -116,9 +115,9 @@ def measure_stopping() -> Iterator[Figure]:
             yield _figure(what, pairs, 2.50)
         yield from _over_canopen(robolink, floor)
         for name, what in (("tcp", "EPSON over TCP"), ("modbus", "PLC over Modbus TCP")):
-            command = [robolink, "-c", urls[name], "status"]
+            command = [robolink, "-c", name, "status"]
             pairs = [(_run(floor), _run(command)) for _ in range(ROUNDS)]
-            yield _figure(f"robolink status by URL, {what}", pairs, 5.00)
+            yield _figure(f"robolink status, {what}", pairs, 5.00)
 
 
 def _over_canopen(robolink: str, floor: list[str]) -> Iterator[Figure]:

@@ -21,6 +21,7 @@
     │   │   └── LoginRefusedError          wrong password, or one is demanded
     │   ├── NotReadyError                  refused here: the state would not allow it (.reason)
     │   ├── ControllerFaultError           the controller is in error
+    │   │   └── HeartbeatLostError         it halted a movement because we fell silent
     │   ├── MotionTimeoutError             a movement took too long and was aborted
     │   └── BusyError                      another operation is under way
     │       ├── LeaseHeldError             another program or person is changing the controller
@@ -29,6 +30,7 @@
     ├── StoppedError                       a stop ended it, from another thread or terminal
     ├── ToolError
     │   ├── ToolIndexError · ReservedToolError · UndefinedToolError
+    │   ├── SelectedToolError              it is in force, so it was not cleared
     │   ├── ToolChangedError               not the value that was expected; nothing was written
     │   └── ReadBackError                  written, but another value came back
     ├── CalibrationError                   the data do not give a trustworthy result (.code)
@@ -221,6 +223,13 @@ class ControllerFaultError(ControllerError):
     """The controller went into, or is in, its error state."""
 
 
+class HeartbeatLostError(ControllerFaultError):
+    """The controller halted a movement because it heard nothing from this computer for too long.
+
+    Nothing else is wrong: the tool stays, and the movement may be commanded again.
+    """
+
+
 class MotionTimeoutError(ControllerError):
     """A movement did not end in time; it was aborted, and its end was seen."""
 
@@ -258,6 +267,10 @@ class ToolError(RobolinkError):
 
 class ToolIndexError(ToolError, ValueError):
     """No such tool number."""
+
+
+class SelectedToolError(ToolError):
+    """The tool in force was not cleared: nobody said which one takes its place."""
 
 
 class ReservedToolError(ToolError):

@@ -1,9 +1,14 @@
-"""Ctrl-C between exchanges, never inside one.
+"""Ctrl-C, a termination, a closed window: between exchanges, never inside one.
 
 A KeyboardInterrupt between a request and its answer would leave the answer in the pipe, to
 be taken for the answer to the next question. So while a session is open, SIGINT goes through
 a handler that raises KeyboardInterrupt as usual, except inside an exchange: there it is held
 back until the exchange, which a deadline bounds, has ended.
+
+A process that would rather be ended than killed has SIGTERM and SIGHUP take the same way for the
+time of :func:`one_ending`, as every command does: the movement is aborted, tool, power and speed
+are put back, and only then it ends. Without that they do what they always did: they kill, and
+``recover`` finds what was left.
 
 The handler is swapped when the first session opens and not once per exchange, because two calls
 of ``signal.signal`` would cost more than everything else that the driver does in one. All
@@ -12,53 +17,172 @@ sessions of a process share it: a program may hold an EPSON robot and a PLC at a
 
 import signal
 import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from enum import StrEnum
 from types import FrameType, TracebackType
+from typing import Final
+
+
+class EndedBy(StrEnum):
+    """What ended a command before its time."""
+
+    CTRL_C = "SIGINT"
+    TERMINATED = "SIGTERM"
+    HUNG_UP = "SIGHUP"
+    """The window was closed, or the line to it is gone."""
+
+    OUTPUT_CLOSED = "SIGPIPE"
+    """Nobody reads what is shown any more; it arrives as a failed write, not as a signal."""
+
+
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C, or what ends a command like it.
+
+    Attributes:
+        by: What it was.
+    """
+
+    def __init__(self, by: EndedBy) -> None:
+        super().__init__(str(by))
+        self.by = by
+
+
+_PATIENCE_S: Final = 60.0
+"""Cleaning up is bounded by deadlines well below this; after it, one more Ctrl-C is heard."""
+
+
+def _known(*names: str) -> dict[int, EndedBy]:
+    """Return those signals that this system has; Windows ends a console with SIGBREAK."""
+    by = {"SIGBREAK": EndedBy.TERMINATED}
+    return {
+        int(getattr(signal, name)): by.get(name) or EndedBy(name)
+        for name in names
+        if hasattr(signal, name)
+    }
+
+
+_OF_A_SESSION: Final = _known("SIGINT")
+_OF_A_COMMAND: Final = _known("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
+
+
+def _usual(number: int) -> Callable[[int, FrameType | None], object] | signal.Handlers:
+    """Return what Python does with a signal of which nobody has said anything."""
+    return signal.default_int_handler if number == signal.SIGINT else signal.SIG_DFL
 
 
 class _Handler:
-    """The one SIGINT handler of this process, for all gates.
+    """The one handler of this process, for all gates and for the command.
 
     Attributes:
-        gates: How many gates are open.
-        depth: How many times the main thread is inside one.
-        held: Whether SIGINT came while it was.
+        depth: How many times the main thread is inside a gate.
+        held: What came while it was.
+        ended_by: What ended the command that is under way, ``None`` while nothing has.
     """
 
     def __init__(self) -> None:
-        self.gates = 0
+        self._watchers: dict[int, int] = {}
+        self._commands = 0
+        self._ended_s = 0.0
         self.depth = 0
-        self.held = False
+        self.held: EndedBy | None = None
+        self.ended_by: EndedBy | None = None
 
-    def install(self) -> bool:
-        """Watch SIGINT for one gate more; False where that is not possible."""
+    def watch(self, numbers: dict[int, EndedBy]) -> list[int]:
+        """Take over those signals that nobody else has taken; return which."""
         if threading.current_thread() is not threading.main_thread():
-            return False
-        current = signal.getsignal(signal.SIGINT)
-        if current is signal.default_int_handler:
-            signal.signal(signal.SIGINT, self._interrupted)
-        elif current != self._interrupted:
-            return False  # the program has a handler of its own
-        self.gates += 1
-        return True
+            return []
+        taken = []
+        for number in numbers:
+            current = signal.getsignal(number)
+            if current is _usual(number):
+                signal.signal(number, self._came)
+            elif current != self._came:
+                continue  # the program has a handler of its own, or ignores it
+            self._watchers[number] = self._watchers.get(number, 0) + 1
+            taken.append(number)
+        return taken
 
-    def remove(self) -> None:
-        """Watch for one gate less; the last one gives SIGINT back."""
-        self.gates -= 1
-        if self.gates == 0 and signal.getsignal(signal.SIGINT) == self._interrupted:
-            signal.signal(signal.SIGINT, signal.default_int_handler)
+    def leave(self, numbers: list[int], *, for_good: bool = False) -> None:
+        """Watch them for one less; the last one gives them back, or lets nobody hear them."""
+        for number in numbers:
+            self._watchers[number] -= 1
+            if not self._watchers[number] and signal.getsignal(number) == self._came:
+                signal.signal(number, signal.SIG_IGN if for_good else _usual(number))
 
-    def _interrupted(self, number: int, frame: FrameType | None) -> None:
+    def begin_command(self) -> EndedBy | None:
+        """Let one ending count from now on; return what has ended the command around it."""
+        outer, self.ended_by = self.ended_by, None
+        self._commands += 1
+        return outer
+
+    def end_command(self, outer: EndedBy | None) -> None:
+        """Go back to what was before :meth:`begin_command`."""
+        self._commands -= 1
+        self.ended_by = outer
+
+    def arrived(self, by: EndedBy) -> None:
+        """Raise :class:`Interrupted`, or hold it back inside a gate.
+
+        Of a command only the first ending is heard: a second Ctrl-C, or the hang-up that follows
+        a closed output, must not break the cleaning up after the first.
+        """
+        if self._commands:
+            now_s = time.monotonic()
+            if self.ended_by is not None and now_s - self._ended_s < _PATIENCE_S:
+                return
+            self.ended_by, self._ended_s = self.ended_by or by, now_s
         if self.depth:
-            self.held = True
+            self.held = self.held or by
         else:
-            signal.default_int_handler(number, frame)
+            raise Interrupted(by)
+
+    def _came(self, number: int, frame: FrameType | None) -> None:  # noqa: ARG002 - signal's form
+        self.arrived(_OF_A_COMMAND[number])
 
 
 _handler = _Handler()
 
 
+@contextmanager
+def one_ending(*, last: bool = False) -> Iterator[None]:
+    """End the block in order on Ctrl-C, SIGTERM or SIGHUP: by one :class:`Interrupted`.
+
+    For a command or a script as a whole. What the program handles itself, or ignores as ``nohup``
+    has it, is left alone. Outside the main thread nothing is changed.
+
+    Args:
+        last: Whether the process ends after the block, so that a signal that comes then does not
+            change its exit code any more.
+    """
+    taken = _handler.watch(_OF_A_COMMAND)
+    outer = _handler.begin_command() if taken else None
+    try:
+        yield
+    finally:
+        if taken:
+            _handler.end_command(outer)
+        _handler.leave(taken, for_good=last)
+
+
+def output_closed() -> None:
+    """End the command because nobody reads what it shows.
+
+    Raises:
+        Interrupted: At once, or where the gate that the main thread is in ends.
+    """
+    if threading.current_thread() is threading.main_thread():
+        _handler.arrived(EndedBy.OUTPUT_CLOSED)
+
+
+def ended_by() -> EndedBy | None:
+    """Return what has ended the command that is under way, ``None`` while nothing has."""
+    return _handler.ended_by
+
+
 class InterruptGate:
-    """Holds back SIGINT while the main thread is inside the gate; a context manager.
+    """Holds back what would end the program while the main thread is inside; a context manager.
 
     It may be entered inside itself, and inside another one, because some operations are several
     exchanges: a write is not done before it has been read back, and a movement is not under way
@@ -69,24 +193,27 @@ class InterruptGate:
     """
 
     def __init__(self) -> None:
+        self._taken: list[int] = []
         self._open = False
         self._depth = 0
 
     @property
     def interrupted(self) -> bool:
-        """Whether Ctrl-C came inside the gate and waits for its end."""
-        return bool(self._depth) and _handler.held
+        """Whether Ctrl-C or the like came inside the gate and waits for its end."""
+        return bool(self._depth) and _handler.held is not None
 
     def open(self) -> None:
         """Start to watch SIGINT, if this is the main thread and the program does not."""
         if not self._open:
-            self._open = _handler.install()
+            self._taken = _handler.watch(_OF_A_SESSION)
+            self._open = threading.current_thread() is threading.main_thread()
 
     def close(self) -> None:
         """Stop watching. Idempotent; from another thread the handler just stays harmless."""
         if self._open and threading.current_thread() is threading.main_thread():
             self._open = False
-            _handler.remove()
+            _handler.leave(self._taken)
+            self._taken = []
 
     def __enter__(self) -> None:
         if self._open and threading.get_ident() == _MAIN:
@@ -102,9 +229,9 @@ class InterruptGate:
         if self._depth and threading.get_ident() == _MAIN:
             self._depth -= 1
             _handler.depth -= 1
-            if _handler.held and not _handler.depth:
-                _handler.held = False
-                raise KeyboardInterrupt
+            if _handler.held is not None and not _handler.depth:
+                by, _handler.held = _handler.held, None
+                raise Interrupted(by)
 
 
 _MAIN = threading.main_thread().ident

@@ -51,8 +51,16 @@ def _start(context: CliContext, register_list: Path) -> None:
     from robolink.register_maps import draft_from_csv
 
     draft = draft_from_csv(register_list)
-    payload: dict[str, object] = {"map": draft.text, "found": draft.found, "left": list(draft.left)}
+    payload: dict[str, object] = {
+        "map": draft.text,
+        "found": draft.found,
+        "left": list(draft.left),
+        "bad": list(draft.bad),
+        "notes": list(draft.notes),
+    }
     context.emit("plc-map-draft", payload, lambda: say(draft.text.rstrip()))
+    for remark in (*draft.notes, *draft.bad):
+        note(remark)
     note(
         tr(
             "{found} components of tools were found; {left} rows are left for you. Fill in what "
@@ -94,7 +102,7 @@ def _check_values(context: CliContext, shows: tuple[str, ...]) -> None:
         controller.require_probe()
         confirmed = confirmation_of(controller.identity, register_map)
         if shows or (register_map.probe is None and confirmed is None):
-            compared = values.compared(shows or _asked(controller, values))
+            compared = _compared(controller, values, shows)
             person = signature_of(context.operator, context.cell, changes=True)
             by = person.operator or person.os_user
             confirmed = confirm(controller.identity, register_map, by=by, compared=compared)
@@ -117,6 +125,26 @@ def _check_values(context: CliContext, shows: tuple[str, ...]) -> None:
             )
 
     context.emit("plc-map-values", payload, show)
+
+
+def _compared(controller: "PlcMapController", values: "MapValues", shows: tuple[str, ...]) -> str:
+    """Return what was compared; a difference takes an earlier confirmation back."""
+    from robolink.register_maps import revoke
+    from robolink_cli._map_values import MapDiffersError
+
+    answers = shows or _asked(controller, values)
+    try:
+        return values.compared(answers)
+    except MapDiffersError as error:
+        held = revoke(controller.identity, controller.register_map)
+        if held is not None:
+            error.remedy = " ".join(
+                (
+                    tr("The confirmation by {by} of {at} is taken back.", by=held.by, at=held.at),
+                    error.remedy,
+                )
+            )
+        raise
 
 
 def _opened(context: CliContext) -> "PlcMapController":

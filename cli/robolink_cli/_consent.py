@@ -30,6 +30,19 @@ def yes_option(function: F) -> F:
     return click.option("--yes", is_flag=True, help="Answer yes to the question asked.")(function)
 
 
+def then_select_option(function: F) -> F:
+    """Add ``--then-select``."""
+    return click.option(
+        "--then-select",
+        type=click.IntRange(0, 15),
+        metavar="NUMBER",
+        help=tr(
+            "The tool that the machine is to have selected in place of one that is selected and "
+            "loses its definition; 0 is the flange."
+        ),
+    )(function)
+
+
 def published_option(function: F) -> F:
     """Add ``--published``."""
     return click.option(

@@ -32,11 +32,3 @@ def help_width() -> int:
     except (OSError, ValueError):
         columns = 80
     return max(min(columns, 80) - 2, 50)
-
-
-def leave_pipe() -> None:
-    """Send what is still to be flushed nowhere, because the reader of the pipe has left."""
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    for stream in (sys.stdout, sys.stderr):
-        os.dup2(nowhere, stream.fileno())
-    os.close(nowhere)

@@ -1,7 +1,7 @@
 """What every command that talks to a controller has in common."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import replace
 from functools import wraps
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -9,14 +9,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import click
 
 import robolink
-from robolink.errors import ConfigError
+from robolink.errors import ConfigError, RobolinkError
 from robolink.messages import tr
-from robolink.standing import UNTOUCHED, note_standing, standing_after
+from robolink.standing import UNTOUCHED, Standing, note_standing, standing_after
 from robolink_cli._cell import (
     is_cell_name,
     link_options,
     require_expected_robot,
 )
+from robolink_cli._exit import is_cut_off
 from robolink_cli._notices import note_at_work, note_unsettled
 from robolink_cli._people import signature_of
 from robolink_cli._recording import recording
@@ -253,6 +254,11 @@ def _saying_what_is_left(
         offer_to_restore(controller, found)
     try:
         yield
+    except KeyboardInterrupt:
+        # The last line says which tool is selected: as it is now, not as it was once.
+        with suppress(RobolinkError):
+            controller.tools.selected()
+        raise
     finally:
         left = _open_markers(controller, lenient=lenient)
         known = {marker.operation for marker in found}
@@ -264,11 +270,20 @@ def _saying_what_is_left(
 
 @contextmanager
 def _only_what_was_touched(*, always: bool) -> Iterator[None]:
-    """Let an error tell what stands on the controller, if the command might have changed it."""
+    """Let an error tell what stands on the controller, if the command might have changed it.
+
+    Whoever ended a command is told in any case; but not that nobody reads what it only showed.
+    """
     try:
         yield
     except BaseException as error:
-        if not always and standing_after(error).untouched:
+        ended = isinstance(error, KeyboardInterrupt)
+        if ended and standing_after(error) is UNTOUCHED:
+            # It came before the controller was reached, or at the logout.
+            watched = click.get_current_context().meta.get(WATCHED)
+            note_standing(error, watched.ledger.standing() if watched else Standing())
+        told = always or (ended and not is_cut_off(error))
+        if not told and standing_after(error).untouched:
             note_standing(error, UNTOUCHED)
         raise
 

@@ -7,8 +7,9 @@ from typing import Final
 import click
 
 from robolink import errors
+from robolink.interrupts import EndedBy, Interrupted, ended_by
 from robolink.messages import tr
-from robolink.standing import standing_after
+from robolink.standing import UNTOUCHED, standing_after
 from robolink_cli._render import dumps
 from robolink_cli._sink import hand_over, show
 from robolink_cli._standing import standing_payload, tell_standing
@@ -18,8 +19,18 @@ DIFFERENT: Final = 1
 USAGE: Final = 2
 UNKNOWN: Final = 6
 BUG: Final = 70
+HUNG_UP: Final = 129
 INTERRUPTED: Final = 130
 READER_LEFT: Final = 141
+TERMINATED: Final = 143
+
+_ENDINGS: Final = {
+    EndedBy.HUNG_UP: HUNG_UP,
+    EndedBy.CTRL_C: INTERRUPTED,
+    EndedBy.OUTPUT_CLOSED: READER_LEFT,
+    EndedBy.TERMINATED: TERMINATED,
+}
+"""The four clean up alike; 6 comes before them."""
 
 MEANINGS: Final[dict[int, str]] = {
     DONE: "done",
@@ -34,8 +45,10 @@ MEANINGS: Final[dict[int, str]] = {
     9: "a person said no, or was not there to say yes",
     10: "a stop ended it",
     BUG: "a defect in robolink",
+    HUNG_UP: "the window was closed, or the line to it is gone (SIGHUP)",
     INTERRUPTED: "interrupted (Ctrl-C)",
     READER_LEFT: "whoever read the output has left",
+    TERMINATED: "terminated (SIGTERM)",
 }
 """What each exit code says; docs/exit-codes.md has the same table."""
 
@@ -66,7 +79,9 @@ def exit_code(error: BaseException) -> int:
     """
     if not standing_after(error).settled:
         return UNKNOWN
-    if isinstance(error, (KeyboardInterrupt, EOFError, click.Abort)):
+    if isinstance(error, KeyboardInterrupt):
+        return _ENDINGS[_ending(error)]
+    if isinstance(error, (EOFError, click.Abort)):
         return INTERRUPTED
     if isinstance(error, click.ClickException):
         return USAGE
@@ -80,6 +95,8 @@ def report(error: BaseException, *, as_json: bool) -> int:
         import traceback  # here, because --help needs none
 
         show("".join(traceback.format_exception(error)), beside=True)
+    if is_cut_off(error) and standing_after(error) is UNTOUCHED:
+        return code  # a list, cut off by its reader: no news to him
     if as_json:
         hand_over(error_document(error))
     elif isinstance(error, click.ClickException):
@@ -91,9 +108,15 @@ def report(error: BaseException, *, as_json: bool) -> int:
         show(f"robolink: {what}", beside=True)
         if remedy:
             show(f"  {remedy}", beside=True)
-    if not as_json:
+    if not as_json or isinstance(error, KeyboardInterrupt):
+        # Whoever ended it may not be who reads the document.
         tell_standing(standing_after(error))
     return code
+
+
+def is_cut_off(error: BaseException) -> bool:
+    """Tell whether a command ended because nobody reads its output any more."""
+    return isinstance(error, Interrupted) and error.by is EndedBy.OUTPUT_CLOSED
 
 
 def error_document(error: BaseException) -> str:
@@ -106,15 +129,32 @@ def error_body(error: BaseException) -> dict[str, object]:
     what, remedy = _sentences(error)
     ours = isinstance(error, errors.RobolinkError)
     standing = standing_after(error)
+    ended = _ending(error) if isinstance(error, KeyboardInterrupt) else ended_by()
     return {
         "kind": type(error).__name__,
         "what": what,
         "remedy": remedy,
         "reason": getattr(error, "reason", None) if ours else None,
         "code": (getattr(error, "code", None) or None) if ours else None,
+        "ended_by": None if ended is None else str(ended),
         "controller_state": standing.effect,
         "stands": standing_payload(standing),
     }
+
+
+def _ending(error: KeyboardInterrupt) -> EndedBy:
+    """Return what ended it; a KeyboardInterrupt that does not say so is Ctrl-C."""
+    return error.by if isinstance(error, Interrupted) else EndedBy.CTRL_C
+
+
+def _ending_in_words(by: EndedBy) -> str:
+    if by is EndedBy.TERMINATED:
+        return tr("Terminated (SIGTERM).")
+    if by is EndedBy.HUNG_UP:
+        return tr("The window was closed, or the line to it is gone (SIGHUP).")
+    if by is EndedBy.OUTPUT_CLOSED:
+        return tr("Nobody reads the output any more, so the command was ended.")
+    return tr("Interrupted.")
 
 
 def _sentences(error: BaseException) -> tuple[str, str]:
@@ -122,7 +162,9 @@ def _sentences(error: BaseException) -> tuple[str, str]:
         return error.what, error.remedy
     if isinstance(error, click.ClickException):
         return error.format_message(), tr("'robolink COMMAND --help' shows what can be given.")
-    if exit_code(error) == INTERRUPTED:
+    if isinstance(error, KeyboardInterrupt):
+        return _ending_in_words(_ending(error)), ""
+    if isinstance(error, (EOFError, click.Abort)):
         return tr("Interrupted."), ""
     return (
         tr(

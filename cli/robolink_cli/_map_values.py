@@ -12,6 +12,10 @@ if TYPE_CHECKING:
     from robolink.controllers.plc_map import PlcMapController
 
 
+class MapDiffersError(ConfigError):
+    """The map finds something else than the HMI shows: it is wrong."""
+
+
 class MapValues:
     """What stands in the registers of the tools now; reads only.
 
@@ -86,8 +90,9 @@ class MapValues:
         """Compare values with what the HMI shows, and return what was compared, in words.
 
         Raises:
-            ConfigError: One differs, an answer cannot be understood, or a way in which
-                numbers stand was not compared.
+            MapDiffersError: One differs.
+            ConfigError: An answer cannot be understood, or a way in which numbers stand was not
+                compared.
         """
         ways = set()
         for answer in answers:
@@ -120,7 +125,7 @@ class MapValues:
         # The HMI may round or cut off: its last digit may differ by one.
         allowed = 10.0 ** -len(text.partition(".")[2])
         if not value or not abs(found - value) <= allowed * (1 + 1e-6):
-            raise ConfigError(
+            raise MapDiffersError(
                 tr(
                     "The HMI shows {shown} for {key}, the map finds {found:.4f}.",
                     shown=text,

@@ -32,7 +32,9 @@ class Restoration:
         if plan.select is not None:
             requests += tools.preview_select(plan.select)
         for change in plan.clears:
-            requests += tools.preview_clear(change.tool)
+            # The selection in place of it stands there already.
+            clear = tools.preview_clear(change.tool, then_select=plan.select)
+            requests += [request for request in clear if request not in requests]
         return requests
 
     def show(self) -> None:

@@ -10,25 +10,35 @@ from robolink_cli._views import offset_payload, receipt_payload
 
 
 class Undoing:
-    """One undo on one controller."""
+    """One undo on one controller.
 
-    def __init__(self, controller: Controller, plan: UndoPlan) -> None:
+    Args:
+        controller: The controller, connected.
+        plan: What to do.
+        then_select: The tool to put in force in place of one that becomes undefined.
+    """
+
+    def __init__(
+        self, controller: Controller, plan: UndoPlan, *, then_select: int | None = None
+    ) -> None:
         self._controller = controller
         self._plan = plan
+        self._then_select = then_select
         self._done = Undone("", ())
 
     def requests(self) -> list[str]:
         """Return what would be sent besides reads.
 
         Raises:
-            ToolError: A value does not fit this robot.
+            ToolError: A value does not fit this robot, or the tool in force would become
+                undefined.
             NotReadyError: The state forbids a write.
         """
         tools = self._controller.tools
         requests: list[str] = []
         for step in self._plan.steps:
             if step.requested is None:
-                requests += tools.preview_clear(step.tool)
+                requests += tools.preview_clear(step.tool, then_select=self._then_select)
             else:
                 requests += tools.preview_write(step.tool, step.requested)
         return requests
@@ -46,7 +56,9 @@ class Undoing:
         """Carry it out and return the document; nothing is sent when nothing differs."""
         if self._plan.steps:
             back_up_first(self._controller)
-            self._done = undo(self._controller, self._plan, tell=note)
+            self._done = undo(
+                self._controller, self._plan, then_select=self._then_select, tell=note
+            )
         return {
             "sentence": self._plan.sentence,
             "remarks": list(self._plan.remarks),

@@ -10,11 +10,16 @@ from typing import NoReturn
 
 def main() -> NoReturn:
     """Run the command line of this process and exit."""
-    sys.exit(run(sys.argv[1:]))
+    sys.exit(run(sys.argv[1:], last=True))
 
 
-def run(arguments: Sequence[str]) -> int:
-    """Run one command line; return the exit code (the table is in ``_exit``)."""
+def run(arguments: Sequence[str], *, last: bool = False) -> int:
+    """Run one command line; return the exit code (the table is in ``_exit``).
+
+    Args:
+        arguments: The command line without the program's name.
+        last: Whether the process ends then.
+    """
     if "stop" in arguments:
         from robolink_cli._stop_request import read_stop
 
@@ -28,4 +33,4 @@ def run(arguments: Sequence[str]) -> int:
             return tell_stop(request, outcome)
     from robolink_cli.main import run as run_any
 
-    return run_any(arguments)
+    return run_any(arguments, last=last)

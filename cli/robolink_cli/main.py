@@ -3,15 +3,18 @@
 import os
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from typing import TYPE_CHECKING, Final, NoReturn
 
 import click
 
 from robolink import __version__
+from robolink.interrupts import Interrupted, one_ending
 from robolink.messages import tr
-from robolink_cli._console import colour_wanted, help_width, leave_pipe, tolerate_any_console
-from robolink_cli._exit import READER_LEFT, report
+from robolink_cli._console import colour_wanted, help_width, tolerate_any_console
+from robolink_cli._exit import exit_code, report
 from robolink_cli._lazy import LazyGroup
+from robolink_cli._output import watched_output
 from robolink_cli._render import dumps, note, print_document, say
 from robolink_cli._shared_options import shared_options
 from robolink_cli._sink import hand_over
@@ -117,27 +120,32 @@ def cli() -> None:
 
 def main() -> NoReturn:
     """Run the command line of this process and exit."""
-    sys.exit(run(sys.argv[1:]))
+    sys.exit(run(sys.argv[1:], last=True))
 
 
-def run(arguments: Sequence[str]) -> int:
-    """Run one command line; return the exit code (the table is in ``_exit``)."""
-    return _guarded(lambda: _answer(arguments))
+def run(arguments: Sequence[str], *, last: bool = False) -> int:
+    """Run one command line; return the exit code (the table is in ``_exit``).
+
+    Args:
+        arguments: The command line without the program's name.
+        last: Whether the process ends then.
+    """
+    return _guarded(lambda: _answer(arguments), last=last)
 
 
 def tell_stop(request: "StopRequest", outcome: "StopOutcome") -> int:
     """Tell how a stop ended that needed no click so far; return the exit code."""
-    return _guarded(lambda: _tell_stop(request, outcome))
+    return _guarded(lambda: _tell_stop(request, outcome), last=False)
 
 
-def _guarded(speak: Callable[[], int]) -> int:
-    tolerate_any_console()
-    try:
-        code = speak()
-        sys.stdout.flush()
-    except BrokenPipeError:
-        leave_pipe()
-        return READER_LEFT
+def _guarded(speak: Callable[[], int], *, last: bool) -> int:
+    with one_ending(last=last), watched_output():
+        tolerate_any_console()
+        try:
+            code = speak()
+            sys.stdout.flush()
+        except KeyboardInterrupt as late:
+            return exit_code(late)
     return code
 
 
@@ -165,11 +173,13 @@ def _answer(arguments: Sequence[str]) -> int:
         return _invoke(arguments)
     except click.exceptions.Exit as end:
         return end.exit_code
-    except BrokenPipeError:
-        raise
     except (Exception, KeyboardInterrupt) as error:
-        # Looked for by hand, because the arguments may be what is wrong.
-        return report(error, as_json="--json" in arguments)
+        code = exit_code(error)
+        # That nobody is left to read how it ended is no other end.
+        with suppress(Interrupted):
+            # Looked for by hand, because the arguments may be what is wrong.
+            report(error, as_json="--json" in arguments)
+        return code
 
 
 def _invoke(arguments: Sequence[str]) -> int:

@@ -6,8 +6,15 @@ import click
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink_cli._consent import agree, dry_run_option, published_option, yes_option
+from robolink_cli._consent import (
+    agree,
+    dry_run_option,
+    published_option,
+    then_select_option,
+    yes_option,
+)
 from robolink_cli._context import CliContext, controller_options, open_controller
+from robolink_cli._jumps import Allowed, accept_jump, accept_jump_options, allowed_by
 from robolink_cli._notices import note_change
 from robolink_cli._render import note, say
 
@@ -93,15 +100,27 @@ def _get_by_mode(context: CliContext, mode: str) -> None:
 @click.option("--u", type=float, help="Degrees about Z.")
 @click.option("--v", type=float, help="Degrees about Y; six-axis robots only.")
 @click.option("--w", type=float, help="Degrees about X; six-axis robots only.")
+@accept_jump_options
 @controller_options
 @dry_run_option
 @yes_option
 def set_tool(
-    context: CliContext, number: int, dry_run: bool, yes: bool, **given: float | None
+    context: CliContext,
+    number: int,
+    *,
+    accepted_mm: float | None,
+    accepted_deg: float | None,
+    dry_run: bool,
+    yes: bool,
+    **given: float | None,
 ) -> None:
-    """Write a tool offset; components that are not given are kept."""
+    """Write a tool offset; components that are not given are kept.
+
+    A change beyond the cell's max_change_mm or max_change_deg takes an engineer, who is asked
+    with the figure, whatever --yes says.
+    """
     from robolink.model import ToolOffset
-    from robolink.transaction import Wanted, change_tools
+    from robolink.transaction import Jump, Wanted, change_tools
     from robolink_cli._safekeeping import back_up_first
     from robolink_cli._tables import show_change
     from robolink_cli._views import offset_payload, receipt_payload
@@ -127,6 +146,15 @@ def set_tool(
             return
         if not context.json:
             show_change(number, *shown, after_name=tr("new"))
+        # An undefined tool has no place from which its tip could jump.
+        accepted = before is not None and accept_jump(
+            controller,
+            number,
+            Jump.between(before, wanted),
+            allowed=allowed_by(context.cell),
+            accepted=Allowed(accepted_mm, accepted_deg),
+        )
+        if not (accepted or context.json):
             agree(tr("Write this to tool {number}?", number=number), yes=yes)
         back_up_first(controller)
         (receipt,) = change_tools(controller, [Wanted(number, wanted, before)], tell=note)
@@ -143,11 +171,19 @@ def set_tool(
 
 @tool.command("clear")
 @click.argument("number", type=int)
+@then_select_option
 @controller_options
 @dry_run_option
 @yes_option
-def clear(context: CliContext, number: int, dry_run: bool, yes: bool) -> None:
-    """Remove a tool's definition."""
+def clear(
+    context: CliContext, number: int, *, then_select: int | None, dry_run: bool, yes: bool
+) -> None:
+    """Remove a tool's definition. Where the cell names people, it takes an engineer.
+
+    The tool that is selected is cleared only with --then-select: the machine goes on with that
+    one.
+    """
+    from robolink.model import Role, require_engineer
     from robolink.transaction import Wanted, change_tools
     from robolink_cli._safekeeping import back_up_first
     from robolink_cli._views import receipt_payload
@@ -155,18 +191,39 @@ def clear(context: CliContext, number: int, dry_run: bool, yes: bool) -> None:
     with open_controller(context, changes=not dry_run) as controller:
         before = controller.tools.read(number)
         if dry_run:
-            requests = controller.tools.preview_clear(number)
+            requests = controller.tools.preview_clear(number, then_select=then_select)
             context.show_requests(requests)
             return
+        act, outcomes = tr("clear tool {tool}", tool=number), controller.outcomes
+        # What is refused is refused before anybody is asked.
+        controller.tools.preview_clear(number, then_select=then_select)
+        if outcomes.signature.role == Role.OPERATOR:
+            require_engineer(outcomes, act)
         if not context.json:
-            agree(tr("Clear tool {number}?", number=number), yes=yes)
+            agree(_clear_question(number, then_select), yes=yes)
+        if before is not None:
+            require_engineer(outcomes, act)
         back_up_first(controller)
-        (receipt,) = change_tools(controller, [Wanted(number, None, before)], tell=note)
+        wanted = Wanted(number, None, before, then_select=then_select)
+        (receipt,) = change_tools(controller, [wanted], tell=note)
+        selected = controller.tools.selected()
     done = tr("was undefined already") if receipt.skipped else tr("cleared, read back")
-    context.emit(
-        "tool-clear",
-        receipt_payload(receipt),
-        lambda: say(tr("tool {number}: {done}", number=number, done=done)),
+
+    def show() -> None:
+        say(tr("tool {number}: {done}", number=number, done=done))
+        if selected is not None:
+            say(tr("Tool {tool} is selected.", tool=selected))
+
+    context.emit("tool-clear", receipt_payload(receipt) | {"selected_tool": selected}, show)
+
+
+def _clear_question(number: int, then_select: int | None) -> str:
+    if then_select is None:
+        return tr("Clear tool {number}?", number=number)
+    return tr(
+        "Clear tool {number}? If it is selected now, tool {other} is selected in its place.",
+        number=number,
+        other=then_select,
     )
 
 

@@ -4,7 +4,13 @@ import click
 
 from robolink.errors import ConfigError, DeclinedError
 from robolink.messages import tr
-from robolink_cli._consent import agree, dry_run_option, on_terminal, yes_option
+from robolink_cli._consent import (
+    agree,
+    dry_run_option,
+    on_terminal,
+    then_select_option,
+    yes_option,
+)
 from robolink_cli._context import CliContext, controller_options, open_controller
 
 
@@ -17,6 +23,7 @@ from robolink_cli._context import CliContext, controller_options, open_controlle
     metavar="NUMBER",
     help=tr("Bring back the value that this entry of the journal proved."),
 )
+@then_select_option
 @controller_options
 @dry_run_option
 @yes_option
@@ -26,6 +33,7 @@ def undo(
     change: str | None,
     tool: int | None,
     to: int | None,
+    then_select: int | None,
     dry_run: bool,
     yes: bool,
 ) -> None:
@@ -46,7 +54,8 @@ def undo(
         )
     with open_controller(context, changes=not dry_run) as controller:
         chosen = change_named(controller.outcomes.recorded(), change) if change else ""
-        undoing = Undoing(controller, plan_undo(controller, tool=tool, change=chosen, to=to))
+        plan = plan_undo(controller, tool=tool, change=chosen, to=to)
+        undoing = Undoing(controller, plan, then_select=then_select)
         requests = undoing.requests()
         if not context.json:
             undoing.show()

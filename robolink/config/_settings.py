@@ -33,6 +33,7 @@ class CellSettings(BaseModel):
         lift_mm, clearance_mm: How far the tip is lifted before it turns, and how far above
             the pin it stops.
         max_change_mm: Largest plausible change against the stored offset.
+        max_change_deg: Largest change of a tool's orientation that is typed without an engineer.
         drift_tolerance_mm: Largest drift about the new tip that passes.
         rms_tolerance_mm, residual_tolerance_mm: Largest rms of the residuals of a calibration,
             and largest single one, that is believed.
@@ -57,6 +58,7 @@ class CellSettings(BaseModel):
     lift_mm: Annotated[float, Field(ge=1, le=100)] | None = None
     clearance_mm: Annotated[float, Field(ge=0.5, le=50)] | None = None
     max_change_mm: Positive | None = None
+    max_change_deg: Annotated[float, Field(gt=0, le=180)] | None = None
     drift_tolerance_mm: Positive | None = None
     rms_tolerance_mm: Positive | None = None
     residual_tolerance_mm: Positive | None = None

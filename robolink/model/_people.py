@@ -11,8 +11,8 @@ from robolink.model._outcomes import OutcomeLog
 class Role(StrEnum):
     """What a person is, by the cell file.
 
-    An operator changes nozzles. Passing the jump limit, undo, restore, writes without an
-    expected value and raw statements take an engineer.
+    An operator changes nozzles. Passing the jump limit, clearing a tool, undo, restore, writes
+    without an expected value and raw statements take an engineer.
     """
 
     OPERATOR = "operator"

@@ -167,14 +167,27 @@ class ToolTable(Protocol):
         Empty when the value is stored already. Reads only; raises what the write would.
         """
 
-    def preview_clear(self, tool: int) -> tuple[str, ...]:
-        """Return what :meth:`clear` would send besides its reads."""
+    def preview_clear(self, tool: int, *, then_select: int | None = None) -> tuple[str, ...]:
+        """Return what :meth:`clear` would send besides its reads; raises what it would."""
 
     def preview_select(self, tool: int) -> tuple[str, ...]:
         """Return what :meth:`select` would send besides its reads."""
 
-    def clear(self, tool: int, *, expected: Expected) -> ToolReceipt:
-        """Remove a definition; same conditions and errors as :meth:`write`."""
+    def clear(
+        self, tool: int, *, expected: Expected, then_select: int | None = None
+    ) -> ToolReceipt:
+        """Remove a definition; same conditions and errors as :meth:`write`.
+
+        Args:
+            tool: Its number.
+            expected: What is believed to be stored.
+            then_select: The tool to put in force before, if ``tool`` is in force; 0 is the
+                flange. What is in force is left alone otherwise.
+
+        Raises:
+            SelectedToolError: The tool is in force and no other one is named; nothing was sent.
+            UndefinedToolError: The tool named has no definition; nothing was cleared.
+        """
 
     def selected(self) -> int | None:
         """Return the number of the tool in force, 0 for the flange.

@@ -87,6 +87,10 @@ class NozzleChange:
             controller.outcomes.change = ""
 
     def _carry_out(self, *, write: bool) -> ChangeReport:
+        if write:
+            # What the write would be refused for is said before a person has measured anything.
+            for one in self._plan.tools:
+                self._controller.tools.require_writable(one.tool)
         plan, listener, bench = self._plan, self._listener, self._bench()
         measuring = Measuring(bench, listener)
         measuring.go_to(plan.safe, tr("go to the safe pose"))

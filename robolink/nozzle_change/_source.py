@@ -90,6 +90,8 @@ class Bench:
             on_step=self._on_step,
             camera=camera,
             offers=self._offers,
+            # About a new tip nothing is repeated: its value is written and not yet proved.
+            repeats=tip is None,
         )
 
 

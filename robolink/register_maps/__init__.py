@@ -7,6 +7,7 @@ It is checked by pydantic, which is imported when a map is loaded and not before
 from robolink.register_maps._confirmations import Confirmation as Confirmation
 from robolink.register_maps._confirmations import confirm as confirm
 from robolink.register_maps._confirmations import confirmation_of as confirmation_of
+from robolink.register_maps._confirmations import revoke as revoke
 from robolink.register_maps._drafts import Draft as Draft
 from robolink.register_maps._drafts import draft_from_csv as draft_from_csv
 from robolink.register_maps._loading import check_map as check_map

@@ -74,5 +74,25 @@ def confirm(identity: str, register_map: RegisterMap, *, by: str, compared: str)
     return made
 
 
+def revoke(identity: str, register_map: RegisterMap) -> Confirmation | None:
+    """Take back that a map is right, because a comparison showed that it is not.
+
+    Returns:
+        Who had confirmed it, ``None`` when nobody had.
+
+    Raises:
+        ConfigError: The record cannot be removed.
+    """
+    held, path = confirmation_of(identity, register_map), _path(identity, register_map)
+    try:
+        path.unlink(missing_ok=True)
+    except OSError as error:
+        raise ConfigError(
+            tr("{path} cannot be removed: {cause}.", path=path, cause=error.strerror or error),
+            remedy=tr("Remove it by hand: it says that a wrong map is right."),
+        ) from error
+    return held
+
+
 def _path(identity: str, register_map: RegisterMap) -> Path:
     return state_folder("plc-maps") / file_name(f"{identity} {register_map.sha256}")

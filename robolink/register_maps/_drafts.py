@@ -7,7 +7,11 @@ are there::
     name,register,type
     Tool1_X,40101,REAL
     Tool1_Y,40103,REAL
+    GVL.T2.x,40105,REAL
     Commit,00001,BOOL
+
+A column ``address`` that holds nothing but numbers as 40101 is read as ``register``, and the draft
+says so. A row that cannot be used is named with its line; the others are kept.
 
 What a list does not say (word order, handshake) is left open in the draft and named there;
 a draft is no map before a person has filled it in.
@@ -15,7 +19,7 @@ a draft is no map before a person has filled it in.
 
 import csv
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -25,12 +29,8 @@ from robolink.messages import tr
 from robolink.named_files import read_named
 from robolink.register_maps._map import COMPONENTS
 from robolink.register_maps._places import LAST_ADDRESS, Table
+from robolink.register_maps._variable_names import component_of
 
-_TOOL: Final = re.compile(
-    r"(?:tool|nozzle|needle|t)[\W_]{0,2}(\d{1,2})[\W_]*(?:[a-z]+[\W_]+)?([xyzuvw])"
-    r"(?:[\W_]+(?:mm|deg))?[\W_]*",
-    re.IGNORECASE,
-)
 _REGISTER: Final = re.compile(r"([0134])(\d{4,5})")
 _TABLES: Final = {"0": Table.COIL, "1": Table.DISCRETE, "3": Table.INPUT, "4": Table.HOLDING}
 _TYPES: Final = {
@@ -53,38 +53,66 @@ class Draft:
         text: TOML, with comments that say what is to be filled in.
         found: How many components of tools were recognised.
         left: Names of the rows that were not.
+        bad: What cannot be used of the rows that were, each with its line.
+        notes: How the list was understood where it could be understood in two ways.
     """
 
     text: str
     found: int
     left: tuple[str, ...]
+    bad: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+class _BadRowError(ValueError):
+    """A row cannot be used; the text says why."""
 
 
 def draft_from_csv(path: Path) -> Draft:
-    """Return the beginning of a map.
+    """Return the beginning of a map; rows that cannot be used are named and left out.
 
     Raises:
-        ConfigError: The list cannot be read, or names no component of a tool.
+        ConfigError: The list cannot be read, or names no component of a tool that can be used.
     """
+    rows = list(_rows(path))
+    references = _are_references(row.get("address", "") for _, row in rows)
     tools: dict[int, dict[str, str]] = {}
     left: list[tuple[str, str]] = []
-    for line, row in _rows(path):
-        place = _place(path, line, row)
-        known = _TOOL.fullmatch(row["name"])
-        if known is None or not 1 <= int(known[1]) <= 15:
-            left.append((row["name"], place))
-            continue
-        components, name = tools.setdefault(int(known[1]), {}), known[2].lower()
-        if name in components:
-            raise _unusable(path, tr("line {line} names a component again", line=line))
-        components[name] = f"{{ {_number(path, line, row, place)} }}"
-    if not tools:
-        raise _unusable(
-            path, tr("no name in it is one of a tool's component, such as Tool1_X or T1.X")
-        )
+    bad: list[str] = []
+    for line, row in rows:
+        known = component_of(row["name"])
+        try:
+            place = _place(row, references=references)
+            if known is None:
+                left.append((row["name"], place))
+                continue
+            components = tools.setdefault(known.tool, {})
+            if known.axis in components:
+                raise _BadRowError(
+                    tr(
+                        "{axis} of tool {tool} stands in a line before it",
+                        axis=known.axis.upper(),
+                        tool=known.tool,
+                    )
+                )
+            components[known.axis] = f"{{ {_number(row, place, known.unit)} }}"
+        except _BadRowError as error:
+            bad.append(tr("line {line} ({name}): {why}", line=line, name=row["name"], why=error))
     found = sum(len(components) for components in tools.values())
-    text = "\n".join(_lines(path.stem, tools, left)) + "\n"
-    return Draft(text, found, tuple(name for name, _ in left))
+    if not found:
+        named = tr("no name in it is one of a tool's component, such as Tool1_X or GVL.T1.x")
+        raise _unusable(path, "; ".join(bad) or named)
+    notes = []
+    if references:
+        notes.append(
+            tr(
+                "The addresses are taken for numbers as manuals print them: 40401 is holding "
+                "register 400, counted from 0."
+            )
+        )
+    used = {tool: components for tool, components in tools.items() if components}
+    text = "\n".join(_lines(path.stem, used, left, [*notes, *bad])) + "\n"
+    return Draft(text, found, tuple(name for name, _ in left), tuple(bad), tuple(notes))
 
 
 def _rows(path: Path) -> Iterator[tuple[int, dict[str, str]]]:
@@ -106,48 +134,57 @@ def _rows(path: Path) -> Iterator[tuple[int, dict[str, str]]]:
             yield reader.line_num, row
 
 
-def _place(path: Path, line: int, row: Mapping[str, str]) -> str:
+def _are_references(addresses: Iterable[str]) -> bool:
+    """Whether a column of addresses holds numbers as manuals print them, counted from 1.
+
+    Only a whole column says so: 40401 alone may also be an address that counts from 0.
+    """
+    given = [address for address in addresses if address]
+    return bool(given) and all(_REGISTER.fullmatch(address) for address in given)
+
+
+def _place(row: Mapping[str, str], *, references: bool) -> str:
     """Return table and address as a map writes them."""
-    register = _REGISTER.fullmatch(row.get("register", ""))
+    address = row.get("address", "")
+    text = row.get("register", "") or (address if references else "")
+    register = _REGISTER.fullmatch(text)
     if register is not None and 1 <= int(register[2]) <= LAST_ADDRESS + 1:
         return f'table = "{_TABLES[register[1]]}", address = {int(register[2]) - 1}'
-    address = row.get("address", "")
-    if address.isascii() and address.isdigit() and int(address) <= LAST_ADDRESS:
+    counted = not references and address.isascii() and address.isdigit()
+    if counted and int(address) <= LAST_ADDRESS:
         return f"address = {int(address)}"
-    raise _unusable(
-        path,
-        tr(
-            "line {line} has no place: give an address counted from 0, or a register such as 40101",
-            line=line,
-        ),
+    raise _BadRowError(
+        tr("it has no place: give an address counted from 0, or a register such as 40101")
     )
 
 
-def _number(path: Path, line: int, row: Mapping[str, str], place: str) -> str:
+def _number(row: Mapping[str, str], place: str, unit_in_name: str) -> str:
     parts = [place]
     given = row.get("type", "").lower()
     if given:
         known = next((name for name, spelt in _TYPES.items() if given in spelt), None)
         if known is None:
-            raise _unusable(
-                path, tr("line {line} has an unknown type {type!r}", line=line, type=row["type"])
-            )
+            raise _BadRowError(tr("its type {type!r} is not known", type=row["type"]))
         parts.append(f'type = "{known}"')
-    if row.get("unit", "").lower() in _UNITS:
-        parts.append(f'unit = "{row["unit"].lower()}"')
+    unit = row.get("unit", "").lower() or unit_in_name
+    if unit in _UNITS:
+        parts.append(f'unit = "{unit}"')
     if row.get("scale"):
         try:
             parts.append(f"scale = {float(row['scale'])!r}")
         except ValueError as error:
-            raise _unusable(
-                path, tr("line {line} has a scale that is no number", line=line)
-            ) from error
+            raise _BadRowError(tr("its scale is no number")) from error
     return ", ".join(parts)
 
 
 def _lines(
-    name: str, tools: Mapping[int, Mapping[str, str]], left: list[tuple[str, str]]
+    name: str,
+    tools: Mapping[int, Mapping[str, str]],
+    left: list[tuple[str, str]],
+    remarks: list[str],
 ) -> Iterator[str]:
+    for remark in remarks:
+        yield f"# {_printable(remark)}"
     yield 'schema = "robolink/plc-map/1"'
     yield f'name = "{re.sub("[^A-Za-z0-9._ -]+", "-", name)}"'
     yield ""
@@ -171,7 +208,11 @@ def _lines(
         yield ""
         yield "# In the list, and not used yet:"
         for other, place in left:
-            yield f"#   {re.sub('[^ -~]', '?', other)}: {place}"
+            yield f"#   {_printable(other)}: {place}"
+
+
+def _printable(text: str) -> str:
+    return re.sub("[^ -~]", "?", text)
 
 
 def _unusable(path: Path, why: str) -> ConfigError:

@@ -12,6 +12,7 @@ from robolink.errors import (
     ConfigError,
     ControllerFaultError,
     DeclinedError,
+    HeartbeatLostError,
     JournalError,
     NotReadyError,
     NotReadyReason,
@@ -20,6 +21,7 @@ from robolink.errors import (
 from robolink.messages import tr
 from robolink.model import (
     Controller,
+    ControllerState,
     ControllerStatus,
     MotionGroup,
     MotionOutcome,
@@ -36,6 +38,9 @@ from robolink.sensing import seen_once
 
 POLL_S = 1.0
 """Longest time between two status reads while a person is asked (design: at most 5 s)."""
+
+_MOST_REPEATS: Final = 2
+"""Steps of one procedure that may be repeated: a computer busier than that has to be looked at."""
 
 MOST_REFUSED: Final = 10
 """So many answers in a row that lead nowhere end a question: whoever answers, a person or what
@@ -78,6 +83,8 @@ class Runner:
         on_step: Told of every step taken.
         camera: What looks are taken with, ``None`` where there are none.
         offers: Whether the person is asked about offers; else each is declined unasked.
+        repeats: Whether the person is also asked to repeat a step that ended because this
+            computer fell silent. It is for measuring, where nothing was written yet.
     """
 
     def __init__(
@@ -90,6 +97,7 @@ class Runner:
         on_step: Callable[[StepDone], None] | None = None,
         camera: TipSensor | None = None,
         offers: bool = True,
+        repeats: bool = False,
     ) -> None:
         self._controller = controller
         self._group = group
@@ -98,6 +106,7 @@ class Runner:
         self._on_step = on_step
         self._camera = camera
         self._offers = offers
+        self._repeats_left = _MOST_REPEATS if offers and repeats else 0
 
     def run(self, procedure: Procedure[T]) -> T:
         """Take the procedure's steps until it returns; its result is a proposal.
@@ -136,8 +145,12 @@ class Runner:
             StoppedError: It was stopped before it arrived.
         """
         profile = MotionProfile(path, self._settings.speed_percent, self._settings.speed_mm_s)
-        motion = self._group.move_to(target, profile, box=self._settings.box)
-        outcome = motion.wait(timeout_s=self._settings.motion_timeout_s)
+
+        def go() -> MotionOutcome:
+            motion = self._group.move_to(target, profile, box=self._settings.box)
+            return motion.wait(timeout_s=self._settings.motion_timeout_s)
+
+        outcome = self._seen_through(go, target)
         if outcome is not MotionOutcome.ARRIVED:
             raise StoppedError(
                 tr("The movement was stopped before it arrived."),
@@ -194,11 +207,15 @@ class Runner:
 
     def _seek(self, step: Seek) -> Pose:
         settings = self._settings
-        with _as_measurement():
-            motion = self._group.move_until_input(
-                step.target, step.edge, speed_mm_s=step.speed_mm_s, box=settings.box
-            )
-        found = motion.wait(timeout_s=settings.motion_timeout_s)
+
+        def go() -> Pose | None:
+            with _as_measurement():
+                motion = self._group.move_until_input(
+                    step.target, step.edge, speed_mm_s=step.speed_mm_s, box=settings.box
+                )
+            return motion.wait(timeout_s=settings.motion_timeout_s)
+
+        found = self._seen_through(go, step.target)
         if found is None:
             raise CalibrationError(
                 "no_edge",
@@ -219,8 +236,11 @@ class Runner:
                 return self._group.pose()
             if word in ("q", "quit", "abort"):
                 raise _ended_by_operator()
+            repeats_left = self._repeats_left
             try:
                 self.jog(word)
+                if self._repeats_left != repeats_left:  # another question came between
+                    self._operator.ask(step.instruction, _QUESTIONS[step.shown])
             except JournalError:
                 raise  # no mistake of the person's: the record cannot be kept any more
             except ConfigError as error:
@@ -231,6 +251,36 @@ class Runner:
                 self._operator.tell(str(error))
             else:
                 refused = 0
+
+    def _seen_through(self, go: Callable[[], T], target: Pose) -> T:
+        """Move, and once more from where the robot stands if this computer was too busy to.
+
+        The controller has ended the movement, so that what follows is another one, to the same
+        place; a person decides on it, a bounded number of times.
+        """
+        while True:
+            try:
+                return go()
+            except HeartbeatLostError:
+                if not self._repeats_left or not self._stands(target) or not self._again():
+                    raise
+                self._repeats_left -= 1
+
+    def _stands(self, target: Pose) -> bool:
+        """Whether the robot rests, ready, with the tool in force that the step is meant for."""
+        status = self._controller.status()
+        return status.state is ControllerState.READY and self._group.pose().tool == target.tool
+
+    def _again(self) -> bool:
+        try:
+            return self.confirm(
+                tr(
+                    "This computer was busy for half a second, so the controller halted the robot. "
+                    "It stands still, and nothing was written. Repeat this step from here?"
+                )
+            )
+        except DeclinedError:  # nobody is there
+            return False
 
     def confirm(self, question: str) -> bool:
         """Ask a yes-or-no question under the same watch; see :func:`ask_yes_no`."""

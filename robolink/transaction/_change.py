@@ -57,12 +57,15 @@ class Wanted:
         offset: The new value; ``None`` clears it.
         expected: What the caller believes it holds now.
         details: More for the journal, plain JSON.
+        then_select: The tool to put in force before this one is cleared, should this one be in
+            force; without it that is refused.
     """
 
     tool: int
     offset: ToolOffset | None
     expected: Expected
     details: Mapping[str, object] | None = None
+    then_select: int | None = None
 
 
 class ToolChange:
@@ -96,6 +99,7 @@ class ToolChange:
         self._begun: list[Step] = []
         self._receipts: tuple[ToolReceipt, ...] = ()
         self._spoiled: int | None = None
+        self._selected: int | None = None
         self._account: Account | None = None
         self.kept = False
 
@@ -126,6 +130,8 @@ class ToolChange:
 
         Raises:
             ToolChangedError: A tool does not hold what was expected; nothing was written.
+            SelectedToolError: A tool in force is to be cleared, and none is named to be selected
+                in its place; nothing was written.
             OutcomeUnknownError: Something earlier is unsettled, or a write was not answered.
             ReadBackError: Another value came back; the old ones are put back.
             ConfigError: The intent cannot be stored; nothing was written.
@@ -135,6 +141,7 @@ class ToolChange:
         self._controller.latch.require_open(self.request)
         self._controller.require_settled(self.request)
         steps = self._compare()
+        self._selected = self._selected_before(steps)
         if self._several_steps and any(self._differs(step) for step in steps):
             tools = {
                 str(step.tool): {
@@ -148,6 +155,8 @@ class ToolChange:
                 "verify": self._verify,
                 "change": self._controller.outcomes.change,
             }
+            if self._selected is not None:
+                details["selected"] = self._selected
             with self._controller.uninterrupted():
                 self._marker = self._controller.begin(MarkerKind.CHANGE, self.request, details)
         self._receipts = tuple(
@@ -212,6 +221,9 @@ class ToolChange:
             steps.append(step)
             expected = wanted.expected
             if expected is ANY or tools.same(before, expected) or not self._differs(step):
+                if wanted.offset is None:
+                    # Raises what a clear would, before the first of several tools is written.
+                    tools.preview_clear(wanted.tool, then_select=wanted.then_select)
                 continue
             raise ToolChangedError(
                 tr(
@@ -228,6 +240,12 @@ class ToolChange:
             )
         return steps
 
+    def _selected_before(self, steps: list[Step]) -> int | None:
+        """Return the tool in force where this change, or taking it back, may need to know it."""
+        clears = any(wanted.then_select is not None for wanted in self._wanted)
+        defines = any(step.before is None and step.requested is not None for step in steps)
+        return self._controller.tools.selected() if clears or defines else None
+
     def _differs(self, step: Step) -> bool:
         return not self._controller.tools.same(step.before, step.requested)
 
@@ -238,7 +256,7 @@ class ToolChange:
         expected: Expected = ANY if wanted.expected is ANY else step.before
         try:
             if wanted.offset is None:
-                return tools.clear(wanted.tool, expected=expected)
+                return tools.clear(wanted.tool, expected=expected, then_select=wanted.then_select)
             return tools.write(wanted.tool, wanted.offset, expected=expected)
         except ReadBackError:
             self._spoiled = wanted.tool
@@ -251,13 +269,31 @@ class ToolChange:
         if isinstance(error, _OUT_OF_REACH):
             self._leave_open(error)
             return
-        done = put_back(self._controller, self._begun, spoiled=self._spoiled)
+        done = put_back(
+            self._controller, self._begun, spoiled=self._spoiled, selected=self._selected
+        )
         for result in done:
             self._tell(result.sentence)
+        self._select_again()
         if isinstance(error, RobolinkError):
             sentences = (result.sentence for result in done)
             error.remedy = " ".join((error.remedy, *sentences)).strip()
         self._record(done)
+
+    def _select_again(self) -> None:
+        """Put the tool in force again that gave way to a clear of this change."""
+        if not any(wanted.then_select is not None for wanted in self._wanted):
+            return
+        tools, before = self._controller.tools, self._selected
+        try:
+            if before is not None and tools.selected() != before:
+                with self._controller.latch.restoring():
+                    tools.select(before)
+                self._tell(tr("Tool {tool} is selected again.", tool=before))
+        except RobolinkError as error:
+            self._tell(
+                tr("Tool {tool} could NOT be selected again: {error}", tool=before, error=error)
+            )
 
     def _settle_account(self, error: BaseException | None) -> None:
         """Let whoever is told of ``error`` know what stands, and which tool is selected."""

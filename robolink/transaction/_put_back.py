@@ -3,13 +3,14 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from robolink.errors import ReadBackError, RobolinkError
+from robolink.errors import ReadBackError, RobolinkError, SelectedToolError
 from robolink.messages import tr
 from robolink.model import (
     Controller,
     EntryKind,
     NewEntry,
     ToolOffset,
+    ToolTable,
     describe_offset,
     plain_offset,
 )
@@ -50,7 +51,11 @@ class PutBack:
 
 
 def put_back(
-    controller: Controller, steps: Sequence[Step], *, spoiled: int | None = None
+    controller: Controller,
+    steps: Sequence[Step],
+    *,
+    spoiled: int | None = None,
+    selected: int | None = None,
 ) -> list[PutBack]:
     """Give each tool its old value back, the last one first, with one write each at most.
 
@@ -61,13 +66,17 @@ def put_back(
         steps: What the change was to do.
         spoiled: A tool whose write was read back as something else, so that what it holds is
             this change's own doing.
+        selected: The tool that was in force before the change, ``None`` where that is not known.
+            A tool that becomes undefined again gives way to it, should it be in force now, and to
+            the flange where it is not known.
     """
     return [
-        _put_one_back(controller, step, spoiled=step.tool == spoiled) for step in reversed(steps)
+        _put_one_back(controller, step, spoiled=step.tool == spoiled, selected=selected or 0)
+        for step in reversed(steps)
     ]
 
 
-def _put_one_back(controller: Controller, step: Step, *, spoiled: bool) -> PutBack:
+def _put_one_back(controller: Controller, step: Step, *, spoiled: bool, selected: int) -> PutBack:
     tools, tool, before = controller.tools, step.tool, step.before
     try:
         now = tools.read(tool)
@@ -77,13 +86,21 @@ def _put_one_back(controller: Controller, step: Step, *, spoiled: bool) -> PutBa
             return _conflict(step, now)
         with controller.latch.putting_back(tool):
             if before is None:
-                tools.clear(tool, expected=now)
+                _clear(tools, tool, now, selected)
             else:
                 tools.write(tool, before, expected=now)
     except RobolinkError as error:
         return _failed(step, error)
     sentence = tr("The old value of tool {tool} was written back.", tool=tool)
     return _restored(step, sentence, written=True)
+
+
+def _clear(tools: ToolTable, tool: int, now: ToolOffset | None, selected: int) -> None:
+    try:
+        tools.clear(tool, expected=now, then_select=selected)
+    except SelectedToolError:
+        # It was selected before, without a definition: the flange is what that meant.
+        tools.clear(tool, expected=now, then_select=0)
 
 
 def _restored(step: Step, sentence: str, *, written: bool) -> PutBack:

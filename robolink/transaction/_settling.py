@@ -101,7 +101,12 @@ class Settler:
         self._controller.begin(
             marker.kind, marker.request, marker.details, operation=marker.operation
         )
-        done = put_back(self._controller, _steps(marker))
+        selected = marker.details.get("selected")
+        done = put_back(
+            self._controller,
+            _steps(marker),
+            selected=selected if isinstance(selected, int) else None,
+        )
         failures = [result for result in done if not result.restored]
         entries = [result.entry for result in done]
         if not failures:

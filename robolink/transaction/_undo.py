@@ -100,17 +100,21 @@ def undo(
     controller: Controller,
     plan: UndoPlan,
     *,
+    then_select: int | None = None,
     tell: Callable[[str], None] = lambda _sentence: None,
 ) -> Undone:
-    """Write the old values: all of them, or none.
+    """Write the old values: all of them, or none. The same tool stays selected.
 
     Args:
         controller: The controller, connected.
         plan: What to do.
+        then_select: The tool to put in force in place of one that is in force and becomes
+            undefined; without it that is refused.
         tell: Told what was put back when it fails on the way.
 
     Raises:
         NotAllowedError: It takes an engineer; nothing was sent.
+        SelectedToolError: The tool in force would become undefined; nothing was sent.
         RobolinkError: As :func:`robolink.transaction.change_tools`.
     """
     if not plan.steps:
@@ -123,7 +127,10 @@ def undo(
         outcomes.append(
             NewEntry(EntryKind.DECISION, verdict=plan.sentence, details=dict(plan.details))
         )
-        wanted = [Wanted(step.tool, step.requested, step.before) for step in plan.steps]
+        wanted = [
+            Wanted(step.tool, step.requested, step.before, then_select=then_select)
+            for step in plan.steps
+        ]
         return Undone(change, change_tools(controller, wanted, tell=tell))
     finally:
         outcomes.change = ""

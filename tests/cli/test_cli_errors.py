@@ -62,6 +62,7 @@ CODES = {
     "ToolError": 5,
     "ToolIndexError": 2,
     "ReservedToolError": 2,
+    "SelectedToolError": 5,
     "UndefinedToolError": 5,
     "ToolChangedError": 5,
     "ReadBackError": 5,
@@ -96,6 +97,7 @@ def test_an_error_is_one_json_document(command, capsys):
             "remedy": "Close it.",
             "reason": "guard_open",
             "code": None,
+            "ended_by": None,
             "controller_state": "unchanged",
             "stands": {
                 "tools": {},

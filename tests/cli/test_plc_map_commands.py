@@ -97,7 +97,8 @@ def test_a_map_in_the_wrong_order_is_shown_and_diagnosed(shown, serve, tmp_path)
 def test_without_a_probe_nothing_is_written_until_a_person_has_compared(shown, serve):
     url, plc = serve("no-handshake")
     write = ["-c", url, "tool", "set", "1", "--x", "2.5", "--dry-run"]
-    assert shown(*write)[0] == 0
+    code, _, err = shown(*write)
+    assert (code, "nobody has confirmed it" in err) == (2, True)
     code, _, err = shown("-c", url, "plc", "check-map")
     assert (code, "--shows 1.x=" in err) == (9, True)
     code, _, err = shown("-c", url, "plc", "check-map", "--shows", "1.x=-54.4")
@@ -111,6 +112,25 @@ def test_without_a_probe_nothing_is_written_until_a_person_has_compared(shown, s
     assert document(out, "plc-map-values")["confirmed_by"]
     code, out, _ = shown("-c", url, "plc", "check-map", "--operator", "Kim")
     assert (code, "Confirmed by" in out) == (0, True)
+    assert shown(*write)[0] == 0
+    assert plc.writes == []
+
+
+def test_a_comparison_that_fails_takes_the_confirmation_back(shown, serve):
+    url, plc = serve("no-handshake")
+    check = ["-c", url, "plc", "check-map"]
+    write = ["-c", url, "tool", "set", "1", "--x", "2.5", "--dry-run"]
+    assert shown(*check, "--shows", "1.x=-5.44", "--operator", "Kim")[0] == 0
+    code, _, err = shown(*check, "--shows", "1.x=much")
+    assert (code, "taken back" in err) == (2, False)  # a typing mistake says nothing of the map
+    assert shown(*write)[0] == 0
+    code, _, err = shown(*check, "--shows", "1.x=9.99")
+    assert (code, "The confirmation by Kim" in err, "taken back" in err) == (2, True, True)
+    assert shown(*write)[0] == 2
+    code, _, err = shown(*check, "--shows", "1.x=9.99")
+    assert (code, "taken back" in err) == (2, False)
+    assert shown(*check, "--shows", "1.x=-5.44")[0] == 0
+    assert shown(*write)[0] == 0
     assert plc.writes == []
 
 

@@ -35,7 +35,7 @@ NEEDS_A_CONTROLLER = {
     "tool list": [],
     "tool get": ["1"],
     "tool set": ["1", "--x", "13", "--yes"],
-    "tool clear": ["1", "--yes"],
+    "tool clear": ["1", "--then-select", "0", "--yes"],
     "tool select": ["0", "--yes"],
     "backup": ["new.json"],
     "restore": ["golden.json", "--yes"],

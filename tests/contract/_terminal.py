@@ -11,16 +11,28 @@ import time
 LONGEST_S = 20.0
 
 
-class Terminal:
-    """The far end of a pseudo terminal on which a command runs."""
+OWN_THE_WINDOW = (
+    "import fcntl, termios; fcntl.ioctl(0, termios.TIOCSCTTY, 0); "
+    "from robolink_cli.main import main; main()"
+)
 
-    def __init__(self, *words):
+
+class Terminal:
+    """The far end of a pseudo terminal on which a command runs.
+
+    Args:
+        words: The command line.
+        controlling: Whether it is the command's own window: closing it hangs the command up.
+    """
+
+    def __init__(self, *words, controlling=False):
         self.descriptor, near = os.openpty()
         self.before = termios.tcgetattr(near)
         paths = os.pathsep.join(path for path in sys.path if path)
         environment = {**os.environ, "PYTHONPATH": paths, "COLUMNS": "200", "TERM": "dumb"}
+        how = ("-c", OWN_THE_WINDOW) if controlling else ("-m", "robolink_cli")
         self.command = subprocess.Popen(
-            [sys.executable, "-m", "robolink_cli", *words],
+            [sys.executable, *how, *words],
             stdin=near,
             stdout=near,
             stderr=near,
@@ -53,11 +65,18 @@ class Terminal:
                 break
         return self.command.wait(LONGEST_S)
 
+    def close_window(self):
+        """Close the window while the command runs, and return its exit code."""
+        os.close(self.descriptor)
+        self.descriptor = -1
+        return self.command.wait(LONGEST_S)
+
     def close(self):
         if self.command.poll() is None:
             self.command.kill()
             self.command.wait()
-        os.close(self.descriptor)
+        if self.descriptor >= 0:
+            os.close(self.descriptor)
 
     def _read(self):
         return os.read(self.descriptor, 4096).decode("utf-8", "replace")

@@ -83,11 +83,12 @@ def test_the_first_line_says_where_it_is_and_sigterm_ends_it_well():
         assert process.wait(timeout=20) == 0
 
 
-def test_a_person_reads_that_it_is_simulated_and_may_press_ctrl_c():
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGHUP, 129)])
+def test_a_person_reads_that_it_is_simulated_and_may_press_ctrl_c_or_close_the_window(number, code):
     with started() as process:
         assert "SIMULATED" in first_line(process)
-        process.send_signal(signal.SIGINT)
-        assert process.wait(timeout=20) == 130
+        process.send_signal(number)
+        assert process.wait(timeout=20) == code
 
 
 def test_options_password_and_state_reach_the_simulator(tmp_path):

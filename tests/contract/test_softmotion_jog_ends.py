@@ -8,7 +8,7 @@ from robolink_simulators.softmotion.mailbox import PlcFault, PlcFaultAction
 
 from robolink.controllers.softmotion import Jog
 from robolink.controllers.softmotion._wire import MailboxWire
-from robolink.errors import ControllerFaultError, LimitError, RejectedError
+from robolink.errors import ControllerFaultError, LimitError, RejectedError, StoppedError
 from robolink.model import WorkBox
 from robolink.protocols.mailbox import ErrorClass
 from tests.contract._softmotion_cell import SLOW, above, served
@@ -77,7 +77,7 @@ def test_a_stop_from_another_thread_ends_the_jog_and_is_no_success(cell, control
         return read_head(wire)
 
     monkeypatch.setattr(MailboxWire, "read_head", stop_meanwhile)
-    with pytest.raises(ControllerFaultError):
+    with pytest.raises(StoppedError):
         group.jog(BACK_ALONG_X, duration_s=20.0, box=ANYWHERE)
     assert distance_mm(controller, start) < 20.0
     assert controller.status().paused

@@ -14,8 +14,8 @@ from robolink.errors import (
     ReadBackError,
     RejectedError,
     ReservedToolError,
+    SelectedToolError,
     ToolChangedError,
-    ToolError,
     ToolIndexError,
     UndefinedToolError,
 )
@@ -126,9 +126,9 @@ def test_writing_the_selected_slot_moves_the_tip_and_not_the_robot(cell, control
 
 
 def test_the_selected_slot_is_not_cleared(cell, controller):
-    with pytest.raises(ToolError, match="in force") as refusal:
+    with pytest.raises(SelectedToolError, match="Tool 1 is selected") as refusal:
         controller.tools.clear(1, expected=ANY)
-    assert "Select another tool first" in refusal.value.remedy
+    assert "--then-select" in refusal.value.remedy
     assert cell.commands == []
 
 

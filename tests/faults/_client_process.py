@@ -104,4 +104,4 @@ def _robolink(
     signal.signal(signal.SIGINT, signal.default_int_handler)
     from robolink_cli.main import run
 
-    sys.exit(run(arguments))
+    sys.exit(run(arguments, last=True))

@@ -1,13 +1,15 @@
-"""Ctrl-C at each step of a nozzle change: the tool, power and speed of before are put back.
+"""Ctrl-C, SIGTERM or SIGHUP at each step of a nozzle change: all of before is put back.
 
 Until the verification has passed, an interrupted change ends with the old value in tool 1: it
 was not written, or it is written back, and that is said. From then on the new value is kept.
 Steps are taken as in the test of kill points; ``ROBOLINK_ALL_KILL_POINTS=1`` takes all.
 """
 
+import json
 import math
 import signal
 from dataclasses import dataclass, field
+from queue import SimpleQueue
 
 import pytest
 from robolink_cli._operator import AssistedOperator
@@ -17,13 +19,19 @@ from robolink_simulators.hosting.in_process import register, unregister
 import robolink
 from robolink.interrupts import InterruptGate
 from robolink.journal import JournalOutcomeLog, memory_journal
+from robolink.model import describe_offset
 from robolink.nozzle_change import ChangePlan, NozzleChange, ToolPlan
-from tests.faults._nozzle_cell import OLD_TIP, NozzleCell, served_cell
+from tests.faults._client_process import ClientProcess
+from tests.faults._nozzle_cell import MOVE, OLD_TIP, NozzleCell, served_cell
 from tests.faults._steps import SHARES, Step, disturbed, steps_of
 
 pytestmark = pytest.mark.timeout(600)
 
 POSE = '$Execute,"Print RealPos"'
+
+CODES = {signal.SIGINT: 130, signal.SIGTERM: 143, signal.SIGHUP: 129}
+WAYS = tuple(CODES)
+"""Taken in turn: what cleans up after one, cleans up after all."""
 
 
 @pytest.fixture(scope="module")
@@ -37,9 +45,14 @@ def requests(tmp_path_factory):
 
 
 def check(cell: NozzleCell, step: Step, *, verified: bool) -> None:
-    client = disturbed(cell, step, lambda client: client.signal(signal.SIGINT))
+    way = WAYS[step.number % len(WAYS)]
+    client = disturbed(cell, step, lambda client: client.signal(way))
     code = client.exit_code()
-    assert code == 130, client.err
+    assert code == CODES[way], client.err
+    document = json.loads(client.out)
+    assert document["exit_code"] == code
+    assert document["error"]["ended_by"] == way.name
+    check_last_line(cell, client.err.splitlines()[-1])
     assert not cell.simulator.status_flags().running, "the robot still moves"
     assert cell.requests.count("$Abort") <= 1
     cell.check_nothing_else_was_written()
@@ -53,6 +66,54 @@ def check(cell: NozzleCell, step: Step, *, verified: bool) -> None:
         assert cell.tool_1 == OLD_TIP, client.err
     if cell.simulator.machine.flash_writes == 2:
         assert "The old value of tool 1 was written back" in client.err
+
+
+def check_last_line(cell: NozzleCell, line: str) -> None:
+    """It says what stands, what was written and what is selected, as it is past the wire."""
+    moved = cell.simulator.machine.arm.moves_started
+    assert line.startswith("Every movement has ended. " if moved else "Nothing was moved. "), line
+    holds = describe_offset(cell.tool_1)
+    if cell.tool_1 != OLD_TIP:
+        written = f"Tool 1 holds {holds} now; before it held {describe_offset(OLD_TIP)}."
+    elif cell.simulator.machine.flash_writes:
+        written = f"Tool 1 holds {holds}, as before."
+    else:
+        written = "Nothing was written."
+    assert written in line
+    # Before it was read once, nobody claims to know it.
+    selected = (f"Tool {cell.selected_tool} is selected.", "Which tool is selected was not read.")
+    assert line.endswith(selected)
+
+
+def test_a_second_signal_during_the_cleaning_up_breaks_nothing(tmp_path, monkeypatch):
+    with served_cell(tmp_path / "cell", monkeypatch) as cell:
+        started: SimpleQueue[ClientProcess] = SimpleQueue()
+        sent: list[str] = []
+
+        def disturb(_number: int, text: str) -> None:
+            if not sent and not MOVE.match(text):
+                return
+            if not sent:
+                sent.append("SIGTERM")
+                clients.append(started.get(timeout=30))
+                clients[0].signal(signal.SIGTERM)
+            elif text == "$Abort":
+                sent.append("SIGINT")
+                clients[0].signal(signal.SIGINT)
+            elif "Tool 1" in text:
+                sent.append("SIGHUP")
+                clients[0].signal(signal.SIGHUP)
+
+        clients: list[ClientProcess] = []
+        with cell.simulator.lock:
+            cell.simulator.on_request = disturb
+        client = cell.calibrate()
+        started.put(client)
+        assert client.exit_code() == 143, client.err
+        assert sent == ["SIGTERM", "SIGINT", "SIGHUP"]
+        assert cell.open_markers() == (), client.err
+        cell.check_settings_are_those_of_before()
+        check_last_line(cell, client.err.splitlines()[-1])
 
 
 @pytest.mark.parametrize("share", range(SHARES))

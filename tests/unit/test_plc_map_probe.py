@@ -156,11 +156,10 @@ def test_a_register_list_starts_a_map_that_only_lacks_what_no_list_says(tmp_path
         ("", "must name the columns"),
         ("name,place\nTool1_X,5\n", "must name the columns"),
         ("name,address\nPump,5\n", "no name in it"),
-        ("name,address\nTool1_X,nowhere\n", "line 2 has no place"),
-        ("name,register\nTool1_X,50001\n", "line 2 has no place"),
-        ("name,address,type\nTool1_X,5,STRING\n", "unknown type"),
+        ("name,address\nTool1_X,nowhere\n", "line 2 .Tool1_X.: it has no place"),
+        ("name,register\nTool1_X,50001\n", "line 2 .Tool1_X.: it has no place"),
+        ("name,address,type\nTool1_X,5,STRING\n", "'STRING' is not known"),
         ("name,address,scale\nTool1_X,5,much\n", "no number"),
-        ("name,address\nTool1_X,5\nT1.x,7\n", "line 3 names a component again"),
     ],
 )
 def test_a_register_list_that_cannot_be_used_says_why(tmp_path, text, words):

@@ -17,6 +17,7 @@ from robolink.errors import (
     ToolError,
 )
 from robolink.model import ANY, ToolOffset, Verdict
+from robolink.nozzle_change import ChangePlan, GivenPoses, NozzleChange, ToolPlan
 from robolink.register_maps import Table
 from robolink.transaction import Wanted, change_tools, recover
 from tests.unit._plc_bench import COMMIT_BIT, LEVEL, NO_HANDSHAKE, Bench
@@ -336,9 +337,65 @@ def test_all_zeros_are_a_lost_link_or_no_tool_as_the_map_says(no_handshake, leve
             controller.tools.clear(1, expected=ANY)
     level.program.memory.zero(Table.HOLDING)
     with level.connect() as controller:
-        assert controller.tools.read(1) is None
-        controller.tools.write(1, NEW, expected=None)
-        assert controller.tools.clear(1, expected=NEW).read_back is None
+        assert controller.tools.read(2) is None
+        controller.tools.write(2, NEW, expected=None)
+        assert controller.tools.clear(2, expected=NEW).read_back is None
+
+
+ZERO = ToolOffset()
+
+
+@pytest.mark.parametrize("value", [ZERO, ToolOffset(0.00004), ToolOffset(y_mm=-0.00004)])
+@pytest.mark.parametrize(
+    ("name", "meaning"), [("no_handshake", "a lost link"), ("level", "no tool")]
+)
+def test_a_value_that_would_read_back_as_none_is_refused_before_it_is_sent(
+    request, name, meaning, value
+):
+    bench = request.getfixturevalue(name)
+    with bench.connect() as controller:
+        before = controller.tools.read(1)
+        for act in (
+            lambda: controller.tools.write(1, value, expected=before),
+            lambda: controller.tools.preview_write(1, value),
+        ):
+            with pytest.raises(LimitError, match=f"takes that for {meaning}") as refusal:
+                act()
+            assert 'all_zero = "tool"' in refusal.value.remedy
+        assert controller.tools.read(1) == before
+    assert bench.plc.writes == []
+
+
+def test_an_unconfirmed_map_is_refused_before_anything_else_is_looked_at():
+    bench = bench_of(NO_HANDSHAKE, confirmed=False)
+    with bench.connect() as controller:
+        controller.status()
+        before = controller.exchanges
+        # What would be refused for another reason too is refused for this one first.
+        for tool, value in ((1, NEW), (1, ZERO), (9, NEW)):
+            for act in (
+                lambda tool=tool: controller.tools.require_writable(tool),
+                lambda tool=tool, value=value: controller.tools.write(tool, value, expected=ANY),
+                lambda tool=tool, value=value: controller.tools.preview_write(tool, value),
+                lambda tool=tool: controller.tools.clear(tool, expected=ANY),
+                lambda tool=tool, value=value: change_tools(
+                    controller, [Wanted(tool, value, None)]
+                ),
+            ):
+                with pytest.raises(ConfigError, match="nobody has confirmed it"):
+                    act()
+        assert controller.exchanges == before
+    assert bench.plc.writes == []
+
+
+def test_an_unconfirmed_map_is_refused_before_a_person_has_measured_anything():
+    def measured():
+        raise AssertionError("nobody was to measure")
+
+    plan = ChangePlan((ToolPlan(1, GivenPoses(measured)),), ask_before_write=False)
+    with bench_of(NO_HANDSHAKE, confirmed=False).connect() as controller:
+        with pytest.raises(ConfigError, match="nobody has confirmed it"):
+            NozzleChange(controller, plan, operator=None).run(write=True)
 
 
 def test_a_number_that_cannot_be_true_is_not_taken_for_an_offset(commit_bit):

@@ -1,6 +1,6 @@
 """What a person may answer, how a jog step may be typed, and that no question is for ever."""
 
-from itertools import count
+from itertools import count, cycle
 
 import pytest
 from robolink_cli._operator import MOST_STEPS, AssistedOperator
@@ -150,8 +150,8 @@ def test_a_text_that_never_comes_ends_the_question(controller):
 
 
 def test_a_stand_in_that_sees_another_way_each_time_gives_up():
-    seen = [(1.0, 0.0, 0.0), (-1.0, 0.0, 0.0)]
-    operator = AssistedOperator(lambda: seen.append(seen.pop(0)) or seen[0], lambda _text: None)
+    seen = cycle([(1.0, 0.0, 0.0), (-1.0, 0.0, 0.0)])
+    operator = AssistedOperator(lambda: next(seen), lambda _text: None)
     operator.ask("Onto the pin.", Question.PLACE)
     with pytest.raises(DeclinedError, match="did not get there"):
         for _ in range(MOST_STEPS + 1):

@@ -16,8 +16,8 @@ from robolink.errors import (
     ReadBackError,
     RejectedError,
     ReservedToolError,
+    SelectedToolError,
     ToolChangedError,
-    ToolError,
     ToolIndexError,
     TransportTimeoutError,
     UndefinedToolError,
@@ -122,7 +122,7 @@ def test_a_cleared_slot_is_empty_again(controller):
 
 def test_the_slot_in_force_is_not_cleared(plc, controller):
     select(plc, 3)
-    with pytest.raises(ToolError, match="in force"):
+    with pytest.raises(SelectedToolError, match="is selected"):
         controller.tools.clear(3, expected=ANY)
     assert plc.executed == []
 

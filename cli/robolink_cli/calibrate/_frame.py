@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 import click
 
@@ -11,16 +11,14 @@ from robolink.errors import ConfigError, ReservedToolError, ToolIndexError
 from robolink.messages import tr
 from robolink_cli._context import CliContext
 from robolink_cli._impacting import ImpactRequest, impact_request
+from robolink_cli._jumps import jump_limit_mm
 from robolink_cli._motion_options import refuse_motion_options
 from robolink_cli._pose_source import PoseSource
 from robolink_cli._reporting import ReportRequest, report_request
 
 if TYPE_CHECKING:
-    from robolink.config import Cell
     from robolink.model import Controller
     from robolink.nozzle_change import ChangePlan, Gate, Limits, PoseMethod, TipSource
-
-USUAL_CHANGE_MM: Final = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,12 +152,6 @@ def frame_from(
         dry_run=dry_run,
         yes=yes,
     )
-
-
-def jump_limit_mm(cell: "Cell | None") -> float:
-    """Return the largest change that takes no engineer: the cell's, or the usual one."""
-    limit = cell.settings.max_change_mm if cell else None
-    return USUAL_CHANGE_MM if limit is None else limit
 
 
 def _require_tool(tool: int) -> None:

@@ -11,10 +11,11 @@ from robolink_cli._cell import with_cell_limits
 from robolink_cli._consent import dry_run_option, yes_option
 from robolink_cli._context import CliContext, controller_options
 from robolink_cli._impacting import impact_options
+from robolink_cli._jumps import USUAL_CHANGE_MM
 from robolink_cli._motion_options import motion_option
 from robolink_cli._people import nozzle_options
 from robolink_cli._reporting import report_options
-from robolink_cli.calibrate._frame import USUAL_CHANGE_MM, frame_from
+from robolink_cli.calibrate._frame import frame_from
 
 _CELL_KEYS: Final = {
     "lift_mm": "lift_mm",

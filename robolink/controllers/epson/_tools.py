@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from contextlib import suppress
 
+from robolink.controllers._clearing import clear_making_way, previewed
 from robolink.controllers._guarded import MarkerDesk, ProcedureLock
 from robolink.controllers._tool_writing import ToolWrite, ToolWriter
 from robolink.controllers.epson._answers import NOT_EXECUTED
@@ -102,22 +103,32 @@ class EpsonToolTable:
             return ()
         return executes([spel.set_tool(tool, requested, six_axes=six_axes)])
 
-    def preview_clear(self, tool: int) -> tuple[str, ...]:
+    def preview_clear(self, tool: int, *, then_select: int | None = None) -> tuple[str, ...]:
         """Return what :meth:`clear` would send besides its reads."""
         self.require_writable(tool)
-        return () if self.read(tool) is None else executes([spel.clear_tool(tool)])
+        requests = () if self.read(tool) is None else executes([spel.clear_tool(tool)])
+        return previewed(self, tool, requests, then_select)
 
     def preview_select(self, tool: int) -> tuple[str, ...]:
         """Return what :meth:`select` would send besides its reads."""
         self._require_defined(tool)
         return () if self.selected() == tool else executes([spel.select_tool(tool)])
 
-    def clear(self, tool: int, *, expected: Expected) -> ToolReceipt:
+    def clear(
+        self, tool: int, *, expected: Expected, then_select: int | None = None
+    ) -> ToolReceipt:
         """Clear and read back; see :class:`robolink.model.ToolTable`."""
         self.require_writable(tool)
         with self._lock.held(f"TLClr {tool}"):
             self._preferences.require_real(f"TLClr {tool}")
-            return self._set(tool, None, expected, spel.clear_tool(tool))
+            return clear_making_way(
+                self,
+                tool,
+                lambda: self._set(tool, None, expected, spel.clear_tool(tool)),
+                expected=expected,
+                then_select=then_select,
+                uninterrupted=self._window.uninterrupted,
+            )
 
     def selected(self) -> int:
         """Read which tool is in force; the selection survives power-off (epson.md 3.1)."""

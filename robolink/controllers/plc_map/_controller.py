@@ -61,6 +61,7 @@ class PlcMapController:
             register_map,
             self._desk,
             self._lock,
+            require_confirmed=self._require_confirmed,
             require_ready=self._require_ready,
         )
         self._resolver = RegisterResolver(
@@ -247,7 +248,20 @@ class PlcMapController:
 
     def _require_ready(self, request: str) -> None:
         """Refuse a write where the map is not known to be right, or the machine says no."""
+        self._require_confirmed(request)
         self.require_probe()
+        permit = self.register_map.permit
+        if permit is not None and not self._registers.is_on(permit):
+            raise NotReadyError(
+                tr("The machine does not permit changes now ({place}).", place=permit.place),
+                reason=NotReadyReason.NOT_REMOTE,
+                remedy=tr("Permit it at the machine, then try again; nothing was written."),
+                controller=self.identity,
+                request=request,
+            )
+
+    def _require_confirmed(self, request: str) -> None:
+        """Refuse a change by a map without a probe that nobody has compared; sends nothing."""
         if self.register_map.probe is None and not confirmation_of(
             self.identity, self.register_map
         ):
@@ -261,15 +275,6 @@ class PlcMapController:
                     "Run 'robolink plc check-map' with the same -c and compare with the HMI. A map "
                     "that was changed is confirmed anew. Nothing was written."
                 ),
-                controller=self.identity,
-                request=request,
-            )
-        permit = self.register_map.permit
-        if permit is not None and not self._registers.is_on(permit):
-            raise NotReadyError(
-                tr("The machine does not permit changes now ({place}).", place=permit.place),
-                reason=NotReadyReason.NOT_REMOTE,
-                remedy=tr("Permit it at the machine, then try again; nothing was written."),
                 controller=self.identity,
                 request=request,
             )

@@ -62,7 +62,11 @@ class FlangeReader:
         """
         raise no_motion(self._registers.identity)
 
-    move_until_input = requests_until = requests_for = require_able = terms = stop = move_to
+    def require_able(self, purpose: str) -> NoReturn:
+        """Refuse, as :meth:`move_to` does."""
+        self.move_to(purpose)
+
+    move_until_input = requests_until = requests_for = terms = stop = move_to
 
 
 def no_motion(identity: str) -> RejectedError:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 
+from robolink.controllers._clearing import clear_making_way, previewed
 from robolink.controllers._guarded import MarkerDesk, ProcedureLock
 from robolink.controllers._tool_writing import ToolWrite, ToolWriter
 from robolink.controllers.plc_map._commit import Handshake
@@ -29,6 +30,8 @@ class RegisterToolTable:
         register_map: Where everything stands.
         desk: Keeps the markers.
         lock: One procedure at a time.
+        require_confirmed: Refuses every change while nobody knows the map to be right; sends
+            nothing.
         require_ready: Refuses a write that the machine or the map does not allow.
     """
 
@@ -39,12 +42,14 @@ class RegisterToolTable:
         desk: MarkerDesk,
         lock: ProcedureLock,
         *,
+        require_confirmed: Callable[[str], None],
         require_ready: Callable[[str], None],
     ) -> None:
         self._registers = registers
         self._map = register_map
         self._desk = desk
         self._lock = lock
+        self._require_confirmed = require_confirmed
         self._require_ready = require_ready
         self._slots = Slots(registers, register_map)
         self._writer = ToolWriter(
@@ -72,9 +77,11 @@ class RegisterToolTable:
         """Refuse a tool number that cannot be written; sends nothing.
 
         Raises:
+            ConfigError: The map has no probe, and nobody has confirmed it.
             ReservedToolError, ToolIndexError: As :meth:`write` would.
             ToolError: The PLC's offsets can only be read.
         """
+        self._require_confirmed(tr("tool {tool}", tool=tool))
         if tool == 0:
             raise ReservedToolError(
                 tr("Tool 0 is the flange itself and is never written."),
@@ -111,10 +118,24 @@ class RegisterToolTable:
         self.require_writable(tool)
         return self._set(tool, self._slots.values.rounded(self._slot(tool), offset), expected)
 
-    def clear(self, tool: int, *, expected: Expected) -> ToolReceipt:
-        """Make a tool undefined, where the map says how; see :meth:`write`."""
+    def clear(
+        self, tool: int, *, expected: Expected, then_select: int | None = None
+    ) -> ToolReceipt:
+        """Make a tool undefined, where the map says how; see :meth:`write`.
+
+        Where the map does not tell which tool is in force, nobody can keep it from losing its
+        definition but who works at the machine.
+        """
         self.require_writable(tool)
-        return self._set(tool, None, expected)
+        return clear_making_way(
+            self,
+            tool,
+            lambda: self._set(tool, None, expected),
+            expected=expected,
+            then_select=then_select,
+            uninterrupted=lambda: self._registers.gate,
+            stays_selected=True,
+        )
 
     def preview_write(self, tool: int, offset: ToolOffset) -> tuple[str, ...]:
         """Return what :meth:`write` would send, in words; reads only.
@@ -124,10 +145,10 @@ class RegisterToolTable:
         self.require_writable(tool)
         return self._preview(tool, self._slots.values.rounded(self._slot(tool), offset))
 
-    def preview_clear(self, tool: int) -> tuple[str, ...]:
+    def preview_clear(self, tool: int, *, then_select: int | None = None) -> tuple[str, ...]:
         """Return what :meth:`clear` would send, in words."""
         self.require_writable(tool)
-        return self._preview(tool, None)
+        return previewed(self, tool, self._preview(tool, None), then_select)
 
     def preview_select(self, tool: int) -> tuple[str, ...]:
         """Refuse, as :meth:`select` does."""

@@ -65,7 +65,8 @@ class OffsetValues:
 
         Raises:
             ToolError: A component is not 0 that the PLC does not have.
-            LimitError: A component is too large for its registers.
+            LimitError: A component is too large for its registers, or the map would not believe
+                them when it reads them back.
         """
         words: Words = {}
         for name, value in zip(COMPONENTS, offset.components(), strict=True):
@@ -83,7 +84,35 @@ class OffsetValues:
                     remedy=tr("Leave it out; nothing was sent."),
                     controller=self._identity,
                 )
+        self._require_believable(slot, words)
         return words
+
+    def _require_believable(self, slot: Slot, words: Words) -> None:
+        """Refuse registers that the map would take for no tool, or for none that can be true."""
+        if not any(words.values()) and self._map.all_zero is not AllZero.TOOL:
+            raise LimitError(
+                tr(
+                    "All registers of tool {tool} would be zero. This map takes that for "
+                    "{meaning}, so it could not be read back; nothing was sent.",
+                    tool=slot.tool,
+                    meaning=tr("no tool")
+                    if self._map.all_zero is AllZero.UNDEFINED
+                    else tr("a lost link"),
+                ),
+                remedy=tr(
+                    "Where zeros are a tool of this machine, say so in the map: "
+                    'all_zero = "tool". To remove a tool: robolink tool clear.'
+                ),
+                controller=self._identity,
+            )
+        try:
+            self.numbers(slot.components, words, largest_mm=self._map.largest_mm)
+        except RemoteProtocolError as error:
+            raise LimitError(
+                tr("{cause} It would read so after the write; nothing was sent.", cause=error.what),
+                remedy=tr("Write 0 in place of so small a number."),
+                controller=self._identity,
+            ) from error
 
     def rounded(self, slot: Slot, offset: ToolOffset) -> ToolOffset:
         """Return the offset that the registers would hold; raises as :meth:`registers`."""

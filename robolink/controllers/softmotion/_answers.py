@@ -2,7 +2,12 @@
 
 from typing import Final, NamedTuple
 
-from robolink.errors import ControllerError, ControllerFaultError, RejectedError
+from robolink.errors import (
+    ControllerError,
+    ControllerFaultError,
+    HeartbeatLostError,
+    RejectedError,
+)
 from robolink.messages import tr
 from robolink.protocols.mailbox import (
     Command,
@@ -70,8 +75,11 @@ def cut_short(command: Command) -> ControllerFaultError:
 
 def ended_badly(request: str, now: Response, error_class: int) -> ControllerError:
     """Return the error for a movement that did not end as it should."""
+    kind: type[ControllerError]
     fault = error_class // 100 in _FAULTS or now.group_state == GroupState.ERRORSTOP
     kind = ControllerFaultError if fault else RejectedError
+    if error_class == ErrorClass.HEARTBEAT_LOST and now.group_state != GroupState.ERRORSTOP:
+        kind = HeartbeatLostError
     return kind(
         tr(
             "The PLC ended {request!r}: {meaning}.",
@@ -122,7 +130,8 @@ def _remedy(error_class: int) -> str:
             "The PLC's own kinematics must implement ISMKinematicsWithOrientationImage."
         ),
         ErrorClass.HEARTBEAT_LOST: tr(
-            "A movement goes on only while someone waits on it. Look at the network's delays."
+            "A movement goes on only while someone waits on it. This computer, or the network, "
+            "was too slow for half a second: close other programs, then start again."
         ),
     }
     return remedies.get(error_class) or tr("Read the status before you go on.")

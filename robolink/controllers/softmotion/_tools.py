@@ -7,6 +7,7 @@ and selecting one, or writing the selected one, calls SMC_GroupSetTool (design p
 from collections.abc import Sequence
 from dataclasses import replace
 
+from robolink.controllers._clearing import clear_making_way, previewed, require_way
 from robolink.controllers._tool_writing import ToolWrite
 from robolink.controllers.softmotion._answers import describe
 from robolink.controllers.softmotion._condition import require_enabled, require_still
@@ -15,7 +16,6 @@ from robolink.controllers.softmotion._tool_proof import GroupTool, WriteProof
 from robolink.errors import (
     ReadBackError,
     ReservedToolError,
-    ToolError,
     ToolIndexError,
     UndefinedToolError,
 )
@@ -97,10 +97,20 @@ class SoftMotionToolTable:
         self.require_writable(tool)
         return self._set(tool, offset, expected, self._write_draft(tool, offset))
 
-    def clear(self, tool: int, *, expected: Expected) -> ToolReceipt:
+    def clear(
+        self, tool: int, *, expected: Expected, then_select: int | None = None
+    ) -> ToolReceipt:
         """Empty a slot that is not selected; see :class:`robolink.model.ToolTable`."""
         self.require_writable(tool)
-        return self._set(tool, None, expected, _clear_draft(tool))
+        with self._mailbox.lock.held(describe(_clear_draft(tool))):
+            return clear_making_way(
+                self,
+                tool,
+                lambda: self._set(tool, None, expected, _clear_draft(tool)),
+                expected=expected,
+                then_select=then_select,
+                uninterrupted=self._mailbox.uninterrupted,
+            )
 
     def preview_write(self, tool: int, offset: ToolOffset) -> tuple[str, ...]:
         """Return what :meth:`write` would send, in words; reads only.
@@ -112,10 +122,11 @@ class SoftMotionToolTable:
             return ()
         return (describe(self._write_draft(tool, offset)),)
 
-    def preview_clear(self, tool: int) -> tuple[str, ...]:
+    def preview_clear(self, tool: int, *, then_select: int | None = None) -> tuple[str, ...]:
         """Return what :meth:`clear` would send, in words."""
         self.require_writable(tool)
-        return () if self.read(tool) is None else (describe(_clear_draft(tool)),)
+        requests = () if self.read(tool) is None else (describe(_clear_draft(tool)),)
+        return previewed(self, tool, requests, then_select)
 
     def preview_select(self, tool: int) -> tuple[str, ...]:
         """Return what :meth:`select` would send, in words."""
@@ -208,12 +219,7 @@ class SoftMotionToolTable:
     ) -> None:
         """Hold back what the PLC would refuse for the slot in force."""
         if requested is None:
-            raise ToolError(
-                tr("Tool {tool} is in force, so it cannot be cleared.", tool=tool),
-                remedy=tr("Select another tool first, or tool 0."),
-                controller=self._mailbox.identity,
-                request=request,
-            )
+            require_way(tool, None)
         require_enabled(now, controller=self._mailbox.identity, request=request)
 
     def _require_defined(self, tool: int) -> ToolOffset:

@@ -1,0 +1,90 @@
+"""Output to a reader who may leave: a closed pipe ends a command like Ctrl-C, and just once.
+
+Whoever reads may close the pipe (``robolink ... | head -1``), the window or the line to it, in
+the middle of a movement. The first write that fails ends the command in order
+(:func:`robolink.interrupts.output_closed`); from then on everything that is shown goes nowhere,
+so that the sentences of the cleaning up cannot break it off.
+"""
+
+import io
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from typing import TYPE_CHECKING
+
+from robolink.interrupts import Interrupted, output_closed
+
+if TYPE_CHECKING:
+    from _typeshed import ReadableBuffer
+
+
+class _Watched(io.FileIO):
+    """A file that ends the command when it cannot be written to."""
+
+    def write(self, data: "ReadableBuffer") -> int:
+        """Write, or end the command; then the rest goes nowhere.
+
+        Raises:
+            Interrupted: The reader has left.
+        """
+        try:
+            return super().write(data)
+        except OSError:
+            # EPIPE of a pipe, EIO of a terminal that hung up, ENOSPC of a file: in each case
+            # nobody will ever see it.
+            send_nowhere(self.fileno())
+            output_closed()
+            return memoryview(data).nbytes
+
+
+def send_nowhere(descriptor: int) -> None:
+    """Let everything that is written to a descriptor vanish from now on."""
+    with suppress(OSError):
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, descriptor)
+        os.close(nowhere)
+
+
+@contextmanager
+def watched_output() -> Iterator[None]:
+    """Watch stdout and stderr of this process, where they are real files, for the block."""
+    with ExitStack() as stack:
+        for name in ("stdout", "stderr"):
+            stack.enter_context(_watched(name))
+        yield
+
+
+@contextmanager
+def _watched(name: str) -> Iterator[None]:
+    before = getattr(sys, name)
+    if before is None:  # closed by whoever started us: Python has no stream then
+        with open(os.devnull, "w", encoding="ascii", errors="backslashreplace") as nowhere:
+            setattr(sys, name, nowhere)
+            yield
+            setattr(sys, name, None)
+        return
+    buffer = getattr(before, "buffer", None)
+    raw = getattr(buffer, "raw", buffer)  # the same where Python was told not to buffer
+    if type(before) is not io.TextIOWrapper or type(raw) is not io.FileIO:
+        yield  # a console of Windows, or a stream of whoever runs us inside a program
+        return
+    watched = _Watched(raw.fileno(), "wb", closefd=False)
+    with suppress(OSError):
+        before.flush()
+    stream = io.TextIOWrapper(
+        watched if buffer is raw else io.BufferedWriter(watched),
+        encoding=before.encoding,
+        errors="backslashreplace",
+        newline=None if os.name == "nt" else "\n",
+        line_buffering=before.line_buffering,
+        write_through=before.write_through,
+    )
+    setattr(sys, name, stream)
+    try:
+        yield
+    finally:
+        with suppress(Interrupted):
+            stream.flush()
+        setattr(sys, name, before)
+        stream.detach()

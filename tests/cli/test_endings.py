@@ -1,0 +1,194 @@
+"""What a command says that was ended, and with which exit code; the same for every way."""
+
+import io
+import json
+import os
+import signal
+import sys
+
+import pytest
+from robolink_cli import main
+from robolink_cli._context import open_controller
+from robolink_cli._output import watched_output
+
+from robolink.errors import OutcomeUnknownError
+from robolink.interrupts import EndedBy, Interrupted, InterruptGate, ended_by, one_ending
+from robolink.model import ToolOffset
+from robolink.transaction import ToolChange, Wanted, change_tools
+
+NEW = ToolOffset(1.5, 2.5, 3.5)
+
+CODES = {signal.SIGHUP: 129, signal.SIGINT: 130, signal.SIGTERM: 143}
+
+
+@pytest.fixture(params=CODES, ids=lambda number: number.name)
+def number(request):
+    return request.param
+
+
+def test_a_signal_becomes_one_interruption_and_a_second_one_is_not_heard(number):
+    before = [signal.getsignal(each) for each in CODES]
+    reached = []
+    with one_ending():
+        with pytest.raises(Interrupted) as raised:
+            signal.raise_signal(number)
+        assert raised.value.by == ended_by() == EndedBy(number.name)
+        for each in CODES:
+            signal.raise_signal(each)
+        reached.append("the end of the cleaning up")
+    assert reached
+    assert ended_by() is None
+    assert [signal.getsignal(each) for each in CODES] == before
+
+
+def test_it_is_held_back_inside_an_exchange(number):
+    gate, reached = InterruptGate(), []
+    with one_ending():
+        gate.open()
+        with pytest.raises(Interrupted), gate:
+            signal.raise_signal(number)
+            assert gate.interrupted
+            reached.append("the end of the exchange")
+        gate.close()
+    assert reached
+
+
+def test_without_a_command_around_it_a_session_leaves_sigterm_to_the_program():
+    gate = InterruptGate()
+    gate.open()
+    assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+    assert signal.getsignal(signal.SIGHUP) is signal.SIG_DFL
+    gate.close()
+
+
+def test_what_nohup_ignores_stays_ignored():
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with one_ending():
+            signal.raise_signal(signal.SIGHUP)
+        assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
+def test_a_process_that_ends_then_is_not_killed_by_a_late_signal():
+    before = {each: signal.getsignal(each) for each in CODES}
+    try:
+        with one_ending(last=True):
+            pass
+        for each in CODES:
+            signal.raise_signal(each)
+    finally:
+        for each, handler in before.items():
+            signal.signal(each, handler)
+
+
+@pytest.mark.parametrize("buffered", [True, False])
+def test_a_write_that_nobody_reads_ends_the_command_once(monkeypatch, buffered):
+    reader, writer = os.pipe()
+    os.close(reader)
+    raw = io.FileIO(writer, "wb")
+    stream = io.TextIOWrapper(io.BufferedWriter(raw) if buffered else raw, write_through=True)
+    monkeypatch.setattr(sys, "stdout", stream)
+    with one_ending(), watched_output():
+        with pytest.raises(Interrupted) as raised:
+            print("lost", flush=True)  # noqa: T201 - the stream is what is tested
+        assert raised.value.by is EndedBy.OUTPUT_CLOSED
+        print("the sentences of the cleaning up", flush=True)  # noqa: T201
+    assert sys.stdout is stream
+    stream.close()
+
+
+def test_output_that_was_closed_from_the_start_goes_nowhere(monkeypatch):
+    monkeypatch.setattr(sys, "stderr", None)
+    with watched_output():
+        print("to nobody", file=sys.stderr)  # noqa: T201
+    assert sys.stderr is None
+
+
+@pytest.fixture
+def ended(command, simulator, capsys):
+    """Run a command that does ``act`` on the controller."""
+
+    def run(act, *more):
+        def at_work(context):
+            with open_controller(context) as controller:
+                act(controller)
+
+        command(at_work)
+        code = main.run(["-c", simulator.url, "status", *more])
+        shown = capsys.readouterr()
+        return code, shown.out, shown.err
+
+    return run
+
+
+def test_the_last_line_says_what_stands_what_was_written_and_what_is_selected(ended, number):
+    code, out, err = ended(lambda _controller: signal.raise_signal(number))
+    assert (code, out) == (CODES[number], "")
+    assert err.splitlines()[-1] == "Nothing was moved. Nothing was written. Tool 1 is selected."
+
+
+def test_a_tool_that_was_written_before_is_named(ended):
+    def act(controller):
+        change_tools(controller, [Wanted(3, NEW, controller.tools.read(3))])
+        signal.raise_signal(signal.SIGTERM)
+
+    code, _, err = ended(act)
+    assert code == 143
+    assert err.splitlines()[-1] == (
+        "Nothing was moved. Tool 3 holds X 1.500 Y 2.500 Z 3.500 U 0.000 now; before it held "
+        "undefined. Tool 1 is selected."
+    )
+
+
+def test_a_tool_that_was_put_back_is_named(ended, simulator):
+    before = simulator.machine.tools.get(1)
+
+    def act(controller):
+        wanted = [Wanted(1, NEW, controller.tools.read(1))]
+        with ToolChange(controller, wanted, verify=True) as change:
+            change.write()
+            signal.raise_signal(signal.SIGHUP)
+
+    code, out, err = ended(act, "--json")
+    assert code == 129
+    assert err.splitlines()[-1].endswith(", as before. Tool 1 is selected.")
+    document = json.loads(out)
+    assert document["error"]["ended_by"] == "SIGHUP"
+    assert document["error"]["controller_state"] == "unchanged"
+    assert simulator.machine.tools.get(1) == before
+
+
+def test_a_doubtful_outcome_keeps_its_exit_code_and_names_what_ended_it(ended):
+    def act(_controller):
+        try:
+            signal.raise_signal(signal.SIGTERM)
+        finally:
+            raise OutcomeUnknownError("No end was seen.", remedy="Look at the robot.")
+
+    code, out, _ = ended(act, "--json")
+    document = json.loads(out)
+    assert code == document["exit_code"] == 6
+    assert document["error"]["ended_by"] == "SIGTERM"
+
+
+def test_a_write_that_stays_unsettled_is_6_though_a_signal_ended_it(ended, simulator):
+    def act(controller):
+        wanted = [Wanted(1, NEW, controller.tools.read(1))]
+        with ToolChange(controller, wanted, verify=True) as change:
+            change.write()
+            simulator.panel.press_estop()
+            signal.raise_signal(signal.SIGTERM)
+
+    code, out, err = ended(act, "--json")
+    assert code == 6
+    assert json.loads(out)["error"]["ended_by"] == "SIGTERM"
+    assert err.splitlines()[-1].endswith("Next: robolink recover.")
+
+
+def test_a_list_that_is_cut_off_by_its_reader_is_no_news_to_him(ended):
+    def act(_controller):
+        raise Interrupted(EndedBy.OUTPUT_CLOSED)
+
+    assert ended(act) == (141, "", "")

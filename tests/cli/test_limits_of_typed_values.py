@@ -1,0 +1,179 @@
+"""tool set and tool clear obey the cell: how far a tip may be taken, and by whom."""
+
+import json
+
+import pytest
+from robolink_cli import _consent, _jumps, _operator, main
+
+from robolink.model import ToolOffset
+from robolink.transaction import Jump
+
+CELL = """
+[cells.a]
+url = "{url}"
+{limits}
+[cells.a.people]
+anna = "operator"
+eva = "engineer"
+"""
+
+STORED = ToolOffset(12.0, -3.5, -20.0)
+SIGN_ERROR = ("tool", "set", "1", "--x", "-12")
+
+
+@pytest.fixture
+def tools(simulator):
+    simulator.machine.tools.set(1, STORED)
+    simulator.machine.tools.set(2, STORED)
+    return simulator.machine.tools
+
+
+@pytest.fixture
+def cell(simulator, tools, tmp_path, monkeypatch, capsys):
+    """Run a command on the cell as somebody; return the exit code, the document and stderr."""
+
+    def run(who, *words, limits="max_change_mm = 1.5\nmax_change_deg = 5"):
+        path = tmp_path / "robolink.toml"
+        path.write_text(CELL.format(url=simulator.url, limits=limits))
+        monkeypatch.setenv("ROBOLINK_CONFIG", str(path))
+        code = main.run(["-c", "a", "--operator", who, *words])
+        shown = capsys.readouterr()
+        return code, shown.out, shown.err
+
+    return run
+
+
+class Person:
+    def __init__(self, answer):
+        self.answer, self.questions = answer, []
+
+    def ask(self, question, kind):
+        self.questions.append(question)
+
+    def tell(self, text):
+        pass
+
+    def poll(self, wait_s):
+        return self.answer
+
+
+@pytest.fixture
+def person(monkeypatch, request):
+    person = Person(request.param)
+    for module in (_consent, _jumps):
+        monkeypatch.setattr(module, "on_terminal", lambda: True)
+    monkeypatch.setattr(_operator, "terminal", lambda: person)
+    return person
+
+
+def test_an_operator_may_not_write_a_sign_error_and_is_told_the_figure(cell, tools):
+    for more in ((), ("--yes",), ("--accept-jump", "30")):
+        code, _, err = cell("anna", *SIGN_ERROR, *more)
+        assert code == 9, err
+        assert "anna may not let tool 1 jump by 24.000 mm" in err
+        assert "it takes an engineer" in err
+    assert tools.get(1) == STORED
+
+
+def test_off_a_terminal_an_engineer_says_beforehand_how_far(cell, tools):
+    for more in ((), ("--yes",), ("--accept-jump", "23.9")):
+        code, _, err = cell("eva", *SIGN_ERROR, *more)
+        assert code == 9, err
+        assert "The tip of tool 1 would move by 24.000 mm; this cell allows 1.500 mm." in err
+        assert "--accept-jump" in err
+    assert tools.get(1) == STORED
+    code, out, err = cell("eva", *SIGN_ERROR, "--accept-jump", "24.1", "--json")
+    assert code == 0, err
+    assert json.loads(out)["read_back"]["x_mm"] == -12.0
+
+
+@pytest.mark.parametrize("person", ["y"], indirect=True)
+def test_on_a_terminal_an_engineer_is_asked_with_the_figure_whatever_yes_says(cell, tools, person):
+    code, _, err = cell("eva", *SIGN_ERROR, "--yes")
+    assert code == 0, err
+    (question,) = person.questions
+    assert "would move by 24.000 mm; this cell allows 1.500 mm" in question
+    assert tools.get(1) == ToolOffset(-12.0, -3.5, -20.0)
+
+
+@pytest.mark.parametrize("person", ["n"], indirect=True)
+def test_a_no_writes_nothing_and_an_operator_is_not_even_asked(cell, tools, person):
+    assert cell("eva", *SIGN_ERROR)[0] == 9
+    assert len(person.questions) == 1
+    assert cell("anna", *SIGN_ERROR)[0] == 9
+    assert len(person.questions) == 1
+    assert tools.get(1) == STORED
+
+
+def test_a_turn_has_a_limit_of_its_own(cell, tools):
+    code, _, err = cell("eva", "tool", "set", "1", "--u", "6")
+    assert code == 9
+    assert "Tool 1 would turn by 6.000 degrees; this cell allows 5.000." in err
+    assert cell("eva", "tool", "set", "1", "--u", "6", "--accept-turn", "7")[0] == 0
+    assert tools.get(1).u_deg == 6.0
+
+
+def test_what_the_cell_allows_anybody_writes(cell, tools):
+    assert cell("anna", "tool", "set", "1", "--x", "13.4", "--u", "4")[0] == 0
+    assert tools.get(1).x_mm == 13.4
+    # 2 mm where the cell says nothing, and a tool that has no value yet may get any.
+    assert cell("anna", "tool", "set", "2", "--x", "13.9", limits="")[0] == 0
+    assert cell("anna", "tool", "set", "2", "--x", "16.1", limits="")[0] == 9
+    assert cell("anna", "tool", "set", "3", "--x", "100")[0] == 0
+
+
+def test_a_url_alone_has_no_limits(run, tools):
+    assert run(*SIGN_ERROR)[0] == 0
+
+
+def test_a_clear_takes_an_engineer(cell, tools):
+    code, _, err = cell("anna", "tool", "clear", "2")
+    assert code == 9
+    assert "anna may not clear tool 2: it takes an engineer." in err
+    assert tools.get(2) == STORED
+    assert cell("eva", "tool", "clear", "2")[0] == 0
+    assert tools.get(2) is None
+
+
+def test_the_selected_tool_is_cleared_only_for_another_one(run, tools):
+    for words in (("tool", "clear", "1"), ("tool", "clear", "1", "--dry-run")):
+        code, _, err = run(*words)
+        assert code == 5
+        assert "Tool 1 is selected, so it was not cleared." in err
+        assert "--then-select NUMBER" in err
+    code, out, _ = run("tool", "clear", "1", "--then-select", "2", "--dry-run")
+    assert code == 0
+    assert [line for line in out.splitlines() if line.startswith("$")] == [
+        '$Execute,"Tool 2"',
+        '$Execute,"TLClr 1"',
+    ]
+    assert (tools.get(1), tools.selected) == (STORED, 1)
+    code, out, _ = run("tool", "clear", "1", "--then-select", "2", "--json")
+    assert (code, json.loads(out)["selected_tool"]) == (0, 2)
+    assert (tools.get(1), tools.selected) == (None, 2)
+
+
+def test_an_undo_to_undefined_wants_to_know_too(run, tools):
+    assert run("tool", "set", "5", "--x", "1")[0] == 0
+    assert run("tool", "select", "5")[0] == 0
+    code, _, err = run("undo", "--tool", "5", "--yes")
+    assert code == 5
+    assert "Tool 5 is selected, so it was not cleared." in err
+    assert run("undo", "--tool", "5", "--yes", "--then-select", "2")[0] == 0
+    assert (tools.get(5), tools.selected) == (None, 2)
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "angle_deg"),
+    [
+        (ToolOffset(u_deg=170), ToolOffset(u_deg=-170), 20.0),
+        (ToolOffset(v_deg=30), ToolOffset(v_deg=-30), 60.0),
+        (ToolOffset(w_deg=90), ToolOffset(w_deg=270), 180.0),
+        (ToolOffset(u_deg=1e-4), ToolOffset(), 1e-4),
+        # At V = 90 a turn about Z is one about X: the same orientation in other figures.
+        (ToolOffset(u_deg=40, v_deg=90), ToolOffset(v_deg=90, w_deg=-40), 0.0),
+    ],
+)
+def test_how_far_two_orientations_are_apart(a, b, angle_deg):
+    assert Jump.between(a, b).angle_deg == pytest.approx(angle_deg, rel=1e-6, abs=1e-9)
+    assert Jump.between(b, a).angle_deg == pytest.approx(angle_deg, rel=1e-6, abs=1e-9)

@@ -196,7 +196,7 @@ def test_what_was_left_unfinished_is_resolved_by_the_cell_s_name(cell, simulator
     assert main.run(["-c", "a", "status"]) == 0
     log = memory_journal(URL).log(URL)
     log.begin(Marker("a", MarkerKind.SET, "TLSet 3, XY(1,2,3,0)", "2026-01-01T00:00:00+00:00"))
-    log.close()  # nobody is at work any more
+    log.close()
     try:
         assert main.run(["-c", "a", "status"]) == 0
         assert "robolink -c a recover" in capsys.readouterr().err

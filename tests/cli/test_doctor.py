@@ -232,7 +232,7 @@ def test_unsettled_work_on_any_controller_is_listed(capsys):
     for number in (1, 2):
         log = open_journal().log(f"epson+tcp://192.0.2.{number}:5000")
         log.begin(Marker("a", MarkerKind.SET, "TLSet 3", "2026-01-01T00:00:00+00:00"))
-        log.close()  # nobody is at work any more
+        log.close()
     assert main.run(["doctor", "--json"]) == 0
     checks = json.loads(capsys.readouterr().out)["checks"]
     found = [check["remedy"] for check in checks if check["subject"] == "unsettled"]

@@ -10,6 +10,7 @@ import click
 
 import robolink
 from robolink.errors import ConfigError, RobolinkError
+from robolink.interrupts import EndedBy, ended_by
 from robolink.messages import tr
 from robolink.standing import UNTOUCHED, Standing, note_standing, standing_after
 from robolink_cli._cell import (
@@ -279,6 +280,7 @@ def _saying_what_is_left(
         # The last line says which tool is selected: as it is now, not as it was once.
         with suppress(RobolinkError):
             controller.tools.selected()
+        _record_for_nobody(controller)
         raise
     finally:
         left = _open_markers(controller, lenient=lenient)
@@ -287,6 +289,19 @@ def _saying_what_is_left(
         if trouble is not None:
             # After the work: nothing that the journal has to say stands before it.
             note(f"{trouble.what} {_unrecorded()}")
+
+
+def _record_for_nobody(controller: "Controller") -> None:
+    """Put what stands on record where a command was ended because nobody reads it any more."""
+    from robolink.model import EntryKind, NewEntry, describe_standing
+
+    by, standing = ended_by(), controller.ledger.standing()
+    if by not in (EndedBy.HUNG_UP, EndedBy.OUTPUT_CLOSED) or standing.untouched:
+        return
+    details = {"ended_by": str(by)}
+    entry = NewEntry(EntryKind.DECISION, verdict=describe_standing(standing), details=details)
+    with suppress(ConfigError):  # what cannot be recorded is said, and is no other end
+        controller.outcomes.append(entry)
 
 
 @contextmanager

@@ -106,7 +106,10 @@ class Controller(Protocol):
 
     @property
     def identity(self) -> str:
-        """Which controller this is, without options or passwords."""
+        """How it is reached: the URL, without passwords and without options that name nothing.
+
+        Who it is, whatever the URL, is ``outcomes.identity``.
+        """
 
     @property
     def clock(self) -> Clock:

@@ -216,7 +216,7 @@ def test_a_selection_that_was_not_answered_leaves_two_tools_to_be_named(capsys):
     assert "Tool 3 or 0 is selected now; it was tool 3 before." in capsys.readouterr().err
 
 
-def test_resolve_is_not_told_to_resolve(command, capsys, monkeypatch):
+def test_recover_is_not_told_to_recover(command, capsys, monkeypatch):
     def act(context):
         with open_controller(context, quiet=True):
             pass

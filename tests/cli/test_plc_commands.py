@@ -18,6 +18,7 @@ from robolink_simulators.softmotion.mailbox import (
 )
 
 import robolink
+from robolink.controllers.softmotion import SoftMotionController
 from robolink.errors import RobolinkError
 from robolink.journal import memory_journal, open_journal
 from robolink.model import ANY, EntryKind, ToolOffset
@@ -129,11 +130,17 @@ def test_what_is_for_epson_controllers_only_is_refused_of_a_plc(shown, serve, tm
     assert (code, "plc check-map" in err) == (2, True)
 
 
+def another_client(url):
+    controller = robolink.connect(url, outcomes=memory_journal("other").log(url))
+    assert isinstance(controller, SoftMotionController)
+    return controller
+
+
 @pytest.fixture
 def held(serve):
     """Serve a PLC whose mailbox another client holds."""
     url, simulator = serve()
-    with robolink.connect(url, outcomes=memory_journal("other").log(url)) as other:
+    with another_client(url) as other:
         other.take()
         yield url, simulator, other
 
@@ -164,7 +171,7 @@ def test_that_a_person_insisted_is_on_record(shown, tmp_path):
     name = f"plc-commands-{next(_names)}"
     url = plc_in_process.register(name, simulator)
     try:
-        with robolink.connect(url, outcomes=memory_journal("other").log(url)) as other:
+        with another_client(url) as other:
             other.take()
             assert shown("-c", url, "take-ownership", "--yes", "--operator", "Kim")[0] == 0
     finally:

@@ -225,7 +225,7 @@ def test_nobody_there_is_told_and_leaves_no_note(state_folder, capsys):
 
 def test_a_note_holds_the_next_movement_until_somebody_releases_it(moving, stop, capsys):
     assert stop("-c", moving.url, "--operator", "anna")[0] == 0
-    assert main.run(["-c", moving.url, "resolve", "--yes"]) == 0
+    assert main.run(["-c", moving.url, "recover", "--yes"]) == 0
     localhost = moving.url.replace("127.0.0.1", "localhost")
     jog = ["jog", "x+1", "--yes", "-c"]
     started = moving.machine.arm.moves_started
@@ -285,7 +285,7 @@ def test_a_note_that_cannot_be_read_is_a_note(moving, stop, state_folder, capsys
     assert stop()[0] == 0
     (note,) = (state_folder / "stops").iterdir()
     note.write_bytes(b"{")
-    assert main.run(["-c", moving.url, "resolve", "--yes"]) == 0
+    assert main.run(["-c", moving.url, "recover", "--yes"]) == 0
     assert main.run(["jog", "x+1", "--yes", "-c", moving.url]) == 10
     assert "cannot be read" in capsys.readouterr().err
 

@@ -389,7 +389,7 @@ def test_an_emergency_stop_during_a_recipe_repeats_nothing(cell, nth):
     cell.simulator.panel.release_estop()
     assert cell.run("reset").code == 0
     assert cell.run("recover").code in (0, 6)
-    assert cell.run("resolve", "--yes").code == 0
+    assert cell.run("recover", "--yes").code == 0
     assert cell.tool_1 == OLD_TIP
     cell.check_settings_are_those_of_before()
 

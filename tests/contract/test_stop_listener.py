@@ -35,7 +35,7 @@ def holder_of(controller):
 
 
 def test_who_asks_is_named_and_the_latch_is_closed(controller):
-    heard = []
+    heard: list[str] = []
     with StopListener(controller, url_of(controller), who="line 3", heard=heard.append):
         holder = holder_of(controller)
         assert holder.who == "line 3"

@@ -22,7 +22,7 @@ def drawn():
 
 
 def test_every_class_is_drawn_under_its_parent():
-    there = {
+    there: dict[str, str | None] = {
         name: kind.__bases__[0].__name__
         for name, kind in vars(errors).items()
         if isinstance(kind, type) and issubclass(kind, errors.RobolinkError)

@@ -89,7 +89,7 @@ def test_a_pin_that_is_not_reached_is_refused(cell):
     x_mm, y_mm, z_mm = cell.simulator.world.pin_mm
     cell.simulator.world.pin_mm = (x_mm, y_mm, z_mm - 100)
     said: list[str] = []
-    with pytest.raises(DeclinedError, match="ended by the operator"):
+    with pytest.raises(DeclinedError, match="jogs in a row were refused"):
         cell.change(operator=GivesUp(cell.look, said.append))
     assert any("box" in sentence for sentence in said), said
     cell.check_the_tool_is(STORED, writes=0)

@@ -253,6 +253,7 @@ def test_a_movement_without_an_answer_is_unknown_and_blocks_the_next(cell, plc, 
     later = cell.connect()
     with pytest.raises(OutcomeUnknownError, match="not settled"):
         move(later.groups[0])
+    plc.clock.sleep(1.0)  # what may be under way is not looked into before it stands
     (marker,) = cell.outcomes.open_markers()
     finding = later.resolver.examine(marker)
     assert finding.verdict is Verdict.LOOK

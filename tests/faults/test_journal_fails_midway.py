@@ -72,7 +72,8 @@ def check(cell, failing, number):
 
 @pytest.mark.parametrize("number", [1, 4, 17, 18, 28, 30, 37, 38, 55])
 def test_what_was_in_force_is_put_back_without_a_record(cell, number):
-    check(*cell, number)
+    served, failing = cell
+    check(served, failing, number)
 
 
 @pytest.mark.soak

@@ -239,7 +239,13 @@ class BusyError(ControllerError):
 
 
 class LeaseHeldError(BusyError):
-    """Another program or person is changing the controller. Nothing was sent."""
+    """Another program or person is changing the controller. Nothing was sent.
+
+    Attributes:
+        holder: Who, in the controller's own words; empty where it has none.
+    """
+
+    holder: str = ""
 
 
 class LeaseLostError(BusyError):

@@ -10,6 +10,7 @@ import click
 
 import robolink
 from robolink.errors import ConfigError, RobolinkError
+from robolink.interrupts import EndedBy, ended_by
 from robolink.messages import tr
 from robolink.standing import UNTOUCHED, Standing, note_standing, standing_after
 from robolink_cli._cell import (
@@ -29,7 +30,7 @@ from robolink_cli._stop_request import StopRequest
 from robolink_cli._stopping_beside import listening_for_stop, remember_address
 
 if TYPE_CHECKING:
-    from robolink.config import Cell
+    from robolink.config import Cell, Reach
     from robolink.model import Controller, Marker, Secret
 
 WATCHED = "robolink.watched"
@@ -57,6 +58,7 @@ class CliContext(NamedTuple):
         lot: Its lot.
         station: Name of the station where it is measured.
         doubt: What is wrong with the cell files, when they were not needed so far.
+        reach: How the cell is reached all the same.
     """
 
     url: str | None = None
@@ -70,6 +72,7 @@ class CliContext(NamedTuple):
     lot: str = ""
     station: str = ""
     doubt: ConfigError | None = None
+    reach: "Reach | None" = None
 
     def with_nozzle(self, nozzle: str | None, lot: str | None) -> "CliContext":
         """Return the same with what is mounted, for the record."""
@@ -160,6 +163,20 @@ def calming_options(command: Callable[..., int | None]) -> Callable[..., int | N
     def with_context(*args: object, **kwargs: object) -> int | None:
         given = click.get_current_context().meta.get(GIVEN, {})
         return command(_calming_context_from(given), *args, **kwargs)
+
+    return shared_options(with_context)
+
+
+def looking_options(command: Callable[..., int | None]) -> Callable[..., int | None]:
+    """As :func:`calming_options`, for a command that only looks.
+
+    Cell files that were right at the last connection, and are the same, are not checked anew.
+    """
+
+    @wraps(command)
+    def with_context(*args: object, **kwargs: object) -> int | None:
+        given = click.get_current_context().meta.get(GIVEN, {})
+        return command(_looking_context_from(given), *args, **kwargs)
 
     return shared_options(with_context)
 
@@ -263,6 +280,7 @@ def _saying_what_is_left(
         # The last line says which tool is selected: as it is now, not as it was once.
         with suppress(RobolinkError):
             controller.tools.selected()
+        _record_for_nobody(controller)
         raise
     finally:
         left = _open_markers(controller, lenient=lenient)
@@ -271,6 +289,19 @@ def _saying_what_is_left(
         if trouble is not None:
             # After the work: nothing that the journal has to say stands before it.
             note(f"{trouble.what} {_unrecorded()}")
+
+
+def _record_for_nobody(controller: "Controller") -> None:
+    """Put what stands on record where a command was ended because nobody reads it any more."""
+    from robolink.model import EntryKind, NewEntry, describe_standing
+
+    by, standing = ended_by(), controller.ledger.standing()
+    if by not in (EndedBy.HUNG_UP, EndedBy.OUTPUT_CLOSED) or standing.untouched:
+        return
+    details = {"ended_by": str(by)}
+    entry = NewEntry(EntryKind.DECISION, verdict=describe_standing(standing), details=details)
+    with suppress(ConfigError):  # what cannot be recorded is said, and is no other end
+        controller.outcomes.append(entry)
 
 
 @contextmanager
@@ -302,7 +333,7 @@ def password_of(context: CliContext) -> "Secret | None":
     from robolink.transport import parse_url
     from robolink_cli._password import find_password
 
-    settings = context.cell.settings if context.cell else None
+    settings = context.cell.settings if context.cell else context.reach
     return find_password(
         parse_url(context.require_url()).identity,
         password_file=context.password_file,
@@ -330,6 +361,19 @@ def _context_from(given: Mapping[str, Any]) -> CliContext:
     return CliContext(**{**link_options(cell), **given, "url": cell.url, "cell": cell})
 
 
+def _looking_context_from(given: Mapping[str, Any]) -> CliContext:
+    name = given.get("url")
+    if name is None or not is_cell_name(name):
+        return _context_from(given)
+    from robolink.config import glance_at_cell
+
+    reach = glance_at_cell(name)
+    if reach is None:
+        return _calming_context_from(given)
+    said = {"timeout_s": reach.timeout_s} if reach.timeout_s else {}
+    return CliContext(**{**said, **given, "url": reach.url, "reach": reach})
+
+
 def _calming_context_from(given: Mapping[str, Any]) -> CliContext:
     try:
         return _context_from(given)
@@ -344,10 +388,7 @@ def _calming_context_from(given: Mapping[str, Any]) -> CliContext:
         except ConfigError:
             raise error from None
         note(reach.doubt or error.what)
-        password_file = given.get("password_file") or reach.password_file or None
-        return CliContext(
-            **{**given, "url": reach.url, "password_file": password_file, "doubt": error}
-        )
+        return CliContext(**{**given, "url": reach.url, "doubt": error, "reach": reach})
 
 
 def _unrecorded() -> str:

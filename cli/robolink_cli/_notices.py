@@ -86,8 +86,8 @@ def _record_missing(marker: "Marker", url: str) -> str:
     if before and before != journal:
         said += " " + tr("Its record was kept in {before}.", before=before)
     remedy = tr(
-        "Look at the selected tool and at the tools first. 'robolink -c {url} recover' asks you, "
-        "and begins a new record.",
+        "Look at the selected tool and at the tools first. 'robolink -c {url} recover' begins a "
+        "new record on your word.",
         url=url,
     )
     return f"{said}\n  {remedy}"

@@ -83,7 +83,8 @@ def who_asks(request: StopRequest) -> str:
 
 
 def _stop(request: StopRequest, outcome: StopOutcome) -> None:
-    password_file, password_env = request.password_file, ""
+    password_file = request.password_file or os.environ.get("ROBOLINK_PASSWORD_FILE", "")
+    password_env = ""
     if not request.named:
         raise ConfigError(
             tr("No controller is named."),
@@ -98,9 +99,7 @@ def _stop(request: StopRequest, outcome: StopOutcome) -> None:
 
         reach = reach_cell(request.named)
         outcome.url, password_env = reach.url, reach.password_env
-        password_file = (
-            password_file or os.environ.get("ROBOLINK_PASSWORD_FILE", "") or reach.password_file
-        )
+        password_file = password_file or reach.password_file
         outcome.doubts += [reach.doubt] if reach.doubt else []
     outcome.keys = far_end_of(outcome.url)
     if _SEVERAL_CLIENTS in outcome.url:

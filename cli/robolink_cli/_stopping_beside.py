@@ -45,13 +45,20 @@ def remember_address(context: "CliContext") -> None:
     """Keep how the cell was reached, for a stop on the day when its file cannot be read."""
     if context.cell is None or "+sim://" in context.cell.url:
         return
-    from robolink.config import Reach, remember_reach
+    from robolink.config import Reach, proof_of_files, remember_reach
 
     settings = context.cell.settings
     remember_reach(
         context.cell.name,
         context.cell.origins["url"],
-        Reach(context.cell.url, settings.password_file or "", settings.password_env or ""),
+        Reach(
+            context.cell.url,
+            password_file=settings.password_file or "",
+            password_env=settings.password_env or "",
+            timeout_s=settings.timeout_s or 0.0,
+            # A look at a cell that names its robot, or people, needs the whole of its file.
+            proof="" if settings.robot or settings.people else proof_of_files(),
+        ),
     )
 
 

@@ -60,12 +60,19 @@ def _show_preferences(told: object) -> None:
 
 
 def show_pose(payload: Mapping[str, object]) -> None:
-    """Print a pose and the joints."""
-    title = tr("tool {tool} in local {local}, hand {hand}", **payload)
+    """Print a pose and the joints; what this kind of controller has not is not spoken of."""
+    if payload["tool"] is None:
+        title = tr("tool not told by this controller")
+    elif payload["hand"] is None:
+        title = tr("tool {tool}", tool=payload["tool"])
+    else:
+        title = tr("tool {tool} in local {local}, hand {hand}", **payload)
     table(title, AXES, [offset_cells(payload)])
-    joints = payload.get("joints")
+    joints, axes = payload.get("joints"), payload.get("axes")
     if isinstance(joints, Sequence):
         say(tr("  joints: {joints}", joints="  ".join(number(j) for j in joints)))
+    if isinstance(axes, Sequence):
+        say(tr("  axes: {axes}", axes="  ".join(number(axis) for axis in axes)))
 
 
 def show_tools(tools: Mapping[str, Mapping[str, object] | None], selected: int | None) -> None:

@@ -40,6 +40,10 @@ COMMANDS: Final = {
     "motors": ("robolink_cli.operate:motors", tr("Switch the motors on or off.")),
     "enable": ("robolink_cli.operate:enable", tr("Enable the axis group of a PLC.")),
     "disable": ("robolink_cli.operate:disable", tr("Disable the axis group of a PLC.")),
+    "take-ownership": (
+        "robolink_cli.take_ownership:take_ownership",
+        tr("Take a PLC's mailbox from another client, because a person insists."),
+    ),
     "recover": (
         "robolink_cli.recover:recover",
         tr("Settle what was begun and not proved finished."),

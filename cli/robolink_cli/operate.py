@@ -18,6 +18,7 @@ from robolink_cli._context import (
     calming_options,
     controller_options,
     emit,
+    looking_options,
     open_controller,
     show_requests,
     stop_request,
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@calming_options
+@looking_options
 def status(context: CliContext) -> None:
     """Show what the controller is doing. Reads only; legal while production runs."""
     from robolink_cli._selected_tool import note_doubts
@@ -46,7 +47,7 @@ def status(context: CliContext) -> None:
 
 
 @click.command()
-@calming_options
+@looking_options
 def where(context: CliContext) -> None:
     """Show where the tool in force is (measured), and the joints."""
     from robolink_cli._tables import show_pose

@@ -9,7 +9,7 @@ from robolink_cli._check_map import check_map
 from robolink_cli._context import json_option
 from robolink_cli._render import emit_json, json_is_on, say
 
-_LAST_BASE = 64884  # the response block and fifteen slots end at register 65535
+_LAST_BASE = 64880  # the response block, fifteen slots and the device block end at register 65535
 
 
 @click.group()

@@ -144,6 +144,7 @@ def set_tool(
             requests = controller.tools.preview_write(number, wanted)
             context.show_requests(requests)
             return
+        controller.tools.selected()  # read now: the last line of a failure names it
         if not context.json:
             show_change(number, *shown, after_name=tr("new"))
         # An undefined tool has no place from which its tip could jump.

@@ -36,11 +36,22 @@ def verify_controller(
     """Find out what this controller does where documents are unsure.
 
     Reads only: nothing moves, nothing is written, and no statement is run that could leave
-    an error. While production runs only queries are sent, and less is found out.
+    an error. While production runs only queries are sent, and less is found out. Of a PLC it
+    shows what its mailbox says of itself, and whether that is right.
     """
     from robolink.controllers.epson.verify import verify_epson
+    from robolink.transport import parse_url
 
     url = context.require_url()
+    kind = parse_url(url).kind
+    if kind != "epson":
+        if profile is not None or transcript is not None or redact:
+            raise ConfigError(
+                tr("A profile and a transcript are made of EPSON controllers only."),
+                remedy=tr("Leave --profile, --transcript and --redact out."),
+            )
+        _verify_plc(context, url, kind)
+        return
     with recording(context.record, url.partition("?")[0]) as trace:
         found = verify_epson(
             url, password=password_of(context), timeout_s=context.timeout_s, trace=trace
@@ -60,6 +71,44 @@ def verify_controller(
     for path in (profile, transcript):
         if path is not None:
             context.note(tr("Written: {path}", path=path))
+
+
+def _verify_plc(context: CliContext, url: str, kind: str) -> None:
+    """Look at what a mailbox shows of itself; a map has a check of its own."""
+    import robolink
+    from robolink.controllers.softmotion import SoftMotionController
+    from robolink.journal import memory_journal
+
+    if kind != "softmotion":
+        raise ConfigError(
+            tr("There is nothing to find out about a PLC with registers of its own."),
+            remedy=tr("Compare its map instead: robolink -c {url} plc check-map", url=url),
+        )
+    # Nothing is written, so nothing is recorded.
+    log = memory_journal(url).log(url)
+    with robolink.connect(url, timeout_s=context.timeout_s, outcomes=log) as controller:
+        assert isinstance(controller, SoftMotionController)  # noqa: S101 - of that kind
+        found, name = controller.verify(), controller.identity
+    payload: dict[str, object] = {
+        "controller": name,
+        "findings": [
+            {"name": one.name, "finding": one.finding, "right": one.right, "remedy": one.remedy}
+            for one in found
+        ],
+    }
+
+    def show() -> None:
+        table(
+            tr("the mailbox of {controller}", controller=name),
+            (tr("what"), tr("found"), tr("right")),
+            [(one.name, one.finding, tr("yes") if one.right else tr("NO")) for one in found],
+        )
+        for one in found:
+            if not one.right:
+                say(tr("{name}: {remedy}", name=one.name, remedy=one.remedy))
+        say(tr("Nothing was written, and nothing moved."))
+
+    context.emit("mailbox-verification", payload, show)
 
 
 def _said(found: "Verification", *, redact: bool) -> str:

@@ -16,6 +16,7 @@ from robolink.transport import (
     TracingTransport,
     Transport,
     open_mailbox_link,
+    open_quick_link,
     open_transport,
     parse_url,
 )
@@ -121,7 +122,8 @@ def _connect_softmotion(
         )
     from robolink.controllers.softmotion import open_softmotion
 
-    link = open_mailbox_link(url, timeout_s=timeout_s, clock=clock)
+    opener = open_quick_link if record.glance else open_mailbox_link
+    link = opener(url, timeout_s=timeout_s, clock=clock)
     kept = outcomes or record.of(link)
     return open_softmotion(link, outcomes=kept, timeout_s=timeout_s)
 
@@ -152,14 +154,17 @@ def _connect_plc(
 class _Record:
     """Opens the record of a controller.
 
+    Attributes:
+        glance: Whether it is for a look only.
+
     Args:
         signature: Who works here.
-        glance: Whether it is for a look only.
+        glance: See above.
     """
 
     def __init__(self, signature: Signature, *, glance: bool) -> None:
         self._signature = signature
-        self._glance = glance
+        self.glance = glance
 
     def of(self, link: Transport | MailboxLink) -> OutcomeLog:
         """Return the record of what a link leads to; the link is closed when that fails."""
@@ -171,6 +176,6 @@ class _Record:
 
     def at(self, address: str, *, durable: bool) -> OutcomeLog:
         """Return the record of what is reached at an address."""
-        if self._glance and durable:
+        if self.glance and durable:
             return GlancingLog(address, signature=self._signature)
         return open_log(address, durable=durable, signature=self._signature)

@@ -140,9 +140,9 @@ def _stop_group(link: LinkUrl, means: _Means) -> "ControllerStatus":
     from robolink.controllers.softmotion._snapshots import Snapshots
     from robolink.controllers.softmotion._stopping import bring_group_to_rest
     from robolink.controllers.softmotion._wire import MailboxWire
-    from robolink.transport import open_stop_link
+    from robolink.transport import open_quick_link
 
-    mailbox = open_stop_link(link, timeout_s=means.timeout_s, clock=means.clock)
+    mailbox = open_quick_link(link, timeout_s=means.timeout_s, clock=means.clock)
     owner = int.from_bytes(os.urandom(4)) or 1  # a token that nobody else has
     wire = MailboxWire(mailbox, owner=owner, timeout_s=means.timeout_s)
     try:

@@ -1,5 +1,6 @@
 """One run of a recipe: preflight, then the nozzle change with all that the recipe adds."""
 
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 
@@ -158,14 +159,26 @@ class RecipeRun:
         try:
             return change.run(write=not self.takes_reference)
         except RobolinkError as error:
-            error.remedy = f"{error.remedy} {_switched(listener)}".strip()
+            error.remedy = f"{error.remedy} {self._outputs_left(listener)}".strip()
             raise
         except KeyboardInterrupt:
-            if listener.switched:
-                self._operator.tell(_switched(listener))
+            if said := self._outputs_left(listener):
+                self._operator.tell(said)
             raise
         finally:
             outcomes.signature = before
+
+    def _outputs_left(self, listener: RecipeListener) -> str:
+        """Say how the outputs were left.
+
+        An emergency stop may switch them off by itself (spel.md 8): what the recipe had switched
+        is not how they are then. Where the controller cannot be asked any more, only what the
+        recipe did is known.
+        """
+        stopped = False
+        with suppress(RobolinkError):
+            stopped = self._controller.status().emergency_stop
+        return _switched(listener, stopped=stopped)
 
     def _require_role(self) -> None:
         if not any(plan.gate.accepted_change_mm for plan in self.plan.tools):
@@ -178,13 +191,18 @@ class RecipeRun:
             )
 
 
-def _switched(listener: RecipeListener) -> str:
-    """Say which outputs the recipe left switched."""
+def _switched(listener: RecipeListener, *, stopped: bool) -> str:
+    """Say which outputs the recipe left switched, and what an emergency stop did to them."""
     if not listener.switched:
-        return ""
+        return tr("The emergency stop may have switched outputs off.") if stopped else ""
     states = ", ".join(
         f"{number} {tr('on') if on else tr('off')}" for number, on in listener.switched.items()
     )
+    if stopped:
+        return tr(
+            "The emergency stop may have switched outputs off; the recipe had switched: {states}.",
+            states=states,
+        )
     return tr("Outputs stay as the recipe switched them: {states}.", states=states)
 
 

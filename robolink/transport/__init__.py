@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from robolink.transport._registry import TransportOpener as TransportOpener
     from robolink.transport._registry import open_mailbox_link as open_mailbox_link
     from robolink.transport._registry import open_modbus as open_modbus
-    from robolink.transport._registry import open_stop_link as open_stop_link
+    from robolink.transport._registry import open_quick_link as open_quick_link
     from robolink.transport._registry import open_transport as open_transport
     from robolink.transport._trace import SECRET_PLACEHOLDER as SECRET_PLACEHOLDER
     from robolink.transport._trace import Direction as Direction
@@ -39,7 +39,7 @@ else:
             "_mailbox_link": "MailboxHead MailboxLink",
             "_registry": (
                 "TRANSPORTS_GROUP TransportOpener "
-                "open_mailbox_link open_modbus open_stop_link open_transport"
+                "open_mailbox_link open_modbus open_quick_link open_transport"
             ),
             "_trace": "SECRET_PLACEHOLDER Direction TraceSink TracingTransport",
             "_url": "LinkUrl parse_url",

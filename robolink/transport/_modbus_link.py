@@ -49,7 +49,7 @@ class MailboxPlaces:
 
 
 def open_modbus_link(
-    url: LinkUrl, *, timeout_s: float, clock: Clock | None = None, to_stop: bool = False
+    url: LinkUrl, *, timeout_s: float, clock: Clock | None = None, registers_only: bool = False
 ) -> "ModbusMailboxLink":
     """Open a mailbox over Modbus TCP or RTU.
 
@@ -59,7 +59,7 @@ def open_modbus_link(
             (``holding`` reads response and slots from holding registers, function 3).
         timeout_s: Longest wait for the connection, and for each answer.
         clock: Keeps the deadlines.
-        to_stop: Whether it is opened for a stop alone, so that nothing may be loaded for it.
+        registers_only: Whether it is opened for a stop or a look, which wait for no pymodbus.
 
     Raises:
         ConfigError: The URL or an option is wrong.
@@ -70,7 +70,7 @@ def open_modbus_link(
     places = _take_places(options)
     probe = Probe(places.area, places.response)
     client = open_client(
-        url, options, probe=probe, timeout_s=timeout_s, clock=clock, to_stop=to_stop
+        url, options, probe=probe, timeout_s=timeout_s, clock=clock, registers_only=registers_only
     )
 
     def again(timeout_s: float) -> ModbusMailboxLink:

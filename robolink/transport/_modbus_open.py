@@ -10,8 +10,8 @@ from robolink.transport._dial import dial
 from robolink.transport._modbus import ModbusClient
 from robolink.transport._modbus_framing import Framing
 from robolink.transport._modbus_messages import Area
+from robolink.transport._modbus_register_frames import RegisterRtuFraming, RegisterTcpFraming
 from robolink.transport._modbus_rtu import RtuExchange, RtuLine
-from robolink.transport._modbus_stop_frames import StopRtuFraming, StopTcpFraming
 from robolink.transport._modbus_tcp import TcpExchange
 from robolink.transport._serial import SerialSettings, open_serial
 from robolink.transport._tcp import TcpTransport
@@ -76,17 +76,17 @@ def open_client(
     probe: Probe,
     timeout_s: float,
     clock: Clock | None,
-    to_stop: bool = False,
+    registers_only: bool = False,
 ) -> ModbusClient:
     """Open a client; ``options`` are those that the caller has left. See :func:`open_modbus`.
 
-    With ``to_stop`` it reads and writes registers and nothing else, and loads no pymodbus.
+    With ``registers_only`` it reads and writes registers and nothing else, and loads no pymodbus.
     """
     clock = clock or SystemClock()
     if url.medium == TCP_MEDIUM:
-        wrapped: Framing = StopTcpFraming() if to_stop else _tcp_framing()
+        wrapped: Framing = RegisterTcpFraming() if registers_only else _tcp_framing()
         return _open_tcp(url, options, wrapped, timeout_s=timeout_s, clock=clock)
-    wrapped = StopRtuFraming() if to_stop else _rtu_framing()
+    wrapped = RegisterRtuFraming() if registers_only else _rtu_framing()
     return _open_rtu(url, options, wrapped, probe=probe, timeout_s=timeout_s, clock=clock)
 
 

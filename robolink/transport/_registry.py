@@ -80,12 +80,12 @@ def open_mailbox_link(
     return opened
 
 
-def open_stop_link(
+def open_quick_link(
     url: str | LinkUrl, *, timeout_s: float = 3.0, clock: Clock | None = None
 ) -> MailboxLink:
-    """Open a link to a PLC mailbox for a stop and nothing else; as :func:`open_mailbox_link`.
+    """Open a link to a PLC mailbox for a stop or a look; as :func:`open_mailbox_link`.
 
-    Over Modbus it has its own frames, because loading pymodbus takes longer than the stop.
+    Over Modbus it has its own frames, because loading pymodbus takes longer than either.
     """
     link = parse_url(url) if isinstance(url, str) else url
     opener = _find(link, _MAILBOX_MEDIA)
@@ -94,7 +94,7 @@ def open_stop_link(
         return opened
     from robolink.transport._modbus_link import open_modbus_link
 
-    return open_modbus_link(link, timeout_s=timeout_s, clock=clock, to_stop=True)
+    return open_modbus_link(link, timeout_s=timeout_s, clock=clock, registers_only=True)
 
 
 def open_modbus(

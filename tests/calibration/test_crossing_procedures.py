@@ -33,6 +33,10 @@ HERE = Pose(280.0, 90.0, 0.0, 120.0, tool=0)
 WIDTH_MM = 0.3
 
 
+SLIP_MM = 0.4
+"""Two crossings that check each other share it: half of it is well beyond the tolerance, 0.15."""
+
+
 class IdealCell:
     """Takes the steps of a procedure; the tip breaks a beam within its width.
 
@@ -84,11 +88,11 @@ class IdealCell:
             self.frame = step.target
             raise CalibrationError("no_edge", "nothing", remedy="look")
         if step.edge.number == PLATE.input:
-            self._slip_mm = 0.3 if len(self.seeks) in self._slips else 0.0
+            self._slip_mm = SLIP_MM if len(self.seeks) in self._slips else 0.0
             off_mm = self._slip_mm + self._random.gauss(0, self._noise_mm)
             return replace(step.target, z_mm=PLATE.z_mm - self.tip.z_mm + off_mm)
         crossing = (len(self.seeks) + 1) // 2
-        self._slip_mm = 0.3 if crossing in self._slips else 0.0
+        self._slip_mm = SLIP_MM if crossing in self._slips else 0.0
         beam = STATION.beams[STATION.inputs.index(step.edge.number)]
         begin, end = self._across(beam, self.frame), self._across(beam, step.target)
         way = 1.0 if end > begin else -1.0

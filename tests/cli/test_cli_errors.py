@@ -57,6 +57,7 @@ CODES = {
     "LeaseHeldError": 5,
     "LeaseLostError": 5,
     "MotionTimeoutError": 5,
+    "HeartbeatLostError": 5,
     "OutcomeUnknownError": 6,
     "StoppedError": 10,
     "ToolError": 5,

@@ -13,7 +13,8 @@ from robolink_cli._notices import marker_notice, note_unsettled
 
 import robolink
 from robolink.errors import NotReadyError, NotReadyReason
-from robolink.model import Marker, MarkerKind
+from robolink.model import Ledger, Marker, MarkerKind
+from robolink.stop_latch import StopLatch
 
 URL = "epson+tcp://192.0.2.1:5000"
 OTHER = "epson+tcp://192.0.2.2:5000"
@@ -150,6 +151,11 @@ class UnfinishedController:
         self.outcomes = self.tools = self
         self.closed = False
         self.more = more
+        self.latch, self.ledger = StopLatch(URL), Ledger()
+        self.trouble, self.remarks = None, ()
+
+    def at_work(self):
+        return ""
 
     def selected(self):
         raise NotReadyError("The safety guard is open.", reason=NotReadyReason.GUARD_OPEN)
@@ -199,7 +205,7 @@ def test_what_was_left_unfinished_is_said_on_connecting(command, capsys, monkeyp
         "timeout_s": 2.0,
         "remote_timeout_s": 60.0,
         "trace": None,
-        "outcomes": None,
+        "glance": False,
     }
     shown = capsys.readouterr()
     assert shown.out == ""
@@ -216,7 +222,7 @@ def test_a_selection_that_was_not_answered_leaves_two_tools_to_be_named(capsys):
     assert "Tool 3 or 0 is selected now; it was tool 3 before." in capsys.readouterr().err
 
 
-def test_resolve_is_not_told_to_resolve(command, capsys, monkeypatch):
+def test_recover_is_not_told_to_recover(command, capsys, monkeypatch):
     def act(context):
         with open_controller(context, quiet=True):
             pass

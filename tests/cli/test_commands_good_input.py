@@ -50,7 +50,7 @@ COMMANDS = {
     ),
     "jog": (["jog", "x+0.5", "z+1", "--yes"], "robolink/jog/1", "tool 1 in local 0"),
     "calibrate two-pose": ([], "robolink/calibration/1", "Tool 1 was written and read back."),
-    "resolve": (["resolve", "--yes"], "robolink/resolve/1", ""),
+    "recover with a word": (["recover", "--yes"], "robolink/recover/1", ""),
 }
 
 REQUESTS = {
@@ -145,7 +145,7 @@ def test_the_dry_run_of_a_calibration_shows_every_step_and_writes_nothing(cell):
     assert cell.tool_1 == OLD_TIP
 
 
-def test_the_dry_run_of_resolve_says_what_is_true_and_settles_nothing(cell):
+def test_the_dry_run_of_the_old_name_says_what_is_true_and_settles_nothing(cell):
     assert cell.run("status").code == 0
     log = open_journal().log(cell.url)
     details = {"tool": 1, "before": [12.0, -3.5, -20.0, 0.0, 0.0, 0.0], "requested": [1.0] * 6}

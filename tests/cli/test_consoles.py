@@ -33,7 +33,7 @@ COMMANDS = {
     ("ports",): 0,
     ("-c", "四号线", "status"): 2,
     ("-c", "四号线", "status", "--json"): 2,
-    ("-c", "wrong-robot", "tool", "list"): 2,
+    ("-c", "wrong-robot", "tool", "set", "3", "--x", "1"): 2,
     ("-c", "epson+é://机器人", "status"): 2,
     ("-c", "epson+sim://機?é=1", "status"): 2,
     ("-c", "三号线", "tool", "get", "é"): 2,

@@ -13,7 +13,7 @@ from robolink_cli._output import watched_output
 
 from robolink.errors import OutcomeUnknownError
 from robolink.interrupts import EndedBy, Interrupted, InterruptGate, ended_by, one_ending
-from robolink.model import ToolOffset
+from robolink.model import EntryKind, ToolOffset
 from robolink.transaction import ToolChange, Wanted, change_tools
 
 NEW = ToolOffset(1.5, 2.5, 3.5)
@@ -140,6 +140,19 @@ def test_a_tool_that_was_written_before_is_named(ended):
         "Nothing was moved. Tool 3 holds X 1.500 Y 2.500 Z 3.500 U 0.000 now; before it held "
         "undefined. Tool 1 is selected."
     )
+
+
+def test_what_nobody_is_left_to_read_is_on_record(ended):
+    def act(controller):
+        change_tools(controller, [Wanted(3, NEW, controller.tools.read(3))])
+        signal.raise_signal(signal.SIGHUP)
+
+    code, _, err = ended(act)
+    assert code == 129
+    found = []
+    ended(lambda controller: found.extend(controller.outcomes.recorded(kinds=[EntryKind.DECISION])))
+    assert found[0].verdict == err.splitlines()[-1]
+    assert found[0].details == {"ended_by": "SIGHUP"}
 
 
 def test_a_tool_that_was_put_back_is_named(ended, simulator):

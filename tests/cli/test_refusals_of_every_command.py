@@ -31,7 +31,7 @@ NEEDS_A_CONTROLLER = {
     "stop": [],
     "reset": ["--yes"],
     "motors": ["on", "--yes"],
-    "resolve": ["--yes"],
+    "recover": ["--yes"],
     "tool list": [],
     "tool get": ["1"],
     "tool set": ["1", "--x", "13", "--yes"],
@@ -52,7 +52,7 @@ NEEDS_A_CONTROLLER = {
 }
 """Command and arguments with which it succeeds on a controller that is ready."""
 
-ANY_STATE = {"status", "resolve", "verify-controller", "io get", "var get"}
+ANY_STATE = {"status", "recover", "verify-controller", "io get", "var get"}
 """What only reads, and by queries that are legal at any time."""
 
 STOPPABLE = set(STATES) - {"controller in Teach", "monitoring only"}
@@ -98,11 +98,11 @@ BAD = {
     "recalibrate": (["missing.toml"], "missing.toml"),
     "enable": (["--yes"], "no SoftMotion axis group"),
     "disable": (["now"], "unexpected extra argument"),
+    "take-ownership": (["--yes"], "no SoftMotion axis group"),
     "recover": (["all"], "unexpected extra argument"),
     "execute-raw": (["--yes", "Print\u20ac"], "printable ASCII"),
     "plc export": (["golden.json"], "is a file"),
     "plc check-map": ([], "is no PLC with a map"),
-    "resolve": (["all"], "unexpected extra argument"),
     "undo": (["--to", "0"], "--to"),
     "report": (["--points", "1-x"], "not a point"),
     "journal list": (["--limit", "0"], "--limit"),

@@ -12,7 +12,7 @@ from types import SimpleNamespace
 
 import click
 import pytest
-from robolink_cli import entry, main
+from robolink_cli import _consent, _operator, entry, main
 from robolink_cli._stop_request import FLAGS, VALUES, StopRequest, read_stop
 from robolink_simulators.clock import ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
@@ -22,6 +22,7 @@ from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 import robolink
 from robolink import Secret
+from robolink.config import glance_at_cell
 from robolink.controllers.epson import EpsonController
 from robolink.journal import close_files, open_journal
 from robolink.model import MotionProfile, WorkBox
@@ -46,6 +47,7 @@ def moving(state_folder):
         controller.outcomes.close()  # the lease of the one who died
         simulator.url = host.url
         yield simulator
+        controller._session.close()  # what it watches for Ctrl-C is given back
         close_files()
 
 
@@ -159,6 +161,36 @@ def test_a_password_file_that_others_may_read_does_not_keep_it_back(moving, stop
     assert "Others than its owner may read" in err
 
 
+@pytest.mark.parametrize(
+    "how", ["password_file = 'secret'", "password_env = 'ROBOLINK_PASSWORD_A'"]
+)
+@pytest.mark.parametrize("broken", [False, True])
+def test_the_password_is_where_the_cell_says(state_folder, tmp_path, monkeypatch, how, broken):
+    (tmp_path / "secret").write_text("right\n")
+    (tmp_path / "secret").chmod(0o600)
+    monkeypatch.setenv("ROBOLINK_PASSWORD", "another cell's")
+    monkeypatch.setenv("ROBOLINK_PASSWORD_A", "right")
+    with serve_tcp(EpsonSimulator(seed=4, password=Secret("right"))) as host:
+        cell = Path("robolink.toml")
+        cell.write_text(CELL.format(url=host.url, more=how))
+        assert main.run(["-c", "a", "status"]) == 0
+        if broken:
+            cell.write_text(CELL.format(url=host.url, more="[["))
+        assert entry.run(["-c", "a", "stop"]) == 0
+        assert main.run(["-c", "a", "status"]) == 0
+    close_files()
+
+
+def test_the_password_file_of_the_environment_counts_with_a_url(
+    state_folder, tmp_path, monkeypatch
+):
+    (tmp_path / "secret").write_text("right\n")
+    (tmp_path / "secret").chmod(0o600)
+    monkeypatch.setenv("ROBOLINK_PASSWORD_FILE", str(tmp_path / "secret"))
+    with serve_tcp(EpsonSimulator(seed=4, password=Secret("right"))) as host:
+        assert entry.run(["-c", host.url, "stop"]) == 0
+
+
 def test_the_recording_is_written_afterwards(moving, stop, tmp_path):
     assert stop("-c", moving.url, "--record", str(tmp_path / "talk"))[0] == 0
     talk = (tmp_path / "talk").read_text()
@@ -193,7 +225,7 @@ def test_nobody_there_is_told_and_leaves_no_note(state_folder, capsys):
 
 def test_a_note_holds_the_next_movement_until_somebody_releases_it(moving, stop, capsys):
     assert stop("-c", moving.url, "--operator", "anna")[0] == 0
-    assert main.run(["-c", moving.url, "resolve", "--yes"]) == 0
+    assert main.run(["-c", moving.url, "recover", "--yes"]) == 0
     localhost = moving.url.replace("127.0.0.1", "localhost")
     jog = ["jog", "x+1", "--yes", "-c"]
     started = moving.machine.arm.moves_started
@@ -210,6 +242,38 @@ def test_a_note_holds_the_next_movement_until_somebody_releases_it(moving, stop,
     assert "No stop is noted" in capsys.readouterr().out
 
 
+class Person:
+    """Somebody at a terminal who answers every question alike."""
+
+    def __init__(self, answer):
+        self.answer, self.questions = answer, []
+
+    def ask(self, question, kind):
+        self.questions.append(question)
+
+    def poll(self, wait_s):
+        return self.answer
+
+
+@pytest.mark.parametrize(("answer", "code"), [("n", 9), ("y", 0)])
+def test_a_person_is_shown_who_stopped_it_and_asked(
+    moving, stop, capsys, monkeypatch, answer, code
+):
+    assert stop("-c", moving.url, "--operator", "anna")[0] == 0
+    assert main.run(["-c", moving.url, "resolve", "--yes"]) == 0
+    started, person = moving.machine.arm.moves_started, Person(answer)
+    monkeypatch.setattr(_consent, "on_terminal", lambda: True)
+    monkeypatch.setattr(_operator, "terminal", lambda: person)
+    capsys.readouterr()
+    assert main.run(["jog", "x+1", "-c", moving.url]) == code
+    assert "anna (process" in capsys.readouterr().err
+    assert "may the robot move again" in person.questions[0]
+    moves = answer == "y"
+    assert len(person.questions) == (2 if moves else 1)  # the second is that of every movement
+    assert moving.machine.arm.moves_started == started + moves
+    assert (find_note(far_end_of(moving.url)) is None) is moves
+
+
 def test_a_reset_takes_the_note_away_too(moving, stop):
     assert stop()[0] == 0
     assert find_note(far_end_of(moving.url)) is not None
@@ -221,7 +285,7 @@ def test_a_note_that_cannot_be_read_is_a_note(moving, stop, state_folder, capsys
     assert stop()[0] == 0
     (note,) = (state_folder / "stops").iterdir()
     note.write_bytes(b"{")
-    assert main.run(["-c", moving.url, "resolve", "--yes"]) == 0
+    assert main.run(["-c", moving.url, "recover", "--yes"]) == 0
     assert main.run(["jog", "x+1", "--yes", "-c", moving.url]) == 10
     assert "cannot be read" in capsys.readouterr().err
 
@@ -302,3 +366,22 @@ def test_nothing_heavy_is_loaded_before_the_robot_stands(state_folder, kind):
             env={**os.environ, "ROBOLINK_STATE_DIR": str(state_folder)},
         )
     assert (done.stdout, done.stderr) == ("\n", "")
+
+
+@pytest.mark.parametrize("more", ["", "robot = 'T6-602S'", "timeout_s = 2.5"])
+def test_a_cell_file_is_checked_anew_for_a_look_when_it_changed(moving, stop, capsys, more):
+    assert stop()[0] == 0
+    cell = Path("robolink.toml")
+    cell.write_text(CELL.format(url=moving.url, more=more))
+    assert glance_at_cell("a") is None
+    for _ in range(2):
+        assert main.run(["-c", "a", "status"]) == 0
+        assert (glance_at_cell("a") is None) is ("robot" in more)
+    cell.write_text(CELL.format(url=moving.url, more=more + "\nno_such_key = 1"))
+    assert glance_at_cell("a") is None
+    capsys.readouterr()
+    assert main.run(["-c", "a", "status"]) == 0
+    assert "no_such_key" in capsys.readouterr().err
+    cell.write_text(CELL.format(url=moving.url, more="robot = 'LS10-B'"))
+    assert main.run(["-c", "a", "status"]) == 0
+    assert "has a robot LS10-B" in capsys.readouterr().err

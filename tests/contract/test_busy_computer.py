@@ -47,7 +47,8 @@ class Person:
 
 def be_busy(cell, *moves, meanwhile=lambda: None):
     """Let this computer have something else to do in the middle of these movements, from 1."""
-    begun, busy = [], []
+    begun: list[str] = []
+    busy: list[int] = []
 
     def on_request(_number, text):
         if text.startswith("write_command MOVE"):
@@ -134,7 +135,7 @@ def calibrated(cell, controller):
         seen = world.operator.look(1)
         return seen.dx_mm, seen.dy_mm, seen.dz_mm
 
-    said = []
+    said: list[str] = []
     limits = Limits(speed_percent=5, speed_mm_s=20.0)
     plan = ChangePlan((ToolPlan(1),), limits)
     operator = AssistedOperator(look, said.append)

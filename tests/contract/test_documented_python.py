@@ -16,7 +16,6 @@ import pytest
 import sqlalchemy.dialects.sqlite  # noqa: F401 - pytester forgets imports; it bears one only
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.kinematics import inverse
-from robolink_simulators.epson.variables import VariableType
 from robolink_simulators.hosting import in_process, plc_in_process
 from robolink_simulators.hosting.modbus import serve_modbus_tcp
 from robolink_simulators.sensing import LightBeam
@@ -25,6 +24,7 @@ from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 import robolink
 from robolink import ToolOffset
 from robolink.model import TIP, Hand, Pose, Secret, Spot, SpotUnit, WorkBox, rotate_xy
+from robolink.protocols.epson_text import VariableType
 from robolink.runner import RunSettings
 
 pytest_plugins = ["pytester"]
@@ -97,15 +97,16 @@ def two_tools(stack: ExitStack) -> dict[str, Any]:
     simulator = stack.enter_context(epson())
     controller = stack.enter_context(robolink.connect("epson+sim://documented"))
     controller.tools.write(2, ToolOffset(5, 6, -70), expected=None)
-    looked = []
+    looked: list[ToolOffset | None] = []
+    new_1, new_2 = ToolOffset(12.25, -3.5, -20), ToolOffset(5.25, 6, -70)
     return {
         "controller": controller,
         "old_1": controller.tools.read(1),
         "old_2": controller.tools.read(2),
-        "new_1": ToolOffset(12.25, -3.5, -20),
-        "new_2": ToolOffset(5.25, 6, -70),
+        "new_1": new_1,
+        "new_2": new_2,
         "look_at_the_parts": lambda: looked.append(simulator.machine.tools.get(2)),
-        "then": lambda: looked[0].x_mm == 5.25 and simulator.machine.tools.get(1).x_mm == 12.25,
+        "then": lambda: looked == [new_2] and simulator.machine.tools.get(1) == new_1,
     }
 
 
@@ -114,14 +115,14 @@ def above_two_beams(stack: ExitStack) -> dict[str, Any]:
     world, arm = simulator.world, simulator.machine.arm
     for number, heading in ((3, 0.0), (4, 90.0)):
         world.connect(number, LightBeam((300.2, 79.9, -60.0), heading))
-    pin = world.tips[1]
+    pin = world.tips[1] or ToolOffset(0, 0, 0)
     above = Pose(295 - pin.x_mm, 85 - pin.y_mm, -45 - pin.z_mm, 0.0)
     arm.place(inverse(arm.model, above, Hand.RIGHT), 0)
     controller = stack.enter_context(robolink.connect("epson+sim://documented"))
     controller.tools.select(0)
 
     def found() -> bool:
-        stored = simulator.machine.tools.get(1)
+        stored = simulator.machine.tools.get(1) or ToolOffset(0, 0, 0)
         return abs(stored.x_mm - pin.x_mm) < 0.02 and abs(stored.y_mm - pin.y_mm) < 0.02
 
     return {
@@ -201,6 +202,8 @@ MAKERS = {
     "solvers.md 1": four_poses,
     "softmotion-controller.md 1": one_plc,
     "softmotion-controller.md 2": a_connected_plc,
+    "stopping.md 1": with_password,
+    "stopping.md 2": with_password,
 }
 
 TESTS = {name for name, block in BLOCKS.items() if "\ndef test_" in f"\n{block}"}

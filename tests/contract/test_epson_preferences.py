@@ -64,6 +64,17 @@ def test_what_an_unreal_cell_would_falsify_is_held_back_before_it_is_sent(habit,
 
 
 @pytest.mark.parametrize("habit", UNREAL)
+def test_an_old_value_is_put_back_all_the_same(habit):
+    """Left alone, a value that nobody proved would stay in force."""
+    simulator = EpsonSimulator(seed=3, options=options_from_text({habit: "yes"}))
+    with served("sim", simulator) as cell, cell.connect() as controller:
+        unproved, old = controller.tools.read(1), ToolOffset(11.5, -3, -20)
+        with controller.latch.putting_back(1):
+            controller.tools.write(1, old, expected=unproved)
+        assert simulator.machine.tools.get(1) == old
+
+
+@pytest.mark.parametrize("habit", UNREAL)
 def test_firmware_that_does_not_tell_is_not_suspected(habit):
     options = options_from_text({"extended_queries": "no", habit: "yes"})
     with served("sim", EpsonSimulator(seed=3, options=options)) as cell:

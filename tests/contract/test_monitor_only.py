@@ -35,6 +35,7 @@ HABITS = [
 
 READS = {"Login", "GetStatus", "GetVariable", "GetCurRobot", "GetAlm", "GetRobotInfo"}
 READS |= {"GetRobotSerial", "GetContVer", "GetContName", "GetContType", "GetContNo", "GetPrjName"}
+READS |= {"GetContSettings"}
 
 
 def in_production(options, **habit):

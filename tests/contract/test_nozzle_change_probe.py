@@ -39,12 +39,12 @@ def test_a_change_ends_with_the_length_and_latency_that_braking_lets_be_known(la
         cell.mount_plate(latency_s=latency_s)
         report = cell.run(TouchProbe(cell.plate))
         found, drift = report.proposal.result, report.verification.drifts[0]
-        assert cell.stored.z_mm == pytest.approx(
-            cell.truth.z_mm - LEFT_OF_BRAKING_MM, abs=PRINTED_MM
-        )
+        stored, expected_mm = cell.stored, cell.truth.z_mm - LEFT_OF_BRAKING_MM
+        assert stored is not None
+        assert stored.z_mm == pytest.approx(expected_mm, abs=PRINTED_MM)
         assert found.latency_s == pytest.approx(latency_s + TAKEN_FOR_LATENCY_S, abs=PRINTED_S)
         assert drift.dz_mm == pytest.approx(0.0, abs=2 * PRINTED_MM)
-        assert cell.stored.x_mm == report.proposal.before.x_mm
+        assert stored.x_mm == report.proposal.before.x_mm
 
 
 def test_a_change_ends_with_the_true_length_written_and_proved(cell):

@@ -149,7 +149,9 @@ def test_two_nozzles_on_one_head(cell):
     assert len(measured) == len(written) == 2
     assert max(measured) < min(written)
     assert "$SetIO,8,0" not in requests[first_write:]
-    assert len({entry.change for entry in journal(cell)}) == 1
+    # The backup before the first write of all belongs to no change.
+    changes_known = {e.change for e in journal(cell) if e.kind is not EntryKind.BACKUP}
+    assert len(changes_known) == 1
     assert [tool["write"]["skipped"] for tool in json.loads(done.out)["tools"]] == [False, False]
 
 
@@ -389,7 +391,7 @@ def test_an_emergency_stop_during_a_recipe_repeats_nothing(cell, nth):
     cell.simulator.panel.release_estop()
     assert cell.run("reset").code == 0
     assert cell.run("recover").code in (0, 6)
-    assert cell.run("resolve", "--yes").code == 0
+    assert cell.run("recover", "--yes").code == 0
     assert cell.tool_1 == OLD_TIP
     cell.check_settings_are_those_of_before()
 

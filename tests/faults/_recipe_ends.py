@@ -74,7 +74,7 @@ def check_stopped(cell: RecipeCell, ended: Ended, disturbance: Disturbance) -> N
 
 
 def check_put_right(cell: RecipeCell, disturbance: Disturbance, *, offered: bool) -> None:
-    """After the reset one command settles what reading can, another what takes a person."""
+    """After the reset one command settles what reading can, and with --yes the rest."""
     found = {marker.kind for marker in cell.open_markers()}
     cell.make_ready(disturbance.how)
     if offered:
@@ -85,8 +85,8 @@ def check_put_right(cell: RecipeCell, disturbance: Disturbance, *, offered: bool
     assert recovered.code == (6 if cell.open_markers() else 0), recovered.err
     if recovered.code:
         assert {marker.kind for marker in cell.open_markers()} <= {MarkerKind.MOVE, MarkerKind.SET}
-        resolved = cell.run("resolve", "--yes")
-        assert resolved.code == 0, resolved.err
+        recovered = cell.run("recover", "--yes")
+        assert recovered.code == 0, recovered.err
     assert cell.open_markers() == ()
     assert cell.selected == 1
     if MarkerKind.SELECTION in found:

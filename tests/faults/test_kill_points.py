@@ -35,7 +35,7 @@ def check(cell: NozzleCell, step: Step) -> None:
     cell.check_nothing_else_was_written()
     assert cell.simulator.machine.flash_writes <= 1
     check_the_next_command_says_what_is_selected(cell)
-    check_resolve_puts_the_cell_s_own_tool_back(cell)
+    check_recover_puts_the_cell_s_own_tool_back(cell)
     assert cell.simulator.machine.arm.moves_started == moves_started
     check_motion_is_allowed_again(cell)
 
@@ -51,9 +51,9 @@ def check_the_next_command_says_what_is_selected(cell):
     assert cell.open_markers() == markers
 
 
-def check_resolve_puts_the_cell_s_own_tool_back(cell):
-    resolved = cell.run("resolve", "--yes")
-    assert resolved.code == 0, resolved.err
+def check_recover_puts_the_cell_s_own_tool_back(cell):
+    recovered = cell.run("recover", "--yes")
+    assert recovered.code == 0, recovered.err
     cell.check_settings_are_those_of_before()
     assert cell.open_markers() == ()
     cell.check_nothing_else_was_written()

@@ -84,7 +84,7 @@ def test_a_lost_answer_to_a_move_is_unknown_and_the_move_is_never_sent_twice(ser
             with pytest.raises(OutcomeUnknownError):
                 lift(controller).wait(timeout_s=2)
         with robolink.connect(url) as controller:
-            with pytest.raises(OutcomeUnknownError, match="resolve"):
+            with pytest.raises(OutcomeUnknownError, match="recover"):
                 lift(controller)
             with pytest.raises(OutcomeUnknownError), controller.preserved("a procedure"):
                 pass

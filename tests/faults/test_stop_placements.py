@@ -86,8 +86,8 @@ def check_said(cell: RecipeCell, ended: Ended) -> None:
     if cell.selected != 1 or cell.open_markers():
         assert cell.run("reset").code == 0
         if cell.run("recover").code:
-            resolved = cell.run("resolve", "--yes")
-            assert resolved.code == 0, resolved.err
+            recovered = cell.run("recover", "--yes")
+            assert recovered.code == 0, recovered.err
         assert cell.selected == 1
         assert cell.open_markers() == ()
         assert not cell.changed() or kept(cell)

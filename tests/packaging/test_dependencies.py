@@ -14,7 +14,7 @@ from packaging.version import Version
 
 ROOT = Path(__file__).parents[2]
 
-IMPORT = re.compile(r"^ *(?:from (\w+)[\w.]* import |import (\w+))", re.MULTILINE)
+IMPORT = re.compile(r"^ *(?:from (\w+)[\w.]* import |import (\w+)[\w.]*(?: as \w+)?$)", re.M)
 
 CHOSEN = (
     "tests/contract/journal/test_journal_files.py",
@@ -72,7 +72,7 @@ def test_each_package_that_the_sources_import_is_a_dependency_or_an_extra():
     wanted = {requirement.name.replace("-", "_") for requirement in run_time_dependencies()}
     # pydantic_core comes with pydantic, each release of which asks for one of its versions.
     packages = {"can": "python_can", "serial": "pyserial", "pydantic_core": "pydantic"}
-    ours = {"robolink", "robolink_cli", "robolink_simulators", "pytest"}
+    ours = {"robolink", "robolink_cli", "robolink_simulators", "pytest", "_typeshed"}
     imported = set()
     for part in ("robolink", "cli/robolink_cli", "simulators/robolink_simulators"):
         for path in (ROOT / part).rglob("*.py"):
@@ -113,9 +113,19 @@ def test_with_the_lowest_version_of_each_the_chosen_tests_pass(tmp_path):
         f"{wanted.name}{'[binary]' if wanted.extras else ''}=={lowest(wanted)}"
         for wanted in run_time_dependencies()
     ]
-    tools = ["hypothesis", "pytest", "pytest-timeout", "hatchling"]
+    tools = ["editables", "hatchling", "hypothesis", "pytest", "pytest-timeout"]
     run(python, "-m", "pip", "install", "--quiet", "--no-compile", *pinned, *tools)
-    run(python, "-m", "pip", "install", "--quiet", "--no-deps", "--no-build-isolation", str(ROOT))
+    run(
+        python,
+        "-m",
+        "pip",
+        "install",
+        "--quiet",
+        "--no-deps",
+        "--no-build-isolation",
+        "-e",
+        str(ROOT),
+    )
     program = "import importlib.metadata as m, sys; print(*map(m.version, sys.argv[1:]))"
     names = [wanted.name for wanted in run_time_dependencies()]
     installed = run(python, "-c", program, *names).split()

@@ -16,11 +16,11 @@ from robolink_cli._plc_export import plc_texts
 from robolink.protocols.mailbox import (
     COMMAND,
     DEVICE,
+    DEVICE_START,
     RESPONSE,
     SLOT,
     Opcode,
     Profile,
-    slot_start,
     structured_text_types,
 )
 
@@ -175,7 +175,7 @@ def test_a_folder_that_cannot_be_made_is_told(tmp_path, capsys):
 
 
 def test_a_base_that_leaves_no_room_is_told(tmp_path, capsys):
-    last = 0x10000 - slot_start(16)
+    last = 0x10000 - DEVICE_START - DEVICE.words
     assert main.run(["plc", "export", str(tmp_path / "plc"), "--base", str(last + 1)]) == 2
     assert str(last) in capsys.readouterr().err
     assert main.run(["plc", "export", str(tmp_path / "plc"), "--base", str(last)]) == 0

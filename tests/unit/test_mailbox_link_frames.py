@@ -12,7 +12,7 @@ from pymodbus.pdu import DecodePDU
 from robolink.transport._modbus_frames import RtuFraming, TcpFraming
 from robolink.transport._modbus_framing import FrameError
 from robolink.transport._modbus_messages import Area, ModbusRequest
-from robolink.transport._modbus_stop_frames import StopRtuFraming, StopTcpFraming
+from robolink.transport._modbus_register_frames import RegisterRtuFraming, RegisterTcpFraming
 
 READ = ModbusRequest(unit=5, function=4, area=Area.INPUT, address=0, count=3)
 WRITE = ModbusRequest(unit=5, function=16, area=Area.HOLDING, address=7, count=2, values=(1, 2))
@@ -167,8 +167,10 @@ REQUESTS = st.builds(
 @settings(max_examples=60, deadline=None)
 @given(request=REQUESTS, transaction=st.integers(1, 0xFFFF))
 def test_a_stop_sends_the_bytes_that_pymodbus_sends(request, transaction):
-    assert StopTcpFraming().pack(request, transaction) == TcpFraming().pack(request, transaction)
-    assert StopRtuFraming().pack(request, 0) == RtuFraming().pack(request, 0)
+    assert RegisterTcpFraming().pack(request, transaction) == TcpFraming().pack(
+        request, transaction
+    )
+    assert RegisterRtuFraming().pack(request, 0) == RtuFraming().pack(request, 0)
 
 
 PAYLOADS = st.one_of(
@@ -187,7 +189,7 @@ def test_a_stop_takes_what_pymodbus_takes_and_nothing_else(payload, serial, plac
     # The bytes that say which function it is and how long: another function is for pymodbus.
     if place < len(frame) and place not in ((1, 2) if serial else (7, 8)):
         frame[place] ^= flip
-    kinds = (StopRtuFraming(), RtuFraming()) if serial else (StopTcpFraming(), TcpFraming())
+    kinds = (RegisterRtuFraming(), RtuFraming()) if serial else (RegisterTcpFraming(), TcpFraming())
     seen: list[object] = []
     for framing in kinds:
         buffer = bytearray(frame)

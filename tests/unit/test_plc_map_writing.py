@@ -19,6 +19,7 @@ from robolink.errors import (
 from robolink.model import ANY, ToolOffset, Verdict
 from robolink.nozzle_change import ChangePlan, GivenPoses, NozzleChange, ToolPlan
 from robolink.register_maps import Table
+from robolink.runner import Question
 from robolink.transaction import Wanted, change_tools, recover
 from tests.unit._plc_bench import COMMIT_BIT, LEVEL, NO_HANDSHAKE, Bench
 
@@ -388,6 +389,22 @@ def test_an_unconfirmed_map_is_refused_before_anything_else_is_looked_at():
     assert bench.plc.writes == []
 
 
+class Nobody:
+    """A person who is not to be troubled."""
+
+    def tell(self, text: str) -> None:
+        """Not to be told anything."""
+        raise AssertionError(text)
+
+    def ask(self, question: str, kind: Question) -> None:
+        """Not to be asked anything."""
+        raise AssertionError(question)
+
+    def poll(self, wait_s: float) -> str | None:
+        """Answer nothing."""
+        return None
+
+
 def test_an_unconfirmed_map_is_refused_before_a_person_has_measured_anything():
     def measured():
         raise AssertionError("nobody was to measure")
@@ -395,7 +412,7 @@ def test_an_unconfirmed_map_is_refused_before_a_person_has_measured_anything():
     plan = ChangePlan((ToolPlan(1, GivenPoses(measured)),), ask_before_write=False)
     with bench_of(NO_HANDSHAKE, confirmed=False).connect() as controller:
         with pytest.raises(ConfigError, match="nobody has confirmed it"):
-            NozzleChange(controller, plan, operator=None).run(write=True)
+            NozzleChange(controller, plan, operator=Nobody()).run(write=True)
 
 
 def test_a_number_that_cannot_be_true_is_not_taken_for_an_offset(commit_bit):

@@ -135,7 +135,7 @@ def test_a_beam_is_broken_by_the_nozzle_and_not_beside_it_or_above_it():
 def test_crossing_a_beam_both_ways_finds_the_middle_of_the_nozzle():
     world = world_of(latch="edge")
     x_mm, y_mm, z_mm = world.tip_mm()
-    world.connect(2, LightBeam((x_mm - 8.0, y_mm, z_mm), heading_deg=90.0))
+    world.connect(2, LightBeam((x_mm - 8.0, y_mm, z_mm + 1.0), heading_deg=90.0))
     start = world.group.flange().shift_mm[0]
     edges_mm = []
     for way_mm in (-15.0, 15.0):

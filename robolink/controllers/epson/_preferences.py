@@ -93,8 +93,12 @@ class Preferences:
     def require_real(self, request: str) -> None:
         """Hold a measurement, or the writing of one, back while the cell is not the real one.
 
+        Putting an old value back is let through: left alone, an unproved one would stay in force.
+
         Raises:
             NotReadyError: Dry run or virtual I/O.
         """
+        if self._session.latch.restores:
+            return
         self.require_real_motion(request)
         self.require_real_inputs(request)

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from types import TracebackType
-from typing import Final, Self
+from typing import TYPE_CHECKING, Final, Self
 
 from robolink.controllers.softmotion._answers import describe
 from robolink.controllers.softmotion._condition import condition_of, status_of
@@ -11,6 +11,7 @@ from robolink.controllers.softmotion._facts import MailboxFacts, set_kinematics
 from robolink.controllers.softmotion._group import SoftMotionGroup
 from robolink.controllers.softmotion._io import SoftMotionIo
 from robolink.controllers.softmotion._mailbox import Mailbox
+from robolink.controllers.softmotion._ownership import taking
 from robolink.controllers.softmotion._preserve import Preserver
 from robolink.controllers.softmotion._resolve import SoftMotionResolver
 from robolink.controllers.softmotion._stopping import REST_S
@@ -39,6 +40,9 @@ from robolink.protocols.mailbox import (
 from robolink.standing import note_standing
 from robolink.stop_latch import StopLatch
 from robolink.timing import Clock, Deadline
+
+if TYPE_CHECKING:
+    from robolink.controllers.softmotion._verify import MailboxFinding
 
 _RESETS: Final = (
     (GroupState.ERRORSTOP, Command(0, Opcode.RESET)),
@@ -141,6 +145,12 @@ class SoftMotionController:
         """Read which machine and which mailbox program this is."""
         return MailboxFacts.of(self._mailbox.snapshots.take(), device_id=self.device_id)
 
+    def verify(self) -> "tuple[MailboxFinding, ...]":
+        """Look at everything that can be seen without a command; nothing is written."""
+        from robolink.controllers.softmotion._verify import verify_mailbox
+
+        return verify_mailbox(self._mailbox)
+
     def condition(self) -> dict[str, object]:
         """Read the meaning of an error, the tool in force, and what the mailbox shows beside."""
         return condition_of(self._mailbox.snapshots.take())
@@ -156,6 +166,10 @@ class SoftMotionController:
             Act.MOTORS_OFF: Opcode.DISABLE,
         }
         return (describe(Command(0, opcodes[act])),)
+
+    def preview_take(self, *, insist: bool = False) -> str:
+        """Return what :meth:`take` would send, in words."""
+        return describe(taking(insist=insist))
 
     def take(self, *, insist: bool = False) -> None:
         """Take the mailbox now, before the first command that needs it.

@@ -19,6 +19,15 @@ _LONGEST_STOP_S: Final = 1.0
 _AGAIN_S: Final = 0.05
 
 
+def taking(*, insist: bool) -> Command:
+    """Return the command that takes the mailbox.
+
+    Args:
+        insist: A person who sees the cell wants it, whoever owns it now.
+    """
+    return Command(0, Opcode.OWNERSHIP, operands=(1, int(insist), 0, 0))
+
+
 class Ownership:
     """Takes the mailbox, once, and gives it back.
 
@@ -59,10 +68,10 @@ class Ownership:
         Raises:
             LeaseHeldError: Another client owns it; the error names its token.
         """
-        end = self._send(Command(0, Opcode.OWNERSHIP, operands=(1, int(insist), 0, 0)))
+        end = self._send(taking(insist=insist))
         answer = end.now.answer
         if end.state != CommandState.DONE or answer.holder != self._wire.owner:
-            raise LeaseHeldError(
+            error = LeaseHeldError(
                 tr(
                     "Client {holder:08X} owns the mailbox of {identity}.",
                     holder=answer.holder,
@@ -70,10 +79,12 @@ class Ownership:
                 ),
                 remedy=tr(
                     "Close the other program; 10 s after its last sign the mailbox is free. A "
-                    "person at the cell may insist."
+                    "person at the cell may insist: 'robolink take-ownership'."
                 ),
                 controller=self._wire.identity,
             )
+            error.holder = f"{answer.holder:08X}"
+            raise error
         self._wire.epoch = answer.epoch
         self._lost = False
 

@@ -103,10 +103,15 @@ class Snapshots:
         self._wire.rides.note(now)
         return now
 
-    def slot(self, number: int) -> Slot:
-        """Read a tool slot; needs no ownership, and raises like :meth:`take`."""
+    def slot(self, number: int, *, keep: bool = False) -> Slot:
+        """Read a tool slot; needs no ownership, and raises like :meth:`take`.
+
+        Args:
+            number: Of the slot.
+            keep: Whether the session goes on after a slot that cannot be used.
+        """
         name = tr("Tool slot {number}", number=number)
-        return self._whole(lambda: self._wire.read_slot(number), decode_slot, name)
+        return self._whole(lambda: self._wire.read_slot(number), decode_slot, name, keep=keep)
 
     def news(self, since: Response, *, wait_s: float = LOOK_S) -> Response:
         """Return a snapshot once the head differs from ``since``, or ``wait_s`` has passed.
@@ -141,7 +146,12 @@ class Snapshots:
         return read_block(words, controller=self._wire.identity)
 
     def _whole(
-        self, read: Callable[[], Sequence[int]], decode: Callable[[Sequence[int]], T], name: str
+        self,
+        read: Callable[[], Sequence[int]],
+        decode: Callable[[Sequence[int]], T],
+        name: str,
+        *,
+        keep: bool = False,
     ) -> T:
         cause = ""
         for _ in range(_READS):
@@ -154,12 +164,11 @@ class Snapshots:
             except RemoteProtocolError as error:
                 self._wire.ended(error)
                 raise
-        raise self._wire.ended(
-            RemoteProtocolError(
-                tr("{name} cannot be used: {cause}.", name=name, cause=cause),
-                remedy=tr("Connect again; if it stays so, compare the PLC's register map."),
-            )
+        useless = RemoteProtocolError(
+            tr("{name} cannot be used: {cause}.", name=name, cause=cause),
+            remedy=tr("Connect again; if it stays so, compare the PLC's register map."),
         )
+        raise useless if keep else self._wire.ended(useless)
 
     def _look_back(self, link: MailboxLink) -> RobolinkError | None:
         """Return that the PLC has started anew, when it is that which ended the session.

@@ -1,5 +1,7 @@
 """What the mailbox program gives out: the response block and the tool slots (design part 7)."""
 
+from dataclasses import replace
+
 from robolink.protocols.mailbox import (
     DEVICE,
     DEVICE_WORDS,
@@ -63,8 +65,19 @@ class Outbox:
 
     def response(self, program: MailboxProgram, heartbeat: int) -> Words:
         """Return the response block."""
-        whole = encode_response(self._response(program, heartbeat))
-        return arranged(RESPONSE, whole, self._order)
+        told = replace(
+            self._without_position(program, heartbeat),
+            tcp=self._units.given(
+                CoordRef(*self._group.read_actual_position(CoordSystem.MCS).values)
+            ),
+            axes=self._units.given_axes(self._group.values, self._group.kinematics.kinds),
+        )
+        return arranged(RESPONSE, encode_response(told), self._order)
+
+    def beginning(self, program: MailboxProgram, heartbeat: int) -> Words:
+        """Return the words before the position: of these clients ask all the time."""
+        told = encode_response(self._without_position(program, heartbeat))
+        return arranged(RESPONSE, told, self._order)[: RESPONSE.at("tcp").start]
 
     def slot(self, number: int) -> Words:
         """Return a tool slot."""
@@ -76,11 +89,9 @@ class Outbox:
             return (0,) * DEVICE_WORDS
         return arranged(DEVICE, encode_device_id(self._memory.device_id), self._order)
 
-    def _response(self, program: MailboxProgram, heartbeat: int) -> Response:
+    def _without_position(self, program: MailboxProgram, heartbeat: int) -> Response:
         group, jobs = self._group, program.jobs
         job = jobs.acknowledged
-        tcp = group.read_actual_position(CoordSystem.MCS).values
-        kinds = group.kinematics.kinds
         return Response(
             ack_head=job.command.sequence if job else 0,
             state=job.state if job else CommandState.EMPTY,
@@ -93,10 +104,8 @@ class Outbox:
             boot_id=self._memory.boot_id,
             tool_slot=self._tools.selected,
             answer=program.answer,
-            tcp=self._units.given(CoordRef(*tcp)),
-            axes=self._units.given_axes(group.values, kinds),
             kinematics=self._tools.kinematics_code,
-            axis_count=len(kinds),
+            axis_count=len(group.kinematics.kinds),
             capabilities=program.capabilities,
             unit_um=self._units.unit_um,
             rejected=program.inbox.rejected,

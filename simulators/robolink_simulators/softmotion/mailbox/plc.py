@@ -5,6 +5,7 @@ from typing import Final
 
 from robolink.protocols.mailbox import (
     DEVICE_START,
+    RESPONSE,
     RESPONSE_WORDS,
     SLOT_WORDS,
     WordOrder,
@@ -128,6 +129,9 @@ class Plc:
     def read(self, first: int, count: int, now_ns: int) -> Words:
         """Return words of response, slots and device block."""
         slot, offset = divmod(first - RESPONSE_WORDS, SLOT_WORDS)
+        if self._frozen is None and first + count <= RESPONSE.at("tcp").start:
+            told = self._outbox.beginning(self.program, self._heartbeat(now_ns))
+            return told[first : first + count]
         if first + count <= RESPONSE_WORDS:
             return self.response(now_ns)[first : first + count]
         if first >= DEVICE_START:

@@ -1,4 +1,4 @@
-"""The frames of a stop: registers read and written, without pymodbus. No I/O.
+"""Registers read and written, without pymodbus: the frames of a stop and of a look. No I/O.
 
 A stop may not wait for an import: pymodbus alone takes longer to load than everything else that
 a stop needs before its frame (docs/decisions/0017). So functions 3, 4 and 16 and their refusals
@@ -17,7 +17,7 @@ _HEADER: Final = struct.Struct(">HHHB")
 _MOST_BYTES_COUNTED: Final = 254  # unit and PDU, in the header of a TCP frame
 
 
-class StopTcpFraming:
+class RegisterTcpFraming:
     """See :class:`._modbus_frames.TcpFraming`."""
 
     def pack(self, request: ModbusRequest, transaction: int) -> bytes:
@@ -40,7 +40,7 @@ class StopTcpFraming:
         return _reply(unit, payload, transaction)
 
 
-class StopRtuFraming:
+class RegisterRtuFraming:
     """See :class:`._modbus_frames.RtuFraming`."""
 
     def pack(self, request: ModbusRequest, transaction: int) -> bytes:  # noqa: ARG002 - not numbered

@@ -1,0 +1,139 @@
+"""A process that has a controller stops it for its own user, and for nobody else."""
+
+import json
+import os
+import socket
+import stat
+import threading
+
+import pytest
+from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.hosting.tcp import serve_tcp
+
+import robolink
+from robolink.errors import OutcomeUnknownError, RejectedError, StoppedError
+from robolink.model import MotionProfile, WorkBox
+from robolink.stopping import HolderGoneError, StopListener, far_end_of, holders_of
+
+
+@pytest.fixture(params=["path", "loopback"])
+def controller(request, monkeypatch, tmp_path):
+    """An open controller; ``loopback`` is for paths, and systems, without local sockets."""
+    if request.param == "loopback":
+        monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / ("long" * 30)))
+    with serve_tcp(EpsonSimulator(seed=3)) as host, robolink.connect(host.url) as controller:
+        yield controller
+
+
+def url_of(controller):
+    return controller.identity
+
+
+def holder_of(controller):
+    (holder,) = holders_of(far_end_of(url_of(controller)))
+    return holder
+
+
+def test_who_asks_is_named_and_the_latch_is_closed(controller):
+    heard: list[str] = []
+    with StopListener(controller, url_of(controller), who="line 3", heard=heard.append):
+        holder = holder_of(controller)
+        assert holder.who == "line 3"
+        assert holder.ask_to_stop("anna") == "ready"
+        assert heard == ["anna"]
+        controller.latch.release()
+        assert holder.ask_to_stop("bert") == "ready"  # it goes on listening
+    group = controller.groups[0]
+    with pytest.raises(StoppedError):
+        group.move_to(group.pose(), MotionProfile(), box=WorkBox())
+    assert list(holders_of(far_end_of(url_of(controller)))) == []
+    with pytest.raises(HolderGoneError):
+        holder.ask_to_stop("anna")
+
+
+def test_only_the_user_himself_may_read_where_to_knock(controller):
+    with StopListener(controller, url_of(controller)):
+        holder = holder_of(controller)
+        assert stat.S_IMODE(holder.card.parent.stat().st_mode) == 0o700
+        assert stat.S_IMODE(holder.card.stat().st_mode) == 0o600
+        if isinstance(holder.place, str):
+            assert stat.S_IMODE(os.stat(holder.place).st_mode) == 0o600
+
+
+@pytest.mark.parametrize("said", [b'{"token": "wrong"}\n', b"{}\n", b"\xff\n", b"[1]\n", b""])
+def test_without_the_token_nothing_is_stopped(controller, said):
+    with StopListener(controller, url_of(controller)):
+        holder = holder_of(controller)
+        with holder._knock() as line:
+            line.sendall(said)
+            line.shutdown(socket.SHUT_WR)
+            assert line.recv(10) == b""
+        controller.latch.require_open("the check")
+        assert holder.ask_to_stop("anna") == "ready"  # and the next one is served
+
+
+def test_another_address_is_not_this_controller(controller):
+    with StopListener(controller, url_of(controller)):
+        assert list(holders_of(far_end_of("epson+tcp://127.0.0.1:1"))) == []
+        assert list(holders_of(far_end_of(url_of(controller).replace("127.0.0.1", "localhost"))))
+
+
+class Refusing:
+    """A controller that cannot be stopped."""
+
+    def __init__(self, error):
+        self._error = error
+
+    def stop(self):
+        raise self._error
+
+    def status(self):
+        raise AssertionError
+
+
+@pytest.mark.parametrize(
+    ("error", "told"),
+    [
+        (RejectedError("no", remedy="do it there", code=20), RejectedError),
+        (OutcomeUnknownError("no", remedy="do it there"), OutcomeUnknownError),
+        (ZeroDivisionError("no"), OutcomeUnknownError),
+    ],
+)
+def test_a_stop_that_fails_is_told_as_it_is(error, told):
+    with StopListener(Refusing(error), "epson+tcp://127.0.0.1:5000"):
+        (holder,) = holders_of(far_end_of("epson+tcp://127.0.0.1:5000"))
+        with pytest.raises(told, match="no"):
+            holder.ask_to_stop("anna")
+
+
+def test_whoever_leaves_the_controller_waits_for_the_stop_under_way(controller):
+    begun, go_on, ends = threading.Event(), threading.Event(), []
+
+    def heard(_who):
+        begun.set()
+        go_on.wait(10)
+
+    listener = StopListener(controller, url_of(controller), heard=heard)
+    holder = holder_of(controller)
+    asking = threading.Thread(target=lambda: ends.append(holder.ask_to_stop("anna")))
+    asking.start()
+    assert begun.wait(10)
+    leaving = threading.Thread(target=listener.close)
+    leaving.start()
+    go_on.set()
+    leaving.join(10)
+    asking.join(10)
+    assert ends == ["ready"]
+
+
+def test_what_a_dead_process_left_is_taken_away(tmp_path):
+    url = "epson+tcp://127.0.0.1:5000"
+    with StopListener(Refusing(OSError()), url):
+        (holder,) = holders_of(far_end_of(url))
+        card = json.loads(holder.card.read_text())
+        gone = holder.card.with_name("1-dead.json")
+        gone.write_text(json.dumps(card | {"pid": 2**22 + 1}))
+        assert [found.card for found in holders_of(far_end_of(url))] == [holder.card]
+        assert not gone.exists()
+        gone.write_text("{")
+        assert len(list(holders_of(far_end_of(url)))) == 1

@@ -160,12 +160,6 @@ class UnfinishedController:
     def selected(self):
         raise NotReadyError("The safety guard is open.", reason=NotReadyReason.GUARD_OPEN)
 
-    trouble = None
-    remarks = ()
-
-    def at_work(self):
-        return ""
-
     def open_markers(self):
         when = "2025-01-01T00:00:00+00:00"
         return (

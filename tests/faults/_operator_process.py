@@ -116,6 +116,7 @@ def _operate(
     url, folder, name, wanted, later_s = task
     clock = ManualClock(round(later_s * NS_PER_S))
     signature = Signature(operator=name)
+    os.environ["ROBOLINK_STATE_DIR"] = folder  # a PC of his own, where the folder is
     outcomes = open_journal(f"{folder}/journal.db").log(url, signature=signature, clock=clock)
     try:
         with robolink.connect(url, outcomes=outcomes, timeout_s=1.0) as controller:

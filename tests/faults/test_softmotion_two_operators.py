@@ -112,7 +112,8 @@ def test_a_write_counts_as_done_when_the_group_s_own_tool_was_read_too(cell, oth
     ann.step()
     ann.advance_to("mailbox command")  # she asks which tool the group works with
     ann.step()
-    assert bob(cell, other_pc).how == "LeaseHeldError"
+    refused = bob(cell, other_pc)
+    assert refused.how == "LeaseHeldError", refused.said
     ended = ann.end()
     # His refused request has taken the place of her answer in the mailbox.
     assert ended.how == "OutcomeUnknownError"

@@ -115,8 +115,8 @@ class Placements:
                 self._stop(self._controller, held=point is Point.HELD)
 
     def _placeable(self, here: Placement) -> bool:
-        # After the logout there is no session left that could stop anything.
-        over = here.point is Point.EXCHANGE and here.what == "Logout"
+        # Once the logout is on its way there is no session left that could stop anything.
+        over = here.point in (Point.HELD, Point.EXCHANGE) and here.what == "Logout"
         return self._controller is not None and here not in self.distinct and not over
 
     def _stop(self, controller: Controller, *, held: bool) -> None:

@@ -15,6 +15,7 @@ from robolink.config._files import config_files, read_document
 from robolink.durable_files import file_name, make_folder, state_folder, write_whole
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink.named_files import read_named
 
 _KIND = "cells"
 
@@ -102,7 +103,7 @@ def proof_of_files() -> str:
     try:
         for file in config_files():
             if file.present:
-                content = file.path.read_bytes()
+                content = read_named(file.path)
                 digest.update(f"{file.path} {len(content)} ".encode() + content)
     except OSError:
         return ""

@@ -51,7 +51,7 @@ class Traces:
 def leave_trace(identity: str, journal: str) -> None:
     """Note that a controller is changed from here; a state folder that is full is no matter."""
     path = _path(identity)
-    if path.exists():
+    if _is_there(path):
         return
     known = {"schema": _SCHEMA, "controller": identity, "journal": journal, "since": wall_label()}
     with suppress(OSError):
@@ -62,7 +62,7 @@ def leave_trace(identity: str, journal: str) -> None:
 def traces_of(names: tuple[str, ...]) -> Traces | None:
     """Return the signs of a controller under any of its names, ``None`` for none."""
     backups = (state_folder("backups") / file_name(name) for name in names)
-    backup = next((path for path in backups if path.exists()), None)
+    backup = next((path for path in backups if _is_there(path)), None)
     for name in names:
         try:
             known = json.loads(_path(name).read_bytes())
@@ -70,6 +70,14 @@ def traces_of(names: tuple[str, ...]) -> Traces | None:
         except (OSError, ValueError, KeyError, TypeError):
             continue
     return None if backup is None else Traces("", "", backup)
+
+
+def _is_there(path: Path) -> bool:
+    """Tell whether a file is there; in a folder that may not be looked into nothing is."""
+    try:
+        return path.exists()
+    except OSError:
+        return False
 
 
 def _path(identity: str) -> Path:

@@ -100,6 +100,9 @@ class StopListener:
         self._card.unlink(missing_ok=True)
         if self._path:
             Path(self._path).unlink(missing_ok=True)
+        self._close_sockets()
+
+    def _close_sockets(self) -> None:
         for one in (self._socket, self._wake, self._awake):
             one.close()
 
@@ -122,8 +125,8 @@ class StopListener:
             with open(descriptor, "w", encoding="utf-8") as file:
                 json.dump(card, file)
             os.replace(draft, self._card)
-        except OSError:
-            self._socket.close()
+        except BaseException:
+            self._close_sockets()
             raise
 
     def _listen(self) -> None:

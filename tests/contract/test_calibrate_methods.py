@@ -201,7 +201,8 @@ def test_what_cannot_be_is_refused_and_nothing_is_written(arm, words, code, name
 
 def test_a_tool_that_somebody_changed_has_no_last_touch(arm):
     assert arm.calibrate("n-angle", "--station", "PIN-07", "--count", "3").code == 0
-    arm.run("tool", "set", "1", "--x", "1", "--y", "2", "--z", "-20")
+    set_by_hand = ("--x", "1", "--y", "2", "--z", "-20", "--accept-jump", "20")
+    assert arm.run("tool", "set", "1", *set_by_hand).code == 0
     refused = arm.calibrate("one-touch", "--station", "PIN-07")
     assert (refused.code, refused.document["error"]["code"]) == (7, "reference_outdated")
 

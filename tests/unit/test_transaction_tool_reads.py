@@ -87,7 +87,7 @@ def test_what_is_stored_already_is_asked_for_by_itself_before_the_write_is_left_
 
 
 def test_a_tool_that_was_cleared_here_is_asked_for_again(cell, controller):
-    controller.tools.clear(1, expected=controller.tools.read(1))
+    controller.tools.clear(1, expected=controller.tools.read(1), then_select=0)
     assert controller.tools.read(1) is None
     controller.tools.write(1, OTHER, expected=None)
     assert controller.tools.read(1) == OTHER

@@ -43,7 +43,7 @@ def moving(state_folder):
         here = controller.groups[0].pose()
         controller.groups[0].move_to(replace(here, z_mm=here.z_mm + 30), CREEPING, box=WorkBox())
         assert isinstance(controller, EpsonController)
-        controller._session._transport.close()
+        controller._session.close()
         controller.outcomes.close()  # the lease of the one who died
         simulator.url = host.url
         yield simulator

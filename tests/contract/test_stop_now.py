@@ -42,7 +42,7 @@ def left_moving(cell, **options):
     group = controller.groups[0]
     here = group.pose()
     group.move_to(replace(here, z_mm=here.z_mm + 30), CREEPING, box=ANYWHERE)
-    controller._session._transport.close()
+    controller._session.close()
 
 
 @pytest.mark.parametrize("habits", HABITS, ids=str)
@@ -151,7 +151,7 @@ def test_a_group_whose_client_died_is_brought_to_rest_and_held(plc):
     group = controller.groups[0]
     here = group.pose()
     group.move_to(above(here, 30), SLOW, box=ANYWHERE)
-    controller._mailbox.wire._link.close()
+    controller._mailbox.wire.close()
     status = stop_now(plc.url)
     assert (status.running, status.paused) == (False, True)
     with plc.connect() as controller:

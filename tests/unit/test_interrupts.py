@@ -10,11 +10,12 @@ from robolink.interrupts import InterruptGate
 
 @pytest.fixture
 def gate():
+    before = signal.getsignal(signal.SIGINT)
     gate = InterruptGate()
     gate.open()
     yield gate
     gate.close()
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    assert signal.getsignal(signal.SIGINT) == before
 
 
 def test_an_interrupt_inside_the_gate_is_raised_at_its_end(gate):

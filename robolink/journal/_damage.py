@@ -30,11 +30,13 @@ def damage(tables: "Tables", names: tuple[str, ...]) -> Iterator[str]:
         for (answer,) in tables.runner.rows(check):
             if answer != "ok":
                 yield tr("A table is damaged: {text}.", text=str(answer).strip().rstrip("."))
-    newest = tables.entries.page(Filter(), before=None, after=None, limit=_NEWEST)
+    newest, head = tables.entries.settled(
+        lambda: tables.entries.page(Filter(), before=None, after=None, limit=_NEWEST)
+    )
     chain = ChainCheck.before(newest[-1]) if newest else ChainCheck()
     for row in reversed(newest):
         yield from chain.problems_of(row)
-    yield from chain.problems_at_end(tables.entries.head())
+    yield from chain.problems_at_end(head)
     seen = {row["number"] for row in newest}
     own = tables.entries.page(Filter(names), before=None, after=None, limit=_NEWEST)
     for row in own:

@@ -1,10 +1,10 @@
 """Statements about entries."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
 from datetime import UTC, datetime
 from functools import lru_cache
-from typing import Any, Final, TypeAlias
+from typing import Any, Final, TypeAlias, TypeVar
 
 from sqlalchemy import Connection, Select, bindparam, func, insert, select, update
 
@@ -14,7 +14,12 @@ from robolink.journal._records import Filter
 from robolink.journal._tables import ENTRIES, HEAD, IN_A_CHANGE
 from robolink.model import EntryKind, NewEntry, Signature
 
+T = TypeVar("T")
+
 _Head: TypeAlias = tuple[int, str]
+
+_LOOKS: Final = 100
+"""After so many in which others wrote each time something else is wrong."""
 
 # The kinds whose value was read on the controller.
 _PROVING: Final = (EntryKind.READ_BACK, EntryKind.DONE, EntryKind.ROLLED_BACK)
@@ -102,6 +107,24 @@ class EntryRows:
         """Return number and hash of the entry that was stored last."""
         row = self._connection.execute(_SELECT_HEAD).one_or_none()
         return None if row is None else (row.number, row.hash)
+
+    def settled(self, read: Callable[[], T]) -> tuple[T, _Head | None]:
+        """Read something together with the head, as both were at one instant.
+
+        Other processes may add entries between two statements, and every entry changes the head:
+        so what was read between two equal heads belongs to them. A durable commit takes longer
+        than such a look, so that one of a few finds the journal as it was.
+
+        Args:
+            read: Reads what is to be compared with the head.
+        """
+        head = self.head()
+        for _ in range(_LOOKS):
+            found, after = read(), self.head()
+            if after == head:
+                break
+            head = after
+        return found, head
 
     def _locked_head(self) -> _Head:
         number, last_hash = self._connection.execute(_SELECT_HEAD.with_for_update()).one()

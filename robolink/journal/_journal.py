@@ -142,11 +142,11 @@ class Journal:
         Raises:
             JournalError: It cannot be read, or a newer robolink made it.
         """
-        # The last number comes first: whatever is added from here on is behind the head too.
+        # Whatever is added from here on is behind both.
         with self._store.read() as tables:
             if tables.newer:
                 raise _too_new(self.location)
-            last, head = tables.entries.last_number(), tables.entries.head()
+            last, head = tables.entries.settled(tables.entries.last_number)
         check = ChainCheck()
         problems: list[str] = []
         for page in self._pages(Filter(newest_first=False), before=last + 1):

@@ -14,6 +14,7 @@ from sqlalchemy import Engine, event
 
 from robolink.errors import JournalError
 from robolink.journal import EntryKind, NewEntry, Verification, memory_journal, open_journal
+from robolink.journal._entry_rows import EntryRows
 from tests.contract.journal._acts import marker
 
 ROOT = Path(__file__).parents[3]
@@ -304,3 +305,23 @@ def test_many_entries_do_not_slow_down_the_questions_of_every_day(path, open_ane
     assert any("entries_with_value" in plan[0] for plan in plans.values())
     assert sum("entries_by_change" in plan[0] for plan in plans.values()) == 2
     assert journal.last_value("cell", 3).number == 1
+
+
+def test_an_entry_that_another_process_adds_during_the_look_is_no_damage(
+    filled, open_anew, monkeypatch
+):
+    """The look for damage reads entries and head one after the other."""
+    page, added = EntryRows.page, []
+
+    def overtaken(rows, *args, **kwargs):
+        found = page(rows, *args, **kwargs)
+        if len(added) < 3:
+            added.append(None)  # before the append, which looks itself
+            open_anew(str(filled)).log("another").append(NewEntry(EntryKind.DONE))
+        return found
+
+    log = open_anew(str(filled)).log("cell")
+    monkeypatch.setattr(EntryRows, "page", overtaken)
+    log.begin(marker("b"))
+    assert len(added) == 3
+    assert open_anew(str(filled)).verify().problems == ()

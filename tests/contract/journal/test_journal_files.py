@@ -311,7 +311,8 @@ def test_an_entry_that_another_process_adds_during_the_look_is_no_damage(
     filled, open_anew, monkeypatch
 ):
     """The look for damage reads entries and head one after the other."""
-    page, added = EntryRows.page, []
+    page = EntryRows.page
+    added: list[None] = []
 
     def overtaken(rows, *args, **kwargs):
         found = page(rows, *args, **kwargs)

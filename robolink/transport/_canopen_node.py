@@ -27,8 +27,7 @@ _BOOT_UP: Final = 0
 _HEAD: Final = struct.Struct("<HBBHH")
 """TPDO1: ack, state, group_state, error_class, heartbeat (softmotion.md 4.8)."""
 _MISSED: Final = 3
-_SHORTEST_LOSS_S: Final = 1.0
-"""A computer that is busy looks late; what moves, the PLC watches itself by our beats."""
+_SHORTEST_LOSS_S: Final = 0.5
 
 _MOST_WAITING: Final = 10_000
 """Frames that may have come while nobody listened: more than a second of a full bus at 1 Mbit/s

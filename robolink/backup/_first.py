@@ -38,6 +38,9 @@ def keep_first_backup(controller: ToolHolder) -> Path | None:
     if any(first_backup_path(name).exists() for name in (identity, *former)):
         return None
     backup = take_backup(controller)
+    # Before it is there: a backup that is not on record is a sign that the record was lost.
+    verdict = tr("saved in {path}", path=path)
+    controller.outcomes.append(NewEntry(EntryKind.BACKUP, verdict=verdict))
     try:
         make_folder(path.parent)
         save(backup, path)
@@ -54,6 +57,4 @@ def keep_first_backup(controller: ToolHolder) -> Path | None:
             ),
             controller=controller.identity,
         ) from error
-    # A backup that is not on record is a sign that the record was lost.
-    controller.outcomes.append(NewEntry(EntryKind.BACKUP, verdict=tr("saved in {path}", path=path)))
     return path

@@ -15,8 +15,8 @@ from robolink_cli._sensor_option import sensor_option
 from robolink_cli.calibrate._frame import Frame
 
 if TYPE_CHECKING:
-    from robolink.calibration import CameraStation
     from robolink.model import Controller
+    from robolink.stations import CameraStation
 
 
 @dataclass(frozen=True, slots=True)

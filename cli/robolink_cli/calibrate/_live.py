@@ -9,12 +9,12 @@ from robolink.nozzle_change import (
     ChangePlan,
     NozzleChange,
     Proposal,
-    TipSource,
     ToolReport,
     preview,
     require_inside,
     require_ready,
 )
+from robolink.procedures import TipSource
 from robolink.transaction import earlier_corrections
 from robolink_cli._calibration_views import (
     doubts,
@@ -38,7 +38,7 @@ from robolink_cli.calibrate._pins import remark_on_pin
 
 class _LiveListener(CalibrationListener):
     def __init__(self, draft: Draft, plan: ChangePlan, impact: ImpactRequest | None) -> None:
-        super().__init__(draft, plan.tools[0].gate, impact)
+        super().__init__(draft, plan.tools[0].criteria, impact)
         self._source = plan.tools[0].source
 
     def proposed(self, proposals: Sequence[Proposal]) -> None:

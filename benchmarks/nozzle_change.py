@@ -5,7 +5,7 @@ from statistics import median
 from time import perf_counter_ns
 
 from robolink_cli._operator import AssistedOperator
-from robolink_simulators.hosting.in_process import simulator_named, unregister
+from robolink_simulators.hosting.in_process.epson import simulator_named, unregister
 
 import robolink
 from benchmarks.table import Figure

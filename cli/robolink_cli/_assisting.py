@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from robolink_simulators.assist import AssistClient
+from robolink_simulators.assist.port import AssistClient
 
 from robolink.errors import ConfigError
 from robolink.messages import tr

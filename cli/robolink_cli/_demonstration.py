@@ -4,11 +4,11 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from robolink_simulators.clock import ScaledClock
+from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.hosting.plc_in_process import simulator_named
-from robolink_simulators.hosting.tcp import serve_tcp
-from robolink_simulators.world import Look
+from robolink_simulators.epson.world import Look
+from robolink_simulators.hosting.in_process.softmotion import simulator_named
+from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 
 import robolink
 from robolink.errors import VerifyError

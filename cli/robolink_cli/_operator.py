@@ -13,7 +13,7 @@ from robolink_cli._lines import QUIET_S, Lines, open_lines
 from robolink_cli._render import note
 
 if TYPE_CHECKING:
-    from robolink_simulators.places import Axis, XyzMm
+    from robolink_simulators.cell.places import Axis, XyzMm
 
 WAY_MM: Final = 60.0
 """How far the stand-in jogs to show an axis."""
@@ -197,7 +197,7 @@ def operator_at(assist_url: str | None, tool: Callable[[], int]) -> Iterator[Ope
     if assist_url is None:
         yield terminal()
         return
-    from robolink_simulators.assist import open_eyes
+    from robolink_simulators.assist.port import open_eyes
 
     with open_eyes(assist_url) as eyes:
 

@@ -24,7 +24,7 @@ def serve_recording(
         ConfigError: The file is no recording, or an option was given that says how a
             simulator behaves: a recording behaves as recorded.
     """
-    from robolink_simulators.replay import ReplayDevice, read_recording, serve_replay
+    from robolink_simulators.hosting.replay import ReplayDevice, read_recording, serve_replay
 
     _refuse_habits()
     dialogues = read_recording(recording)

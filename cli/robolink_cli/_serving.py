@@ -13,7 +13,7 @@ from robolink_cli._render import json_is_on
 from robolink_cli._sink import hand_over, show
 
 if TYPE_CHECKING:
-    from robolink_simulators.world_parameters import WorldParameters
+    from robolink_simulators.cell.world_parameters import WorldParameters
 
 
 class Termination:
@@ -89,7 +89,7 @@ def world_from(texts: Sequence[str]) -> "WorldParameters":
     Raises:
         ConfigError: It is not NAME=VALUE, or there is no such parameter.
     """
-    from robolink_simulators.world_parameters import WorldParameters, parameters_from_text
+    from robolink_simulators.cell.world_parameters import WorldParameters, parameters_from_text
 
     pairs = named_values(texts, "--world camera_noise_px=0.3")
     return replace(WorldParameters(), **parameters_from_text(pairs))  # type: ignore[arg-type]

@@ -5,8 +5,8 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
-from robolink_simulators.assist import serve_assist
-from robolink_simulators.clock import ScaledClock
+from robolink_simulators.assist.port import serve_assist
+from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 from robolink.errors import ConfigError
@@ -15,7 +15,7 @@ from robolink_cli._serving import Termination, announce, host_and_port
 from robolink_cli._sim_options import DEFAULT_ADDRESS
 
 if TYPE_CHECKING:
-    from robolink_simulators.hosting.canopen_node import CanPlace
+    from robolink_simulators.hosting.fieldbus.canopen_node import CanPlace
 
 _PTY: Final = "pty"
 _MULTICAST: Final = "udp_multicast"
@@ -62,18 +62,18 @@ def _served(
     if address is None and buses.modbus_rtu is None and buses.can is None:
         address = DEFAULT_ADDRESS
     if address is not None:
-        from robolink_simulators.hosting.modbus import serve_modbus_tcp
+        from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_tcp
 
         host, port = host_and_port(address, "--modbus-tcp")
         tcp = serve_modbus_tcp(simulator, host, port, clock=clock, allow_remote=buses.allow_remote)
         urls["modbus-tcp"] = stack.enter_context(tcp).url
     if buses.modbus_rtu is not None:
-        from robolink_simulators.hosting.modbus import serve_modbus_rtu
+        from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_rtu
 
         rtu = serve_modbus_rtu(simulator, unit=buses.unit, clock=clock)
         urls["modbus-rtu"] = stack.enter_context(rtu).url
     if buses.can is not None:
-        from robolink_simulators.hosting.canopen_node import serve_canopen
+        from robolink_simulators.hosting.fieldbus.canopen_node import serve_canopen
 
         can = serve_canopen(simulator, _can_place(buses.can, buses.node), clock=clock)
         urls["can"] = stack.enter_context(can).url
@@ -81,7 +81,7 @@ def _served(
 
 
 def _can_place(text: str, node: int) -> "CanPlace":
-    from robolink_simulators.hosting.canopen_node import MULTICAST_PORT, CanPlace
+    from robolink_simulators.hosting.fieldbus.canopen_node import MULTICAST_PORT, CanPlace
 
     interface, _, channel = text.partition(":")
     port = str(MULTICAST_PORT)

@@ -48,7 +48,7 @@ def sim_plc(
 
     Both buses may be given; one PLC stands behind them.
     """
-    from robolink_simulators.clock import ScaledClock
+    from robolink_simulators.cell.clock import ScaledClock
     from robolink_simulators.plc import PlcSimulator, serve_plc, serve_plc_line
 
     from robolink.register_maps import load_map

@@ -9,7 +9,7 @@ import pytest
 from robolink_cli import _lazy, _render, main
 from robolink_cli._context import controller_options, json_option
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.hosting.in_process import register, unregister
+from robolink_simulators.hosting.in_process.epson import register, unregister
 
 _numbers = count()
 

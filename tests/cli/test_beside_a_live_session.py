@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 from robolink_cli import main
-from robolink_simulators.hosting.modbus import serve_modbus_tcp
+from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_tcp
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 import robolink

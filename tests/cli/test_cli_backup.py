@@ -6,7 +6,7 @@ from itertools import count
 import pytest
 from robolink_cli import _consent, main
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.hosting.in_process import register, unregister
+from robolink_simulators.hosting.in_process.epson import register, unregister
 
 from robolink.backup import load
 from robolink.errors import DeclinedError

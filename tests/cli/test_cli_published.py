@@ -5,7 +5,7 @@ import json
 import pytest
 from robolink_cli import _companions
 from robolink_simulators.epson.condition import Task
-from robolink_simulators.hosting.in_process import clock_of
+from robolink_simulators.hosting.in_process.epson import clock_of
 
 from robolink.model import ToolOffset
 

@@ -6,7 +6,7 @@ import pytest
 from robolink_cli import jog, main
 from robolink_cli.calibrate import _options
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.hosting.in_process import register, unregister
+from robolink_simulators.hosting.in_process.epson import register, unregister
 
 from robolink.config._settings import CellSettings
 from robolink.journal import memory_journal

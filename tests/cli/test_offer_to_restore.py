@@ -3,7 +3,7 @@
 import pytest
 from robolink_cli import _consent, _offering, _operator, main
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.hosting.in_process import register, unregister
+from robolink_simulators.hosting.in_process.epson import register, unregister
 
 import robolink
 from robolink.controllers.epson import EpsonController

@@ -14,10 +14,10 @@ import click
 import pytest
 from robolink_cli import _consent, _operator, entry, main
 from robolink_cli._stop_request import FLAGS, VALUES, StopRequest, read_stop
-from robolink_simulators.clock import ScaledClock
+from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.hosting.modbus import serve_modbus_tcp
-from robolink_simulators.hosting.tcp import serve_tcp
+from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_tcp
+from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 import robolink

@@ -18,7 +18,7 @@ from typing import Final, Literal
 
 import pytest
 from robolink_cli import _operator
-from robolink_simulators.clock import ManualClock
+from robolink_simulators.cell.clock import ManualClock
 
 from robolink.journal._store import Store, Tables
 from robolink.runner import Question

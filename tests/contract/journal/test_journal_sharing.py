@@ -5,7 +5,7 @@ import threading
 from dataclasses import replace
 
 import pytest
-from robolink_simulators.clock import ManualClock
+from robolink_simulators.cell.clock import ManualClock
 
 from robolink.errors import JournalError, LeaseHeldError, LeaseLostError
 from robolink.journal import EntryKind, NewEntry, Verification, open_journal

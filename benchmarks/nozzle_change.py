@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from statistics import median
 from time import perf_counter_ns
 
-from robolink_cli._operator import AssistedOperator
+from robolink_cli.prompts.operator import AssistedOperator
 from robolink_simulators.hosting.in_process.epson import simulator_named, unregister
 
 import robolink

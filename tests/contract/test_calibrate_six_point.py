@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import pytest
-from robolink_cli._operator import AssistedOperator
+from robolink_cli.prompts.operator import AssistedOperator
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 

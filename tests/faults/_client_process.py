@@ -20,7 +20,7 @@ _FORKS.set_forkserver_preload(
         "robolink_cli.calibrate",
         "robolink_cli.calibrate.two_pose",
         "robolink_cli.calibrate._live",
-        "robolink_cli._password",
+        "robolink_cli.session.password",
         "robolink.transport._tcp",
         "robolink.transport._modbus_open",
         "robolink.journal._store",

@@ -17,7 +17,7 @@ from itertools import groupby
 from typing import Final, Literal
 
 import pytest
-from robolink_cli import _operator
+from robolink_cli.prompts import operator as _operator
 from robolink_simulators.cell.clock import ManualClock
 
 from robolink.journal._store import Store, Tables

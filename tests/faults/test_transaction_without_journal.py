@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from robolink_cli._exit import USAGE
+from robolink_cli.console.exit_codes import USAGE
 
 from robolink.errors import JournalError
 from robolink.journal import EntryKind, NewEntry, _engines, open_journal

@@ -6,7 +6,7 @@ from dataclasses import replace
 from statistics import fmean, pstdev
 
 import pytest
-from robolink_cli._serving import world_from
+from robolink_cli.commands.simulate.serving import world_from
 from robolink_simulators.assist.acts import perform
 from robolink_simulators.cell.camera import CameraOptics, UpCamera
 from robolink_simulators.cell.tip_switches import LightBeam

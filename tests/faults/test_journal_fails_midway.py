@@ -10,7 +10,7 @@ import pytest
 from robolink_cli.console.exit_codes import USAGE
 
 from robolink.errors import JournalError
-from robolink.journal._store import Store
+from robolink.journal.store.store import Store
 from robolink.model import MarkerKind
 from tests.faults._nozzle_cell import OLD_TIP, served_cell
 

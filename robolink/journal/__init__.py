@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from robolink.journal._opening import open_log as open_log
     from robolink.journal._places import default_location as default_location
     from robolink.journal._places import may_exist as may_exist
-    from robolink.journal._records import Verification as Verification
-    from robolink.journal.leases.processes import Holder as Holder
+    from robolink.journal._records import ChainVerification as ChainVerification
+    from robolink.journal.leases.processes import LeaseHolder as LeaseHolder
     from robolink.journal.leases.processes import signature_here as signature_here
     from robolink.journal.leases.processes import this_process as this_process
     from robolink.journal.leases.sightings import LEASE_S as LEASE_S
@@ -39,8 +39,8 @@ else:
             "logs.looking": "LookingLog",
             "_opening": "close_files memory_journal open_journal open_log",
             "_places": "default_location may_exist",
-            "leases.processes": "Holder signature_here this_process",
-            "_records": "Verification",
+            "leases.processes": "LeaseHolder signature_here this_process",
+            "_records": "ChainVerification",
             "leases.sightings": "LEASE_S",
         },
     )

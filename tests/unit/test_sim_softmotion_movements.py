@@ -11,7 +11,7 @@ from robolink_simulators.softmotion import (
     CoordSystem,
     Dynamics,
     ErrorKind,
-    GroupState,
+    SmcGroupState,
     Target,
     machine_named,
 )
@@ -157,7 +157,7 @@ def test_a_target_out_of_reach_is_refused_and_nothing_moves(target, expected, li
     group = standing()
     command = group.move_linear_absolute if line else group.move_direct_absolute
     assert kind(command(target, LINE if line else FACTORS)) is expected
-    assert group.state is GroupState.STANDBY
+    assert group.state is SmcGroupState.STANDBY
     assert group.movements_started == 0
 
 

@@ -26,7 +26,7 @@ from robolink_cli.calibrate._pins import remark_on_pin
 from robolink_cli.console.render import note, say
 from robolink_cli.options.impact import impact_payload, show_impact
 from robolink_cli.options.pose_source import PoseSource
-from robolink_cli.options.report import Draft, reporting
+from robolink_cli.options.report import ReportDraft, reporting
 from robolink_cli.prompts.consent import agree, on_terminal
 from robolink_cli.prompts.operator import terminal
 from robolink_cli.session.context import CliContext, open_controller
@@ -40,7 +40,7 @@ class _PosesListener(CalibrationListener):
 
     def __init__(
         self,
-        draft: Draft,
+        draft: ReportDraft,
         frame: Frame,
         given: GivenPoses,
         *,

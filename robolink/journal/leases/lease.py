@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Final
 
 from robolink.errors import LeaseHeldError, LeaseLostError
 from robolink.journal._chain import canonical, storable
-from robolink.journal.leases.processes import Holder
-from robolink.journal.leases.sightings import FREE, LEASE_S, Sighting
+from robolink.journal.leases.processes import LeaseHolder
+from robolink.journal.leases.sightings import FREE, LEASE_S, LeaseSighting
 from robolink.messages import tr
 from robolink.model import NewEntry, new_operation
 from robolink.timing import NS_PER_S, Clock, Deadline, wall_label
@@ -52,7 +52,7 @@ class Lease:
         clock: In which beats are stamped and watched.
     """
 
-    def __init__(self, store: "Store", controller: str, holder: Holder, clock: Clock) -> None:
+    def __init__(self, store: "Store", controller: str, holder: LeaseHolder, clock: Clock) -> None:
         self.controller = controller
         self._store = store
         self._holder = holder
@@ -61,7 +61,7 @@ class Lease:
         self._epoch = 0
         self._beaten_ns = 0
         self._lost = False
-        self._seen: tuple[Sighting, str] | None = None  # and why its holder may be replaced
+        self._seen: tuple[LeaseSighting, str] | None = None  # and why its holder may be replaced
 
     @property
     def held(self) -> bool:
@@ -173,7 +173,7 @@ class Lease:
         rows.end(self.controller)
         return seen.taken_entry(reason)
 
-    def _judged(self, seen: Sighting) -> tuple[Sighting, str]:
+    def _judged(self, seen: LeaseSighting) -> tuple[LeaseSighting, str]:
         """Return a lease that can be taken, and why if it is another's; or raise LeaseHeldError."""
         if seen.token in (FREE, self._token):
             return seen, ""
@@ -188,7 +188,7 @@ class Lease:
             return seen, ""
         return seen, tr("it gave no sign of life for {seconds:.0f} s", seconds=LEASE_S)
 
-    def _watched(self, seen: Sighting) -> Sighting:
+    def _watched(self, seen: LeaseSighting) -> LeaseSighting:
         """Watch a holder whose clock cannot be read here."""
         deadline = Deadline.after(self._clock, LEASE_S)
         while not deadline.expired:
@@ -200,7 +200,7 @@ class Lease:
                 raise self._held_error(now)
         return seen
 
-    def _sight(self) -> Sighting:
+    def _sight(self) -> LeaseSighting:
         with self._store.read(tr("The command was not sent.")) as tables:
             return tables.leases.sight(self.controller)
 
@@ -217,7 +217,7 @@ class Lease:
     def _lose(self) -> None:
         self._epoch, self._lost = 0, True
 
-    def _held_error(self, seen: Sighting) -> LeaseHeldError:
+    def _held_error(self, seen: LeaseSighting) -> LeaseHeldError:
         who = seen.who()
         if self._holder.shares_clock_with(who):
             silent_s = max(0, self._clock.now_ns() - seen.beat_ns) / NS_PER_S
@@ -238,5 +238,5 @@ class Lease:
 
 
 @lru_cache(maxsize=64)
-def _holder_text(holder: Holder, operator: str) -> str:
+def _holder_text(holder: LeaseHolder, operator: str) -> str:
     return canonical({**asdict(holder), "operator": operator})

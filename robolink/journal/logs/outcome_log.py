@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 from robolink.errors import JournalError, OutcomeUnknownError
 from robolink.journal._traces import leave_trace, traces_of
 from robolink.journal.leases.lease import Lease
-from robolink.journal.leases.processes import BootClock, Holder, this_process
+from robolink.journal.leases.processes import BootClock, LeaseHolder, this_process
 from robolink.journal.logs.naming import Names, Naming
 from robolink.messages import tr
 from robolink.model import EntryKind, Marker, MarkerKind, NewEntry, Recorded, Signature, Who
@@ -46,7 +46,7 @@ class JournalOutcomeLog:
         controller: str,
         *,
         signature: Signature,
-        holder: Holder | None = None,
+        holder: LeaseHolder | None = None,
         clock: Clock | None = None,
     ) -> None:
         self.signature = signature

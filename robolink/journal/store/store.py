@@ -8,10 +8,10 @@ from contextlib import AbstractContextManager, contextmanager
 from sqlalchemy import Connection, Engine
 from sqlalchemy.exc import SQLAlchemyError
 
-from robolink.checkpoints import Point, checkpoint
+from robolink.checkpoints import Checkpoint, checkpoint
 from robolink.errors import JournalError
 from robolink.journal._damage import damage
-from robolink.journal._places import Place
+from robolink.journal._places import JournalPlace
 from robolink.journal.store import migrations
 from robolink.journal.store.engines import Backend, backend_of
 from robolink.journal.store.entry_rows import EntryRows
@@ -19,7 +19,7 @@ from robolink.journal.store.failures import damaged_error, journal_error
 from robolink.journal.store.lease_rows import LeaseRows
 from robolink.journal.store.marker_rows import MarkerRows
 from robolink.journal.store.name_rows import NameRows
-from robolink.journal.store.prepared import Prepared, Runner
+from robolink.journal.store.prepared import Prepared, StatementRunner
 from robolink.messages import tr
 
 
@@ -41,7 +41,7 @@ class Tables:
         self, connection: Connection, version: int, self_checks: tuple[Prepared, ...]
     ) -> None:
         self.connection = connection
-        self.runner = Runner(connection)
+        self.runner = StatementRunner(connection)
         self.entries = EntryRows(connection, self.runner)
         self.markers = MarkerRows(self.runner)
         self.leases = LeaseRows(self.runner)
@@ -57,7 +57,7 @@ class Store:
     server that was restarted is found again.
     """
 
-    def __init__(self, place: Place, *, read_only: bool) -> None:
+    def __init__(self, place: JournalPlace, *, read_only: bool) -> None:
         self._place = place
         self._read_only = read_only
         self._lock = threading.RLock()
@@ -132,7 +132,7 @@ class Store:
     @contextmanager
     def _use(self, consequence: str, *, writing: bool) -> Iterator[Tables]:
         if writing:
-            checkpoint(Point.COMMIT, "before")
+            checkpoint(Checkpoint.COMMIT, "before")
         with self._lock:
             try:
                 backend, tables = self._connected(to_write=writing)
@@ -155,7 +155,7 @@ class Store:
                 self._drop()
                 raise journal_error(error, self._place.name, consequence) from error
         if writing:
-            checkpoint(Point.COMMIT, "after")
+            checkpoint(Checkpoint.COMMIT, "after")
 
     def _connected(self, *, to_write: bool) -> tuple[Backend, Tables]:
         if self._backend is None:

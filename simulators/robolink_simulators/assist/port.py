@@ -19,11 +19,11 @@ from robolink_simulators.assist.acts import Assisted, perform
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.cell.person import Look
 from robolink_simulators.cell.places import Axis, XyzMm
-from robolink_simulators.epson.refusals import Refusal
+from robolink_simulators.epson.refusals import SpelRefusal
 from robolink_simulators.hosting.in_process import epson as in_process
 from robolink_simulators.hosting.in_process import softmotion as plc_in_process
 from robolink_simulators.hosting.streams.tcp_host import TcpHost
-from robolink_simulators.softmotion.group.smc_errors import Refused
+from robolink_simulators.softmotion.group.smc_errors import BlockRefused
 
 _MAX_LINE: Final = 65536
 _SCHEME: Final = "assist+tcp"
@@ -101,7 +101,7 @@ class _AssistLink:
             return b""
         try:
             answer = {"ok": True, **perform(self._simulator, request)}
-        except (RobolinkError, Refusal, Refused) as error:
+        except (RobolinkError, SpelRefusal, BlockRefused) as error:
             answer = {"ok": False, "error": str(error)}
         return json.dumps(answer).encode() + b"\n"
 

@@ -7,7 +7,7 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.named_files import require_free, save_named
 from robolink.protocols.mailbox import (
-    Profile,
+    ExportProfile,
     electronic_data_sheet,
     register_map_csv,
     register_map_markdown,
@@ -15,7 +15,7 @@ from robolink.protocols.mailbox import (
 )
 
 
-def plc_texts(profile: Profile, base: int) -> Mapping[str, str]:
+def plc_texts(profile: ExportProfile, base: int) -> Mapping[str, str]:
     """Return the files by name; ``base`` is the first register of both blocks."""
     return {
         "register_map.csv": register_map_csv(base),

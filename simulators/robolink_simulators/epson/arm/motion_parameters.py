@@ -13,7 +13,7 @@ LIMZ_MARGIN_MM: Final = 0.02
 """Default of LimZMargin (spel.md 6.3)."""
 
 
-class Phase(IntEnum):
+class MotionPhase(IntEnum):
     """Which part of a Jump a leg belongs to; everything else is travel."""
 
     TRAVEL = 0
@@ -46,7 +46,7 @@ class MotionParameters:
     accel_r: float = 200.0
     limz_mm: float = 0.0
 
-    def joint_pace(self, *, power_high: bool, phase: Phase = Phase.TRAVEL) -> JointPace:
+    def joint_pace(self, *, power_high: bool, phase: MotionPhase = MotionPhase.TRAVEL) -> JointPace:
         """Return the pace of a joint-space leg.
 
         In low power the values may be set but are held to the defaults (documented,

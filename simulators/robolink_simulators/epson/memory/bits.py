@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from robolink_simulators.epson.refusals import Refusal, RefusalKind
+from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 
 IO_BITS: Final = 512
 """Inputs and outputs (spel.md 8: bit numbers 0 to 511)."""
@@ -51,7 +51,7 @@ class BitBank:
         """
         self._check(port * 8)
         if not 0 <= value <= 0xFF:
-            raise Refusal(RefusalKind.VALUE_OUT_OF_RANGE, f"Not a byte: {value}")
+            raise SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, f"Not a byte: {value}")
         self._bits[port * 8 : port * 8 + 8] = [bool(value >> i & 1) for i in range(8)]
 
     def clear(self) -> None:
@@ -60,4 +60,4 @@ class BitBank:
 
     def _check(self, number: int) -> None:
         if not 0 <= number < len(self._bits):
-            raise Refusal(RefusalKind.VALUE_OUT_OF_RANGE, f"There is no bit {number}")
+            raise SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, f"There is no bit {number}")

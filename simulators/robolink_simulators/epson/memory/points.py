@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from robolink.model import Hand, Pose, rotate_xy
-from robolink_simulators.epson.refusals import Refusal, RefusalKind
+from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 
 AXES: Final = "XYZUVW"
 """The order of a point's coordinates."""
@@ -90,7 +90,7 @@ class LocalTable:
             Refusal: It is not defined.
         """
         if number not in self._locals:
-            raise Refusal(RefusalKind.LOCAL_UNDEFINED, f"Local {number} is not defined")
+            raise SpelRefusal(RefusalKind.LOCAL_UNDEFINED, f"Local {number} is not defined")
         return self._locals[number]
 
     def define(self, number: int, local: Local) -> None:
@@ -100,7 +100,9 @@ class LocalTable:
             Refusal: There is no such local to define.
         """
         if not 1 <= number <= HIGHEST_LOCAL:
-            raise Refusal(RefusalKind.VALUE_OUT_OF_RANGE, f"There is no local {number} to define")
+            raise SpelRefusal(
+                RefusalKind.VALUE_OUT_OF_RANGE, f"There is no local {number} to define"
+            )
         self._locals[number] = local
 
     def to_base(self, point: Point) -> Point:
@@ -139,7 +141,7 @@ class PointTable:
             Refusal: The number does not exist (0 to 999) or nothing is stored.
         """
         if not self.defined(number):
-            raise Refusal(RefusalKind.POINT_UNDEFINED, f"Point P{number} is not defined")
+            raise SpelRefusal(RefusalKind.POINT_UNDEFINED, f"Point P{number} is not defined")
         return self._points[number]
 
     def defined(self, number: int) -> bool:
@@ -149,7 +151,7 @@ class PointTable:
             Refusal: The number does not exist.
         """
         if not 0 <= number <= HIGHEST_POINT:
-            raise Refusal(RefusalKind.SUBSCRIPT, f"There is no point P{number}")
+            raise SpelRefusal(RefusalKind.SUBSCRIPT, f"There is no point P{number}")
         return number in self._points
 
     def store(self, number: int, point: Point) -> None:
@@ -173,5 +175,5 @@ class PointTable:
             Refusal: The range runs backwards.
         """
         if first > last:
-            raise Refusal(RefusalKind.VALUE_OUT_OF_RANGE, f"Point range {first}, {last}")
+            raise SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, f"Point range {first}, {last}")
         return sorted(number for number in self._points if first <= number <= last)

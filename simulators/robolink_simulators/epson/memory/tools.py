@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Final, Literal, TypeAlias
 
 from robolink.model import ToolOffset
-from robolink_simulators.epson.refusals import Refusal, RefusalKind
+from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 
 HIGHEST_TOOL: Final = 15
 
@@ -36,7 +36,7 @@ class ToolMemory:
             Refusal: There is no such tool number.
         """
         if not 0 <= tool <= HIGHEST_TOOL:
-            raise Refusal(RefusalKind.VALUE_OUT_OF_RANGE, f"There is no tool {tool}")
+            raise SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, f"There is no tool {tool}")
         return self._offsets.get(tool)
 
     def defined(self) -> dict[int, ToolOffset]:
@@ -68,7 +68,7 @@ class ToolMemory:
         self._check_writable(tool)
         selected = self._selected == tool
         if selected and in_force == "error":
-            raise Refusal(RefusalKind.TOOL_IN_FORCE, f"Tool {tool} is selected")
+            raise SpelRefusal(RefusalKind.TOOL_IN_FORCE, f"Tool {tool} is selected")
         self._offsets.pop(tool, None)
         if selected and in_force == "selects_zero":
             self._selected = 0
@@ -82,7 +82,7 @@ class ToolMemory:
                 there is no such number.
         """
         if self.get(tool) is None and tool != 0:
-            raise Refusal(RefusalKind.TOOL_UNDEFINED, f"Tool {tool} is not defined")
+            raise SpelRefusal(RefusalKind.TOOL_UNDEFINED, f"Tool {tool} is not defined")
         self._selected = tool
 
     def to_state(self) -> dict[str, object]:
@@ -112,4 +112,4 @@ class ToolMemory:
     def _check_writable(self, tool: int) -> None:
         self.get(tool)
         if tool == 0:
-            raise Refusal(RefusalKind.TOOL_ZERO_FIXED, "Tool 0 is fixed")
+            raise SpelRefusal(RefusalKind.TOOL_ZERO_FIXED, "Tool 0 is fixed")

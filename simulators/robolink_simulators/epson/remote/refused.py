@@ -7,7 +7,7 @@ from robolink.protocols.epson_text import ErrorCode
 _MOST_DIGITS: Final = 9
 
 
-class Refused(Exception):
+class RequestRefused(Exception):
     """Nothing was carried out.
 
     Attributes:
@@ -19,9 +19,9 @@ class Refused(Exception):
         self.code = code
 
 
-def malformed() -> Refused:
+def malformed() -> RequestRefused:
     """Return the refusal of a parameter that makes no sense."""
-    return Refused(ErrorCode.MALFORMED)
+    return RequestRefused(ErrorCode.MALFORMED)
 
 
 def number(text: str, most: int | None = None) -> int:

@@ -9,7 +9,7 @@ from typing import Final
 from lark import Lark, Token
 from lark.exceptions import LarkError
 
-from robolink_simulators.epson.refusals import Refusal, RefusalKind
+from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.build import TreeBuilder
 from robolink_simulators.epson.spel.tree import Statement
 
@@ -101,15 +101,15 @@ def parse(text: str) -> tuple[Statement, ...]:
     return tuple(statements)
 
 
-def _refusal(text: str, error: LarkError) -> Refusal:
+def _refusal(text: str, error: LarkError) -> SpelRefusal:
     for match in _STATEMENT_WORDS.finditer(text):
         word = match.group(1) or ""
         for words, kind, why in _REFUSED_WORDS:
             if word.lower() in words:
-                return Refusal(kind, f"{word} {why}")
+                return SpelRefusal(kind, f"{word} {why}")
     token = getattr(error, "token", None)
     near = token if isinstance(token, Token) else getattr(error, "char", "")
-    return Refusal(
+    return SpelRefusal(
         RefusalKind.SYNTAX,
         f"Syntax error near {str(near)!r}",
     )

@@ -109,7 +109,7 @@ class Print:
 
 
 @dataclass(frozen=True, slots=True)
-class Command:
+class KeywordStatement:
     """A keyword and its arguments; ``open_ended`` when they end with a comma."""
 
     name: str
@@ -135,7 +135,7 @@ class MotionOptions:
 
 
 @dataclass(frozen=True, slots=True)
-class Motion:
+class MotionStatement:
     """``Go``, ``Move``, ``Jump`` ... and their points; ``verb`` is lower case."""
 
     verb: str
@@ -177,4 +177,12 @@ class If:
     otherwise: "tuple[Statement, ...]" = ()
 
 
-Statement = Print | Command | Motion | AssignPoint | AssignVariable | AssignCoordinate | If
+Statement = (
+    Print
+    | KeywordStatement
+    | MotionStatement
+    | AssignPoint
+    | AssignVariable
+    | AssignCoordinate
+    | If
+)

@@ -7,7 +7,7 @@ from urllib.parse import urlencode
 from robolink.errors import ConnectError
 from robolink.messages import tr
 from robolink_simulators.cell.clock import ScaledClock
-from robolink_simulators.hosting.fieldbus.modbus_server import ModbusServerThread, SerialPort
+from robolink_simulators.hosting.fieldbus.modbus_server import ModbusServerThread, SerialLine
 from robolink_simulators.hosting.fieldbus.plc_registers import PlcRegisters
 from robolink_simulators.hosting.loopback import require_loopback
 from robolink_simulators.hosting.streams.serial_cable import (
@@ -131,7 +131,7 @@ def serve_modbus_rtu(
     clock = _presented(simulator, clock)
     try:
         cable = SerialCable(baud)
-        port = SerialPort(cable.far, unit)
+        port = SerialLine(cable.far, unit)
         server = ModbusServerThread(PlcRegisters(simulator, clock), clock, port)
     except (ImportError, AttributeError, OSError) as error:
         raise no_pseudo_terminal(error) from error

@@ -22,7 +22,7 @@ from robolink.protocols.mailbox import (
 from robolink.transport import MailboxHead
 from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
-from robolink_simulators.softmotion.mailbox.words.exchange import Served
+from robolink_simulators.softmotion.mailbox.words.exchange import ServedAccess
 
 _HEAD_WORDS: Final = 10
 _HEARTBEAT: Final = COMMAND["client_heartbeat"].word
@@ -108,7 +108,7 @@ class InProcessMailboxLink:
         """See :meth:`robolink.transport.MailboxLink.close`."""
         self._closed = True
 
-    def _exchange(self, serve: Callable[[int], Served]) -> Words:
+    def _exchange(self, serve: Callable[[int], ServedAccess]) -> Words:
         """Have a request served: half of the time passes before, half of it after."""
         with self._simulator.lock:
             if self._closed:

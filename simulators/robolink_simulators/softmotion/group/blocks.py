@@ -21,7 +21,7 @@ ENDS = (BlockState.DONE, BlockState.COMMAND_ABORTED, BlockState.ERROR)
 
 
 @dataclass(frozen=True, slots=True)
-class Outputs:
+class BlockOutputs:
     """What a program reads at the block: ``Busy``, ``Active``, ``Done`` and the rest."""
 
     state: BlockState
@@ -48,7 +48,7 @@ class Outputs:
         return self.state is BlockState.COMMAND_ABORTED
 
 
-class Execution:
+class BlockExecution:
     """One rising edge of ``Execute``; its outputs change as time passes.
 
     Inputs are sampled at the edge; an end is for good (softmotion.md 2.5).
@@ -61,10 +61,10 @@ class Execution:
     def __init__(self) -> None:
         self.movement_number = 0
         self.latched: CoordRef | None = None
-        self._outputs = Outputs(BlockState.BUSY)
+        self._outputs = BlockOutputs(BlockState.BUSY)
 
     @property
-    def outputs(self) -> Outputs:
+    def outputs(self) -> BlockOutputs:
         """The outputs at the instant that the group was given last."""
         return self._outputs
 
@@ -91,4 +91,4 @@ class Execution:
 
     def _become(self, state: BlockState, error: SmcError | None = None) -> None:
         if not self.ended:
-            self._outputs = Outputs(state, error)
+            self._outputs = BlockOutputs(state, error)

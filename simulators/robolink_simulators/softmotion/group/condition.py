@@ -7,7 +7,7 @@ from robolink_simulators.softmotion.group.smc_errors import SmcError
 from robolink_simulators.softmotion.kinematics.kinematics import AxisValues, Configuration
 
 
-class GroupState(IntEnum):
+class SmcGroupState(IntEnum):
     """``SMC_AXIS_GROUP_STATE``; the numbers are a field report (softmotion.md 2.1)."""
 
     DISABLED = 0
@@ -40,7 +40,7 @@ class GroupStatus:
         error: The group error.
     """
 
-    state: GroupState
+    state: SmcGroupState
     active_movement: int
     unfinished: int
     interrupted_movement: int

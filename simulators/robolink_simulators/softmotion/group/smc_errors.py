@@ -60,7 +60,7 @@ class SmcError:
         return SYMBOLS.get(self.kind, "")
 
 
-class Refused(Exception):
+class BlockRefused(Exception):
     """A block will not do it; nothing was changed and nothing new moves.
 
     The text is data of the simulated PLC and not translated.

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import Self
 
-from robolink_simulators.softmotion.group.smc_errors import ErrorKind, Refused
+from robolink_simulators.softmotion.group.smc_errors import BlockRefused, ErrorKind
 from robolink_simulators.softmotion.kinematics.frames import ORIGIN, Frame, zyz, zyz_angles
 
 
@@ -94,7 +94,7 @@ class CoordinateTransforms:
             case CoordSystem.TCS:
                 return tcp
             case CoordSystem.ACS:
-                raise Refused(ErrorKind.PARAMETER, "ACS is no Cartesian coordinate system")
+                raise BlockRefused(ErrorKind.PARAMETER, "ACS is no Cartesian coordinate system")
             case CoordSystem.WCS:
                 return self._in_wcs[CoordSystem.MCS].inverse()
             case CoordSystem.PCS_1 | CoordSystem.PCS_2:
@@ -102,4 +102,4 @@ class CoordinateTransforms:
 
     def _require_placed(self, system: CoordSystem) -> None:
         if system not in self._in_wcs:
-            raise Refused(ErrorKind.PARAMETER, f"{system.name} has no place of its own")
+            raise BlockRefused(ErrorKind.PARAMETER, f"{system.name} has no place of its own")

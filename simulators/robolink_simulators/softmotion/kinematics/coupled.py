@@ -2,13 +2,13 @@
 
 from dataclasses import dataclass, field
 
-from robolink_simulators.softmotion.group.smc_errors import ErrorKind, Refused
+from robolink_simulators.softmotion.group.smc_errors import BlockRefused, ErrorKind
 from robolink_simulators.softmotion.kinematics.frames import Frame, Matrix, subtract, turned
 from robolink_simulators.softmotion.kinematics.kinematics import (
     AxisKind,
     AxisValues,
     Configuration,
-    Kinematics,
+    KinematicsModel,
     near_turn,
 )
 from robolink_simulators.softmotion.kinematics.orientation import OrientationSpace, about_z, yaw_deg
@@ -47,7 +47,7 @@ class Coupled:
         own_name: Name of a kinematics that is such a coupling itself.
     """
 
-    position: Kinematics
+    position: KinematicsModel
     c_axis: CAxis = CAxis()
     c_index: int = 3
     own_name: str = ""
@@ -110,5 +110,7 @@ def scara3_z(
 def _yaw_deg(rotation: Matrix) -> float:
     angle_deg = yaw_deg(rotation)
     if angle_deg is None:
-        raise Refused(ErrorKind.UNREACHABLE, "The Z axis of the flange cannot point the other way")
+        raise BlockRefused(
+            ErrorKind.UNREACHABLE, "The Z axis of the flange cannot point the other way"
+        )
     return angle_deg

@@ -34,7 +34,7 @@ ANY_CONFIGURATION: Final = Configuration()
 """Says nothing: the only one of a kinematics without an elbow, or the present one."""
 
 
-class Kinematics(Protocol):
+class KinematicsModel(Protocol):
     """Axes to flange and back. Implementations hold parameters only."""
 
     @property

@@ -7,4 +7,4 @@ from robolink_simulators.softmotion.mailbox.options import MailboxOptions as Mai
 from robolink_simulators.softmotion.mailbox.simulator import (
     SoftMotionSimulator as SoftMotionSimulator,
 )
-from robolink_simulators.softmotion.mailbox.words.exchange import Served as Served
+from robolink_simulators.softmotion.mailbox.words.exchange import ServedAccess as ServedAccess

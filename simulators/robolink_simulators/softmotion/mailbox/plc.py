@@ -13,7 +13,7 @@ from robolink.protocols.mailbox import (
     next_number,
 )
 from robolink_simulators.softmotion.group.axis_group import AxisGroup
-from robolink_simulators.softmotion.group.condition import GroupState
+from robolink_simulators.softmotion.group.condition import SmcGroupState
 from robolink_simulators.softmotion.kinematics.catalogue import MachineModel
 from robolink_simulators.softmotion.kinematics.coordinates import CoordRef
 from robolink_simulators.softmotion.mailbox.commands.tools import ToolDesk
@@ -91,7 +91,7 @@ class Plc:
 
     def make_ready(self, tool: CoordRef) -> None:
         """Enable the group and select slot 1 with a tool, as somebody did earlier today."""
-        if self.group.state is GroupState.DISABLED:
+        if self.group.state is SmcGroupState.DISABLED:
             self.group.enable()
         self.tools.preset(_PRESET_SLOT, tool)
 

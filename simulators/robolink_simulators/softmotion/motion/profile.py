@@ -29,7 +29,7 @@ class Pace(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Profile:
+class SpeedProfile:
     """The share of a path, 0 to 1, as a function of time.
 
     Attributes:

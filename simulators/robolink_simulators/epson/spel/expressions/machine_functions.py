@@ -8,7 +8,7 @@ from robolink.model import Hand, ToolOffset
 from robolink_simulators.epson.arm.kinematics import Joints, check_ranges, forward, tip_of
 from robolink_simulators.epson.memory.bits import BitBank
 from robolink_simulators.epson.memory.points import AXES, Point
-from robolink_simulators.epson.refusals import OutOfReach, Refusal, RefusalKind
+from robolink_simulators.epson.refusals import OutOfReach, RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.values import (
     Value,
     as_integer,
@@ -85,7 +85,7 @@ def _at_home(session: Session, _: Arguments) -> Value:
 def _home(session: Session, arguments: Arguments) -> Value:
     home = session.machine.settings.home_pulses
     if home is None:
-        raise Refusal(RefusalKind.HOME_UNDEFINED, "No home position is set")
+        raise SpelRefusal(RefusalKind.HOME_UNDEFINED, "No home position is set")
     return _item(home, arguments)
 
 
@@ -182,7 +182,7 @@ def coordinates_of(values: Sequence[float]) -> Point:
         Refusal: Another number of coordinates.
     """
     if len(values) not in (4, 6):
-        raise Refusal(RefusalKind.SYNTAX, f"{len(values)} coordinates: 4 or 6 are needed")
+        raise SpelRefusal(RefusalKind.SYNTAX, f"{len(values)} coordinates: 4 or 6 are needed")
     x, y, z, u, v, w = (*map(float, values), 0.0, 0.0)[:6]
     return Point((x, y, z, u, v, w), given=len(values))
 
@@ -245,7 +245,7 @@ def _real_position(session: Session, _: Arguments) -> Point:
 def _found_position(session: Session, _: Arguments) -> Point:
     if session.machine.found is None:
         # What FindPos gives before anything was found is not documented: an error here.
-        raise Refusal(RefusalKind.POINT_UNDEFINED, "No Find has met its condition")
+        raise SpelRefusal(RefusalKind.POINT_UNDEFINED, "No Find has met its condition")
     return session.machine.found
 
 
@@ -253,7 +253,7 @@ def _tool_point(session: Session, arguments: Arguments) -> Point:
     tool = as_integer(arguments[0])
     offset = session.machine.tools.get(tool)
     if offset is None and tool != 0 and session.options.tlset_of_undefined == "error":
-        raise Refusal(RefusalKind.TOOL_UNDEFINED, f"Tool {tool} is not defined")
+        raise SpelRefusal(RefusalKind.TOOL_UNDEFINED, f"Tool {tool} is not defined")
     return offset_point(offset or ToolOffset())
 
 

@@ -5,7 +5,7 @@ import operator
 from collections.abc import Callable
 from typing import Final
 
-from robolink_simulators.epson.refusals import Refusal, RefusalKind
+from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.values import (
     Number,
     Value,
@@ -67,7 +67,7 @@ def _strings(sign: str, left: str, right: str) -> Value:
         case "<>":
             return left != right
         case _:
-            raise Refusal(RefusalKind.TYPE_MISMATCH, f"Strings know no {sign}")
+            raise SpelRefusal(RefusalKind.TYPE_MISMATCH, f"Strings know no {sign}")
 
 
 def _compare(sign: str, left: Value, right: Value) -> bool:

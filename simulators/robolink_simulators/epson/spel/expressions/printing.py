@@ -7,7 +7,7 @@ from typing import Final, Literal
 from robolink.protocols.spel import PrintedPoint, decimal, format_point
 from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.epson.options import EpsonOptions
-from robolink_simulators.epson.refusals import Refusal, RefusalKind
+from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.values import Number, Value, out_of_range
 
 CRLF: Final = "\r\n"
@@ -96,7 +96,7 @@ def formatted(value: Number, layout: str) -> str:
     """
     marks = _MARKS.fullmatch(layout)
     if marks is None:
-        raise Refusal(RefusalKind.VALUE_OUT_OF_RANGE, f"Unknown format {layout!r}")
+        raise SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, f"Unknown format {layout!r}")
     before, after = marks[1], marks[2]
     places = len(after or "")
     whole, _, fraction = f"{abs(value):.{places}f}".partition(".")

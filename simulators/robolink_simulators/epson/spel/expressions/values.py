@@ -3,7 +3,7 @@
 import math
 
 from robolink_simulators.epson.memory.points import Point
-from robolink_simulators.epson.refusals import Refusal, RefusalKind
+from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 
 Number = int | float
 Value = bool | int | float | str | Point
@@ -14,13 +14,13 @@ _TRUE = -1
 _LARGEST_INT = 2**63 - 1
 
 
-def out_of_range(text: str) -> Refusal:
+def out_of_range(text: str) -> SpelRefusal:
     """Return the refusal of a value that is not allowed."""
-    return Refusal(RefusalKind.VALUE_OUT_OF_RANGE, text)
+    return SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, text)
 
 
-def _mismatch(wanted: str) -> Refusal:
-    return Refusal(RefusalKind.TYPE_MISMATCH, f"Type mismatch: {wanted} expected")
+def _mismatch(wanted: str) -> SpelRefusal:
+    return SpelRefusal(RefusalKind.TYPE_MISMATCH, f"Type mismatch: {wanted} expected")
 
 
 def as_number(value: Value) -> Number:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from typing import Final
 
 from robolink_simulators.epson.machine import Machine
-from robolink_simulators.epson.refusals import Refusal, RefusalKind
+from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.printing import CRLF, number_text
 from robolink_simulators.epson.spel.expressions.values import Number, out_of_range
 
@@ -31,7 +31,7 @@ HIGHEST_ACCEL_R: Final = 5000.0
 
 def _expect(values: Numbers, *counts: int) -> None:
     if len(values) not in counts:
-        raise Refusal(RefusalKind.SYNTAX, f"{len(values)} values, not one of {counts}")
+        raise SpelRefusal(RefusalKind.SYNTAX, f"{len(values)} values, not one of {counts}")
 
 
 def _checked(values: Numbers, low: float, high: float) -> list[float]:

@@ -3,7 +3,7 @@
 from typing import Final
 
 from robolink.protocols.mailbox import ErrorClass
-from robolink_simulators.softmotion.group.condition import GroupState
+from robolink_simulators.softmotion.group.condition import SmcGroupState
 from robolink_simulators.softmotion.group.smc_errors import ErrorKind
 
 _CLASSES: Final = {
@@ -25,12 +25,12 @@ _CLASSES: Final = {
 }
 
 _STATES: Final = {
-    GroupState.DISABLED: ErrorClass.DISABLED,
-    GroupState.STANDBY: ErrorClass.WRONG_STATE,
-    GroupState.MOVING: ErrorClass.MOVING,
-    GroupState.HOMING: ErrorClass.MOVING,
-    GroupState.STOPPING: ErrorClass.STOPPING,
-    GroupState.ERROR_STOP: ErrorClass.ERRORSTOP,
+    SmcGroupState.DISABLED: ErrorClass.DISABLED,
+    SmcGroupState.STANDBY: ErrorClass.WRONG_STATE,
+    SmcGroupState.MOVING: ErrorClass.MOVING,
+    SmcGroupState.HOMING: ErrorClass.MOVING,
+    SmcGroupState.STOPPING: ErrorClass.STOPPING,
+    SmcGroupState.ERROR_STOP: ErrorClass.ERRORSTOP,
 }
 
 
@@ -48,6 +48,6 @@ class Rejected(Exception):
         self.raw = raw
 
 
-def class_of(kind: ErrorKind, state: GroupState) -> ErrorClass:
+def class_of(kind: ErrorKind, state: SmcGroupState) -> ErrorClass:
     """Return the class of a complaint that a block made in this state of the group."""
     return _STATES[state] if kind is ErrorKind.WRONG_STATE else _CLASSES[kind]

@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Final, TypeVar
 
-from robolink.checkpoints import Point, checkpoint
+from robolink.checkpoints import Checkpoint, checkpoint
 from robolink.errors import (
     CalibrationError,
     ConfigError,
@@ -131,7 +131,7 @@ class Runner:
         try:
             step = next(procedure)
             while True:
-                checkpoint(Point.STEP, type(step).__name__)
+                checkpoint(Checkpoint.STEP, type(step).__name__)
                 self._require_going()
                 try:
                     done = self._take(step)
@@ -335,7 +335,7 @@ class Runner:
         """Return the next line typed, reading the status at least once a second meanwhile."""
         while True:
             line = self._operator.poll(POLL_S)
-            checkpoint(Point.QUESTION, line or "")
+            checkpoint(Checkpoint.QUESTION, line or "")
             self._watch()
             if line is not None:
                 return line

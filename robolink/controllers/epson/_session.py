@@ -16,7 +16,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
 
-from robolink.checkpoints import Point, checkpoint
+from robolink.checkpoints import Checkpoint, checkpoint
 from robolink.controllers.epson._answers import rejected
 from robolink.controllers.epson._command_classes import command_class_of
 from robolink.controllers.epson._login import PASSWORD_REFUSALS, refused, unanswered
@@ -195,10 +195,10 @@ class EpsonSession:
     def _exchanging(self, request: Request) -> Iterator[None]:
         """Hold the exchange lock for ``request``, once it is legal and no stop forbids it."""
         what = _shown(request)
-        checkpoint(Point.LOCK, what)
+        checkpoint(Checkpoint.LOCK, what)
         try:
             with self._gate, self._wire:
-                checkpoint(Point.HELD, what)
+                checkpoint(Checkpoint.HELD, what)
                 self._check_usable(request)
                 self.latch.admit(command_class_of(request), what)
                 if self._pending is not None and request.name == "Abort":
@@ -206,7 +206,7 @@ class EpsonSession:
                     self._pending.abort_requested = True
                 yield
         finally:
-            checkpoint(Point.EXCHANGE, what)
+            checkpoint(Checkpoint.EXCHANGE, what)
 
     def _ask(self, request: Request, *, secret: bool = False) -> Reply | Refusal:
         with self._exchanging(request):

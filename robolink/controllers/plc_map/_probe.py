@@ -11,13 +11,13 @@ from typing import Final
 from robolink.controllers.plc_map._registers import Registers
 from robolink.errors import RejectedError, RemoteProtocolError
 from robolink.messages import tr
-from robolink.register_maps import Number, Probe, describe_place
+from robolink.register_maps import MapProbe, Number, describe_place
 
 _AROUND: Final = 8
 """How many registers before and behind its place it is looked for."""
 
 
-def require_probe(registers: Registers, probe: Probe | None) -> None:
+def require_probe(registers: Registers, probe: MapProbe | None) -> None:
     """Read the constant, if there is one, and refuse a PLC in which it is another.
 
     Raises:
@@ -41,7 +41,7 @@ def require_probe(registers: Registers, probe: Probe | None) -> None:
     )
 
 
-def _diagnosis(registers: Registers, probe: Probe) -> str:
+def _diagnosis(registers: Registers, probe: MapProbe) -> str:
     number = probe.number
     found = _found(registers, probe)
     if found is None:
@@ -64,7 +64,7 @@ def _diagnosis(registers: Registers, probe: Probe) -> str:
     return " ".join(hints)
 
 
-def _found(registers: Registers, probe: Probe) -> Number | None:
+def _found(registers: Registers, probe: MapProbe) -> Number | None:
     """Look for the constant in every order, nearest first."""
     number = probe.number
     count = len(number.registers)

@@ -16,7 +16,7 @@ from robolink.errors import (
 )
 from robolink.messages import tr
 from robolink.model import Expected, ToolOffset, ToolReceipt
-from robolink.register_maps import RegisterMap, Slot
+from robolink.register_maps import MapSlot, RegisterMap
 
 
 class RegisterToolTable:
@@ -216,7 +216,7 @@ class RegisterToolTable:
         content = self._slots.content(slot, requested)
         return () if self.same(self.read(tool), requested) else self._slots.requests(slot, content)
 
-    def _slot(self, tool: int) -> Slot:
+    def _slot(self, tool: int) -> MapSlot:
         if isinstance(tool, bool) or tool not in self._map.slots:
             raise ToolIndexError(
                 tr("There is no tool {tool}.", tool=tool),

@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from typing import Final
 
-from robolink.checkpoints import Point, checkpoint
+from robolink.checkpoints import Checkpoint, checkpoint
 from robolink.controllers.softmotion._answers import Ended, cut_short, describe, refused
 from robolink.controllers.softmotion._command_classes import command_class_of
 from robolink.controllers.softmotion._ownership import Ownership
@@ -198,13 +198,13 @@ class Orders:
     @contextmanager
     def _exchanging(self, request: str) -> Iterator[None]:
         """Hold the lock from the look at the latch to the acknowledgement."""
-        checkpoint(Point.LOCK, request)
+        checkpoint(Checkpoint.LOCK, request)
         try:
             with self._lock:
-                checkpoint(Point.HELD, request)
+                checkpoint(Checkpoint.HELD, request)
                 yield
         finally:
-            checkpoint(Point.EXCHANGE, request)
+            checkpoint(Checkpoint.EXCHANGE, request)
 
     def _await_acknowledgement(self, command: Command, before: Response) -> tuple[Response, bool]:
         """Return the snapshot that shows the acknowledgement, or the damage, of a block."""

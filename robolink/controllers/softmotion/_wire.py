@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Final, TypeVar
 
-from robolink.checkpoints import Point, checkpoint
+from robolink.checkpoints import Checkpoint, checkpoint
 from robolink.controllers.softmotion._pulse import ClientBeat
 from robolink.controllers.softmotion._rides import Rides
 from robolink.controllers.softmotion._turns import Turns
@@ -226,7 +226,7 @@ class MailboxWire:
                 with self._gate:
                     self.exchanges += 1
                     found = exchange()
-                checkpoint(Point.EXCHANGE, "read")
+                checkpoint(Checkpoint.EXCHANGE, "read")
                 return found
             except (TransportError, RemoteProtocolError) as error:
                 lost.append(error)

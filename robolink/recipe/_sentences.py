@@ -5,6 +5,7 @@ from difflib import get_close_matches
 from typing import Any
 
 from robolink.messages import tr
+from robolink.methods.fields import at_least, at_most, holds_at_least, holds_at_most
 
 
 def unknown(key: str, table: Sequence[str], top: Sequence[str]) -> str:
@@ -57,13 +58,13 @@ def sentence(detail: Any) -> str:  # noqa: ANN401 - pydantic's own form
     limits = detail.get("ctx", {})
     match detail["type"]:
         case "greater_than_equal":
-            return tr("must be at least {limit:g}", limit=limits["ge"])
+            return at_least(limits["ge"])
         case "less_than_equal":
-            return tr("must be at most {limit:g}", limit=limits["le"])
+            return at_most(limits["le"])
         case "too_short":
-            return tr("must hold at least {count}", count=limits["min_length"])
+            return holds_at_least(limits["min_length"])
         case "too_long":
-            return tr("must hold at most {count}", count=limits["max_length"])
+            return holds_at_most(limits["max_length"])
         case "string_too_long":
             return tr("must be at most {count} characters long", count=limits["max_length"])
         case "literal_error":

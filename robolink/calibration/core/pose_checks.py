@@ -11,7 +11,6 @@ from robolink.model import Pose, ToolOffset
 MAX_OFFSET_MM = 1000.0
 """A tool longer than this is taken for a mistake (calibration.md 6)."""
 
-
 _METRES_BELOW = 2.0
 
 

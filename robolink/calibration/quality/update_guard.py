@@ -16,7 +16,6 @@ from robolink.model import ToolOffset
 NEEDLE_LIMIT_MM = 2.0
 """Largest plausible change by a new needle; 0.5 mm is usual for a nozzle (calibration.md 2)."""
 
-
 NOISE_MM = 0.05
 
 

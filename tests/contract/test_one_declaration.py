@@ -2,7 +2,6 @@
 
 import json
 import tomllib
-from typing import Any
 
 import pytest
 from annotated_types import Ge, Le
@@ -17,8 +16,13 @@ NOBODY = "epson+tcp://127.0.0.1:9"
 """Refused before anything is sent, nothing is asked for there."""
 
 
-def limits_of(field) -> tuple[Any, ...]:
-    return field.metadata
+def beyond(field):
+    """Yield values just outside the limits of a parameter."""
+    for limit in field.metadata:
+        if isinstance(limit, Ge):
+            yield limit.ge - 1  # type: ignore[operator]
+        if isinstance(limit, Le):
+            yield limit.le + 1  # type: ignore[operator]
 
 
 LIMITS = [
@@ -27,10 +31,7 @@ LIMITS = [
     if method.command
     for field in fields_of(method.parameters)
     if field.kind in (float, int)
-    for value in (
-        *(limit.ge - 1 for limit in limits_of(field) if isinstance(limit, Ge)),
-        *(limit.le + 1 for limit in limits_of(field) if isinstance(limit, Le)),
-    )
+    for value in beyond(field)
 ]
 RELATIONS = [
     ("two-pose", {"clearance_mm": 12}, "clearance_mm", "must be smaller than"),

@@ -103,7 +103,7 @@ def _check_values(context: CliContext, shows: tuple[str, ...]) -> None:
         confirmed = confirmation_of(controller.identity, register_map)
         if shows or (register_map.probe is None and confirmed is None):
             compared = _compared(controller, values, shows)
-            person = signature_of(context.operator, context.cell, changes=True)
+            person = signature_of(context.operator, context.expected, changes=True)
             by = person.operator or person.os_user
             confirmed = confirm(controller.identity, register_map, by=by, compared=compared)
     payload = values.payload()

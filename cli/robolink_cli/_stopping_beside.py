@@ -56,8 +56,8 @@ def remember_address(context: "CliContext") -> None:
             password_file=settings.password_file or "",
             password_env=settings.password_env or "",
             timeout_s=settings.timeout_s or 0.0,
-            # A look at a cell that names its robot, or people, needs the whole of its file.
-            proof="" if settings.robot or settings.people else proof_of_files(),
+            proof=proof_of_files(),
+            expected=context.cell.expected,
         ),
     )
 

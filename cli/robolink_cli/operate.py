@@ -42,7 +42,7 @@ def status(context: CliContext) -> None:
 
     with open_controller(context, looks=True) as controller:
         payload = status_payload(controller)
-        note_doubts(payload, controller, context.cell)
+        note_doubts(payload, controller, context.expected)
     context.emit("status", payload, lambda: show_status(payload))
 
 

@@ -245,7 +245,7 @@ def open_controller(
         )
         remember_address(context)
         with (
-            listening_for_stop(controller, context),
+            listening_for_stop(controller, context, looks=unhindered),
             _saying_what_is_left(controller, context, quiet=quiet, looks=looks, calms=calms),
         ):
             yield controller

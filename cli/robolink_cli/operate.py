@@ -26,7 +26,7 @@ from robolink_cli._context import (
 from robolink_cli._kinds import preferences_of, require_epson, require_softmotion
 from robolink_cli._render import note, say
 from robolink_cli._shared_options import shared_options
-from robolink_cli._stop_notes import forget_stop
+from robolink_cli._stop_notes import forget_stop, own_name_of
 
 if TYPE_CHECKING:
     from robolink.model import Controller
@@ -125,7 +125,8 @@ def reset(context: CliContext, dry_run: bool, yes: bool) -> None:
         agree(tr("{effect} Go on?", effect=effect), yes=yes)
         controller.reset_fault()
         state = controller.status().state
-    forget_stop(context)
+        name = own_name_of(controller)
+    forget_stop(context, name)
     payload: dict[str, object] = {"state": state}
     context.emit(
         "reset",

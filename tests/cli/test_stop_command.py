@@ -283,11 +283,13 @@ def test_a_reset_takes_the_note_away_too(moving, stop):
 
 def test_a_note_that_cannot_be_read_is_a_note(moving, stop, state_folder, capsys):
     assert stop()[0] == 0
-    (note,) = (state_folder / "stops").iterdir()
-    note.write_bytes(b"{")
+    for note in (state_folder / "stops").iterdir():
+        note.write_bytes(b"{")
     assert main.run(["-c", moving.url, "recover", "--yes"]) == 0
     assert main.run(["jog", "x+1", "--yes", "-c", moving.url]) == 10
     assert "cannot be read" in capsys.readouterr().err
+    assert main.run(["-c", moving.url, "release", "--yes"]) == 0
+    assert main.run(["jog", "x+1", "--yes", "-c", moving.url]) == 0
 
 
 def test_what_is_read_by_hand_is_what_click_knows():

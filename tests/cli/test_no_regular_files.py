@@ -83,6 +83,13 @@ def test_a_cell_file_is_no_exception(no_file, capsys, monkeypatch):
     assert str(no_file) in what
 
 
+def test_a_journal_is_no_exception(no_file, capsys, monkeypatch):
+    monkeypatch.setenv("ROBOLINK_JOURNAL", str(no_file))
+    code, what = run(["journal", "list"], capsys)
+    assert code == 2
+    assert f"{no_file} is no regular file" in what
+
+
 @pytest.mark.parametrize("where", ["environment", "cell file"])
 def test_a_password_file_that_nobody_typed_is_no_exception(where, no_file, capsys, monkeypatch):
     cell = '[cells.a]\nurl = "epson+tcp://127.0.0.1:1"\n'

@@ -18,12 +18,16 @@ from robolink.transport._base import Transport
 from robolink.transport._modbus_framing import FrameError, Framing
 from robolink.transport._modbus_messages import WRITE_COIL, Area, ModbusReply, ModbusRequest
 
+_AROUND: Final = 3
+"""The unit in front of a frame and its checksum behind."""
+
 
 @dataclass(frozen=True, slots=True)
 class RtuLine:
     """What is special about one serial line.
 
     Attributes:
+        character_s: How long one character takes.
         silence_s: Pause between frames: 3.5 characters, 1.75 ms above 19 200 baud
             (Modbus over serial line 1.02, 2.5.1.1).
         quiet_s: After something doubtful, this long without a byte counts as silent.
@@ -32,6 +36,7 @@ class RtuLine:
         probe_address: First address of it.
     """
 
+    character_s: float
     silence_s: float
     quiet_s: float
     echo: bool
@@ -71,6 +76,11 @@ class RtuExchange:
         self._in_step: set[int] = set()
         self._quiet_since_ns = transport.clock.now_ns()
         self._unasked = 0
+
+    def takes_s(self, sent_bytes: int, answered_bytes: int) -> float:
+        """See :meth:`robolink.transport._modbus.Exchange.takes_s`."""
+        framed = sent_bytes + answered_bytes + 2 * _AROUND
+        return framed * self._line.character_s + 2 * self._line.silence_s
 
     def ask(self, request: ModbusRequest, deadline: Deadline) -> ModbusReply:
         """See :meth:`robolink.transport._modbus.Exchange.ask`."""

@@ -28,6 +28,10 @@ class TcpExchange:
         self._transaction = 0
         self._unasked = 0
 
+    def takes_s(self, sent_bytes: int, answered_bytes: int) -> float:  # noqa: ARG002 - the form of all exchanges
+        """See :meth:`robolink.transport._modbus.Exchange.takes_s`."""
+        return 0.0
+
     def ask(self, request: ModbusRequest, deadline: Deadline) -> ModbusReply:
         """See :meth:`robolink.transport._modbus.Exchange.ask`."""
         # A server that hung up while nothing was asked is noticed before anything is sent.

@@ -26,7 +26,12 @@ def over_rtu(*steps, echo=False):
 
     line = ScriptedLine(first, *steps)
     settings = RtuLine(
-        silence_s=0.002, quiet_s=0.02, echo=echo, probe_area=Area.INPUT, probe_address=0
+        character_s=0.0005,
+        silence_s=0.002,
+        quiet_s=0.02,
+        echo=echo,
+        probe_area=Area.INPUT,
+        probe_address=0,
     )
     exchange = RtuExchange(line, IDENTITY, settings, RtuFraming())
     return line, ModbusClient(line, exchange, identity=IDENTITY, unit=1, timeout_s=1.0)

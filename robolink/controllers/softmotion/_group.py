@@ -5,6 +5,7 @@ import math
 from robolink.controllers._edge_ahead import require_edge_ahead
 from robolink.controllers.softmotion._answers import describe
 from robolink.controllers.softmotion._condition import (
+    require_beats,
     require_enabled,
     require_permit,
     require_power,
@@ -59,6 +60,7 @@ class SoftMotionGroup:
     def require_able(self, purpose: str) -> None:
         """Refuse what no movement could begin in now; see :class:`robolink.model.MotionGroup`."""
         identity = self._mailbox.identity
+        require_beats(self._mailbox.wire.whole_look_s, controller=identity, request=purpose)
         now = self._mailbox.snapshots.take()
         require_permit(now, controller=identity, request=purpose)
         require_enabled(now, controller=identity, request=purpose)
@@ -162,10 +164,12 @@ class SoftMotionGroup:
         """
         draft = Command(0, Opcode.CONTINUE)
         request = describe(draft)
+        mailbox = self._mailbox
+        require_beats(mailbox.wire.whole_look_s, controller=mailbox.identity, request=request)
         self._starter.require_settled(request)
-        self._mailbox.prepare(draft, request)
-        with self._mailbox.desk.doubt(request):
-            self._mailbox.orders.carry_out(draft)
+        mailbox.prepare(draft, request)
+        with mailbox.desk.doubt(request):
+            mailbox.orders.carry_out(draft)
 
     def abort_unfinished(self) -> None:
         """Halt what was sent here and not seen to its end."""

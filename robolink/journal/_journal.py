@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING, Any, Final, cast
 
 from robolink.errors import JournalError
 from robolink.journal._chain import ChainCheck
-from robolink.journal._log import JournalOutcomeLog
-from robolink.journal._processes import Holder
 from robolink.journal._records import Filter, Verification
+from robolink.journal.leases.processes import Holder
+from robolink.journal.logs.outcome_log import JournalOutcomeLog
 from robolink.messages import tr
 from robolink.model import EntryKind, Marker, Recorded, Signature
 from robolink.timing import Clock
 
 if TYPE_CHECKING:
-    from robolink.journal._store import Store
+    from robolink.journal.store.store import Store
 
 PAGE: Final = 500
 """How many entries are read at once; nothing is locked between two pages."""

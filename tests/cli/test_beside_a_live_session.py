@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import pytest
 from robolink_cli import main
-from robolink_simulators.hosting.modbus import serve_modbus_tcp
+from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_tcp
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 import robolink
 from robolink.journal import Holder, open_journal
-from robolink.journal._processes import BootClock, this_process
+from robolink.journal.leases.processes import BootClock, this_process
 from robolink.model import Marker, MarkerKind, Signature
 from robolink.timing import NS_PER_S
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 from robolink_cli import main
-from robolink_simulators.held_board import HeldBoard
+from robolink_simulators.cell.held_board import HeldBoard
 
 from robolink.journal import EntryKind, memory_journal
 from tests.contract._camera_cell import KINDS, cell_of, furnish, recipe_here, stored_in

@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import Final
 
-from robolink_simulators.clock import ManualClock
+from robolink_simulators.cell.clock import ManualClock
 
 from robolink.journal import (
     EntryKind,

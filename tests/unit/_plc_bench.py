@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from robolink_simulators.clock import ManualClock
+from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.plc import PlcSimulator
 from robolink_simulators.plc.memory import OutsideError
 

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from itertools import count
 from typing import Final
 
-from robolink_simulators.clock import ManualClock
+from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.options import EpsonOptions
-from robolink_simulators.hosting.in_process import register, unregister
+from robolink_simulators.hosting.in_process.epson import register, unregister
 
 import robolink
 from robolink.journal import Holder, Journal, JournalOutcomeLog, memory_journal

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robolink.journal import EntryKind, NewEntry, Signature, Verification, memory_journal
-from robolink.journal._tables import ENTRIES
+from robolink.journal.store.tables import ENTRIES
 from robolink.model import new_operation
 
 COLUMNS = [column.name for column in ENTRIES.columns]

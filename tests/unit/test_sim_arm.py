@@ -5,13 +5,13 @@ from itertools import pairwise
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from robolink_simulators.epson.arm import REST, Arm
-from robolink_simulators.epson.kinematics import Joints, forward, tip_of
-from robolink_simulators.epson.parameters import MotionParameters
-from robolink_simulators.epson.ramps import Ramp
+from robolink_simulators.epson.arm.arm import REST, Arm
+from robolink_simulators.epson.arm.kinematics import Joints, forward, tip_of
+from robolink_simulators.epson.arm.motion_parameters import MotionParameters
+from robolink_simulators.epson.arm.ramps import Ramp
+from robolink_simulators.epson.arm.robots import find_robot
+from robolink_simulators.epson.arm.trajectory import JointPace, LinePace
 from robolink_simulators.epson.refusals import OutOfReach, Refusal
-from robolink_simulators.epson.robots import find_robot
-from robolink_simulators.epson.trajectory import JointPace, LinePace
 
 from robolink.model import Hand, Pose, ToolOffset
 

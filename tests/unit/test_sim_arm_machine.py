@@ -1,12 +1,12 @@
 import random
 
 import pytest
-from robolink_simulators.epson.bits import BitBank
+from robolink_simulators.epson.arm.motion_parameters import MotionParameters
+from robolink_simulators.epson.arm.robots import find_robot
 from robolink_simulators.epson.machine import Machine
-from robolink_simulators.epson.parameters import MotionParameters
-from robolink_simulators.epson.points import Local, Point
+from robolink_simulators.epson.memory.bits import BitBank
+from robolink_simulators.epson.memory.points import Local, Point
 from robolink_simulators.epson.refusals import Refusal, RefusalKind
-from robolink_simulators.epson.robots import find_robot
 
 from robolink.model import ToolOffset
 

@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from robolink_simulators.softmotion import CoordRef, CoordSystem, ErrorKind, Refused
-from robolink_simulators.softmotion.coordinates import CoordinateTransforms
-from robolink_simulators.softmotion.frames import (
+from robolink_simulators.softmotion.kinematics.coordinates import CoordinateTransforms
+from robolink_simulators.softmotion.kinematics.frames import (
     NO_TURN,
     ORIGIN,
     X_AXIS,
@@ -18,7 +18,7 @@ from robolink_simulators.softmotion.frames import (
     zyz,
     zyz_angles,
 )
-from robolink_simulators.softmotion.orientation import about_z, yaw_deg
+from robolink_simulators.softmotion.kinematics.orientation import about_z, yaw_deg
 
 angles = st.floats(-360, 360)
 lengths = st.floats(-1000, 1000)

@@ -14,7 +14,7 @@ from robolink_simulators.softmotion import (
     GroupState,
     JogCommand,
 )
-from robolink_simulators.softmotion.frames import (
+from robolink_simulators.softmotion.kinematics.frames import (
     NO_TURN,
     X_AXIS,
     Y_AXIS,
@@ -24,8 +24,8 @@ from robolink_simulators.softmotion.frames import (
     axis_and_angle,
     product,
 )
-from robolink_simulators.softmotion.kinematics import ANY_CONFIGURATION, AxisKind
-from robolink_simulators.softmotion.orientation import OrientationSpace
+from robolink_simulators.softmotion.kinematics.kinematics import ANY_CONFIGURATION, AxisKind
+from robolink_simulators.softmotion.kinematics.orientation import OrientationSpace
 
 from tests.unit._softmotion_machine import (
     CYCLE_NS,

@@ -2,10 +2,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from robolink_simulators.softmotion import CoordRef, ErrorKind, Refused, machine_named
-from robolink_simulators.softmotion.catalogue import NAMES, parameter_names
-from robolink_simulators.softmotion.coupled import CAxis, Coupled, scara3_z
-from robolink_simulators.softmotion.five_axes import FiveAxes
-from robolink_simulators.softmotion.frames import (
+from robolink_simulators.softmotion.kinematics.catalogue import NAMES, parameter_names
+from robolink_simulators.softmotion.kinematics.coupled import CAxis, Coupled, scara3_z
+from robolink_simulators.softmotion.kinematics.five_axes import FiveAxes
+from robolink_simulators.softmotion.kinematics.frames import (
     NO_TURN,
     ORIGIN,
     X_AXIS,
@@ -17,10 +17,15 @@ from robolink_simulators.softmotion.frames import (
     transposed,
     zyz,
 )
-from robolink_simulators.softmotion.kinematics import ANY_CONFIGURATION, Configuration
-from robolink_simulators.softmotion.orientation import Freedom, OrientationSpace, about_z, yaw_deg
-from robolink_simulators.softmotion.paths import axes_for_tcp
-from robolink_simulators.softmotion.positions import Gantry3, PolarZ, Scara2Z
+from robolink_simulators.softmotion.kinematics.kinematics import ANY_CONFIGURATION, Configuration
+from robolink_simulators.softmotion.kinematics.orientation import (
+    Freedom,
+    OrientationSpace,
+    about_z,
+    yaw_deg,
+)
+from robolink_simulators.softmotion.kinematics.positions import Gantry3, PolarZ, Scara2Z
+from robolink_simulators.softmotion.motion.paths import axes_for_tcp
 
 from robolink.errors import ConfigError
 

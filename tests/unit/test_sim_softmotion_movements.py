@@ -15,9 +15,9 @@ from robolink_simulators.softmotion import (
     Target,
     machine_named,
 )
-from robolink_simulators.softmotion.catalogue import NAMES
-from robolink_simulators.softmotion.frames import Z_AXIS, turned
-from robolink_simulators.softmotion.kinematics import Configuration
+from robolink_simulators.softmotion.kinematics.catalogue import NAMES
+from robolink_simulators.softmotion.kinematics.frames import Z_AXIS, turned
+from robolink_simulators.softmotion.kinematics.kinematics import Configuration
 
 from tests.unit._softmotion_machine import (
     CYCLE_NS,

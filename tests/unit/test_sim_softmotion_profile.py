@@ -3,7 +3,7 @@ from itertools import pairwise
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from robolink_simulators.softmotion.profile import Pace, Profile
+from robolink_simulators.softmotion.motion.profile import Pace, Profile
 
 rates = st.floats(1e-3, 1e3)
 paces = st.builds(Pace, rates, rates, rates)

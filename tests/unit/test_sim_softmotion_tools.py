@@ -15,9 +15,9 @@ from robolink_simulators.softmotion import (
     Tool,
     machine_named,
 )
-from robolink_simulators.softmotion.catalogue import NAMES
-from robolink_simulators.softmotion.frames import zyz
-from robolink_simulators.softmotion.positions import Gantry3
+from robolink_simulators.softmotion.kinematics.catalogue import NAMES
+from robolink_simulators.softmotion.kinematics.frames import zyz
+from robolink_simulators.softmotion.kinematics.positions import Gantry3
 
 from tests.unit._softmotion_machine import (
     FACTORS,

@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from robolink_simulators.sensing import LightBeam, TouchPlate
+from robolink_simulators.cell.tip_switches import LightBeam, TouchPlate
 from robolink_simulators.softmotion import (
     AxisGroup,
     CoordSystem,
@@ -15,8 +15,8 @@ from robolink_simulators.softmotion import (
     Target,
     machine_named,
 )
-from robolink_simulators.softmotion.catalogue import NAMES
-from robolink_simulators.softmotion.frames import zyx_angles
+from robolink_simulators.softmotion.kinematics.catalogue import NAMES
+from robolink_simulators.softmotion.kinematics.frames import zyx_angles
 
 from robolink.errors import ConfigError
 from robolink.model import ToolOffset

@@ -6,15 +6,16 @@ from dataclasses import replace
 from statistics import fmean, pstdev
 
 import pytest
-from robolink_cli._serving import world_from
-from robolink_simulators.assist_acts import perform
-from robolink_simulators.camera import CameraOptics, UpCamera
+from robolink_cli.commands.simulate.serving import world_from
+from robolink_simulators.assist.acts import perform
+from robolink_simulators.cell.camera import CameraOptics, UpCamera
+from robolink_simulators.cell.tip_switches import LightBeam
+from robolink_simulators.cell.world_parameters import WorldParameters, parameter_names
 from robolink_simulators.epson import EpsonSimulator
-from robolink_simulators.epson.kinematics import inverse
-from robolink_simulators.hosting import in_process, plc_in_process
-from robolink_simulators.sensing import LightBeam
+from robolink_simulators.epson.arm.kinematics import inverse
+from robolink_simulators.hosting.in_process import epson as in_process
+from robolink_simulators.hosting.in_process import softmotion as plc_in_process
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
-from robolink_simulators.world_parameters import WorldParameters, parameter_names
 
 from robolink.errors import ConfigError
 from robolink.model import ToolOffset

@@ -16,24 +16,24 @@ from robolink.nozzle_change import (
     require_ready,
 )
 from robolink.transaction import earlier_corrections
-from robolink_cli._calibration_views import (
+from robolink_cli.calibrate._frame import Frame
+from robolink_cli.calibrate._listener import CalibrationListener
+from robolink_cli.calibrate._pins import remark_on_pin
+from robolink_cli.options.impact import ImpactRequest, impact_payload, show_impact
+from robolink_cli.options.report import Draft, reporting
+from robolink_cli.prompts.consent import agree_to_motion, motion_question
+from robolink_cli.prompts.operator import operator_at
+from robolink_cli.session.context import open_controller
+from robolink_cli.session.first_backup import back_up_first
+from robolink_cli.session.warnings import note_change
+from robolink_cli.views.calibration import (
     doubts,
     report_payload,
     show_course,
     show_plan,
     show_report,
 )
-from robolink_cli._consent import agree_to_motion, motion_question
-from robolink_cli._context import open_controller
-from robolink_cli._impacting import ImpactRequest, impact_payload, show_impact
-from robolink_cli._notices import note_change
-from robolink_cli._operator import operator_at
-from robolink_cli._planned_steps import steps_payload
-from robolink_cli._reporting import Draft, reporting
-from robolink_cli._safekeeping import back_up_first
-from robolink_cli.calibrate._frame import Frame
-from robolink_cli.calibrate._listener import CalibrationListener
-from robolink_cli.calibrate._pins import remark_on_pin
+from robolink_cli.views.planned_steps import steps_payload
 
 
 class _LiveListener(CalibrationListener):

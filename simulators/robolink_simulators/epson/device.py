@@ -16,29 +16,29 @@ from typing import Final
 
 from robolink.model import Secret
 from robolink.protocols.epson_text import BadRequest, ErrorCode, Request, StatusFlags
+from robolink_simulators.cell.world_parameters import WorldParameters
+from robolink_simulators.epson.arm.robots import find_robot
 from robolink_simulators.epson.card import ControllerCard
-from robolink_simulators.epson.client_slot import ClientSlot
 from robolink_simulators.epson.companion import Companion
 from robolink_simulators.epson.condition import Condition, Mode, Task
-from robolink_simulators.epson.desk import CommandDesk
-from robolink_simulators.epson.exchange import Exchange
-from robolink_simulators.epson.flash import Flash, forget_volatile
-from robolink_simulators.epson.link import EpsonLink
 from robolink_simulators.epson.machine import Machine
+from robolink_simulators.epson.memory.flash import Flash, forget_volatile
+from robolink_simulators.epson.memory.variables import project_variables
 from robolink_simulators.epson.mishaps import Mishaps
 from robolink_simulators.epson.options import EpsonOptions
 from robolink_simulators.epson.panel import Panel
-from robolink_simulators.epson.queries import Alarms
-from robolink_simulators.epson.robots import find_robot
-from robolink_simulators.epson.service import Service
+from robolink_simulators.epson.remote.client_slot import ClientSlot
+from robolink_simulators.epson.remote.command_window import CommandWindow
+from robolink_simulators.epson.remote.commands import CommandDesk
+from robolink_simulators.epson.remote.exchange import Exchange
+from robolink_simulators.epson.remote.link import EpsonLink
+from robolink_simulators.epson.remote.queries import Alarms
+from robolink_simulators.epson.remote.service import Service
+from robolink_simulators.epson.remote.wire_text import shown_reply, shown_request
 from robolink_simulators.epson.spel import Interpreter
-from robolink_simulators.epson.variables import project_variables
-from robolink_simulators.epson.window import CommandWindow
-from robolink_simulators.epson.wire_text import shown_reply, shown_request
+from robolink_simulators.epson.world import World
 from robolink_simulators.faults import Departure, Fault, FaultAction, FaultPlan
 from robolink_simulators.serial_numbers import drawn_serial
-from robolink_simulators.world import World
-from robolink_simulators.world_parameters import WorldParameters
 
 _LOG_LINES: Final = 2000
 
@@ -47,7 +47,7 @@ RequestHook = Callable[[int, str], None]
 
 
 class EpsonSimulator:
-    """Implements :class:`~robolink_simulators.wire.WireDevice`.
+    """Implements :class:`~robolink_simulators.hosting.seam.WireDevice`.
 
     Args:
         robot: Name of a SCARA model.

@@ -3,12 +3,12 @@
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 
-from robolink_simulators.epson.client_slot import ClientSlot
 from robolink_simulators.epson.condition import Condition, Mode, Task
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.options import EpsonOptions
-from robolink_simulators.epson.queries import Alarms
-from robolink_simulators.epson.window import CommandWindow
+from robolink_simulators.epson.remote.client_slot import ClientSlot
+from robolink_simulators.epson.remote.command_window import CommandWindow
+from robolink_simulators.epson.remote.queries import Alarms
 
 
 class Panel:

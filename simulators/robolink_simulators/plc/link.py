@@ -21,7 +21,7 @@ class Served(Protocol):
 
 
 class PlcLink:
-    """Implements :class:`~robolink_simulators.wire.DeviceLink`.
+    """Implements :class:`~robolink_simulators.hosting.seam.DeviceLink`.
 
     Args:
         plc: Who serves.

@@ -7,11 +7,21 @@ from typing import Final
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
-from robolink_simulators.person import Operator
-from robolink_simulators.places import Direction
-from robolink_simulators.sensing import Lean, Shake, TipSwitch
-from robolink_simulators.softmotion.condition import GroupState
-from robolink_simulators.softmotion.frames import (
+from robolink_simulators.cell.person import Operator
+from robolink_simulators.cell.places import Direction
+from robolink_simulators.cell.tip_switches import Lean, Shake, TipSwitch
+from robolink_simulators.cell.workplace import (
+    MOUNTED_TOOL,
+    Workplace,
+    XyzMm,
+    exchanged,
+    pin_beside,
+)
+from robolink_simulators.cell.world_parameters import WorldParameters
+from robolink_simulators.softmotion.group.axis_group import AxisGroup
+from robolink_simulators.softmotion.group.condition import GroupState
+from robolink_simulators.softmotion.group.smc_errors import ErrorKind, Refused
+from robolink_simulators.softmotion.kinematics.frames import (
     NO_TURN,
     ORIGIN,
     Frame,
@@ -21,17 +31,7 @@ from robolink_simulators.softmotion.frames import (
     zyx,
     zyx_angles,
 )
-from robolink_simulators.softmotion.group import AxisGroup
-from robolink_simulators.softmotion.kinematics import AxisKind, AxisValues
-from robolink_simulators.softmotion.smc_errors import ErrorKind, Refused
-from robolink_simulators.workplace import (
-    MOUNTED_TOOL,
-    Workplace,
-    XyzMm,
-    exchanged,
-    pin_beside,
-)
-from robolink_simulators.world_parameters import WorldParameters
+from robolink_simulators.softmotion.kinematics.kinematics import AxisKind, AxisValues
 
 STORED: Final = ToolOffset(12.0, -3.5, -20.0)
 """The nozzle that was there before, on a kinematics that carries any tool."""
@@ -136,7 +136,7 @@ class SoftMotionWorld(Workplace):
 
 
 class _HandledGroup:
-    """Implements :class:`~robolink_simulators.workplace.Handled`."""
+    """Implements :class:`~robolink_simulators.cell.workplace.Handled`."""
 
     def __init__(self, group: AxisGroup) -> None:
         self._group = group

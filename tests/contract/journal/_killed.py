@@ -14,7 +14,7 @@ from itertools import count
 from sqlalchemy import Engine, event
 
 from robolink.journal import EntryKind, JournalOutcomeLog, NewEntry, open_journal
-from robolink.journal._prepared import Runner
+from robolink.journal.store.prepared import Runner
 from tests.contract.journal._acts import marker
 
 STEPS: tuple[Callable[[JournalOutcomeLog], None], ...] = (

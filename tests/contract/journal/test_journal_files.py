@@ -14,7 +14,7 @@ from sqlalchemy import Engine, event
 
 from robolink.errors import JournalError
 from robolink.journal import EntryKind, NewEntry, Verification, memory_journal, open_journal
-from robolink.journal._entry_rows import EntryRows
+from robolink.journal.store.entry_rows import EntryRows
 from tests.contract.journal._acts import marker
 
 ROOT = Path(__file__).parents[3]
@@ -232,7 +232,7 @@ def test_what_may_not_be_written_is_read(public, open_anew, of_folder, of_file, 
 
 
 def test_a_locked_journal_is_read_and_not_written(filled, open_anew, monkeypatch):
-    monkeypatch.setattr("robolink.journal._engines.BUSY_S", 0.1)
+    monkeypatch.setattr("robolink.journal.store.engines.BUSY_S", 0.1)
     holder = sqlite3.connect(filled, isolation_level=None)
     try:
         holder.execute("PRAGMA locking_mode = EXCLUSIVE")

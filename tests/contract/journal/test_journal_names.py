@@ -4,7 +4,7 @@ import pytest
 
 from robolink.errors import LeaseHeldError, TransportTimeoutError
 from robolink.journal import Holder
-from robolink.journal._migrations import MIGRATIONS
+from robolink.journal.store.migrations import MIGRATIONS
 from robolink.model import EntryKind, Identity, NewEntry
 from tests.contract.journal._acts import marker, run
 
@@ -171,7 +171,7 @@ def test_a_journal_without_names_is_read_as_it_is_and_then_brought_up_to_date(
     location, open_anew, monkeypatch
 ):
     with monkeypatch.context() as patched:
-        patched.setattr("robolink.journal._migrations.MIGRATIONS", MIGRATIONS[:1])
+        patched.setattr("robolink.journal.store.migrations.MIGRATIONS", MIGRATIONS[:1])
         older = open_anew(location)
         run(older, "INSERT INTO markers VALUES ('" + BY_NAME + "', 'a', 1, 'set', 'r', 't', '{}')")
     reader = open_anew(location, read_only=True)

@@ -5,12 +5,12 @@ import threading
 from dataclasses import replace
 
 import pytest
-from robolink_simulators.clock import ManualClock
+from robolink_simulators.cell.clock import ManualClock
 
 from robolink.errors import JournalError, LeaseHeldError, LeaseLostError
 from robolink.journal import EntryKind, NewEntry, Verification, open_journal
 from robolink.journal import this_process as here
-from robolink.journal._migrations import MIGRATIONS
+from robolink.journal.store.migrations import MIGRATIONS
 from robolink.model import MarkerKind
 from tests.contract.journal._acts import marker, run
 
@@ -139,7 +139,7 @@ def _fail_half_way(connection):
 
 
 def _newer(monkeypatch, *steps):
-    monkeypatch.setattr("robolink.journal._migrations.MIGRATIONS", (*MIGRATIONS, *steps))
+    monkeypatch.setattr("robolink.journal.store.migrations.MIGRATIONS", (*MIGRATIONS, *steps))
 
 
 def _version(journal):
@@ -208,7 +208,7 @@ def test_a_database_of_something_else_is_left_alone(location, journal, open_anew
 
 
 def test_a_write_that_another_program_holds_up_is_refused_in_time(location, open_anew, monkeypatch):
-    monkeypatch.setattr("robolink.journal._engines.BUSY_S", 0.2)
+    monkeypatch.setattr("robolink.journal.store.engines.BUSY_S", 0.2)
     journal, other = open_anew(location), open_anew(location)
     with other._store.write() as tables:
         tables.connection.exec_driver_sql("UPDATE head SET hash = hash")

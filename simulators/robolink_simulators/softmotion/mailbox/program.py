@@ -20,20 +20,20 @@ from robolink.protocols.mailbox import (
     WordOrder,
     opcodes_of,
 )
-from robolink_simulators.softmotion.blocks import Execution
-from robolink_simulators.softmotion.group import AxisGroup
-from robolink_simulators.softmotion.mailbox.client_watch import ClientWatch
-from robolink_simulators.softmotion.mailbox.complaints import Rejected
-from robolink_simulators.softmotion.mailbox.inbox import Inbox
-from robolink_simulators.softmotion.mailbox.jobs import Job, Jobs
-from robolink_simulators.softmotion.mailbox.motion_desk import MotionDesk
+from robolink_simulators.softmotion.group.axis_group import AxisGroup
+from robolink_simulators.softmotion.group.blocks import Execution
+from robolink_simulators.softmotion.mailbox.commands.complaints import Rejected
+from robolink_simulators.softmotion.mailbox.commands.jobs import Job, Jobs
+from robolink_simulators.softmotion.mailbox.commands.motion import MotionDesk
+from robolink_simulators.softmotion.mailbox.commands.signals import SignalDesk
+from robolink_simulators.softmotion.mailbox.commands.told import Handler, Told, done
+from robolink_simulators.softmotion.mailbox.commands.tools import ToolDesk
 from robolink_simulators.softmotion.mailbox.options import MailboxOptions
 from robolink_simulators.softmotion.mailbox.ownership import Ownership
 from robolink_simulators.softmotion.mailbox.retained import RetainedMemory
-from robolink_simulators.softmotion.mailbox.signal_desk import SignalDesk
-from robolink_simulators.softmotion.mailbox.told import Handler, Told, done
-from robolink_simulators.softmotion.mailbox.tool_desk import ToolDesk
-from robolink_simulators.softmotion.mailbox.units import UserUnits
+from robolink_simulators.softmotion.mailbox.words.client_watch import ClientWatch
+from robolink_simulators.softmotion.mailbox.words.inbox import Inbox
+from robolink_simulators.softmotion.mailbox.words.units import UserUnits
 
 _ANYTIME: Final = frozenset({Opcode.STOP, Opcode.HALT})
 _ANSWERED: Final = frozenset(

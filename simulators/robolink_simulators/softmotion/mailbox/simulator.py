@@ -14,23 +14,23 @@ from pathlib import Path
 from typing import Any, Final
 
 from robolink.protocols.mailbox import COMMAND, Opcode, Words
-from robolink_simulators.softmotion.catalogue import machine_named
-from robolink_simulators.softmotion.coordinates import CoordRef
-from robolink_simulators.softmotion.mailbox.exchange import (
-    Served,
-    WireFaults,
-    shown_read,
-    shown_write,
-)
+from robolink_simulators.cell.world_parameters import WorldParameters
+from robolink_simulators.softmotion.kinematics.catalogue import machine_named
+from robolink_simulators.softmotion.kinematics.coordinates import CoordRef
 from robolink_simulators.softmotion.mailbox.faults import PlcFault, PlcFaultAction
-from robolink_simulators.softmotion.mailbox.fieldbus_watchdog import FieldbusWatchdog
 from robolink_simulators.softmotion.mailbox.mishaps import Mishaps
 from robolink_simulators.softmotion.mailbox.option_text import PlcOptions
 from robolink_simulators.softmotion.mailbox.panel import PlcPanel
 from robolink_simulators.softmotion.mailbox.plc import Plc
 from robolink_simulators.softmotion.mailbox.retained import RetainedFile
+from robolink_simulators.softmotion.mailbox.words.exchange import (
+    Served,
+    WireFaults,
+    shown_read,
+    shown_write,
+)
+from robolink_simulators.softmotion.mailbox.words.fieldbus_watchdog import FieldbusWatchdog
 from robolink_simulators.softmotion.world import SoftMotionWorld
-from robolink_simulators.world_parameters import WorldParameters
 
 DEFAULT_KINEMATICS: Final = "Kin_Scara3_Z"
 

@@ -337,8 +337,8 @@ def test_the_environment_names_the_controller(monkeypatch):
 
 HEAVY = """
 can canopen click jinja2 keyring lark numpy pydantic pymodbus rich sqlalchemy sqlite3 logging
-asyncio robolink.journal robolink.calibration robolink.controllers.epson._controller
-robolink.controllers.softmotion._controller
+asyncio robolink.journal robolink.calibration robolink.controllers.epson.controller
+robolink.controllers.softmotion.controller
 """
 
 PROBE = """

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
 
-from robolink.controllers import press_the_button, stop_now
+from robolink.controllers import advise_emergency_stop, stop_now
 from robolink.errors import (
     ConfigError,
     ConnectError,
@@ -64,7 +64,7 @@ def stop_first(request: StopRequest) -> StopOutcome:
     try:
         _stop(request, outcome)
     except RobolinkError as error:
-        outcome.error = press_the_button(error)
+        outcome.error = advise_emergency_stop(error)
     except (Exception, KeyboardInterrupt) as error:
         outcome.error = error
     return outcome

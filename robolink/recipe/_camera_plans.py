@@ -1,11 +1,12 @@
 """From a recipe to an up-looking camera."""
 
-from robolink.calibration import CameraStation, LookPlan, PatternPlan
+from robolink import methods
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink.nozzle_change import CameraToFind, HeldBoard, TipSource, UpCamera
+from robolink.procedures import LookPlan, TipSource
 from robolink.recipe._sources import BoardSource, CameraAffineSource, LookingSource
 from robolink.recipe._tables import Station
+from robolink.stations import CameraStation
 
 
 def from_camera(
@@ -36,10 +37,10 @@ def from_camera(
         beside_mm=source.beside_mm,
     )
     if isinstance(source, CameraAffineSource):
-        plan = PatternPlan(look, source.span_mm)
-        return CameraToFind(sensor, station, plan, sigma_mm=sigma_mm, name=place.id)
+        plan = methods.PatternPlan(look, source.span_mm)
+        return methods.CameraAffineSource(sensor, station, plan, sigma_mm=sigma_mm, name=place.id)
     if isinstance(source, BoardSource):
         drawing = source.drawing
         assert drawing is not None  # noqa: S101 - the recipe was checked
-        return HeldBoard(sensor, station, drawing, look, sigma_mm=sigma_mm)
-    return UpCamera(sensor, station, look, sigma_mm=sigma_mm)
+        return methods.BoardSource(sensor, station, drawing, look, sigma_mm=sigma_mm)
+    return methods.CameraSource(sensor, station, look, sigma_mm=sigma_mm)

@@ -181,7 +181,7 @@ class RecipeRun:
         return _switched(listener, stopped=stopped)
 
     def _require_role(self) -> None:
-        if not any(plan.gate.accepted_change_mm for plan in self.plan.tools):
+        if not any(plan.criteria.accepted_change_mm for plan in self.plan.tools):
             return
         signature = self._controller.outcomes.signature
         if signature.role == Role.OPERATOR:

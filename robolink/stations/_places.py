@@ -3,9 +3,10 @@
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, cast
 
-from robolink.calibration import BeamStation, CameraModel, CameraStation, TouchStation
+from robolink.calibration import CameraModel
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink.stations._sensors import BeamStation, CameraStation, TouchStation
 from robolink.stations._station import Station
 
 if TYPE_CHECKING:

@@ -14,19 +14,20 @@ from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.hosting.in_process import softmotion
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
-from robolink.calibration import Ask, TouchPlan, telling_tilts
 from robolink.errors import ConfigError, VerifyError
+from robolink.methods import PivotSource, informative_tilts
 from robolink.model import Pose, ToolOffset
 from robolink.nozzle_change import (
+    AcceptanceCriteria,
     ChangePlan,
-    Gate,
     Limits,
     Listener,
     NozzleChange,
-    TiltedPin,
     ToolPlan,
     flange_now,
 )
+from robolink.procedures import TouchPlan
+from robolink.runner import Ask
 from tests.contract._method_cell import method_cell
 from tests.contract._softmotion_cell import served
 
@@ -77,8 +78,8 @@ def eyes(simulator):
 
 
 def change(controller, simulator, *, listener=None, verify=True):
-    source = TiltedPin(telling_tilts(2, 20.0), TouchPlan())
-    one = ToolPlan(1, source, Gate(), verify=verify)
+    source = PivotSource(informative_tilts(2, 20.0), TouchPlan())
+    one = ToolPlan(1, source, AcceptanceCriteria(), verify=verify)
     plan = ChangePlan((one,), QUICK, ask_before_write=False)
     return NozzleChange(controller, plan, operator=eyes(simulator), listener=listener)
 
@@ -199,4 +200,4 @@ def test_limits_lie_about_the_tip_of_a_flange_that_points_down():
 
 def test_an_undefined_tool_is_not_swung_about():
     with pytest.raises(ConfigError, match="not defined"):
-        TiltedPin(telling_tilts(3, 20.0)).procedure(None, Pose(0, 0, 0, 0))
+        PivotSource(informative_tilts(3, 20.0)).procedure(None, Pose(0, 0, 0, 0))

@@ -6,8 +6,8 @@ from robolink.calibration import CameraModel
 from robolink.config import check_file, find_cell
 from robolink.errors import ConfigError
 from robolink.journal import EntryKind, memory_journal
+from robolink.methods import learn_station
 from robolink.model import Pose, ToolOffset
-from robolink.nozzle_change import learn_station
 from robolink.stations import (
     Found,
     Station,

@@ -7,29 +7,45 @@ sentence says with :func:`speaking` how its users say each of them.
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from enum import StrEnum
+from enum import StrEnum, unique
 
 
+@unique
 class Way(StrEnum):
     """What a sentence may ask for; the value is how a Python program says it."""
 
+    ACCEPT_JUMP = "accepted_change_mm"
+    ANSWER = "Answers(texts={{{number}: TEXT}})"
+    CALIBRATE_AT = "ToolPlan(..., pin={station!r})"
+    CALIBRATE_CAMERA_AT = "the method camera-affine, with tool {tool} at {station!r}"
+    CALIBRATE_TOOL_AT = "ToolPlan({tool}, ..., pin={station!r})"
     DIALOGUE_FILE = "DialogueLog"
     EARLIER_VALUE = "to=NUMBER"
     EXPORT_JOURNAL = "open_journal(..., read_only=True)"
     FORGET_MARKER = "recover(..., confirm=...)"
     GIVEN_POSES = "GivenPoses"
+    HEIGHT = "Answers(z_mm={{{tool}: MM}})"
     LENGTH_TOLERANCE = "length_mm=0.05"
     LIST_CHANGES = "outcomes.recorded(kinds=(EntryKind.DONE,))"
-    OPERATOR = "signature="
+    LOT = "Answers(lot=ID)"
+    NOZZLE = "Answers(nozzle=ID)"
+    OPERATOR = "connect(..., signature=...)"
     OTHER_CONTROLLER = "leave require_same_controller out"
     OVERWRITE = "replace=True"
     PASSWORD = "connect(..., password=...)"
     RECORD = "trace"
+    REFERENCE = "reference=True"
     REMOTE_TIMEOUT = "remote_timeout_s"
     SELECTED_TOO = "selected"
+    SENSOR = "sensor"
+    SIGMA = "sigma_mm"
+    TAUGHT_POINTS = "taught_poses"
+    TAUGHT_TOOL = "taught_tool"
     THEN_SELECT = "then_select=NUMBER"
+    TILT = "tilt_deg"
     TOOL = "tool"
     TOOLS = "tools"
+    YES = "Answers(yes=True)"
 
 
 _spoken: Mapping[Way, str] = {}
@@ -47,6 +63,7 @@ def speaking(words: Mapping[Way, str]) -> Iterator[None]:
         _spoken = before
 
 
-def way(which: Way) -> str:
-    """Return how the users of this program say ``which``."""
-    return _spoken.get(which, which.value)
+def way(which: Way, **values: object) -> str:
+    """Return how the users of this program say ``which``, with its placeholders filled."""
+    text = _spoken.get(which, which.value)
+    return text.format(**values) if values else text

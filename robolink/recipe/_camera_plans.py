@@ -7,6 +7,7 @@ from robolink.procedures import LookPlan, TipSource
 from robolink.recipe._sources import BoardSource, CameraAffineSource, LookingSource
 from robolink.recipe._tables import Station
 from robolink.stations import CameraStation
+from robolink.ways import Way, way
 
 
 def from_camera(
@@ -27,7 +28,7 @@ def from_camera(
     if sensor is None:
         raise ConfigError(
             tr("The recipe does not say which camera sees the tip."),
-            remedy=tr("Give --sensor, or write source.sensor."),
+            remedy=tr("Give {sensor}, or write source.sensor.", sensor=way(Way.SENSOR)),
         )
     station = CameraStation(*place.place_mm, source.model)
     look = LookPlan(

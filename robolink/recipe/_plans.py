@@ -18,6 +18,7 @@ from robolink.recipe._sources import (
 )
 from robolink.recipe._tables import Station, Tool
 from robolink.stations import BeamStation, TouchStation
+from robolink.ways import Way, way
 
 
 def plan_of(
@@ -49,7 +50,7 @@ def plan_of(
         interval_mm=tolerances.interval_mm,
         drift_tolerance_mm=tolerances.drift_mm,
         accepted_change_mm=accepted_change_mm,
-        accepted_with="--accept-jump",
+        accepted_with=way(Way.ACCEPT_JUMP),
     )
     box, speeds, safe = recipe.box, recipe.speeds, recipe.poses.safe
     return ChangePlan(

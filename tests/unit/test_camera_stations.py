@@ -109,4 +109,4 @@ def test_a_camera_is_not_learnt_by_a_tip_but_with_one():
     here = Pose(0.0, 0.0, 0.0, 0.0)
     with pytest.raises(ConfigError) as refusal:
         learn_station(camera, here=here, tool=2, tip=ToolOffset())
-    assert "camera-affine --tool 2 --station CAM" in refusal.value.remedy
+    assert "camera-affine, with tool 2 at 'CAM'" in refusal.value.remedy

@@ -19,6 +19,7 @@ from robolink.model import (
     describe_offset,
     read_offset,
 )
+from robolink.ways import Way, way
 
 KEPT = (EntryKind.DONE, EntryKind.DECISION)
 """Entries that say that a value stays, and what it rests on."""
@@ -68,10 +69,8 @@ def find_last_touch(controller: Controller, tool: int, station: str) -> LastTouc
                 "Tool {tool} was never calibrated on station {station}.", tool=tool, station=station
             ),
             remedy=tr(
-                "Make a full calibration there first: robolink calibrate n-angle --tool {tool} "
-                "--station {station}",
-                tool=tool,
-                station=station,
+                "Make a full calibration there first: {calibrate}",
+                calibrate=way(Way.CALIBRATE_TOOL_AT, tool=tool, station=station),
             ),
         )
     stored = controller.tools.read(tool)

@@ -1,4 +1,7 @@
-"""Alarms: what the controller wants looked after, apart from errors (epson.md 1.2)."""
+"""Alarms: what the controller wants looked after, apart from errors.
+
+Source: docs/reference/epson.md 1.2.
+"""
 
 from robolink.controllers._guarded import ProcedureLock
 from robolink.controllers.epson._session import EpsonSession

@@ -10,14 +10,14 @@ from robolink.model import ControllerFacts
 from robolink.protocols import spel
 
 _UNSET: Final = frozenset({"", "0"})
-"""What a name reads as when nobody set it (epson.md 1.8)."""
+"""What a name reads as when nobody set it (docs/reference/epson.md 1.8)."""
 
 
 class FactReader:
     """Reads :class:`robolink.model.ControllerFacts`.
 
-    The queries of epson.md 1.8 change nothing and are served while production runs and to a
-    client that may only monitor. Older firmware refuses them; there the robot's model and
+    The queries of docs/reference/epson.md 1.8 change nothing and are served while production runs
+    and to a client that may only monitor. Older firmware refuses them; there the robot's model and
     serial number are printed through Execute, if Execute is available just then.
     """
 
@@ -38,7 +38,7 @@ class FactReader:
             controller_name=self._text("GetContName"),
             controller_type=self._text("GetContType"),
             controller_serial=self._text("GetContNo"),
-            # Blanks stand inside the version and mean nothing (epson.md 1.8).
+            # Blanks stand inside the version and mean nothing (docs/reference/epson.md 1.8).
             firmware=None if firmware is None else "".join(firmware.split()),
             project=self._text("GetPrjName"),
             robot_number=None if number is None else spel.parse_integer(number),

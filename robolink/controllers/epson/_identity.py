@@ -9,21 +9,22 @@ from robolink.model import Identity
 from robolink.protocols import spel
 
 _UNSET: Final = frozenset({"", "0"})
-"""What a text reads as when nobody set it (epson.md 1.8)."""
+"""What a text reads as when nobody set it (docs/reference/epson.md 1.8)."""
 
 _QUERY: Final = spel.print_robot_serial()
 
 _NOT_NOW: Final = frozenset({20, 21})
-"""Refusals that say nothing about the query itself: the controller is busy (epson.md 1.6)."""
+"""Refusals that say nothing about the query itself: the controller is busy
+(docs/reference/epson.md 1.6)."""
 
 
 class IdentityReader:
     """Asks with two requests, which change nothing.
 
     Newer firmware tells the serial numbers of controller and robots at any time, to a client
-    that only monitors too (epson.md 1.8). Older firmware refuses the first query; there the
-    status is read, and where that is ready the robot's serial number is printed through Execute.
-    Else it is known by its address until it can be asked.
+    that only monitors too (docs/reference/epson.md 1.8). Older firmware refuses the first query;
+    there the status is read, and where that is ready the robot's serial number is printed through
+    Execute. Else it is known by its address until it can be asked.
     """
 
     def __init__(self, session: EpsonSession, window: CommandWindow) -> None:

@@ -6,7 +6,7 @@ from robolink.errors import LoginRefusedError, LoginUnansweredError
 from robolink.messages import tr
 
 PASSWORD_REFUSALS: Final = (13, 98)
-"""The password is wrong, or one is demanded (epson.md 1.6)."""
+"""The password is wrong, or one is demanded (docs/reference/epson.md 1.6)."""
 
 
 def unanswered(controller: str) -> LoginUnansweredError:

@@ -1,4 +1,4 @@
-"""Points that a person taught: P0 to P999 of the robot in force (spel.md 5.1)."""
+"""Points that a person taught: P0 to P999 of the robot in force (docs/reference/spel.md 5.1)."""
 
 from collections.abc import Iterable
 
@@ -11,7 +11,7 @@ class EpsonPoints:
     """The point memory. Only read: robolink never changes a taught point.
 
     A point holds coordinates, a hand and a local, but not the tool that was in force when
-    it was taught (epson.md 3.2); so the poses returned here carry ``tool=None``.
+    it was taught (docs/reference/epson.md 3.2); so the poses returned here carry ``tool=None``.
     """
 
     def __init__(self, window: CommandWindow) -> None:
@@ -30,7 +30,7 @@ class EpsonPoints:
         """Read several points, in the order given; same errors as :meth:`read`.
 
         The point is asked for only when it is taught: printing another one would put the
-        controller in error (spel.md 5.1).
+        controller in error (docs/reference/spel.md 5.1).
         """
         wanted = [(number, spel.print_point_defined(number)) for number in numbers]
         if wanted:

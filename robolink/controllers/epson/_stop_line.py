@@ -75,8 +75,8 @@ class StopLine:
     def leave(self, flags: StatusFlags) -> None:
         """Log out, where that does no harm: not while another device may begin a task.
 
-        Logging out while a task runs is an error on the controller (epson.md 1.1). Whoever
-        leaves without it just closes the connection, and nothing that fails here matters.
+        Logging out while a task runs is an error on the controller (docs/reference/epson.md 1.1).
+        Whoever leaves without it just closes the connection, and nothing that fails here matters.
         """
         if flags.auto and not flags.paused:
             with suppress(RobolinkError):

@@ -1,10 +1,10 @@
 """Bringing an EPSON controller to rest, and knowing that it rests.
 
 Abort ends what Execute runs, whoever began it: also the Execute of a client that has died,
-which goes on without it where the controller's remote time-out is long (epson.md 1.7). Stop
-ends tasks. While an Execute runs only Abort and GetStatus are served (epson.md 1.5), so a Stop
-that was accepted shows, beside the Running flag, that no Execute is left: whether the flag is on
-during an Execute is not documented.
+which goes on without it where the controller's remote time-out is long
+(docs/reference/epson.md 1.7). Stop ends tasks. While an Execute runs only Abort and GetStatus are
+served (docs/reference/epson.md 1.5), so a Stop that was accepted shows, beside the Running flag,
+that no Execute is left: whether the flag is on during an Execute is not documented.
 
 It needs a codec, a transport and a clock; nothing here looks at a record or a file.
 """
@@ -19,7 +19,7 @@ from robolink.protocols.epson_text import ErrorCode, Reply, StatusFlags, parse_s
 from robolink.timing import Clock, Deadline
 
 REST_S: Final = 5.0
-"""Longest time from the first Abort to a state that shows rest (design part 4)."""
+"""Longest time from the first Abort to a state that shows rest (docs/reference/rules.md 5)."""
 
 _POLL_S: Final = 0.02
 _AGAIN_S: Final = 1.0
@@ -68,7 +68,7 @@ def bring_to_rest(ask: Ask, clock: Clock, *, controller: str) -> tuple[StatusFla
 
 
 def _abort(ask: Ask) -> None:
-    # Older firmware has none (epson.md 1.9); the Stop that follows tells what is so.
+    # Older firmware has none (docs/reference/epson.md 1.9); the Stop that follows tells what is so.
     with suppress(RejectedError):
         ask("Abort")
 

@@ -25,6 +25,7 @@ class IdentityReader:
             return Identity(place, address, place)
         words = self._registers.read_twice(self._place.table, self._place.registers)
         if not any(words):
-            # Zeroed by a watchdog, or the program has not started (softmotion.md 4.1).
+            # Zeroed by a watchdog, or the program has not started
+            # (docs/reference/softmotion.md 4.1).
             return Identity(place, address, place, certain=False)
         return Identity(f"plc:{''.join(f'{word:04X}' for word in words)}", address, place)

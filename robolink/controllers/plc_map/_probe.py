@@ -1,7 +1,7 @@
 """Compares the PLC's constant, and says what is wrong with a map that does not fit.
 
 Wrong word order and addresses off by one are the mistakes that users of Modbus report most
-(softmotion.md 4.4); both make plausible numbers.
+(docs/reference/softmotion.md 4.4); both make plausible numbers.
 """
 
 from dataclasses import replace

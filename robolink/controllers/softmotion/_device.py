@@ -1,4 +1,7 @@
-"""Which PLC answers: the number that it drew once, the same on every link (design part 7)."""
+"""Which PLC answers: the number that it drew once, the same on every link.
+
+Source: docs/mailbox.md, "Which PLC this is".
+"""
 
 from typing import Final, Protocol
 

@@ -5,7 +5,7 @@ from robolink.model import Identity
 
 
 def identity_of(wire: MailboxWire, device_id: int | None) -> Identity:
-    """Return who a PLC is, the same over each medium (design part 7).
+    """Return who a PLC is, the same over each medium (docs/mailbox.md, "Which PLC this is").
 
     Args:
         wire: The session.

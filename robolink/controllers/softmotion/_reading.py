@@ -1,8 +1,8 @@
 """From the words of a response block to what they say, or to why they cannot be believed.
 
 Words in a wrong order, or read one register too far, make plausible numbers. So the probe is
-looked for before anything is believed, and the error names what was found (design part 7;
-softmotion.md 4.4; faults_and_speed.md F33, F34, F70).
+looked for before anything is believed, and the error names what was found (docs/mailbox.md;
+docs/reference/softmotion.md 4.4; docs/reference/faults.md F33, F34, F70).
 """
 
 from collections.abc import Sequence

@@ -1,7 +1,7 @@
 """Whole snapshots of a mailbox: never half of one, never another PLC's.
 
 The PLC may write while it is read, so a block counts only when its two ends and its checksum
-agree (faults_and_speed.md F31). Only such snapshots decide anything; the head of the block
+agree (docs/reference/faults.md F31). Only such snapshots decide anything; the head of the block
 says when to read the next one.
 """
 

@@ -13,7 +13,7 @@ from robolink_simulators.softmotion.profile import Pace, Profile
 
 
 class BufferMode(IntEnum):
-    """``MC_BUFFER_MODE`` (documented, softmotion.md 2.4)."""
+    """``MC_BUFFER_MODE`` (documented, docs/reference/softmotion.md 2.4)."""
 
     ABORTING = 0
     BUFFERED = 1

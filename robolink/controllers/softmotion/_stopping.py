@@ -1,9 +1,9 @@
 """Bringing the axis group behind a mailbox to rest, and knowing that it rests.
 
 Stop (opcode 2003) needs neither ownership nor the machine's permit (docs/mailbox.md, "What ends by
-itself"). Its block is done when the group stands (docs/reference/softmotion.md 2.2). A group that is
-disabled, in error or held by an earlier stop refuses it, and may yet be braking, so there the axes
-themselves are compared.
+itself"). Its block is done when the group stands (docs/reference/softmotion.md 2.2). A group that
+is disabled, in error or held by an earlier stop refuses it, and may yet be braking, so there the
+axes themselves are compared.
 """
 
 from typing import Final

@@ -11,7 +11,7 @@ _LENGTHS = 3
 
 
 @dataclass(frozen=True, slots=True)
-class Tolerance:
+class ComparisonTolerance:
     """The largest difference that counts as none.
 
     By default half the last digit that a controller prints (docs/reference/rules.md 3): values that
@@ -116,7 +116,7 @@ class Comparison:
 def compare(
     expected: ToolState,
     found: ToolState,
-    tolerance: Tolerance | None = None,
+    tolerance: ComparisonTolerance | None = None,
     *,
     selection_counts: bool = True,
 ) -> Comparison:
@@ -129,7 +129,7 @@ def compare(
         selection_counts: Whether another tool in force is a difference. While a program runs
             it selects tools by itself.
     """
-    limits = tolerance or Tolerance()
+    limits = tolerance or ComparisonTolerance()
     return Comparison(
         tuple(_tool(tool, expected, found, limits) for tool in TOOLS),
         expected.selected,
@@ -138,7 +138,9 @@ def compare(
     )
 
 
-def _tool(tool: int, expected: ToolState, found: ToolState, limits: Tolerance) -> ToolComparison:
+def _tool(
+    tool: int, expected: ToolState, found: ToolState, limits: ComparisonTolerance
+) -> ToolComparison:
     wanted, stored = expected.tools[tool], found.tools[tool]
     if wanted is None or stored is None:
         return ToolComparison(tool, wanted, stored)

@@ -18,7 +18,7 @@ from robolink.model import ControllerFacts, ToolOffset, ToolReceipt, ToolTable
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class RestoreChange:
     """One tool that the backup knows otherwise.
 
     Attributes:
@@ -43,16 +43,16 @@ class RestorePlan:
         select: The tool to put in force, ``None`` to leave that as it is.
     """
 
-    changes: tuple[Change, ...]
+    changes: tuple[RestoreChange, ...]
     select: int | None = None
 
     @property
-    def writes(self) -> tuple[Change, ...]:
+    def writes(self) -> tuple[RestoreChange, ...]:
         """The tools that get a value."""
         return tuple(change for change in self.changes if change.wanted is not None)
 
     @property
-    def clears(self) -> tuple[Change, ...]:
+    def clears(self) -> tuple[RestoreChange, ...]:
         """The tools that lose theirs."""
         return tuple(change for change in self.changes if change.wanted is None)
 
@@ -114,7 +114,7 @@ def plan_restore(
     for tool in wanted:
         _check_index(tool)
     differing = (tool for tool in compare(backup.state, now).differing if tool.tool in wanted)
-    changes = [Change(tool.tool, tool.found, tool.expected) for tool in differing]
+    changes = [RestoreChange(tool.tool, tool.found, tool.expected) for tool in differing]
     changes.sort(key=lambda change: (change.wanted is None, change.tool))
     select = backup.state.selected if selected and backup.state.selected != now.selected else None
     plan = RestorePlan(tuple(changes), select)
@@ -150,7 +150,7 @@ def restore(
     return tuple(receipts)
 
 
-def _set(tools: ToolTable, change: Change, tell: Callable[[str], None]) -> ToolReceipt:
+def _set(tools: ToolTable, change: RestoreChange, tell: Callable[[str], None]) -> ToolReceipt:
     if change.wanted is None:
         receipt = tools.clear(change.tool, expected=change.now)
         tell(tr("tool {tool}: cleared, read back", tool=change.tool))

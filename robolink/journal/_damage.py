@@ -13,7 +13,7 @@ from robolink.journal._records import Filter
 from robolink.messages import tr
 
 if TYPE_CHECKING:
-    from robolink.journal._store import Tables
+    from robolink.journal.store.store import Tables
 
 _NEWEST: Final = 20
 """How many entries are looked at, of the journal and of the controller."""

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
 
-from robolink.register_maps._places import Table, describe_place
+from robolink.register_maps._places import RegisterTable, describe_place
 
 LREAL_TOLERANCE: Final = 1e-9
 """Two LREALs this near are equal (docs/reference/rules.md 3)."""
@@ -64,7 +64,7 @@ class Number:
         factor: Millimetres or degrees in one unit of the encoded number; not 0.
     """
 
-    table: Table
+    table: RegisterTable
     address: int
     type: NumberType
     low_word_first: bool = False

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Final, TypeVar
 
 from robolink.calibration import Ask, Look, Move, Offer, Procedure, Seek, SeenAt, Shown, Step, Tell
-from robolink.checkpoints import Point, checkpoint
+from robolink.checkpoints import Checkpoint, checkpoint
 from robolink.errors import (
     CalibrationError,
     ConfigError,
@@ -120,7 +120,7 @@ class Runner:
         try:
             step = next(procedure)
             while True:
-                checkpoint(Point.STEP, type(step).__name__)
+                checkpoint(Checkpoint.STEP, type(step).__name__)
                 self._require_going()
                 try:
                     done = self._take(step)
@@ -324,7 +324,7 @@ class Runner:
         """Return the next line typed, reading the status at least once a second meanwhile."""
         while True:
             line = self._operator.poll(POLL_S)
-            checkpoint(Point.QUESTION, line or "")
+            checkpoint(Checkpoint.QUESTION, line or "")
             self._watch()
             if line is not None:
                 return line

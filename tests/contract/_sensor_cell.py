@@ -7,13 +7,13 @@ from dataclasses import dataclass, field, replace
 from itertools import count
 from typing import Any
 
-from robolink_simulators.clock import ManualClock
+from robolink_simulators.cell.clock import ManualClock
+from robolink_simulators.cell.tip_switches import UPRIGHT, LightBeam, TipSwitch, TouchPlate
+from robolink_simulators.cell.workplace import XyzMm
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.hosting import plc_in_process
-from robolink_simulators.hosting.in_process import register, unregister
-from robolink_simulators.sensing import UPRIGHT, LightBeam, TipSwitch, TouchPlate
+from robolink_simulators.hosting.in_process import softmotion
+from robolink_simulators.hosting.in_process.epson import register, unregister
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
-from robolink_simulators.workplace import XyzMm
 
 import robolink
 from robolink.calibration import Ask, Beam, BeamStation, Look, Move, Seek, TouchStation
@@ -213,11 +213,11 @@ def plc_sensor_cell(seed: int = 3) -> Iterator[SensorCell]:
     """Set a cell up around a PLC."""
     clock, name = ManualClock(), f"sensors-{next(_names)}"
     simulator = SoftMotionSimulator(seed=seed)
-    url = plc_in_process.register(name, simulator, clock=clock)
+    url = softmotion.register(name, simulator, clock=clock)
     try:
         yield SensorCell(simulator, url, clock)
     finally:
-        plc_in_process.unregister(name)
+        softmotion.unregister(name)
 
 
 def miss_mm(found: ToolOffset, true: ToolOffset) -> float:

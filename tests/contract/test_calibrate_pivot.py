@@ -9,9 +9,9 @@ from itertools import count
 
 import pytest
 from robolink_cli import main
-from robolink_cli._operator import AssistedOperator
-from robolink_simulators.clock import ManualClock
-from robolink_simulators.hosting import plc_in_process
+from robolink_cli.prompts.operator import AssistedOperator
+from robolink_simulators.cell.clock import ManualClock
+from robolink_simulators.hosting.in_process import softmotion
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 from robolink.calibration import Ask, TouchPlan, telling_tilts
@@ -48,11 +48,11 @@ def plc(tmp_path, monkeypatch):
     monkeypatch.setattr("robolink.nozzle_change.Limits", partial(Limits, speed_percent=100))
     monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
     name, simulator = f"five-axes-{next(_names)}", SoftMotionSimulator(FIVE, seed=4)
-    simulator.url = plc_in_process.register(name, simulator, clock=ManualClock())
+    simulator.url = softmotion.register(name, simulator, clock=ManualClock())
     try:
         yield simulator
     finally:
-        plc_in_process.unregister(name)
+        softmotion.unregister(name)
 
 
 def run(url, *words):

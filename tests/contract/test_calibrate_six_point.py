@@ -3,9 +3,9 @@
 from dataclasses import replace
 
 import pytest
-from robolink_cli._operator import AssistedOperator
+from robolink_cli.prompts.operator import AssistedOperator
+from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
-from robolink_simulators.world_parameters import WorldParameters
 
 from robolink.calibration import Ask, Shown, TouchPlan, WayPlan, rotation_of, telling_tilts
 from robolink.errors import VerifyError

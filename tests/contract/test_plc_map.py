@@ -5,7 +5,7 @@ import threading
 from pathlib import Path
 
 import pytest
-from robolink_simulators.clock import ScaledClock
+from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.faults import Fault, FaultAction
 from robolink_simulators.plc import PlcSimulator, serve_plc, serve_plc_line
 

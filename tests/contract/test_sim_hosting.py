@@ -9,10 +9,10 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 
 import pytest
-from robolink_simulators.clock import ScaledClock
+from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson import EpsonOptions, EpsonSimulator
 from robolink_simulators.faults import Fault, FaultAction
-from robolink_simulators.hosting.tcp import serve_tcp
+from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 
 from robolink.errors import ConfigError, ConnectError
 from robolink.model import Secret

@@ -22,8 +22,8 @@ from robolink.errors import (
     TransportTimeoutError,
 )
 from robolink.transport import open_modbus, parse_url
-from robolink.transport._can_bus import CanLine
-from robolink.transport._canopen_link import CanopenMailboxLink
+from robolink.transport.can.bus import CanLine
+from robolink.transport.can.mailbox import CanopenMailboxLink
 from tests.unit._scripted_can import IDENTITY, NODE, SDO_ANSWER, FakeClock, ScriptedBus, node_with
 
 OFFERED = 64_000_000

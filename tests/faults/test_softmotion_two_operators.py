@@ -9,7 +9,7 @@ import os
 from contextlib import contextmanager
 
 import pytest
-from robolink_simulators.clock import ScaledClock
+from robolink_simulators.cell.clock import ScaledClock
 
 from robolink.model import EntryKind, ToolOffset
 from tests.contract._softmotion_cell import OWNER_SILENCE_S, SkippingClock

@@ -7,7 +7,7 @@ half a second and arrives where it was sent.
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from robolink_simulators.clock import ManualClock
+from robolink_simulators.cell.clock import ManualClock
 
 from robolink.protocols.mailbox import (
     Answer,

@@ -10,12 +10,12 @@ import re
 from pathlib import Path
 
 import pytest
+from robolink_simulators.epson.arm.robots import find_robot
 from robolink_simulators.epson.companion import LAST_COUNT, Companion
 from robolink_simulators.epson.machine import Machine
+from robolink_simulators.epson.memory.variables import Variables
 from robolink_simulators.epson.options import EpsonOptions
-from robolink_simulators.epson.robots import find_robot
 from robolink_simulators.epson.spel import Interpreter
-from robolink_simulators.epson.variables import Variables
 
 from robolink.model import ToolOffset
 from robolink.protocols.spel import parse_number

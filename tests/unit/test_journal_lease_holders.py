@@ -7,10 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from robolink_simulators.clock import ManualClock
+from robolink_simulators.cell.clock import ManualClock
 
 from robolink.errors import LeaseHeldError
-from robolink.journal._sightings import LEASE_S
+from robolink.journal.leases.sightings import LEASE_S
 from tests.unit._lease_logs import (
     ANNA,
     BERT,

@@ -1,7 +1,7 @@
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from robolink_simulators.epson.kinematics import (
+from robolink_simulators.epson.arm.kinematics import (
     Joints,
     check_ranges,
     flange_of,
@@ -10,8 +10,8 @@ from robolink_simulators.epson.kinematics import (
     solve,
     tip_of,
 )
+from robolink_simulators.epson.arm.robots import ROBOTS, Evidence, find_robot
 from robolink_simulators.epson.refusals import OutOfReach
-from robolink_simulators.epson.robots import ROBOTS, Evidence, find_robot
 
 from robolink.errors import ConfigError
 from robolink.model import Hand, Pose, ToolOffset

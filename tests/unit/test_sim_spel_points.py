@@ -3,9 +3,9 @@
 import random
 
 import pytest
+from robolink_simulators.epson.arm.robots import find_robot
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.options import EpsonOptions, SpelNumbers
-from robolink_simulators.epson.robots import find_robot
 from robolink_simulators.epson.spel import Interpreter
 
 from robolink.model import Hand, ToolOffset

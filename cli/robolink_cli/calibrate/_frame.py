@@ -9,12 +9,12 @@ import click
 
 from robolink.errors import ConfigError, ReservedToolError, ToolIndexError
 from robolink.messages import tr
-from robolink_cli._context import CliContext
-from robolink_cli._impacting import ImpactRequest, impact_request
-from robolink_cli._jumps import jump_limit_mm
-from robolink_cli._motion_options import refuse_motion_options
-from robolink_cli._pose_source import PoseSource
-from robolink_cli._reporting import ReportRequest, report_request
+from robolink_cli.options.impact import ImpactRequest, impact_request
+from robolink_cli.options.motion import refuse_motion_options
+from robolink_cli.options.pose_source import PoseSource
+from robolink_cli.options.report import ReportRequest, report_request
+from robolink_cli.prompts.jumps import jump_limit_mm
+from robolink_cli.session.context import CliContext
 
 if TYPE_CHECKING:
     from robolink.model import Controller

@@ -20,19 +20,19 @@ from robolink.nozzle_change import (
     ToolReport,
 )
 from robolink.transaction import earlier_corrections
-from robolink_cli._calibration_views import doubts, judged_payload, report_payload
-from robolink_cli._consent import agree, on_terminal
-from robolink_cli._context import CliContext, open_controller
-from robolink_cli._impacting import impact_payload, show_impact
-from robolink_cli._notices import note_change
-from robolink_cli._operator import terminal
-from robolink_cli._pose_source import PoseSource
-from robolink_cli._render import note, say
-from robolink_cli._reporting import Draft, reporting
-from robolink_cli._safekeeping import back_up_first
 from robolink_cli.calibrate._frame import Frame
 from robolink_cli.calibrate._listener import CalibrationListener
 from robolink_cli.calibrate._pins import remark_on_pin
+from robolink_cli.console.render import note, say
+from robolink_cli.options.impact import impact_payload, show_impact
+from robolink_cli.options.pose_source import PoseSource
+from robolink_cli.options.report import ReportDraft, reporting
+from robolink_cli.prompts.consent import agree, on_terminal
+from robolink_cli.prompts.operator import terminal
+from robolink_cli.session.context import CliContext, open_controller
+from robolink_cli.session.first_backup import back_up_first
+from robolink_cli.session.warnings import note_change
+from robolink_cli.views.calibration import doubts, judged_payload, report_payload
 
 
 class _PosesListener(CalibrationListener):
@@ -40,7 +40,7 @@ class _PosesListener(CalibrationListener):
 
     def __init__(
         self,
-        draft: Draft,
+        draft: ReportDraft,
         frame: Frame,
         given: GivenPoses,
         *,

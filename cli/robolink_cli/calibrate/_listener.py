@@ -3,9 +3,9 @@
 from robolink.calibration import Impact, VerifyResult
 from robolink.model import Controller, Pose, ToolReceipt
 from robolink.nozzle_change import Gate, Listener, Proposal
-from robolink_cli._calibration_views import show_proposal, show_verdicts
-from robolink_cli._impacting import ImpactRequest, judge
-from robolink_cli._reporting import Draft
+from robolink_cli.options.impact import ImpactRequest, judge
+from robolink_cli.options.report import ReportDraft
+from robolink_cli.views.calibration import show_proposal, show_verdicts
 
 
 class CalibrationListener(Listener):
@@ -15,7 +15,7 @@ class CalibrationListener(Listener):
         impact: What the change means for taught points, once it was proposed.
     """
 
-    def __init__(self, draft: Draft, gate: Gate, impact: ImpactRequest | None) -> None:
+    def __init__(self, draft: ReportDraft, gate: Gate, impact: ImpactRequest | None) -> None:
         self._draft = draft
         self._gate = gate
         self._request = impact

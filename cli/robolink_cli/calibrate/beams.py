@@ -6,9 +6,9 @@ import click
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink_cli._motion_options import motion_option
 from robolink_cli.calibrate._frame import Frame
 from robolink_cli.calibrate._options import calibration_options, sigma_option, until_option
+from robolink_cli.options.motion import motion_option
 
 if TYPE_CHECKING:
     from robolink.model import Controller

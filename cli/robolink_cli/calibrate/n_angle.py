@@ -4,8 +4,6 @@ import click
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink_cli._motion_options import motion_option
-from robolink_cli._pose_source import PoseSource, pose_source_options
 from robolink_cli.calibrate._frame import Frame
 from robolink_cli.calibrate._options import (
     calibration_options,
@@ -14,6 +12,8 @@ from robolink_cli.calibrate._options import (
     touch_options,
     until_option,
 )
+from robolink_cli.options.motion import motion_option
+from robolink_cli.options.pose_source import PoseSource, pose_source_options
 
 
 @click.command("n-angle")

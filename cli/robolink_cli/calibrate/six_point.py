@@ -6,8 +6,6 @@ from typing import TYPE_CHECKING, Literal
 import click
 
 from robolink.messages import tr
-from robolink_cli._motion_options import motion_option
-from robolink_cli._pose_source import PoseSource, pose_source_options
 from robolink_cli.calibrate._frame import Frame
 from robolink_cli.calibrate._options import (
     calibration_options,
@@ -17,6 +15,8 @@ from robolink_cli.calibrate._options import (
     until_option,
 )
 from robolink_cli.calibrate._tilting import tilt_options
+from robolink_cli.options.motion import motion_option
+from robolink_cli.options.pose_source import PoseSource, pose_source_options
 
 if TYPE_CHECKING:
     from robolink.model import Controller

@@ -3,8 +3,6 @@
 import click
 
 from robolink.messages import tr
-from robolink_cli._motion_options import motion_option
-from robolink_cli._pose_source import PoseSource, pose_source_options
 from robolink_cli.calibrate._frame import Frame
 from robolink_cli.calibrate._options import (
     calibration_options,
@@ -12,6 +10,8 @@ from robolink_cli.calibrate._options import (
     sigma_option,
     touch_options,
 )
+from robolink_cli.options.motion import motion_option
+from robolink_cli.options.pose_source import PoseSource, pose_source_options
 
 
 @click.command("two-pose")

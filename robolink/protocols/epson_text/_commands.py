@@ -40,7 +40,7 @@ class ReplyShape(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Command:
+class RemoteCommand:
     """What one command demands and gives.
 
     Attributes:
@@ -88,8 +88,8 @@ _UNSAFE: Final = frozenset({"emergency_stop", "safeguard"})
 _UNFIT: Final = _UNSAFE | {"error"}
 
 
-def _query(name: str, parameters: int = 0, *, during_execute: int | None = None) -> Command:
-    return Command(
+def _query(name: str, parameters: int = 0, *, during_execute: int | None = None) -> RemoteCommand:
+    return RemoteCommand(
         name,
         parameters,
         parameters,
@@ -99,12 +99,12 @@ def _query(name: str, parameters: int = 0, *, during_execute: int | None = None)
     )
 
 
-def _output(name: str, needs: frozenset[str]) -> Command:
-    return Command(name, 2, 2, needs, during_execute=7)
+def _output(name: str, needs: frozenset[str]) -> RemoteCommand:
+    return RemoteCommand(name, 2, 2, needs, during_execute=7)
 
 
-def _extended(name: str, parameters: int = 0) -> Command:
-    return Command(
+def _extended(name: str, parameters: int = 0) -> RemoteCommand:
+    return RemoteCommand(
         name,
         parameters,
         parameters,
@@ -118,19 +118,19 @@ def _extended(name: str, parameters: int = 0) -> Command:
 _VARIABLE: Final = ParameterForm.VARIABLE
 _STATEMENT: Final = ParameterForm.STATEMENT
 
-COMMANDS: Final[tuple[Command, ...]] = (
-    Command("Login", 1, 1, form=ParameterForm.PASSWORD, in_monitoring=True, bare=True),
-    Command("Logout", in_monitoring=True),
-    Command("Start", 1, 1, _READY, _UNFIT),
-    Command("Stop", needs=_AUTO),
-    Command("Pause", needs=frozenset({"auto", "running"})),
-    Command("Continue", needs=frozenset({"auto", "paused"})),
-    Command("Reset", needs=_READY),
-    Command("SetMotorsOn", 1, 1, _READY, _UNSAFE, bare=True),
-    Command("SetMotorsOff", 1, 1, _READY, bare=True),
-    Command("SetCurRobot", 1, 1, _READY),
+COMMANDS: Final[tuple[RemoteCommand, ...]] = (
+    RemoteCommand("Login", 1, 1, form=ParameterForm.PASSWORD, in_monitoring=True, bare=True),
+    RemoteCommand("Logout", in_monitoring=True),
+    RemoteCommand("Start", 1, 1, _READY, _UNFIT),
+    RemoteCommand("Stop", needs=_AUTO),
+    RemoteCommand("Pause", needs=frozenset({"auto", "running"})),
+    RemoteCommand("Continue", needs=frozenset({"auto", "paused"})),
+    RemoteCommand("Reset", needs=_READY),
+    RemoteCommand("SetMotorsOn", 1, 1, _READY, _UNSAFE, bare=True),
+    RemoteCommand("SetMotorsOff", 1, 1, _READY, bare=True),
+    RemoteCommand("SetCurRobot", 1, 1, _READY),
     _query("GetCurRobot"),
-    Command("Home", 1, 1, _READY, _UNFIT, bare=True),
+    RemoteCommand("Home", 1, 1, _READY, _UNFIT, bare=True),
     _query("GetIO", 1),
     _query("GetMemIO", 1),
     _output("SetIO", _READY_ONLY),
@@ -143,14 +143,14 @@ COMMANDS: Final[tuple[Command, ...]] = (
     _query("GetMemIOWord", 1),
     _output("SetIOWord", _READY),
     _output("SetMemIOWord", _READY),
-    Command("GetVariable", 1, 3, form=_VARIABLE, reply=ReplyShape.FIELDS, in_monitoring=True),
-    Command("SetVariable", 2, 3, _READY, form=_VARIABLE),
+    RemoteCommand("GetVariable", 1, 3, form=_VARIABLE, reply=ReplyShape.FIELDS, in_monitoring=True),
+    RemoteCommand("SetVariable", 2, 3, _READY, form=_VARIABLE),
     _query("GetStatus", during_execute=5),
-    Command("Execute", 1, 1, _READY, _UNFIT, form=_STATEMENT, reply=ReplyShape.TEXT),
-    Command("Abort", needs=_AUTO, during_execute=5),
-    Command("GetAlm", reply=ReplyShape.FIELDS, in_monitoring=True, since=7),
+    RemoteCommand("Execute", 1, 1, _READY, _UNFIT, form=_STATEMENT, reply=ReplyShape.TEXT),
+    RemoteCommand("Abort", needs=_AUTO, during_execute=5),
+    RemoteCommand("GetAlm", reply=ReplyShape.FIELDS, in_monitoring=True, since=7),
     # Its preconditions are not documented; Auto is what accepts remote commands at all.
-    Command("ResetAlm", 1, 1, _AUTO, since=7),
+    RemoteCommand("ResetAlm", 1, 1, _AUTO, since=7),
     _extended("GetContName"),
     _extended("GetContNo"),
     _extended("GetContVer"),
@@ -177,12 +177,12 @@ COMMANDS: Final[tuple[Command, ...]] = (
 )
 """The table, in the order of docs/reference/epson.md 1.2, then 1.8."""
 
-_BY_NAME: Final[Mapping[str, Command]] = MappingProxyType(
+_BY_NAME: Final[Mapping[str, RemoteCommand]] = MappingProxyType(
     {command.name.lower(): command for command in COMMANDS}
 )
 
 
-def find_command(name: str) -> Command | None:
+def find_command(name: str) -> RemoteCommand | None:
     """Return the command called ``name`` in any case, ``None`` when there is none."""
     # The Kelvin sign and its like are lower-cased to ASCII letters; they are no names.
     return _BY_NAME.get(name.lower()) if name.isascii() else None

@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from robolink.protocols.epson_text._commands import Command, ParameterForm, ReplyShape
+from robolink.protocols.epson_text._commands import ParameterForm, RemoteCommand, ReplyShape
 
 MAX_TEXT: Final = 4060
 """Most bytes of a statement, and of what it prints (docs/reference/epson.md 1.5)."""
@@ -10,7 +10,7 @@ MAX_TEXT: Final = 4060
 QUOTE: Final = '"'
 
 
-def read_parameters(command: Command, payload: str) -> tuple[str, ...] | None:
+def read_parameters(command: RemoteCommand, payload: str) -> tuple[str, ...] | None:
     """Return the parameters in ``payload`` as a device takes them, ``None`` when it cannot.
 
     Clients in use send more than a command takes (``$Login,,terminator``, ``$GetStatus,``,
@@ -25,7 +25,7 @@ def read_parameters(command: Command, payload: str) -> tuple[str, ...] | None:
     return parameters if fits or (command.bare and not parameters) else None
 
 
-def write_parameters(command: Command, parameters: tuple[str, ...]) -> str | None:
+def write_parameters(command: RemoteCommand, parameters: tuple[str, ...]) -> str | None:
     """Return ``parameters`` as one text, ``None`` when a device could read anything else."""
     payload = ",".join(parameters)
     if command.form is ParameterForm.STATEMENT:
@@ -36,7 +36,7 @@ def write_parameters(command: Command, parameters: tuple[str, ...]) -> str | Non
     return None if missing or read_parameters(command, payload) != parameters else payload
 
 
-def _read(command: Command, payload: str) -> tuple[str, ...] | None:
+def _read(command: RemoteCommand, payload: str) -> tuple[str, ...] | None:
     most = command.max_parameters
     match command.form:
         case ParameterForm.NUMBERS:

@@ -67,7 +67,7 @@ class Capability(IntFlag):
 _EVERYTHING: Final = Capability(sum(Capability))
 
 
-class Profile(StrEnum):
+class ExportProfile(StrEnum):
     """Which opcodes an exported mailbox program holds."""
 
     TOOLS = "tools"
@@ -76,7 +76,7 @@ class Profile(StrEnum):
     @property
     def capabilities(self) -> Capability:
         """What such a program says that it can do."""
-        return Capability.TOOLS if self is Profile.TOOLS else _EVERYTHING
+        return Capability.TOOLS if self is ExportProfile.TOOLS else _EVERYTHING
 
 
 class CoordinateSystem(IntEnum):

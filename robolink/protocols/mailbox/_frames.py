@@ -12,7 +12,7 @@ orientation: the first angle may be any, the others follow from it.
 from math import atan2, cos, degrees, hypot, radians, sin
 from typing import Final
 
-from robolink.protocols.mailbox._blocks import Six
+from robolink.protocols.mailbox.blocks.layout import Six
 
 _UM_PER_MM: Final = 1000.0
 _SINGULAR: Final = 1e-12

@@ -15,8 +15,8 @@ _LENGTHS = 3
 class ComparisonTolerance:
     """The largest difference that counts as none.
 
-    By default half the last digit that a controller prints (design part 4): values that it
-    prints alike are equal.
+    By default half the last digit that a controller prints (docs/reference/rules.md 3): values that
+    it prints alike are equal.
 
     Raises:
         ConfigError: One is negative or no number.

@@ -39,7 +39,7 @@ def config_files() -> tuple[ConfigFile, ...]:
     """Return the places looked at, the one that wins first.
 
     The file that ROBOLINK_CONFIG names, ``robolink.toml`` in the working folder, the user's,
-    the site's (ecosystem.md 5).
+    the site's (docs/cell-files.md, "Where they are").
     """
     from platformdirs import site_config_path, user_config_path
 

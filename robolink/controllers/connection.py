@@ -100,8 +100,8 @@ def connect(
             remote_timeout_s=remote_timeout_s,
         )
     except LoginUnansweredError:
-        # One client at a time is served (epson.md 1.1). The lease may say who that is, if the
-        # journal can be read.
+        # One client at a time is served (docs/reference/epson.md 1.1). The lease may say who that
+        # is, if the journal can be read.
         with suppress(JournalError):
             kept.look()
         raise

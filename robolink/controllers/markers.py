@@ -1,6 +1,6 @@
 """Commands that change something: marked before they leave, cleared when proved.
 
-The command classes of design part 4 (faults_and_speed.md A3):
+The command classes of docs/reference/rules.md 1:
 
 =====  ==========================================  =======================================
 class  on an EPSON controller                      when no answer comes

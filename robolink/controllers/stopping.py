@@ -1,8 +1,9 @@
 """A stop from outside: reach the controller, stop it, see it rest, leave.
 
 Nothing stands before the Abort, Stop or 2003 frame: no journal, no lease, no question, and no
-import that the frame does not need (design part 4, docs/decisions/0017). What is imported inside
-the functions below is needed afterwards, or for one kind of controller only.
+import that the frame does not need (docs/decisions/0017-a-stop-has-its-own-way-to-the-wire.md).
+What is imported inside the functions below is needed afterwards, or for one kind of controller
+only.
 """
 
 from typing import TYPE_CHECKING, Final, NamedTuple

@@ -1,7 +1,8 @@
 """The journal: what was done to each tool, by whom, and what is not settled yet.
 
-Append-only, on SQLAlchemy Core: an SQLite file by default, PostgreSQL by URL (design parts 2
-and 8). Importing this package loads no database code; opening a journal does.
+Append-only, on SQLAlchemy Core: an SQLite file by default, PostgreSQL by URL
+(docs/decisions/0011-journal-on-sqlalchemy.md, docs/reference/rules.md 6). Importing this package
+loads no database code; opening a journal does.
 """
 
 from typing import TYPE_CHECKING

@@ -172,9 +172,9 @@ class RecipeRun:
     def _outputs_left(self, listener: RecipeListener) -> str:
         """Say how the outputs were left.
 
-        An emergency stop may switch them off by itself (spel.md 8): what the recipe had switched
-        is not how they are then. Where the controller cannot be asked any more, only what the
-        recipe did is known.
+        An emergency stop may switch them off by itself (docs/reference/spel.md 8): what the recipe
+        had switched is not how they are then. Where the controller cannot be asked any more, only
+        what the recipe did is known.
         """
         stopped = False
         with suppress(RobolinkError):

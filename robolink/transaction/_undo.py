@@ -1,7 +1,7 @@
 """Undoing a change: what the tools held before it, or any value proved earlier, is written back.
 
-An undo is a change like any other (design part 8): it expects what the journal proved last,
-writes all of its tools or none, and can itself be undone.
+An undo is a change like any other (docs/reference/rules.md 6): it expects what the journal proved
+last, writes all of its tools or none, and can itself be undone.
 """
 
 from collections.abc import Callable, Collection, Iterator, Mapping

@@ -23,7 +23,7 @@ def link_options(cell: "Cell") -> dict[str, Any]:
     """Return what a cell says about reaching its controller, by the names of the options.
 
     A cell whose file states no remote time-out has none: it cannot be read over the wire
-    (epson.md 1.1), so nothing moves until a person states it.
+    (docs/reference/epson.md 1.1), so nothing moves until a person states it.
     """
     settings = cell.settings
     said: dict[str, Any] = {"remote_timeout_s": settings.remote_timeout_s or 0.0}

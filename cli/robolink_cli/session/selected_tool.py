@@ -3,7 +3,7 @@
 What a program on another computer, or one with another state folder, left behind is in no
 journal here; the controller shows it. A calibration that was killed leaves Tool 0 selected: the
 next movement would be that of the flange, and the next program would drive the flange where the
-nozzle tip belongs (epson.md 3.1).
+nozzle tip belongs (docs/reference/epson.md 3.1).
 """
 
 from contextlib import suppress

@@ -1,7 +1,7 @@
 """Whether the PLC is the one of the map: its constant, and the number that it is known by.
 
 Wrong word order and addresses off by one are the mistakes that users of Modbus report most
-(softmotion.md 4.4); both make plausible numbers.
+(docs/reference/softmotion.md 4.4); both make plausible numbers.
 """
 
 from dataclasses import replace
@@ -104,6 +104,7 @@ class IdentityReader:
             return Identity(place, address, place)
         words = self._registers.read_twice(self._place.table, self._place.registers)
         if not any(words):
-            # Zeroed by a watchdog, or the program has not started (softmotion.md 4.1).
+            # Zeroed by a watchdog, or the program has not started
+            # (docs/reference/softmotion.md 4.1).
             return Identity(place, address, place, certain=False)
         return Identity(f"plc:{''.join(f'{word:04X}' for word in words)}", address, place)

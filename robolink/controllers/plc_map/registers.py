@@ -100,8 +100,8 @@ class Registers:
     def read_twice(self, table: RegisterTable, addresses: range) -> tuple[int, ...]:
         """Return what stands there as soon as two reads agree.
 
-        A server may change registers between the words of one answer (softmotion.md 4.1,
-        faults_and_speed.md F31).
+        A server may change registers between the words of one answer
+        (docs/reference/softmotion.md 4.1, docs/reference/faults.md F31).
 
         Raises:
             RemoteProtocolError: No two reads in a row agree.

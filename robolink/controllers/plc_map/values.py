@@ -122,7 +122,8 @@ class OffsetValues:
     def same(self, a: ToolOffset | None, b: ToolOffset | None) -> bool:
         """Tell whether registers hold both alike; undefined equals undefined only.
 
-        Whole numbers: half a step; REAL: one unit in the last place; LREAL: 1e-9 (design 4).
+        Whole numbers: half a step; REAL: one unit in the last place; LREAL: 1e-9
+        (docs/reference/rules.md 3).
         """
         if a is None or b is None:
             return a is b

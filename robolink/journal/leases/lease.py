@@ -1,4 +1,6 @@
-"""One at a time on a controller: a lease with an epoch (design part 8; F46, F47).
+"""One at a time on a controller: a lease with an epoch.
+
+Source: docs/reference/rules.md 6; docs/reference/faults.md F46, F47.
 
 The epoch counts who held the lease. Whoever writes an intent proves in the same transaction
 that the epoch still is his own, so a holder that was frozen and comes back is told, and sends

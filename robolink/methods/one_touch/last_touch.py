@@ -2,7 +2,7 @@
 
 The offset that is written and the touches that it came from say together where the pin is,
 ``P = p + R t``. As long as that offset stays stored and the pin stays where it is, a new tip that
-touches the pin shows by how much it differs from the old one (calibration.md 2).
+touches the pin shows by how much it differs from the old one (docs/reference/calibration.md 2.9).
 """
 
 from collections.abc import Mapping

@@ -1,8 +1,8 @@
 """Poses that exist already: taught on the pendant, typed, or kept in a file.
 
 With the guard open in Teach, where a person touches a tip to a pin, a PC commands nothing
-(design part 1a). So the poses are taught on the pendant and read afterwards. Nothing moves
-here and no tool is selected; therefore nothing is proved by turning about the new tip either.
+(docs/reference/rules.md 9). So the poses are taught on the pendant and read afterwards. Nothing
+moves here and no tool is selected; therefore nothing is proved by turning about the new tip either.
 """
 
 from collections.abc import Callable, Mapping, Sequence

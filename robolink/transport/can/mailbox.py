@@ -1,4 +1,4 @@
-"""A PLC mailbox in the object dictionary of a CANopen node (design part 7)."""
+"""A PLC mailbox in the object dictionary of a CANopen node (docs/mailbox.md, "CANopen")."""
 
 import struct
 import threading

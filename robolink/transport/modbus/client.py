@@ -1,7 +1,7 @@
 """A Modbus client for a PLC's registers and coils, over TCP or a serial line.
 
-Nothing is sent twice and no connection is renewed by itself (design part 2). Addresses count
-from 0, as on the wire.
+Nothing is sent twice and no connection is renewed by itself
+(docs/decisions/0004-no-silent-retry.md). Addresses count from 0, as on the wire.
 """
 
 import threading

@@ -1,7 +1,7 @@
 """Puts what goes wrong between this computer and a Modbus server into words.
 
 Addresses are always given both ways, as the number that manuals print and as the one on the
-wire, because tools disagree about which one they mean (ecosystem.md 3.1). Exception codes:
+wire, because tools disagree about which one they mean. Exception codes:
 Modbus application protocol 1.1b3, chapter 7.
 """
 

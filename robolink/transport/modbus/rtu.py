@@ -1,7 +1,7 @@
 """How one Modbus request and its answer pass on a serial line.
 
 A serial frame carries no number: an answer of the same function and length that comes late
-would pass for the next one (faults_and_speed.md finding 3, F02). So after anything doubtful,
+would pass for the next one (docs/reference/faults.md F02). So after anything doubtful,
 and when it is opened, a line falls silent, throws away what it holds and asks a question whose
 answer no earlier question can have. A server answers in order, so whatever was late has passed
 when that answer comes.

@@ -296,7 +296,7 @@ class EpsonSimulator:
             self._stepping = False
 
     def _supervise(self, now_ns: int) -> None:
-        """Keep the time-outs of epson.md 1.1."""
+        """Keep the time-outs of docs/reference/epson.md 1.1."""
         unfinished = self._service.unfinished
         self._slot.settle(unfinished=unfinished)
         deadline = self._slot.deadline(unfinished=unfinished)

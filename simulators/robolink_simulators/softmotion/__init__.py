@@ -1,7 +1,7 @@
 """A simulated CODESYS SoftMotion axis group: SIMULATED, no runtime system is involved.
 
 What is simulated and on what evidence stands in docs/simulated-softmotion.md; the facts are
-those of softmotion.md.
+those of docs/reference/softmotion.md.
 """
 
 from robolink_simulators.softmotion.group.axis_group import AxisGroup as AxisGroup

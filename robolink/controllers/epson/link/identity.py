@@ -10,21 +10,22 @@ from robolink.model import ControllerFacts, Identity
 from robolink.protocols import spel
 
 _UNSET: Final = frozenset({"", "0"})
-"""What a text reads as when nobody set it (epson.md 1.8)."""
+"""What a text reads as when nobody set it (docs/reference/epson.md 1.8)."""
 
 _QUERY: Final = spel.print_robot_serial()
 
 _NOT_NOW: Final = frozenset({20, 21})
-"""Refusals that say nothing about the query itself: the controller is busy (epson.md 1.6)."""
+"""Refusals that say nothing about the query itself: the controller is busy
+(docs/reference/epson.md 1.6)."""
 
 
 class IdentityReader:
     """Asks with two requests, which change nothing.
 
     Newer firmware tells the serial numbers of controller and robots at any time, to a client
-    that only monitors too (epson.md 1.8). Older firmware refuses the first query; there the
-    status is read, and where that is ready the robot's serial number is printed through Execute.
-    Else it is known by its address until it can be asked.
+    that only monitors too (docs/reference/epson.md 1.8). Older firmware refuses the first query;
+    there the status is read, and where that is ready the robot's serial number is printed through
+    Execute. Else it is known by its address until it can be asked.
     """
 
     def __init__(self, session: EpsonSession, window: CommandWindow) -> None:
@@ -79,8 +80,8 @@ class _BusyNow(Exception):
 class FactReader:
     """Reads :class:`robolink.model.ControllerFacts`.
 
-    The queries of epson.md 1.8 change nothing and are served while production runs and to a
-    client that may only monitor. Older firmware refuses them; there the robot's model and
+    The queries of docs/reference/epson.md 1.8 change nothing and are served while production runs
+    and to a client that may only monitor. Older firmware refuses them; there the robot's model and
     serial number are printed through Execute, if Execute is available just then.
     """
 
@@ -101,7 +102,7 @@ class FactReader:
             controller_name=self._text("GetContName"),
             controller_type=self._text("GetContType"),
             controller_serial=self._text("GetContNo"),
-            # Blanks stand inside the version and mean nothing (epson.md 1.8).
+            # Blanks stand inside the version and mean nothing (docs/reference/epson.md 1.8).
             firmware=None if firmware is None else "".join(firmware.split()),
             project=self._text("GetPrjName"),
             robot_number=None if number is None else spel.parse_integer(number),

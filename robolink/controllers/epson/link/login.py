@@ -7,7 +7,7 @@ from robolink.messages import tr
 from robolink.ways import Way, way
 
 PASSWORD_REFUSALS: Final = (13, 98)
-"""The password is wrong, or one is demanded (epson.md 1.6)."""
+"""The password is wrong, or one is demanded (docs/reference/epson.md 1.6)."""
 
 
 def unanswered(controller: str) -> LoginUnansweredError:

@@ -1,15 +1,15 @@
 """One login on an EPSON controller: a transport, a codec and a lock.
 
 Theory of operation. Remote Ethernet has no transaction numbers; an answer is known by its
-name and by its place in line (epson.md 1.1). So at most two requests are outstanding: one
-Execute, which answers when its statement has ended, and one of the few requests that are
-legal meanwhile. Whoever holds the lock reads; an Execute answer that turns up is put into
+name and by its place in line (docs/reference/epson.md 1.1). So at most two requests are
+outstanding: one Execute, which answers when its statement has ended, and one of the few requests
+that are legal meanwhile. Whoever holds the lock reads; an Execute answer that turns up is put into
 the pending motion's slot. The lock is held for one exchange, never for a motion, so that a
 stop always gets in.
 
 A time-out, a broken link or an answer that nobody asked for ends the session for good: late
 bytes die with the connection and can never be taken for the answer to a later question
-(faults_and_speed.md F01, F06, F09).
+(docs/reference/faults.md F01, F06, F09).
 """
 
 import threading
@@ -269,8 +269,8 @@ class EpsonSession:
         name = event.name.lower()
         if name == wanted:
             return True
-        # A refusal may come without a readable name (epson.md 1.6, unverified); it can be
-        # ours only when nothing else is outstanding.
+        # A refusal may come without a readable name (docs/reference/epson.md 1.6, unverified); it
+        # can be ours only when nothing else is outstanding.
         return isinstance(event, Refusal) and not name and self._pending is None
 
     def _expect_silence(self) -> None:

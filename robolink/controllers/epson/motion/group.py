@@ -194,7 +194,7 @@ class EpsonGroup:
 
     def _require_supervision(self, statement: str) -> None:
         # With a remote time-out of 0 the robot may keep moving when this PC is gone
-        # (epson.md 1.1). The value cannot be read over the wire; a person states it.
+        # (docs/reference/epson.md 1.1). The value cannot be read over the wire; a person states it.
         if self._remote_timeout_s <= 0:
             raise NotReadyError(
                 tr("The remote time-out of this controller is stated as 0 (never)."),

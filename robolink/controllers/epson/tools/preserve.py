@@ -1,7 +1,7 @@
 """Puts back what a procedure changed: the tool, the power mode and the speed.
 
-A calibration works in Tool 0, and the selection survives power-off (epson.md 3.1): left
-there, the next program would drive the flange where the nozzle tip belongs. So a durable
+A calibration works in Tool 0, and the selection survives power-off (docs/reference/epson.md 3.1):
+left there, the next program would drive the flange where the nozzle tip belongs. So a durable
 marker names the cell's own tool before anything is changed, and goes only when that tool
 has been read back.
 """

@@ -1,4 +1,4 @@
-"""The tool table of an EPSON controller: TLSet, TLClr, Tool (epson.md 3.1)."""
+"""The tool table of an EPSON controller: TLSet, TLClr, Tool (docs/reference/epson.md 3.1)."""
 
 from collections.abc import Sequence
 from contextlib import suppress
@@ -24,7 +24,7 @@ from robolink.model import Expected, ToolOffset, ToolReceipt
 from robolink.protocols import spel
 
 DECIMALS = 3
-"""Places that a printed point shows (epson.md 3.3, from a real capture)."""
+"""Places that a printed point shows (docs/reference/epson.md 3.3, from a real capture)."""
 
 TOLERANCE = 0.5 * 10**-DECIMALS
 """Two values that this controller prints alike are equal."""
@@ -34,7 +34,7 @@ class EpsonToolTable:
     """Tools 1 to 15 in the controller's flash, and the selected one.
 
     Every write is compare-and-set and read back. A value that is stored already is not
-    written again: TLSet wears the flash (epson.md 3.1).
+    written again: TLSet wears the flash (docs/reference/epson.md 3.1).
     """
 
     def __init__(
@@ -131,7 +131,10 @@ class EpsonToolTable:
             )
 
     def selected(self) -> int:
-        """Read which tool is in force; the selection survives power-off (epson.md 3.1)."""
+        """Read which tool is in force; the selection survives power-off.
+
+        Source: docs/reference/epson.md 3.1.
+        """
         self._window.require_ready("Print Tool")
         return self._selected_now()
 
@@ -223,7 +226,7 @@ class EpsonToolTable:
         return ToolOffset(*point.coordinates)
 
     def _require_defined(self, tool: int) -> None:
-        # Tool n on an undefined tool leaves the controller in error (epson.md 1.5).
+        # Tool n on an undefined tool leaves the controller in error (docs/reference/epson.md 1.5).
         if self.read(tool) is None:
             raise UndefinedToolError(
                 tr("Tool {tool} is not defined, so it was not selected.", tool=tool),

@@ -1,4 +1,6 @@
-"""Telling the PLC something, once, and knowing what became of it (design part 7).
+"""Telling the PLC something, once, and knowing what became of it.
+
+Source: docs/mailbox.md, "When a command counts".
 
 A command goes out with a number that is new, the owner's token, the epoch and the PLC start
 that was met. Its answer counts as ours only when owner, number and opcode are ours; an answer
@@ -292,7 +294,7 @@ class CommandSender:
 
     def _unseen(self, command: Command) -> UnclearAnswerError:
         # Only what a stop ends is kept among the last ends; what had ended before it, well or
-        # not, is not shown any more (design part 7).
+        # not, is not shown any more (docs/mailbox.md, "When a command counts").
         return UnclearAnswerError(
             tr("A stop came before the end of {request!r} was read.", request=describe(command)),
             remedy=tr("Read again what it was to change."),
@@ -324,7 +326,9 @@ def is_own(command: Command, now: Response) -> bool:
 
 
 def _came_too_early(command: Command, before: Response, now: Response) -> bool:
-    """Whether the PLC held a command back, which it then never carries out (design part 7).
+    """Whether the PLC held a command back, which it then never carries out.
+
+    Source: docs/mailbox.md, "When a command counts".
 
     Its number was in none of the ends when it was sent, so an end of that number is its own.
     """

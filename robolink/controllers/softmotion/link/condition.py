@@ -14,7 +14,7 @@ def is_moving(now: Response) -> bool:
 
 
 def status_of(now: Response) -> ControllerStatus:
-    """Translate a snapshot (design part 7).
+    """Translate a snapshot (docs/mailbox.md).
 
     ``remote`` is the machine's permit, ``paused`` an interrupted movement or a held stop,
     ``ready`` a group at rest that could move: enabled, its drives with power. ``code`` is
@@ -69,7 +69,7 @@ def require_permit(now: Response, *, controller: str, request: str) -> None:
 
 
 def require_still(now: Response, *, controller: str, request: str) -> None:
-    """Hold back what may not happen while the group moves (faults_and_speed.md F42).
+    """Hold back what may not happen while the group moves (docs/reference/faults.md F42).
 
     Raises:
         NotReadyError: It moves, or an interrupted movement waits to go on.
@@ -93,7 +93,9 @@ def require_still(now: Response, *, controller: str, request: str) -> None:
 
 
 def require_enabled(now: Response, *, controller: str, request: str) -> None:
-    """Hold back what an axis group in this state would refuse (softmotion.md 1.1, 2.2).
+    """Hold back what an axis group in this state would refuse.
+
+    Source: docs/reference/softmotion.md 1.1, 2.2.
 
     Raises:
         NotReadyError: It is in its error state, disabled, or held by a stop.
@@ -138,7 +140,7 @@ def require_power(now: Response, *, controller: str, request: str) -> None:
 
     Raises:
         NotReadyError: It has none. Enabling the group does not switch it on
-            (softmotion.md 2.2).
+            (docs/reference/softmotion.md 2.2).
     """
     if not now.bits & Bits.POWERED:
         raise NotReadyError(

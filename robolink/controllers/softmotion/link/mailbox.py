@@ -23,7 +23,8 @@ from robolink.protocols.mailbox import (
 )
 
 TOLERANCE = 1e-9
-"""Two LREALs this near are equal: user units, and elements of a rotation matrix (design 4)."""
+"""Two LREALs this near are equal: user units, and elements of a rotation matrix
+(docs/reference/rules.md 3)."""
 
 
 class Mailbox:
@@ -54,7 +55,8 @@ class Mailbox:
         self.commands = CommandSender(wire, snapshots)
         self.markers = MarkerStore(wire.identity, outcomes, wire.latch)
         self.lock = ProcedureLock(wire.identity, wire.latch)
-        # A refused command did nothing, whatever the reason (design part 7).
+        # A refused command did nothing, whatever the reason (docs/mailbox.md, "When a command
+        # counts").
         self.writer = ToolWriter(
             self.markers,
             same=self.same,

@@ -1,4 +1,4 @@
-"""Movements that were sent and whose end is not read: at most four (design part 7).
+"""Movements that were sent and whose end is not read: at most four (docs/mailbox.md, "Movements").
 
 The PLC names the last four ends by their sequence. Every snapshot is looked through for them,
 whatever it was read for, because a later end may push an earlier one out.

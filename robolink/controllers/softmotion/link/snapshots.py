@@ -1,12 +1,12 @@
 """Whole snapshots of a mailbox: never half of one, never another PLC's.
 
 The PLC may write while it is read, so a block counts only when its two ends and its checksum
-agree (faults_and_speed.md F31). Only such snapshots decide anything; the head of the block
+agree (docs/reference/faults.md F31). Only such snapshots decide anything; the head of the block
 says when to read the next one.
 
 Words in a wrong order, or read one register too far, make plausible numbers. So the probe is
-looked for before anything is believed, and the error names what was found (design part 7;
-softmotion.md 4.4; faults_and_speed.md F33, F34, F70).
+looked for before anything is believed, and the error names what was found (docs/mailbox.md;
+docs/reference/softmotion.md 4.4; docs/reference/faults.md F33, F34, F70).
 """
 
 from collections.abc import Callable, Sequence

@@ -136,7 +136,7 @@ class MailboxWire:
         """Wait on what is unfinished: the exchanges of this thread keep it going meanwhile.
 
         Nothing else does. A thread that only looks, or a program that does something else, would
-        else keep a robot moving that nobody watches (design part 7).
+        else keep a robot moving that nobody watches (docs/mailbox.md, "What ends by itself").
         """
         if self._attends:
             yield

@@ -159,8 +159,9 @@ class SoftMotionMotion:
     def _await_rest(self) -> None:
         """Let the group come to rest unless more is under way.
 
-        It counts as moving for a cycle longer than its last movement (softmotion.md 2.2), and
-        a program that watches an input may call that movement done while it still brakes.
+        It counts as moving for a cycle longer than its last movement
+        (docs/reference/softmotion.md 2.2), and a program that watches an input may call that
+        movement done while it still brakes.
         """
         wire, snapshots = self._mailbox.wire, self._mailbox.snapshots
         deadline = Deadline.after(wire.clock, _REST_S)

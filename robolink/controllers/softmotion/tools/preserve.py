@@ -2,7 +2,7 @@
 
 Power and speed need no putting back on a PLC: each command carries its own. A durable marker
 names the cell's own tool before anything is changed, and goes only when that slot is read
-back as selected (design part 4).
+back as selected (docs/reference/rules.md 4).
 """
 
 from collections.abc import Iterator

@@ -19,7 +19,7 @@ SCHEMA: Final = "robolink/sim-state/1"
 
 
 class Flash:
-    """Keeps the tools and the selected tool (spel.md 6.1), and which robot it is.
+    """Keeps the tools and the selected tool (docs/reference/spel.md 6.1), and which robot it is.
 
     Args:
         path: Where; ``None`` keeps nothing.

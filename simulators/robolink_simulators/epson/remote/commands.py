@@ -1,4 +1,4 @@
-"""Which request is served now, and what it does (epson.md 1.2)."""
+"""Which request is served now, and what it does (docs/reference/epson.md 1.2)."""
 
 from functools import lru_cache
 

@@ -1,7 +1,7 @@
-"""Remote Ethernet's input, output and memory commands (epson.md 1.2).
+"""Remote Ethernet's input, output and memory commands (docs/reference/epson.md 1.2).
 
 Numbers count from 0. Bytes and words are read as hex digits and set as decimal numbers, as
-clients do it (epson.md 1.2 note 5). GetIO reads inputs, SetIO sets outputs.
+clients do it (docs/reference/epson.md 1.2 note 5). GetIO reads inputs, SetIO sets outputs.
 """
 
 from collections.abc import Callable

@@ -11,7 +11,7 @@ class RequestRefused(Exception):
     """Nothing was carried out.
 
     Attributes:
-        code: What is answered (epson.md 1.6).
+        code: What is answered (docs/reference/epson.md 1.6).
     """
 
     def __init__(self, code: int) -> None:

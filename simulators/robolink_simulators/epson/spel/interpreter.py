@@ -210,7 +210,7 @@ class StatementExecution:
     def _assign(self, name: str, value: Value) -> StatementOutcome:
         session = self._evaluator.session
         if session.options.variable_assignment == "refused":
-            # Whether the command window takes variables is left open (spel.md 13).
+            # Whether the command window takes variables is left open (docs/reference/spel.md 13).
             raise SpelRefusal(RefusalKind.NOT_ALLOWED_HERE, f"{name} needs a program")
         if not session.variables.holds(name):
             raise SpelRefusal(RefusalKind.NAME_UNDEFINED, f"Nothing is called {name}")

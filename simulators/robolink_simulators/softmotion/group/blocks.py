@@ -8,7 +8,7 @@ from robolink_simulators.softmotion.kinematics.coordinates import CoordRef
 
 
 class BlockState(Enum):
-    """Where an execution stands; one at a time (PLCopen, softmotion.md 2.5)."""
+    """Where an execution stands; one at a time (PLCopen, docs/reference/softmotion.md 2.5)."""
 
     BUSY = "busy"
     ACTIVE = "active"
@@ -51,7 +51,7 @@ class BlockOutputs:
 class BlockExecution:
     """One rising edge of ``Execute``; its outputs change as time passes.
 
-    Inputs are sampled at the edge; an end is for good (softmotion.md 2.5).
+    Inputs are sampled at the edge; an end is for good (docs/reference/softmotion.md 2.5).
 
     Attributes:
         movement_number: Number of the movement that a movement block began, 0 for none.

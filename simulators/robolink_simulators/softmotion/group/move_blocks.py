@@ -1,4 +1,4 @@
-"""The blocks that move an axis group (softmotion.md 2.3, 2.4)."""
+"""The blocks that move an axis group (docs/reference/softmotion.md 2.3, 2.4)."""
 
 from robolink_simulators.softmotion.group.blocks import BlockExecution
 from robolink_simulators.softmotion.group.condition import SmcGroupState
@@ -28,7 +28,7 @@ class MoveBlocks(GroupCore):
     ) -> None:
         """``MC_MoveLinearAbsolute``: the TCP on a straight line, the elbow on its side.
 
-        With ``watch``, as the companion program's movement until an input (design part 7,
+        With ``watch``, as the companion program's movement until an input (docs/mailbox.md,
         opcode 30008): ``execution.latched`` is the TCP at the edge, in the coordinate system
         of the target; without an edge the block ends in error.
         """

@@ -1,4 +1,4 @@
-"""The blocks that change the state of an axis group (softmotion.md 2.2, 2.3)."""
+"""The blocks that change the state of an axis group (docs/reference/softmotion.md 2.2, 2.3)."""
 
 from robolink_simulators.softmotion.group.blocks import BlockExecution
 from robolink_simulators.softmotion.group.condition import SmcGroupState

@@ -1,4 +1,4 @@
-"""The states of an axis group in simulated time (softmotion.md 2.2)."""
+"""The states of an axis group in simulated time (docs/reference/softmotion.md 2.2)."""
 
 from collections.abc import Callable
 

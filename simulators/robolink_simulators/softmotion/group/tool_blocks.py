@@ -1,4 +1,4 @@
-"""The blocks about tool, kinematics and position (softmotion.md 1, 2.3)."""
+"""The blocks about tool, kinematics and position (docs/reference/softmotion.md 1, 2.3)."""
 
 from robolink_simulators.softmotion.group.blocks import BlockExecution
 from robolink_simulators.softmotion.group.condition import (
@@ -80,7 +80,7 @@ class ToolBlocks(GroupCore):
     def read_actual_position(self, system: CoordSystem = CoordSystem.MCS) -> ActualPosition:
         """``MC_GroupReadActualPosition`` of the TCP of the tool that is set.
 
-        It therefore jumps when a tool is set (inferred, softmotion.md 1.1).
+        It therefore jumps when a tool is set (inferred, docs/reference/softmotion.md 1.1).
         """
         if system is CoordSystem.ACS:
             return ActualPosition(self.values, None)

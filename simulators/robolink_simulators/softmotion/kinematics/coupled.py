@@ -34,7 +34,9 @@ class CAxis:
 
 @dataclass(frozen=True, slots=True)
 class Coupled:
-    """``Kin_Coupled`` of a position kinematics and a C axis (documented, softmotion.md 3.1).
+    """``Kin_Coupled`` of a position kinematics and a C axis.
+
+    Source: docs/reference/softmotion.md 3.1 (documented).
 
     The position part may turn the C axis's base about Z, as a SCARA's arms do. A shift of any
     direction fits, because the C axis decides the orientation.

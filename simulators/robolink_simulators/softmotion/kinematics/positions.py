@@ -1,6 +1,6 @@
 """The position kinematics: three axes that carry a flange.
 
-Geometry as in softmotion.md 3.3; the evidence of each stands at its class.
+Geometry as in docs/reference/softmotion.md 3.3; the evidence of each stands at its class.
 """
 
 import math

@@ -10,7 +10,7 @@ from robolink_simulators.softmotion.kinematics.coordinates import CoordRef
 from robolink_simulators.softmotion.mailbox.plc import Plc
 
 _LAG_ERROR = 16
-"""SMC_ERROR: lag error (softmotion.md 1.4)."""
+"""SMC_ERROR: lag error (docs/reference/softmotion.md 1.4)."""
 
 
 class PlcPanel:

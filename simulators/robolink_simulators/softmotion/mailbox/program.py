@@ -1,4 +1,4 @@
-"""The mailbox program of a PLC: what it does with a command, and meanwhile (design part 7).
+"""The mailbox program of a PLC: what it does with a command, and meanwhile (docs/mailbox.md).
 
 Theory of operation. Clients write words. In the next cycle of its task the program looks at
 them: a whole new command is accepted, once, and handed to one of the desks, which call the

@@ -15,7 +15,7 @@ _STILL = 1e-9
 
 
 class AxisState(IntEnum):
-    """``SMC_AXIS_STATE`` (documented, softmotion.md 2.1)."""
+    """``SMC_AXIS_STATE`` (documented, docs/reference/softmotion.md 2.1)."""
 
     POWER_OFF = 0
     ERRORSTOP = 1

@@ -184,7 +184,7 @@ def jogged(tcp: Frame, base: Matrix, way_mm: Vector, turn_deg: Vector) -> Frame:
     """Return a TCP moved along, and turned about, the axes of a coordinate system.
 
     A, B and C turn about X, Y and Z through the TCP: they are no Euler angles here
-    (documented, softmotion.md 0.4).
+    (documented, docs/reference/softmotion.md 2.3).
 
     Args:
         tcp: The TCP in MCS.

@@ -13,7 +13,7 @@ from robolink_simulators.softmotion.motion.profile import Pace, SpeedProfile
 
 
 class SmcBufferMode(IntEnum):
-    """``MC_BUFFER_MODE`` (documented, softmotion.md 2.4)."""
+    """``MC_BUFFER_MODE`` (documented, docs/reference/softmotion.md 2.4)."""
 
     ABORTING = 0
     BUFFERED = 1

@@ -145,7 +145,8 @@ def axes_for_tcp(
 ) -> AxisValues:
     """Return the axes that bring the TCP somewhere, its orientation as close as it can be.
 
-    The orientation is projected first and the position kept (documented, softmotion.md 3.1).
+    The orientation is projected first and the position kept (documented,
+    docs/reference/softmotion.md 3.1).
 
     Raises:
         Refused: Out of reach.

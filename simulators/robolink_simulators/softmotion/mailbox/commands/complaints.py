@@ -1,4 +1,7 @@
-"""What the mailbox program makes of the complaints of function blocks (softmotion.md 1.4)."""
+"""What the mailbox program makes of the complaints of function blocks.
+
+Source: docs/reference/softmotion.md 1.4.
+"""
 
 from typing import Final
 

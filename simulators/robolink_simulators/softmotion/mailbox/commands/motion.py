@@ -1,4 +1,4 @@
-"""The opcodes that move the axis group, or change its state (design part 7)."""
+"""The opcodes that move the axis group, or change its state (docs/mailbox.md, "Movements")."""
 
 from collections.abc import Mapping
 from dataclasses import replace

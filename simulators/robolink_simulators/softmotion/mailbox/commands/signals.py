@@ -1,4 +1,4 @@
-"""The opcodes about inputs and outputs (design part 7)."""
+"""The opcodes about inputs and outputs (docs/mailbox.md)."""
 
 from collections.abc import Mapping
 from types import MappingProxyType

@@ -1,4 +1,4 @@
-"""The opcodes about tools and kinematics (design part 7)."""
+"""The opcodes about tools and kinematics (docs/mailbox.md, "Tools")."""
 
 from collections.abc import Mapping
 from types import MappingProxyType

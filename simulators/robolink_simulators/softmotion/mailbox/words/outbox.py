@@ -1,4 +1,4 @@
-"""What the mailbox program gives out: the response block and the tool slots (design part 7)."""
+"""What the mailbox program gives out: the response block and the tool slots (docs/mailbox.md)."""
 
 from dataclasses import replace
 

@@ -12,7 +12,7 @@ from statistics import median
 from tempfile import TemporaryDirectory
 from time import perf_counter_ns
 
-from robolink_simulators.hosting.in_process import unregister
+from robolink_simulators.hosting.in_process.epson import unregister
 
 import robolink
 from benchmarks.table import Figure

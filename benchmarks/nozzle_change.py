@@ -4,8 +4,8 @@ from collections.abc import Iterator
 from statistics import median
 from time import perf_counter_ns
 
-from robolink_cli._operator import AssistedOperator
-from robolink_simulators.hosting.in_process import simulator_named, unregister
+from robolink_cli.prompts.operator import AssistedOperator
+from robolink_simulators.hosting.in_process.epson import simulator_named, unregister
 
 import robolink
 from benchmarks.table import Figure

@@ -21,11 +21,11 @@ def run(arguments: Sequence[str], *, last: bool = False) -> int:
         last: Whether the process ends then.
     """
     if "stop" in arguments:
-        from robolink_cli._stop_request import read_stop
+        from robolink_cli.stopping.request import read_stop
 
         request = read_stop(arguments)
         if request is not None:
-            from robolink_cli._stop_first import stop_first
+            from robolink_cli.stopping.stop_first import stop_first
 
             outcome = stop_first(request)
             from robolink_cli.main import tell_stop

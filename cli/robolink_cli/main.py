@@ -11,98 +11,151 @@ import click
 from robolink import __version__
 from robolink.interrupts import Interrupted, one_ending
 from robolink.messages import tr
-from robolink_cli._console import colour_wanted, help_width, tolerate_any_console
-from robolink_cli._exit import exit_code, report
-from robolink_cli._lazy import LazyGroup
-from robolink_cli._output import watched_output
-from robolink_cli._render import dumps, note, print_document, say
-from robolink_cli._shared_options import shared_options
-from robolink_cli._sink import hand_over
+from robolink.ways import speaking
+from robolink_cli.console.exit_codes import exit_code, report
+from robolink_cli.console.output import watched_output
+from robolink_cli.console.render import dumps, note, print_document, say
+from robolink_cli.console.sink import hand_over
+from robolink_cli.console.tolerance import colour_wanted, help_width, tolerate_any_console
+from robolink_cli.console.ways import SHELL_WAYS
+from robolink_cli.lazy_group import LazyGroup
+from robolink_cli.options.shared import shared_options
 
 if TYPE_CHECKING:
-    from robolink_cli._stop_first import StopOutcome
-    from robolink_cli._stop_request import StopRequest
+    from robolink_cli.stopping.request import StopRequest
+    from robolink_cli.stopping.stop_first import StopOutcome
 
 COMMANDS: Final = {
     "demo": (
-        "robolink_cli.demo:demo",
+        "robolink_cli.commands.simulate.demo:demo",
         tr("A nozzle change on a simulated robot, from clogged to proved."),
     ),
-    "sim": ("robolink_cli.sim:sim", tr("Serve a simulated controller.")),
-    "status": ("robolink_cli.operate:status", tr("What the controller is doing.")),
-    "where": ("robolink_cli.operate:where", tr("Where the robot is, and with which tool.")),
-    "stop": ("robolink_cli.operate:stop", tr("Stop every motion.")),
+    "sim": ("robolink_cli.commands.simulate.sim:sim", tr("Serve a simulated controller.")),
+    "status": (
+        "robolink_cli.commands.controller.operate:status",
+        tr("What the controller is doing."),
+    ),
+    "where": (
+        "robolink_cli.commands.controller.operate:where",
+        tr("Where the robot is, and with which tool."),
+    ),
+    "stop": ("robolink_cli.commands.controller.operate:stop", tr("Stop every motion.")),
     "release": (
-        "robolink_cli.operate:release",
+        "robolink_cli.commands.controller.operate:release",
         tr("Let the robot be moved again after a stop."),
     ),
-    "reset": ("robolink_cli.operate:reset", tr("Clear an error of the controller.")),
-    "motors": ("robolink_cli.operate:motors", tr("Switch the motors on or off.")),
-    "enable": ("robolink_cli.operate:enable", tr("Enable the axis group of a PLC.")),
-    "disable": ("robolink_cli.operate:disable", tr("Disable the axis group of a PLC.")),
+    "reset": (
+        "robolink_cli.commands.controller.operate:reset",
+        tr("Clear an error of the controller."),
+    ),
+    "motors": (
+        "robolink_cli.commands.controller.operate:motors",
+        tr("Switch the motors on or off."),
+    ),
+    "enable": (
+        "robolink_cli.commands.controller.operate:enable",
+        tr("Enable the axis group of a PLC."),
+    ),
+    "disable": (
+        "robolink_cli.commands.controller.operate:disable",
+        tr("Disable the axis group of a PLC."),
+    ),
     "take-ownership": (
-        "robolink_cli.take_ownership:take_ownership",
+        "robolink_cli.commands.controller.take_ownership:take_ownership",
         tr("Take a PLC's mailbox from another client, because a person insists."),
     ),
     "recover": (
-        "robolink_cli.recover:recover",
+        "robolink_cli.commands.record.recover:recover",
         tr("Settle what was begun and not proved finished."),
     ),
-    "tool": ("robolink_cli.tools:tool", tr("Read, write, clear and select tool offsets.")),
-    "undo": ("robolink_cli.undo:undo", tr("Put back what tools held before a change.")),
+    "tool": (
+        "robolink_cli.commands.controller.tool:tool",
+        tr("Read, write, clear and select tool offsets."),
+    ),
+    "undo": (
+        "robolink_cli.commands.record.undo:undo",
+        tr("Put back what tools held before a change."),
+    ),
     "journal": (
-        "robolink_cli.journal:journal",
+        "robolink_cli.commands.record.journal:journal",
         tr("What is on record: values, proofs, people. Reads only."),
     ),
     "report": (
-        "robolink_cli.report:report",
+        "robolink_cli.commands.record.report:report",
         tr("One page about one tool change, from the journal, to keep or print."),
     ),
-    "backup": ("robolink_cli.backup:backup", tr("Save all tools to a file.")),
-    "restore": ("robolink_cli.backup:restore", tr("Put the tools of a backup back.")),
+    "backup": ("robolink_cli.commands.controller.backup:backup", tr("Save all tools to a file.")),
+    "restore": (
+        "robolink_cli.commands.controller.backup:restore",
+        tr("Put the tools of a backup back."),
+    ),
     "compare": (
-        "robolink_cli.backup:compare",
+        "robolink_cli.commands.controller.backup:compare",
         tr("What differs from a backup; exit code 1 when something does."),
     ),
-    "io": ("robolink_cli.io:io", tr("Read inputs, switch outputs and memory bits.")),
-    "var": ("robolink_cli.var:var", tr("Read and set the project's variables.")),
+    "io": (
+        "robolink_cli.commands.controller.io:io",
+        tr("Read inputs, switch outputs and memory bits."),
+    ),
+    "var": (
+        "robolink_cli.commands.controller.var:var",
+        tr("Read and set the project's variables."),
+    ),
     "verify-controller": (
-        "robolink_cli.verify_controller:verify_controller",
+        "robolink_cli.commands.controller.verify_controller:verify_controller",
         tr("Find out, reading only, what this controller really does."),
     ),
-    "jog": ("robolink_cli.jog:jog", tr("Move a small step, in Power Low.")),
+    "jog": ("robolink_cli.commands.controller.jog:jog", tr("Move a small step, in Power Low.")),
     "calibrate": (
         "robolink_cli.calibrate:calibrate",
         tr("Measure a tool offset, propose it, write it and prove it."),
     ),
     "recalibrate": (
-        "robolink_cli.recalibrate:recalibrate",
+        "robolink_cli.commands.measure.recalibrate:recalibrate",
         tr("The scripted nozzle change: run a recipe."),
     ),
     "station": (
-        "robolink_cli.station:station",
+        "robolink_cli.commands.measure.station:station",
         tr("Pins, beams, surfaces and cameras of a cell: where they are, and how sure."),
     ),
-    "solve": ("robolink_cli.solve:solve", tr("Calculate a tool offset from a file, offline.")),
-    "doctor": ("robolink_cli.doctor:doctor", tr("What could get in the way on this computer.")),
-    "ports": ("robolink_cli.ports:ports", tr("List the serial ports.")),
-    "scan": ("robolink_cli.scan:scan", tr("Try which of a few addresses answer.")),
-    "config": ("robolink_cli.config:config", tr("Look at the cell files.")),
-    "completion": ("robolink_cli.completion:completion", tr("Make TAB complete commands.")),
+    "solve": (
+        "robolink_cli.commands.measure.solve.command:solve",
+        tr("Calculate a tool offset from a file, offline."),
+    ),
+    "doctor": (
+        "robolink_cli.commands.computer.doctor:doctor",
+        tr("What could get in the way on this computer."),
+    ),
+    "ports": ("robolink_cli.commands.computer.ports:ports", tr("List the serial ports.")),
+    "scan": (
+        "robolink_cli.commands.computer.scan:scan",
+        tr("Try which of a few addresses answer."),
+    ),
+    "config": ("robolink_cli.commands.computer.config:config", tr("Look at the cell files.")),
+    "completion": (
+        "robolink_cli.commands.computer.completion:completion",
+        tr("Make TAB complete commands."),
+    ),
     "execute-raw": (
-        "robolink_cli.operate:execute_raw",
+        "robolink_cli.commands.controller.operate:execute_raw",
         tr("Run one SPEL+ statement as typed; for engineers."),
     ),
-    "spel": ("robolink_cli.spel:spel", tr("The companion program for the controller's project.")),
-    "plc": ("robolink_cli.plc:plc", tr("The register map and data types of a PLC's mailbox.")),
+    "spel": (
+        "robolink_cli.commands.companions.spel:spel",
+        tr("The companion program for the controller's project."),
+    ),
+    "plc": (
+        "robolink_cli.commands.companions.plc:plc",
+        tr("The register map and data types of a PLC's mailbox."),
+    ),
     "impact": (
-        "robolink_cli.impact:impact",
+        "robolink_cli.commands.measure.impact:impact",
         tr("How far a tool change moves the tip at taught points."),
     ),
 }
 """Name, where it is, one-line help; in the order of the help page."""
 
-ALIASES: Final = {"resolve": "robolink_cli.recover:resolve"}
+ALIASES: Final = {"resolve": "robolink_cli.commands.record.recover:resolve"}
 """Names of before, which still work and are listed nowhere."""
 
 
@@ -143,7 +196,7 @@ def tell_stop(request: "StopRequest", outcome: "StopOutcome") -> int:
 
 
 def _guarded(speak: Callable[[], int], *, last: bool) -> int:
-    with one_ending(last=last), watched_output():
+    with one_ending(last=last), watched_output(), speaking(SHELL_WAYS):
         tolerate_any_console()
         try:
             code = speak()
@@ -154,7 +207,7 @@ def _guarded(speak: Callable[[], int], *, last: bool) -> int:
 
 
 def _tell_stop(request: "StopRequest", outcome: "StopOutcome") -> int:
-    from robolink_cli._stop_telling import Telling
+    from robolink_cli.stopping.outcome import Telling
 
     telling, code = Telling(request, outcome), 0
     telling.explain_the_holder()

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Final
 
 from robolink.errors import JournalError
 from robolink.journal._looking import LookingLog
-from robolink.journal._places import Place, default_location, memory_place, place_of
+from robolink.journal._places import JournalPlace, default_location, memory_place, place_of
 from robolink.model import OutcomeLog, Signature
 
 if TYPE_CHECKING:
@@ -82,9 +82,9 @@ def close_files() -> None:
                 journal.close()
 
 
-def _open(place: Place, *, read_only: bool) -> "Journal":
+def _open(place: JournalPlace, *, read_only: bool) -> "Journal":
     from robolink.journal._journal import Journal
-    from robolink.journal._store import Store  # here, because it loads SQLAlchemy
+    from robolink.journal.store.store import Store  # here, because it loads SQLAlchemy
 
     store = Store(place, read_only=read_only)
     store.open()

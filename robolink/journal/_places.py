@@ -13,7 +13,7 @@ _SQLITE: Final = "sqlite:///"
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class JournalPlace:
     """Where one journal is: a file, a server, or the memory of this process.
 
     Attributes:
@@ -52,7 +52,7 @@ def may_exist(location: str) -> bool:
     return path is None or path.exists()
 
 
-def place_of(location: str) -> Place:
+def place_of(location: str) -> JournalPlace:
     """Understand a URL or a path.
 
     A PostgreSQL URL without a driver means psycopg. Nothing is opened.
@@ -66,12 +66,12 @@ def place_of(location: str) -> Place:
     if location.startswith(_SQLITE) and location != _SQLITE:
         path = Path(location.removeprefix(_SQLITE)).absolute()
         _require_regular(path)
-        return Place(_file_location(path), str(path), path=path)
+        return JournalPlace(_file_location(path), str(path), path=path)
     scheme, _, rest = location.partition("://")
     if scheme in ("postgresql", "postgresql+psycopg") and rest:
         url = f"postgresql+psycopg://{rest}"
         shown = f"postgresql+psycopg://{_without_password(rest)}"
-        return Place(shown, shown, url=url)
+        return JournalPlace(shown, shown, url=url)
     raise JournalError(
         tr("robolink keeps no journal in {scheme!r} databases.", scheme=scheme),
         remedy=tr(
@@ -81,10 +81,10 @@ def place_of(location: str) -> Place:
     )
 
 
-def memory_place(identity: str) -> Place:
+def memory_place(identity: str) -> JournalPlace:
     """Return the place of a journal that ends with this process."""
     name = tr("in memory, of {identity}", identity=identity)
-    return Place("sqlite://", name)
+    return JournalPlace("sqlite://", name)
 
 
 def _require_regular(path: Path) -> None:

@@ -12,7 +12,7 @@ _DEAD_STATES: Final = ("Z", "X")
 
 
 @dataclass(frozen=True, slots=True)
-class Holder:
+class LeaseHolder:
     """Who holds a lease.
 
     Attributes:
@@ -32,11 +32,11 @@ class Holder:
     boot: str = ""
     operator: str = ""
 
-    def shares_clock_with(self, other: "Holder") -> bool:
+    def shares_clock_with(self, other: "LeaseHolder") -> bool:
         """Whether both count the same time since the start of one system."""
         return self.boot != "" and self.boot == other.boot
 
-    def proves_gone(self, other: "Holder") -> bool:
+    def proves_gone(self, other: "LeaseHolder") -> bool:
         """Whether this process can tell for certain that ``other`` has ended.
 
         A container has process numbers of its own, so only the same PID namespace counts.
@@ -63,7 +63,7 @@ class BootClock:
             time.sleep(seconds)
 
 
-def this_process(operator: str = "") -> Holder:
+def this_process(operator: str = "") -> LeaseHolder:
     """Return this process as the holder of a lease."""
     import getpass
     import platform
@@ -74,7 +74,7 @@ def this_process(operator: str = "") -> Holder:
         os_user = ""  # a container may run under a number that has no name
     pid = os.getpid()
     found, namespace = _state_and_start(pid), _pid_namespace()
-    return Holder(
+    return LeaseHolder(
         os_user=os_user,
         host=platform.node(),
         pid=pid,

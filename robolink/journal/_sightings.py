@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass
 from typing import Final
 
 from robolink.errors import LeaseHeldError
-from robolink.journal._processes import Holder
+from robolink.journal._processes import LeaseHolder
 from robolink.messages import tr
 from robolink.model import EntryKind, NewEntry
 
@@ -17,7 +17,7 @@ FREE: Final = ""
 
 
 @dataclass(frozen=True, slots=True)
-class Sighting:
+class LeaseSighting:
     """A lease as it was seen.
 
     Attributes:
@@ -38,12 +38,12 @@ class Sighting:
     taken_at: str = ""
     purpose: str = ""
 
-    def who(self) -> Holder:
+    def who(self) -> LeaseHolder:
         """Return the holder, nobody known when the record of him is damaged."""
         try:
-            return Holder(**json.loads(self.holder))
+            return LeaseHolder(**json.loads(self.holder))
         except (ValueError, TypeError):
-            return Holder()
+            return LeaseHolder()
 
     def held_error(self, controller: str, last_sign: str) -> LeaseHeldError:
         """Return the error that names the holder.
@@ -106,14 +106,14 @@ class Sighting:
         }
         return NewEntry(EntryKind.LEASE, verdict=verdict, details=details)
 
-    def is_like(self, other: "Sighting") -> bool:
+    def is_like(self, other: "LeaseSighting") -> bool:
         """Whether nothing happened between two sightings."""
         return (self.epoch, self.token, self.beat) == (other.epoch, other.token, other.beat)
 
 
-def describe(holder: Holder) -> str:
+def describe(holder: LeaseHolder) -> str:
     """Return who it is, as a person is told."""
-    if holder == Holder():
+    if holder == LeaseHolder():
         return tr("Somebody unknown")
     process = tr("process {pid} on {host}", pid=holder.pid, host=holder.host)
     if holder.operator and holder.operator != holder.os_user:

@@ -5,16 +5,16 @@ from importlib.resources import files
 from xml.etree.ElementTree import Element
 
 from robolink.messages import tr
-from robolink.report._fit_picture import fit
 from robolink.report._markup import document, element
-from robolink.report._offset_sections import doubts, offsets, poses
-from robolink.report._point_sections import points
-from robolink.report._pose_plan import pose_plan
-from robolink.report._record_sections import evidence, judgements
-from robolink.report._summary import facts, heading
-from robolink.report._tip_picture import tip
 from robolink.report._values import Report
-from robolink.report._verification import verification
+from robolink.report.pictures.fit import fit
+from robolink.report.pictures.pose_plan import pose_plan
+from robolink.report.pictures.tip import tip
+from robolink.report.sections.offsets import doubts, offsets, poses
+from robolink.report.sections.points import points
+from robolink.report.sections.record import evidence, judgements
+from robolink.report.sections.summary import facts, heading
+from robolink.report.sections.verification import verification
 
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'"
 

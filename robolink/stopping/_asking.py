@@ -25,7 +25,7 @@ _RESTS_S: Final = 8.0
 
 
 @dataclass(frozen=True, slots=True)
-class Holder:
+class ControllerHolder:
     """A process on this computer that has a controller, and listens.
 
     Attributes:
@@ -123,7 +123,7 @@ class HolderGoneError(Exception):
         self.pid = pid
 
 
-def holders_of(keys: Set[str]) -> Iterator[Holder]:
+def holders_of(keys: Set[str]) -> Iterator[ControllerHolder]:
     """Yield the processes on this computer that hold a controller, the latest first.
 
     Args:
@@ -142,7 +142,7 @@ def holders_of(keys: Set[str]) -> Iterator[Holder]:
             yield holder
 
 
-def _read(card: Path, keys: Set[str]) -> Holder | None:
+def _read(card: Path, keys: Set[str]) -> ControllerHolder | None:
     try:
         said = json.loads(card.read_bytes())
         held, place, pid = set(said["keys"]), said["place"], int(said["pid"])
@@ -154,7 +154,7 @@ def _read(card: Path, keys: Set[str]) -> Holder | None:
             return None
         where = place if isinstance(place, str) else (str(place[0]), int(place[1]))
         controller = str(said.get("controller", ""))
-        return Holder(where, str(said["token"]), pid, str(said["who"]), controller, card)
+        return ControllerHolder(where, str(said["token"]), pid, str(said["who"]), controller, card)
     except (OSError, ValueError, TypeError, KeyError, IndexError):
         return None
 

@@ -1,10 +1,10 @@
 """A process that holds a controller listens for the stop from a second terminal.
 
-EPSON serves one client (epson.md 1.1), a serial line is opened once, and a CANopen node answers
-one at a time. So whoever has the controller is the one who can stop it: it listens on a local
-socket, for its own user only, and stops on request. Where the system has no such sockets, or the
-path is too long for one, it listens on the loopback address, and a token in a file that only this
-user can read opens it.
+EPSON serves one client (docs/reference/epson.md 1.1), a serial line is opened once, and a CANopen
+node answers one at a time. So whoever has the controller is the one who can stop it: it listens on
+a local socket, for its own user only, and stops on request. Where the system has no such sockets,
+or the path is too long for one, it listens on the loopback address, and a token in a file that only
+this user can read opens it.
 
 The thread that listens is the only one that robolink starts on its own; it does nothing but
 ``controller.stop()``, which any thread may call.

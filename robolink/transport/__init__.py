@@ -5,14 +5,6 @@ from typing import TYPE_CHECKING
 from robolink.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
-    from robolink.transport._base import Transport as Transport
-    from robolink.transport._dialogue import Dialogue as Dialogue
-    from robolink.transport._dialogue import DialogueLog as DialogueLog
-    from robolink.transport._dialogue import Passage as Passage
-    from robolink.transport._dialogue import format_dialogue as format_dialogue
-    from robolink.transport._dialogue import opening_line as opening_line
-    from robolink.transport._dialogue import parse_dialogues as parse_dialogues
-    from robolink.transport._dialogue import passage_line as passage_line
     from robolink.transport._mailbox_link import MailboxHead as MailboxHead
     from robolink.transport._mailbox_link import MailboxLink as MailboxLink
     from robolink.transport._registry import TRANSPORTS_GROUP as TRANSPORTS_GROUP
@@ -21,18 +13,26 @@ if TYPE_CHECKING:
     from robolink.transport._registry import open_modbus as open_modbus
     from robolink.transport._registry import open_quick_link as open_quick_link
     from robolink.transport._registry import open_transport as open_transport
-    from robolink.transport._trace import SECRET_PLACEHOLDER as SECRET_PLACEHOLDER
-    from robolink.transport._trace import Direction as Direction
-    from robolink.transport._trace import TraceSink as TraceSink
-    from robolink.transport._trace import TracingTransport as TracingTransport
     from robolink.transport._url import LinkUrl as LinkUrl
     from robolink.transport._url import parse_url as parse_url
+    from robolink.transport.stream.contract import Transport as Transport
+    from robolink.transport.stream.dialogue import Dialogue as Dialogue
+    from robolink.transport.stream.dialogue import DialogueLog as DialogueLog
+    from robolink.transport.stream.dialogue import Passage as Passage
+    from robolink.transport.stream.dialogue import format_dialogue as format_dialogue
+    from robolink.transport.stream.dialogue import opening_line as opening_line
+    from robolink.transport.stream.dialogue import parse_dialogues as parse_dialogues
+    from robolink.transport.stream.dialogue import passage_line as passage_line
+    from robolink.transport.stream.trace import SECRET_PLACEHOLDER as SECRET_PLACEHOLDER
+    from robolink.transport.stream.trace import Direction as Direction
+    from robolink.transport.stream.trace import TraceSink as TraceSink
+    from robolink.transport.stream.trace import TracingTransport as TracingTransport
 else:
     __getattr__ = lazy_exports(
         __name__,
         {
-            "_base": "Transport",
-            "_dialogue": (
+            "stream.contract": "Transport",
+            "stream.dialogue": (
                 "Dialogue DialogueLog Passage format_dialogue opening_line "
                 "parse_dialogues passage_line"
             ),
@@ -41,7 +41,7 @@ else:
                 "TRANSPORTS_GROUP TransportOpener "
                 "open_mailbox_link open_modbus open_quick_link open_transport"
             ),
-            "_trace": "SECRET_PLACEHOLDER Direction TraceSink TracingTransport",
+            "stream.trace": "SECRET_PLACEHOLDER Direction TraceSink TracingTransport",
             "_url": "LinkUrl parse_url",
         },
     )

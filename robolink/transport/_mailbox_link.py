@@ -1,4 +1,4 @@
-"""The contract of a link to a PLC mailbox (design parts 4 and 7)."""
+"""The contract of a link to a PLC mailbox (docs/reference/rules.md 11; docs/mailbox.md)."""
 
 from collections.abc import Sequence
 from typing import Final, NamedTuple, Protocol

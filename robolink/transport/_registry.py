@@ -12,24 +12,24 @@ from typing import TYPE_CHECKING, Any, Protocol, cast
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.timing import Clock
-from robolink.transport._base import Transport
 from robolink.transport._mailbox_link import MailboxLink
 from robolink.transport._url import LinkUrl, parse_url
+from robolink.transport.stream.contract import Transport
 
 if TYPE_CHECKING:
-    from robolink.transport._modbus import ModbusClient
+    from robolink.transport.modbus.client import ModbusClient
 
 TRANSPORTS_GROUP = "robolink.transports"
 
-_MEDIA = {"tcp": ("robolink.transport._tcp", "open_tcp")}
+_MEDIA = {"tcp": ("robolink.transport.stream.tcp", "open_tcp")}
 _MAILBOX_MEDIA = {
-    "modbus-tcp": ("robolink.transport._modbus_link", "open_modbus_link"),
-    "modbus-rtu": ("robolink.transport._modbus_link", "open_modbus_link"),
-    "can": ("robolink.transport._canopen_link", "open_canopen_link"),
+    "modbus-tcp": ("robolink.transport.modbus.mailbox", "open_modbus_link"),
+    "modbus-rtu": ("robolink.transport.modbus.mailbox", "open_modbus_link"),
+    "can": ("robolink.transport.can.mailbox", "open_canopen_link"),
 }
 _REGISTER_MEDIA = {
-    "modbus-tcp": ("robolink.transport._modbus_open", "open_modbus"),
-    "modbus-rtu": ("robolink.transport._modbus_open", "open_modbus"),
+    "modbus-tcp": ("robolink.transport.modbus.opening", "open_modbus"),
+    "modbus-rtu": ("robolink.transport.modbus.opening", "open_modbus"),
 }
 
 
@@ -92,7 +92,7 @@ def open_quick_link(
     if link.medium not in _REGISTER_MEDIA:
         opened: MailboxLink = opener(link, timeout_s=timeout_s, clock=clock)
         return opened
-    from robolink.transport._modbus_link import open_modbus_link
+    from robolink.transport.modbus.mailbox import open_modbus_link
 
     return open_modbus_link(link, timeout_s=timeout_s, clock=clock, registers_only=True)
 

@@ -102,7 +102,7 @@ def epson_sim(
 ) -> Iterator[ServedEpson]:
     """A simulated EPSON controller in this process, whose time passes only while you wait."""
     from robolink_simulators.epson.device import EpsonSimulator
-    from robolink_simulators.hosting.in_process import register, unregister
+    from robolink_simulators.hosting.in_process.epson import register, unregister
 
     simulator = EpsonSimulator(seed=request.config.getoption("--robolink-seed"))
     name = f"pytest-{id(simulator):x}"
@@ -117,10 +117,10 @@ def epson_tcp(
     robolink_state: Path,  # noqa: ARG001 - the state of the test, not the tester's
 ) -> Iterator[ServedEpson]:
     """A simulated EPSON controller on a loopback TCP port, with its assist port."""
-    from robolink_simulators.assist import serve_assist
-    from robolink_simulators.clock import ScaledClock
+    from robolink_simulators.assist.port import serve_assist
+    from robolink_simulators.cell.clock import ScaledClock
     from robolink_simulators.epson.device import EpsonSimulator
-    from robolink_simulators.hosting.tcp import serve_tcp
+    from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 
     simulator = EpsonSimulator(seed=request.config.getoption("--robolink-seed"))
     clock = ScaledClock()
@@ -151,16 +151,16 @@ def softmotion_sim(
 def _serve(simulator: "SoftMotionSimulator", medium: str, stack: ExitStack) -> None:
     name = f"pytest-{id(simulator):x}"
     if medium == "sim":
-        from robolink_simulators.hosting.plc_in_process import register, unregister
+        from robolink_simulators.hosting.in_process.softmotion import register, unregister
 
         register(name, simulator)
         stack.callback(unregister, name)
     elif medium == "can":
-        from robolink_simulators.hosting.canopen_node import CanPlace, serve_canopen
+        from robolink_simulators.hosting.fieldbus.canopen_node import CanPlace, serve_canopen
 
         stack.enter_context(serve_canopen(simulator, CanPlace("virtual", name)))
     else:
-        from robolink_simulators.hosting.modbus import serve_modbus_rtu, serve_modbus_tcp
+        from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_rtu, serve_modbus_tcp
 
         tcp = medium == "modbus-tcp"
         stack.enter_context(serve_modbus_tcp(simulator) if tcp else serve_modbus_rtu(simulator))
@@ -174,7 +174,7 @@ def epson_replay(
 
     The test fails when a client asked otherwise than recorded, or did not connect as often.
     """
-    from robolink_simulators.replay import ReplayDevice, read_recording, serve_replay
+    from robolink_simulators.hosting.replay import ReplayDevice, read_recording, serve_replay
 
     devices: list[ReplayDevice] = []
     with ExitStack() as stack:

@@ -6,10 +6,11 @@ from itertools import count
 
 import click
 import pytest
-from robolink_cli import _lazy, _render, main
-from robolink_cli._context import controller_options, json_option
+from robolink_cli import lazy_group, main
+from robolink_cli.console import render
+from robolink_cli.session.context import controller_options, json_option
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.hosting.in_process import register, unregister
+from robolink_simulators.hosting.in_process.epson import register, unregister
 
 _numbers = count()
 
@@ -37,11 +38,11 @@ def command(monkeypatch):
         @click.command("sim")
         @json_option
         def sim():
-            _render.say("serving")
+            render.say("serving")
 
         own = {"status": status, "sim": sim}
         monkeypatch.setattr(
-            _lazy.LazyGroup, "get_command", lambda self, context, name: own.get(name)
+            lazy_group.LazyGroup, "get_command", lambda self, context, name: own.get(name)
         )
         return seen
 

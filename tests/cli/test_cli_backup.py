@@ -4,9 +4,10 @@ import json
 from itertools import count
 
 import pytest
-from robolink_cli import _consent, main
+from robolink_cli import main
+from robolink_cli.prompts import consent
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.hosting.in_process import register, unregister
+from robolink_simulators.hosting.in_process.epson import register, unregister
 
 from robolink.backup import load
 from robolink.errors import DeclinedError
@@ -216,8 +217,8 @@ def test_a_person_who_says_no_leaves_everything_as_it_was(run, simulator, golden
     def say_no(question):
         raise DeclinedError(question)
 
-    monkeypatch.setattr(_consent, "on_terminal", lambda: True)
-    monkeypatch.setattr(_consent, "_require_yes", say_no)
+    monkeypatch.setattr(consent, "on_terminal", lambda: True)
+    monkeypatch.setattr(consent, "_require_yes", say_no)
     simulator.machine.tools.set(1, ToolOffset(99))
     code, out, err = run("restore", golden)
     assert (code, "99.000" in out, "Write this" in err) == (9, True, True)

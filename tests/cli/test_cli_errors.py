@@ -4,7 +4,8 @@ import json
 
 import click
 import pytest
-from robolink_cli import _exit, main
+from robolink_cli import main
+from robolink_cli.console import exit_codes
 
 from robolink import errors
 
@@ -75,7 +76,7 @@ CODES = {
 
 
 def test_every_error_class_has_its_exit_code():
-    assert {kind.__name__: _exit.exit_code(an_error(kind)) for kind in every_error()} == CODES
+    assert {kind.__name__: exit_codes.exit_code(an_error(kind)) for kind in every_error()} == CODES
 
 
 @pytest.mark.parametrize("kind", [*every_error()], ids=lambda kind: kind.__name__)
@@ -124,7 +125,7 @@ def test_an_error_is_one_json_document(command, capsys):
     ],
 )
 def test_the_code_of_an_error_stands_in_its_document(error, code):
-    assert json.loads(_exit.error_document(error))["error"]["code"] == code
+    assert json.loads(exit_codes.error_document(error))["error"]["code"] == code
 
 
 @pytest.mark.parametrize("arguments", [["status", "--json", "--wrong"], ["--json", "wrong"]])

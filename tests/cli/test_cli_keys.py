@@ -7,9 +7,9 @@ from types import SimpleNamespace
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from robolink_cli._key_jog import STEPS, KeyOperator, agree_by_key
-from robolink_cli._keyboard import PosixKeyboard, WindowsKeyboard, keyboard
-from robolink_cli._keys import Key, KeyDecoder
+from robolink_cli.prompts.key_jog import STEPS, KeyOperator, agree_by_key
+from robolink_cli.prompts.keyboard import PosixKeyboard, WindowsKeyboard, keyboard
+from robolink_cli.prompts.keys import Key, KeyDecoder
 
 from robolink.errors import ConfigError, DeclinedError
 from robolink.model import Pose, WorkBox

@@ -7,7 +7,8 @@ import sys
 
 import click
 import pytest
-from robolink_cli import _render, main
+from robolink_cli import main
+from robolink_cli.console import render
 
 from robolink import errors
 
@@ -15,9 +16,9 @@ from robolink import errors
 @pytest.mark.parametrize("arguments", [["--json", "status"], ["status", "--json"]])
 def test_json_is_one_document_and_text_goes_to_stderr(command, capsys, arguments):
     def act(context):
-        _render.say("for people")
-        _render.table("poses", ["x_mm"], [["1.000"]])
-        context.emit("status", {"x_mm": 1.0, "word": "°"}, lambda: _render.say("never"))
+        render.say("for people")
+        render.table("poses", ["x_mm"], [["1.000"]])
+        context.emit("status", {"x_mm": 1.0, "word": "°"}, lambda: render.say("never"))
 
     command(act)
     assert main.run(arguments) == 0
@@ -30,7 +31,7 @@ def test_json_is_one_document_and_text_goes_to_stderr(command, capsys, arguments
 
 
 def test_without_json_text_goes_to_stdout(command, capsys):
-    command(lambda context: context.emit("status", {}, lambda: _render.say("for people")))
+    command(lambda context: context.emit("status", {}, lambda: render.say("for people")))
     assert main.run(["status"]) == 0
     assert capsys.readouterr().out == "for people\n"
 
@@ -63,8 +64,8 @@ def test_an_error_after_the_result_replaces_it(command, capsys):
 
 def test_a_second_document_is_a_defect(command, capsys):
     def act(context):
-        _render.emit_json("robolink/status/1", {})
-        _render.emit_json("robolink/status/1", {})
+        render.emit_json("robolink/status/1", {})
+        render.emit_json("robolink/status/1", {})
 
     command(act)
     assert main.run(["--json", "status"]) == 70
@@ -73,7 +74,7 @@ def test_a_second_document_is_a_defect(command, capsys):
 
 def test_a_wide_table_is_not_cut_off_a_terminal(command, capsys):
     wide = "x" * 200
-    command(lambda context: _render.table("wide", ["a", "b"], [[wide, "end"]]))
+    command(lambda context: render.table("wide", ["a", "b"], [[wide, "end"]]))
     assert main.run(["status"]) == 0
     shown = capsys.readouterr().out
     assert wide in shown
@@ -81,7 +82,7 @@ def test_a_wide_table_is_not_cut_off_a_terminal(command, capsys):
 
 
 def test_brackets_in_a_table_are_text(command, capsys):
-    command(lambda context: _render.table("[bold]", ["[a]"], [["[red]x"]]))
+    command(lambda context: render.table("[bold]", ["[a]"], [["[red]x"]]))
     assert main.run(["status"]) == 0
     shown = capsys.readouterr().out
     assert all(text in shown for text in ("[bold]", "[a]", "[red]x"))
@@ -90,11 +91,11 @@ def test_brackets_in_a_table_are_text(command, capsys):
 @pytest.mark.parametrize("encoding", ["ascii", "cp1252", "cp936"])
 def test_no_console_makes_a_sentence_fail(encoding):
     program = (
-        "from robolink_cli import _console, _render\n"
-        "_console.tolerate_any_console()\n"
-        "_render.say('90° ✓ 机器人 µm')\n"
-        "_render.note('90° ✓ 机器人 µm')\n"
-        "_render.table('°', ['µ'], [['✓']])\n"
+        "from robolink_cli.console import render, tolerance\n"
+        "tolerance.tolerate_any_console()\n"
+        "render.say('90° ✓ 机器人 µm')\n"
+        "render.note('90° ✓ 机器人 µm')\n"
+        "render.table('°', ['µ'], [['✓']])\n"
     )
     paths = os.pathsep.join(path for path in sys.path if path)
     done = subprocess.run(
@@ -111,12 +112,13 @@ def test_no_console_makes_a_sentence_fail(encoding):
 def test_a_reader_that_leaves_early_causes_no_noise():
     program = (
         "import sys\n"
-        "from robolink_cli import main, _lazy, _render\n"
+        "from robolink_cli import lazy_group, main\n"
+        "from robolink_cli.console import render\n"
         "import click\n"
         "@click.command()\n"
         "def long():\n"
-        "    for _ in range(100_000): _render.say('line')\n"
-        "_lazy.LazyGroup.get_command = lambda *arguments: long\n"
+        "    for _ in range(100_000): render.say('line')\n"
+        "lazy_group.LazyGroup.get_command = lambda *arguments: long\n"
         "sys.exit(main.run(['long']))\n"
     )
     paths = os.pathsep.join(path for path in sys.path if path)

@@ -3,9 +3,9 @@
 import json
 
 import pytest
-from robolink_cli import _companions
+from robolink_cli.commands.companions import companion_files
 from robolink_simulators.epson.condition import Task
-from robolink_simulators.hosting.in_process import clock_of
+from robolink_simulators.hosting.in_process.epson import clock_of
 
 from robolink.model import ToolOffset
 
@@ -83,7 +83,7 @@ def test_the_export_as_a_document(run, tmp_path):
     code, out, _ = run("spel", "export", "project", "--json")
     document = json.loads(out)
     assert (code, document["schema"]) == (0, "robolink/spel-export/1")
-    assert len(document["files"]) == len(_companions.companion_texts())
+    assert len(document["files"]) == len(companion_files.companion_texts())
 
 
 def test_a_folder_that_cannot_be_made_is_told(run, tmp_path):

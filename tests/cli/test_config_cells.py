@@ -3,10 +3,11 @@
 import json
 
 import pytest
-from robolink_cli import jog, main
+from robolink_cli import main
 from robolink_cli.calibrate import _options
+from robolink_cli.commands.controller import jog
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.hosting.in_process import register, unregister
+from robolink_simulators.hosting.in_process.epson import register, unregister
 
 from robolink.config._settings import CellSettings
 from robolink.journal import memory_journal
@@ -170,8 +171,8 @@ def test_calibrate_takes_its_limits_from_the_cell(cell, simulator, monkeypatch, 
         plan.limits.box_mm,
         one.source.touch.lift_mm,
         one.source.touch.clearance_mm,
-        one.gate.max_change_mm,
-        one.gate.drift_tolerance_mm,
+        one.criteria.max_change_mm,
+        one.criteria.drift_tolerance_mm,
     ) == expected
 
 
@@ -186,7 +187,7 @@ def test_jog_takes_its_limits_from_the_cell(cell, simulator, monkeypatch, option
         seen.append((speed_mm_s, box_mm))
         return []
 
-    monkeypatch.setattr("robolink_cli._jogging.plan_jog", remember)
+    monkeypatch.setattr("robolink_cli.prompts.jogging.plan_jog", remember)
     assert main.run(["-c", "a", "jog", "x+1", "--dry-run", *options]) == 0
     assert seen == [expected]
 

@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 import robolink_cli
-from robolink_cli import _exit, _render, main
-from robolink_cli._sink import visible
+from robolink_cli import main
+from robolink_cli.console import exit_codes, render
+from robolink_cli.console.sink import visible
 
 from robolink.errors import RobolinkError
 from robolink.protocols.epson_text import VariableType
@@ -89,13 +90,13 @@ def test_a_name_from_the_environment_is_judged_alike(run, monkeypatch):
 @pytest.mark.parametrize("text", ["\x1b", "\x07", "\t", "\r", "\x7f", "\x9b", "\u202e", "\u2067"])
 def test_every_door_escapes(command, capsys, text):
     def act(context):
-        _render.say(f"say {text}")
-        _render.note(f"note {text}")
-        _render.table(f"title {text}", [f"column {text}"], [[f"cell {text}"]])
+        render.say(f"say {text}")
+        render.note(f"note {text}")
+        render.table(f"title {text}", [f"column {text}"], [[f"cell {text}"]])
 
     command(act)
     assert main.run(["status"]) == 0
-    _exit.report(RobolinkError(f"what {text}", remedy=f"remedy {text}"), as_json=False)
+    exit_codes.report(RobolinkError(f"what {text}", remedy=f"remedy {text}"), as_json=False)
     shown = capsys.readouterr()
     escaped = text.encode("unicode_escape").decode()
     for door in ("say", "title", "column", "cell"):
@@ -114,8 +115,8 @@ def test_lines_and_the_worlds_characters_are_left_alone():
 def test_there_is_one_door_to_the_console():
     """Whoever writes past it, writes raw."""
     allowed = {
-        "_sink.py": {"echo"},
-        "_render.py": {"print"},  # of rich, with cells that went through the sink
+        "sink.py": {"echo"},
+        "render.py": {"print"},  # of rich, with cells that went through the sink
         "completion.py": {"echo"},  # a script for the shell, of our own words
     }
     folder = Path(robolink_cli.__file__).parent

@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 import pytest
-from robolink_cli import _exit
+from robolink_cli.console import exit_codes
 
 from robolink import errors
 from robolink.standing import Standing, ToolStanding, note_standing
@@ -12,19 +12,19 @@ from robolink.standing import Standing, ToolStanding, note_standing
 _PAGE = Path(__file__).parents[2] / "docs" / "exit-codes.md"
 _NAMED = {
     value
-    for name, value in vars(_exit).items()
+    for name, value in vars(exit_codes).items()
     if name.isupper() and isinstance(value, int) and not isinstance(value, bool)
 }
 
 
 def test_the_page_has_the_table_of_the_code():
     rows = re.findall(r"^\| (\d+) \| (.+) \|$", _PAGE.read_text(), re.MULTILINE)
-    assert {int(code): meaning for code, meaning in rows} == _exit.MEANINGS
-    assert [int(code) for code, _ in rows] == sorted(_exit.MEANINGS)
+    assert {int(code): meaning for code, meaning in rows} == exit_codes.MEANINGS
+    assert [int(code) for code, _ in rows] == sorted(exit_codes.MEANINGS)
 
 
 def test_every_code_that_a_command_can_end_with_has_a_meaning():
-    assert _NAMED | {code for _, code in _exit.EXIT_CODES} == set(_exit.MEANINGS)
+    assert _NAMED | {code for _, code in exit_codes.EXIT_CODES} == set(exit_codes.MEANINGS)
 
 
 OLD, NEW = (12.0, -3.5, -20.0, 0.0, 0.0, 0.0), (12.5, -3.5, -20.0, 0.0, 0.0, 0.0)
@@ -44,12 +44,12 @@ OLD, NEW = (12.0, -3.5, -20.0, 0.0, 0.0, 0.0), (12.5, -3.5, -20.0, 0.0, 0.0, 0.0
     ids=lambda error: type(error).__name__,
 )
 def test_what_is_not_settled_outranks_whatever_broke_afterwards(error):
-    settled = _exit.exit_code(error)
+    settled = exit_codes.exit_code(error)
     assert settled != 6
     tools = {1: ToolStanding(before=OLD, holds=NEW, requested=NEW)}
     note_standing(error, Standing(tools=tools, settled=False, left_open=True))
-    assert _exit.exit_code(error) == 6
-    body = _exit.error_body(error)
+    assert exit_codes.exit_code(error) == 6
+    body = exit_codes.error_body(error)
     assert body["controller_state"] == "changed"
     note_standing(error, Standing(tools=tools))
-    assert _exit.exit_code(error) == settled
+    assert exit_codes.exit_code(error) == settled

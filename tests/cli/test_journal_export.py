@@ -5,7 +5,7 @@ import json
 
 import pytest
 from robolink_cli import main
-from robolink_cli._journal_export import COLUMNS
+from robolink_cli.commands.record.journal_export import COLUMNS
 
 from robolink.model import EntryKind, NewEntry, Signature
 from tests.cli._recorded_changes import HERE, NEW, record_changes

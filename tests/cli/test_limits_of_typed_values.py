@@ -3,7 +3,9 @@
 import json
 
 import pytest
-from robolink_cli import _consent, _jumps, _operator, main
+from robolink_cli import main
+from robolink_cli.prompts import consent, jumps
+from robolink_cli.prompts import operator as _operator
 
 from robolink.model import ToolOffset
 from robolink.transaction import Jump
@@ -60,7 +62,7 @@ class Person:
 @pytest.fixture
 def person(monkeypatch, request):
     person = Person(request.param)
-    for module in (_consent, _jumps):
+    for module in (consent, jumps):
         monkeypatch.setattr(module, "on_terminal", lambda: True)
     monkeypatch.setattr(_operator, "terminal", lambda: person)
     return person

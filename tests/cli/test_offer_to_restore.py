@@ -1,9 +1,10 @@
 """The next command says that Tool 0 is still selected, and offers the old one."""
 
 import pytest
-from robolink_cli import _consent, _offering, _operator, main
+from robolink_cli import main
+from robolink_cli.prompts import consent, operator, restore_offer
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.hosting.in_process import register, unregister
+from robolink_simulators.hosting.in_process.epson import register, unregister
 
 import robolink
 from robolink.controllers.epson import EpsonController
@@ -46,9 +47,9 @@ def open_markers(url):
 @pytest.fixture
 def person(monkeypatch, request):
     person = Person(request.param)
-    monkeypatch.setattr(_offering, "on_terminal", lambda: True)
-    monkeypatch.setattr(_consent, "on_terminal", lambda: True)
-    monkeypatch.setattr(_operator, "terminal", lambda: person)
+    monkeypatch.setattr(restore_offer, "on_terminal", lambda: True)
+    monkeypatch.setattr(consent, "on_terminal", lambda: True)
+    monkeypatch.setattr(operator, "terminal", lambda: person)
     return person
 
 

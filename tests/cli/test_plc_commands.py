@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from robolink_cli import main
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.hosting import in_process, plc_in_process
+from robolink_simulators.hosting.in_process import epson, softmotion
 from robolink_simulators.plc import PlcSimulator, serve_plc
 from robolink_simulators.softmotion.mailbox import (
     MailboxOptions,
@@ -49,11 +49,11 @@ def serve():
         mailbox = MailboxOptions(**options)
         simulator = SoftMotionSimulator(options=PlcOptions(mailbox=mailbox), faults=faults)
         served.append(f"plc-commands-{next(_names)}")
-        return plc_in_process.register(served[-1], simulator), simulator
+        return softmotion.register(served[-1], simulator), simulator
 
     yield made
     for name in served:
-        plc_in_process.unregister(name)
+        softmotion.unregister(name)
 
 
 def commands(simulator):
@@ -74,12 +74,12 @@ def test_where_prints_no_none_of_any_kind_of_controller(shown, state_folder):
     plc = serve_plc(PlcSimulator(load_map(path), seed=1), path)
     name = f"plc-commands-{next(_names)}"
     try:
-        for url in (plc.url, in_process.register(name, EpsonSimulator())):
+        for url in (plc.url, epson.register(name, EpsonSimulator())):
             code, out, _ = shown("-c", url, "where")
             assert (code, "None" in out) == (0, False)
     finally:
         plc.close()
-        in_process.unregister(name)
+        epson.unregister(name)
 
 
 def test_a_mailbox_is_looked_at_and_nothing_is_written(shown, serve):
@@ -169,13 +169,13 @@ def test_a_person_insists_and_the_mailbox_is_free_afterwards(shown, held):
 def test_that_a_person_insisted_is_on_record(shown, tmp_path):
     simulator = SoftMotionSimulator(state_path=tmp_path / "plc.json")
     name = f"plc-commands-{next(_names)}"
-    url = plc_in_process.register(name, simulator)
+    url = softmotion.register(name, simulator)
     try:
         with another_client(url) as other:
             other.take()
             assert shown("-c", url, "take-ownership", "--yes", "--operator", "Kim")[0] == 0
     finally:
-        plc_in_process.unregister(name)
+        softmotion.unregister(name)
     entries = [it for it in open_journal().entries() if it.kind is EntryKind.DECISION]
     assert [(it.signature.operator, "taken from client" in it.verdict) for it in entries] == [
         ("Kim", True)

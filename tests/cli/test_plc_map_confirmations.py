@@ -4,7 +4,7 @@ import pytest
 from robolink_cli import main
 from robolink_simulators.plc import PlcSimulator, serve_plc
 
-from robolink.register_maps import Table, load_map
+from robolink.register_maps import RegisterTable, load_map
 from tests.cli.test_plc_map_commands import MAPS
 from tests.faults._second_address import SecondAddress
 
@@ -37,7 +37,7 @@ def machine(state_folder, tmp_path):
 
 
 def number(plc, value):
-    plc.program.memory.write(Table.HOLDING, NUMBER_AT, [value, 0])
+    plc.program.memory.write(RegisterTable.HOLDING, NUMBER_AT, [value, 0])
 
 
 def compare(url):

@@ -12,7 +12,7 @@ import click
 import pytest
 from robolink_cli import main
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.hosting.in_process import register, unregister
+from robolink_simulators.hosting.in_process.epson import register, unregister
 
 from robolink.model import Secret
 from tests.cli.test_commands_bad_input import (

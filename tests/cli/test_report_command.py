@@ -6,7 +6,7 @@ import sqlite3
 
 import pytest
 from robolink_cli import main
-from robolink_simulators.epson.points import Point
+from robolink_simulators.epson.memory.points import Point
 
 from robolink.calibration import Drift, VerifyResult
 from robolink.journal import open_journal

@@ -6,8 +6,9 @@ import time
 from types import SimpleNamespace
 
 import pytest
-from robolink_cli import _scanning, main
-from robolink_cli._scanning import Probe, State, parse_range
+from robolink_cli import main
+from robolink_cli.commands.computer import scanning
+from robolink_cli.commands.computer.scanning import AddressProbe, State, parse_range
 
 from robolink.errors import ConfigError
 
@@ -100,7 +101,7 @@ def test_each_way_of_not_answering_has_its_name(monkeypatch, failure, state):
         raise failure
 
     monkeypatch.setattr(socket, "create_connection", fail)
-    (probe,) = _scanning.probe_all(["192.0.2.1"], 5000, 0.3)
+    (probe,) = scanning.probe_all(["192.0.2.1"], 5000, 0.3)
     assert (probe.address, probe.state) == ("192.0.2.1", state)
 
 
@@ -113,11 +114,11 @@ def test_256_addresses_are_tried_a_few_at_a_time_and_told_in_order(monkeypatch):
         most.append(len(running))
         time.sleep(0.001)
         running.remove(address)
-        return Probe(address, State.SILENT, 0.0)
+        return AddressProbe(address, State.SILENT, 0.0)
 
-    monkeypatch.setattr(_scanning, "_probe", probe)
+    monkeypatch.setattr(scanning, "_probe", probe)
     wanted = parse_range("192.0.2.0/24")
-    assert [p.address for p in _scanning.probe_all(wanted, 5000, 0.3)] == wanted
+    assert [p.address for p in scanning.probe_all(wanted, 5000, 0.3)] == wanted
     assert 1 < max(most) <= 32
 
 

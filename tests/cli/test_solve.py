@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 from robolink_cli import main
-from robolink_cli._solving import METHODS
+from robolink_cli.commands.measure.solve.solving import METHODS
 
 from robolink.calibration import Beam
 from robolink.model import rotate_xy
@@ -418,7 +418,8 @@ def test_no_method_is_left_untried():
 
 def test_looking_at_a_controller_does_not_load_numpy():
     program = (
-        "import sys; import robolink.calibration, robolink_cli._views, robolink_cli.calibrate\n"
+        "import sys; import robolink.calibration, robolink_cli.views.documents\n"
+        "import robolink_cli.calibrate\n"
         "print('numpy' in sys.modules)\n"
     )
     paths = os.pathsep.join(path for path in sys.path if path)

@@ -12,12 +12,14 @@ from types import SimpleNamespace
 
 import click
 import pytest
-from robolink_cli import _consent, _operator, entry, main
-from robolink_cli._stop_request import FLAGS, VALUES, StopRequest, read_stop
-from robolink_simulators.clock import ScaledClock
+from robolink_cli import entry, main
+from robolink_cli.prompts import consent
+from robolink_cli.prompts import operator as _operator
+from robolink_cli.stopping.request import FLAGS, VALUES, StopRequest, read_stop
+from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.hosting.modbus import serve_modbus_tcp
-from robolink_simulators.hosting.tcp import serve_tcp
+from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_tcp
+from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 import robolink
@@ -262,7 +264,7 @@ def test_a_person_is_shown_who_stopped_it_and_asked(
     assert stop("-c", moving.url, "--operator", "anna")[0] == 0
     assert main.run(["-c", moving.url, "resolve", "--yes"]) == 0
     started, person = moving.machine.arm.moves_started, Person(answer)
-    monkeypatch.setattr(_consent, "on_terminal", lambda: True)
+    monkeypatch.setattr(consent, "on_terminal", lambda: True)
     monkeypatch.setattr(_operator, "terminal", lambda: person)
     capsys.readouterr()
     assert main.run(["jog", "x+1", "-c", moving.url]) == code
@@ -337,14 +339,14 @@ def test_the_environment_names_the_controller(monkeypatch):
 
 HEAVY = """
 can canopen click jinja2 keyring lark numpy pydantic pymodbus rich sqlalchemy sqlite3 logging
-asyncio robolink.journal robolink.calibration robolink.controllers.epson._controller
-robolink.controllers.softmotion._controller
+asyncio robolink.journal robolink.calibration robolink.controllers.epson.controller
+robolink.controllers.softmotion.controller
 """
 
 PROBE = """
 import sys
-from robolink_cli._stop_request import read_stop
-from robolink_cli._stop_first import stop_first
+from robolink_cli.stopping.request import read_stop
+from robolink_cli.stopping.stop_first import stop_first
 outcome = stop_first(read_stop(["-c", "a", "stop"]))
 assert outcome.error is None, outcome.error
 print(*sorted(set(sys.argv[1:]) & set(sys.modules)), sep=",")

@@ -6,7 +6,7 @@ import pytest
 from robolink_cli import main
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.options import EpsonOptions
-from robolink_simulators.hosting.in_process import register, unregister
+from robolink_simulators.hosting.in_process.epson import register, unregister
 
 
 @pytest.fixture

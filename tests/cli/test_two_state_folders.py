@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 from robolink_cli import main
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.hosting.modbus import serve_modbus_tcp
-from robolink_simulators.hosting.tcp import serve_tcp
+from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_tcp
+from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 import robolink

@@ -3,7 +3,8 @@
 import json
 
 import pytest
-from robolink_cli import _consent, main
+from robolink_cli import main
+from robolink_cli.prompts import consent
 
 from robolink.journal import open_journal
 from robolink.model import EntryKind, ToolOffset
@@ -85,14 +86,14 @@ def test_off_a_terminal_it_takes_yes(run, simulator, changed, more):
 @pytest.mark.parametrize(("answer", "expected"), [(True, (0, OLD)), (False, (9, NEW))])
 def test_on_a_terminal_it_asks(run, simulator, changed, monkeypatch, answer, expected):
     questions = []
-    monkeypatch.setattr("robolink_cli.undo.on_terminal", lambda: True)
-    monkeypatch.setattr(_consent, "on_terminal", lambda: True)
+    monkeypatch.setattr("robolink_cli.commands.record.undo.on_terminal", lambda: True)
+    monkeypatch.setattr(consent, "on_terminal", lambda: True)
 
     def asked(question):
         questions.append(question)
         return answer
 
-    monkeypatch.setattr(_consent, "asked", asked)
+    monkeypatch.setattr(consent, "asked", asked)
     code, _, _ = run("undo")
     assert (code, tool_1(simulator)) == expected
     assert questions == ["Write the old values back?"]

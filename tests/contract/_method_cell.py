@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from robolink_cli import main
-from robolink_simulators.clock import ManualClock
+from robolink_simulators.cell.clock import ManualClock
 
 from robolink.journal import EntryKind, memory_journal
 from robolink.model import Recorded, ToolOffset

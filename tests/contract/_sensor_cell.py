@@ -7,28 +7,29 @@ from dataclasses import dataclass, field, replace
 from itertools import count
 from typing import Any
 
-from robolink_simulators.clock import ManualClock
+from robolink_simulators.cell.clock import ManualClock
+from robolink_simulators.cell.tip_switches import UPRIGHT, LightBeam, TipSwitch, TouchPlate
+from robolink_simulators.cell.workplace import XyzMm
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.hosting import plc_in_process
-from robolink_simulators.hosting.in_process import register, unregister
-from robolink_simulators.sensing import UPRIGHT, LightBeam, TipSwitch, TouchPlate
+from robolink_simulators.hosting.in_process import softmotion
+from robolink_simulators.hosting.in_process.epson import register, unregister
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
-from robolink_simulators.workplace import XyzMm
 
 import robolink
-from robolink.calibration import Ask, Beam, BeamStation, Look, Move, Seek, TouchStation
+from robolink.calibration import Beam
 from robolink.model import Controller, InputEdge, Pose, ToolOffset
 from robolink.nozzle_change import (
+    AcceptanceCriteria,
     ChangePlan,
-    Gate,
     Listener,
     NozzleChange,
     PlannedStep,
-    TipSource,
     ToolPlan,
     preview,
 )
-from robolink.runner import Question, StepDone
+from robolink.procedures import TipSource
+from robolink.runner import Ask, Look, Move, Question, Seek, StepDone
+from robolink.stations import BeamStation, TouchStation
 
 TOOL = 1
 HEADINGS = (3.0, 88.0)
@@ -167,7 +168,7 @@ class SensorCell:
 
     def change(self, source: TipSource, listener: Listener | None = None, **plan: Any) -> Any:
         """Return a change of the nozzle that asks nobody."""
-        one = ToolPlan(TOOL, source, Gate(**plan))
+        one = ToolPlan(TOOL, source, AcceptanceCriteria(**plan))
         return lambda controller, write=True: (
             NozzleChange(
                 controller,
@@ -213,11 +214,11 @@ def plc_sensor_cell(seed: int = 3) -> Iterator[SensorCell]:
     """Set a cell up around a PLC."""
     clock, name = ManualClock(), f"sensors-{next(_names)}"
     simulator = SoftMotionSimulator(seed=seed)
-    url = plc_in_process.register(name, simulator, clock=clock)
+    url = softmotion.register(name, simulator, clock=clock)
     try:
         yield SensorCell(simulator, url, clock)
     finally:
-        plc_in_process.unregister(name)
+        softmotion.unregister(name)
 
 
 def miss_mm(found: ToolOffset, true: ToolOffset) -> float:

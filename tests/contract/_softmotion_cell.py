@@ -8,10 +8,10 @@ from dataclasses import replace
 from itertools import count
 from typing import Any, Final
 
-from robolink_simulators.clock import ManualClock, ScaledClock
-from robolink_simulators.hosting.canopen_node import CanPlace, serve_canopen
-from robolink_simulators.hosting.modbus import serve_modbus_rtu, serve_modbus_tcp
-from robolink_simulators.hosting.plc_in_process import clock_of, register, unregister
+from robolink_simulators.cell.clock import ManualClock, ScaledClock
+from robolink_simulators.hosting.fieldbus.canopen_node import CanPlace, serve_canopen
+from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_rtu, serve_modbus_tcp
+from robolink_simulators.hosting.in_process.softmotion import clock_of, register, unregister
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 import robolink
@@ -22,7 +22,7 @@ from robolink.timing import NS_PER_S, SystemClock
 
 BACKENDS: Final = ("sim", "modbus-tcp", "modbus-rtu", "can-virtual", "can-multicast")
 OWNER_SILENCE_S: Final = 10.1
-"""After this long without a sign of its owner a mailbox is free (design part 7)."""
+"""After this long without a sign of its owner a mailbox is free (docs/mailbox.md, "Owners")."""
 
 QUICK: Final = MotionProfile(Path.STRAIGHT, speed_mm_s=1000.0)
 SLOW: Final = MotionProfile(Path.STRAIGHT, speed_mm_s=2.0)

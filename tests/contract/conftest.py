@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from itertools import count
 
 import pytest
-from robolink_simulators.clock import ScaledClock
+from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.options import EpsonOptions
-from robolink_simulators.hosting.in_process import register, unregister
-from robolink_simulators.hosting.tcp import serve_tcp
+from robolink_simulators.hosting.in_process.epson import register, unregister
+from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 
 import robolink
 

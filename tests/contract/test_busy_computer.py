@@ -1,7 +1,7 @@
 """A computer that is too busy to beat: the PLC halts, and a person may let the step be repeated."""
 
 import pytest
-from robolink_cli._operator import AssistedOperator
+from robolink_cli.prompts.operator import AssistedOperator
 
 from robolink.errors import ControllerFaultError, DeclinedError, HeartbeatLostError
 from robolink.model import Path, WorkBox

@@ -7,7 +7,8 @@ from itertools import count
 
 import pytest
 from robolink_cli import main
-from robolink_simulators.hosting import in_process, plc_in_process
+from robolink_simulators.hosting.in_process import epson as in_process
+from robolink_simulators.hosting.in_process import softmotion as plc_in_process
 
 from robolink.journal import EntryKind, open_journal
 from tests.contract._camera_cell import camera_model, camera_station

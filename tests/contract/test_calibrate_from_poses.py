@@ -8,7 +8,7 @@ import pytest
 from robolink_cli import main
 from robolink_cli.calibrate import _given
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.epson.points import Point
+from robolink_simulators.epson.memory.points import Point
 
 import robolink
 from robolink.model import Hand, Pose, ToolOffset, rotate_xy

@@ -14,11 +14,12 @@ from typing import Any
 
 import pytest
 import sqlalchemy.dialects.sqlite  # noqa: F401 - pytester forgets imports; it bears one only
+from robolink_simulators.cell.tip_switches import LightBeam
+from robolink_simulators.epson.arm.kinematics import inverse
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.epson.kinematics import inverse
-from robolink_simulators.hosting import in_process, plc_in_process
-from robolink_simulators.hosting.modbus import serve_modbus_tcp
-from robolink_simulators.sensing import LightBeam
+from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_tcp
+from robolink_simulators.hosting.in_process import epson as in_process
+from robolink_simulators.hosting.in_process import softmotion as plc_in_process
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 
 import robolink

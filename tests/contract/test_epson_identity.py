@@ -1,10 +1,10 @@
 """Who an EPSON controller is, however it is reached: over real TCP and in the same process."""
 
 import pytest
-from robolink_simulators.clock import ManualClock
+from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.hosting.in_process import register, unregister
-from robolink_simulators.hosting.tcp import serve_tcp
+from robolink_simulators.hosting.in_process.epson import register, unregister
+from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 
 import robolink
 from robolink.errors import OutcomeUnknownError

@@ -4,9 +4,9 @@ from dataclasses import fields, replace
 from typing import Any
 
 import pytest
+from robolink_simulators.cell.tip_switches import TouchPlate
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.options import EpsonOptions
-from robolink_simulators.sensing import TouchPlate
 
 from robolink import ANY, ToolOffset
 from robolink.errors import (

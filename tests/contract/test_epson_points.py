@@ -2,7 +2,7 @@
 
 import pytest
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.epson.points import Point
+from robolink_simulators.epson.memory.points import Point
 
 from robolink.errors import LocalProtocolError, NotReadyError
 from robolink.model import Hand, Pose

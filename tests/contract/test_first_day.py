@@ -11,12 +11,12 @@ from contextlib import contextmanager
 
 import pytest
 from robolink_cli import main
-from robolink_simulators.assist import serve_assist
-from robolink_simulators.clock import ScaledClock
+from robolink_simulators.assist.port import serve_assist
+from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.epson.points import Point
-from robolink_simulators.hosting.in_process import register, unregister
-from robolink_simulators.hosting.tcp import serve_tcp
+from robolink_simulators.epson.memory.points import Point
+from robolink_simulators.hosting.in_process.epson import register, unregister
+from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 
 from robolink.model import ToolOffset
 

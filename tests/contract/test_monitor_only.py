@@ -5,11 +5,11 @@ from contextlib import contextmanager
 from itertools import count
 
 import pytest
-from robolink_simulators.clock import ManualClock, ScaledClock
+from robolink_simulators.cell.clock import ManualClock, ScaledClock
 from robolink_simulators.epson.condition import Task
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.hosting.in_process import register, unregister
-from robolink_simulators.hosting.tcp import serve_tcp
+from robolink_simulators.hosting.in_process.epson import register, unregister
+from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 
 import robolink
 from robolink.errors import NotReadyError, ToolError, TransportError

@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import pytest
+from robolink_simulators.cell.tip_switches import TouchPlate
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.options import EpsonOptions
-from robolink_simulators.hosting.plc_in_process import register, unregister
-from robolink_simulators.sensing import TouchPlate
+from robolink_simulators.hosting.in_process.softmotion import register, unregister
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 
 import robolink

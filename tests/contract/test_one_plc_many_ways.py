@@ -3,8 +3,8 @@
 from contextlib import ExitStack
 
 import pytest
-from robolink_simulators.hosting.canopen_node import CanPlace, serve_canopen
-from robolink_simulators.hosting.modbus import serve_modbus_rtu, serve_modbus_tcp
+from robolink_simulators.hosting.fieldbus.canopen_node import CanPlace, serve_canopen
+from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_rtu, serve_modbus_tcp
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 import robolink

@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import pytest
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.hosting.in_process import clock_of, register, unregister
+from robolink_simulators.hosting.in_process.epson import clock_of, register, unregister
 
 import robolink
 from robolink.errors import ControllerFaultError, TransportError

@@ -5,7 +5,7 @@ import signal
 from pathlib import Path
 
 import pytest
-from robolink_simulators.epson.points import Point
+from robolink_simulators.epson.memory.points import Point
 
 from robolink.journal import EntryKind, open_journal
 from robolink.model import Pose, ToolOffset, rotate_xy

@@ -5,7 +5,7 @@ import math
 from pathlib import Path
 
 import pytest
-from robolink_simulators.sensing import LightBeam, TouchPlate
+from robolink_simulators.cell.tip_switches import LightBeam, TouchPlate
 
 from robolink.journal import EntryKind, open_journal
 from tests.faults._nozzle_cell import OLD_TIP, served_cell

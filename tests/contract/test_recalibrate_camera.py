@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 from robolink_cli import main
-from robolink_simulators.hosting import in_process, plc_in_process
-from robolink_simulators.sensing import TouchPlate
+from robolink_simulators.cell.tip_switches import TouchPlate
+from robolink_simulators.hosting.in_process import epson as in_process
+from robolink_simulators.hosting.in_process import softmotion as plc_in_process
 
 from robolink.journal import EntryKind, open_journal
 from tests.contract._camera_cell import recipe_here

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 from robolink_cli import main
-from robolink_simulators.sensing import LightBeam
+from robolink_simulators.cell.tip_switches import LightBeam
 
 from robolink.model import ToolOffset
 from tests.contract._sensor_cell import sensor_cell

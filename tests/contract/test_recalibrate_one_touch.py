@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from robolink_cli import _operator
+from robolink_cli.prompts import operator as _operator
 
 from robolink.journal import EntryKind
 from robolink.model import ToolOffset
@@ -178,9 +178,11 @@ def test_a_recipe_offers_the_worst_pose_again_and_the_answer_is_on_record(
     source = 'kind = "operator"\nmethod = "n_angle"\ncount = 4\nretake = true\nuntil_mm = 1.0'
     text = AT_STATION.format(source=source, station="PIN-07", z="kept")
     path = written(tmp_path / "recipe.toml", text)
-    monkeypatch.setattr("robolink_cli._consent.on_terminal", lambda: True)
-    monkeypatch.setattr("robolink_cli._recalibrating.agree_to_motion", lambda *_, **__: None)
-    monkeypatch.setattr("robolink_cli._recalibrating.asked", lambda _: True)
+    monkeypatch.setattr("robolink_cli.prompts.consent.on_terminal", lambda: True)
+    monkeypatch.setattr(
+        "robolink_cli.commands.measure.recalibration.agree_to_motion", lambda *_, **__: None
+    )
+    monkeypatch.setattr("robolink_cli.commands.measure.recalibration.asked", lambda _: True)
     asked = []
     answer = _operator.AssistedOperator.ask
 

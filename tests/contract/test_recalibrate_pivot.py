@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 from robolink_cli import main
-from robolink_simulators.clock import ManualClock
-from robolink_simulators.hosting import plc_in_process
+from robolink_simulators.cell.clock import ManualClock
+from robolink_simulators.hosting.in_process import softmotion
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 from robolink.journal import EntryKind, memory_journal
@@ -32,13 +32,13 @@ def machine(tmp_path, monkeypatch):
     def open_machine(kinematics="Kin_5Axes"):
         name = f"pivot-recipe-{next(_names)}"
         simulator = SoftMotionSimulator(kinematics, seed=1)
-        simulator.url = plc_in_process.register(name, simulator, clock=ManualClock())
+        simulator.url = softmotion.register(name, simulator, clock=ManualClock())
         opened.append(name)
         return simulator
 
     yield open_machine
     for name in opened:
-        plc_in_process.unregister(name)
+        softmotion.unregister(name)
 
 
 def recalibrate(simulator, path, *more):
@@ -70,7 +70,7 @@ def test_the_example_finds_the_whole_tip_inside_the_stated_interval(machine, cap
         assert abs(found - true) <= half < 0.05
     assert tool["verification"]["passed"]
     with capsys.disabled():
-        took_s = plc_in_process.clock_of(simulator.url.partition("://")[2]).now_ns() / 1e9
+        took_s = softmotion.clock_of(simulator.url.partition("://")[2]).now_ns() / 1e9
         sys.stdout.write(f"\nfive axes, pivot recipe: {took_s:.1f} s of robot time\n")
     (pin,) = memory_journal(simulator.url).entries(kinds=[EntryKind.STATION])
     place = [pin.details[name] for name in ("x_mm", "y_mm", "z_mm")]

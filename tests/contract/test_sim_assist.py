@@ -6,10 +6,10 @@ import socket
 from contextlib import closing
 
 import pytest
-from robolink_simulators.assist import AssistClient, serve_assist
-from robolink_simulators.clock import ScaledClock
+from robolink_simulators.assist.port import AssistClient, serve_assist
+from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson import EpsonSimulator
-from robolink_simulators.hosting.tcp import serve_tcp
+from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 
 from robolink.errors import ConfigError, ConnectError
 from robolink.timing import Deadline

@@ -10,7 +10,7 @@ import sys
 from contextlib import closing, contextmanager
 
 import pytest
-from robolink_simulators.assist import AssistClient
+from robolink_simulators.assist.port import AssistClient
 
 from robolink.timing import Deadline
 from robolink.transport import open_transport

@@ -9,10 +9,10 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 
 import pytest
-from robolink_simulators.clock import ScaledClock
+from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson import EpsonOptions, EpsonSimulator
 from robolink_simulators.faults import Fault, FaultAction
-from robolink_simulators.hosting.tcp import serve_tcp
+from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 
 from robolink.errors import ConfigError, ConnectError
 from robolink.model import Secret
@@ -61,7 +61,7 @@ def served(simulator=None, *, factor=1.0):
         yield host
 
 
-# ---- the vectors of epson.md part 7, against the simulator ----------------------------------
+# ---- the exchanges of docs/reference/epson.md 6, against the simulator
 
 
 def test_a_login_with_and_without_a_password():

@@ -4,10 +4,10 @@ import threading
 from contextlib import closing
 
 import pytest
-from robolink_simulators.clock import ManualClock
+from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.epson import EpsonSimulator
 from robolink_simulators.faults import Fault, FaultAction
-from robolink_simulators.hosting.in_process import (
+from robolink_simulators.hosting.in_process.epson import (
     clock_of,
     open_epson,
     register,

@@ -1,4 +1,4 @@
-"""The conformance behaviours of softmotion.md part 7, seen through the wire.
+"""The behaviours of docs/reference/softmotion.md 5, seen through the wire.
 
 Numbers 6 and 9 need kinematics that are not simulated.
 """
@@ -9,9 +9,9 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 
 import pytest
-from robolink_simulators.clock import ManualClock, ScaledClock
-from robolink_simulators.hosting.modbus import serve_modbus_tcp
-from robolink_simulators.softmotion.frames import axis_and_angle, zyz
+from robolink_simulators.cell.clock import ManualClock, ScaledClock
+from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_tcp
+from robolink_simulators.softmotion.kinematics.frames import axis_and_angle, zyz
 from robolink_simulators.softmotion.mailbox import (
     MailboxOptions,
     PlcOptions,

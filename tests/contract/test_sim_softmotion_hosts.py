@@ -6,9 +6,13 @@ from contextlib import closing
 
 import canopen
 import pytest
-from robolink_simulators.clock import ScaledClock
-from robolink_simulators.hosting.canopen_node import CanopenHost, CanPlace, serve_canopen
-from robolink_simulators.hosting.modbus import ModbusHost, serve_modbus_rtu, serve_modbus_tcp
+from robolink_simulators.cell.clock import ScaledClock
+from robolink_simulators.hosting.fieldbus.canopen_node import CanopenHost, CanPlace, serve_canopen
+from robolink_simulators.hosting.fieldbus.modbus import (
+    ModbusHost,
+    serve_modbus_rtu,
+    serve_modbus_tcp,
+)
 from robolink_simulators.softmotion.mailbox import (
     MailboxOptions,
     PlcFault,

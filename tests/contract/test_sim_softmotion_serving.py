@@ -9,10 +9,10 @@ import sys
 from contextlib import closing, contextmanager
 
 import pytest
-from robolink_simulators.assist import AssistClient, open_eyes, serve_assist
-from robolink_simulators.clock import ManualClock, ScaledClock
-from robolink_simulators.hosting.modbus import serve_modbus_tcp
-from robolink_simulators.hosting.plc_in_process import (
+from robolink_simulators.assist.port import AssistClient, open_eyes, serve_assist
+from robolink_simulators.cell.clock import ManualClock, ScaledClock
+from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_tcp
+from robolink_simulators.hosting.in_process.softmotion import (
     clock_of,
     register,
     simulator_named,

@@ -1,7 +1,7 @@
 """What is done with a PLC as a whole, on every link: look, back up, calibrate, recover, undo."""
 
 import pytest
-from robolink_cli._operator import AssistedOperator
+from robolink_cli.prompts.operator import AssistedOperator
 from robolink_simulators.softmotion.mailbox import PlcFault, PlcFaultAction
 
 from robolink.backup import (

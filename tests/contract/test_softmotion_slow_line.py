@@ -7,8 +7,8 @@ import threading
 from contextlib import ExitStack, contextmanager
 
 import pytest
-from robolink_simulators.clock import ScaledClock
-from robolink_simulators.hosting.modbus import serve_modbus_rtu
+from robolink_simulators.cell.clock import ScaledClock
+from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_rtu
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 import robolink

@@ -4,13 +4,12 @@ import json
 
 import pytest
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.epson.option_text import option_names, options_from_text
-from robolink_simulators.epson.options import EpsonOptions
+from robolink_simulators.epson.options import EpsonOptions, option_names, options_from_text
 from robolink_simulators.epson.profile import read_profile
-from robolink_simulators.epson.spel._machine_functions import MACHINE_FUNCTIONS
+from robolink_simulators.epson.spel.expressions.machine_functions import MACHINE_FUNCTIONS
 from robolink_simulators.faults import Fault, FaultAction
-from robolink_simulators.hosting.in_process import register, unregister
-from robolink_simulators.hosting.tcp import serve_tcp
+from robolink_simulators.hosting.in_process.epson import register, unregister
+from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 
 from robolink.controllers.epson.verify import redacted, verify_epson
 from robolink.errors import LoginRefusedError

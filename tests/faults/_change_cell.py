@@ -14,10 +14,10 @@ from typing import Any, ClassVar
 
 import pytest
 from robolink_cli import main
-from robolink_simulators.clock import ManualClock, ScaledClock
+from robolink_simulators.cell.clock import ManualClock, ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.options import EpsonOptions
-from robolink_simulators.hosting.tcp import serve_tcp
+from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 import robolink

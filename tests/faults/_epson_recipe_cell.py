@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Final
 
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.hosting import in_process
+from robolink_simulators.hosting.in_process import epson
 
 from robolink.model import ToolOffset
 from tests.faults._recipe_cell import RecipeCell
@@ -45,10 +45,10 @@ class EpsonRecipeCell(RecipeCell):
         super().__init__(simulator, recipe_tools)
 
     def _register(self) -> str:
-        return in_process.register(self.name, self.simulator, clock=self.clock)
+        return epson.register(self.name, self.simulator, clock=self.clock)
 
     def _unregister(self) -> None:
-        in_process.unregister(self.name)
+        epson.unregister(self.name)
 
     def tools(self) -> dict[int, ToolOffset | None]:
         """Return what is stored in the tools of the recipe, past the wire."""

@@ -11,12 +11,12 @@ from pathlib import Path
 from typing import Any
 
 from robolink_cli import main
-from robolink_simulators.assist import serve_assist
-from robolink_simulators.clock import ScaledClock
+from robolink_simulators.assist.port import serve_assist
+from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.options import EpsonOptions
-from robolink_simulators.hosting.tcp import serve_tcp
-from robolink_simulators.world import STORED
+from robolink_simulators.epson.world import STORED
+from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 
 from robolink.journal import open_journal
 from robolink.model import Marker, Secret, ToolOffset

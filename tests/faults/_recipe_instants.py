@@ -17,10 +17,11 @@ from itertools import groupby
 from typing import Final, Literal
 
 import pytest
-from robolink_cli import _operator
-from robolink_simulators.clock import ManualClock
+from robolink_cli.prompts import operator as _operator
+from robolink_simulators.cell.clock import ManualClock
 
-from robolink.journal._store import Store, Tables
+from robolink.journal.store.statements import Tables
+from robolink.journal.store.store import Store
 from robolink.runner import Question
 
 Kind = Literal["request", "answer", "wait", "question", "commit"]

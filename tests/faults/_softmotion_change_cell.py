@@ -6,8 +6,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
 
-from robolink_simulators.clock import ScaledClock
-from robolink_simulators.hosting.modbus import serve_modbus_tcp
+from robolink_simulators.cell.clock import ScaledClock
+from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_tcp
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 from robolink_simulators.softmotion.mailbox.plc import Plc
 

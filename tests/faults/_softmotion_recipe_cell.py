@@ -4,7 +4,7 @@ import signal
 from collections.abc import Callable, Mapping, Sequence
 from typing import Final
 
-from robolink_simulators.hosting import plc_in_process
+from robolink_simulators.hosting.in_process import softmotion
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 from robolink.model import ToolOffset
@@ -45,10 +45,10 @@ class PlcRecipeCell(RecipeCell):
         assert self.changed() == set()
 
     def _register(self) -> str:
-        return plc_in_process.register(self.name, self.simulator, clock=self.clock)
+        return softmotion.register(self.name, self.simulator, clock=self.clock)
 
     def _unregister(self) -> None:
-        plc_in_process.unregister(self.name)
+        softmotion.unregister(self.name)
 
     def tools(self) -> dict[int, ToolOffset | None]:
         """Return what is stored in the tools of the recipe, past the wire."""

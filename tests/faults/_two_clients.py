@@ -1,7 +1,7 @@
 """A controller that lets two clients be logged in at once, which no EPSON controller does."""
 
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.epson.link import EpsonLink
+from robolink_simulators.epson.remote.link import EpsonLink
 
 from robolink.protocols.epson_text import BadRequest, Request
 

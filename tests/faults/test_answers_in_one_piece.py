@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.faults import Fault, FaultAction
-from robolink_simulators.hosting.in_process import clock_of, register, unregister
+from robolink_simulators.hosting.in_process.epson import clock_of, register, unregister
 
 import robolink
 from robolink.model import MotionOutcome, MotionProfile, Path, WorkBox

@@ -25,8 +25,8 @@ from robolink.errors import (
     RobolinkError,
 )
 from robolink.transport import open_modbus, parse_url
-from robolink.transport._can_bus import CanLine
-from robolink.transport._canopen_link import CanopenMailboxLink
+from robolink.transport.can.bus import CanLine
+from robolink.transport.can.mailbox import CanopenMailboxLink
 from tests.unit._scripted_can import IDENTITY, NODE, SDO_ANSWER, FakeClock, ScriptedBus, node_with
 from tests.unit._scripted_modbus import rtu, words
 

@@ -12,9 +12,9 @@ from dataclasses import dataclass, field
 from queue import SimpleQueue
 
 import pytest
-from robolink_cli._operator import AssistedOperator
+from robolink_cli.prompts.operator import AssistedOperator
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.hosting.in_process import register, unregister
+from robolink_simulators.hosting.in_process.epson import register, unregister
 
 import robolink
 from robolink.interrupts import InterruptGate

@@ -7,10 +7,10 @@ so putting them back needs no further record. What cannot be recorded stays open
 from contextlib import contextmanager
 
 import pytest
-from robolink_cli._exit import USAGE
+from robolink_cli.console.exit_codes import USAGE
 
 from robolink.errors import JournalError
-from robolink.journal._store import Store
+from robolink.journal.store.store import Store
 from robolink.model import MarkerKind
 from tests.faults._nozzle_cell import OLD_TIP, served_cell
 

@@ -6,7 +6,7 @@ import tempfile
 from pathlib import Path
 
 import pytest
-from robolink_cli._exit import USAGE
+from robolink_cli.console.exit_codes import USAGE
 
 import robolink
 from robolink.errors import JournalError

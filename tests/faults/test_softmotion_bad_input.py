@@ -8,8 +8,8 @@ from contextlib import contextmanager
 from dataclasses import replace
 
 import pytest
-from robolink_simulators.hosting.canopen_node import CanPlace, serve_canopen
-from robolink_simulators.hosting.modbus import serve_modbus_rtu
+from robolink_simulators.hosting.fieldbus.canopen_node import CanPlace, serve_canopen
+from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_rtu
 from robolink_simulators.softmotion.mailbox import (
     MailboxOptions,
     PlcFault,

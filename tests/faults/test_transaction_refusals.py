@@ -4,10 +4,10 @@ from dataclasses import replace
 from itertools import count
 
 import pytest
-from robolink_cli._operator import AssistedOperator
+from robolink_cli.prompts.operator import AssistedOperator
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.hosting.in_process import register, unregister
-from robolink_simulators.world import STORED
+from robolink_simulators.epson.world import STORED
+from robolink_simulators.hosting.in_process.epson import register, unregister
 
 import robolink
 from robolink.errors import CalibrationError, DeclinedError, VerifyError

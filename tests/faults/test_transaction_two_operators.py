@@ -11,7 +11,7 @@ import os
 from itertools import combinations
 
 import pytest
-from robolink_simulators.clock import ManualClock
+from robolink_simulators.cell.clock import ManualClock
 
 import robolink
 from robolink.errors import LeaseHeldError

@@ -11,10 +11,11 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from robolink_cli._exit import USAGE
+from robolink_cli.console.exit_codes import USAGE
 
 from robolink.errors import JournalError
-from robolink.journal import EntryKind, NewEntry, _engines, open_journal
+from robolink.journal import EntryKind, NewEntry, open_journal
+from robolink.journal.store import engines
 from tests.faults._nozzle_cell import OLD_TIP, NozzleCell, served_cell
 from tests.faults._requests import changes
 
@@ -24,14 +25,14 @@ NOBODY = 65534
 @contextmanager
 def full_disk(path, monkeypatch):
     """Let the file have no more pages than it has, as a full disk would."""
-    prepare = _engines._prepare
+    prepare = engines._prepare
 
     def prepared(connection):
         prepare(connection)
         connection.execute("PRAGMA max_page_count = 1")  # SQLite takes what it has got already
 
     open_journal(str(path)).close()
-    monkeypatch.setattr(_engines, "_prepare", prepared)
+    monkeypatch.setattr(engines, "_prepare", prepared)
     log = open_journal(str(path)).log("somebody else")
     with pytest.raises(JournalError, match="disk is full"):
         for _ in range(1000):
@@ -76,7 +77,7 @@ def newer(path, monkeypatch):
 @contextmanager
 def locked(path, monkeypatch):
     """Let another program write for a long time."""
-    monkeypatch.setattr(_engines, "BUSY_S", 0.1)
+    monkeypatch.setattr(engines, "BUSY_S", 0.1)
     other = sqlite3.connect(path, isolation_level=None)
     other.execute("BEGIN IMMEDIATE")
     try:

@@ -1,4 +1,6 @@
-"""A chosen part of the suite in a Python that lacks what Windows lacks (design part 2).
+"""A chosen part of the suite in a Python that lacks what Windows lacks.
+
+Source: docs/reference/rules.md 10.
 
 What the library, the simulators and the command line use where it exists is taken away before
 anything of theirs is imported: modules cannot be imported, names are gone. pyserial chooses
@@ -91,7 +93,8 @@ def run(program, *arguments):
 def test_the_platform_really_lacks_them():
     done = run(
         "import select, socket\n"
-        "import robolink.controllers, robolink_cli.main, robolink_simulators.hosting.tcp\n"
+        "import robolink.controllers, robolink_cli.main\n"
+        "import robolink_simulators.hosting.streams.epson_tcp\n"
         "assert not hasattr(select, 'poll') and not hasattr(socket, 'MSG_DONTWAIT')\n"
         "import termios\n"
     )

@@ -6,7 +6,7 @@ import struct
 
 import canopen
 import pytest
-from robolink_simulators.hosting.canopen_node import CanPlace, serve_canopen
+from robolink_simulators.hosting.fieldbus.canopen_node import CanPlace, serve_canopen
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 from robolink.protocols.mailbox import PROBE, VERSION, Bits, decode_response, decode_slot

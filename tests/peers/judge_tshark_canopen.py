@@ -5,7 +5,7 @@ import threading
 
 import can
 import pytest
-from robolink_simulators.hosting.canopen_node import CanPlace, serve_canopen
+from robolink_simulators.hosting.fieldbus.canopen_node import CanPlace, serve_canopen
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 from robolink.protocols.mailbox import decode_command

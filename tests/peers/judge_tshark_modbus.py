@@ -3,7 +3,7 @@
 import struct
 
 import pytest
-from robolink_simulators.hosting.modbus import serve_modbus_tcp
+from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_tcp
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 from robolink.protocols.mailbox import (

@@ -2,8 +2,8 @@
 
 from dataclasses import replace
 
-from robolink_simulators.clock import ManualClock
-from robolink_simulators.hosting._mailbox_link import InProcessMailboxLink
+from robolink_simulators.cell.clock import ManualClock
+from robolink_simulators.hosting.in_process.mailbox_link import InProcessMailboxLink
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 from robolink.protocols.mailbox import (

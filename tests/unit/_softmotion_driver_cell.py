@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from typing import Any, TypeVar
 
-from robolink_simulators.clock import ManualClock
+from robolink_simulators.cell.clock import ManualClock
 
 from robolink.controllers.softmotion import SoftMotionController, open_softmotion
 from robolink.errors import ConnectError, RobolinkError, TransportClosedError, TransportTimeoutError

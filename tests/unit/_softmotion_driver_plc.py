@@ -1,13 +1,13 @@
 """A PLC mailbox in its documented DEVICE role.
 
-It plays design part 7 with the codec and nothing else: no kinematics, no path. A movement takes
+It plays docs/mailbox.md with the codec and nothing else: no kinematics, no path. A movement takes
 half a second and arrives where it was sent.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from robolink_simulators.clock import ManualClock
+from robolink_simulators.cell.clock import ManualClock
 
 from robolink.protocols.mailbox import (
     Answer,

@@ -10,12 +10,12 @@ import re
 from pathlib import Path
 
 import pytest
+from robolink_simulators.epson.arm.robots import find_robot
 from robolink_simulators.epson.companion import LAST_COUNT, Companion
 from robolink_simulators.epson.machine import Machine
+from robolink_simulators.epson.memory.variables import Variables
 from robolink_simulators.epson.options import EpsonOptions
-from robolink_simulators.epson.robots import find_robot
 from robolink_simulators.epson.spel import Interpreter
-from robolink_simulators.epson.variables import Variables
 
 from robolink.model import ToolOffset
 from robolink.protocols.spel import parse_number
@@ -180,7 +180,7 @@ def test_names_and_arrays_keep_within_the_language_s_bounds():
         if form in ("global", "local"):
             for name, bound in DECLARED.findall(parts[1]):
                 assert len(name) <= 32
-                # One GetVariable gives at most 100 elements (epson.md 1.2 note 4).
+                # One GetVariable gives at most 100 elements (docs/reference/epson.md 1.2 note 4).
                 assert int(bound or 0) < 100
 
 

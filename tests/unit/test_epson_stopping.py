@@ -1,9 +1,9 @@
 """What counts as rest on an EPSON controller, against one that answers as it is told."""
 
 import pytest
-from robolink_simulators.clock import ManualClock
+from robolink_simulators.cell.clock import ManualClock
 
-from robolink.controllers.epson._stopping import REST_S, bring_to_rest
+from robolink.controllers.epson.link.stopping import REST_S, bring_to_rest
 from robolink.errors import BusyError, OutcomeUnknownError, RejectedError
 from robolink.protocols.epson_text import Reply
 from robolink.timing import NS_PER_S

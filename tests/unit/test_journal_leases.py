@@ -3,7 +3,7 @@
 import pytest
 
 from robolink.errors import JournalError, LeaseHeldError, LeaseLostError
-from robolink.journal._leases import BEAT_S
+from robolink.journal._lease import BEAT_S
 from robolink.journal._sightings import LEASE_S
 from tests.unit._lease_logs import ANNA, BERT, HERE, IDENTITY, leases_in_memory, marker
 

@@ -14,8 +14,8 @@ from robolink.errors import (
     TransportClosedError,
     TransportTimeoutError,
 )
-from robolink.transport._can_bus import CanLine
-from robolink.transport._canopen_link import CanopenMailboxLink
+from robolink.transport.can.bus import CanLine
+from robolink.transport.can.mailbox import CanopenMailboxLink
 from tests.unit._scripted_can import (
     HEARTBEAT,
     IDENTITY,

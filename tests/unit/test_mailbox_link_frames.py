@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 from pymodbus.framer import FramerRTU, FramerSocket
 from pymodbus.pdu import DecodePDU
 
-from robolink.transport._modbus_frames import RtuFraming, TcpFraming
-from robolink.transport._modbus_framing import FrameError
-from robolink.transport._modbus_messages import Area, ModbusRequest
-from robolink.transport._modbus_register_frames import RegisterRtuFraming, RegisterTcpFraming
+from robolink.transport.modbus.frames import RtuFraming, TcpFraming
+from robolink.transport.modbus.framing import FrameError
+from robolink.transport.modbus.messages import Area, ModbusRequest
+from robolink.transport.modbus.register_frames import RegisterRtuFraming, RegisterTcpFraming
 
 READ = ModbusRequest(unit=5, function=4, area=Area.INPUT, address=0, count=3)
 WRITE = ModbusRequest(unit=5, function=16, area=Area.HOLDING, address=7, count=2, values=(1, 2))

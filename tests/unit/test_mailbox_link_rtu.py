@@ -5,10 +5,10 @@ from itertools import pairwise
 import pytest
 
 from robolink.errors import ConfigError, RemoteProtocolError, TransportTimeoutError
-from robolink.transport._modbus import ModbusClient
-from robolink.transport._modbus_frames import RtuFraming
-from robolink.transport._modbus_messages import Area
-from robolink.transport._modbus_rtu import RtuExchange, RtuLine
+from robolink.transport.modbus.client import ModbusClient
+from robolink.transport.modbus.frames import RtuFraming
+from robolink.transport.modbus.messages import Area
+from robolink.transport.modbus.rtu import RtuExchange, RtuLine
 from tests.unit._scripted_modbus import IDENTITY, ScriptedLine, rtu, words
 
 

@@ -11,9 +11,9 @@ from robolink.errors import (
     TransportClosedError,
     TransportTimeoutError,
 )
-from robolink.transport._modbus import ModbusClient
-from robolink.transport._modbus_frames import TcpFraming
-from robolink.transport._modbus_tcp import TcpExchange
+from robolink.transport.modbus.client import ModbusClient
+from robolink.transport.modbus.frames import TcpFraming
+from robolink.transport.modbus.tcp import TcpExchange
 from tests.unit._scripted_modbus import IDENTITY, ScriptedLine, tcp, words
 
 

@@ -5,10 +5,10 @@ import random
 from dataclasses import replace
 
 import pytest
+from robolink_simulators.cell.tip_switches import LightBeam, TouchPlate
+from robolink_simulators.epson.arm.kinematics import inverse
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.epson.kinematics import inverse
 from robolink_simulators.epson.spel import Interpreter
-from robolink_simulators.sensing import LightBeam, TouchPlate
 
 INPUT = 3
 SPEED_MM_S = 10.0

@@ -4,10 +4,10 @@ import random
 from typing import Any
 
 import pytest
-from robolink_simulators.epson.kinematics import Joints
+from robolink_simulators.epson.arm.kinematics import Joints
+from robolink_simulators.epson.arm.robots import find_robot
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.options import EpsonOptions, SpelNumbers
-from robolink_simulators.epson.robots import find_robot
 from robolink_simulators.epson.spel import Interpreter
 
 from robolink.errors import LocalProtocolError

@@ -1,7 +1,7 @@
 """A recorded dialogue, served without a socket."""
 
 import pytest
-from robolink_simulators.replay import ReplayDevice, read_recording
+from robolink_simulators.hosting.replay import ReplayDevice, read_recording
 
 from robolink.errors import ConfigError
 from robolink.transport import Dialogue, Passage

@@ -9,8 +9,8 @@ import pytest
 from robolink.calibration import Robust, Touch, solve_n_angle, solve_two_pose, solve_z_touch
 from robolink.model import ControllerFacts, Pose, ToolOffset
 from robolink.report import Outcome, Report, render
-from robolink.report._fit_picture import fit, interval_ellipse
-from robolink.report._pose_plan import pose_plan
+from robolink.report.pictures.fit import fit, interval_ellipse
+from robolink.report.pictures.pose_plan import pose_plan
 
 TIP = ToolOffset(12.0, -3.5, -20.0)
 ERRORS = ((0.012, -0.004), (-0.009, 0.011), (0.003, 0.007), (-0.006, -0.010), (0.004, 0.002))

@@ -3,9 +3,9 @@
 from itertools import count, cycle
 
 import pytest
-from robolink_cli._operator import MOST_STEPS, AssistedOperator
+from robolink_cli.prompts.operator import MOST_STEPS, AssistedOperator
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.hosting.in_process import register, unregister
+from robolink_simulators.hosting.in_process.epson import register, unregister
 
 import robolink
 from robolink.errors import ConfigError, DeclinedError

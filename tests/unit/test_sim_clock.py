@@ -3,7 +3,7 @@
 import threading
 
 import pytest
-from robolink_simulators.clock import ManualClock, ScaledClock
+from robolink_simulators.cell.clock import ManualClock, ScaledClock
 
 from robolink.errors import ConfigError
 

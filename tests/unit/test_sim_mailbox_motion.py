@@ -1,7 +1,7 @@
 """Movements through the simulated mailbox: the queue, the ends, and every way of stopping."""
 
 import pytest
-from robolink_simulators.sensing import TouchPlate
+from robolink_simulators.cell.tip_switches import TouchPlate
 
 from robolink.protocols.mailbox import (
     Bits,

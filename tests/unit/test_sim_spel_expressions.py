@@ -1,4 +1,4 @@
-"""Expressions and Print; the checks of the language reference, part 15, by number."""
+"""Expressions and Print; the checks of docs/reference/spel.md 15, by number."""
 
 import os
 import random
@@ -8,11 +8,11 @@ import sys
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from robolink_simulators.epson.arm.robots import find_robot
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.options import EpsonOptions, SpelNumbers
-from robolink_simulators.epson.robots import find_robot
 from robolink_simulators.epson.spel import Interpreter
-from robolink_simulators.epson.spel._parse import parse
+from robolink_simulators.epson.spel.parse import parse
 
 NUMBERS = SpelNumbers()
 
@@ -246,8 +246,8 @@ def test_whatever_is_sent_ends_in_an_answer(text):
 def test_importing_the_language_builds_no_parser():
     script = (
         "import sys; import robolink_simulators.epson.spel; "
-        "from robolink_simulators.epson.spel import _parse; "
-        "print(_parse._parser.cache_info().misses)"
+        "from robolink_simulators.epson.spel import parse; "
+        "print(parse._parser.cache_info().misses)"
     )
     paths = os.pathsep.join(filter(None, sys.path))
     ran = subprocess.run(

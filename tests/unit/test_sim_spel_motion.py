@@ -1,12 +1,12 @@
-"""Motion statements and settings; the checks of the language reference, part 15."""
+"""Motion statements and settings; the checks of docs/reference/spel.md 15."""
 
 import random
 
 import pytest
-from robolink_simulators.epson.kinematics import Joints
+from robolink_simulators.epson.arm.kinematics import Joints
+from robolink_simulators.epson.arm.robots import find_robot
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.options import EpsonOptions, SpelNumbers
-from robolink_simulators.epson.robots import find_robot
 from robolink_simulators.epson.spel import Interpreter, SpelError
 
 from robolink.model import Hand

@@ -6,9 +6,9 @@ from statistics import pstdev
 
 import pytest
 from robolink_simulators.epson import EpsonSimulator
-from robolink_simulators.epson.kinematics import inverse
-from robolink_simulators.epson.robots import ROBOTS
-from robolink_simulators.world import STORED
+from robolink_simulators.epson.arm.kinematics import inverse
+from robolink_simulators.epson.arm.robots import ROBOTS
+from robolink_simulators.epson.world import STORED
 
 from robolink.errors import ConfigError
 from robolink.model import ToolOffset

@@ -16,8 +16,8 @@ from robolink.errors import (
 )
 from robolink.timing import Deadline
 from robolink.transport import parse_url
-from robolink.transport._dial import dial
-from robolink.transport._tcp import TcpTransport, open_tcp
+from robolink.transport.stream.dial import dial
+from robolink.transport.stream.tcp import TcpTransport, open_tcp
 
 URL = parse_url("epson+tcp://192.0.2.1:5000")
 ADDRESSES = [

@@ -9,7 +9,7 @@ from typing import Final
 import click
 
 from robolink.messages import tr
-from robolink_cli._lazy import LazyGroup
+from robolink_cli.lazy_group import LazyGroup
 
 METHODS: Final = {
     "two-pose": (

@@ -10,13 +10,13 @@ import click
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink_cli._motion_options import motion_option
-from robolink_cli._sensor_option import sensor_option
 from robolink_cli.calibrate._frame import Frame
+from robolink_cli.options.motion import motion_option
+from robolink_cli.options.sensor import sensor_option
 
 if TYPE_CHECKING:
-    from robolink.calibration import CameraStation
     from robolink.model import Controller
+    from robolink.stations import CameraStation
 
 
 @dataclass(frozen=True, slots=True)

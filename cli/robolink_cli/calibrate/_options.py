@@ -7,15 +7,15 @@ from typing import Any, Final
 import click
 
 from robolink.messages import tr
-from robolink_cli._cell import with_cell_limits
-from robolink_cli._consent import dry_run_option, yes_option
-from robolink_cli._context import CliContext, controller_options
-from robolink_cli._impacting import impact_options
-from robolink_cli._jumps import USUAL_CHANGE_MM
-from robolink_cli._motion_options import motion_option
-from robolink_cli._people import nozzle_options
-from robolink_cli._reporting import report_options
 from robolink_cli.calibrate._frame import frame_from
+from robolink_cli.options.impact import impact_options
+from robolink_cli.options.motion import motion_option
+from robolink_cli.options.report import report_options
+from robolink_cli.prompts.consent import dry_run_option, yes_option
+from robolink_cli.prompts.jumps import USUAL_CHANGE_MM
+from robolink_cli.session.cell import with_cell_limits
+from robolink_cli.session.context import CliContext, controller_options
+from robolink_cli.session.operator_identity import nozzle_options
 
 _CELL_KEYS: Final = {
     "lift_mm": "lift_mm",

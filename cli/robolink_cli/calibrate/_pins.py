@@ -3,8 +3,8 @@
 from robolink.messages import tr
 from robolink.model import Controller, EntryKind
 from robolink.stations import Station, StationKind, find_station, find_stations
-from robolink_cli._render import note
 from robolink_cli.calibrate._frame import Frame
+from robolink_cli.console.render import note
 
 
 def station_at(frame: Frame, controller: Controller, kind: StationKind) -> Station:

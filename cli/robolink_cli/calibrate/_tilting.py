@@ -6,7 +6,7 @@ from typing import Any
 import click
 
 from robolink.messages import tr
-from robolink_cli._motion_options import motion_option
+from robolink_cli.options.motion import motion_option
 
 
 def tilt_options(function: Callable[..., Any]) -> Callable[..., Any]:

@@ -1,4 +1,4 @@
-"""The PLC mailbox: blocks of 16-bit words between a client and a SoftMotion PLC (design part 7).
+"""The PLC mailbox: blocks of 16-bit words between a client and a SoftMotion PLC (docs/mailbox.md).
 
 HOST encodes commands and decodes responses and slots; DEVICE decodes commands and encodes
 responses and slots.
@@ -9,101 +9,103 @@ from typing import TYPE_CHECKING
 from robolink.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
-    from robolink.protocols.mailbox._answer import Answer as Answer
-    from robolink.protocols.mailbox._blocks import BlockError as BlockError
-    from robolink.protocols.mailbox._blocks import BlockFault as BlockFault
-    from robolink.protocols.mailbox._blocks import Field as Field
-    from robolink.protocols.mailbox._blocks import Four as Four
-    from robolink.protocols.mailbox._blocks import Layout as Layout
-    from robolink.protocols.mailbox._blocks import Six as Six
-    from robolink.protocols.mailbox._blocks import Words as Words
-    from robolink.protocols.mailbox._blocks import WordType as WordType
     from robolink.protocols.mailbox._codes import Bits as Bits
     from robolink.protocols.mailbox._codes import BufferMode as BufferMode
     from robolink.protocols.mailbox._codes import Capability as Capability
     from robolink.protocols.mailbox._codes import CommandState as CommandState
     from robolink.protocols.mailbox._codes import CoordinateSystem as CoordinateSystem
     from robolink.protocols.mailbox._codes import ErrorClass as ErrorClass
+    from robolink.protocols.mailbox._codes import ExportProfile as ExportProfile
     from robolink.protocols.mailbox._codes import GroupState as GroupState
-    from robolink.protocols.mailbox._codes import Profile as Profile
     from robolink.protocols.mailbox._codes import ReadMode as ReadMode
     from robolink.protocols.mailbox._codes import error_meaning as error_meaning
-    from robolink.protocols.mailbox._command import Command as Command
-    from robolink.protocols.mailbox._command import decode_command as decode_command
-    from robolink.protocols.mailbox._command import encode_command as encode_command
-    from robolink.protocols.mailbox._device import decode_device_id as decode_device_id
-    from robolink.protocols.mailbox._device import encode_device_id as encode_device_id
-    from robolink.protocols.mailbox._eds import electronic_data_sheet as electronic_data_sheet
     from robolink.protocols.mailbox._frames import frames_match as frames_match
     from robolink.protocols.mailbox._frames import from_frame as from_frame
     from robolink.protocols.mailbox._frames import to_frame as to_frame
     from robolink.protocols.mailbox._kinematics import Kinematics as Kinematics
     from robolink.protocols.mailbox._kinematics import find_kinematics as find_kinematics
     from robolink.protocols.mailbox._kinematics import kinematics_word as kinematics_word
-    from robolink.protocols.mailbox._layouts import COMMAND as COMMAND
-    from robolink.protocols.mailbox._layouts import COMMAND_WORDS as COMMAND_WORDS
-    from robolink.protocols.mailbox._layouts import DEVICE as DEVICE
-    from robolink.protocols.mailbox._layouts import DEVICE_START as DEVICE_START
-    from robolink.protocols.mailbox._layouts import DEVICE_WORDS as DEVICE_WORDS
-    from robolink.protocols.mailbox._layouts import PROBE as PROBE
-    from robolink.protocols.mailbox._layouts import RESPONSE as RESPONSE
-    from robolink.protocols.mailbox._layouts import RESPONSE_WORDS as RESPONSE_WORDS
-    from robolink.protocols.mailbox._layouts import SLOT as SLOT
-    from robolink.protocols.mailbox._layouts import SLOT_WORDS as SLOT_WORDS
-    from robolink.protocols.mailbox._layouts import SLOTS as SLOTS
-    from robolink.protocols.mailbox._layouts import VERSION as VERSION
-    from robolink.protocols.mailbox._layouts import slot_start as slot_start
     from robolink.protocols.mailbox._opcodes import OPCODES as OPCODES
     from robolink.protocols.mailbox._opcodes import Opcode as Opcode
     from robolink.protocols.mailbox._opcodes import OpcodeFacts as OpcodeFacts
     from robolink.protocols.mailbox._opcodes import opcodes_of as opcodes_of
-    from robolink.protocols.mailbox._register_map import register_map_csv as register_map_csv
-    from robolink.protocols.mailbox._register_map import (
+    from robolink.protocols.mailbox.blocks.answer import Answer as Answer
+    from robolink.protocols.mailbox.blocks.command import Command as Command
+    from robolink.protocols.mailbox.blocks.command import decode_command as decode_command
+    from robolink.protocols.mailbox.blocks.command import encode_command as encode_command
+    from robolink.protocols.mailbox.blocks.device import decode_device_id as decode_device_id
+    from robolink.protocols.mailbox.blocks.device import encode_device_id as encode_device_id
+    from robolink.protocols.mailbox.blocks.layout import BlockError as BlockError
+    from robolink.protocols.mailbox.blocks.layout import BlockFault as BlockFault
+    from robolink.protocols.mailbox.blocks.layout import Field as Field
+    from robolink.protocols.mailbox.blocks.layout import Four as Four
+    from robolink.protocols.mailbox.blocks.layout import Layout as Layout
+    from robolink.protocols.mailbox.blocks.layout import Six as Six
+    from robolink.protocols.mailbox.blocks.layout import Words as Words
+    from robolink.protocols.mailbox.blocks.layout import WordType as WordType
+    from robolink.protocols.mailbox.blocks.register_layouts import COMMAND as COMMAND
+    from robolink.protocols.mailbox.blocks.register_layouts import COMMAND_WORDS as COMMAND_WORDS
+    from robolink.protocols.mailbox.blocks.register_layouts import DEVICE as DEVICE
+    from robolink.protocols.mailbox.blocks.register_layouts import DEVICE_START as DEVICE_START
+    from robolink.protocols.mailbox.blocks.register_layouts import DEVICE_WORDS as DEVICE_WORDS
+    from robolink.protocols.mailbox.blocks.register_layouts import PROBE as PROBE
+    from robolink.protocols.mailbox.blocks.register_layouts import RESPONSE as RESPONSE
+    from robolink.protocols.mailbox.blocks.register_layouts import RESPONSE_WORDS as RESPONSE_WORDS
+    from robolink.protocols.mailbox.blocks.register_layouts import SLOT as SLOT
+    from robolink.protocols.mailbox.blocks.register_layouts import SLOT_WORDS as SLOT_WORDS
+    from robolink.protocols.mailbox.blocks.register_layouts import SLOTS as SLOTS
+    from robolink.protocols.mailbox.blocks.register_layouts import VERSION as VERSION
+    from robolink.protocols.mailbox.blocks.register_layouts import slot_start as slot_start
+    from robolink.protocols.mailbox.blocks.response import Finished as Finished
+    from robolink.protocols.mailbox.blocks.response import Response as Response
+    from robolink.protocols.mailbox.blocks.response import decode_response as decode_response
+    from robolink.protocols.mailbox.blocks.response import encode_response as encode_response
+    from robolink.protocols.mailbox.blocks.slot import Slot as Slot
+    from robolink.protocols.mailbox.blocks.slot import decode_slot as decode_slot
+    from robolink.protocols.mailbox.blocks.slot import encode_slot as encode_slot
+    from robolink.protocols.mailbox.blocks.word_order import FoundProbe as FoundProbe
+    from robolink.protocols.mailbox.blocks.word_order import WordOrder as WordOrder
+    from robolink.protocols.mailbox.blocks.word_order import find_probe as find_probe
+    from robolink.protocols.mailbox.blocks.word_order import find_word_order as find_word_order
+    from robolink.protocols.mailbox.blocks.words import beats_for as beats_for
+    from robolink.protocols.mailbox.blocks.words import crc16 as crc16
+    from robolink.protocols.mailbox.blocks.words import heartbeat_word as heartbeat_word
+    from robolink.protocols.mailbox.blocks.words import next_number as next_number
+    from robolink.protocols.mailbox.exports.eds import (
+        electronic_data_sheet as electronic_data_sheet,
+    )
+    from robolink.protocols.mailbox.exports.register_map import register_map_csv as register_map_csv
+    from robolink.protocols.mailbox.exports.register_map import (
         register_map_markdown as register_map_markdown,
     )
-    from robolink.protocols.mailbox._response import Finished as Finished
-    from robolink.protocols.mailbox._response import Response as Response
-    from robolink.protocols.mailbox._response import decode_response as decode_response
-    from robolink.protocols.mailbox._response import encode_response as encode_response
-    from robolink.protocols.mailbox._slot import Slot as Slot
-    from robolink.protocols.mailbox._slot import decode_slot as decode_slot
-    from robolink.protocols.mailbox._slot import encode_slot as encode_slot
-    from robolink.protocols.mailbox._structured_text import (
+    from robolink.protocols.mailbox.exports.structured_text import (
         structured_text_types as structured_text_types,
     )
-    from robolink.protocols.mailbox._word_order import FoundProbe as FoundProbe
-    from robolink.protocols.mailbox._word_order import WordOrder as WordOrder
-    from robolink.protocols.mailbox._word_order import find_probe as find_probe
-    from robolink.protocols.mailbox._word_order import find_word_order as find_word_order
-    from robolink.protocols.mailbox._words import beats_for as beats_for
-    from robolink.protocols.mailbox._words import crc16 as crc16
-    from robolink.protocols.mailbox._words import heartbeat_word as heartbeat_word
-    from robolink.protocols.mailbox._words import next_number as next_number
 else:
     __getattr__ = lazy_exports(
         __name__,
         {
-            "_answer": "Answer",
-            "_blocks": "BlockError BlockFault Field Four Layout Six WordType Words",
+            "blocks.answer": "Answer",
+            "blocks.layout": "BlockError BlockFault Field Four Layout Six WordType Words",
             "_codes": (
                 "Bits BufferMode Capability CommandState CoordinateSystem ErrorClass "
-                "GroupState Profile ReadMode error_meaning"
+                "GroupState ExportProfile ReadMode error_meaning"
             ),
-            "_command": "Command decode_command encode_command",
-            "_device": "decode_device_id encode_device_id",
-            "_eds": "electronic_data_sheet",
+            "blocks.command": "Command decode_command encode_command",
+            "blocks.device": "decode_device_id encode_device_id",
+            "exports.eds": "electronic_data_sheet",
             "_frames": "frames_match from_frame to_frame",
             "_kinematics": "Kinematics find_kinematics kinematics_word",
-            "_layouts": (
+            "blocks.register_layouts": (
                 "COMMAND COMMAND_WORDS DEVICE DEVICE_START DEVICE_WORDS PROBE RESPONSE "
                 "RESPONSE_WORDS SLOT SLOTS SLOT_WORDS VERSION slot_start"
             ),
             "_opcodes": "OPCODES Opcode OpcodeFacts opcodes_of",
-            "_register_map": "register_map_csv register_map_markdown",
-            "_response": "Finished Response decode_response encode_response",
-            "_slot": "Slot decode_slot encode_slot",
-            "_structured_text": "structured_text_types",
-            "_word_order": "FoundProbe WordOrder find_probe find_word_order",
-            "_words": "beats_for crc16 heartbeat_word next_number",
+            "exports.register_map": "register_map_csv register_map_markdown",
+            "blocks.response": "Finished Response decode_response encode_response",
+            "blocks.slot": "Slot decode_slot encode_slot",
+            "exports.structured_text": "structured_text_types",
+            "blocks.word_order": "FoundProbe WordOrder find_probe find_word_order",
+            "blocks.words": "beats_for crc16 heartbeat_word next_number",
         },
     )

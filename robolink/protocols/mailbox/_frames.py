@@ -1,8 +1,8 @@
-"""Between robolink's coordinates and the PLC's (design part 4).
+"""Between robolink's coordinates and the PLC's (docs/reference/calibration.md 1.4).
 
 robolink: mm and degrees, R = Rz(U) Ry(V) Rx(W), as EPSON defines it. SoftMotion: the axis
-group's user units and degrees, R = Rz(A) Ry(B) Rz(C), intrinsic (softmotion.md 1.3). The
-angles are never converted into each other but through the matrix, and the unit factor is
+group's user units and degrees, R = Rz(A) Ry(B) Rz(C), intrinsic (docs/reference/softmotion.md 1.3).
+The angles are never converted into each other but through the matrix, and the unit factor is
 applied nowhere else.
 
 Reading an angle off a matrix is done in an order that leaves no doubt near a singular
@@ -12,7 +12,7 @@ orientation: the first angle may be any, the others follow from it.
 from math import atan2, cos, degrees, hypot, radians, sin
 from typing import Final
 
-from robolink.protocols.mailbox._blocks import Six
+from robolink.protocols.mailbox.blocks.layout import Six
 
 _UM_PER_MM: Final = 1000.0
 _SINGULAR: Final = 1e-12

@@ -9,8 +9,8 @@ from typing import Final
 
 from robolink.protocols.epson_text import VariableType
 from robolink_simulators.epson.machine import Machine
-from robolink_simulators.epson.tool_memory import HIGHEST_TOOL
-from robolink_simulators.epson.variables import Variables
+from robolink_simulators.epson.memory.tools import HIGHEST_TOOL
+from robolink_simulators.epson.memory.variables import Variables
 
 LAYOUT: Final = 1
 LAST_COUNT: Final = 1_000_000_000

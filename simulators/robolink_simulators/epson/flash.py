@@ -11,15 +11,15 @@ from typing import Final
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.named_files import read_named
+from robolink_simulators.epson.arm.robot_settings import RobotSettings
 from robolink_simulators.epson.machine import Machine
-from robolink_simulators.epson.points import LocalTable, PointTable
-from robolink_simulators.epson.robot_settings import RobotSettings
+from robolink_simulators.epson.memory.points import LocalTable, PointTable
 
 SCHEMA: Final = "robolink/sim-state/1"
 
 
 class Flash:
-    """Keeps the tools and the selected tool (spel.md 6.1), and which robot it is.
+    """Keeps the tools and the selected tool (docs/reference/spel.md 6.1), and which robot it is.
 
     Args:
         path: Where; ``None`` keeps nothing.

@@ -3,20 +3,20 @@
 import random
 
 from robolink.model import Pose, ToolOffset
-from robolink_simulators.epson.arm import REST, Arm
-from robolink_simulators.epson.bits import IO_BITS, MEMORY_BITS, BitBank
-from robolink_simulators.epson.input_bits import InputBits
-from robolink_simulators.epson.kinematics import Joints, flange_of, inverse, tip_of
-from robolink_simulators.epson.pallets import PalletTable
-from robolink_simulators.epson.parameters import MotionParameters
-from robolink_simulators.epson.points import LocalTable, Point, PointTable
-from robolink_simulators.epson.robot_settings import RobotSettings
-from robolink_simulators.epson.robots import ScaraModel
-from robolink_simulators.epson.timed_bits import TimedBits
-from robolink_simulators.epson.tool_memory import ToolMemory
+from robolink_simulators.epson.arm.arm import REST, Arm
+from robolink_simulators.epson.arm.kinematics import Joints, flange_of, inverse, tip_of
+from robolink_simulators.epson.arm.motion_parameters import MotionParameters
+from robolink_simulators.epson.arm.robot_settings import RobotSettings
+from robolink_simulators.epson.arm.robots import ScaraModel
+from robolink_simulators.epson.memory.bits import IO_BITS, MEMORY_BITS, BitBank
+from robolink_simulators.epson.memory.input_bits import InputBits
+from robolink_simulators.epson.memory.pallets import PalletTable
+from robolink_simulators.epson.memory.points import LocalTable, Point, PointTable
+from robolink_simulators.epson.memory.timed_bits import TimedBits
+from robolink_simulators.epson.memory.tools import ToolMemory
 
 REMOTE_ETHERNET = 26
-"""CtrlDev of a controller run over Remote Ethernet (spel.md 9)."""
+"""CtrlDev of a controller run over Remote Ethernet (docs/reference/spel.md 9)."""
 
 
 class Machine:
@@ -113,7 +113,7 @@ class Machine:
         return inverse(self.model, flange, base.hand)
 
     def switch_motors(self, on: bool) -> None:
-        """Switch the motors; on also resets the motion parameters (spel.md 6.3)."""
+        """Switch the motors; on also resets the motion parameters (docs/reference/spel.md 6.3)."""
         self.motors_on = on
         if on:
             self.reset_motion_parameters()
@@ -124,7 +124,10 @@ class Machine:
         self.timed_bits.clear()
 
     def reset_motion_parameters(self) -> None:
-        """Set the defaults and low power: start-up, Motor On, Reset ... (spel.md 6.3)."""
+        """Set the defaults and low power: start-up, Motor On, Reset and the like.
+
+        Source: docs/reference/spel.md 6.3.
+        """
         self.parameters = MotionParameters()
         self.power_high = False
         self.settings.reset()

@@ -6,10 +6,10 @@ from urllib.parse import quote, urlencode
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink_simulators.clock import ScaledClock
-from robolink_simulators.hosting._line_host import LineHost
-from robolink_simulators.hosting._serial_cable import PTY_LINE, no_pseudo_terminal
-from robolink_simulators.hosting._tcp_host import TcpHost
+from robolink_simulators.cell.clock import ScaledClock
+from robolink_simulators.hosting.streams.line_host import LineHost
+from robolink_simulators.hosting.streams.serial_cable import PTY_LINE, no_pseudo_terminal
+from robolink_simulators.hosting.streams.tcp_host import TcpHost
 from robolink_simulators.plc.device import PlcSimulator
 from robolink_simulators.plc.frames import LineFrames
 from robolink_simulators.plc.link import PlcLink
@@ -64,7 +64,7 @@ class PlcLineHost(LineHost):
 
 
 class _OnLine:
-    """Implements :class:`~robolink_simulators.wire.WireDevice`: the PLC as a line sees it."""
+    """The PLC as a line sees it: a :class:`~robolink_simulators.hosting.seam.WireDevice`."""
 
     def __init__(self, simulator: PlcSimulator) -> None:
         self._simulator = simulator

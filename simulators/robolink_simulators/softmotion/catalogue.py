@@ -7,11 +7,11 @@ from typing import Final
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink_simulators.softmotion.axes import ASSUMED_LIMITS, AxisLimits
-from robolink_simulators.softmotion.coupled import CAxis, Coupled, scara3_z
-from robolink_simulators.softmotion.five_axes import FiveAxes
-from robolink_simulators.softmotion.kinematics import AxisKind, Kinematics
-from robolink_simulators.softmotion.positions import Gantry3, PolarZ, Scara2Z
+from robolink_simulators.softmotion.kinematics.coupled import CAxis, Coupled, scara3_z
+from robolink_simulators.softmotion.kinematics.five_axes import FiveAxes
+from robolink_simulators.softmotion.kinematics.kinematics import AxisKind, KinematicsModel
+from robolink_simulators.softmotion.kinematics.positions import Gantry3, PolarZ, Scara2Z
+from robolink_simulators.softmotion.motion.axes import ASSUMED_LIMITS, AxisLimits
 
 _COUPLED: Final = "+Kin_CAxis"
 _C_AXIS: Final = 3
@@ -32,7 +32,7 @@ class MachineModel:
         limits: Of each drive, a0 first.
     """
 
-    kinematics: Kinematics
+    kinematics: KinematicsModel
     limits: tuple[AxisLimits, ...]
 
 
@@ -47,7 +47,7 @@ class _Entry:
         limits: Of axes that are not like others of their kind.
     """
 
-    make: Callable[..., Kinematics]
+    make: Callable[..., KinematicsModel]
     parameters: Mapping[str, float]
     arms: int = 0
     limits: Mapping[int, AxisLimits] = field(default_factory=dict)
@@ -129,7 +129,7 @@ def _require_finite(parameters: Mapping[str, float]) -> None:
             )
 
 
-def _made(name: str, left: dict[str, float]) -> Kinematics:
+def _made(name: str, left: dict[str, float]) -> KinematicsModel:
     entry = _ENTRIES[name.removesuffix(_COUPLED)]
     lengths_mm = [left.pop(key, default) for key, default in entry.parameters.items()]
     arms_mm = lengths_mm[: entry.arms]
@@ -145,7 +145,7 @@ def _made(name: str, left: dict[str, float]) -> Kinematics:
     return Coupled(position, c_axis, c_index=_C_AXIS)
 
 
-def _assumed(name: str, kinematics: Kinematics) -> Iterator[AxisLimits]:
+def _assumed(name: str, kinematics: KinematicsModel) -> Iterator[AxisLimits]:
     entry = _ENTRIES[name.removesuffix(_COUPLED)]
     special = {**entry.limits, **({_C_AXIS: _C_LIMITS} if name.endswith(_COUPLED) else {})}
     for axis, kind in enumerate(kinematics.kinds):

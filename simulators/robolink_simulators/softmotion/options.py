@@ -1,6 +1,6 @@
 """What no document settles about SoftMotion, and what differs by version, as named options.
 
-Evidence marks as in ``softmotion.md``: [D] vendor documentation, [F] field report,
+Evidence marks as in docs/reference/softmotion.md: [D] vendor documentation, [F] field report,
 [I] inferred, [U] unverified.
 """
 
@@ -12,7 +12,10 @@ from robolink_simulators.softmotion.smc_errors import ErrorKind, SmcError
 
 @dataclass(frozen=True, slots=True)
 class SmcNumbers:
-    """Numbers of ``SMC_ERROR``; 0 where none could be read [U] (softmotion.md 1.4)."""
+    """Numbers of ``SMC_ERROR``; 0 where none could be read [U].
+
+    Source: docs/reference/softmotion.md 1.4.
+    """
 
     wrong_state: int = 11000  # [F]
     nothing_to_reset: int = 120  # [F]

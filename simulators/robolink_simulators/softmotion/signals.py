@@ -3,8 +3,8 @@
 from collections.abc import Callable
 from typing import Final
 
-from robolink_simulators.softmotion.kinematics import AxisValues
-from robolink_simulators.softmotion.smc_errors import ErrorKind, Refused
+from robolink_simulators.softmotion.kinematics.kinematics import AxisValues
+from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind
 
 SIGNALS: Final = 32
 """How many inputs, and how many outputs, there are (assumed)."""
@@ -14,7 +14,7 @@ Sense = Callable[[AxisValues], bool]
 nozzle then breaks a light beam."""
 
 
-class InputBits:
+class DigitalInputs:
     """Inputs 0 to 31: switched by hand, or connected to something that the robot meets."""
 
     def __init__(self) -> None:
@@ -51,7 +51,7 @@ class InputBits:
         return self._on[number] if sense is None else sense(axes)
 
 
-class OutputBits:
+class DigitalOutputs:
     """Outputs 0 to 31, all off at first."""
 
     def __init__(self) -> None:
@@ -78,4 +78,4 @@ class OutputBits:
 
 def _require_signal(number: int) -> None:
     if not 0 <= number < SIGNALS:
-        raise Refused(ErrorKind.PARAMETER, f"There is no signal {number}")
+        raise BlockRefused(ErrorKind.PARAMETER, f"There is no signal {number}")

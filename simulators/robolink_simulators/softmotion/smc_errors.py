@@ -1,7 +1,7 @@
 """What a function block or the axis group can complain about.
 
-Numbers of ``SMC_ERROR`` are no stable public API (softmotion.md 0.2, 1.4): each complaint has
-a kind of ours, the vendor's symbol where a document names it, and a number that
+Numbers of ``SMC_ERROR`` are no stable public API (docs/reference/softmotion.md 1.4): each complaint
+has a kind of ours, the vendor's symbol where a document names it, and a number that
 :class:`~robolink_simulators.softmotion.options.SmcNumbers` can fill in.
 """
 
@@ -37,7 +37,7 @@ SYMBOLS: Final = {
     ErrorKind.NO_ORIENTATION_IMAGE: "SMC_AXIS_GROUP_TOOL_OFFSET_INCOMPATIBLE_WITH_KINEMATICS",
     ErrorKind.INTERRUPTED_BY_SINGLE_AXIS: "SMC_AXIS_GROUP_INTERRUPTED_BY_SINGLE_AXIS",
 }
-"""The vendor's symbols, where a document names them (softmotion.md 1.4)."""
+"""The vendor's symbols, where a document names them (docs/reference/softmotion.md 1.4)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +60,7 @@ class SmcError:
         return SYMBOLS.get(self.kind, "")
 
 
-class Refused(Exception):
+class BlockRefused(Exception):
     """A block will not do it; nothing was changed and nothing new moves.
 
     The text is data of the simulated PLC and not translated.

@@ -7,7 +7,7 @@ import pytest
 
 from robolink.journal._journal import Journal
 from robolink.journal._places import place_of
-from robolink.journal._store import Store
+from robolink.journal.store.store import Store
 from tests.contract.journal._postgresql import Server, is_installed, served
 
 Opener = Callable[..., Journal]

@@ -13,8 +13,8 @@ import pytest
 from sqlalchemy import Engine, event
 
 from robolink.errors import JournalError
-from robolink.journal import EntryKind, NewEntry, Verification, memory_journal, open_journal
-from robolink.journal._entry_rows import EntryRows
+from robolink.journal import ChainVerification, EntryKind, NewEntry, memory_journal, open_journal
+from robolink.journal.store.entry_rows import EntryRows
 from tests.contract.journal._acts import marker
 
 ROOT = Path(__file__).parents[3]
@@ -126,7 +126,7 @@ def test_an_empty_file_becomes_a_journal(path, open_anew):
     path.parent.mkdir()
     path.touch()
     refused(lambda: open_anew(str(path), read_only=True), path, "is empty")
-    assert open_anew(str(path)).verify() == Verification(0, ())
+    assert open_anew(str(path)).verify() == ChainVerification(0, ())
 
 
 def test_a_damaged_page_is_told_and_what_can_be_read_is_read(filled, open_anew):
@@ -142,7 +142,7 @@ def test_a_damaged_page_is_told_and_what_can_be_read_is_read(filled, open_anew):
         journal.log("cell").open_markers()
         journal.log("other").begin(marker())
 
-    refused(everything, filled, "it is damaged", "journal export --read-only", "by hand")
+    refused(everything, filled, "it is damaged", "read_only=True", "by hand")
     assert open_anew(str(filled), read_only=True).entry(1).verdict == "x" * 50
     assert filled.read_bytes()[page : page + 200] == b"\xff" * 200
 
@@ -190,7 +190,7 @@ def test_nothing_is_sent_when_the_intent_finds_no_space(filled):
     assert "The command was not sent." in shown.stdout
     journal = open_journal(str(filled))
     assert [known.operation for known in journal.log("other").open_markers()] == ["before"]
-    assert journal.verify() == Verification(201, ())
+    assert journal.verify() == ChainVerification(201, ())
     journal.close()
 
 
@@ -227,12 +227,12 @@ def test_what_may_not_be_written_is_read(public, open_anew, of_folder, of_file, 
 
     refused(write, public, "may not write", "Make the file and its folder writable", "was not sent")
     reader = open_anew(str(public), read_only=True)
-    assert reader.verify() == Verification(200, ())
+    assert reader.verify() == ChainVerification(200, ())
     assert [known.operation for known in reader.log("cell").open_markers()] == ["left open"]
 
 
 def test_a_locked_journal_is_read_and_not_written(filled, open_anew, monkeypatch):
-    monkeypatch.setattr("robolink.journal._engines.BUSY_S", 0.1)
+    monkeypatch.setattr("robolink.journal.store.engines.BUSY_S", 0.1)
     holder = sqlite3.connect(filled, isolation_level=None)
     try:
         holder.execute("PRAGMA locking_mode = EXCLUSIVE")

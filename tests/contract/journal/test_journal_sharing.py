@@ -5,12 +5,12 @@ import threading
 from dataclasses import replace
 
 import pytest
-from robolink_simulators.clock import ManualClock
+from robolink_simulators.cell.clock import ManualClock
 
 from robolink.errors import JournalError, LeaseHeldError, LeaseLostError
-from robolink.journal import EntryKind, NewEntry, Verification, open_journal
+from robolink.journal import ChainVerification, EntryKind, NewEntry, open_journal
 from robolink.journal import this_process as here
-from robolink.journal._migrations import MIGRATIONS
+from robolink.journal.store.migrations import MIGRATIONS
 from robolink.model import MarkerKind
 from tests.contract.journal._acts import marker, run
 
@@ -86,12 +86,12 @@ def test_many_connections_give_consecutive_numbers(location, open_anew):
             log.append(NewEntry(EntryKind.RAW), NewEntry(EntryKind.RAW))
 
     _together([lambda journal=journal: append(journal) for journal in journals])
-    assert journals[0].verify() == Verification(120, ())
+    assert journals[0].verify() == ChainVerification(120, ())
 
 
 def test_an_empty_database_is_made_a_journal_once_however_many_open_it(location, open_anew):
     _together([lambda: open_anew(location).log(CELLS[0]).append(NewEntry(EntryKind.RAW))] * 5)
-    assert open_anew(location).verify() == Verification(5, ())
+    assert open_anew(location).verify() == ChainVerification(5, ())
 
 
 def _together(acts):
@@ -119,7 +119,7 @@ def test_several_processes_share_one_journal(location, journal):
     for process in processes:
         process.join(timeout=30)
     assert [process.exitcode for process in processes] == [0, 0]
-    assert journal.verify() == Verification(40, ())
+    assert journal.verify() == ChainVerification(40, ())
 
 
 def _work(location, name):
@@ -139,7 +139,7 @@ def _fail_half_way(connection):
 
 
 def _newer(monkeypatch, *steps):
-    monkeypatch.setattr("robolink.journal._migrations.MIGRATIONS", (*MIGRATIONS, *steps))
+    monkeypatch.setattr("robolink.journal.store.migrations.MIGRATIONS", (*MIGRATIONS, *steps))
 
 
 def _version(journal):
@@ -166,7 +166,7 @@ def test_a_migration_that_fails_leaves_the_older_form(location, journal, open_an
         with pytest.raises(JournalError, match="no_such_table"):
             open_anew(location)
     assert _version(journal) == len(MIGRATIONS)
-    assert journal.verify() == Verification(1, ())
+    assert journal.verify() == ChainVerification(1, ())
 
 
 def test_a_newer_journal_is_read_but_not_written(location, open_anew, monkeypatch):
@@ -189,7 +189,7 @@ def test_a_newer_journal_is_read_but_not_written(location, open_anew, monkeypatc
 def test_a_reader_changes_nothing_and_sees_what_is_added(location, journal, open_anew):
     reader = open_anew(location, read_only=True)
     journal.log(CELLS[0]).append(NewEntry(EntryKind.RAW))
-    assert reader.verify() == Verification(1, ())
+    assert reader.verify() == ChainVerification(1, ())
     assert reader.read_only
     with pytest.raises(JournalError, match="for reading only"):
         reader.log(CELLS[0]).append(NewEntry(EntryKind.RAW))
@@ -208,7 +208,7 @@ def test_a_database_of_something_else_is_left_alone(location, journal, open_anew
 
 
 def test_a_write_that_another_program_holds_up_is_refused_in_time(location, open_anew, monkeypatch):
-    monkeypatch.setattr("robolink.journal._engines.BUSY_S", 0.2)
+    monkeypatch.setattr("robolink.journal.store.engines.BUSY_S", 0.2)
     journal, other = open_anew(location), open_anew(location)
     with other._store.write() as tables:
         tables.connection.exec_driver_sql("UPDATE head SET hash = hash")

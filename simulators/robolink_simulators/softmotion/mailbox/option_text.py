@@ -8,7 +8,7 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_simulators.option_values import values_from_text
 from robolink_simulators.softmotion.mailbox.options import MailboxOptions
-from robolink_simulators.softmotion.mailbox.places import require_places
+from robolink_simulators.softmotion.mailbox.words.places import require_places
 from robolink_simulators.softmotion.options import GroupOptions, SmcNumbers
 
 _NUMBERS: Final = "numbers."

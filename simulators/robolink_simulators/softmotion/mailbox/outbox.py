@@ -1,4 +1,4 @@
-"""What the mailbox program gives out: the response block and the tool slots (design part 7)."""
+"""What the mailbox program gives out: the response block and the tool slots (docs/mailbox.md)."""
 
 from dataclasses import replace
 
@@ -19,13 +19,13 @@ from robolink.protocols.mailbox import (
     encode_response,
     encode_slot,
 )
-from robolink_simulators.softmotion.coordinates import CoordRef, CoordSystem
-from robolink_simulators.softmotion.group import AxisGroup
-from robolink_simulators.softmotion.mailbox.image import arranged
+from robolink_simulators.softmotion.group.axis_group import AxisGroup
+from robolink_simulators.softmotion.kinematics.coordinates import CoordRef, CoordSystem
+from robolink_simulators.softmotion.mailbox.commands.tools import ToolDesk
 from robolink_simulators.softmotion.mailbox.program import MailboxProgram
 from robolink_simulators.softmotion.mailbox.retained import RetainedMemory
-from robolink_simulators.softmotion.mailbox.tool_desk import ToolDesk
-from robolink_simulators.softmotion.mailbox.units import UserUnits
+from robolink_simulators.softmotion.mailbox.words.image import arranged
+from robolink_simulators.softmotion.mailbox.words.units import UserUnits
 
 
 class Outbox:

@@ -1,17 +1,17 @@
-"""Who may command the mailbox (design part 7)."""
+"""Who may command the mailbox (docs/mailbox.md)."""
 
 from typing import Final
 
 from robolink.protocols.mailbox import Answer, Command, ErrorClass, next_number
 from robolink.timing import NS_PER_S
-from robolink_simulators.softmotion.mailbox.complaints import Rejected
+from robolink_simulators.softmotion.mailbox.commands.complaints import Rejected
 from robolink_simulators.softmotion.mailbox.retained import RetainedMemory
 
 SILENCE_NS: Final = 10 * NS_PER_S
 """After this long without a sign of its owner a mailbox may be taken, if nothing moves."""
 
 
-class Ownership:
+class MailboxOwnership:
     """The owner's token; a PLC start clears it, and keeps the epoch.
 
     Args:

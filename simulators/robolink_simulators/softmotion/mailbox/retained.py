@@ -24,7 +24,7 @@ SCHEMA: Final = "robolink/plc-state/1"
 
 
 class RetainedMemory:
-    """The retained variables of the mailbox program (design part 7).
+    """The retained variables of the mailbox program (docs/mailbox.md).
 
     Attributes:
         boot_id: Counts PLC starts; 0 before the first.

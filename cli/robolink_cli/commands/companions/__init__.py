@@ -1,0 +1,1 @@
+"""Commands about the programs for the controllers themselves, and register maps."""

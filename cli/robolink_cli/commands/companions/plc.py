@@ -1,0 +1,56 @@
+"""plc export: what a PLC programmer needs to serve the mailbox."""
+
+from pathlib import Path
+
+import click
+
+from robolink.messages import tr
+from robolink_cli.commands.companions.check_map import check_map
+from robolink_cli.console.render import emit_json, json_is_on, say
+from robolink_cli.session.context import json_option
+
+_LAST_BASE = 64880  # the response block, fifteen slots and the device block end at register 65535
+
+
+@click.group()
+def plc() -> None:
+    """The mailbox of a CODESYS SoftMotion PLC, or the registers of any other."""
+
+
+plc.add_command(check_map)
+
+
+@plc.command("export")
+@click.argument("folder", metavar="DIR", type=click.Path(file_okay=False, path_type=Path))
+@click.option(
+    "--profile",
+    type=click.Choice(["tools", "full"]),
+    default="tools",
+    show_default=True,
+    help="tools: tool offsets only, no motion; full: all opcodes.",
+)
+@click.option(
+    "--base",
+    type=click.IntRange(0, _LAST_BASE),
+    default=0,
+    show_default=True,
+    help="First register of both blocks, counted from 0.",
+)
+@click.option("--force", is_flag=True, help="Write over files that were changed.")
+@json_option
+def export(folder: Path, profile: str, base: int, force: bool) -> None:
+    """Write the register map, the CANopen data sheet and the data types of the mailbox.
+
+    docs/mailbox.md says what to do with them. Their licence is 0BSD: they may be used in a
+    machine without any duty.
+    """
+    from robolink.protocols.mailbox import ExportProfile
+    from robolink_cli.commands.companions.plc_export import export_texts, plc_texts
+
+    texts = plc_texts(ExportProfile(profile), base)
+    written = [str(path) for path in export_texts(folder, texts, replace=force)]
+    if json_is_on():
+        emit_json("robolink/plc-export/1", {"files": written, "profile": profile, "base": base})
+    else:
+        for path in written:
+            say(tr("wrote {path}", path=path))

@@ -1,0 +1,57 @@
+"""The files that a PLC programmer puts beside the mailbox program."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from robolink.errors import ConfigError
+from robolink.messages import tr
+from robolink.named_files import holds, require_free, save_named
+from robolink.protocols.mailbox import (
+    ExportProfile,
+    electronic_data_sheet,
+    register_map_csv,
+    register_map_markdown,
+    structured_text_types,
+)
+
+
+def plc_texts(profile: ExportProfile, base: int) -> Mapping[str, str]:
+    """Return the files by name; ``base`` is the first register of both blocks."""
+    return {
+        "register_map.csv": register_map_csv(base),
+        "register_map.md": register_map_markdown(profile, base),
+        "robolink_mailbox.eds": electronic_data_sheet(),
+        "robolink_mailbox_types.st": structured_text_types(profile),
+    }
+
+
+def export_texts(folder: Path, texts: Mapping[str, str], *, replace: bool = False) -> list[Path]:
+    """Write the files into ``folder``, which is made when it is missing.
+
+    A file that is there already with the same content is fine.
+
+    Raises:
+        ConfigError: A file is there that differs, or one cannot be written.
+    """
+    _make(folder)
+    files = {folder / name: text.encode() for name, text in texts.items()}
+    stale = {path: data for path, data in files.items() if not holds(path, data)}
+    for path in stale:
+        require_free(path, replace=replace)
+    for path, data in stale.items():
+        save_named(path, data, replace=replace)
+    return list(files)
+
+
+def _make(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ConfigError(
+            tr(
+                "{folder} cannot be written: {cause}.",
+                folder=folder,
+                cause=error.strerror or error,
+            ),
+            remedy=tr("Name a folder that can be written."),
+        ) from error

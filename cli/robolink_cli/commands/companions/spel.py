@@ -1,0 +1,34 @@
+"""spel export: the companion program for the controller's own project."""
+
+from pathlib import Path
+
+import click
+
+from robolink.messages import tr
+from robolink_cli.console.render import emit_json, json_is_on, say
+from robolink_cli.session.context import json_option
+
+
+@click.group()
+def spel() -> None:
+    """Programs that a controller's project can hold."""
+
+
+@spel.command("export")
+@click.argument("folder", metavar="DIR", type=click.Path(file_okay=False, path_type=Path))
+@click.option("--force", is_flag=True, help="Write over files that were changed.")
+@json_option
+def export(folder: Path, force: bool) -> None:
+    """Write the companion program, which publishes the tool table while production runs.
+
+    Add robolink_tools.prg to the RC+ project and call RobolinkPublish; docs/monitor-only.md
+    says where. Its licence is 0BSD: it may be used in a machine without any duty.
+    """
+    from robolink_cli.commands.companions.companion_files import export_companions
+
+    written = [str(path) for path in export_companions(folder, replace=force)]
+    if json_is_on():
+        emit_json("robolink/spel-export/1", {"files": written})
+    else:
+        for path in written:
+            say(tr("wrote {path}", path=path))

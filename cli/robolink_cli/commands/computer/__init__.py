@@ -1,0 +1,1 @@
+"""Commands about this computer: cell files, ports, addresses, completion, doctor."""

@@ -1,0 +1,33 @@
+"""doctor: what could get in the way on this computer."""
+
+import click
+
+from robolink.messages import tr
+from robolink_cli.console.render import emit_json, json_is_on, say
+from robolink_cli.session.context import json_option
+
+
+@click.command()
+@json_option
+def doctor() -> int:
+    """Look at versions, folders, cell files, passwords, ports and unsettled work.
+
+    No controller is spoken to and nothing is changed. Ends with 1 when something is bad.
+    """
+    from dataclasses import asdict
+
+    from robolink_cli.commands.computer.checkup import check_up
+    from robolink_cli.commands.computer.doctor_finding import Level
+
+    remarks = check_up()
+    healthy = all(remark.level is not Level.BAD for remark in remarks)
+    if json_is_on():
+        entries = [asdict(remark) for remark in remarks]
+        emit_json("robolink/doctor/1", {"healthy": healthy, "checks": entries})
+    else:
+        for remark in remarks:
+            say(f"{remark.level:4}  {remark.subject}: {remark.what}")
+            if remark.remedy:
+                say(f"      {remark.remedy}")
+        say(tr("No obstacle was found.") if healthy else tr("Something is in the way; see above."))
+    return 0 if healthy else 1

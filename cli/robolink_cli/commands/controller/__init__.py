@@ -1,0 +1,1 @@
+"""Commands at one controller: look, calm, tools, inputs, variables, jog, backup."""

@@ -1,0 +1,134 @@
+"""io get, set: inputs, outputs and memory bits."""
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+import click
+
+from robolink.errors import ConfigError
+from robolink.messages import tr
+from robolink_cli.console.render import say
+from robolink_cli.prompts.consent import agree, dry_run_option, yes_option
+from robolink_cli.session.capabilities import io_of, require_epson
+from robolink_cli.session.context import CliContext, controller_options, open_controller
+
+if TYPE_CHECKING:
+    from robolink.model import Controller
+
+_number = click.IntRange(min=0, max=0xFFFF)
+_memory = click.option("--memory", is_flag=True, help="Memory bits in place of inputs or outputs.")
+
+
+@click.group()
+def io() -> None:
+    """Read inputs, switch outputs, read and switch memory bits."""
+
+
+@io.command("get")
+@click.argument("bit", type=_number, required=False)
+@click.option("--byte", type=_number, metavar="PORT", help="Eight bits, from 8 x PORT on.")
+@click.option("--word", type=_number, metavar="PORT", help="Sixteen bits, from 16 x PORT on.")
+@click.option("--output", is_flag=True, help="An output, read through Execute.")
+@_memory
+@controller_options
+def get(
+    context: CliContext,
+    bit: int | None,
+    byte: int | None,
+    word: int | None,
+    *,
+    output: bool,
+    memory: bool,
+) -> None:
+    """Show an input. Legal while production runs, except with --output."""
+    if sum(at is not None for at in (bit, byte, word)) != 1:
+        raise ConfigError(
+            tr("Exactly one place can be read at a time."),
+            remedy=tr("Give one of BIT, --byte PORT and --word PORT."),
+        )
+    if output and (memory or bit is None):
+        raise ConfigError(
+            tr("Outputs are read bit by bit, and are not memory."),
+            remedy=tr("Write for example 'robolink io get 3 --output'."),
+        )
+    with open_controller(context) as controller:
+        if bit is not None and not (output or memory):
+            value: int = io_of(controller).read_input(bit)
+        else:
+            bank = require_epson(controller, tr("outputs, memory, bytes or words to read")).io
+            if bit is not None:
+                value = (bank.read_output if output else bank.read_memory)(bit)
+            elif byte is not None:
+                value = (bank.read_memory_byte if memory else bank.read_input_byte)(byte)
+            else:
+                value = (bank.read_memory_word if memory else bank.read_input_word)(word or 0)
+    size = "bit" if bit is not None else "byte" if byte is not None else "word"
+    at = next(number for number in (bit, byte, word) if number is not None)
+    kind = "output" if output else "memory" if memory else "input"
+    payload: dict[str, object] = {"kind": kind, "size": size, "number": at, "value": value}
+    context.emit("io", payload, lambda: say(_shown(kind, size, at, value)))
+
+
+@io.command("set")
+@click.argument("bit", type=_number)
+@click.argument("switch", type=click.Choice(["on", "off"]))
+@_memory
+@controller_options
+@dry_run_option
+@yes_option
+def set_bit(
+    context: CliContext, bit: int, switch: str, *, memory: bool, dry_run: bool, yes: bool
+) -> None:
+    """Switch an output or a memory bit, and read it back. An output may move something."""
+    on = switch == "on"
+    kind = tr("memory bit") if memory else tr("output")
+    with open_controller(context) as controller:
+        preview, change = _switching(controller, memory=memory)
+        if dry_run:
+            context.show_requests(preview(bit, on))
+            return
+        agree(tr("Switch {kind} {bit} {switch}?", kind=kind, bit=bit, switch=switch), yes=yes)
+        receipt = change(bit, on)
+    payload: dict[str, object] = {
+        "kind": "memory" if memory else "output",
+        "number": bit,
+        "before": getattr(receipt, "before", None),
+        "value": getattr(receipt, "read_back", None),
+        "skipped": getattr(receipt, "skipped", False),
+    }
+    if payload["skipped"]:
+        done = tr("was so already")
+    elif payload["value"] is None:
+        done = tr("switched, acknowledged; it cannot be read back")
+    else:
+        done = tr("switched, read back")
+    line = tr("{kind} {bit} is {switch}: {done}", kind=kind, bit=bit, switch=switch, done=done)
+    context.emit("io-set", payload, lambda: say(line))
+
+
+def _switching(
+    controller: "Controller", *, memory: bool
+) -> "tuple[Callable[[int, bool], Sequence[str]], Callable[[int, bool], object]]":
+    """Return what shows the requests of switching a bit, and what switches it."""
+    if memory:
+        bank = require_epson(controller, tr("memory bits")).io
+        return bank.preview_memory, bank.set_memory
+    outputs = io_of(controller)
+    return outputs.preview_output, outputs.set_output
+
+
+def _shown(kind: str, size: str, at: int, value: int) -> str:
+    if size == "bit":
+        state = tr("on") if value else tr("off")
+        return tr("{kind} {at}: {state}", kind=kind, at=at, state=state)
+    width = 8 if size == "byte" else 16
+    return tr(
+        "{kind} {size} {at}: {value} (bits {high} to {low}: {bits})",
+        kind=kind,
+        size=size,
+        at=at,
+        value=value,
+        high=at * width + width - 1,
+        low=at * width,
+        bits=f"{value:0{width}b}",
+    )

@@ -1,0 +1,219 @@
+"""status, where, stop, reset, motors: looking at a controller and calming it."""
+
+from typing import TYPE_CHECKING
+
+import click
+
+from robolink.messages import tr
+from robolink.model import Act
+from robolink_cli.console.render import note, say
+from robolink_cli.options.shared import shared_options
+from robolink_cli.prompts.consent import (
+    agree,
+    agree_to_motion,
+    dry_run_option,
+    on_terminal,
+    yes_option,
+)
+from robolink_cli.session.capabilities import preferences_of, require_epson, require_softmotion
+from robolink_cli.session.context import (
+    CliContext,
+    calming_options,
+    controller_options,
+    emit,
+    looking_options,
+    open_controller,
+    show_requests,
+    stop_request,
+)
+from robolink_cli.stopping.notes import forget_stop, own_name_of
+
+if TYPE_CHECKING:
+    from robolink.model import Controller
+
+
+@click.command()
+@looking_options
+def status(context: CliContext) -> None:
+    """Show what the controller is doing. Reads only; legal while production runs."""
+    from robolink_cli.session.selected_tool import note_doubts
+    from robolink_cli.views.documents import status_payload
+    from robolink_cli.views.tables import show_status
+
+    with open_controller(context, looks=True) as controller:
+        payload = status_payload(controller)
+        note_doubts(payload, controller, context.expected)
+    context.emit("status", payload, lambda: show_status(payload))
+
+
+@click.command()
+@looking_options
+def where(context: CliContext) -> None:
+    """Show where the tool in force is (measured), and the joints."""
+    from robolink_cli.views.documents import pose_payload
+    from robolink_cli.views.tables import show_pose
+
+    with open_controller(context, looks=True) as controller:
+        group = controller.groups[0]
+        pose, axes = group.pose(), group.axes()
+    payload = pose_payload(pose) | {name: list(values) for name, values in axes.items()}
+    context.emit("where", payload, lambda: show_pose(payload))
+
+
+@click.command()
+@shared_options
+@dry_run_option
+def stop(dry_run: bool) -> None:
+    """Bring the robot to rest, whoever moves it. Not an emergency stop, and no substitute for one.
+
+    Nothing is asked and no file is waited for. What may move next is asked about, until 'robolink
+    reset' or 'robolink release'.
+    """
+    from robolink_cli.stopping.outcome import Telling, requests_of
+    from robolink_cli.stopping.stop_first import stop_first
+
+    request = stop_request()
+    if dry_run:
+        show_requests(requests_of(request))
+        return
+    outcome = stop_first(request)
+    telling = Telling(request, outcome)
+    telling.explain_the_holder()
+    if outcome.error is None:
+        emit("stop", telling.payload(), lambda: say(telling.sentence()))
+    for remark in telling.remarks():
+        note(remark)
+    if outcome.error is not None:
+        raise outcome.error
+
+
+@click.command()
+@shared_options
+@yes_option
+def release(yes: bool) -> None:
+    """Let the robot be moved again after a stop: shows who stopped it and when, and asks.
+
+    Nothing is sent: a PLC that is held by a stop, and a controller in error, want 'reset'.
+    """
+    from robolink_cli.stopping.notes import release_stop
+
+    payload = release_stop(stop_request(), yes=yes)
+    emit(
+        "release",
+        payload,
+        lambda: say(
+            tr("Released: the robot may be moved again.")
+            if payload["released"]
+            else tr("No stop is noted here; there is nothing to release.")
+        ),
+    )
+
+
+@click.command()
+@calming_options
+@dry_run_option
+@yes_option
+def reset(context: CliContext, dry_run: bool, yes: bool) -> None:
+    """Clear an error. May switch outputs off: a gripper may drop its part."""
+    with open_controller(context, calms=True) as controller:
+        if dry_run:
+            context.show_requests(controller.preview(Act.RESET))
+            return
+        effect, told = _effect_of_reset(controller)
+        if told and (yes or not on_terminal()):
+            note(effect)  # nobody is asked, so it is said before it is sent
+        agree(tr("{effect} Go on?", effect=effect), yes=yes)
+        controller.reset_fault()
+        state = controller.status().state
+        name = own_name_of(controller)
+    forget_stop(context, name)
+    payload: dict[str, object] = {"state": state}
+    context.emit(
+        "reset",
+        payload,
+        lambda: say(tr("The reset was carried out; the controller is: {state}.", state=state)),
+    )
+
+
+def _effect_of_reset(controller: "Controller") -> tuple[str, bool]:
+    """Return what a reset does to the outputs, and whether the controller told that."""
+    from robolink.protocols.epson_text import Preference
+
+    told = preferences_of(controller)
+    if told is None:
+        return tr("Reset may switch outputs off (vacuum, gripper)."), False
+    if Preference.RESET_OUTPUTS_OFF in told:
+        return tr("Reset SWITCHES THE OUTPUTS OFF (vacuum, gripper): a part may drop."), True
+    return tr("Reset clears the error; the outputs stay as they are."), True
+
+
+@click.command()
+@click.argument("switch", type=click.Choice(["on", "off"]))
+@calming_options
+@dry_run_option
+@yes_option
+def motors(context: CliContext, switch: str, dry_run: bool, yes: bool) -> None:
+    """Switch the robot's motors on or off, and prove it."""
+    on = switch == "on"
+    with open_controller(context, calms=not on) as controller:
+        if dry_run:
+            context.show_requests(controller.preview(Act.MOTORS_ON if on else Act.MOTORS_OFF))
+            return
+        if on:
+            agree(tr("Is the cell clear? The motors go on."), yes=yes)
+        controller.motors(on)
+    payload: dict[str, object] = {"motors_on": on}
+    context.emit("motors", payload, lambda: say(tr("The motors are {switch}.", switch=switch)))
+
+
+@click.command()
+@controller_options
+@dry_run_option
+@yes_option
+def enable(context: CliContext, dry_run: bool, yes: bool) -> None:
+    """Enable the axis group of a PLC, and prove it; its own program switches the drives."""
+    _switch_group(context, on=True, dry_run=dry_run, yes=yes)
+
+
+@click.command()
+@controller_options
+@dry_run_option
+@yes_option
+def disable(context: CliContext, dry_run: bool, yes: bool) -> None:
+    """Disable the axis group of a PLC, which must stand still, and prove it."""
+    _switch_group(context, on=False, dry_run=dry_run, yes=yes)
+
+
+def _switch_group(context: CliContext, *, on: bool, dry_run: bool, yes: bool) -> None:
+    with open_controller(context) as controller:
+        require_softmotion(controller)
+        if dry_run:
+            context.show_requests(controller.preview(Act.MOTORS_ON if on else Act.MOTORS_OFF))
+            return
+        if on:
+            agree(tr("Is the machine clear? The axis group is enabled."), yes=yes)
+        controller.motors(on)
+    payload: dict[str, object] = {"enabled": on}
+    state = tr("enabled") if on else tr("disabled")
+    context.emit("group", payload, lambda: say(tr("The axis group is {state}.", state=state)))
+
+
+@click.command("execute-raw")
+@click.argument("statement")
+@controller_options
+@yes_option
+def execute_raw(context: CliContext, statement: str, yes: bool) -> None:
+    """Run one SPEL+ statement as typed; it takes an engineer, and goes on record.
+
+    It is sent once, as it stands, and must be answered within --timeout: it is not for
+    movements, which may end in a doubtful outcome.
+    """
+    with open_controller(context, changes=True) as controller:
+        agree_to_motion(
+            tr("Send {statement!r} as it stands? It may do anything.", statement=statement),
+            yes=yes,
+            in_tool=False,
+        )
+        printed = require_epson(controller, tr("SPEL+ statements")).execute_raw(statement)
+    payload: dict[str, object] = {"statement": statement, "printed": printed}
+    context.emit("execute-raw", payload, lambda: say(printed or tr("carried out")))

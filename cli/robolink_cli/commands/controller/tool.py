@@ -1,0 +1,255 @@
+"""tool list, get, set, clear, select: the tool table."""
+
+from dataclasses import replace
+
+import click
+
+from robolink.errors import ConfigError
+from robolink.messages import tr
+from robolink_cli.console.render import note, say
+from robolink_cli.prompts.consent import (
+    agree,
+    dry_run_option,
+    published_option,
+    then_select_option,
+    yes_option,
+)
+from robolink_cli.prompts.jumps import Allowed, accept_jump, accept_jump_options, allowed_by
+from robolink_cli.session.context import CliContext, controller_options, open_controller
+from robolink_cli.session.warnings import note_change
+
+
+@click.group()
+def tool() -> None:
+    """Read and change the tool offsets stored in the controller."""
+
+
+@tool.command("list")
+@published_option
+@controller_options
+def list_tools(context: CliContext, published: bool) -> None:
+    """Show all tools and which one is in force."""
+    from robolink_cli.session.tool_source import find_tools
+    from robolink_cli.views.documents import offset_payload
+    from robolink_cli.views.tables import show_tools
+
+    with open_controller(context, looks=True) as controller:
+        found = find_tools(controller, published=published)
+    tools = {str(number): offset_payload(offset) for number, offset in found.tools.items()}
+    payload: dict[str, object] = {"selected_tool": found.selected, "tools": tools}
+    payload["source"] = "published" if published else "controller"
+    context.emit("tools", payload, lambda: show_tools(tools, found.selected))
+
+
+@tool.command("get")
+@click.argument("number", type=int, required=False)
+@click.option(
+    "--mode",
+    type=click.Choice(["set", "active", "last"]),
+    help="On a PLC, what SMC_GroupReadTool says: the tool set, that of the movement under way, or "
+    "that of the movement commanded last.",
+)
+@controller_options
+def get(context: CliContext, number: int | None, mode: str | None) -> None:
+    """Show one tool; 0 is the flange."""
+    from robolink_cli.views.documents import offset_payload
+    from robolink_cli.views.tables import show_tools
+
+    if (number is None) == (mode is None):
+        raise ConfigError(
+            tr("Either a tool number or --mode is needed."),
+            remedy=tr("Write for example 'robolink tool get 1', or with a PLC --mode set."),
+        )
+    if number is None:
+        _get_by_mode(context, str(mode))
+        return
+    with open_controller(context, looks=True) as controller:
+        offset, selected = controller.tools.read(number), controller.tools.selected()
+        if number:
+            note_change(controller, number, offset)
+    value = offset_payload(offset)
+    payload: dict[str, object] = {
+        "tool": number,
+        "defined": value is not None,
+        "offset": value,
+        "selected": selected == number,
+    }
+    context.emit("tool", payload, lambda: show_tools({str(number): value}, selected))
+
+
+def _get_by_mode(context: CliContext, mode: str) -> None:
+    """Show what the PLC's own reading block says about the tool in force."""
+    from robolink.protocols.mailbox import ReadMode
+    from robolink_cli.session.capabilities import require_softmotion
+    from robolink_cli.views.documents import offset_payload
+    from robolink_cli.views.tables import show_offset
+
+    modes = {"set": ReadMode.SET, "active": ReadMode.ACTIVE, "last": ReadMode.LAST_COMMANDED}
+    with open_controller(context, looks=True) as controller:
+        offset = require_softmotion(controller).tools.read_mode(modes[mode])
+    value = offset_payload(offset)
+    payload: dict[str, object] = {"mode": mode, "offset": value}
+    context.emit("tool-mode", payload, lambda: show_offset(mode, value))
+
+
+@tool.command("set")
+@click.argument("number", type=int)
+@click.option("--x", type=float, help="mm from the flange.")
+@click.option("--y", type=float, help="mm from the flange.")
+@click.option("--z", type=float, help="mm from the flange.")
+@click.option("--u", type=float, help="Degrees about Z.")
+@click.option("--v", type=float, help="Degrees about Y; six-axis robots only.")
+@click.option("--w", type=float, help="Degrees about X; six-axis robots only.")
+@accept_jump_options
+@controller_options
+@dry_run_option
+@yes_option
+def set_tool(
+    context: CliContext,
+    number: int,
+    *,
+    accepted_mm: float | None,
+    accepted_deg: float | None,
+    dry_run: bool,
+    yes: bool,
+    **given: float | None,
+) -> None:
+    """Write a tool offset; components that are not given are kept.
+
+    A change beyond the cell's max_change_mm or max_change_deg takes an engineer, who is asked
+    with the figure, whatever --yes says.
+    """
+    from robolink.model import ToolOffset
+    from robolink.transaction import Jump, Wanted, change_tools
+    from robolink_cli.session.first_backup import back_up_first
+    from robolink_cli.views.documents import offset_payload, receipt_payload
+    from robolink_cli.views.tables import show_change
+
+    units = {"x": "x_mm", "y": "y_mm", "z": "z_mm", "u": "u_deg", "v": "v_deg", "w": "w_deg"}
+    changes = {units[axis]: value for axis, value in given.items() if value is not None}
+    if not changes:
+        raise ConfigError(
+            tr("No component was given."), remedy=tr("Give at least one of --x --y --z --u.")
+        )
+    # Checks the numbers before a connection is made.
+    ToolOffset(**changes)
+    with open_controller(context, changes=not dry_run) as controller:
+        controller.tools.require_writable(number)
+        before = controller.tools.read(number)
+        note_change(controller, number, before)
+        wanted = replace(before or ToolOffset(), **changes)
+        kept = [name for name in units.values() if name not in changes]
+        shown = offset_payload(before), offset_payload(wanted)
+        if dry_run:
+            requests = controller.tools.preview_write(number, wanted)
+            context.show_requests(requests)
+            return
+        controller.tools.selected()  # read now: the last line of a failure names it
+        if not context.json:
+            show_change(number, *shown, after_name=tr("new"))
+        # An undefined tool has no place from which its tip could jump.
+        accepted = before is not None and accept_jump(
+            controller,
+            number,
+            Jump.between(before, wanted),
+            allowed=allowed_by(context.cell),
+            accepted=Allowed(accepted_mm, accepted_deg),
+        )
+        if not (accepted or context.json):
+            agree(tr("Write this to tool {number}?", number=number), yes=yes)
+        back_up_first(controller)
+        (receipt,) = change_tools(controller, [Wanted(number, wanted, before)], tell=note)
+    payload = receipt_payload(receipt) | {"kept": kept}
+    done = (
+        tr("already stored, nothing was written") if receipt.skipped else tr("written, read back")
+    )
+    context.emit(
+        "tool-write",
+        payload,
+        lambda: say(tr("tool {number}: {done}", number=number, done=done)),
+    )
+
+
+@tool.command("clear")
+@click.argument("number", type=int)
+@then_select_option
+@controller_options
+@dry_run_option
+@yes_option
+def clear(
+    context: CliContext, number: int, *, then_select: int | None, dry_run: bool, yes: bool
+) -> None:
+    """Remove a tool's definition. Where the cell names people, it takes an engineer.
+
+    The tool that is selected is cleared only with --then-select: the machine goes on with that
+    one.
+    """
+    from robolink.model import Role, require_engineer
+    from robolink.transaction import Wanted, change_tools
+    from robolink_cli.session.first_backup import back_up_first
+    from robolink_cli.views.documents import receipt_payload
+
+    with open_controller(context, changes=not dry_run) as controller:
+        before = controller.tools.read(number)
+        if dry_run:
+            requests = controller.tools.preview_clear(number, then_select=then_select)
+            context.show_requests(requests)
+            return
+        act, outcomes = tr("clear tool {tool}", tool=number), controller.outcomes
+        # What is refused is refused before anybody is asked.
+        controller.tools.preview_clear(number, then_select=then_select)
+        if outcomes.signature.role == Role.OPERATOR:
+            require_engineer(outcomes, act)
+        if not context.json:
+            agree(_clear_question(number, then_select), yes=yes)
+        if before is not None:
+            require_engineer(outcomes, act)
+        back_up_first(controller)
+        wanted = Wanted(number, None, before, then_select=then_select)
+        (receipt,) = change_tools(controller, [wanted], tell=note)
+        selected = controller.tools.selected()
+    done = tr("was undefined already") if receipt.skipped else tr("cleared, read back")
+
+    def show() -> None:
+        say(tr("tool {number}: {done}", number=number, done=done))
+        if selected is not None:
+            say(tr("Tool {tool} is selected.", tool=selected))
+
+    context.emit("tool-clear", receipt_payload(receipt) | {"selected_tool": selected}, show)
+
+
+def _clear_question(number: int, then_select: int | None) -> str:
+    if then_select is None:
+        return tr("Clear tool {number}?", number=number)
+    return tr(
+        "Clear tool {number}? If it is selected now, tool {other} is selected in its place.",
+        number=number,
+        other=then_select,
+    )
+
+
+@tool.command("select")
+@click.argument("number", type=int)
+@controller_options
+@dry_run_option
+@yes_option
+def select(context: CliContext, number: int, dry_run: bool, yes: bool) -> None:
+    """Put a tool in force; the choice survives power-off. 0 is the flange."""
+    with open_controller(context, changes=not dry_run) as controller:
+        before = controller.tools.selected()
+        if dry_run:
+            requests = controller.tools.preview_select(number)
+            context.show_requests(requests)
+            return
+        if not context.json and before != number:
+            agree(
+                tr("Select tool {number} in place of {before}?", number=number, before=before),
+                yes=yes,
+            )
+        controller.tools.select(number)
+    payload: dict[str, object] = {"before": before, "selected_tool": number}
+    context.emit(
+        "tool-select",
+        payload,
+        lambda: say(tr("tool in force: {number} (was {before})", number=number, before=before)),
+    )

@@ -1,0 +1,1 @@
+"""Commands that measure or calculate where a tip is."""

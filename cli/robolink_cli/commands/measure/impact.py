@@ -1,0 +1,92 @@
+"""impact: how far a tool change moves the tip at taught points. Reads only."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import click
+
+from robolink.errors import ConfigError
+from robolink.messages import tr
+from robolink_cli.console.render import say
+from robolink_cli.options.impact import impact_payload, impact_request, show_impact
+from robolink_cli.options.report import report_options, report_request, reporting
+from robolink_cli.session.context import CliContext, controller_options, open_controller
+
+
+@click.command()
+@click.option("--tool", type=click.IntRange(1, 15), required=True, help="Number of the tool.")
+@click.option("--x", type=float, help="New offset, mm from the flange; left out: as stored.")
+@click.option("--y", type=float, help="mm from the flange.")
+@click.option("--z", type=float, help="mm from the flange.")
+@click.option("--u", type=float, help="Degrees about Z.")
+@click.option("--points", metavar="1-50", help="Taught points to read from the controller.")
+@click.option(
+    "--pts",
+    "path",
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="A .pts file of EPSON RC+ in place of the controller's points.",
+)
+@report_options
+@controller_options
+def impact(
+    context: CliContext,
+    *,
+    tool: int,
+    points: str | None,
+    path: Path | None,
+    report_path: Path | None,
+    force: bool,
+    **given: float | None,
+) -> None:
+    """Show how far the tip will move at taught points when a tool's offset is changed.
+
+    Shown is where the tip that is on the arm now will go with the new offset, against where
+    it goes with the stored one. Nothing is written; legal only while no program runs.
+    """
+    from robolink.calibration import impact_on
+    from robolink.errors import UndefinedToolError
+    from robolink_cli.views.documents import offset_payload
+    from robolink_cli.views.tables import show_change
+
+    request = impact_request(points, path, names=("--points", "--pts"))
+    if request is None:
+        raise ConfigError(
+            tr("No points were named."), remedy=tr("Give --points 1-50 or --pts robot1.pts.")
+        )
+    changes = _changes(given)
+    wanted = report_request(report_path, force=force)
+    with open_controller(context) as controller, reporting(wanted, controller) as draft:
+        before = controller.tools.read(tool)
+        if before is None:
+            raise UndefinedToolError(
+                tr("Tool {tool} is not defined: no program can use it.", tool=tool),
+                remedy=tr("There is nothing that a new offset would move."),
+                controller=controller.identity,
+            )
+        after = replace(before, **changes)
+        found = impact_on(request.read(controller), old=before, new=after)
+        draft.offer(tool, before=before, after=after, given=tuple(changes), impact=found)
+    shown = offset_payload(before), offset_payload(after)
+    payload = {"tool": tool, "before": shown[0], "after": shown[1], **impact_payload(found)}
+    payload["report"] = draft.saved
+
+    def show() -> None:
+        show_change(tool, *shown, after_name=tr("new"))
+        show_impact(tool, found)
+        say(tr("Nothing was written."))
+
+    context.emit("impact", payload, show)
+
+
+def _changes(given: dict[str, float | None]) -> dict[str, float]:
+    """Return the components that were given, checked before a connection is made."""
+    from robolink.model import ToolOffset
+
+    units = {"x": "x_mm", "y": "y_mm", "z": "z_mm", "u": "u_deg"}
+    changes = {units[axis]: value for axis, value in given.items() if value is not None}
+    if not changes:
+        raise ConfigError(
+            tr("No component was given."), remedy=tr("Give at least one of --x --y --z --u.")
+        )
+    ToolOffset(**changes)
+    return changes

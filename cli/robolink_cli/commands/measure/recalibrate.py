@@ -1,0 +1,86 @@
+"""recalibrate RECIPE.toml: the scripted nozzle change."""
+
+from pathlib import Path
+
+import click
+
+from robolink.messages import tr
+from robolink_cli.options.recipe_answers import answer_options
+from robolink_cli.options.sensor import sensor_option
+from robolink_cli.prompts.consent import dry_run_option, yes_option
+from robolink_cli.session.context import CliContext, controller_options
+from robolink_cli.session.operator_identity import nozzle_options
+
+
+@click.command()
+@click.argument("recipe", metavar="RECIPE.toml", type=click.Path(dir_okay=False, path_type=Path))
+@click.option(
+    "--reference",
+    is_flag=True,
+    help=tr("Measure and record a reference for differences; nothing is written."),
+)
+@click.option(
+    "--accept-jump",
+    "accepted_change_mm",
+    metavar="MM",
+    type=click.FloatRange(min=0, min_open=True),
+    help=tr("Accept a change up to MM this time, beyond the recipe's limit; for engineers."),
+)
+@click.option(
+    "--assist",
+    metavar="URL",
+    help=tr("A simulator's assist or sim URL: its operator brings the tip onto the pin."),
+)
+@sensor_option
+@click.option(
+    "--jsonl",
+    is_flag=True,
+    help=tr("One JSON line on stdout for every event, the last one result or error."),
+)
+@answer_options
+@nozzle_options
+@controller_options
+@dry_run_option
+@yes_option
+def recalibrate(
+    context: CliContext,
+    recipe: Path,
+    *,
+    reference: bool,
+    accepted_change_mm: float | None,
+    assist: str | None,
+    sensor: str | None,
+    jsonl: bool,
+    nozzle: str | None,
+    lot: str | None,
+    answers: tuple[str, ...],
+    z_mm: tuple[str, ...],
+    dry_run: bool,
+    yes: bool,
+) -> None:
+    """Change a nozzle as a recipe says: measure, propose, write, prove, record.
+
+    All tools of the recipe are measured before one is written; all are written or none. A
+    refusal, Ctrl-C or an emergency stop leaves the old values, and the tool that was selected.
+    """
+    from robolink.recipe import load_recipe
+    from robolink_cli.commands.measure.recalibration import Recalibration
+    from robolink_cli.commands.measure.recipe_events import EventStream
+    from robolink_cli.options.recipe_answers import answers_from
+
+    events = EventStream(click.get_current_context(), on=jsonl)
+    with events.closing():
+        loaded = load_recipe(recipe)
+        prepared = answers_from(
+            loaded.recipe, texts=answers, z_mm=z_mm, nozzle=nozzle, lot=lot, yes=yes
+        )
+        Recalibration(
+            context,
+            loaded,
+            prepared,
+            events=events,
+            assist_url=assist,
+            take_reference=reference,
+            accepted_change_mm=accepted_change_mm,
+            sensor=sensor,
+        ).run(dry_run=dry_run)

@@ -1,0 +1,222 @@
+"""One run of a recipe from the command line."""
+
+from collections.abc import Callable
+
+from robolink.errors import DeclinedError
+from robolink.messages import tr
+from robolink.model import Controller
+from robolink.nozzle_change import ChangeReport, preview
+from robolink.recipe import Answers, LoadedRecipe, RecipeRun, require_answers
+from robolink_cli.commands.measure.recipe_events import EventStream, Progress
+from robolink_cli.console.render import note, say
+from robolink_cli.prompts.consent import agree_to_motion, asked, motion_question, on_terminal
+from robolink_cli.prompts.operator import operator_at
+from robolink_cli.session.capabilities import io_of
+from robolink_cli.session.context import CliContext, open_controller
+from robolink_cli.session.first_backup import back_up_first
+from robolink_cli.views.calibration import report_payload, show_report
+from robolink_cli.views.planned_steps import steps_payload
+
+
+class Recalibration:
+    """Runs one recipe on the controller of a command.
+
+    Args:
+        context: What the command was told.
+        loaded: The recipe.
+        answers: What was answered beforehand.
+        events: Where events go.
+        assist_url: A simulator's stand-in for the person.
+        take_reference: Whether only a reference is taken.
+        accepted_change_mm: A larger jump that an engineer accepts this time.
+        sensor: The camera, in place of the recipe's.
+    """
+
+    def __init__(
+        self,
+        context: CliContext,
+        loaded: LoadedRecipe,
+        answers: Answers,
+        *,
+        events: EventStream,
+        assist_url: str | None,
+        take_reference: bool,
+        accepted_change_mm: float | None,
+        sensor: str | None,
+    ) -> None:
+        self._context = context
+        self._loaded = loaded
+        self._answers = answers
+        self._events = events
+        self._assist_url = assist_url
+        self._take_reference = take_reference
+        self._accepted_change_mm = accepted_change_mm
+        self._sensor = sensor
+
+    def run(self, *, dry_run: bool) -> None:
+        """Carry the recipe out, or only show it.
+
+        Raises:
+            RobolinkError: It ended early; the old values are in force, or it says which are not.
+        """
+        if not dry_run and self._assist_url is None and not on_terminal():
+            require_answers(self._answers, self._loaded.recipe)
+        progress = Progress(self._events)
+        with (
+            open_controller(self._context, changes=not dry_run) as controller,
+            operator_at(self._assist_url, lambda: progress.tool) as operator,
+        ):
+            run = RecipeRun(
+                controller,
+                self._loaded,
+                operator=operator,
+                answers=self._answers,
+                audience=progress,
+                take_reference=self._take_reference,
+                accepted_change_mm=self._accepted_change_mm,
+                ask_before_write=not self._answers.yes,
+                sensor=self._sensor,
+                cell=self._context.cell,
+            )
+            run.preflight()
+            self._start(controller, run)
+            if dry_run:
+                payload = self._dry_run(controller, run)
+                show: Callable[[dict[str, object]], None] = _shown_plan
+            else:
+                self._consent(controller, run)
+                payload = self._carry_out(controller, run)
+                show = _nothing
+        self._events.emit("result", **payload)
+        if not self._events.on:
+            self._context.emit("recalibration", payload, lambda: show(payload))
+
+    def _start(self, controller: Controller, run: RecipeRun) -> None:
+        for change in run.changed:
+            note(change.sentence)
+        self._events.emit(
+            "start",
+            recipe=self._loaded.name,
+            recipe_hash=self._loaded.sha256,
+            controller=controller.identity,
+            tools=[plan.tool for plan in run.plan.tools],
+            takes_reference=run.takes_reference,
+            changed_by_others=[change.sentence for change in run.changed],
+        )
+
+    def _consent(self, controller: Controller, run: RecipeRun) -> None:
+        """Have the person agree to what is about to happen; back up before it does.
+
+        Raises:
+            NotReadyError: Nothing can move now; nobody was asked anything.
+            DeclinedError: The answer was no, or nobody could be asked.
+        """
+        question = self._question(controller, run) if run.plan.moves else None
+        if run.takes_reference and not self._take_reference:
+            self._explain_reference()
+        back_up_first(controller)
+        if question is None:
+            self._require_writer(run)
+            return
+        agree_to_motion(question, yes=self._answers.yes)
+
+    def _question(self, controller: Controller, run: RecipeRun) -> str:
+        limits = run.plan.limits
+        return motion_question(
+            controller,
+            tr(
+                "as {recipe!r} says for tool {tools}",
+                recipe=self._loaded.name,
+                tools=", ".join(str(plan.tool) for plan in run.plan.tools),
+            ),
+            speed_mm_s=limits.speed_mm_s,
+            box_mm=limits.box_mm,
+        )
+
+    def _explain_reference(self) -> None:
+        note(
+            tr(
+                "There is no reference yet. Taught points are consistent only with the tool value "
+                "that they were taught with, so this first run measures and writes nothing: it "
+                "records where the tip is for which the stored value is right. Changes from then "
+                "on are differences to it."
+            )
+        )
+        if not on_terminal():
+            raise DeclinedError(
+                tr("A reference is needed first, and nobody can be asked here."),
+                remedy=tr("Mount the nozzle that the points were taught with, give --reference."),
+            )
+        if not asked(tr("Is the nozzle mounted that the points were taught with?")):
+            raise DeclinedError(
+                tr("The reference was not taken."),
+                remedy=tr("Mount that nozzle, or restore the tool value that fits this one."),
+            )
+
+    def _require_writer(self, run: RecipeRun) -> None:
+        """Refuse to write values that nobody watched being measured without a yes."""
+        nobody = not self._answers.yes and self._assist_url is None and not on_terminal()
+        if nobody and not run.takes_reference:
+            raise DeclinedError(
+                tr("Tools would be written, and nobody can be asked here."),
+                remedy=tr("Run it on a terminal, or give --yes. Nothing was written."),
+            )
+
+    def _dry_run(self, controller: Controller, run: RecipeRun) -> dict[str, object]:
+        recipe = self._loaded.recipe
+        return {
+            "dry_run": True,
+            "recipe": self._loaded.name,
+            "tools": [plan.tool for plan in run.plan.tools],
+            "takes_reference": run.takes_reference,
+            "steps": steps_payload(controller, preview(controller, run.plan)),
+            "prompts": [{"at": prompt.at, "text": prompt.text} for prompt in recipe.prompts],
+            "outputs": [
+                {
+                    "at": output.at,
+                    "output": output.output,
+                    "on": output.on,
+                    "requests": list(io_of(controller).preview_output(output.output, output.on)),
+                }
+                for output in recipe.outputs
+            ],
+        }
+
+    def _carry_out(self, controller: Controller, run: RecipeRun) -> dict[str, object]:
+        report = run.run()
+        # Now, because Ctrl-C may come before the logout is answered.
+        for one in report.tools:
+            show_report(one)
+        if run.takes_reference:
+            say(tr("The reference was recorded; nothing was written."))
+        say(tr("On record as change {change}: robolink report {change}", change=report.change[:8]))
+        return {
+            "recipe": self._loaded.name,
+            "recipe_hash": self._loaded.sha256,
+            "controller": controller.identity,
+            **_payload(report),
+            "reference_taken": run.takes_reference,
+        }
+
+
+def _payload(report: ChangeReport) -> dict[str, object]:
+    return {"change": report.change, "tools": [report_payload(one) for one in report.tools]}
+
+
+def _nothing(_payload: dict[str, object]) -> None:
+    """Everything was said as it happened."""
+
+
+def _shown_plan(payload: dict[str, object]) -> None:
+    from robolink_cli.views.calibration import show_steps
+
+    say(tr("Dry run; nothing is sent. The recipe {recipe!r}:", recipe=payload["recipe"]))
+    prompts, outputs = payload["prompts"], payload["outputs"]
+    assert isinstance(prompts, list) and isinstance(outputs, list)  # noqa: S101, PT018 - made above
+    for prompt in prompts:
+        say(tr("  {at}: ask {text!r}", at=prompt["at"], text=prompt["text"]))
+    for output in outputs:
+        state = tr("on") if output["on"] else tr("off")
+        number, at = output["output"], output["at"]
+        say(tr("  {at}: switch output {number} {state}", at=at, number=number, state=state))
+    show_steps(payload["steps"])

@@ -1,0 +1,132 @@
+"""The events of a recalibration: JSON lines for a script, headings for a person."""
+
+import json
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
+import click
+
+from robolink.calibration import VerifyResult
+from robolink.errors import CalibrationError
+from robolink.messages import tr
+from robolink.model import ToolReceipt
+from robolink.nozzle_change import Listener, Moment, Proposal
+from robolink.procedures import MeasurementContext
+from robolink.runner import Ask, Confirm, Notify, Step, StepDone
+from robolink_cli.console.exit_codes import error_body, exit_code
+from robolink_cli.console.render import note, switch_json_on
+from robolink_cli.console.sink import hand_over
+from robolink_cli.views.documents import (
+    pose_payload,
+    proposal_payload,
+    receipt_payload,
+    verification_payload,
+)
+
+
+class EventStream:
+    """Writes one JSON line for each event, where that is wanted.
+
+    Args:
+        context: Click's, so that text for people goes to stderr.
+        on: Whether it is wanted.
+    """
+
+    def __init__(self, context: click.Context, *, on: bool) -> None:
+        self.on = on
+        if on:
+            switch_json_on(context)
+
+    def emit(self, event: str, **payload: object) -> None:
+        """Write one event."""
+        if self.on:
+            line = {"schema": "robolink/recalibration-event/1", "event": event, **payload}
+            hand_over(json.dumps(line, allow_nan=False))
+
+    @contextmanager
+    def closing(self) -> Iterator[None]:
+        """End the stream with ``error`` when the block does; ``result`` is the block's own."""
+        try:
+            yield
+        except (Exception, KeyboardInterrupt) as error:
+            self.emit("error", error=error_body(error), exit_code=exit_code(error))
+            raise
+
+
+class Progress(Listener):
+    """Tells a person and a script what happens.
+
+    Attributes:
+        tool: Number of the tool at work.
+    """
+
+    def __init__(self, events: EventStream) -> None:
+        self._events = events
+        self.tool = 0
+
+    def moment(self, moment: Moment, bench: MeasurementContext, tool: int | None = None) -> None:  # noqa: ARG002 - a phase is a phase
+        """Say which phase begins."""
+        if tool is not None:
+            self.tool = tool
+        heading = _heading(moment, self.tool)
+        if heading:
+            note(heading)
+        self._events.emit("phase", phase=moment, tool=tool)
+
+    def step(self, tool: int, done: StepDone) -> None:
+        """Tell of one step."""
+        self.tool = tool
+        kind, text = _in_words(done.step)
+        pose = pose_payload(done.pose) if done.pose else None
+        self._events.emit("step", tool=tool, kind=kind, text=text, pose=pose)
+
+    def refused(self, tool: int, error: CalibrationError, *, again: bool) -> None:
+        """Tell of a measurement that is not believed."""
+        if again:
+            note(tr("Tool {tool}: {error} It is measured again.", tool=tool, error=error))
+        self._events.emit(
+            "refused", tool=tool, code=error.code, what=error.what, remedy=error.remedy, again=again
+        )
+
+    def proposed(self, proposals: Sequence[Proposal]) -> None:
+        """Show what was measured, next to what is stored."""
+        from robolink_cli.views.calibration import show_proposal
+
+        for proposal in proposals:
+            show_proposal(proposal)
+            self._events.emit("proposal", **proposal_payload(proposal))
+
+    def wrote(self, receipt: ToolReceipt) -> None:
+        """Tell of a write."""
+        self.tool = receipt.tool
+        self._events.emit("write", **receipt_payload(receipt))
+
+    def verified(self, tool: int, result: VerifyResult) -> None:
+        """Tell of a verification."""
+        self._events.emit("verification", tool=tool, **(verification_payload(result) or {}))
+
+    def told(self, sentence: str) -> None:
+        """Pass on what a person was told."""
+        self._events.emit("note", text=sentence)
+
+
+def _in_words(step: Step) -> tuple[str, str]:
+    """Return what kind of step it is, and what it says."""
+    match step:
+        case Ask():
+            return "touch", step.instruction
+        case Notify():
+            return "remark", step.text
+        case Confirm():
+            return "offer", step.question
+        case _:
+            return "move", step.purpose
+
+
+def _heading(moment: Moment, tool: int) -> str:
+    """Return the line over what comes next, empty for none."""
+    if moment is Moment.BEFORE_MEASURE:
+        return tr("-- tool {tool}: measure", tool=tool)
+    if moment is Moment.BEFORE_WRITE:
+        return tr("-- propose and write")
+    return tr("-- done") if moment is Moment.END else ""

@@ -1,0 +1,1 @@
+"""solve: calculate a tool offset from a file. Nothing is connected, nothing moves."""

@@ -1,0 +1,66 @@
+"""solve: calculate a tool offset from a file. Nothing is connected, nothing moves."""
+
+from pathlib import Path
+
+import click
+
+from robolink.errors import ConfigError
+from robolink.messages import tr
+from robolink_cli.console.render import emit_json, json_is_on
+from robolink_cli.session.context import json_option
+
+
+@click.command()
+@click.argument("file", type=click.Path(dir_okay=False, path_type=Path))
+@click.option(
+    "--method",
+    type=click.Choice(["n_angle", "n_angle_robust", "pivot", "pivot_robust"]),
+    help="FILE is a table with one pose a line, to be solved with this method.",
+)
+@click.option(
+    "--columns",
+    metavar="x,y,z,u,v,w",
+    help="What the table's columns are, when its first line does not say so. Angles are EPSON's; "
+    "a quaternion is qx,qy,qz,qs with the scalar last.",
+)
+@click.option("--sigma", "sigma_mm", type=float, help="Standard deviation of one placement, mm.")
+@click.option(
+    "--threshold", "threshold_mm", type=float, help="Residual that a robust method rejects, mm."
+)
+@json_option
+def solve(
+    file: Path,
+    method: str | None,
+    columns: str | None,
+    sigma_mm: float | None,
+    threshold_mm: float | None,
+) -> int:
+    """Calculate a tool offset from measurements in FILE, offline.
+
+    FILE is JSON: one case with method, units and input, or many under "vectors"; or, with
+    --method, a table of poses. Lengths are mm, angles degrees. The exit code is 7 when a case
+    gives no trustworthy result.
+    """
+    from robolink_cli.commands.measure.solve.pose_table import table_case
+    from robolink_cli.commands.measure.solve.solving import exit_code, load, solve_document
+    from robolink_cli.views.solve import show_case
+
+    if method is not None:
+        case = table_case(
+            file, method=method, columns=columns, sigma_mm=sigma_mm, threshold_mm=threshold_mm
+        )
+    elif any(option is not None for option in (columns, sigma_mm, threshold_mm)):
+        raise ConfigError(
+            tr("--columns, --sigma and --threshold belong to a table of poses."),
+            remedy=tr("Give --method as well, or write the values into the JSON file."),
+        )
+    else:
+        case = load(file)
+    document = solve_document(case)
+    if json_is_on():
+        emit_json("robolink/solve/1", document)
+    else:
+        results = document.get("results")
+        for result in results if isinstance(results, list) else [document]:
+            show_case(result)
+    return exit_code(document)

@@ -1,0 +1,102 @@
+"""Solving a case, or a file of them, without any robot."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Final
+
+from robolink.errors import CalibrationError
+from robolink.messages import tr
+from robolink.named_files import read_named
+from robolink_cli.commands.measure.solve.case import Node, read_poses, unusable
+from robolink_cli.commands.measure.solve.methods import FROM_POSES
+from robolink_cli.commands.measure.solve.more_methods import MORE_METHODS
+
+CASE_SCHEMA: Final = "robolink-calibration-vectors/1"
+METHODS: Final = {**FROM_POSES, **MORE_METHODS}
+
+_GAINS_OF: Final = ("two_pose", "two_pose_general", "n_angle", "n_angle_robust")
+_SEVERITY: Final = ("ok", "warn", "error")
+_MOST_BYTES: Final = 64_000_000
+"""A file of many cases is longer than anything else that is named."""
+
+
+def load(path: Path) -> Node:
+    """Return the document of a JSON file.
+
+    Raises:
+        ConfigError: It cannot be read or is no JSON object.
+    """
+    import json
+
+    try:
+        value = json.loads(read_named(path, most_bytes=_MOST_BYTES).decode("utf-8-sig"))
+    except OSError as error:
+        cause = error.strerror or str(error)
+        raise unusable(str(path), tr("it cannot be read ({error})", error=cause)) from error
+    except (ValueError, RecursionError) as error:
+        raise unusable(str(path), tr("it is not JSON ({error})", error=error)) from error
+    return Node(value, "")
+
+
+def solve_document(node: Node) -> dict[str, object]:
+    """Return the answer to one case, or to a file with ``vectors``.
+
+    Raises:
+        ConfigError: The file is not laid out as it should be; names the path.
+    """
+    node.optional("schema", lambda name: node.text(name, CASE_SCHEMA))
+    if "vectors" not in node:
+        return solve_case(node)
+    node.ignore("conventions")
+    results = [solve_case(child) for child in node.children("vectors")]
+    node.finish()
+    worst = max((str(result["status"]) for result in results), key=_SEVERITY.index, default="ok")
+    return {"status": worst, "results": results}
+
+
+def solve_case(node: Node) -> dict[str, object]:
+    """Return the answer to one case; a refusal is an answer too, with status ``error``.
+
+    Raises:
+        ConfigError: The case is not laid out as it should be; names the path.
+    """
+    node.ignore("schema", "expected", "tolerance", "note")
+    identity = node.optional("id", node.raw)
+    method = node.text("method", *METHODS)
+    node.optional("units", lambda name: _check_units(node.child(name)))
+    head: dict[str, object] = {} if identity is None else {"id": identity}
+    head |= {"method": method}
+    given = node.child("input")
+    node.finish()
+    try:
+        found = METHODS[method](given)
+    except CalibrationError as error:
+        return head | _refusal(error, method, given)
+    given.finish()
+    codes = found.pop("codes", [])
+    return head | {"status": "warn" if codes else "ok", "codes": codes} | found
+
+
+def _refusal(error: CalibrationError, method: str, given: Node) -> dict[str, object]:
+    refusal: dict[str, object] = {
+        "status": "error",
+        "codes": [error.code],
+        "what": error.what,
+        "remedy": error.remedy,
+    }
+    if error.code == "insufficient_rotation" and method in _GAINS_OF:
+        from robolink.calibration import planar_sigma_gain
+
+        refusal["sigma_gain_per_axis"] = planar_sigma_gain(read_poses(given))
+    return refusal
+
+
+def _check_units(node: Node) -> None:
+    node.text("length", "mm")
+    node.text("angle", "deg")
+    node.finish()
+
+
+def exit_code(document: Mapping[str, object]) -> int:
+    """Return 7 when a case was refused, else 0."""
+    return 7 if document["status"] == "error" else 0

@@ -1,0 +1,101 @@
+"""station list, show, learn: the pins, beams, surfaces and cameras of a cell."""
+
+import click
+
+from robolink.messages import tr
+from robolink_cli.prompts.consent import dry_run_option, yes_option
+from robolink_cli.session.context import CliContext, controller_options
+
+
+@click.group()
+def station() -> None:
+    """Pins, beams, surfaces and cameras of a cell: where they are, and how sure."""
+
+
+@station.command("list")
+@controller_options
+def list_stations(context: CliContext) -> None:
+    """List the stations of a cell. Reads cell file and journal only; no controller is asked."""
+    from robolink_cli.views.stations import known_stations, show_stations, station_payload
+
+    stations = known_stations(context)
+    payload = {"stations": [station_payload(one) for one in stations.values()]}
+    context.emit("stations", payload, lambda: show_stations(tuple(stations.values())))
+
+
+@station.command("show")
+@click.argument("name", metavar="ID")
+@controller_options
+def show(context: CliContext, name: str) -> None:
+    """Show one station. Reads cell file and journal only; no controller is asked."""
+    from robolink_cli.views.stations import known_station, show_station, station_payload
+
+    found = known_station(context, name)
+    context.emit("station", station_payload(found), lambda: show_station(found))
+
+
+@station.command("learn")
+@click.argument("name", metavar="ID")
+@click.option("--tool", type=click.IntRange(1, 15), required=True, help=tr("The known tool."))
+@click.option(
+    "--sigma",
+    "sigma_mm",
+    type=click.FloatRange(min=0, min_open=True),
+    metavar="MM",
+    help=tr("Standard deviation of one coordinate of one touch, where it is known."),
+)
+@click.option(
+    "--speed",
+    "speed_mm_s",
+    type=click.FloatRange(1, 100),
+    default=20.0,
+    metavar="MM_S",
+    help=tr("Speed of straight moves, in Power Low."),
+)
+@click.option(
+    "--box",
+    "box_mm",
+    type=click.FloatRange(min=1),
+    default=150.0,
+    show_default=True,
+    help=tr("How far, sideways, the flange may go from where it is."),
+)
+@click.option(
+    "--assist",
+    metavar="URL",
+    help=tr("A simulator's assist or sim URL: its operator brings the tip onto the pin."),
+)
+@controller_options
+@dry_run_option
+@yes_option
+def learn(
+    context: CliContext,
+    *,
+    name: str,
+    tool: int,
+    sigma_mm: float | None,
+    speed_mm_s: float,
+    box_mm: float,
+    assist: str | None,
+    dry_run: bool,
+    yes: bool,
+) -> None:
+    """Find a station with a tool whose offset is known, such as a gauge pin, and keep where it is.
+
+    A pin is touched by a person; beams and surfaces are sought about where the cell file says. No
+    tool is written. What is wrong with the tool's offset shifts the station by as much.
+    """
+    from robolink.nozzle_change import Limits
+    from robolink_cli.commands.measure.station_learning import learn as learn_it
+
+    limits = Limits(box_mm=box_mm, speed_mm_s=speed_mm_s)
+    learn_it(
+        context,
+        name,
+        tool=tool,
+        limits=limits,
+        sigma_mm=sigma_mm,
+        assist=assist,
+        dry_run=dry_run,
+        yes=yes,
+    )

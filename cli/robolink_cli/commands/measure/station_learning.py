@@ -1,0 +1,118 @@
+"""station learn: find a station with a tip that is known, show it, keep it."""
+
+from robolink.errors import ConfigError, DeclinedError, UndefinedToolError
+from robolink.messages import tr
+from robolink.methods import learn_station
+from robolink.model import Controller, EntryKind, ToolOffset
+from robolink.nozzle_change import Limits, flange_now, foresee, require_inside
+from robolink.procedures import MeasurementContext
+from robolink.stations import Found, Station, StationKind, find_stations, station_entry
+from robolink_cli.console.render import note, table
+from robolink_cli.prompts.consent import agree_to_motion, motion_question
+from robolink_cli.prompts.operator import operator_at
+from robolink_cli.session.context import CliContext, open_controller
+from robolink_cli.views.calibration import show_plan
+from robolink_cli.views.documents import number
+from robolink_cli.views.planned_steps import steps_payload
+from robolink_cli.views.stations import station_payload
+
+
+def learn(
+    context: CliContext,
+    name: str,
+    *,
+    tool: int,
+    limits: Limits,
+    sigma_mm: float | None,
+    assist: str | None,
+    dry_run: bool,
+    yes: bool,
+) -> None:
+    """Measure a station, ask, and put it on record. No tool is written.
+
+    Raises:
+        CalibrationError: The measurement is not trusted.
+        ConfigError: The station is not declared, and it is no pin.
+        DeclinedError: A person said no, or nobody could be asked.
+        UndefinedToolError: The tool has no offset.
+    """
+    with open_controller(context._replace(station=name), changes=not dry_run) as controller:
+        known = _known(context, controller, name)
+        tip = _tip(controller, tool)
+        here = flange_now(controller)
+        course = learn_station(known, here=here, tool=tool, tip=tip)
+        steps = foresee(course, here=here, settings=limits.settings(here, None))
+        if dry_run:
+            payload = {"dry_run": True, "tool": tool, "steps": steps_payload(controller, steps)}
+            context.emit("dry-run", payload, lambda: show_plan(payload))
+            return
+        require_inside(controller, steps)
+        controller.require_settled(tr("learn station {name}", name=name))
+        purpose = tr("to find station {name} with tool {tool}", name=name, tool=tool)
+        question = motion_question(
+            controller, purpose, speed_mm_s=limits.speed_mm_s, box_mm=limits.box_mm
+        )
+        agree_to_motion(question, yes=yes)
+        with (
+            operator_at(assist, lambda: tool) as operator,
+            controller.preserved(purpose),
+        ):
+            controller.tools.select(0)
+            start = controller.groups[0].pose()
+            bench = MeasurementContext(controller, operator, start=start, settings=limits.settings)
+            found = bench.run(
+                learn_station(known, here=start, tool=tool, tip=tip, sigma_mm=sigma_mm)
+            )
+            _show(known, found)
+            if not yes and not bench.runner().confirm(tr("Keep this on record?")):
+                raise DeclinedError(
+                    tr("The place was not accepted."), remedy=tr("Nothing was recorded.")
+                )
+            controller.outcomes.append(station_entry(found))
+        kept = _known(context, controller, name)
+    context.emit("station", station_payload(kept), lambda: None)
+
+
+def _known(context: CliContext, controller: Controller, name: str) -> Station:
+    entries = controller.outcomes.recorded(kinds=(EntryKind.STATION,))
+    # A pin needs nothing but its name: the person finds it.
+    return find_stations(context.cell, entries).get(name) or Station(id=name, kind=StationKind.PIN)
+
+
+def _tip(controller: Controller, tool: int) -> ToolOffset:
+    offset = controller.tools.read(tool)
+    if offset is None:
+        raise UndefinedToolError(
+            tr("Tool {tool} is not defined, so its tip finds nothing.", tool=tool),
+            remedy=tr("Use a tool whose offset is known well, such as a gauge pin."),
+            controller=controller.identity,
+        )
+    if offset.v_deg or offset.w_deg:
+        raise ConfigError(
+            tr("Tool {tool} is tilted (V or W is not 0).", tool=tool),
+            remedy=tr("Use a tool that stands upright."),
+        )
+    return offset
+
+
+def _show(known: Station, found: Found) -> None:
+    columns = ("", "X mm", "Y mm", "Z mm")
+    before = [number(known.x_mm), number(known.y_mm), number(known.z_mm)]
+    after = [number(found.x_mm), number(found.y_mm), number(found.z_mm)]
+    rows = [[tr("before"), *before], [tr("found"), *after]]
+    table(tr("station {id}", id=found.id), columns, rows)
+    for line in _lines(found):
+        note(
+            tr(
+                "  beam on input {input}: X {x:.3f} Y {y:.3f}, direction {direction:.3f} deg",
+                input=line["input"],
+                x=line["x_mm"],
+                y=line["y_mm"],
+                direction=line["direction_deg"],
+            )
+        )
+
+
+def _lines(found: Found) -> list[dict[str, float]]:
+    lines = found.details.get("beams", [])
+    return lines if isinstance(lines, list) else []

@@ -1,0 +1,1 @@
+"""Commands about what is on record: journal, undo, recover, report."""

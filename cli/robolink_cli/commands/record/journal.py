@@ -1,0 +1,243 @@
+"""journal list, show, diff, export, verify: what is on record. Reads only, no controller."""
+
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, TypeVar
+
+import click
+
+from robolink.messages import tr
+from robolink.model import EntryKind
+from robolink_cli.commands.record.journal_lookup import (
+    controller_meant,
+    entries_named,
+    entries_of_change,
+    journal_to_read,
+)
+from robolink_cli.console.render import emit_json, json_is_on, say
+from robolink_cli.options.shared import json_option
+from robolink_cli.session.cell import complete_cell
+
+if TYPE_CHECKING:
+    from robolink.journal import Journal
+    from robolink.model import Recorded
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+_KINDS: Final = {str(kind).replace(" ", "-"): kind for kind in EntryKind}
+
+
+def _filters(function: F) -> F:
+    """Add the options that say which entries are meant."""
+    options = (
+        click.option(
+            "-c",
+            "--controller",
+            metavar="CELL|URL",
+            shell_complete=complete_cell,
+            help=tr("Only of this controller; without it, of all."),
+        ),
+        click.option("--tool", type=int, help=tr("Only about this tool.")),
+        click.option(
+            "--kind",
+            "kinds",
+            type=click.Choice(list(_KINDS), case_sensitive=False),
+            multiple=True,
+            help=tr("Only of this kind; may be repeated."),
+        ),
+        click.option("--change", metavar="ID", help=tr("Only of this tool change.")),
+    )
+    for option in reversed(options):
+        function = option(function)
+    return function
+
+
+class _Wanted:
+    """Which entries the options mean.
+
+    Attributes:
+        controller: Address of the controller, ``None`` for all.
+    """
+
+    def __init__(
+        self,
+        *,
+        controller: str | None,
+        tool: int | None,
+        kinds: Sequence[str],
+        change: str | None,
+    ) -> None:
+        self.controller = controller_meant(controller)
+        self._tool = tool
+        self._kinds = [_KINDS[kind] for kind in kinds]
+        self._change = change
+
+    def of(
+        self, opened: "Journal", *, limit: int | None = None, newest_first: bool = True
+    ) -> "Iterator[Recorded]":
+        """Yield them, read page by page."""
+        if self._change is None:
+            return opened.entries(
+                controller=self.controller,
+                tool=self._tool,
+                kinds=self._kinds,
+                limit=limit,
+                newest_first=newest_first,
+            )
+        found = [
+            entry
+            for entry in entries_of_change(opened, self._change, controller=self.controller)
+            if self._tool in (None, entry.tool) and (not self._kinds or entry.kind in self._kinds)
+        ]
+        return iter((found[::-1] if newest_first else found)[:limit])
+
+
+@click.group()
+def journal() -> None:
+    """Look at what is on record about tools: values, proofs, people. Never changes it."""
+
+
+@journal.command("list")
+@_filters
+@click.option(
+    "--limit", type=click.IntRange(min=1), default=20, show_default=True, help="At most so many."
+)
+@json_option
+def list_entries(*, limit: int, **meant: Any) -> None:  # noqa: ANN401 - click's form
+    """Show the newest entries, newest first."""
+    from robolink.journal import default_location, may_exist
+    from robolink_cli.views.journal import entry_payload, show_list
+
+    wanted = _Wanted(**meant)
+    location = default_location()
+    if not may_exist(location):
+        if json_is_on():
+            emit_json("robolink/journal/1", {"entries": []})
+        else:
+            say(tr("There is no journal yet at {location}.", location=location))
+            say(tr("The first change that robolink makes starts one."))
+        return
+    entries = list(wanted.of(journal_to_read(), limit=limit))
+    if json_is_on():
+        emit_json("robolink/journal/1", {"entries": [entry_payload(entry) for entry in entries]})
+    else:
+        show_list(entries, all_controllers=wanted.controller is None)
+
+
+@journal.command("show")
+@click.argument("name", metavar="NUMBER|CHANGE")
+@json_option
+def show(name: str) -> None:
+    """Show all fields of one entry, or of all entries of a change."""
+    from robolink_cli.views.journal import entry_payload, show_entry
+
+    entries = entries_named(journal_to_read(), name)
+    if json_is_on():
+        payload = [entry_payload(entry) for entry in entries]
+        emit_json("robolink/journal-entries/1", {"entries": payload})
+        return
+    for entry in entries:
+        show_entry(entry)
+
+
+@journal.command("diff")
+@click.argument("a", metavar="NUMBER|CHANGE")
+@click.argument("b", metavar="NUMBER|CHANGE")
+@json_option
+def diff(a: str, b: str) -> None:
+    """Show what differs between two entries or changes: value, poses, tolerance, people."""
+    from robolink_cli.views.journal_diff import diff_payload, show_diff
+
+    opened = journal_to_read()
+    sides = entries_named(opened, a), entries_named(opened, b)
+    if json_is_on():
+        emit_json("robolink/journal-diff/1", diff_payload(*sides))
+    else:
+        show_diff(*sides)
+
+
+@journal.command("export")
+@click.argument("file", type=click.Path(dir_okay=False, path_type=Path))
+@click.option(
+    "--format",
+    "form",
+    type=click.Choice(["csv", "json", "jsonl"]),
+    help=tr("Form of the file; by default what its name ends with."),
+)
+@click.option("--force", is_flag=True, help=tr("Write over a file that is there already."))
+@_filters
+@json_option
+def export(
+    file: Path,
+    *,
+    form: str | None,
+    force: bool,
+    **meant: Any,  # noqa: ANN401 - click's form
+) -> None:
+    """Write entries to FILE, oldest first; all of them, or those that are meant."""
+    from robolink.named_files import require_free, save_named
+    from robolink_cli.commands.record.journal_export import FORMATS, Counted, form_of
+
+    form = form or form_of(file)
+    require_free(file, replace=force)
+    wanted = _Wanted(**meant)
+    counted = Counted(wanted.of(journal_to_read(), newest_first=False))
+    save_named(file, FORMATS[form](counted), replace=force)
+    payload = {"file": str(file), "format": form, "entry_count": counted.count}
+    if json_is_on():
+        emit_json("robolink/journal-exported/1", payload)
+    else:
+        say(tr("{count} entries were written to {file}.", count=counted.count, file=file))
+
+
+@journal.command("verify")
+@json_option
+def verify() -> int:
+    """Check that no entry was changed and none is missing; exit code 1 when one was.
+
+    The chain of hashes has no key. It shows what a disk, a program or a person did to single
+    entries. It cannot show that somebody who may write the whole journal made all of it anew,
+    or took the newest entries off and set the note of the last one back: for that, keep the
+    number and hash that this prints where that person cannot write, and compare.
+    """
+    opened = journal_to_read()
+    with _progress(opened) as progress:
+        found = opened.verify(progress)
+    payload = {
+        "entry_count": found.checked,
+        "problems": list(found.problems),
+        "last_number": found.last_number,
+        "last_hash": found.last_hash,
+        "keyed": False,
+    }
+    if json_is_on():
+        emit_json("robolink/journal-verified/1", payload)
+    else:
+        for problem in found.problems:
+            say(problem)
+        said = tr("problems: {count}", count=len(found.problems))
+        whole = tr("nothing was changed and nothing is missing")
+        end = said if found.problems else whole
+        say(tr("{count} entries checked: {end}.", count=found.checked, end=end))
+        if found.last_number:
+            say(
+                tr(
+                    "The last one is {number}, {hash}. Without a key this shows no journal that "
+                    "somebody made anew as a whole: compare that hash with one kept elsewhere.",
+                    number=found.last_number,
+                    hash=found.last_hash,
+                )
+            )
+    return 1 if found.problems else 0
+
+
+@contextmanager
+def _progress(opened: "Journal") -> Iterator[Callable[[int, int], None] | None]:
+    """Show how far a check is, on a terminal."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+    with click.progressbar(length=opened.count(), label=tr("checking"), file=sys.stderr) as bar:
+        yield lambda done, _all: bar.update(done - bar.pos)

@@ -1,0 +1,116 @@
+"""A change as the journal has it: finding it, checking the journal, adding taught points."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+
+from robolink import __version__
+from robolink.errors import ConfigError, JournalError
+from robolink.journal import Journal
+from robolink.messages import tr
+from robolink.model import EntryKind, Recorded
+from robolink.report import Report, reports_of
+from robolink.transaction import id_of_change
+from robolink_cli.commands.record.journal_lookup import controller_meant, entries_of_change
+from robolink_cli.options.impact import ImpactRequest, judge
+from robolink_cli.session.context import CliContext, open_controller
+
+_OF_A_CHANGE = (
+    EntryKind.CALIBRATION,
+    EntryKind.REFUSED,
+    EntryKind.INTENT,
+    EntryKind.DONE,
+    EntryKind.ROLLED_BACK,
+    EntryKind.CONFLICT,
+)
+
+
+def find_change(journal: Journal, name: str | None, *, controller: str | None) -> list[Recorded]:
+    """Return the entries of a change in the order in which they were stored.
+
+    Args:
+        journal: Where to look.
+        name: The beginning of its id, or the number of an entry; ``None`` for the newest.
+        controller: URL of the controller that must be meant, ``None`` for any.
+
+    Raises:
+        ConfigError: There is no such change.
+        JournalError: The journal cannot be read.
+    """
+    meant = controller_meant(controller)
+    if name is None:
+        newest = next(journal.entries(controller=meant, kinds=_OF_A_CHANGE), None)
+        if newest is None:
+            raise ConfigError(
+                tr("No tool change is on record."),
+                remedy=tr("'robolink journal list' shows what is; -c names another cell."),
+            )
+        name = id_of_change(newest)
+    return entries_of_change(journal, name, controller=meant)
+
+
+def reports_from(
+    journal: Journal, entries: Sequence[Recorded]
+) -> tuple[tuple[Report, ...], list[str]]:
+    """Return the report of each tool, and what is wrong with the journal.
+
+    The whole journal is checked: that an entry is as it was stored rests on all before it.
+
+    Raises:
+        ConfigError: The entries are not about a change, or cannot be understood.
+    """
+    check, problems = _checked(journal)
+    reports = reports_of(
+        entries,
+        made_at=datetime.now(UTC).isoformat(timespec="seconds"),
+        robolink_version=__version__,
+        check=check,
+        problems=problems,
+    )
+    return reports, problems
+
+
+def with_points(
+    context: CliContext, reports: Sequence[Report], request: ImpactRequest
+) -> tuple[Report, ...]:
+    """Add what the controller says now: which it is, and where taught points lead.
+
+    Raises:
+        ConfigError: It has no taught points.
+    """
+    with open_controller(context) as controller:
+        facts, taught = controller.facts(), request.read(controller)
+    return tuple(
+        replace(report, facts=facts, impact=judge(taught, old=report.before, new=report.after))
+        if report.after is not None
+        else replace(report, facts=facts)
+        for report in reports
+    )
+
+
+def report_payload(reports: Sequence[Report], path: Path) -> dict[str, object]:
+    """Return the document of a page that was written."""
+    record = reports[0].record
+    assert record is not None  # noqa: S101 - made from the journal
+    return {
+        "file": str(path),
+        "change": record.change,
+        "tools": [{"tool": one.tool, "outcome": str(one.outcome)} for one in reports],
+        "entries": [entry.number for entry in record.entries],
+        "problems": list(record.problems),
+    }
+
+
+def _checked(journal: Journal) -> tuple[str, list[str]]:
+    try:
+        found = journal.verify()
+    except JournalError as error:
+        return tr("The journal could not be checked: {error}", error=error), []
+    if found.problems:
+        return tr("The journal is NOT as it was stored."), list(found.problems)
+    return tr(
+        "All {count} entries of the journal were checked when this page was made: none was "
+        "changed and none is missing.",
+        count=found.checked,
+    ), []

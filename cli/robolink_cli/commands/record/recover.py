@@ -1,0 +1,84 @@
+"""recover: the one way to settle what was begun and not proved finished."""
+
+import click
+
+from robolink.transaction import Recovery
+from robolink_cli.commands.record.recovery_guide import Guide, show_end
+from robolink_cli.prompts.consent import dry_run_option, on_terminal, yes_option
+from robolink_cli.session.context import CliContext, controller_options, emit, open_controller
+from robolink_cli.views.documents import finding_payload
+
+
+@click.command("recover")
+@controller_options
+@dry_run_option
+@click.option(
+    "--keep",
+    is_flag=True,
+    help="Keep new values that nobody verified; without it the old ones are written back.",
+)
+@click.option(
+    "--yes",
+    is_flag=True,
+    help="Your word for what reading cannot settle: you have looked, and work may go on.",
+)
+@click.option(
+    "--forget",
+    is_flag=True,
+    help="Forget everything that is open on your word, without looking or restoring.",
+)
+@click.option(
+    "--take-over",
+    metavar="REASON",
+    help="End the lease of another who has this controller, and record why.",
+)
+def recover(
+    context: CliContext,
+    dry_run: bool,
+    keep: bool,
+    yes: bool,
+    forget: bool,
+    take_over: str | None,
+) -> int:
+    """Settle what was begun and not proved finished, by reading and with your word.
+
+    It finishes or takes back each tool change, selects the cell's own tool again, and says how
+    far the robot came. Each tool is written once at most, and nothing moves. What only a person
+    can judge is asked on a terminal; elsewhere it is left open, with exit code 6, unless --yes
+    gives your word. It may be run again at any time.
+    """
+    with open_controller(context, quiet=True, changes=not dry_run) as controller:
+        guide = Guide(controller, keep=keep, word=yes)
+        if take_over is not None and not dry_run:
+            controller.outcomes.take_over(take_over)
+        done, forgotten = _gone_through(guide, forget=forget, yes=yes, dry_run=dry_run)
+        payload = guide.payload(done) | {"forgotten": forgotten}
+    emit("recover", payload, lambda: None if dry_run else show_end(payload))
+    return guide.exit_code(done)
+
+
+@click.command(hidden=True)
+@controller_options
+@dry_run_option
+@yes_option
+@click.option("--forget", is_flag=True, help="As with 'robolink recover'.")
+def resolve(context: CliContext, dry_run: bool, yes: bool, forget: bool) -> int:
+    """Do what 'robolink recover' does; off a terminal the command itself is your word."""
+    with open_controller(context, quiet=True, changes=not dry_run) as controller:
+        guide = Guide(controller, keep=False, word=yes or not on_terminal())
+        done, forgotten = _gone_through(guide, forget=forget, yes=yes, dry_run=dry_run)
+        payload = guide.payload(done)
+    document: dict[str, object] = {
+        "findings": [finding_payload(finding) for finding in (*done.settled, *done.left)],
+        "forgotten": forgotten,
+        "settled": not dry_run and not done.left,
+    }
+    emit("resolve", document, lambda: None if dry_run else show_end(payload))
+    return 0 if dry_run else guide.exit_code(done)
+
+
+def _gone_through(guide: Guide, *, forget: bool, yes: bool, dry_run: bool) -> tuple[Recovery, int]:
+    """Return what was found and done, and how much was forgotten."""
+    if forget:
+        return Recovery((), ()), guide.forget(yes=yes, dry_run=dry_run)
+    return guide.look() if dry_run else guide.run(), 0

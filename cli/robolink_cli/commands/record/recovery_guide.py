@@ -1,0 +1,153 @@
+"""A recovery, told step by step: what is found, what is done, what takes a person's word."""
+
+from contextlib import suppress
+from typing import Final
+
+from robolink.errors import ControllerError
+from robolink.messages import tr
+from robolink.model import Controller, Finding, MarkerKind, Pose
+from robolink.transaction import Recovery, Settler, look, recover
+from robolink_cli.console.render import json_is_on, note, say
+from robolink_cli.prompts.consent import agree, asked, on_terminal
+from robolink_cli.views.documents import finding_payload, pose_payload
+
+DECLINED: Final = 9
+LEFT: Final = 6
+_NOTHING: Final = tr("Nothing is unsettled on this controller.")
+
+
+class Guide:
+    """One recovery on one controller.
+
+    Attributes:
+        declined: Whether a person looked at something and left it open.
+
+    Args:
+        controller: The controller, connected.
+        keep: Whether new values that nobody verified stay.
+        word: Whether a person's word is given beforehand for what reading cannot settle.
+    """
+
+    def __init__(self, controller: Controller, *, keep: bool, word: bool) -> None:
+        self._controller = controller
+        self._keep = keep
+        self._word = word
+        self._where: Pose | None = None
+        self.declined = False
+
+    def run(self) -> Recovery:
+        """Settle what can be settled.
+
+        Raises:
+            RobolinkError: A step failed; the rest stays open.
+        """
+        done = recover(self._controller, keep=self._keep, confirm=self._confirmed, tell=self._ended)
+        if not done.settled and not done.left:
+            note(_NOTHING)
+        return done
+
+    def look(self) -> Recovery:
+        """Show what is open; reads only."""
+        findings = look(self._controller, keep=self._keep, tell=_foretell)
+        note(tr("Nothing was done.") if findings else _NOTHING)
+        return Recovery((), findings)
+
+    def forget(self, *, yes: bool, dry_run: bool) -> int:
+        """Forget everything that is open on a person's word; return how much that was.
+
+        Raises:
+            DeclinedError: The answer was no.
+        """
+        markers = self._controller.outcomes.open_markers()
+        agree(tr("Forget {count} open entries without looking?", count=len(markers)), yes=yes)
+        if not dry_run:
+            settler = Settler(self._controller)
+            for marker in markers:
+                settler.forget(marker)
+        return len(markers)
+
+    def payload(self, done: Recovery) -> dict[str, object]:
+        """Return the document of it; a controller that answers nothing now has no selected tool."""
+        selected: int | None = None
+        with suppress(ControllerError):
+            selected = self._controller.tools.selected()
+        return {
+            "settled": [finding_payload(finding) for finding in done.settled],
+            "left": [finding_payload(finding) for finding in done.left],
+            "selected_tool": selected,
+            "pose": None if self._where is None else pose_payload(self._where),
+        }
+
+    def exit_code(self, done: Recovery) -> int:
+        """Return the exit code: 0, or why something is still open."""
+        if not done.left:
+            return 0
+        return DECLINED if self.declined else LEFT
+
+    def _confirmed(self, finding: Finding) -> bool:
+        _show(finding)
+        if finding.marker.kind is MarkerKind.MOVE:
+            self._show_where()
+        if self._word:
+            return True
+        if json_is_on() or not on_terminal():
+            return False
+        agreed = asked(tr("Is that as it should be, and may work go on?"))
+        self.declined = self.declined or not agreed
+        return agreed
+
+    def _show_where(self) -> None:
+        """Say once where the robot stands, in the tool that is selected by now."""
+        if self._where is None:
+            with suppress(ControllerError):
+                here = self._where = self._controller.groups[0].pose()
+                note(
+                    tr(
+                        "  It is at X {x:.3f} Y {y:.3f} Z {z:.3f} U {u:.3f} (tool {tool}).",
+                        x=here.x_mm,
+                        y=here.y_mm,
+                        z=here.z_mm,
+                        u=here.u_deg,
+                        tool=here.tool,
+                    )
+                )
+
+    def _ended(self, finding: Finding, settled: bool) -> None:
+        if not finding.verdict.needs_a_person:
+            _show(finding)
+        if not settled:
+            note(tr("  left open"))
+        elif finding.action:
+            note(tr("  done: {action}", action=finding.action))
+        else:
+            note(tr("  settled"))
+
+
+def show_end(payload: dict[str, object]) -> None:
+    """Say how it ended."""
+    left, tool = payload["left"], payload["selected_tool"]
+    if left:
+        say(
+            tr(
+                "What is left takes your word: look at the robot and the controller, then run "
+                "'robolink recover' again on a terminal, or with --yes."
+            )
+        )
+    elif payload["settled"]:
+        say(
+            tr("Everything is settled.")
+            if tool is None
+            else tr("Everything is settled; tool {tool} is selected.", tool=tool)
+        )
+
+
+def _foretell(finding: Finding) -> None:
+    _show(finding)
+    if finding.action:
+        note(tr("  to do: {action}", action=finding.action))
+    elif finding.verdict.needs_a_person:
+        note(tr("  to do: it takes your word"))
+
+
+def _show(finding: Finding) -> None:
+    note(f"{finding.marker.begun_at}  {finding.marker.request}\n  {finding.sentence}")

@@ -1,0 +1,1 @@
+"""Commands that serve simulated controllers, and the demonstration."""

@@ -1,0 +1,49 @@
+"""Acting at a simulated cell from the shell."""
+
+from collections.abc import Sequence
+
+from robolink_simulators.assist.port import AssistClient
+
+from robolink.errors import ConfigError
+from robolink.messages import tr
+from robolink_cli.console.render import emit_json, json_is_on, say
+
+
+def do_act(url: str, act: str, values: Sequence[str]) -> None:
+    """Have ``act`` done at the simulator behind ``url`` and show what it gives.
+
+    Raises:
+        ConfigError: A value is not NAME=NUMBER, or the simulator cannot do it and says why.
+        ConnectError: No simulator is there.
+    """
+    parameters = dict(_parsed(value) for value in values)
+    with AssistClient(url) as client:
+        answer = client.do(act, **parameters)
+    if json_is_on():
+        emit_json("robolink/assist/1", {"act": act, **answer})
+        return
+    say(tr("{act}: done", act=act))
+    for name, value in answer.items():
+        say(f"  {name}: {_shown(value)}")
+
+
+def _shown(value: object) -> str:
+    if isinstance(value, dict):
+        return ", ".join(f"{name} {_shown(part)}" for name, part in value.items())
+    if isinstance(value, list):
+        return " ".join(_shown(part) for part in value)
+    return f"{value:.3f}" if isinstance(value, float) else str(value)
+
+
+def _parsed(text: str) -> tuple[str, float | int]:
+    name, equals, value = text.partition("=")
+    try:
+        number = float(value)
+    except ValueError:
+        equals = ""
+    if not (name and equals):
+        raise ConfigError(
+            tr("{text!r} is not NAME=NUMBER.", text=text),
+            remedy=tr("For example number=901 u_deg=180."),
+        )
+    return name, int(number) if number.is_integer() else number

@@ -1,0 +1,26 @@
+"""demo: a whole nozzle change on each kind of simulated controller."""
+
+import click
+
+from robolink_cli.session.context import json_option
+
+
+@click.command()
+@click.option("--seed", type=int, default=1, show_default=True, help="Another cell, another tip.")
+@click.option(
+    "--speed",
+    type=click.FloatRange(1, 100),
+    default=20.0,
+    show_default=True,
+    help="How many times faster than real the simulated time passes.",
+)
+@json_option
+def demo(seed: int, speed: float) -> None:
+    """Change the nozzle of a simulated EPSON SCARA, then of a simulated SoftMotion PLC.
+
+    The SCARA is reached over a TCP connection on this machine's loopback, the PLC through its
+    mailbox inside this process. No machine is touched.
+    """
+    from robolink_cli.commands.simulate.demonstration import demonstrate
+
+    demonstrate(seed=seed, speed=speed)

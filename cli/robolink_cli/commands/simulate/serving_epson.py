@@ -1,0 +1,86 @@
+"""sim epson: serving a simulated EPSON controller."""
+
+import os
+from collections.abc import Sequence
+from contextlib import ExitStack
+from pathlib import Path
+
+import click
+from click.core import ParameterSource
+from robolink_simulators.assist.port import serve_assist
+from robolink_simulators.cell.clock import ScaledClock
+from robolink_simulators.epson import EpsonOptions, EpsonSimulator
+from robolink_simulators.epson.options import options_from_text
+from robolink_simulators.epson.profile import read_profile
+from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+from robolink_simulators.serial_numbers import drawn_serial
+
+from robolink.errors import ConfigError
+from robolink.messages import tr
+from robolink.model import Secret
+from robolink_cli.commands.simulate.serving import Termination, announce, named_values
+
+
+def serve_epson(
+    simulator: EpsonSimulator, address: tuple[str, int], *, speed: float, allow_remote: bool
+) -> None:
+    """Serve a simulator and its assist port until SIGTERM or Ctrl-C."""
+    clock = ScaledClock(speed)
+    with ExitStack() as stack:
+        stopped = stack.enter_context(Termination())
+        tcp = stack.enter_context(
+            serve_tcp(simulator, *address, clock=clock, allow_remote=allow_remote)
+        )
+        assist = stack.enter_context(serve_assist(simulator, clock=clock))
+        _announce(tcp.url, assist.url, simulator.machine.model.name, simulator.seed)
+        stopped.wait()
+
+
+def password_in(variable: str | None) -> Secret | None:
+    """Return the password in an environment variable, ``None`` when none is named.
+
+    Raises:
+        ConfigError: The variable holds none.
+    """
+    if variable is None:
+        return None
+    value = os.environ.get(variable)
+    if not value:
+        raise ConfigError(
+            tr("The environment variable {variable} holds no password.", variable=variable),
+            remedy=tr("Set it first, or leave --password-env out."),
+        )
+    return Secret(value)
+
+
+def habits(options: Sequence[str], profile: Path | None) -> EpsonOptions:
+    """Return the controller's habits: those of a cell profile, overruled by options.
+
+    Raises:
+        ConfigError: An option or the profile makes no sense.
+    """
+    pairs = named_values(options, "--option terminator=cr")
+    settled = {} if profile is None else read_profile(profile)
+    return options_from_text({**settled, **pairs})
+
+
+def serial_of(seed: int) -> str:
+    """Return the serial number of a simulated robot: another one each time, but for a given seed.
+
+    Two simulators that were started alike are two controllers all the same, unless a person
+    asked for the very same one.
+    """
+    given = click.get_current_context().get_parameter_source("seed")
+    return drawn_serial(f"seed {seed}" if given is ParameterSource.COMMANDLINE else "")
+
+
+def _announce(url: str, assist_url: str, robot: str, seed: int) -> None:
+    document: dict[str, object] = {"url": url, "assist": assist_url, "robot": robot, "seed": seed}
+    lines = (
+        tr("SIMULATED EPSON {robot} (seed {seed}). No robot moves.", robot=robot, seed=seed),
+        tr("  controller  {url}", url=url),
+        tr("  assist      {url}", url=assist_url),
+        tr("Try: robolink -c {url} status", url=url),
+        tr("Ctrl-C ends it."),
+    )
+    announce(document, lines)

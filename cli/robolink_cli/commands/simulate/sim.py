@@ -1,0 +1,114 @@
+"""sim: serve a simulated controller for anybody's client."""
+
+from pathlib import Path
+
+import click
+
+from robolink_cli.commands.simulate.sim_plc import sim_plc
+from robolink_cli.commands.simulate.sim_softmotion import softmotion
+from robolink_cli.options.simulation import simulation_options
+from robolink_cli.session.context import json_option
+
+
+@click.group()
+@json_option
+def sim() -> None:
+    """Serve a simulated controller on this machine."""
+
+
+sim.add_command(sim_plc)
+sim.add_command(softmotion)
+
+
+@sim.command()
+@click.option(
+    "--tcp",
+    "address",
+    metavar="HOST:PORT",
+    default="127.0.0.1:5000",
+    show_default=True,
+    help="Where to listen; port 0 takes a free one.",
+)
+@click.option("--robot", default="T6-602S", show_default=True, help="Model of the robot.")
+@click.option(
+    "--password-env",
+    metavar="VAR",
+    help="Environment variable that holds the password clients must give.",
+)
+@click.option(
+    "--profile",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    help="Cell profile written by verify-controller; --option overrules it.",
+)
+@click.option(
+    "--replay",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    help="Serve a dialogue that --record has written, in place of a simulator.",
+)
+@simulation_options
+@json_option
+def epson(
+    *,
+    address: str,
+    robot: str,
+    seed: int,
+    password_env: str | None,
+    state: Path | None,
+    speed: float,
+    options: tuple[str, ...],
+    world: tuple[str, ...],
+    profile: Path | None,
+    replay: Path | None,
+    allow_remote: bool,
+) -> None:
+    """Serve a simulated EPSON controller with Remote Ethernet until Ctrl-C.
+
+    A second port, assist, stands in for the person at the cell: it looks at the tip, knows
+    the truth, and presses the emergency stop.
+    """
+    from robolink_cli.commands.simulate.serving import Termination, host_and_port
+
+    listen = host_and_port(address, "--tcp")
+    if replay is not None:
+        from robolink_cli.commands.simulate.replaying import serve_recording
+
+        with Termination() as stopped:
+            serve_recording(replay, listen, allow_remote=allow_remote, wait=stopped.wait)
+        return
+    from robolink_simulators.epson import EpsonSimulator
+
+    from robolink_cli.commands.simulate.serving import world_from
+    from robolink_cli.commands.simulate.serving_epson import (
+        habits,
+        password_in,
+        serial_of,
+        serve_epson,
+    )
+
+    simulator = EpsonSimulator(
+        robot,
+        seed=seed,
+        password=password_in(password_env),
+        options=habits(options, profile),
+        serial=serial_of(seed),
+        state_path=state,
+        world=world_from(world),
+    )
+    serve_epson(simulator, listen, speed=speed, allow_remote=allow_remote)
+
+
+@sim.command()
+@click.argument("url")
+@click.argument("act")
+@click.argument("values", nargs=-1, metavar="[NAME=NUMBER]...")
+@json_option
+def assist(url: str, act: str, values: tuple[str, ...]) -> None:
+    """Be the person at a simulated cell: press its buttons, teach its points, see its truth.
+
+    URL is the assist URL that 'robolink sim' prints. Acts are for example press_estop,
+    release_estop, open_guard, teach, auto, teach_point number=901 u_deg=180, truth; an unknown
+    one lists them all.
+    """
+    from robolink_cli.commands.simulate.assisting import do_act
+
+    do_act(url, act, values)

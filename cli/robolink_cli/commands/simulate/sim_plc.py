@@ -1,0 +1,81 @@
+"""sim plc: serve a simulated PLC that keeps its tools where a map says."""
+
+from contextlib import ExitStack
+from pathlib import Path
+
+import click
+
+from robolink.messages import tr
+from robolink_cli.options.simulation import (
+    DEFAULT_ADDRESS,
+    allow_remote_option,
+    modbus_options,
+    seed_option,
+)
+from robolink_cli.session.context import json_option
+
+
+@click.command("plc")
+@click.option(
+    "--map",
+    "map_file",
+    required=True,
+    metavar="FILE",
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="The map; docs/plc-maps.md explains it.",
+)
+@modbus_options
+@click.option(
+    "--unit",
+    type=click.IntRange(0, 255),
+    default=1,
+    show_default=True,
+    help="The unit identifier that answers; 1 to 247 on a serial line.",
+)
+@seed_option
+@allow_remote_option
+@json_option
+def sim_plc(
+    *,
+    map_file: Path,
+    modbus_tcp: str | None,
+    modbus_rtu: str | None,
+    unit: int,
+    seed: int,
+    allow_remote: bool,
+) -> None:
+    """Serve a simulated PLC with the registers of any map until Ctrl-C.
+
+    Both buses may be given; one PLC stands behind them.
+    """
+    from robolink_simulators.cell.clock import ScaledClock
+    from robolink_simulators.plc import PlcSimulator, serve_plc, serve_plc_line
+
+    from robolink.register_maps import load_map
+    from robolink_cli.commands.simulate.serving import Termination, announce, host_and_port
+
+    if modbus_tcp is None and modbus_rtu is None:
+        modbus_tcp = DEFAULT_ADDRESS
+    register_map = load_map(map_file)
+    simulator, clock = PlcSimulator(register_map, unit=unit, seed=seed), ScaledClock()
+    urls: dict[str, str] = {}
+    with ExitStack() as stack:
+        stopped = stack.enter_context(Termination())
+        if modbus_tcp is not None:
+            listen = host_and_port(modbus_tcp, "--modbus-tcp")
+            tcp = serve_plc(simulator, map_file, *listen, clock=clock, allow_remote=allow_remote)
+            urls["modbus-tcp"] = stack.enter_context(tcp).url
+        if modbus_rtu is not None:
+            line = serve_plc_line(simulator, map_file, clock=clock)
+            urls["modbus-rtu"] = stack.enter_context(line).url
+        first = next(iter(urls.values()))
+        announce(
+            {"url": first, "urls": urls, "machine": register_map.name, "seed": seed},
+            [
+                tr("SIMULATED PLC: {name} (seed {seed}).", name=register_map.name, seed=seed),
+                *(tr("  {bus}  {url}", bus=bus.ljust(10), url=url) for bus, url in urls.items()),
+                tr("Try: robolink -c '{url}' plc check-map", url=first),
+                tr("Ctrl-C ends it."),
+            ],
+        )
+        stopped.wait()

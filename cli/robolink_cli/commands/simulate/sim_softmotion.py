@@ -1,0 +1,77 @@
+"""sim softmotion: serve a simulated PLC with a mailbox."""
+
+from pathlib import Path
+
+import click
+
+from robolink_cli.options.simulation import modbus_options, simulation_options
+from robolink_cli.session.context import json_option
+
+
+@click.command()
+@modbus_options
+@click.option(
+    "--can",
+    metavar="INTERFACE:CHANNEL",
+    help="Be a CANopen node, for example on udp_multicast:239.74.163.2:43113 or socketcan:vcan0.",
+)
+@click.option(
+    "--unit", type=click.IntRange(1, 247), default=1, show_default=True, help="On the serial line."
+)
+@click.option(
+    "--node", type=click.IntRange(1, 127), default=5, show_default=True, help="On the CAN bus."
+)
+@click.option(
+    "--kinematics",
+    default="Kin_Scara3_Z",
+    show_default=True,
+    metavar="NAME[+ORIENTATION]",
+    help="Kinematics of the axis group; a wrong name lists them all.",
+)
+@click.option(
+    "--param",
+    "parameters",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="A parameter of the kinematics or a drive, for example dArmLength1=250. May be repeated.",
+)
+@simulation_options
+@json_option
+def softmotion(
+    *,
+    modbus_tcp: str | None,
+    modbus_rtu: str | None,
+    can: str | None,
+    unit: int,
+    node: int,
+    kinematics: str,
+    parameters: tuple[str, ...],
+    seed: int,
+    state: Path | None,
+    speed: float,
+    options: tuple[str, ...],
+    world: tuple[str, ...],
+    allow_remote: bool,
+) -> None:
+    """Serve a simulated SoftMotion PLC with a mailbox until Ctrl-C.
+
+    Several buses may be given; one PLC stands behind them. The assist port stands in for the
+    person at the machine.
+    """
+    from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
+    from robolink_simulators.softmotion.mailbox.option_text import options_from_text
+    from robolink_simulators.softmotion.mailbox.parameters import parameters_from_text
+
+    from robolink_cli.commands.simulate.serving import named_values, world_from
+    from robolink_cli.commands.simulate.serving_softmotion import Buses, serve_plc
+
+    simulator = SoftMotionSimulator(
+        kinematics,
+        seed=seed,
+        parameters=parameters_from_text(named_values(parameters, "--param dArmLength1=250")),
+        options=options_from_text(named_values(options, "--option profile=tools")),
+        state_path=state,
+        world=world_from(world),
+    )
+    buses = Buses(modbus_tcp, modbus_rtu, can, unit=unit, node=node, allow_remote=allow_remote)
+    serve_plc(simulator, buses, speed=speed)

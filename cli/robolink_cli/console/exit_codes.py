@@ -1,0 +1,176 @@
+"""The one place where errors become exit codes and text."""
+
+import io
+import os
+from typing import Final
+
+import click
+
+from robolink import errors
+from robolink.interrupts import EndedBy, Interrupted, ended_by
+from robolink.messages import tr
+from robolink.standing import UNTOUCHED, standing_after
+from robolink_cli.console.render import dumps
+from robolink_cli.console.sink import hand_over, show
+from robolink_cli.console.standing import standing_payload, tell_standing
+
+DONE: Final = 0
+DIFFERENT: Final = 1
+USAGE: Final = 2
+UNKNOWN: Final = 6
+BUG: Final = 70
+HUNG_UP: Final = 129
+INTERRUPTED: Final = 130
+READER_LEFT: Final = 141
+TERMINATED: Final = 143
+
+_ENDINGS: Final = {
+    EndedBy.HUNG_UP: HUNG_UP,
+    EndedBy.CTRL_C: INTERRUPTED,
+    EndedBy.OUTPUT_CLOSED: READER_LEFT,
+    EndedBy.TERMINATED: TERMINATED,
+}
+"""The four clean up alike; 6 comes before them."""
+
+MEANINGS: Final[dict[int, str]] = {
+    DONE: "done",
+    DIFFERENT: "`compare` found a difference; `journal verify` found a damaged record",
+    USAGE: "the command, a file, a setting or the journal is wrong",
+    3: "the controller is not reached, or the link broke",
+    4: "the two sides do not understand each other",
+    5: "the controller, or a check of its state, said no",
+    UNKNOWN: "a write or a movement stands unproved; `robolink recover` comes next",
+    7: "the measurements do not support a result",
+    8: "the proof failed; the old value was put back",
+    9: "a person said no, or was not there to say yes",
+    10: "a stop ended it",
+    BUG: "a defect in robolink",
+    HUNG_UP: "the window was closed, or the line to it is gone (SIGHUP)",
+    INTERRUPTED: "interrupted (Ctrl-C)",
+    READER_LEFT: "whoever read the output has left",
+    TERMINATED: "terminated (SIGTERM)",
+}
+"""What each exit code says; docs/exit-codes.md has the same table."""
+
+# The first class that fits decides. A tool number that does not exist is a mistake in the
+# command (2). A tool that was changed meanwhile, is undefined, or did not keep what was
+# written is the controller's no (5): nothing was rolled back, so it cannot be 8.
+EXIT_CODES: Final[tuple[tuple[type[errors.RobolinkError], int], ...]] = (
+    (errors.DeclinedError, 9),
+    (errors.VerifyError, 8),
+    (errors.CalibrationError, 7),
+    (errors.OutcomeUnknownError, UNKNOWN),
+    (errors.StoppedError, 10),
+    (errors.ToolIndexError, USAGE),
+    (errors.ReservedToolError, USAGE),
+    (errors.ToolError, 5),
+    (errors.ControllerError, 5),
+    (errors.ProtocolError, 4),
+    (errors.TransportError, 3),
+    (errors.ConfigError, USAGE),
+)
+
+
+def exit_code(error: BaseException) -> int:
+    """Return the exit code that ``error`` stands for.
+
+    What it left on the controller comes first: where a write or a movement may stand unproved,
+    it is 6 whatever broke afterwards.
+    """
+    if not standing_after(error).settled:
+        return UNKNOWN
+    if isinstance(error, KeyboardInterrupt):
+        return _ENDINGS[_ending(error)]
+    if isinstance(error, (EOFError, click.Abort)):
+        return INTERRUPTED
+    if isinstance(error, click.ClickException):
+        return USAGE
+    return next((code for kind, code in EXIT_CODES if isinstance(error, kind)), BUG)
+
+
+def report(error: BaseException, *, as_json: bool) -> int:
+    """Tell a person, or a machine, about ``error``; return the exit code."""
+    code = exit_code(error)
+    if os.environ.get("ROBOLINK_DEBUG"):
+        import traceback  # here, because --help needs none
+
+        show("".join(traceback.format_exception(error)), beside=True)
+    if is_cut_off(error) and standing_after(error) is UNTOUCHED:
+        return code  # a list, cut off by its reader: no news to him
+    if as_json:
+        hand_over(error_document(error))
+    elif isinstance(error, click.ClickException):
+        usage = io.StringIO()
+        error.show(file=usage)  # it repeats what was typed
+        show(usage.getvalue().rstrip("\n"), beside=True)
+    else:
+        what, remedy = _sentences(error)
+        show(f"robolink: {what}", beside=True)
+        if remedy:
+            show(f"  {remedy}", beside=True)
+    if not as_json or isinstance(error, KeyboardInterrupt):
+        # Whoever ended it may not be who reads the document.
+        tell_standing(standing_after(error))
+    return code
+
+
+def is_cut_off(error: BaseException) -> bool:
+    """Tell whether a command ended because nobody reads its output any more."""
+    return isinstance(error, Interrupted) and error.by is EndedBy.OUTPUT_CLOSED
+
+
+def error_document(error: BaseException) -> str:
+    """Return the JSON document that stands for ``error``."""
+    return dumps("robolink/error/1", {"error": error_body(error), "exit_code": exit_code(error)})
+
+
+def error_body(error: BaseException) -> dict[str, object]:
+    """Return what is known about ``error``, as plain JSON."""
+    what, remedy = _sentences(error)
+    ours = isinstance(error, errors.RobolinkError)
+    standing = standing_after(error)
+    ended = _ending(error) if isinstance(error, KeyboardInterrupt) else ended_by()
+    return {
+        "kind": type(error).__name__,
+        "what": what,
+        "remedy": remedy,
+        "reason": getattr(error, "reason", None) if ours else None,
+        "code": (getattr(error, "code", None) or None) if ours else None,
+        "ended_by": None if ended is None else str(ended),
+        "controller_state": standing.effect,
+        "stands": standing_payload(standing),
+    }
+
+
+def _ending(error: KeyboardInterrupt) -> EndedBy:
+    """Return what ended it; a KeyboardInterrupt that does not say so is Ctrl-C."""
+    return error.by if isinstance(error, Interrupted) else EndedBy.CTRL_C
+
+
+def _ending_in_words(by: EndedBy) -> str:
+    if by is EndedBy.TERMINATED:
+        return tr("Terminated (SIGTERM).")
+    if by is EndedBy.HUNG_UP:
+        return tr("The window was closed, or the line to it is gone (SIGHUP).")
+    if by is EndedBy.OUTPUT_CLOSED:
+        return tr("Nobody reads the output any more, so the command was ended.")
+    return tr("Interrupted.")
+
+
+def _sentences(error: BaseException) -> tuple[str, str]:
+    if isinstance(error, errors.RobolinkError):
+        return error.what, error.remedy
+    if isinstance(error, click.ClickException):
+        return error.format_message(), tr("'robolink COMMAND --help' shows what can be given.")
+    if isinstance(error, KeyboardInterrupt):
+        return _ending_in_words(_ending(error)), ""
+    if isinstance(error, (EOFError, click.Abort)):
+        return tr("Interrupted."), ""
+    return (
+        tr(
+            "A defect in robolink: {kind}: {error}",
+            kind=type(error).__name__,
+            error=error,
+        ),
+        tr("Set ROBOLINK_DEBUG=1 to see where, and report it with that text."),
+    )

@@ -1,0 +1,91 @@
+"""What a command shows: text for people, or one JSON document for machines.
+
+With ``--json``, stdout carries exactly one document and everything for people goes to
+stderr. That there is one document and not two is so by construction: :func:`emit_json` hands
+it over, and it is printed once, when the command has ended well; an error prints its own
+document instead.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+
+import click
+
+from robolink_cli.console.sink import hand_over, show, visible
+
+_JSON = "robolink.json"
+_DOCUMENT = "robolink.document"
+
+
+def json_is_on() -> bool:
+    """Tell whether ``--json`` was given, before or after the command's name."""
+    context = click.get_current_context(silent=True)
+    return context is not None and bool(context.meta.get(_JSON))
+
+
+def switch_json_on(context: click.Context) -> None:
+    """Make this invocation speak JSON."""
+    context.meta[_JSON] = True
+
+
+def say(text: str = "") -> None:
+    """Show a person a line: on stdout, or on stderr when stdout is for machines."""
+    show(text, beside=json_is_on())
+
+
+def note(text: str) -> None:
+    """Show a person a remark beside the result; always on stderr."""
+    show(text, beside=True)
+
+
+def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
+    """Show a person a table: numbers to the right and whole, words to the left and folded."""
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    cells = [[visible(str(cell)) for cell in row] for row in rows]
+    shown = Table(title=Text(visible(title)), title_justify="left", box=box.SIMPLE_HEAD)
+    for number, column in enumerate(columns):
+        if all(_is_figure(row[number]) for row in cells):
+            shown.add_column(Text(visible(column)), justify="right", no_wrap=True)
+        else:
+            shown.add_column(Text(visible(column)), overflow="fold")
+    for row in cells:
+        shown.add_row(*(Text(cell) for cell in row))
+    console = Console(stderr=json_is_on(), highlight=False)
+    if not console.is_terminal:
+        console.width = 1000  # nothing may be folded to an assumed width of 80
+    console.print(shown, crop=False)
+
+
+def _is_figure(cell: str) -> bool:
+    """Tell whether a cell holds a number, a number with a mark, or nothing."""
+    digits = cell.strip().lstrip("*+-").replace(".", "", 1)
+    return digits.isdigit() or not digits
+
+
+def emit_json(schema: str, payload: Mapping[str, object]) -> None:
+    """Hand over the document of this command; it is printed when the command has ended.
+
+    Args:
+        schema: For example ``robolink/status/1``.
+        payload: Plain JSON values; the names of numbers carry their units.
+    """
+    meta = click.get_current_context().meta
+    if _DOCUMENT in meta:
+        raise RuntimeError(f"a second document was emitted: {schema}")
+    meta[_DOCUMENT] = dumps(schema, payload)
+
+
+def print_document(context: click.Context) -> None:
+    """Print what :func:`emit_json` was given, if anything."""
+    if _DOCUMENT in context.meta:
+        hand_over(context.meta[_DOCUMENT])
+
+
+def dumps(schema: str, payload: Mapping[str, object]) -> str:
+    """Return one JSON document in ASCII, so that no console can spoil it."""
+    import json  # here, because --help needs none
+
+    return json.dumps({"schema": schema, **payload}, indent=2, allow_nan=False)

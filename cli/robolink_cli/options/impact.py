@@ -1,0 +1,155 @@
+"""How far taught points lead elsewhere: the options, the reading, the table."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from robolink.errors import ConfigError
+from robolink.messages import tr
+from robolink_cli.console.render import say, table
+from robolink_cli.options.pose_source import point_numbers
+from robolink_cli.session.capabilities import points_of
+
+if TYPE_CHECKING:
+    from robolink.calibration import Impact
+    from robolink.model import Controller, Pose, ToolOffset
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+@dataclass(frozen=True, slots=True)
+class ImpactRequest:
+    """Which points are to be judged: numbers on the controller, or a ``.pts`` file."""
+
+    numbers: tuple[int, ...] = ()
+    path: Path | None = None
+
+    def read(self, controller: "Controller") -> "dict[int, Pose | None]":
+        """Return the points by number, ``None`` for one that is not taught."""
+        if self.path is None:
+            return dict(points_of(controller).read_all(self.numbers))
+        from robolink.pose_files import read_pts
+
+        return read_pts(self.path)
+
+
+def impact_options(function: F) -> F:
+    """Add ``--impact`` and ``--impact-pts`` to a calibration."""
+    function = click.option(
+        "--impact-pts",
+        type=click.Path(dir_okay=False, path_type=Path),
+        help=tr("The same for all points of a .pts file of EPSON RC+."),
+    )(function)
+    return click.option(
+        "--impact",
+        metavar="1-50",
+        help=tr("Before the write, show how far the tip moves at these taught points."),
+    )(function)
+
+
+def impact_request(
+    numbers: str | None, path: Path | None, *, names: tuple[str, str]
+) -> ImpactRequest | None:
+    """Return which points are meant, ``None`` for none.
+
+    Raises:
+        ConfigError: Both forms were given.
+    """
+    if numbers and path is not None:
+        raise ConfigError(
+            tr("{names} exclude each other.", names=", ".join(names)),
+            remedy=tr("Read the points from the controller or from a file."),
+        )
+    if numbers:
+        return ImpactRequest(point_numbers(numbers))
+    return ImpactRequest(path=path) if path is not None else None
+
+
+def judge(
+    points: "dict[int, Pose | None] | None", *, old: "ToolOffset | None", new: "ToolOffset"
+) -> "Impact | None":
+    """Return what the change does at ``points``.
+
+    ``None`` when no points were asked for, or when the tool was undefined: a program cannot
+    have driven to them with it (docs/reference/epson.md 1.5).
+    """
+    from robolink.calibration import impact_on
+
+    if points is None or old is None:
+        return None
+    return impact_on(points, old=old, new=new)
+
+
+def impact_payload(impact: "Impact") -> dict[str, object]:
+    """Return the document's part about the impact."""
+    largest = impact.largest
+    return {
+        "points": [
+            {
+                "point": entry.number,
+                "x_mm": entry.pose.x_mm,
+                "y_mm": entry.pose.y_mm,
+                "z_mm": entry.pose.z_mm,
+                "u_deg": entry.pose.u_deg,
+                "dx_mm": entry.dx_mm,
+                "dy_mm": entry.dy_mm,
+                "dz_mm": entry.dz_mm,
+                "turn_deg": entry.turn_deg,
+                "distance_mm": entry.distance_mm,
+            }
+            for entry in impact.entries
+        ],
+        "largest_mm": None if largest is None else largest.distance_mm,
+        "largest_point": None if largest is None else largest.number,
+        "undefined_count": len(impact.undefined),
+        "other_local": [
+            {"point": number, "local": local} for number, local in impact.other_local.items()
+        ],
+        "tilted": list(impact.tilted),
+    }
+
+
+def show_impact(tool: int, impact: "Impact") -> None:
+    """Print where the tip will be at the taught points, against where it goes now."""
+    columns = (tr("point"), "U deg", "dX mm", "dY mm", "dZ mm", tr("turn deg"), tr("distance mm"))
+    rows = [
+        [
+            f"P{entry.number}",
+            *map(_cell, (entry.pose.u_deg, entry.dx_mm, entry.dy_mm)),
+            *map(_cell, (entry.dz_mm, entry.turn_deg, entry.distance_mm)),
+        ]
+        for entry in impact.entries
+    ]
+    if rows:
+        table(tr("where tool {tool}'s tip will be, against now", tool=tool), columns, rows)
+    if impact.largest is not None:
+        say(
+            tr(
+                "  largest: {distance:.3f} mm at P{point}; only points driven with tool {tool}",
+                distance=impact.largest.distance_mm,
+                point=impact.largest.number,
+                tool=tool,
+            )
+        )
+    else:
+        say(tr("  no point could be judged"))
+    _show_left_out(impact)
+
+
+def _show_left_out(impact: "Impact") -> None:
+    if impact.undefined:
+        say(tr("  not taught, skipped: {count}", count=len(impact.undefined)))
+    if impact.other_local:
+        named = ", ".join(f"P{n} (local {local})" for n, local in impact.other_local.items())
+        say(tr("  in another local, left out: {points}", points=named))
+    if impact.tilted:
+        named = ", ".join(f"P{number}" for number in impact.tilted)
+        say(tr("  tilted (V or W not 0), left out: {points}", points=named))
+
+
+def _cell(value: float) -> str:
+    # Adding zero takes the sign off what rounds to zero.
+    return f"{round(value, 3) + 0.0:.3f}"

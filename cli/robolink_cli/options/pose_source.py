@@ -1,0 +1,213 @@
+"""Where poses come from when nothing moves, and the options that say so."""
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import wraps
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, Literal
+
+import click
+
+from robolink.errors import ConfigError
+from robolink.messages import tr
+
+if TYPE_CHECKING:
+    from robolink.model import Controller, Pose
+
+_RANGE: Final = re.compile(r"([0-9]{1,3})(?:-([0-9]{1,3}))?", re.ASCII)
+
+_STATED: Final = {3: set[str](), 4: {"z_mm"}, 6: {"z_mm", "v_deg", "w_deg"}}
+"""What a typed pose states besides X, Y and U, by how many numbers it has."""
+
+
+@dataclass(frozen=True, slots=True)
+class PoseSource:
+    """What was given in place of a measurement: exactly one of the three.
+
+    Attributes:
+        kind: Which one.
+        points: Numbers of taught points.
+        typed: Three numbers each, X, Y, U; or four, X, Y, Z, U; or six, X, Y, Z, U, V, W.
+        path: A file of poses.
+        taught_tool: The tool whose tip the poses describe; 0 when they are flange poses.
+    """
+
+    kind: Literal["points", "typed", "file"]
+    points: tuple[int, ...] = ()
+    typed: tuple[tuple[float, ...], ...] = ()
+    path: Path | None = None
+    taught_tool: int = 0
+
+    def payload(self) -> dict[str, object]:
+        """Return what the document of a calibration says about it."""
+        body: dict[str, object] = {"kind": self.kind, "taught_tool": self.taught_tool}
+        if self.kind == "points":
+            body["points"] = list(self.points)
+        elif self.path is not None:
+            body["path"] = str(self.path)
+        return body
+
+    @property
+    def sentence(self) -> str:
+        """What a report says about it."""
+        if self.kind == "points":
+            points = ", ".join(f"P{number}" for number in self.points)
+            named = tr("points taught on the pendant, {points}", points=points)
+        elif self.path is not None:
+            named = tr("poses of the file {path}", path=self.path)
+        else:
+            named = tr("typed poses")
+        return tr("{poses}; taught with tool {tool}", poses=named, tool=self.taught_tool)
+
+    def poses(self, controller: "Controller", needs: Sequence[str] = ()) -> "tuple[Pose, ...]":
+        """Return the poses; taught points are read from the controller.
+
+        Args:
+            controller: The controller, connected.
+            needs: What every pose must state besides X, Y and U.
+
+        Raises:
+            CalibrationError: ``undefined_point``, or ``non_finite`` in a file.
+            ConfigError: The file cannot be used, or a pose does not state what is needed.
+        """
+        from robolink.methods import taught_poses
+        from robolink.pose_files import read_poses
+        from robolink_cli.session.capabilities import points_of
+
+        if self.kind == "points":
+            return taught_poses(points_of(controller), self.points)
+        if self.path is not None:
+            return read_poses(self.path, needs=needs)
+        return tuple(_typed_as_pose(numbers, needs) for numbers in self.typed)
+
+
+def pose_source_options(
+    *, points: str, typed: str, path: str
+) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Add ``--points``, ``--pose``, ``--poses`` and ``--taught-tool``, passed on as ``poses``.
+
+    Args:
+        points: What the help says about taught points.
+        typed: The same about typed poses.
+        path: The same about a file of poses.
+    """
+    options = (
+        click.option("--points", metavar="N,N", help=points),
+        click.option("--pose", "typed", metavar="X,Y,..", multiple=True, help=typed),
+        click.option("--poses", "path", type=click.Path(dir_okay=False, path_type=Path), help=path),
+        click.option(
+            "--taught-tool",
+            type=click.IntRange(0, 15),
+            metavar="N",
+            help=tr("The tool that was selected when the poses were taught (0, the flange)."),
+        ),
+    )
+
+    def add(function: Callable[..., Any]) -> Callable[..., Any]:
+        @wraps(function)
+        def with_poses(
+            *args: object,
+            points: str | None,
+            typed: tuple[str, ...],
+            path: Path | None,
+            taught_tool: int | None,
+            **others: object,
+        ) -> object:
+            poses = pose_source(points=points, typed=typed, path=path, taught_tool=taught_tool)
+            return function(*args, poses=poses, **others)
+
+        command: Callable[..., Any] = with_poses
+        for option in reversed(options):
+            command = option(command)
+        return command
+
+    return add
+
+
+def pose_source(
+    *, points: str | None, typed: tuple[str, ...], path: Path | None, taught_tool: int | None
+) -> PoseSource | None:
+    """Return what the options name, ``None`` when the robot is to measure.
+
+    Raises:
+        ConfigError: More than one source, or none to which ``--taught-tool`` belongs.
+    """
+    given = {"--points": points, "--pose": typed, "--poses": path}
+    named = [name for name, value in given.items() if value]
+    if len(named) > 1:
+        raise ConfigError(
+            tr("{names} exclude each other.", names=", ".join(named)),
+            remedy=tr("Give the poses in one way only."),
+        )
+    tool = taught_tool or 0
+    if points:
+        return PoseSource("points", points=point_numbers(points), taught_tool=tool)
+    if typed:
+        poses = tuple(_typed_pose(text) for text in typed)
+        return PoseSource("typed", typed=poses, taught_tool=tool)
+    if path is not None:
+        return PoseSource("file", path=path, taught_tool=tool)
+    if taught_tool is not None:
+        raise ConfigError(
+            tr("--taught-tool belongs to poses that exist already."),
+            remedy=tr("Give them with --points, --pose or --poses."),
+        )
+    return None
+
+
+def point_numbers(text: str) -> tuple[int, ...]:
+    """Read numbers of taught points, 0 to 999: ``901,902`` or ``1-50,60``; each once.
+
+    Raises:
+        ConfigError: It is anything else.
+    """
+    numbers: dict[int, None] = {}
+    for part in text.split(","):
+        match = _RANGE.fullmatch(part.strip())
+        first, last = (int(match[1]), int(match[2] or match[1])) if match else (1, 0)
+        if first > last:
+            raise ConfigError(
+                tr("{part!r} is not a point or a range of points.", part=part),
+                remedy=tr("Write for example 901,902 or 1-50,60; points are 0 to 999."),
+            )
+        numbers |= dict.fromkeys(range(first, last + 1))
+    return tuple(numbers)
+
+
+def _typed_pose(text: str) -> tuple[float, ...]:
+    try:
+        numbers = tuple(float(part) for part in text.split(","))
+    except ValueError as error:
+        raise _no_pose(text) from error
+    if len(numbers) not in _STATED:
+        raise _no_pose(text)
+    return numbers
+
+
+def _typed_as_pose(numbers: tuple[float, ...], needs: Sequence[str]) -> "Pose":
+    from robolink.model import Pose
+
+    x_mm, y_mm, z_mm, u_deg, v_deg, w_deg = {
+        3: (*numbers[:2], 0.0, *numbers[2:], 0.0, 0.0),
+        4: (*numbers, 0.0, 0.0),
+        6: numbers,
+    }[len(numbers)]
+    stated = _STATED[len(numbers)]
+    if not set(needs) <= stated:
+        form = "X,Y,Z,U,V,W" if "v_deg" in needs else "X,Y,Z,U"
+        raise ConfigError(
+            tr("A typed pose does not state all that is needed here."),
+            remedy=tr("Write {form}, in mm and degrees.", form=form),
+        )
+    return Pose(x_mm, y_mm, z_mm, u_deg, v_deg, w_deg)
+
+
+def _no_pose(text: str) -> ConfigError:
+    return ConfigError(
+        tr("{text!r} is not a pose.", text=text),
+        remedy=tr(
+            "Write X,Y,U in mm and degrees, for example 287.5,103.25,180; or X,Y,Z,U; or "
+            "X,Y,Z,U,V,W."
+        ),
+    )

@@ -1,0 +1,217 @@
+"""The report of a tool change: the options, and a page that is written however it ends."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from robolink import __version__
+from robolink.errors import ConfigError
+from robolink.messages import tr
+from robolink_cli.console.render import note
+
+if TYPE_CHECKING:
+    from robolink.calibration import Impact, VerifyResult
+    from robolink.model import Controller, ControllerFacts, ToolOffset, ToolReceipt
+    from robolink.nozzle_change import Proposal
+    from robolink.report import Outcome, Report
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+@dataclass(frozen=True, slots=True)
+class ReportRequest:
+    """Where a report is wanted, and whether a file that is there may go."""
+
+    path: Path
+    replace: bool = False
+
+
+def report_options(function: F) -> F:
+    """Add ``--report`` and ``--force``."""
+    function = click.option(
+        "--force",
+        is_flag=True,
+        help=tr("Let --report replace a file that is there; it forces nothing else."),
+    )(function)
+    return click.option(
+        "--report",
+        "report_path",
+        metavar="FILE.html",
+        type=click.Path(dir_okay=False, path_type=Path),
+        help=tr("Write a page to keep: the offsets, the taught points as a table and a picture."),
+    )(function)
+
+
+def report_request(path: Path | None, *, force: bool) -> ReportRequest | None:
+    """Return what is wanted, checked before a connection is made; ``None`` for no report.
+
+    Raises:
+        ConfigError: The file cannot be written, or ``--force`` stands alone.
+    """
+    from robolink.named_files import require_free
+
+    if path is None:
+        if force:
+            raise ConfigError(
+                tr("--force belongs to --report."),
+                remedy=tr("Leave it out; it forces nothing else."),
+            )
+        return None
+    require_free(path, replace=force)
+    return ReportRequest(path, replace=force)
+
+
+class ReportDraft:
+    """What is known of a tool change so far.
+
+    There is something to report from :meth:`propose` on.
+    """
+
+    def __init__(self, controller: "Controller", facts: "ControllerFacts") -> None:
+        self._controller = controller.identity
+        self._facts = facts
+        self._proposed: dict[str, Any] = {}
+        self._receipt: ToolReceipt | None = None
+        self._verification: VerifyResult | None = None
+        self.saved: str | None = None
+
+    @property
+    def complete(self) -> bool:
+        """Whether there is something to report."""
+        return bool(self._proposed)
+
+    def offer(
+        self,
+        tool: int,
+        *,
+        before: "ToolOffset | None",
+        after: "ToolOffset",
+        given: tuple[str, ...],
+        impact: "Impact",
+    ) -> None:
+        """Note a typed offset that is only looked at."""
+        self._proposed = {
+            "tool": tool,
+            "before": before,
+            "after": after,
+            "determined": given,
+            "source": tr("typed"),
+            "impact": impact,
+        }
+
+    def propose(
+        self,
+        proposal: "Proposal",
+        *,
+        source: str,
+        warnings: tuple[str, ...] = (),
+        impact: "Impact | None" = None,
+    ) -> None:
+        """Note what was measured."""
+        result = proposal.result
+        self._proposed = {
+            "tool": proposal.tool,
+            "before": proposal.before,
+            "after": result.offset,
+            "determined": result.measured,
+            "method": result.method,
+            "source": source,
+            "warnings": warnings,
+            "poses": result.inputs,
+            "fit": result,
+            "impact": impact,
+        }
+
+    def note_result(self, result: "ToolReceipt | VerifyResult") -> None:
+        """Note what was written, or how the verification ended."""
+        from robolink.model import ToolReceipt
+
+        if isinstance(result, ToolReceipt):
+            self._receipt = result
+        else:
+            self._verification = result
+
+    def finish(self, error: BaseException | None) -> "Report":
+        """Return the report of a change that ended with ``error``, or well."""
+        from datetime import UTC, datetime
+
+        from robolink.report import Report
+
+        return Report(
+            made_at=datetime.now(UTC).isoformat(timespec="seconds"),
+            robolink_version=__version__,
+            controller=self._controller,
+            facts=self._facts,
+            outcome=self._outcome(error),
+            ending=_ending(error, self._proposed["tool"]),
+            verification=self._verification,
+            **self._proposed,
+        )
+
+    def _outcome(self, error: BaseException | None) -> "Outcome":
+        from robolink.errors import CalibrationError, DeclinedError, VerifyError
+        from robolink.report import Outcome
+
+        receipt = self._receipt
+        if isinstance(error, VerifyError):
+            return Outcome.VERIFY_FAILED
+        # After a write these two words would claim that nothing was written.
+        if receipt is None and isinstance(error, DeclinedError):
+            return Outcome.DECLINED
+        if receipt is None and isinstance(error, CalibrationError):
+            return Outcome.REFUSED
+        if error is not None:
+            return Outcome.UNFINISHED
+        if receipt is None:
+            return Outcome.PROPOSED
+        if receipt.skipped:
+            return Outcome.SKIPPED
+        return Outcome.WRITTEN if self._verification is None else Outcome.VERIFIED
+
+
+@contextmanager
+def reporting(request: ReportRequest | None, controller: "Controller") -> "Iterator[ReportDraft]":
+    """Collect what a command finds out, and write it at the end, whatever the end is.
+
+    A report that cannot be written changes nothing about how the command ends: it is said.
+    Nothing is written when the command ends before there is a proposal.
+    """
+    from robolink.model import ControllerFacts
+
+    draft = ReportDraft(controller, ControllerFacts() if request is None else controller.facts())
+    try:
+        yield draft
+    except BaseException as error:
+        _save(request, draft, error)
+        raise
+    _save(request, draft, None)
+
+
+def _save(request: ReportRequest | None, draft: ReportDraft, error: BaseException | None) -> None:
+    from robolink.report import save
+
+    if request is None or not draft.complete:
+        return
+    try:
+        save(draft.finish(error), request.path, replace=request.replace)
+    except ConfigError as failure:
+        note(str(failure))
+    else:
+        draft.saved = str(request.path)
+        note(tr("Report: {path}", path=request.path))
+
+
+def _ending(error: BaseException | None, tool: int) -> str:
+    from robolink.errors import OutcomeUnknownError, RobolinkError
+
+    if error is None:
+        return ""
+    look = tr("'robolink tool get {tool}' shows what tool {tool} holds.", tool=tool)
+    if isinstance(error, OutcomeUnknownError) or not isinstance(error, RobolinkError):
+        said = error if isinstance(error, RobolinkError) else tr("It was interrupted.")
+        return f"{said} {look}"
+    return str(error)

@@ -1,0 +1,127 @@
+"""The options that stand before or after a command's name."""
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import click
+from click.core import ParameterSource
+
+from robolink.messages import tr
+from robolink_cli.console.render import switch_json_on
+from robolink_cli.options.line import LINE
+from robolink_cli.session.cell import complete_cell
+
+CommandT = TypeVar("CommandT", bound=Callable[..., Any])
+
+GIVEN = "robolink.given"
+"""Where the options of all levels are collected."""
+
+_ORIGINS = "robolink.origins"
+
+
+def shared_options(command: CommandT) -> CommandT:
+    """Add the options that are accepted before and after a command's name.
+
+    For groups. What is given later, nearer to the command, wins.
+    """
+    return json_option(_link_options(command))
+
+
+def json_option(command: CommandT) -> CommandT:
+    """Add ``--json`` alone, for a command that needs no controller."""
+    return click.option(
+        "--json",
+        "json_",
+        is_flag=True,
+        expose_value=False,
+        callback=_note_json,
+        help=tr("Print one JSON document on stdout; text goes to stderr."),
+    )(command)
+
+
+def origin_of(option: str) -> str | None:
+    """Return the option or variable by which a person gave ``option``, None when nobody did."""
+    origins: dict[str, str] = click.get_current_context().meta.get(_ORIGINS, {})
+    return origins.get(option)
+
+
+def _link_options(command: CommandT) -> CommandT:
+    options = (
+        click.option(
+            "-c",
+            "--controller",
+            "url",
+            metavar="CELL|URL",
+            envvar="ROBOLINK_CONTROLLER",
+            show_envvar=True,
+            expose_value=False,
+            callback=_keep,
+            shell_complete=complete_cell,
+            help=tr("A cell of the cell files, or a URL like epson+tcp://192.168.0.1:5000."),
+        ),
+        click.option(
+            "--password-file",
+            type=click.Path(dir_okay=False),
+            expose_value=False,
+            callback=_keep,
+            help=tr("File whose first line is the controller's password; readable by you only."),
+        ),
+        click.option(
+            "--timeout",
+            "timeout_s",
+            metavar="S",
+            type=click.FloatRange(min=0, min_open=True),
+            expose_value=False,
+            callback=_keep,
+            help=tr("Longest wait for one answer, in seconds (3)."),
+        ),
+        click.option(
+            "--remote-timeout",
+            "remote_timeout_s",
+            metavar="S",
+            type=click.FloatRange(min=0),
+            expose_value=False,
+            callback=_keep,
+            help=tr(
+                "The remote time-out set in the controller, in seconds (60); 0 forbids motion."
+            ),
+        ),
+        click.option(
+            "--operator",
+            metavar="ID",
+            type=LINE,
+            envvar="ROBOLINK_OPERATOR",
+            show_envvar=True,
+            expose_value=False,
+            callback=_keep,
+            help=tr("Badge or name of who works here, for the record and the role."),
+        ),
+        click.option(
+            "--record",
+            metavar="FILE",
+            type=click.Path(dir_okay=False),
+            expose_value=False,
+            callback=_keep,
+            help=tr("Append the dialogue with the controller to FILE, without the password."),
+        ),
+    )
+    for option in reversed(options):
+        command = option(command)
+    return command
+
+
+def _keep(context: click.Context, parameter: click.Parameter, value: object) -> None:
+    given: dict[str, object] = context.meta.setdefault(GIVEN, {})
+    name = str(parameter.name)
+    # The environment speaks at each level of the command line, and must not overrule what
+    # was written at an earlier one.
+    typed = context.get_parameter_source(name) is ParameterSource.COMMANDLINE
+    if value is not None and (typed or name not in given):
+        given[name] = value
+        origin = parameter.opts[-1] if typed else str(parameter.envvar)
+        context.meta.setdefault(_ORIGINS, {})[name] = origin
+
+
+def _note_json(context: click.Context, parameter: click.Parameter, value: bool) -> None:  # noqa: ARG001 - click's form
+    if value:
+        switch_json_on(context)

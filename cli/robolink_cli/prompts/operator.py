@@ -1,0 +1,211 @@
+"""The person at the terminal, and the simulator's stand-in for one."""
+
+import math
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cache
+from typing import TYPE_CHECKING, Final
+
+from robolink.errors import DeclinedError
+from robolink.messages import tr
+from robolink.runner import Operator, Question
+from robolink_cli.console.render import note
+from robolink_cli.prompts.lines import QUIET_S, Lines, open_lines
+
+if TYPE_CHECKING:
+    from robolink_simulators.cell.places import Axis, XyzMm
+
+WAY_MM: Final = 60.0
+"""How far the stand-in jogs to show an axis."""
+
+MOST_STEPS: Final = 300
+"""So many answers to one question are enough for 1.5 m of jogging: the stand-in gives up then."""
+
+
+class TerminalOperator:
+    """Asks on the terminal, with a prompt that can be polled.
+
+    The caller can look after the controller while the person takes their time; ``input()`` could
+    not be left. What was typed before something was shown is no answer to it: see :mod:`._lines`.
+    """
+
+    def __init__(self, show: Callable[[str], None]) -> None:
+        self._show = show
+        self._lines: Lines | None = None
+
+    def tell(self, text: str) -> None:
+        """Show a line."""
+        if self._lines is not None:
+            self._forget(0.0)
+        self._show(text)
+
+    def ask(self, question: str, kind: Question) -> None:
+        """Show what is wanted and how to answer."""
+        if self._lines is None:
+            self._lines = open_lines()
+        self._forget(QUIET_S)
+        self._show(f"{question} [{_how(kind)}]")
+
+    def poll(self, wait_s: float) -> str | None:
+        """Return the next line; the end of input counts as a no.
+
+        Raises:
+            DeclinedError: There is nobody to answer.
+        """
+        assert self._lines is not None  # noqa: S101 - a question is shown before it is answered
+        try:
+            return self._lines.next(wait_s)
+        except EOFError as error:
+            raise DeclinedError(
+                tr("The input ended before the question was answered."),
+                remedy=tr("Run it on a terminal, or with --assist on a simulator."),
+            ) from error
+
+    def _forget(self, quiet_s: float) -> None:
+        assert self._lines is not None  # noqa: S101 - looked at by whoever calls
+        for line in self._lines.forget(quiet_s):
+            if line.strip():
+                self._show(tr("Typed too early, so it was not taken: {line!r}", line=line))
+
+
+def _how(kind: Question) -> str:
+    """Return how a question is answered."""
+    if kind is Question.PLACE:
+        return tr("steps like x+0.1 z-0.5; ENTER when it is on the pin; q ends")
+    if kind is Question.TEXT:
+        return tr("type it, then ENTER; q ends")
+    if kind is Question.YES_NO:
+        return tr("y or n")
+    return tr("steps like x+5 z-0.5; ENTER when it is there; q ends")
+
+
+@cache
+def terminal() -> TerminalOperator:
+    """Return the one operator of this process's terminal: two would share the input badly."""
+    return TerminalOperator(note)
+
+
+class AssistedOperator:
+    """Stands in for the person on a simulator: looks at the tip and types jog steps.
+
+    Args:
+        look: Returns the vector, in mm, that the simulated person sees from the tip to the
+            pin.
+        show: Where to echo questions and answers.
+        way: Returns the vector, in mm, along an axis of the tool as the simulated person sees it;
+            without it they know of none, and jog nowhere to show one.
+        max_step_mm: Largest step it types at once.
+        satisfied_mm: Content when less than this is seen on each axis; an eye that reads
+            with an error would otherwise jog for ever.
+    """
+
+    def __init__(
+        self,
+        look: "Callable[[], XyzMm]",
+        show: Callable[[str], None],
+        *,
+        way: "Callable[[Axis], XyzMm]" = lambda _axis: (0.0, 0.0, 0.0),
+        max_step_mm: float = 5.0,
+        satisfied_mm: float = 0.02,
+    ) -> None:
+        self._look = look
+        self._show = show
+        self._way = way
+        self._max_step_mm = max_step_mm
+        self._satisfied_mm = satisfied_mm
+        self._kind = Question.PLACE
+        self._ahead: list[str] = []
+        self._answers = 0
+
+    def tell(self, text: str) -> None:
+        """Echo a line."""
+        self._show(text)
+
+    def ask(self, question: str, kind: Question) -> None:
+        """Echo the question."""
+        self._kind = kind
+        self._answers = 0
+        self._ahead = list(self._steps_along(kind))
+        self._show(question)
+
+    def poll(self, wait_s: float) -> str | None:  # noqa: ARG002 - it answers at once
+        """Answer: the jog steps still needed, or done.
+
+        Raises:
+            DeclinedError: It has answered this question so often that it will never get there.
+        """
+        self._answers += 1
+        if self._answers > MOST_STEPS:
+            raise DeclinedError(
+                tr(
+                    "The simulated operator did not get there in {count} steps.",
+                    count=MOST_STEPS,
+                ),
+                remedy=tr("Look where pin and tip are: robolink sim assist URL truth"),
+            )
+        if self._kind is Question.YES_NO:
+            return "y"
+        if self._kind is Question.TEXT:
+            return tr("simulated")
+        if self._kind is Question.PLACE:
+            steps, arrived = self._steps_to_pin(), tr("on the pin")
+        else:
+            steps, arrived = self._ahead.pop(0) if self._ahead else "", tr("there")
+        self._show(tr("  operator: {answer}", answer=steps or arrived))
+        return steps or "done"
+
+    def _steps_to_pin(self) -> str:
+        # Sideways first, down last, as one does with a needle.
+        dx_mm, dy_mm, dz_mm = self._look()
+        return self._steps({"x": dx_mm, "y": dy_mm}) or self._steps({"z": dz_mm})
+
+    def _steps_along(self, kind: Question) -> Iterator[str]:
+        """Yield the steps of a way along an axis, or up to where both ways have room."""
+        if kind is Question.ROOM:
+            lowest_mm = min(self._way("x")[2], self._way("z")[2])
+            way_mm = (0.0, 0.0, max(0.0, -lowest_mm))
+        elif kind is Question.ALONG_X:
+            way_mm = self._way("x")
+        elif kind is Question.ALONG_Z:
+            way_mm = self._way("z")
+        else:
+            return
+        pieces = math.ceil(max(map(abs, way_mm)) / self._max_step_mm)
+        gone = [0.0, 0.0, 0.0]
+        for piece in range(1, pieces + 1):
+            # What one step was rounded by, the next one makes good.
+            step = [round(mm * piece / pieces - at, 3) for mm, at in zip(way_mm, gone, strict=True)]
+            gone = [at + by for at, by in zip(gone, step, strict=True)]
+            yield " ".join(f"{axis}{by:+.3f}" for axis, by in zip("xyz", step, strict=True))
+
+    def _steps(self, wanted: dict[str, float]) -> str:
+        if all(abs(distance_mm) < self._satisfied_mm for distance_mm in wanted.values()):
+            return ""
+        limit = self._max_step_mm
+        steps = {axis: max(-limit, min(limit, mm)) for axis, mm in wanted.items()}
+        return " ".join(f"{axis}{step:+.3f}" for axis, step in steps.items())
+
+
+@contextmanager
+def operator_at(assist_url: str | None, tool: Callable[[], int]) -> Iterator[Operator]:
+    """Yield the person at the terminal, or a simulator's stand-in for one.
+
+    Args:
+        assist_url: The simulator's assist URL, ``None`` for a real person.
+        tool: Tells which tip the stand-in is to look at.
+    """
+    if assist_url is None:
+        yield terminal()
+        return
+    from robolink_simulators.assist.port import open_eyes
+
+    with open_eyes(assist_url) as eyes:
+
+        def look() -> "XyzMm":
+            seen = eyes.look(tool())
+            return seen.dx_mm, seen.dy_mm, seen.dz_mm
+
+        def way(axis: "Axis") -> "XyzMm":
+            return eyes.way_along(axis, WAY_MM, tool())
+
+        yield AssistedOperator(look, note, way=way)

@@ -1,0 +1,77 @@
+"""Who works at the cell, and with which nozzle: what goes with every entry of the journal."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from robolink.errors import ConfigError
+from robolink.messages import tr
+from robolink_cli.console.render import json_is_on
+from robolink_cli.options.line import LINE
+
+if TYPE_CHECKING:
+    from robolink.config import Expected
+    from robolink.model import Signature
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def nozzle_options(function: F) -> F:
+    """Add ``--nozzle`` and ``--lot``."""
+    options = (
+        click.option(
+            "--nozzle",
+            metavar="ID",
+            type=LINE,
+            help=tr("Id of the nozzle or needle that is mounted, for the record."),
+        ),
+        click.option("--lot", metavar="LOT", type=LINE, help=tr("Its lot, for the record.")),
+    )
+    for option in reversed(options):
+        function = option(function)
+    return function
+
+
+def signature_of(operator: str | None, cell: "Expected | None", *, changes: bool) -> "Signature":
+    """Return who works here, with the role that the cell file gives.
+
+    Where the cell names people, a change asks for a badge on a terminal; who is not known
+    counts as an operator.
+
+    Args:
+        operator: The badge or name that was given.
+        cell: What the cell file says, if ``-c`` named a cell.
+        changes: Whether the command may change something.
+
+    Raises:
+        ConfigError: The cell names people, and this is none of them.
+        DeclinedError: Nobody gave a name.
+    """
+    from robolink import __version__
+    from robolink.journal import signature_here
+    from robolink.model import Role
+
+    people = cell.people if cell else None
+    here = signature_here(__version__)
+    if people is None:
+        return replace(here, operator=operator or "")
+    if operator is None and changes:
+        operator = _asked_for_badge()
+    if not operator:
+        return replace(here, role=Role.OPERATOR)
+    if operator not in people:
+        raise ConfigError(
+            tr("{operator!r} is not among the people of this cell.", operator=operator),
+            remedy=tr("Give --operator as the cell file has it, or have it added there: 'people'."),
+        )
+    return replace(here, operator=operator, role=people[operator])
+
+
+def _asked_for_badge() -> str:
+    from robolink_cli.prompts.consent import asked_for_text, on_terminal
+
+    if json_is_on() or not on_terminal():
+        return ""
+    return LINE.convert(asked_for_text(tr("Who works here (badge or name)?")), None, None)

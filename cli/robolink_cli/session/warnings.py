@@ -1,0 +1,149 @@
+"""What a person must know about something that was begun and not proved finished."""
+
+from contextlib import suppress
+from typing import TYPE_CHECKING
+
+from robolink.messages import tr
+from robolink_cli.console.render import note
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from robolink.model import Controller, Marker, OutcomeLog, ToolOffset
+
+
+def note_unsettled(controller: "Controller", markers: "Sequence[Marker]", url: str) -> None:
+    """Say what was begun and not proved finished, and what to do about each.
+
+    Args:
+        controller: The controller, connected; the link may be gone.
+        markers: What to tell of.
+        url: How a person names the controller.
+    """
+    from robolink.model import MarkerKind
+
+    if not markers or note_at_work(controller.outcomes, url):
+        return
+    for marker in markers:
+        if marker.kind is MarkerKind.SELECTION:
+            note(_unfinished(marker, url, _selected_now(controller, marker)))
+        else:
+            note(marker_notice(marker, url))
+
+
+def note_at_work(outcomes: "OutcomeLog", url: str) -> bool:
+    """Say who else is working on a controller; return whether somebody is.
+
+    What is open then is not left behind: whoever began it puts it back himself.
+    """
+    from robolink.errors import JournalError
+
+    working = ""
+    with suppress(JournalError):
+        working = outcomes.at_work()
+    if working:
+        what = tr(
+            "What it has begun it ends itself; there is nothing to recover. Wait for it, or "
+            "'robolink -c {url} stop'.",
+            url=url,
+        )
+        note(f"{working}\n  {what}")
+    return bool(working)
+
+
+def marker_notice(marker: "Marker", url: str) -> str:
+    """Return the sentences about an unsettled marker, and the command that settles it."""
+    from robolink.model import MarkerKind
+
+    if marker.kind is MarkerKind.SELECTION:
+        return _unfinished(marker, url, str(marker.details.get("now", "?")))
+    if marker.kind is MarkerKind.HISTORY:
+        return _record_missing(marker, url)
+    if marker.kind is MarkerKind.CHANGE:
+        return tr(
+            "Not finished since {when}: {request}.\n  'robolink -c {url} recover' settles it.",
+            when=marker.begun_at,
+            request=marker.request,
+            url=url,
+        )
+    return tr(
+        "Sent {when} without a clear answer: {request}. It may or may not have run, so motion is "
+        "blocked.\n  'robolink -c {url} recover' settles it.",
+        when=marker.begun_at,
+        request=marker.request,
+        url=url,
+    )
+
+
+def _record_missing(marker: "Marker", url: str) -> str:
+    details = marker.details
+    journal, before = str(details.get("journal", "")), str(details.get("before", ""))
+    said = tr(
+        "This controller was changed from here before, but the journal {journal} knows nothing of "
+        "it: what was left unfinished does not show.",
+        journal=journal,
+    )
+    if before and before != journal:
+        said += " " + tr("Its record was kept in {before}.", before=before)
+    remedy = tr(
+        "Look at the selected tool and at the tools first. 'robolink -c {url} recover' begins a "
+        "new record on your word.",
+        url=url,
+    )
+    return f"{said}\n  {remedy}"
+
+
+def note_change(controller: "Controller", tool: int, now: "ToolOffset | None") -> None:
+    """Say when a tool does not hold what was last proved to be in it, and the usual causes."""
+    from robolink.errors import JournalError
+    from robolink.transaction import changed_since
+
+    # What is wrong with the journal is said once, when the command is done.
+    with suppress(JournalError):
+        change = changed_since(controller, tool, now)
+        if change is not None:
+            note(change.sentence)
+
+
+def _selected_now(controller: "Controller", marker: "Marker") -> str:
+    """Return which tool is in force: read, or else as far as the markers know it."""
+    from robolink.errors import RobolinkError
+
+    try:
+        return str(controller.tools.selected())
+    except RobolinkError:
+        # A selection that was sent and not proved: it may be that tool, or still the one of
+        # before.
+        now = str(marker.details.get("now", "?"))
+        for other in controller.outcomes.open_markers():
+            asked = str(other.details.get("select", now))
+            if asked != now:
+                return tr("{asked} or {now}", asked=asked, now=now)
+        return now
+
+
+def _unfinished(marker: "Marker", url: str, now: str) -> str:
+    before = str(marker.details.get("tool", "?"))
+    parts = [
+        tr("Not finished since {when}: {request}.", when=marker.begun_at, request=marker.request)
+    ]
+    if now == before:
+        parts.append(tr("Tool {tool} is selected, as before.", tool=now))
+    else:
+        parts.append(
+            tr(
+                "Tool {now} is selected now; it was tool {tool} before.",
+                now=now,
+                tool=before,
+            )
+        )
+    if now == before:
+        remedy = tr("'robolink -c {url} recover' settles it.", url=url)
+    else:
+        remedy = tr(
+            "'robolink -c {url} recover' puts tool {tool} back, with the power mode and speed of "
+            "then.",
+            url=url,
+            tool=before,
+        )
+    return f"{' '.join(parts)}\n  {remedy}"

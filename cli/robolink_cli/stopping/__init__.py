@@ -1,0 +1,1 @@
+"""Stopping before anything else, and what a stop leaves behind."""

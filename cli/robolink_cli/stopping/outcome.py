@@ -1,0 +1,161 @@
+"""What is told, noted and looked at once the robot stands, or once it is known that it may not."""
+
+from contextlib import suppress
+
+from robolink.errors import JournalError, LeaseHeldError, RobolinkError
+from robolink.messages import tr
+from robolink.stopping import leave_note
+from robolink.transport import parse_url
+from robolink_cli.stopping.request import StopRequest
+from robolink_cli.stopping.stop_first import StopOutcome, is_beside_another, who_asks
+
+
+class Telling:
+    """Says how a stop ended, then what stood in its way and did not hold it back.
+
+    Args:
+        request: What was asked for.
+        outcome: What became of it.
+    """
+
+    def __init__(self, request: StopRequest, outcome: StopOutcome) -> None:
+        self._request = request
+        self._outcome = outcome
+
+    def payload(self) -> dict[str, object]:
+        """Return what the document of a stop that ended well holds."""
+        outcome = self._outcome
+        return {
+            "stopped": True,
+            "controller": _shown(outcome.url),
+            "state": outcome.state,
+            "stopped_by": outcome.holder or None,
+        }
+
+    def sentence(self) -> str:
+        """Return what a person is told of a stop that ended well."""
+        outcome = self._outcome
+        named, state = _shown(outcome.url), outcome.state
+        if outcome.holder:
+            return tr(
+                "{controller} stands; its state is: {state}. {holder} had it, and stopped.",
+                controller=named,
+                state=state,
+                holder=outcome.holder,
+            )
+        return tr("{controller} stands; its state is: {state}.", controller=named, state=state)
+
+    def remarks(self) -> list[str]:
+        """Leave the note, look at what was not looked at before, and return what is to be said."""
+        outcome = self._outcome
+        told = [*outcome.doubts]
+        if outcome.may_stand and outcome.keys:
+            told += self._noted()
+        told += self._recorded()
+        told += self._journal()
+        if told and outcome.error is None:
+            told.append(tr("None of this kept the stop back."))
+        if outcome.error is None:
+            told.append(
+                tr("Nothing moves with --yes before 'robolink reset' or 'robolink release'.")
+            )
+        return told
+
+    def explain_the_holder(self) -> None:
+        """Add to the error of a login that is taken who has it, as far as the record knows."""
+        error = self._outcome.error
+        if not isinstance(error, RobolinkError) or not is_beside_another(error):
+            return
+        with suppress(RobolinkError):
+            self._look_at_the_lease(error)
+
+    def _look_at_the_lease(self, error: RobolinkError) -> None:
+        from robolink import __version__
+        from robolink.journal import default_location, may_exist, open_journal, signature_here
+
+        if not may_exist(default_location()):
+            return
+        address = parse_url(self._outcome.url).address
+        log = open_journal(read_only=True).log(address, signature=signature_here(__version__))
+        try:
+            log.look()
+        except LeaseHeldError as held:
+            error.what = f"{error.what} {held.what}"
+            error.remedy = tr(
+                "The stop is not confirmed: press the emergency stop, or stop it at that "
+                "computer, which alone can."
+            )
+
+    def _noted(self) -> list[str]:
+        outcome = self._outcome
+        from robolink_cli.stopping.notes import last_known
+
+        if "+sim://" in outcome.url:
+            return []  # it ends with this process, and nobody else moves it
+        try:
+            leave_note(
+                outcome.keys,
+                _shown(outcome.url),
+                who_asks(self._request),
+                confirmed=outcome.error is None,
+                controller=outcome.controller,
+                last_known="" if outcome.controller else last_known(outcome.url),
+            )
+        except OSError as error:
+            return [
+                tr(
+                    "The note of this stop could not be kept ({cause}): the next command that "
+                    "moves does not know of it.",
+                    cause=error.strerror or error,
+                )
+            ]
+        return []
+
+    def _recorded(self) -> list[str]:
+        if not self._request.record:
+            return []
+        from robolink_cli.session.recording import recording
+
+        try:
+            with recording(self._request.record, _shown(self._outcome.url)) as trace:
+                for at_ns, direction, data in self._outcome.heard:
+                    if trace is not None:
+                        trace(at_ns, direction, data)
+        except RobolinkError as error:
+            return [error.what]
+        return []
+
+    def _journal(self) -> list[str]:
+        """Return what the journal has to say: that it is damaged, or what was left unfinished."""
+        from robolink.journal import default_location, may_exist, open_journal
+
+        try:
+            if not may_exist(default_location()):
+                return []
+            journal = open_journal(read_only=True)
+            address = parse_url(self._outcome.url).address if self._outcome.keys else ""
+            log = journal.log(address)
+            open_now = log.open_markers()
+        except JournalError as error:
+            return [error.what]
+        from robolink_cli.session.warnings import marker_notice, note_at_work
+
+        if open_now and note_at_work(log, self._request.named):
+            return []
+        return [marker_notice(marker, self._request.named) for marker in open_now]
+
+
+def _shown(url: str) -> str:
+    return url.partition("?")[0]
+
+
+def requests_of(request: StopRequest) -> tuple[str, ...]:
+    """Return what a stop would send, as a dry run shows it; nothing is opened.
+
+    Raises:
+        ConfigError: No controller is named, or it is not known where it is.
+    """
+    from robolink.controllers import stop_requests
+    from robolink_cli.stopping.notes import url_of
+
+    return stop_requests(url_of(request))

@@ -1,0 +1,220 @@
+"""Stopping before anything else is looked at.
+
+No journal, no lease, no question, no click: what these have to say is said afterwards. Of the
+cell file only the address and the place of the password are read. A process of this computer
+that has the controller is asked to stop it, where it is the only one who can; a Modbus server
+serves several clients, so there the stop goes out directly and that process hears of it then.
+"""
+
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Final
+
+from robolink.controllers import advise_emergency_stop, stop_now
+from robolink.errors import (
+    ConfigError,
+    ConnectError,
+    LoginRefusedError,
+    LoginUnansweredError,
+    RobolinkError,
+)
+from robolink.messages import tr
+from robolink.stopping import HolderGoneError, far_end_of, holders_of
+from robolink_cli.stopping.request import StopRequest
+
+if TYPE_CHECKING:
+    from robolink.transport import Direction
+
+_SEVERAL_CLIENTS: Final = "+modbus-tcp://"
+
+
+@dataclass
+class StopOutcome:
+    """What became of a stop.
+
+    Attributes:
+        url: Whom it was for; empty when that is not known.
+        state: The controller's state at rest; empty when it was not seen.
+        holder: Who stopped it for us; empty when this process did.
+        error: Why it is not confirmed.
+        keys: The far end.
+        controller: Which controller it is, as it said itself once it stood; empty where it
+            did not.
+        doubts: What was wrong on the way, and did not keep the stop back.
+        heard: What went over the connection: time, direction, bytes; without the login.
+    """
+
+    url: str = ""
+    state: str = ""
+    holder: str = ""
+    error: BaseException | None = None
+    keys: frozenset[str] = frozenset()
+    controller: str = ""
+    doubts: list[str] = field(default_factory=list)
+    heard: "list[tuple[int, Direction, bytes]]" = field(default_factory=list)
+
+    @property
+    def may_stand(self) -> bool:
+        """Whether a stop left this computer, so that the next one who moves must hear of it."""
+        kept_back = (ConfigError, ConnectError, LoginRefusedError)
+        return self.error is None or not isinstance(self.error, kept_back)
+
+
+def stop_first(request: StopRequest) -> StopOutcome:
+    """Stop what the request names; whatever fails stands in the outcome."""
+    outcome = StopOutcome()
+    try:
+        _stop(request, outcome)
+    except RobolinkError as error:
+        outcome.error = advise_emergency_stop(error)
+    except (Exception, KeyboardInterrupt) as error:
+        outcome.error = error
+    return outcome
+
+
+def who_asks(request: StopRequest) -> str:
+    """Return who stops, as the person at another terminal is told."""
+    import getpass  # here, because a stop without anybody to tell does without it
+
+    try:
+        user = getpass.getuser()
+    except (OSError, KeyError, ImportError):
+        user = "?"
+    named = request.operator or user
+    return tr("{who} (process {pid})", who=named, pid=os.getpid())
+
+
+def _stop(request: StopRequest, outcome: StopOutcome) -> None:
+    password_file = request.password_file or os.environ.get("ROBOLINK_PASSWORD_FILE", "")
+    password_env = ""
+    if not request.named:
+        raise ConfigError(
+            tr("No controller is named."),
+            remedy=tr(
+                "Give -c CELL from a cell file, or -c URL, for example "
+                "-c epson+tcp://192.168.0.1:5000, or set ROBOLINK_CONTROLLER."
+            ),
+        )
+    outcome.url = request.named
+    if "+" not in request.named and "://" not in request.named:
+        from robolink.config import reach_cell
+
+        reach = reach_cell(request.named)
+        outcome.url, password_env = reach.url, reach.password_env
+        password_file = password_file or reach.password_file
+        outcome.doubts += [reach.doubt] if reach.doubt else []
+    outcome.keys = far_end_of(outcome.url)
+    if _SEVERAL_CLIENTS in outcome.url:
+        try:
+            _directly(request, outcome, password_file, password_env)
+        except RobolinkError:
+            if not _through_holder(request, outcome, also=_last_known(outcome.url)):
+                raise
+        else:
+            _through_holder(request, outcome)
+        return
+    refusals: list[RobolinkError] = []
+    if _through_holder(request, outcome, refusals):
+        return
+    try:
+        _directly(request, outcome, password_file, password_env)
+    except ConnectError as error:
+        if not _through_holder(request, outcome, also=_last_known(outcome.url)):
+            raise (refusals or [error])[0] from error
+    else:
+        # Whoever has it by another address, a PLC over the network, hears of it now.
+        _through_holder(request, outcome)
+
+
+def _last_known(url: str) -> str:
+    """Return who was met last at an address that does not answer; the journal is read for that.
+
+    Nothing is kept back by it: the stop was tried at the address itself before.
+    """
+    from robolink_cli.stopping.notes import last_known
+
+    return last_known(url)
+
+
+def _through_holder(
+    request: StopRequest,
+    outcome: StopOutcome,
+    refusals: list[RobolinkError] | None = None,
+    *,
+    also: str = "",
+) -> bool:
+    """Let whoever has the controller on this computer stop it; False when nobody did.
+
+    Args:
+        request: What was asked for.
+        outcome: Tells the far end and the controller, and takes what becomes of it.
+        refusals: Takes why one could not stop it.
+        also: The controller's own name, where it is not known from itself.
+    """
+    names = {name for name in (outcome.controller, also) if name}
+    for holder in holders_of(outcome.keys | names):
+        try:
+            state = holder.ask_to_stop(who_asks(request))
+        except HolderGoneError:
+            continue
+        except RobolinkError as error:
+            if refusals is not None:
+                refusals.append(error)
+            continue
+        outcome.state = outcome.state or state
+        outcome.holder = holder.who or tr("process {pid}", pid=holder.pid)
+        outcome.controller = outcome.controller or holder.controller
+        return True
+    return False
+
+
+def _directly(request: StopRequest, outcome: StopOutcome, file: str, variable: str) -> None:
+    def met(name: str) -> None:
+        outcome.controller = name
+
+    refused: LoginRefusedError | None = None
+    for password in _passwords(outcome, file, variable):
+        try:
+            status = stop_now(
+                outcome.url,
+                password=password,
+                timeout_s=request.timeout_s,
+                trace=(lambda *passage: outcome.heard.append(passage)) if request.record else None,
+                met=met,
+            )
+        except LoginRefusedError as error:
+            refused = refused or error
+            continue
+        outcome.state = str(status.state)
+        return
+    if refused is not None:
+        raise refused
+
+
+def _passwords(outcome: StopOutcome, file: str, variable: str) -> Iterator[str]:
+    """Yield what may open the controller; the keyring last, because it is slow, or asks."""
+    if not outcome.url.startswith("epson+"):
+        yield ""
+        return
+    from robolink_cli.session.password import from_keyring, from_places
+
+    try:
+        near = from_places(file or None, variable or None)
+    except ConfigError as error:
+        outcome.doubts.append(error.what)
+        near = None
+    if near is not None:
+        yield near.reveal()
+    from robolink.transport import parse_url
+
+    stored = from_keyring(parse_url(outcome.url).identity)
+    if stored is not None:
+        yield stored.reveal()
+    elif near is None:
+        yield ""
+
+
+def is_beside_another(error: BaseException) -> bool:
+    """Whether a stop failed because the controller serves another client."""
+    return isinstance(error, LoginUnansweredError)

@@ -1,0 +1,152 @@
+"""What a calibration shows and reports."""
+
+from collections.abc import Mapping, Sequence
+
+from robolink.calibration import VerifyResult
+from robolink.messages import tr
+from robolink.nozzle_change import PlannedStep, Proposal, ToolReport, Verdict
+from robolink.runner import TeachPrompt
+from robolink_cli.console.render import note, say
+from robolink_cli.views.documents import (
+    offset_payload,
+    proposal_payload,
+    receipt_payload,
+    verification_payload,
+)
+from robolink_cli.views.doubts import doubts as doubts
+from robolink_cli.views.fit import remarks, show_residuals
+from robolink_cli.views.tables import show_change
+
+
+def show_proposal(proposal: Proposal) -> None:
+    """Show what was measured next to what is stored, how sure it is, and what is in doubt."""
+    show_change(
+        proposal.tool,
+        offset_payload(proposal.before),
+        offset_payload(proposal.offset),
+        after_name=tr("measured") if proposal.measured is None else tr("proposed"),
+        unmeasured=proposal.kept,
+    )
+    result = proposal.result
+    for remark in (*proposal.notes, *remarks(result)):
+        say(f"  {remark}")
+    if result.residuals_mm:
+        show_residuals(result)
+    for sentence in doubts(proposal):
+        say(f"  ! {sentence}")
+
+
+def show_verdicts(verdicts: Sequence[Verdict]) -> None:
+    """Show what the limits say about a proposal."""
+    for verdict in verdicts:
+        mark = tr("ok") if verdict.passed else tr("too much")
+        say(
+            tr(
+                "  {name} {found:.3f} mm, {limit:.3f} mm allowed: {mark}",
+                name=verdict.name,
+                found=verdict.found_mm,
+                limit=verdict.limit_mm,
+                mark=mark,
+            )
+        )
+
+
+def show_report(report: ToolReport) -> None:
+    """Say what was written and how the verification ended."""
+    tool, receipt = report.proposal.tool, report.receipt
+    if receipt is None:
+        return
+    if receipt.skipped:
+        say(tr("Tool {tool} held this value already; nothing was written.", tool=tool))
+    else:
+        say(tr("Tool {tool} was written and read back.", tool=tool))
+    if report.verification is None:
+        say(tr("It was not verified."))
+        return
+    for drift in report.verification.drifts:
+        say(
+            tr(
+                "  drift at U {u:.1f}: {distance:.3f} mm",
+                u=drift.u_deg,
+                distance=drift.distance_mm,
+            )
+        )
+    say(_proof(report.verification))
+
+
+def _proof(verification: VerifyResult) -> str:
+    """Return how the verification ended, in one sentence."""
+    found = {"drift": verification.max_drift_mm, "limit": verification.tolerance_mm}
+    if verification.heights_only:
+        return tr(
+            "Touched again it is {drift:.3f} mm off at most ({limit:.3f} mm allowed).", **found
+        )
+    return tr(
+        "Turned about the new tip it drifts {drift:.3f} mm at most ({limit:.3f} mm allowed).",
+        **found,
+    )
+
+
+def judged_payload(proposal: Proposal, verdicts: Sequence[Verdict]) -> dict[str, object]:
+    """Return a proposal with what the limits say about it."""
+    judged = [
+        {
+            "code": verdict.code,
+            "found_mm": verdict.found_mm,
+            "limit_mm": verdict.limit_mm,
+            "passed": verdict.passed,
+        }
+        for verdict in verdicts
+    ]
+    return {**proposal_payload(proposal), "verdicts": judged}
+
+
+def report_payload(report: ToolReport) -> dict[str, object]:
+    """Return the document of a finished calibration."""
+    return {
+        **judged_payload(report.proposal, report.verdicts),
+        "write": receipt_payload(report.receipt) if report.receipt else None,
+        "verification": verification_payload(report.verification),
+    }
+
+
+def show_course(steps: Sequence[PlannedStep]) -> None:
+    """Say how a measurement will go, before anybody is asked."""
+    moves = sum(step.target is not None for step in steps)
+    asks = sum(step.shown is TeachPrompt.PIN for step in steps)
+    ways = sum(step.shown in (TeachPrompt.ALONG_X, TeachPrompt.ALONG_Z) for step in steps)
+    if ways:
+        plan = tr(
+            "The plan: touches of the pin by a person: {asks}; ways along the tool's axes shown by "
+            "a person: {ways}; movements of the robot between them: {moves}.",
+            asks=asks,
+            ways=ways,
+            moves=moves,
+        )
+    elif asks:
+        plan = tr(
+            "The plan: touches of the pin by a person: {asks}; movements of the robot between "
+            "them: {moves}.",
+            asks=asks,
+            moves=moves,
+        )
+    else:
+        plan = tr("The plan: {moves} movements of the robot; nobody touches anything.", moves=moves)
+    note(tr("{plan} All targets lie inside the box; --dry-run lists them.", plan=plan))
+
+
+def show_plan(payload: Mapping[str, object]) -> None:
+    """Show a dry run."""
+    say(tr("Dry run; nothing is sent. The measurement of tool {tool}:", tool=payload["tool"]))
+    show_steps(payload["steps"])
+
+
+def show_steps(steps: object) -> None:
+    """Show the steps of :func:`planned_steps`."""
+    assert isinstance(steps, list)  # noqa: S101 - made by planned_steps
+    for number, step in enumerate(steps, start=1):
+        say(f"{number:3}. {step['text']}")
+        for request in step["requests"]:
+            say(f"       {request}")
+        if step["refusal"]:
+            say(f"       {step['refusal']}")

@@ -1,0 +1,124 @@
+"""What the ``config`` commands show."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from robolink.config import Cell, check_file, config_files, load_cells
+from robolink.errors import ConfigError
+from robolink.messages import tr
+from robolink_cli.console.render import say
+from robolink_cli.session.cell import link_options
+from robolink_cli.session.context import CliContext, origin_of
+
+
+def files_payload() -> list[dict[str, object]]:
+    """Return the places looked at, the one that wins first."""
+    return [
+        {"source": file.source, "path": str(file.path), "exists": file.path.is_file()}
+        for file in config_files()
+    ]
+
+
+def show_files(files: Sequence[Mapping[str, object]]) -> None:
+    """Print the places, one a line."""
+    why = {
+        "named": tr("named by ROBOLINK_CONFIG"),
+        "folder": tr("the working folder's"),
+        "user": tr("the user's"),
+        "site": tr("for everybody on this computer"),
+    }
+    for file in files:
+        found = tr("found") if file["exists"] else tr("not there")
+        say(f"{file['path']}\n    {why[str(file['source'])]}: {found}")
+
+
+def check_payload(file: Path | None) -> dict[str, Any]:
+    """Return what is wrong in one file, or in all that are in use and in how they agree."""
+    paths = [file] if file else [found.path for found in config_files() if found.present]
+    files = [_checked(path) for path in paths]
+    disagreement = None
+    if file is None and all(not entry["problems"] for entry in files):
+        try:
+            load_cells()
+        except ConfigError as error:
+            disagreement = error.what
+    ok = disagreement is None and all(not entry["problems"] for entry in files)
+    return {"ok": ok, "files": files, "disagreement": disagreement}
+
+
+def show_check(payload: Mapping[str, Any]) -> None:
+    """Print the problems, or that there are none."""
+    for entry in payload["files"]:
+        state = tr("wrong") if entry["problems"] else tr("right")
+        say(f"{entry['path']}: {state}")
+        for problem in entry["problems"]:
+            say("    " + ": ".join(filter(None, (problem["where"], problem["what"]))))
+    if payload["disagreement"]:
+        say(payload["disagreement"])
+    if not payload["files"]:
+        say(tr("There is no cell file; 'robolink config path' shows where one may be."))
+
+
+def cells_payload(cells: Iterable[Cell]) -> dict[str, Any]:
+    """Return the cells with their addresses."""
+    return {
+        "cells": {
+            cell.name: {"url": cell.url, "robot": cell.settings.robot, "notes": cell.settings.notes}
+            for cell in cells
+        }
+    }
+
+
+def show_cells(payload: Mapping[str, Any]) -> None:
+    """Print one cell a line."""
+    cells = payload["cells"]
+    width = max((len(name) for name in cells), default=0)
+    for name, cell in cells.items():
+        say(f"{name:{width}}  {cell['url']}  {cell['robot'] or ''}".rstrip())
+    if not cells:
+        say(tr("There is no cell; 'robolink config path' shows where a cell file may be."))
+
+
+def cell_payload(cell: Cell, context: CliContext, *, origin: bool) -> dict[str, Any]:
+    """Return what is in force for a cell, and with ``origin`` where each value came from."""
+    values = cell.settings.model_dump(exclude_none=True)
+    origins = {key: str(path) for key, path in cell.origins.items()}
+    said = link_options(cell)
+    defaults = CliContext()
+    for key in ("password_file", "timeout_s", "remote_timeout_s"):
+        given = origin_of(key)
+        if given is not None:
+            values[key], origins[key] = getattr(context, key), given
+        elif key not in values and key != "password_file":
+            values[key] = said.get(key, getattr(defaults, key))
+            origins[key] = tr("default")
+    payload: dict[str, Any] = {"cell": cell.name, "values": values}
+    return payload | {"origins": origins} if origin else payload
+
+
+def show_cell(payload: Mapping[str, Any]) -> None:
+    """Print one value a line."""
+    values, origins = payload["values"], payload.get("origins", {})
+    say(f"[cells.{payload['cell']}]")
+    names = max(len(name) for name in values)
+    texts = {name: _shown(value) for name, value in values.items()}
+    width = max(len(text) for text in texts.values()) if origins else 0
+    for name, text in texts.items():
+        say(f"  {name:{names}}  {text:{width}}  {origins.get(name, '')}".rstrip())
+    if not values["remote_timeout_s"]:
+        say(tr("Nothing moves: no remote time-out is confirmed for this cell."))
+
+
+def _checked(path: Path) -> dict[str, Any]:
+    try:
+        problems = [{"where": problem.where, "what": problem.what} for problem in check_file(path)]
+    except ConfigError as error:
+        problems = [{"where": "", "what": error.what}]
+    return {"path": str(path), "problems": problems}
+
+
+def _shown(value: object) -> str:
+    if isinstance(value, dict):
+        return ", ".join(value)
+    return f"{value:g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,118 @@
+"""How sure a measurement is, in words and as a table."""
+
+from collections.abc import Iterator
+
+from robolink.calibration import CalibrationResult, chain_of
+from robolink.messages import tr
+from robolink_cli.console.render import table
+from robolink_cli.views.documents import number
+
+
+def remarks(result: CalibrationResult) -> Iterator[str]:
+    """Yield what there is to say about a measurement beside its numbers, a sentence each."""
+    for said in (_fit, _interval, _ways, _camera, _chain):
+        sentence = said(result)
+        if sentence:
+            yield sentence
+
+
+def _fit(result: CalibrationResult) -> str:
+    """Return how well the poses agree, in one sentence; empty where a sensor measured once."""
+    if result.rms_mm is None:
+        if result.method == "one_touch":
+            return tr("one touch leaves no residual")
+        if result.method == "two_pose":
+            return tr(
+                "two poses leave no residual: each placement error counts {gain:.2f} times",
+                gain=result.sigma_gain,
+            )
+        return tr("nothing is left over that could tell how well it agrees with itself")
+    return tr(
+        "{count} poses agree within {rms:.3f} mm rms, {largest:.3f} mm at most",
+        count=len(result.residuals_mm) - len(result.rejected),
+        rms=result.rms_mm,
+        largest=result.max_residual_mm,
+    )
+
+
+def _interval(result: CalibrationResult) -> str:
+    """Return the 95 % interval of each measured component; empty when nothing tells it."""
+    if not result.half_width95:
+        return ""
+    parts = (
+        f"{name[0].upper()} +-{half:.3f}"
+        for name, half in zip(result.measured, result.half_width95, strict=True)
+    )
+    if result.sigma_stated:
+        basis = tr("from a given standard deviation")
+    else:
+        basis = tr("from the residuals")
+    return tr("95 % interval: {parts}, {basis}", parts="  ".join(parts), basis=basis)
+
+
+def _ways(result: CalibrationResult) -> str:
+    """Return how square the ways along a tool's axes were; empty for other methods."""
+    off_deg = result.details().get("off_square_deg")
+    if not isinstance(off_deg, float):
+        return ""
+    return tr("the ways are {off:.2f} degrees off a right angle", off=abs(off_deg))
+
+
+def _camera(result: CalibrationResult) -> str:
+    """Return what a measurement says about its camera; empty where it says nothing."""
+    if not result.details():
+        return ""
+    from robolink.calibration import CameraCalibration, CameraRound  # numpy, loaded by then
+
+    if isinstance(result, CameraRound) and result.camera_error_mm is not None:
+        dx_mm, dy_mm = result.camera_error_mm
+        return tr(
+            "the camera sees things X {dx:+.3f} Y {dy:+.3f} mm beside where they are",
+            dx=dx_mm,
+            dy=dy_mm,
+        )
+    if isinstance(result, CameraCalibration):
+        camera = result.camera
+        x, y = (1000 * scale for scale in camera.scale_mm_per_px)
+        mirror = tr("mirrored") if camera.mirrored else tr("not mirrored")
+        return tr(
+            "camera: {x:.2f} x {y:.2f} micrometres per pixel, turned by {turn:.2f} degrees, "
+            "{mirror}, shear {shear:.2f} degrees",
+            x=x,
+            y=y,
+            turn=camera.turn_deg,
+            mirror=mirror,
+            shear=camera.shear_deg,
+        )
+    return ""
+
+
+def _chain(result: CalibrationResult) -> str:
+    """Return where in a chain of differences this one stands; empty for other methods."""
+    chain = chain_of(result)
+    if chain is None:
+        return ""
+    return tr("difference {count} since the last full calibration", count=chain.changes)
+
+
+def show_residuals(result: CalibrationResult) -> None:
+    """Show the residual of every pose."""
+    rows, names = [], ["u_deg"]
+    if any(pose.v_deg or pose.w_deg for pose in result.inputs):
+        names += ["v_deg", "w_deg"]
+    for index, residual in enumerate(result.residuals_mm):
+        pose = result.inputs[index] if index < len(result.inputs) else None
+        # A single component is a height.
+        parts = (0.0, 0.0, *residual) if len(residual) == 1 else (*residual, 0.0)[:3]
+        rows.append(
+            [
+                str(index + 1),
+                *(number(getattr(pose, name, None)) for name in names),
+                *map(number, parts),
+                number(result.residual_distances_mm[index]),
+                tr("left out") if index in result.rejected else "",
+            ]
+        )
+    angles = (f"{name[0].upper()} deg" for name in names)
+    columns = (tr("pose"), *angles, "dX mm", "dY mm", "dZ mm", tr("distance mm"), "")
+    table(tr("residuals"), columns, rows)

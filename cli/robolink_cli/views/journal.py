@@ -1,0 +1,205 @@
+"""What the journal's commands show: payloads, and the tables made from them."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict
+from typing import Final
+
+from robolink.errors import ConfigError
+from robolink.messages import tr
+from robolink.model import EntryKind, Recorded, ToolOffset, describe_offset, read_offset
+from robolink.transaction import id_of_change
+from robolink_cli.console.render import say, table
+
+COMPONENTS: Final = ("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
+AXES: Final = ("X mm", "Y mm", "Z mm", "U deg", "V deg", "W deg")
+
+SHORT: Final = 8
+"""How many characters of an id a table shows."""
+
+_VALUES: Final = ("before", "proposed", "requested", "value", "tip")
+AFTER: Final = ("value", "proposed", "requested")
+"""Where the value that a tool got, or was to get, stands in the details."""
+
+_PLAIN: Final = (
+    *("number", "at", "controller", "kind", "change", "operation", "tool"),
+    *("tolerance", "verdict"),
+)
+_LISTS: Final = ("poses", "drifts", "tools")
+
+
+def entry_payload(entry: Recorded) -> dict[str, object]:
+    """Return an entry with its units in the keys, and the details as they are stored."""
+    payload: dict[str, object] = {name: getattr(entry, name) for name in _PLAIN}
+    payload["kind"] = str(entry.kind)
+    for key, names in (("before", ("before",)), ("after", AFTER)):
+        known, offset = first_offset(entry.details, names)
+        if known:
+            payload[key] = offset_payload(offset)
+    payload["details"] = dict(entry.details)
+    return payload | asdict(entry.signature) | {"previous": entry.previous, "hash": entry.hash}
+
+
+def offset_payload(offset: ToolOffset | None) -> dict[str, float] | None:
+    """Return an offset with its units in the keys, ``None`` for an undefined tool."""
+    return None if offset is None else dict(zip(COMPONENTS, offset.components(), strict=True))
+
+
+def first_offset(
+    details: Mapping[str, object], names: Iterable[str]
+) -> tuple[bool, ToolOffset | None]:
+    """Return whether one of ``names`` is recorded, and the first that is."""
+    for name in names:
+        if name in details:
+            try:
+                return True, read_offset(details[name])
+            except ConfigError:
+                return False, None  # a damaged entry is shown all the same
+    return False, None
+
+
+def show_list(entries: Sequence[Recorded], *, all_controllers: bool) -> None:
+    """Print entries as a table."""
+    if not entries:
+        say(tr("The journal has no such entry."))
+        if not all_controllers:
+            say(
+                tr(
+                    "It knows a controller by the addresses at which it was met: 'robolink -c URL "
+                    "status' makes one known."
+                )
+            )
+        return
+    columns = [tr("number"), tr("time (UTC)"), tr("change"), tr("tool"), tr("kind")]
+    columns += [tr("value or verdict"), tr("who")]
+    if all_controllers:
+        columns.insert(2, tr("controller"))
+    rows = []
+    for entry in entries:
+        tool = "" if entry.tool is None else entry.tool
+        row: list[object] = [entry.number, short_time(entry.at), id_of_change(entry)[:SHORT], tool]
+        row += [entry.kind, said_in(entry), who(entry)]
+        if all_controllers:
+            row.insert(2, entry.controller)
+        rows.append(row)
+    table(tr("journal"), columns, rows)
+
+
+def show_entry(entry: Recorded) -> None:
+    """Print all that an entry says."""
+    shown: dict[str, object] = {
+        tr("time"): entry.at,
+        tr("controller"): entry.controller,
+        tr("kind"): entry.kind,
+        tr("tool"): "" if entry.tool is None else entry.tool,
+        tr("change"): entry.change,
+        tr("operation"): entry.operation,
+        tr("allowed"): entry.tolerance,
+        tr("verdict"): entry.verdict,
+        **_signed(entry),
+        tr("entry before"): entry.previous,
+        tr("hash"): entry.hash,
+    }
+    say(tr("entry {number}", number=entry.number))
+    for name, value in shown.items():
+        if value != "":
+            say(f"  {name}: {value}")
+    for name, value in entry.details.items():
+        if name not in (*_VALUES, *_LISTS) and value not in (None, [], "", {}):
+            say(f"  {name.replace('_', ' ')}: {_plain(value)}")
+    _show_values(entry)
+    _show_poses(entry.details.get("poses"))
+    _show_drifts(entry.details.get("drifts"))
+    say()
+
+
+def said_in(entry: Recorded) -> str:
+    """Return the value or the verdict of an entry in one line."""
+    if entry.kind in (EntryKind.READ_BACK, EntryKind.DONE, EntryKind.ROLLED_BACK):
+        known, offset = first_offset(entry.details, ("value",))
+        if known:
+            verdict = f" ({entry.verdict})" if entry.verdict else ""
+            return describe_offset(offset) + verdict
+    return entry.verdict or str(entry.details.get("request", ""))
+
+
+def who(entry: Recorded) -> str:
+    """Return who did it: the person, or else the user of the computer."""
+    signature = entry.signature
+    role = f" ({signature.role})" if signature.role else ""
+    return (signature.operator or signature.os_user) + role
+
+
+def short_time(at: str) -> str:
+    """Return a time label to the second."""
+    return at[:19].replace("T", " ")
+
+
+def pose_rows(poses: object) -> list[list[str]]:
+    """Return recorded poses as rows of a table; what is damaged is left out."""
+    if not isinstance(poses, list):
+        return []
+    rows = []
+    for number, pose in enumerate(poses, start=1):
+        if isinstance(pose, dict):
+            cells = [figure(pose.get(name)) for name in COMPONENTS]
+            rows.append([str(number), *cells, str(pose.get("hand", ""))])
+    return rows
+
+
+def _show_values(entry: Recorded) -> None:
+    rows = []
+    for name in _VALUES:
+        known, offset = first_offset(entry.details, (name,))
+        if known:
+            rows.append([name, *offset_cells(offset)])
+    if rows:
+        table(tr("values"), ("", *AXES), rows)
+
+
+def _show_poses(found: object) -> None:
+    rows = pose_rows(found)
+    if rows:
+        table(tr("poses of the flange"), ("", *AXES, tr("hand")), rows)
+
+
+def _show_drifts(found: object) -> None:
+    drifts = found if isinstance(found, list) else []
+    keys = ("u_deg", "dx_mm", "dy_mm", "dz_mm")
+    rows = [[figure(drift.get(key)) for key in keys] for drift in drifts]
+    if rows:
+        table(tr("drift about the new tip"), ("U deg", "dX mm", "dY mm", "dZ mm"), rows)
+
+
+def _signed(entry: Recorded) -> dict[str, object]:
+    signature = entry.signature
+    return {
+        tr("operator"): signature.operator,
+        tr("role"): signature.role,
+        tr("user"): signature.os_user,
+        tr("computer"): signature.host,
+        tr("nozzle"): signature.nozzle,
+        tr("lot"): signature.lot,
+        tr("recipe"): signature.recipe,
+        tr("recipe's SHA-256"): signature.recipe_hash,
+        tr("station"): signature.station,
+        tr("robolink"): signature.version,
+    }
+
+
+def offset_cells(offset: ToolOffset | None) -> list[str]:
+    """Return six table cells for an offset."""
+    if offset is None:
+        return [tr("undefined"), *[""] * 5]
+    return [figure(value) for value in offset.components()]
+
+
+def figure(value: object) -> str:
+    """Return a table cell for a length or an angle."""
+    # Adding zero takes the sign off what rounds to zero.
+    return f"{round(value, 3) + 0.0:.3f}" if isinstance(value, (int, float)) else "-"
+
+
+def _plain(value: object) -> str:
+    if isinstance(value, list):
+        return ", ".join(_plain(part) for part in value)
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

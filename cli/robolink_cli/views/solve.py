@@ -1,0 +1,128 @@
+"""What ``solve`` shows: the names are those of the shared calibration cases."""
+
+from collections.abc import Mapping, Sequence
+
+from robolink.calibration import CalibrationResult
+from robolink.messages import tr
+from robolink_cli.console.render import say
+
+
+def result_payload(result: CalibrationResult) -> dict[str, object]:
+    """Return a result as plain values; lengths in mm, angles in degrees."""
+    payload: dict[str, object] = {"codes": list(result.warnings)}
+    lengths = [name for name in ("x_mm", "y_mm", "z_mm") if name in result.measured]
+    if "x_mm" in lengths:
+        payload["offset"] = [getattr(result.offset, name) for name in lengths]
+    else:
+        payload |= {name[0]: getattr(result.offset, name) for name in lengths}
+    for name in ("u_deg", "v_deg", "w_deg"):
+        if name in result.measured:
+            payload[name[0]] = getattr(result.offset, name)
+    if result.reference_point_mm:
+        payload["reference_point"] = list(result.reference_point_mm)
+    return payload | {
+        "measured": list(result.measured),
+        "unobservable": list(result.unobservable),
+        "interval95": {name: list(ends) for name, ends in result.interval95.items()},
+        "covariance": [list(row) for row in result.covariance],
+        "sigma_mm": result.sigma_mm,
+        "sigma_stated": result.sigma_stated,
+        "sigma_gain_per_axis": result.sigma_gain,
+        "rms_residual": result.rms_mm,
+        "max_residual": result.max_residual_mm,
+        "residuals": list(result.residual_distances_mm),
+        "rejected": list(result.rejected),
+        "condition_number": result.condition_number,
+        "rank": result.rank,
+        "dof": result.dof,
+    }
+
+
+def show_case(document: Mapping[str, object]) -> None:
+    """Print one solved case."""
+    codes = _words(document["codes"])
+    name = document.get("id") or document["method"]
+    say(f"{name}: {document['status']}" + (f" ({codes})" if codes else ""))
+    if document["status"] == "error":
+        say(f"  {document['what']}")
+        say(f"  {document['remedy']}")
+        return
+    for key, label in _SHOWN:
+        if key in document:
+            say(f"  {label}: {_values(document[key], _DECIMALS.get(key, 3))}")
+    _show_quality(document)
+
+
+def _show_quality(document: Mapping[str, object]) -> None:
+    intervals = document.get("interval95")
+    if isinstance(intervals, dict) and intervals:
+        for name, (low, high) in intervals.items():
+            say(tr("  95 %: {name} {low:.4f} to {high:.4f}", name=name, low=low, high=high))
+    elif "interval95" in document:
+        say(tr("  no interval: nothing tells how large the errors are; state sigma_mm"))
+    if document.get("rms_residual") is not None:
+        say(
+            tr(
+                "  residual rms {rms:.4f} mm, largest {worst:.4f} mm, degrees of freedom {dof}",
+                rms=document["rms_residual"],
+                worst=document["max_residual"],
+                dof=document["dof"],
+            )
+        )
+    if document.get("rejected"):
+        say(tr("  rejected poses (from 0): {poses}", poses=_words(document["rejected"])))
+    if document.get("unobservable"):
+        say(tr("  not measured: {names}", names=_words(document["unobservable"])))
+
+
+def _values(value: object, decimals: int) -> str:
+    if value is None:
+        return "-"
+    if isinstance(value, list):
+        apart = "\n    " if value and isinstance(value[0], dict) else "  "
+        return apart.join(_values(item, decimals) for item in value)
+    if isinstance(value, dict):
+        return "  ".join(f"{key} {_values(item, decimals)}" for key, item in value.items())
+    if isinstance(value, bool):
+        return tr("yes") if value else tr("no")
+    return f"{value:.{decimals}f}" if isinstance(value, float) else str(value)
+
+
+def _words(value: object) -> str:
+    return ", ".join(map(str, value)) if isinstance(value, Sequence) else str(value)
+
+
+_DECIMALS = {"mm_per_px_matrix": 6, "rotation_matrix": 6, "direction": 5, "latency_s": 5}
+
+_SHOWN = (
+    ("offset", tr("offset mm")),
+    ("z", tr("Z mm")),
+    ("u", tr("U deg")),
+    ("v", tr("V deg")),
+    ("w", tr("W deg")),
+    ("reference_point", tr("reference point mm")),
+    ("plain_ls_offset", tr("offset without rejecting, mm")),
+    ("mm_per_px_matrix", tr("mm per pixel")),
+    ("camera_origin", tr("camera origin mm")),
+    ("mirrored", tr("mirrored image")),
+    ("rotation_matrix", tr("rotation matrix")),
+    ("zyz", tr("A, B, C deg")),
+    ("lag_mm", tr("lag mm")),
+    ("latency_s", tr("latency s")),
+    ("chain", tr("chain")),
+    ("full_calibration_due", tr("full calibration due")),
+    ("beams", tr("beams")),
+    ("direction", tr("axis direction")),
+    ("tilt_deg", tr("tilt deg")),
+    ("runout_mm", tr("runout mm")),
+    ("ellipse_mm", tr("ellipse mm")),
+    ("second_mm", tr("second harmonic mm")),
+    ("tools", tr("tools")),
+    ("pins", tr("pins mm")),
+    ("max_drift_mm", tr("largest drift mm")),
+    ("passed", tr("passed")),
+    ("correction_mm", tr("correction mm")),
+    ("poses", tr("poses")),
+    ("sigma_gains", tr("gain of sigma after each pose")),
+)
+"""What is printed of a document, in this order; the rest is for machines."""

@@ -1,0 +1,129 @@
+"""Tables for people."""
+
+from collections.abc import Mapping, Sequence
+
+from robolink.messages import tr
+from robolink_cli.console.render import say, table
+from robolink_cli.views.documents import number, offset_cells
+
+AXES = ("X mm", "Y mm", "Z mm", "U deg", "V deg", "W deg")
+
+
+_SAID = ("controller", "state", "code", "text")
+
+
+def show_status(payload: Mapping[str, object]) -> None:
+    """Print the state in words, then the flags that are on, then what else is known."""
+    say(f"{payload['controller']}: {payload['state']}")
+    if payload["code"]:
+        text = payload.get("text", "")
+        say(tr("  code {code:04d} {text}", code=payload["code"], text=text).rstrip())
+    on = [key for key, value in payload.items() if value is True and key != "motors_on"]
+    say(tr("  flags: {flags}", flags=", ".join(on).replace("_", " ") or tr("none")))
+    if "power" in payload:
+        _show_epson(payload)
+        return
+    for key in [name for name in payload if name not in _SAID]:
+        if payload[key] not in (None, "") and not isinstance(payload[key], bool):
+            say(f"  {key.replace('_', ' ')}: {payload[key]}")
+
+
+def _show_epson(payload: Mapping[str, object]) -> None:
+    alarms = payload["alarms"]
+    if isinstance(alarms, Sequence) and alarms:
+        say(tr("  alarms: {numbers}", numbers=", ".join(str(number) for number in alarms)))
+    _show_preferences(payload["preferences"])
+    if payload["selected_tool"] is not None:
+        say(
+            tr(
+                "  tool in force: {tool}; motors {motors}, power {power}",
+                tool=payload["selected_tool"],
+                motors=tr("on") if payload["motors_on"] else tr("off"),
+                power=payload["power"],
+            )
+        )
+    elif payload["published_selected_tool"] is not None:
+        say(tr("  tool in force, as published: {tool}", tool=payload["published_selected_tool"]))
+
+
+def _show_preferences(told: object) -> None:
+    """Warn of what makes the cell unreal, and name what switches outputs off."""
+    if not isinstance(told, Mapping):
+        return  # older firmware does not tell, and nothing is assumed
+    if told["dry_run"]:
+        say(tr("  DRY RUN is set: the robot does not move. Nothing can be measured."))
+    if told["virtual_io"]:
+        say(tr("  VIRTUAL I/O is set: no input is real. Nothing can be measured."))
+    causes = {"reset_outputs_off": tr("reset"), "outputs_off_at_estop": tr("emergency stop")}
+    if named := [cause for name, cause in causes.items() if told[name]]:
+        say(tr("  outputs go off at: {causes}", causes=", ".join(named)))
+
+
+def show_pose(payload: Mapping[str, object]) -> None:
+    """Print a pose and the joints; what this kind of controller has not is not spoken of."""
+    if payload["tool"] is None:
+        title = tr("tool not told by this controller")
+    elif payload["hand"] is None:
+        title = tr("tool {tool}", tool=payload["tool"])
+    else:
+        title = tr("tool {tool} in local {local}, hand {hand}", **payload)
+    table(title, AXES, [offset_cells(payload)])
+    joints, axes = payload.get("joints"), payload.get("axes")
+    if isinstance(joints, Sequence):
+        say(tr("  joints: {joints}", joints="  ".join(number(j) for j in joints)))
+    if isinstance(axes, Sequence):
+        say(tr("  axes: {axes}", axes="  ".join(number(axis) for axis in axes)))
+
+
+def show_tools(tools: Mapping[str, Mapping[str, object] | None], selected: int | None) -> None:
+    """Print the defined tools; the one in force is marked."""
+    rows = []
+    for tool, offset in tools.items():
+        if offset is not None:
+            mark = "*" if int(tool) == selected else " "
+            rows.append([f"{mark}{tool}", *offset_cells(offset)])
+    if rows:
+        table(tr("tools (* in force)"), (tr("tool"), *AXES), rows)
+    missing = [tool for tool, offset in tools.items() if offset is None]
+    if missing:
+        say(tr("  undefined: {tools}", tools=", ".join(missing)))
+
+
+def show_offset(title: str, offset: Mapping[str, object] | None) -> None:
+    """Print one offset under a title."""
+    if offset is None:
+        say(tr("{title}: there is none now", title=title))
+    else:
+        table(title, AXES, [offset_cells(offset)])
+
+
+def show_change(
+    tool: int,
+    before: Mapping[str, object] | None,
+    after: Mapping[str, object] | None,
+    *,
+    after_name: str,
+    unmeasured: Sequence[str] = (),
+) -> None:
+    """Print an offset before and after, and which components were not measured."""
+    rows = [
+        [tr("before"), *offset_cells(before)],
+        [after_name, *offset_cells(after)],
+    ]
+    if before and after:
+        delta = {key: _difference(after[key], before[key]) for key in before}
+        rows.append([tr("change"), *offset_cells(delta)])
+    table(tr("tool {tool}", tool=tool), ("", *AXES), rows)
+    for name in unmeasured:
+        if after is not None and name[0] in "xyzu":
+            say(
+                tr(
+                    "  {axis} kept at {value}: not measured",
+                    axis=name[0].upper(),
+                    value=number(after[name]),
+                )
+            )
+
+
+def _difference(a: object, b: object) -> float:
+    return float(str(a)) - float(str(b))

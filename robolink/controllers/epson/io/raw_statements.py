@@ -1,0 +1,80 @@
+"""A statement that a person typed: the one door past the typed builders.
+
+Source: docs/reference/rules.md 8.
+"""
+
+from robolink.controllers.epson.link.answers import NOT_EXECUTED
+from robolink.controllers.epson.link.session import EpsonSession
+from robolink.controllers.epson.link.window import CommandWindow
+from robolink.controllers.markers import MarkerStore, ProcedureLock
+from robolink.errors import ConfigError, ControllerFaultError, RejectedError
+from robolink.messages import tr
+from robolink.model import EntryKind, Marker, MarkerKind, NewEntry, require_engineer
+from robolink.protocols.epson_text import Refusal, Reply
+from robolink.protocols.spel import Statement
+
+
+class RawStatements:
+    """Runs statements as they were typed, each marked before and on record after."""
+
+    def __init__(
+        self,
+        session: EpsonSession,
+        window: CommandWindow,
+        markers: MarkerStore,
+        lock: ProcedureLock,
+    ) -> None:
+        self._session = session
+        self._window = window
+        self._markers = markers
+        self._lock = lock
+
+    def execute(self, text: str) -> str:
+        """See :meth:`robolink.controllers.epson.EpsonController.execute_raw`."""
+        statement = _checked(text)
+        with self._lock.held(statement):
+            self._markers.require_settled(statement)
+            self._window.require_ready(statement)
+            require_engineer(
+                self._markers.outcomes, tr("run {statement!r} as typed", statement=statement)
+            )
+            with self._window.uninterrupted(), self._markers.ledger.block():
+                marker = self._markers.begin(MarkerKind.SET, statement, {"raw": True})
+                with self._markers.doubt(statement):
+                    with self._markers.unless_stopped(marker):
+                        answer = self._session.execute(statement)
+                    self._check(statement, answer, marker)
+                self._markers.ledger.proved(marker, None)
+                printed = answer.text or "" if isinstance(answer, Reply) else ""
+                self._markers.clear(marker, _entry(marker, verdict=tr("carried out"), said=printed))
+        return printed
+
+    def _check(self, statement: Statement, answer: Reply | Refusal, marker: Marker) -> None:
+        """Raise unless it ran; a plain refusal settles the marker."""
+        if isinstance(answer, Reply) and (answer.text is not None or answer.fields == ("0",)):
+            return
+        try:
+            raise self._window.failure(statement, answer)
+        except (RejectedError, ControllerFaultError) as error:
+            if error.code in NOT_EXECUTED and isinstance(error, RejectedError):
+                self._markers.clear(marker, _entry(marker, verdict=error.what))
+            raise
+
+
+def _checked(text: str) -> Statement:
+    stripped = text.strip()
+    if not stripped or not (stripped.isascii() and stripped.isprintable()):
+        raise ConfigError(
+            tr("{text!r} cannot be sent as a statement.", text=text),
+            remedy=tr("Write one line of printable ASCII."),
+        )
+    return Statement(stripped)
+
+
+def _entry(marker: Marker, *, verdict: str, said: str = "") -> NewEntry:
+    return NewEntry(
+        EntryKind.RAW,
+        operation=marker.operation,
+        verdict=verdict,
+        details={"request": marker.request, "printed": said},
+    )

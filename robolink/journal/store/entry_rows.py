@@ -1,0 +1,202 @@
+"""Statements about entries."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields
+from datetime import UTC, datetime
+from functools import lru_cache
+from typing import Any, Final, TypeAlias, TypeVar
+
+from sqlalchemy import Connection, Select, bindparam, func, insert, select, update
+
+from robolink.journal._records import Filter
+from robolink.journal.store.chain import canonical, digest, storable
+from robolink.journal.store.prepared import Prepared, StatementRunner
+from robolink.journal.store.tables import ENTRIES, HEAD, IN_A_CHANGE
+from robolink.model import EntryKind, NewEntry, Signature
+
+T = TypeVar("T")
+
+_Head: TypeAlias = tuple[int, str]
+
+_LOOKS: Final = 100
+"""After so many in which others wrote each time something else is wrong."""
+
+# The kinds whose value was read on the controller.
+_PROVING: Final = (EntryKind.READ_BACK, EntryKind.DONE, EntryKind.ROLLED_BACK)
+
+# What is recorded of a controller without anything being changed on it.
+_NO_HISTORY: Final = (EntryKind.IDENTITY, EntryKind.RECONNECT, EntryKind.LEASE)
+
+_SELECT_HEAD: Final = select(HEAD.c.number, HEAD.c.hash)
+_MOVE_HEAD: Final = Prepared(
+    update(HEAD)
+    .where(HEAD.c.number == bindparam("of_number"), HEAD.c.hash == bindparam("of_hash"))
+    .values(number=bindparam("number"), hash=bindparam("hash"))
+)
+_INSERT: Final = Prepared(insert(ENTRIES))
+_SIGNATURE: Final = tuple(field.name for field in fields(Signature))
+_PLACES: Final = dict.fromkeys(sorted(column.name for column in ENTRIES.c if column.name != "hash"))
+_COUNT: Final = select(func.count()).select_from(ENTRIES)
+
+
+class EntryRows:
+    """The append-only record over one connection."""
+
+    def __init__(self, connection: Connection, runner: StatementRunner) -> None:
+        self._connection = connection
+        self._runner = runner
+        self._head: _Head | None = None  # a guess: others add entries too
+
+    def append(
+        self, controller: str, signature: Signature, change: str, entries: Sequence[NewEntry]
+    ) -> None:
+        """Add entries, each chained to the one before; the caller's transaction holds the lock.
+
+        Args:
+            controller: Identity of the controller.
+            signature: Who does it.
+            change: Id of the tool change, for the entries that name none.
+            entries: What is put on record.
+
+        Raises:
+            TypeError: Details are no plain JSON.
+            ValueError: Details hold a number that is not finite.
+            RecursionError: Details hold themselves.
+        """
+        if not entries:
+            return
+        head = self._head or self._locked_head()
+        rows = _chained(head, _common(controller, signature), change, entries)
+        if not self._move_head(head, rows[-1]):
+            head = self._locked_head()
+            rows = _chained(head, _common(controller, signature), change, entries)
+            self._move_head(head, rows[-1])
+        self._runner.run_many(_INSERT, rows)
+
+    def page(
+        self, wanted: Filter, *, before: int | None, after: int | None, limit: int
+    ) -> list[Mapping[str, Any]]:
+        """Return up to ``limit`` of the entries between two numbers, both left out."""
+        statement = _listing(wanted).limit(limit)
+        if before is not None:
+            statement = statement.where(ENTRIES.c.number < before)
+        if after is not None:
+            statement = statement.where(ENTRIES.c.number > after)
+        return [dict(row) for row in self._connection.execute(statement).mappings()]
+
+    def history(self, names: Sequence[str]) -> bool:
+        """Whether anything was changed, or decided, on the controller with these names."""
+        wanted = [storable(name) for name in names]
+        about = [str(kind) for kind in _NO_HISTORY]
+        columns = ENTRIES.c
+        statement = select(columns.number).where(
+            columns.controller.in_(wanted), columns.kind.not_in(about)
+        )
+        return self._connection.execute(statement.limit(1)).first() is not None
+
+    def count(self) -> int:
+        """Return how many there are."""
+        return int(self._connection.execute(_COUNT).scalar_one())
+
+    def last_number(self) -> int:
+        """Return the highest number, 0 when there is none."""
+        highest = self._connection.execute(select(func.max(ENTRIES.c.number))).scalar_one()
+        return 0 if highest is None else int(highest)
+
+    def head(self) -> tuple[int, str] | None:
+        """Return number and hash of the entry that was stored last."""
+        row = self._connection.execute(_SELECT_HEAD).one_or_none()
+        return None if row is None else (row.number, row.hash)
+
+    def settled(self, read: Callable[[], T]) -> tuple[T, _Head | None]:
+        """Read something together with the head, as both were at one instant.
+
+        Other processes may add entries between two statements, and every entry changes the head:
+        so what was read between two equal heads belongs to them. A durable commit takes longer
+        than such a look, so that one of a few finds the journal as it was.
+
+        Args:
+            read: Reads what is to be compared with the head.
+        """
+        head = self.head()
+        for _ in range(_LOOKS):
+            found, after = read(), self.head()
+            if after == head:
+                break
+            head = after
+        return found, head
+
+    def _locked_head(self) -> _Head:
+        number, last_hash = self._connection.execute(_SELECT_HEAD.with_for_update()).one()
+        return number, last_hash
+
+    def _move_head(self, head: _Head, last: Mapping[str, Any]) -> bool:
+        self._head = (last["number"], last["hash"])
+        values = {"number": last["number"], "hash": last["hash"]}
+        seen = {"of_number": head[0], "of_hash": head[1]}
+        return self._runner.run(_MOVE_HEAD, {**values, **seen}) == 1
+
+
+def _chained(
+    head: _Head, common: Mapping[str, Any], change: str, entries: Sequence[NewEntry]
+) -> list[dict[str, Any]]:
+    number, previous = head
+    common = {**common, "at": datetime.now(UTC).isoformat(timespec="milliseconds")}
+    rows = []
+    details, text = None, ""
+    for entry in entries:
+        if entry.details is not details:  # what was read back and what is done share theirs
+            details, text = entry.details, canonical(entry.details)
+        number += 1
+        row = {**common, **_fields(entry, change), "details": text}
+        row["number"], row["previous"] = number, previous
+        previous = row["hash"] = digest(row)
+        rows.append(row)
+    return rows
+
+
+def _listing(wanted: Filter) -> Select[Any]:
+    columns = ENTRIES.c
+    order = columns.number.desc() if wanted.newest_first else columns.number
+    listing = select(ENTRIES).order_by(order)
+    if wanted.controllers:
+        # A change has few entries and an index of its own. SQLite prefers the index that gives
+        # the order, and would walk through all that the controller has on record.
+        controller = func.coalesce(columns.controller, "") if wanted.change else columns.controller
+        names = [storable(name) for name in wanted.controllers]
+        one = len(names) == 1
+        listing = listing.where(controller == names[0] if one else controller.in_(names))
+    if wanted.tool is not None:
+        listing = listing.where(columns.tool == wanted.tool)
+    if wanted.proved_tool is not None:
+        listing = listing.where(columns.proved_tool == wanted.proved_tool)
+    if wanted.change:
+        listing = listing.where(columns.change == storable(wanted.change), IN_A_CHANGE)
+    elif wanted.change is not None:
+        listing = listing.where(columns.change == "")
+    if wanted.kinds:
+        listing = listing.where(columns.kind.in_([str(kind) for kind in wanted.kinds]))
+    return listing
+
+
+@lru_cache(maxsize=64)
+def _common(controller: str, signature: Signature) -> dict[str, Any]:
+    """Return a row with what all entries of a run share, and places for the rest.
+
+    The places are sorted by name, because the hash is taken of them so.
+    """
+    signed = {name: storable(getattr(signature, name)) for name in _SIGNATURE}
+    return {**_PLACES, **signed, "controller": storable(controller)}
+
+
+def _fields(entry: NewEntry, change: str) -> dict[str, Any]:
+    proves = entry.kind in _PROVING and "value" in entry.details
+    return {
+        "kind": entry.kind.value,
+        "change": storable(entry.change or change),
+        "operation": storable(entry.operation),
+        "tool": entry.tool,
+        "tolerance": storable(entry.tolerance),
+        "verdict": storable(entry.verdict),
+        "proved_tool": entry.tool if proves else None,
+    }

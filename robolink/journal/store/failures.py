@@ -1,0 +1,120 @@
+"""Errors of the database, turned into errors that say what to do."""
+
+from typing import Final
+
+from sqlalchemy.exc import DBAPIError
+
+from robolink.errors import JournalError
+from robolink.messages import tr
+from robolink.ways import Way, way
+
+# Result codes of SQLite (https://www.sqlite.org/rescode.html), the low byte.
+_SQLITE: Final = {
+    3: "forbidden",
+    5: "locked",
+    6: "locked",
+    8: "forbidden",
+    10: "disk",
+    11: "damaged",
+    13: "full",
+    14: "forbidden",
+    26: "foreign",
+}
+# Classes and codes of PostgreSQL (its manual, appendix A).
+_POSTGRESQL: Final = {
+    "53100": "full",
+    "25006": "denied",
+    "42501": "denied",
+    "28": "denied",
+    "3D": "unreachable",
+    "55P03": "locked",
+    "40P01": "locked",
+    "57": "unreachable",
+    "08": "unreachable",
+    "58": "disk",
+    "XX": "damaged",
+    "42": "foreign",
+}
+
+
+def journal_error(error: Exception, name: str, consequence: str) -> JournalError:
+    """Return what a person is told about an error of the database.
+
+    Args:
+        error: As the driver, SQLAlchemy or the system raised it.
+        name: Which journal, as a person is told.
+        consequence: What it means for the controller, one sentence.
+    """
+    raw = (error.orig if isinstance(error, DBAPIError) else None) or error
+    cause, remedy = _sentences(_reason(raw), " ".join(str(raw).split()))
+    return JournalError(
+        tr("The journal {name} cannot be used: {cause}.", name=name, cause=cause),
+        remedy=f"{remedy} {consequence}".rstrip(),
+    )
+
+
+def damaged_error(found: str, name: str, consequence: str) -> JournalError:
+    """Return what a person is told about damage that the database itself did not notice.
+
+    Args:
+        found: What was found, one sentence.
+        name: Which journal, as a person is told.
+        consequence: What it means for the controller, one sentence.
+    """
+    cause = tr("it is damaged ({text})", text=found.rstrip("."))
+    return JournalError(
+        tr("The journal {name} cannot be used: {cause}.", name=name, cause=cause),
+        remedy=f"{_move_it_away()} {consequence}",
+    )
+
+
+def _reason(error: BaseException) -> str:
+    if isinstance(error, PermissionError):
+        return "forbidden"
+    code = getattr(error, "sqlite_errorcode", None)
+    if isinstance(code, int):
+        return _SQLITE.get(code & 0xFF, "")
+    state = getattr(error, "sqlstate", None)
+    if isinstance(state, str):
+        return _POSTGRESQL.get(state) or _POSTGRESQL.get(state[:2], "")
+    # psycopg names no state when it could not even connect.
+    return "unreachable" if type(error).__module__.startswith("psycopg") else ""
+
+
+def _sentences(reason: str, text: str) -> tuple[str, str]:
+    elsewhere = tr("ROBOLINK_JOURNAL names another place.")
+    match reason:
+        case "full":
+            return tr("the disk is full"), tr("Free space there, then repeat the command.")
+        case "disk":
+            cause = tr("the disk did not do it ({text})", text=text)
+            return cause, tr("Check the disk and the space on it. {elsewhere}", elsewhere=elsewhere)
+        case "forbidden":
+            cause = tr("this user may not write or open it ({text})", text=text)
+            remedy = tr("Make the file and its folder writable. {elsewhere}", elsewhere=elsewhere)
+            return cause, remedy
+        case "locked":
+            remedy = tr("Wait until it has finished, or end it; then repeat the command.")
+            return tr("another program keeps it locked"), remedy
+        case "damaged":
+            return tr("it is damaged ({text})", text=text), _move_it_away()
+        case "foreign":
+            cause = tr("it is not a journal ({text})", text=text)
+            return cause, tr("Move it away. {elsewhere}", elsewhere=elsewhere)
+        case "denied":
+            cause = tr("the database does not let this user write ({text})", text=text)
+            return cause, tr("Give the user that right. {elsewhere}", elsewhere=elsewhere)
+        case "unreachable":
+            cause = tr("the database is not reached ({text})", text=text)
+            return cause, tr("Check that its server runs, the address, its name and the network.")
+        case _:
+            return text, tr("Check the file or the database. {elsewhere}", elsewhere=elsewhere)
+
+
+def _move_it_away() -> str:
+    return tr(
+        "Save what can be read with {export} and move the file away; a new one is made then. It "
+        "also held what was left unfinished: check the robot's selected tool and its tool "
+        "offsets by hand.",
+        export=way(Way.EXPORT_JOURNAL),
+    )

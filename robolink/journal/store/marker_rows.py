@@ -1,0 +1,109 @@
+"""Statements about markers."""
+
+import json
+from typing import Final, NamedTuple
+
+from sqlalchemy import BindParameter, bindparam, delete, func, insert, select, update
+
+from robolink.errors import JournalError
+from robolink.journal.store.chain import canonical, storable
+from robolink.journal.store.prepared import UNLESS_THERE, Prepared, StatementRunner
+from robolink.journal.store.tables import MARKERS
+from robolink.messages import tr
+from robolink.model import Marker, MarkerKind
+
+
+class _Stored(NamedTuple):
+    """A marker as it is stored."""
+
+    controller: str
+    operation: str
+    kind: str
+    request: str
+    begun_at: str
+    details: str
+
+
+_SAME: Final = (
+    MARKERS.c.controller == bindparam("of_controller"),
+    MARKERS.c.operation == bindparam("of_operation"),
+)
+_STATE: Final[dict[str, BindParameter[object]]] = {
+    name: bindparam(name) for name in ("kind", "request", "begun_at", "details")
+}
+_NAMES: Final[dict[str, BindParameter[object]]] = {
+    name: bindparam(f"of_{name}") for name in ("controller", "operation")
+}
+_UPDATE: Final = Prepared(update(MARKERS).where(*_SAME).values(**_STATE))
+_NEXT: Final = select(func.coalesce(func.max(MARKERS.c.id), 0) + 1).scalar_subquery()
+_INSERT: Final = Prepared(insert(MARKERS).values(id=_NEXT, **_NAMES, **_STATE), UNLESS_THERE)
+_DELETE: Final = Prepared(delete(MARKERS).where(*_SAME))
+_LISTING: Final = select(*(MARKERS.c[name] for name in _Stored._fields)).order_by(MARKERS.c.id)
+_SELECT: Final = Prepared(_LISTING.where(MARKERS.c.controller == bindparam("of_controller")))
+_SELECT_ALL: Final = Prepared(_LISTING)
+
+
+class MarkerRows:
+    """What is not settled, over one connection."""
+
+    def __init__(self, runner: StatementRunner) -> None:
+        self._runner = runner
+
+    def put(self, controller: str, marker: Marker) -> bool:
+        """Store a marker in place of an earlier one of its operation.
+
+        Returns:
+            Whether there was none before.
+        """
+        values = {
+            **_same(controller, marker.operation),
+            "kind": str(marker.kind),
+            "request": storable(marker.request),
+            "begun_at": storable(marker.begun_at),
+            "details": canonical(marker.details),
+        }
+        if self._runner.run(_INSERT, values):
+            return True
+        self._runner.run(_UPDATE, values)
+        return False
+
+    def remove(self, controller: str, operation: str) -> bool:
+        """Forget a marker; return whether it was there."""
+        return self._runner.run(_DELETE, _same(controller, operation)) == 1
+
+    def of(self, *names: str) -> tuple[Marker, ...]:
+        """Return the markers of a controller, under each of its names, oldest first."""
+        found: list[Marker] = []
+        for name in names:
+            rows = self._runner.rows(_SELECT, {"of_controller": storable(name)})
+            found += [_marker(_Stored(*row)) for row in rows]
+        return tuple(found)
+
+    def of_all(self) -> tuple[tuple[str, Marker], ...]:
+        """Return every marker with the identity of its controller, oldest first."""
+        found = [_Stored(*row) for row in self._runner.rows(_SELECT_ALL)]
+        return tuple([(row.controller, _marker(row)) for row in found])
+
+
+def _marker(row: _Stored) -> Marker:
+    try:
+        kind, details = MarkerKind(row.kind), json.loads(row.details)
+        if not isinstance(details, dict):
+            raise TypeError
+    except (ValueError, TypeError) as error:
+        raise JournalError(
+            tr("A safety record of {controller} makes no sense.", controller=row.controller),
+            remedy=tr(
+                "It says what was left unfinished, {request!r} of {when}, and may be of a newer "
+                "robolink. Check the robot's selected tool and its tool offsets by hand, then "
+                "move the journal away.",
+                request=row.request,
+                when=row.begun_at,
+            ),
+            controller=row.controller,
+        ) from error
+    return Marker(row.operation, kind, row.request, row.begun_at, details)
+
+
+def _same(controller: str, operation: str) -> dict[str, str]:
+    return {"of_controller": storable(controller), "of_operation": storable(operation)}

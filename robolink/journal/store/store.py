@@ -1,0 +1,199 @@
+"""One connection to the journal's database, shared by the threads of this process."""
+
+import os
+import threading
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager
+
+from sqlalchemy import Connection, Engine
+from sqlalchemy.exc import SQLAlchemyError
+
+from robolink.checkpoints import Checkpoint, checkpoint
+from robolink.errors import JournalError
+from robolink.journal._places import JournalPlace
+from robolink.journal.store import migrations
+from robolink.journal.store.engines import Backend, backend_of
+from robolink.journal.store.failures import damaged_error, journal_error
+from robolink.journal.store.statements import Tables
+from robolink.messages import tr
+
+
+class Store:
+    """Keeps one connection open and gives it to one thread at a time.
+
+    After any error the connection is dropped and the next use makes a new one, so that a
+    server that was restarted is found again.
+    """
+
+    def __init__(self, place: JournalPlace, *, read_only: bool) -> None:
+        self._place = place
+        self._read_only = read_only
+        self._lock = threading.RLock()
+        self._backend: Backend | None = None
+        self._tables: Tables | None = None
+        self._file: tuple[int, int] | None = None
+
+    @property
+    def durable(self) -> bool:
+        """Whether it outlives this process."""
+        return bool(self._place.path or self._place.url)
+
+    def write(self, consequence: str = "") -> AbstractContextManager[Tables]:
+        """Run a block as one durable transaction; an exception undoes all of it.
+
+        Args:
+            consequence: What a failure means for the controller, one sentence.
+
+        Raises:
+            JournalError: It is not stored.
+        """
+        if self._read_only:
+            raise JournalError(
+                tr("The journal {name} was opened for reading only.", name=self._place.name),
+                remedy=tr("Open it for writing to add to it."),
+            )
+        return self._use(consequence, writing=True)
+
+    def read(self, consequence: str = "") -> AbstractContextManager[Tables]:
+        """Run a block that only reads, and leave nothing open.
+
+        Args:
+            consequence: What a failure means for the controller, one sentence.
+
+        Raises:
+            JournalError: It cannot be read.
+        """
+        return self._use(consequence, writing=False)
+
+    def require_sound(self, names: tuple[str, ...]) -> None:
+        """Make sure that what a change of a controller rests on is as it was stored.
+
+        Args:
+            names: Of the controller.
+
+        Raises:
+            JournalError: It is damaged, or was changed.
+        """
+        consequence = tr("The command was not sent.")
+        with self.read(consequence) as tables:
+            found = next(tables.damage(names), "")
+        if found:
+            raise damaged_error(found, self._place.name, consequence)
+
+    def open(self) -> None:
+        """Connect now, and bring older tables up to date.
+
+        Raises:
+            JournalError: That is impossible.
+        """
+        with self.read(tr("The command was not sent.")):
+            pass
+
+    def close(self) -> None:
+        """Close the connection; the next use makes a new one. Memory is forgotten."""
+        with self._lock:
+            self._drop()
+            if self._backend is not None:
+                self._backend.engine.dispose()
+                self._backend = None
+
+    @contextmanager
+    def _use(self, consequence: str, *, writing: bool) -> Iterator[Tables]:
+        if writing:
+            checkpoint(Checkpoint.COMMIT, "before")
+        with self._lock:
+            try:
+                backend, tables = self._connected(to_write=writing)
+                runner = tables.runner
+                if writing and backend.begin_writing is not None:
+                    runner.run(backend.begin_writing)
+                try:
+                    yield tables
+                except BaseException:
+                    runner.roll_back()
+                    raise
+                if writing:
+                    runner.commit()
+                else:
+                    runner.roll_back()
+            except JournalError:
+                self._drop()
+                raise
+            except (SQLAlchemyError, OSError) as error:
+                self._drop()
+                raise journal_error(error, self._place.name, consequence) from error
+        if writing:
+            checkpoint(Checkpoint.COMMIT, "after")
+
+    def _connected(self, *, to_write: bool) -> tuple[Backend, Tables]:
+        if self._backend is None:
+            self._backend = backend_of(self._place, read_only=self._read_only)
+        if self._tables is None:
+            self._tables = self._connect(self._backend)
+            self._file = self._file_now()
+        elif to_write and self._file_now() != self._file:
+            raise JournalError(
+                tr("The journal {name} was moved or deleted while in use.", name=self._place.name),
+                remedy=tr(
+                    "Put it back. Otherwise the next command starts a new one, which knows nothing "
+                    "of what is unfinished."
+                ),
+            )
+        return self._backend, self._tables
+
+    def _connect(self, backend: Backend) -> Tables:
+        try:
+            return self._tables_of(backend.engine, backend)
+        except Exception as error:
+            if backend.last_resort is None or isinstance(error, JournalError):
+                raise
+            first = journal_error(error, self._place.name, "")
+        try:
+            return self._tables_of(backend.last_resort, backend)
+        except Exception as error:
+            raise first from error
+
+    def _tables_of(self, engine: Engine, backend: Backend) -> Tables:
+        connection = engine.connect()
+        try:
+            version = self._bring_up_to_date(connection, backend)
+        except BaseException:
+            connection.close()
+            raise
+        return Tables(connection, version, backend.self_checks)
+
+    def _bring_up_to_date(self, connection: Connection, backend: Backend) -> int:
+        """Return the version of the tables; older ones that are only read stay as they are."""
+        own, name = len(migrations.MIGRATIONS), self._place.name
+        with connection.begin():
+            found = migrations.stored_version(connection, name)
+        if found > own and not self._read_only:
+            raise migrations.newer_error(name, found)
+        if found >= own or (self._read_only and found):
+            return found
+        if self._read_only:
+            raise migrations.empty_error(name)
+        with connection.begin():
+            connection.exec_driver_sql(backend.begin_migrating)
+            # Another process may have been faster while this one waited for the lock.
+            found = migrations.stored_version(connection, name)
+            if found > own:
+                raise migrations.newer_error(name, found)
+            migrations.migrate(connection, found)
+        return max(own, found)
+
+    def _file_now(self) -> tuple[int, int] | None:
+        if self._place.path is None:
+            return None
+        try:
+            found = os.stat(self._place.path)
+        except FileNotFoundError:
+            return (0, 0)
+        return (found.st_dev, found.st_ino)
+
+    def _drop(self) -> None:
+        tables, self._tables = self._tables, None
+        if tables is not None:
+            tables.connection.close()
+        if self._place.path is not None:
+            self._backend = None  # a file that is gone is made anew

@@ -1,0 +1,1 @@
+"""The blocks of the mailbox, word by word, and what guards them."""

@@ -1,0 +1,145 @@
+"""The taught points from above, with an arrow each for the tip's displacement."""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+from xml.etree.ElementTree import Element
+
+from robolink.calibration import Impact, PointImpact
+from robolink.messages import tr
+from robolink.report._markup import element
+from robolink.report.pictures.labels import Paper
+from robolink.report.pictures.plane import WIDTH, Plane, enlargement, plane_around, step_down
+from robolink.report.pictures.shapes import Place, arrow, circle, line, words
+
+_LEFT, _TOP, _BELOW = 46.0, 10.0, 66.0
+_STILL_MM: Final = 5e-7
+"""A displacement below this is a rounding, and has no direction."""
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """A drawing, and what must be said beside it.
+
+    Attributes:
+        svg: The drawing.
+        factor: How many times longer than true the arrows are, ``None`` without arrows.
+        unnamed: How many points have no room for their number.
+    """
+
+    svg: Element
+    factor: float | None
+    unnamed: int
+
+
+def draw(impact: Impact) -> Picture:
+    """Draw the points of ``impact``, of which there is at least one."""
+    places = [(entry.pose.x_mm, entry.pose.y_mm) for entry in impact.entries]
+    plane = plane_around(places)
+    longest_mm = max(math.hypot(entry.dx_mm, entry.dy_mm) for entry in impact.entries)
+    factor = enlargement(plane, places, longest_mm) if longest_mm > _STILL_MM else None
+    marks = _Marks(plane, factor, impact.largest)
+    drawn = [marks.draw(entry) for entry in _largest_last(impact)]
+    names, unnamed = marks.names(impact)
+    content = [*grid(plane), *drawn, *names]
+    height = plane.height + _TOP + _BELOW
+    svg = element(
+        "svg",
+        element("title", tr("Taught points from above, with the displacement of the tip")),
+        element("g", *content, transform=f"translate({_LEFT:g} {_TOP:g})"),
+        _scales(plane, factor, longest_mm),
+        viewBox=f"0 0 {WIDTH + _LEFT + 10:g} {height:g}",
+        role="img",
+    )
+    return Picture(svg, factor, unnamed)
+
+
+class _Marks:
+    """Draws points, arrows and names, and keeps them off each other."""
+
+    def __init__(self, plane: Plane, factor: float | None, largest: PointImpact | None) -> None:
+        self._plane = plane
+        self._factor = factor or 0.0
+        self._largest = largest
+        self._paper = Paper(WIDTH, plane.height)
+
+    def draw(self, entry: PointImpact) -> Element:
+        """Return one point with its arrow."""
+        start, end = self._line(entry)
+        self._paper.take_line(start, end)
+        chosen = entry is self._largest
+        return element(
+            "g",
+            element("title", f"P{entry.number}: {entry.distance_mm:.3f} mm"),
+            circle(start, 7.5, class_="ring") if chosen else None,
+            *arrow(start, end),
+            circle(start, 2.6),
+            class_="largest" if chosen else "point",
+        )
+
+    def names(self, impact: Impact) -> tuple[list[Element], int]:
+        """Return the names that have room, and how many have none; the largest always has."""
+        drawn: list[Element] = []
+        unnamed = 0
+        for entry in reversed(_largest_last(impact)):
+            chosen = entry is self._largest
+            text = f"P{entry.number}: {entry.distance_mm:.3f} mm" if chosen else str(entry.number)
+            size = (6.9 * len(text), 13.0) if chosen else (5.3 * len(text), 9.0)
+            start, _ = self._line(entry)
+            corner = self._paper.place(start, *size, gap=9.0 if chosen else 4.0)
+            if corner is None and chosen:
+                corner = start[0] - size[0] / 2, start[1] - size[1] - 9.0
+            if corner is None:
+                unnamed += 1
+                continue
+            middle, foot = corner[0] + size[0] / 2, corner[1] + 0.82 * size[1]
+            kind = "name largest" if chosen else "name"
+            drawn.append(words(text, middle, foot, class_=kind, text_anchor="middle"))
+        return drawn[::-1], unnamed
+
+    def _line(self, entry: PointImpact) -> tuple[Place, Place]:
+        x_mm, y_mm = entry.pose.x_mm, entry.pose.y_mm
+        along = (x_mm + self._factor * entry.dx_mm, y_mm + self._factor * entry.dy_mm)
+        return self._plane.at(x_mm, y_mm), self._plane.at(*along)
+
+
+def _largest_last(impact: Impact) -> list[PointImpact]:
+    """Return the points so that the largest is drawn over the others."""
+    return sorted(impact.entries, key=lambda entry: entry is impact.largest)
+
+
+def grid(plane: Plane) -> list[Element]:
+    """Return paper, grid lines and axes of a plane."""
+    width, height = WIDTH, plane.height
+    parts = [element("rect", width=f"{width:g}", height=f"{height:.1f}", class_="paper")]
+    for x_mm in plane.grid_x_mm():
+        x, _ = plane.at(x_mm, 0)
+        parts.append(line((x, 0), (x, height), class_="grid"))
+        parts.append(words(f"{x_mm:g}", x, height + 13, class_="tick", text_anchor="middle"))
+    for y_mm in plane.grid_y_mm():
+        _, y = plane.at(0, y_mm)
+        parts.append(line((0, y), (width, y), class_="grid"))
+        parts.append(words(f"{y_mm:g}", -5, y + 3, class_="tick", text_anchor="end"))
+    parts.append(words("X mm", width, height + 25, class_="axis", text_anchor="end"))
+    parts.append(words("Y mm", 6, 13, class_="axis"))
+    return parts
+
+
+def _scales(plane: Plane, factor: float | None, longest_mm: float) -> Element:
+    """Return the two rulers below: one for the points, one for the arrows."""
+    y = plane.height + 48
+    bar_mm = plane.step_mm()
+    bar = bar_mm * plane.per_mm
+    ends = [line((x, y - 4), (x, y + 4), class_="bar") for x in (0.0, bar)]
+    parts = [line((0, y), (bar, y), class_="bar"), *ends]
+    parts.append(words(tr("points: {length:g} mm", length=bar_mm), bar + 8, y + 4, class_="scale"))
+    if factor is not None:
+        shown_mm = step_down(longest_mm)
+        start, length = WIDTH / 2, shown_mm * factor * plane.per_mm
+        said = tr(
+            "arrows: {length:g} mm, drawn {factor:g} times as long", length=shown_mm, factor=factor
+        )
+        shaft = arrow((start, y), (start + length, y))
+        parts.append(element("g", *shaft, class_="point"))
+        parts.append(words(said, start + length + 8, y + 4, class_="scale"))
+    return element("g", *parts, transform=f"translate({_LEFT:g} {_TOP:g})")

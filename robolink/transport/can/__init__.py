@@ -1,0 +1,1 @@
+"""CAN and CANopen: the bus, SDO transfers, a watched node, and the PLC mailbox on it."""

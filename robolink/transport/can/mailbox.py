@@ -1,0 +1,268 @@
+"""A PLC mailbox in the object dictionary of a CANopen node (docs/mailbox.md, "CANopen")."""
+
+import struct
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Final
+
+from robolink.errors import (
+    ConnectError,
+    RejectedError,
+    RemoteProtocolError,
+    RobolinkError,
+    TransportTimeoutError,
+)
+from robolink.messages import tr
+from robolink.timing import Clock, Deadline, SystemClock
+from robolink.transport._mailbox_link import (
+    COMMAND_WORDS,
+    RESPONSE_WORDS,
+    SLOT_WORDS,
+    MailboxHead,
+    require_slot,
+    require_words,
+)
+from robolink.transport._url import LinkUrl
+from robolink.transport._url_options import UrlOptions
+from robolink.transport.can.bus import CanLine, open_can_bus
+from robolink.transport.can.node import NodeWatch, identifiers
+from robolink.transport.can.sdo import SdoTransfer
+
+COMMAND_OBJECT: Final = 0x2100
+RESPONSE_OBJECT: Final = 0x2101
+SNAPSHOT: Final = (0x2102, 5)
+SLOT_OBJECT: Final = 0x2200
+SERIAL_NUMBER: Final = (0x1018, 4)
+HEARTBEAT_TIME_OBJECT: Final = 0x1017
+
+_MS_PER_S: Final = 1000
+
+
+def open_canopen_link(
+    url: LinkUrl, *, timeout_s: float, clock: Clock | None = None
+) -> "CanopenMailboxLink":
+    """Open a mailbox on a CANopen node and start the node, so that it sends its PDOs.
+
+    Args:
+        url: ``softmotion+can://can0?interface=socketcan&node=5``. Options are ``node`` (1 to
+            127), ``interface``, ``channel`` and ``bitrate`` (see ``open_can_bus``), and
+            ``start`` (``no`` when another device on the bus starts the node).
+        timeout_s: Longest time for one exchange.
+        clock: Keeps the deadlines.
+
+    Raises:
+        ConfigError: The URL or an option is wrong.
+        ConnectError: The bus cannot be opened, or the node does not answer.
+        TransportBrokenError: The bus failed.
+        RemoteProtocolError: What the node answered makes no sense.
+    """
+    options = UrlOptions(url)
+    node = options.take_int("node", None, 1, 127)
+    start = options.take_choice("start", "yes", {"yes": True, "no": False})
+    in_process = url.options.get("interface") == "virtual"
+    line = open_can_bus(url, options, identifiers(node))
+    looking = replace(url, options={**url.options, "start": "no"})
+
+    def again(timeout_s: float) -> CanopenMailboxLink:
+        return open_canopen_link(looking, timeout_s=timeout_s, clock=clock)
+
+    link = CanopenMailboxLink(
+        line,
+        node,
+        again,
+        identity=f"{url.identity}?node={node}",
+        durable=not in_process,
+        timeout_s=timeout_s,
+        clock=clock or SystemClock(),
+    )
+    try:
+        link.meet(start=start)
+    except BaseException:
+        link.close()
+        raise
+    return link
+
+
+class CanopenMailboxLink:
+    """Implements :class:`~robolink.transport.MailboxLink` on a bus, and owns it."""
+
+    def __init__(
+        self,
+        line: CanLine,
+        node: int,
+        again: Callable[[float], "CanopenMailboxLink"],
+        *,
+        identity: str,
+        durable: bool,
+        timeout_s: float,
+        clock: Clock,
+    ) -> None:
+        self._line = line
+        self._node = node
+        self._again = again
+        self._identity = identity
+        self._durable = durable
+        self._timeout_s = timeout_s
+        self._clock = clock
+        self._watch = NodeWatch(line, node, identity, clock)
+        self._lock = threading.Lock()
+
+    @property
+    def identity(self) -> str:
+        """The URL with the node, without its other options."""
+        return self._identity
+
+    @property
+    def place(self) -> str:
+        """The bus and the node."""
+        return self._identity.partition("://")[2]
+
+    @property
+    def durable(self) -> bool:
+        """False on a virtual bus, which lives in this process; else True."""
+        return self._durable
+
+    @property
+    def clock(self) -> Clock:
+        """The clock it was opened with."""
+        return self._clock
+
+    def meet(self, *, start: bool) -> None:
+        """Ask for the node's heartbeat period, then start the node if wanted.
+
+        Raises:
+            ConnectError: It does not answer.
+        """
+        try:
+            with self._exchange() as deadline:
+                self._watch.expect_heartbeat(self._read_heartbeat_s(deadline))
+                if start:
+                    self._watch.start_node()
+        except TransportTimeoutError as error:
+            raise ConnectError(
+                tr(
+                    "Node {node} of {identity} does not answer.",
+                    node=self._node,
+                    identity=self._identity,
+                ),
+                remedy=tr(
+                    "Check that the PLC runs, its node number, the bit rate, the wiring and both "
+                    "terminators."
+                ),
+                controller=self._identity,
+            ) from error
+
+    @property
+    def whole_look_s(self) -> float:
+        """0: a bus at 125 kbit/s carries the block in some 60 ms, one at 1 Mbit/s in 8."""
+        return 0.0
+
+    def write_command(self, words: Sequence[int]) -> None:
+        """See :meth:`robolink.transport.MailboxLink.write_command`; one DOMAIN download."""
+        data = struct.pack(f"<{COMMAND_WORDS}H", *require_words(words, COMMAND_WORDS))
+        with self._exchange() as deadline:
+            self._download(COMMAND_OBJECT, 0, data, deadline)
+
+    def read_head(self) -> MailboxHead:
+        """See :meth:`robolink.transport.MailboxLink.read_head`; waits for the next TPDO1."""
+        with self._exchange() as deadline:
+            while (head := self._watch.take_head()) is None:
+                if deadline.expired:
+                    raise self._no_heads()
+                self._watch.pump(deadline)
+            return head
+
+    def read_response(self) -> tuple[int, ...]:
+        """See :meth:`robolink.transport.MailboxLink.read_response`; takes a snapshot first."""
+        with self._exchange() as deadline:
+            self._download(*SNAPSHOT, struct.pack("<H", 1), deadline)
+            return self._upload_words(RESPONSE_OBJECT, 0, RESPONSE_WORDS, deadline)
+
+    def read_slot(self, slot: int) -> tuple[int, ...]:
+        """See :meth:`robolink.transport.MailboxLink.read_slot`; one upload."""
+        with self._exchange() as deadline:
+            return self._upload_words(SLOT_OBJECT, require_slot(slot), SLOT_WORDS, deadline)
+
+    def read_device(self) -> tuple[int, ...]:
+        """See :meth:`robolink.transport.MailboxLink.read_device`; the serial number of 1018h.
+
+        That object holds the number alone; its complement is added here.
+        """
+        with self._exchange() as deadline:
+            low, high = self._upload_words(*SERIAL_NUMBER, 2, deadline)
+            return (low, high, low ^ 0xFFFF, high ^ 0xFFFF)
+
+    def beat(self, word: int) -> None:
+        """See :meth:`robolink.transport.MailboxLink.beat`; one RPDO1."""
+        (beat,) = require_words((word,), 1)
+        with self._exchange():
+            self._watch.beat(beat)
+
+    def reopened(self, *, timeout_s: float) -> "CanopenMailboxLink":
+        """See :meth:`robolink.transport.MailboxLink.reopened`; it does not start the node."""
+        return self._again(timeout_s)
+
+    def close(self) -> None:
+        """See :meth:`robolink.transport.MailboxLink.close`."""
+        self._line.close()
+
+    @contextmanager
+    def _exchange(self) -> Iterator[Deadline]:
+        """Hold the lock and one deadline; after an error that is no refusal, close."""
+        with self._lock:
+            try:
+                self._watch.drain()
+                yield Deadline.after(self._clock, self._timeout_s)
+            except RejectedError:
+                raise
+            except RobolinkError:
+                self._line.close()
+                raise
+
+    def _read_heartbeat_s(self, deadline: Deadline) -> float:
+        try:
+            data = self._upload(HEARTBEAT_TIME_OBJECT, 0, deadline)
+        except RejectedError:  # the object is optional
+            return 0.0
+        return int.from_bytes(data, "little") / _MS_PER_S
+
+    def _upload_words(
+        self, index: int, subindex: int, count: int, deadline: Deadline
+    ) -> tuple[int, ...]:
+        data = self._upload(index, subindex, deadline)
+        if len(data) != 2 * count:
+            raise RemoteProtocolError(
+                tr(
+                    "{identity} holds {found} bytes in object {index:04X}h instead of {due}.",
+                    identity=self._identity,
+                    found=len(data),
+                    index=index,
+                    due=2 * count,
+                ),
+                remedy=tr("The PLC's mailbox has another version: compare its EDS."),
+                controller=self._identity,
+                raw=data,
+            )
+        return struct.unpack(f"<{count}H", data)
+
+    def _upload(self, index: int, subindex: int, deadline: Deadline) -> bytes:
+        return SdoTransfer(self._watch, self._identity, (index, subindex), deadline).upload()
+
+    def _download(self, index: int, subindex: int, data: bytes, deadline: Deadline) -> None:
+        SdoTransfer(self._watch, self._identity, (index, subindex), deadline).download(data)
+
+    def _no_heads(self) -> TransportTimeoutError:
+        return TransportTimeoutError(
+            tr(
+                "Node {node} of {identity} sends no TPDO1.",
+                node=self._node,
+                identity=self._identity,
+            ),
+            remedy=tr(
+                "Check in the PLC that TPDO1 is mapped and sent at least every 100 ms, and that "
+                "the node is operational (start=yes in the URL)."
+            ),
+            controller=self._identity,
+        )

@@ -1,0 +1,1 @@
+"""Modbus over TCP and serial lines, and the PLC mailbox on it."""

@@ -1,0 +1,220 @@
+"""Puts what goes wrong between this computer and a Modbus server into words.
+
+Addresses are always given both ways, as the number that manuals print and as the one on the
+wire, because tools disagree about which one they mean. Exception codes:
+Modbus application protocol 1.1b3, chapter 7.
+"""
+
+from typing import Final
+
+from robolink.errors import (
+    ConnectError,
+    RejectedError,
+    RemoteProtocolError,
+    RobolinkError,
+    TransportBrokenError,
+    TransportTimeoutError,
+)
+from robolink.messages import tr
+from robolink.transport.modbus.messages import ModbusRequest
+
+_SHOWN_BYTES: Final = 256
+_GATEWAY_NO_PATH: Final = 0x0A
+_GATEWAY_NO_ANSWER: Final = 0x0B
+_NOT_DONE: Final = frozenset({1, 2, 3, 6})
+"""Codes after which a write has certainly not been carried out."""
+
+
+def describe(request: ModbusRequest) -> str:
+    """Return a request as it is shown to a person."""
+    where = tr(
+        "{reference} (address {address}) of unit {unit}",
+        reference=request.area.reference(request.address),
+        address=request.address,
+        unit=request.unit,
+    )
+    if request.values:
+        return tr("write {count} from {where}", count=request.count, where=where)
+    return tr("read {count} from {where}", count=request.count, where=where)
+
+
+def unanswered(identity: str, request: ModbusRequest, held: bytes) -> TransportTimeoutError:
+    """Return the error for an answer that did not come, or not whole."""
+    if held:
+        what = tr(
+            "{identity} answered {count} bytes, then nothing: {request}.",
+            identity=identity,
+            count=len(held),
+            request=describe(request),
+        )
+    else:
+        what = tr(
+            "{identity} did not answer: {request}.", identity=identity, request=describe(request)
+        )
+    return TransportTimeoutError(
+        what,
+        remedy=tr(
+            "Check the PLC, the cable, the baud rate and the unit ({unit}), then connect again.",
+            unit=request.unit,
+        ),
+        controller=identity,
+        request=describe(request),
+        raw=held,
+    )
+
+
+def flooding(identity: str, request: ModbusRequest, count: int, raw: bytes) -> RemoteProtocolError:
+    """Return the error for a far end that goes on sending what was not asked for."""
+    return RemoteProtocolError(
+        tr(
+            "{identity} sends without an end: {count} bytes, and no answer to: {request}.",
+            identity=identity,
+            count=count,
+            request=describe(request),
+        ),
+        remedy=tr(
+            "Check that this is the PLC's Modbus port; on a serial line look for a second client, "
+            "or a device that never stops."
+        ),
+        controller=identity,
+        request=describe(request),
+        raw=raw[-_SHOWN_BYTES:],
+    )
+
+
+def restless(identity: str, count: int, raw: bytes) -> RemoteProtocolError:
+    """Return the error for a serial line on which no pause comes."""
+    return RemoteProtocolError(
+        tr(
+            "The line of {identity} does not fall silent: {count} bytes without a pause.",
+            identity=identity,
+            count=count,
+        ),
+        remedy=tr("Look for a second client on it, or a device that never stops."),
+        controller=identity,
+        raw=raw[-_SHOWN_BYTES:],
+    )
+
+
+def hung_up(identity: str) -> TransportBrokenError:
+    """Return the error for a server that ended the connection."""
+    return TransportBrokenError(
+        tr("{identity} closed the connection.", identity=identity),
+        remedy=tr(
+            "Its number of clients may be limited, or its watchdog has run out: close other "
+            "clients, then connect again."
+        ),
+        controller=identity,
+    )
+
+
+def unintelligible(identity: str, request: ModbusRequest, raw: bytes) -> RemoteProtocolError:
+    """Return the error for bytes that are no Modbus."""
+    return RemoteProtocolError(
+        tr("What {identity} sent is not Modbus.", identity=identity),
+        remedy=tr(
+            "Check that this is the PLC's Modbus port; on a serial line, the baud rate, the "
+            "parity and the cable."
+        ),
+        controller=identity,
+        request=describe(request),
+        raw=raw,
+    )
+
+
+def mismatched(identity: str, request: ModbusRequest) -> RemoteProtocolError:
+    """Return the error for an answer to another request than the one it claims."""
+    return RemoteProtocolError(
+        tr("{identity} answered something else than it was asked.", identity=identity),
+        remedy=tr(
+            "Check the unit in the URL ({unit}) and that no other device shares this address.",
+            unit=request.unit,
+        ),
+        controller=identity,
+        request=describe(request),
+    )
+
+
+def echoing(identity: str, request: ModbusRequest, raw: bytes) -> RemoteProtocolError:
+    """Return the error for a line that returns what is sent, unexpectedly."""
+    return RemoteProtocolError(
+        tr("{identity} returns what is sent to it.", identity=identity),
+        remedy=tr("An RS-485 adapter that hears itself needs echo=yes in the URL."),
+        controller=identity,
+        request=describe(request),
+        raw=raw,
+    )
+
+
+def echo_missing(identity: str, request: ModbusRequest, raw: bytes) -> RemoteProtocolError:
+    """Return the error for a line that should return what is sent, and does not."""
+    return RemoteProtocolError(
+        tr("{identity} did not return what was sent.", identity=identity),
+        remedy=tr(
+            "Either the adapter does not hear itself: remove echo=yes. Or two devices spoke at "
+            "once: look for a second client on the line."
+        ),
+        controller=identity,
+        request=describe(request),
+        raw=raw,
+    )
+
+
+def refused(identity: str, request: ModbusRequest, code: int) -> RobolinkError:
+    """Return the error for a Modbus exception.
+
+    A refusal that leaves open whether a write was done is no ``RejectedError``.
+    """
+    what = tr(
+        "{identity} refused with Modbus exception {code} ({name}): {request}.",
+        identity=identity,
+        code=code,
+        name=_name(code),
+        request=describe(request),
+    )
+    remedy = _remedy(code, request.unit)
+    shown = describe(request)
+    if code == _GATEWAY_NO_PATH:
+        return ConnectError(what, remedy=remedy, controller=identity, request=shown)
+    if code == _GATEWAY_NO_ANSWER:
+        return TransportTimeoutError(what, remedy=remedy, controller=identity, request=shown)
+    if request.values and code not in _NOT_DONE:
+        return RemoteProtocolError(what, remedy=remedy, controller=identity, request=shown)
+    return RejectedError(what, code=code, remedy=remedy, controller=identity, request=shown)
+
+
+def _name(code: int) -> str:
+    names = {
+        1: tr("illegal function"),
+        2: tr("illegal data address"),
+        3: tr("illegal data value"),
+        4: tr("server device failure"),
+        5: tr("acknowledged, not finished"),
+        6: tr("server busy"),
+        7: tr("negative acknowledge"),
+        8: tr("memory parity error"),
+        _GATEWAY_NO_PATH: tr("gateway path unavailable"),
+        _GATEWAY_NO_ANSWER: tr("gateway target does not respond"),
+    }
+    return names.get(code, tr("not in the standard"))
+
+
+def _remedy(code: int, unit: int) -> str:
+    remedies = {
+        1: tr("Check that the PLC's Modbus device offers this kind of register."),
+        2: tr(
+            "Check the addresses in the URL (a register printed 40001 is address 0) and the "
+            "sizes of the areas in the PLC's Modbus device."
+        ),
+        3: tr("Check that the PLC's Modbus device allows this many registers at once."),
+        6: tr("Wait until the PLC has finished what it does, then try again."),
+        _GATEWAY_NO_PATH: tr(
+            "The gateway knows no unit {unit}: give another one with unit= in the URL.", unit=unit
+        ),
+        _GATEWAY_NO_ANSWER: tr(
+            "The gateway is there, unit {unit} behind it is not: check unit= in the URL, and "
+            "that device's power and cable.",
+            unit=unit,
+        ),
+    }
+    return remedies.get(code, tr("Look at the PLC; read its state before anything else."))

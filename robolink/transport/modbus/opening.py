@@ -1,0 +1,188 @@
+"""From a URL to a Modbus client."""
+
+from dataclasses import dataclass, replace
+from typing import Final, Literal
+
+from robolink.errors import ConfigError, ConnectError, TransportTimeoutError
+from robolink.messages import tr
+from robolink.timing import Clock, Deadline, SystemClock
+from robolink.transport._url import LinkUrl
+from robolink.transport._url_options import UrlOptions
+from robolink.transport.modbus.client import ModbusClient
+from robolink.transport.modbus.framing import Framing
+from robolink.transport.modbus.messages import Area
+from robolink.transport.modbus.register_frames import RegisterRtuFraming, RegisterTcpFraming
+from robolink.transport.modbus.rtu import RtuExchange, RtuLine
+from robolink.transport.modbus.tcp import TcpExchange
+from robolink.transport.stream.dial import dial
+from robolink.transport.stream.serial_port import SerialSettings, open_serial
+from robolink.transport.stream.tcp import TcpTransport
+
+TCP_MEDIUM: Final = "modbus-tcp"
+RTU_MEDIUM: Final = "modbus-rtu"
+
+_DEFAULT_UNITS: Final = {TCP_MEDIUM: 255, RTU_MEDIUM: 1}
+"""A TCP server that is no gateway is asked as 255 (Modbus messaging on TCP/IP 1.0b)."""
+
+_PORT: Final = 502
+_FASTEST_TIMED_BAUD: Final = 19_200
+_QUIET_CHARACTERS: Final = 10
+_QUIET_S: Final = 0.02
+"""USB adapters hand over what they receive every 16 ms; a shorter pause is not silence."""
+
+_PARITIES: Final[dict[str, Literal["N", "E", "O"]]] = {"even": "E", "none": "N", "odd": "O"}
+_STOP_BITS: Final[dict[str, Literal[1, 2]]] = {"1": 1, "2": 2}
+_NO_YES: Final = {"no": False, "yes": True}
+
+
+@dataclass(frozen=True, slots=True)
+class Probe:
+    """A place that can be read, to find out whether a serial line is in step.
+
+    Attributes:
+        area: Input or holding registers.
+        address: First address; up to 35 registers are read from it.
+    """
+
+    area: Area = Area.HOLDING
+    address: int = 0
+
+
+def open_modbus(
+    url: LinkUrl, *, timeout_s: float = 3.0, clock: Clock | None = None
+) -> ModbusClient:
+    """Open a client for ``KIND+modbus-tcp://host:502`` or ``KIND+modbus-rtu:///dev/ttyUSB0``.
+
+    Args:
+        url: Options are ``unit``; on a serial line also ``baud`` (19200), ``parity`` (even,
+            none or odd), ``stopbits`` (1, or 2 without parity: Modbus over serial line 1.02,
+            2.5.1) and ``echo`` (yes when an RS-485 adapter hears itself).
+        timeout_s: Longest wait for the connection, and for each answer.
+        clock: Replaces the machine's clock.
+
+    Raises:
+        ConfigError: The URL or an option is wrong.
+        ConnectError: No connection; on a serial line also when the unit does not answer.
+        RemoteProtocolError: What a serial line brings is no Modbus.
+    """
+    options = UrlOptions(url)
+    return open_client(url, options, probe=Probe(), timeout_s=timeout_s, clock=clock)
+
+
+def open_client(
+    url: LinkUrl,
+    options: UrlOptions,
+    *,
+    probe: Probe,
+    timeout_s: float,
+    clock: Clock | None,
+    registers_only: bool = False,
+) -> ModbusClient:
+    """Open a client; ``options`` are those that the caller has left. See :func:`open_modbus`.
+
+    With ``registers_only`` it reads and writes registers and nothing else, and loads no pymodbus.
+    """
+    clock = clock or SystemClock()
+    if url.medium == TCP_MEDIUM:
+        wrapped: Framing = RegisterTcpFraming() if registers_only else _tcp_framing()
+        return _open_tcp(url, options, wrapped, timeout_s=timeout_s, clock=clock)
+    wrapped = RegisterRtuFraming() if registers_only else _rtu_framing()
+    return _open_rtu(url, options, wrapped, probe=probe, timeout_s=timeout_s, clock=clock)
+
+
+def _tcp_framing() -> Framing:
+    from robolink.transport.modbus.frames import TcpFraming  # here, because it loads pymodbus
+
+    return TcpFraming()
+
+
+def _rtu_framing() -> Framing:
+    from robolink.transport.modbus.frames import RtuFraming  # here, because it loads pymodbus
+
+    return RtuFraming()
+
+
+def _open_tcp(
+    url: LinkUrl, options: UrlOptions, framing: Framing, *, timeout_s: float, clock: Clock
+) -> ModbusClient:
+    unit = options.take_int("unit", _DEFAULT_UNITS[TCP_MEDIUM], 0, 255)
+    options.finish()
+    if not url.host or url.path:
+        raise ConfigError(
+            tr("{identity} names no host.", identity=url.identity),
+            remedy=tr("Write for example {scheme}://192.168.0.2:502.", scheme=url.scheme),
+        )
+    server = replace(url, port=url.port or _PORT, options={})
+    deadline = Deadline.after(clock, timeout_s)
+    transport = TcpTransport(dial(server, timeout_s=timeout_s, deadline=deadline), server, clock)
+    identity = _identity(server, unit)
+    exchange = TcpExchange(transport, identity, framing)
+    return ModbusClient(transport, exchange, identity=identity, unit=unit, timeout_s=timeout_s)
+
+
+def _open_rtu(
+    url: LinkUrl,
+    options: UrlOptions,
+    framing: Framing,
+    *,
+    probe: Probe,
+    timeout_s: float,
+    clock: Clock,
+) -> ModbusClient:
+    unit = options.take_int("unit", _DEFAULT_UNITS[RTU_MEDIUM], 1, 247)
+    settings = _take_settings(options)
+    echo = options.take_choice("echo", "no", _NO_YES)
+    options.finish()
+    timed = settings.baud <= _FASTEST_TIMED_BAUD
+    line = RtuLine(
+        character_s=settings.character_s,
+        silence_s=3.5 * settings.character_s if timed else 0.00175,
+        quiet_s=max(_QUIET_CHARACTERS * settings.character_s, _QUIET_S),
+        echo=echo,
+        probe_area=probe.area,
+        probe_address=probe.address,
+    )
+    transport = open_serial(url, settings, timeout_s=timeout_s, clock=clock)
+    identity = _identity(url, unit)
+    exchange = RtuExchange(transport, identity, line, framing)
+    try:
+        exchange.get_in_step(unit, Deadline.after(clock, timeout_s))
+    except TransportTimeoutError as error:
+        transport.close()
+        raise _nobody_there(error, url, unit, settings) from error
+    except BaseException:
+        transport.close()
+        raise
+    return ModbusClient(transport, exchange, identity=identity, unit=unit, timeout_s=timeout_s)
+
+
+def _identity(url: LinkUrl, unit: int) -> str:
+    return url.identity + (f"?unit={unit}" if unit != _DEFAULT_UNITS[url.medium] else "")
+
+
+def _take_settings(options: UrlOptions) -> SerialSettings:
+    baud = options.take_int("baud", 19_200, 300, 4_000_000)
+    parity = options.take_choice("parity", "even", _PARITIES)
+    stop_bits = options.take_choice("stopbits", "2" if parity == "N" else "1", _STOP_BITS)
+    return SerialSettings(baud, parity, stop_bits)
+
+
+def _nobody_there(
+    error: TransportTimeoutError, url: LinkUrl, unit: int, settings: SerialSettings
+) -> ConnectError:
+    return ConnectError(
+        tr(
+            "Unit {unit} does not answer on {identity} at {baud} baud, parity {parity}.",
+            unit=unit,
+            identity=url.identity,
+            baud=settings.baud,
+            parity=settings.parity,
+        ),
+        remedy=tr(
+            "Check unit, baud, parity and stopbits in the URL against the PLC's settings, then "
+            "the cable (A and B may be swapped)."
+        ),
+        controller=url.identity,
+        request=error.request,
+        raw=error.raw,
+    )

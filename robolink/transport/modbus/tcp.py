@@ -1,0 +1,81 @@
+"""How one Modbus request and its answer pass over TCP."""
+
+from typing import Final
+
+from robolink.errors import TransportTimeoutError
+from robolink.timing import Deadline
+from robolink.transport.modbus import errors as errors
+from robolink.transport.modbus.framing import FrameError, Framing
+from robolink.transport.modbus.messages import ModbusReply, ModbusRequest
+from robolink.transport.stream.contract import Transport
+
+_MOST_UNASKED_BYTES: Final = 16_384
+"""Sixty of the longest frames. Late answers are fewer: after a time-out the link is closed. Who
+sends more between a question and its answer does not stop."""
+
+
+class TcpExchange:
+    """Takes the answer that carries the number of the request; what comes late is dropped."""
+
+    recovers: Final = False
+    units: Final = range(256)
+
+    def __init__(self, transport: Transport, identity: str, framing: Framing) -> None:
+        self._transport = transport
+        self._identity = identity
+        self._framing = framing
+        self._buffer = bytearray()
+        self._transaction = 0
+        self._unasked = 0
+
+    def takes_s(self, sent_bytes: int, answered_bytes: int) -> float:  # noqa: ARG002 - the form of all exchanges
+        """See :meth:`robolink.transport.modbus.client.Exchange.takes_s`."""
+        return 0.0
+
+    def ask(self, request: ModbusRequest, deadline: Deadline) -> ModbusReply:
+        """See :meth:`robolink.transport.modbus.client.Exchange.ask`."""
+        # A server that hung up while nothing was asked is noticed before anything is sent.
+        self._unasked = 0
+        waiting = self._transport.receive_waiting()
+        if waiting is not None:
+            self._keep(waiting, request)
+        self._transaction = self._transaction % 0xFFFF + 1
+        frame = self._framing.pack(request, self._transaction)
+        self._transport.send(frame, deadline=deadline)
+        while True:
+            reply = self._next(request, deadline)
+            if reply.transaction != self._transaction:
+                continue
+            if not request.is_answered_by(reply):
+                raise errors.mismatched(self._identity, request)
+            return reply
+
+    def _next(self, request: ModbusRequest, deadline: Deadline) -> ModbusReply:
+        while True:
+            try:
+                reply = self._framing.take(self._buffer)
+            except FrameError as error:
+                raise errors.unintelligible(self._identity, request, error.raw) from error
+            if reply is not None:
+                return reply
+            if deadline.expired:  # also when frames of no request of ours keep coming
+                raise errors.unanswered(self._identity, request, bytes(self._buffer))
+            try:
+                self._keep(self._transport.receive(deadline=deadline), request)
+            except TransportTimeoutError as error:
+                held = bytes(self._buffer)
+                raise errors.unanswered(self._identity, request, held) from error
+
+    def _keep(self, data: bytes, request: ModbusRequest) -> None:
+        """Take what came; the longest answer is far shorter than what is taken for one request.
+
+        Raises:
+            TransportBrokenError: It was the end of the stream.
+            RemoteProtocolError: It has no end.
+        """
+        if not data:
+            raise errors.hung_up(self._identity)
+        self._unasked += len(data)
+        if self._unasked > _MOST_UNASKED_BYTES:
+            raise errors.flooding(self._identity, request, self._unasked, data)
+        self._buffer += data

@@ -1,0 +1,1 @@
+"""The assist port: the hands, eyes and truth of a served simulator."""

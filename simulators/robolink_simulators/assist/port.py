@@ -1,0 +1,252 @@
+"""The assist port: the hands, eyes and truth of a served simulator, as JSON lines.
+
+``{"do": "look"}`` is answered with ``{"ok": true, ...}``, anything that cannot be done with
+``{"ok": false, "error": sentence}``. A line that is no JSON object ends the connection, so
+that a web page which posts to the port gets nothing done.
+"""
+
+import json
+import socket
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from types import TracebackType
+from typing import Any, Final, Self
+from urllib.parse import urlsplit
+
+from robolink.errors import ConfigError, ConnectError, RobolinkError, TransportBrokenError
+from robolink.messages import tr
+from robolink_simulators.assist.acts import Assisted, perform
+from robolink_simulators.cell.clock import ScaledClock
+from robolink_simulators.cell.person import Look
+from robolink_simulators.cell.places import Axis, XyzMm
+from robolink_simulators.epson.refusals import SpelRefusal
+from robolink_simulators.hosting.in_process import epson as in_process
+from robolink_simulators.hosting.in_process import softmotion as plc_in_process
+from robolink_simulators.hosting.streams.tcp_host import TcpHost
+from robolink_simulators.softmotion.smc_errors import BlockRefused
+
+_MAX_LINE: Final = 65536
+_SCHEME: Final = "assist+tcp"
+_IN_PROCESS: Final[Mapping[str, Callable[[str], Assisted]]] = {
+    "epson+sim": in_process.simulator_named,
+    "softmotion+sim": plc_in_process.simulator_named,
+}
+
+
+def serve_assist(simulator: Assisted, *, port: int = 0, clock: ScaledClock) -> TcpHost:
+    """Serve the assist port of a simulator, on loopback only.
+
+    Args:
+        simulator: Whose world.
+        port: Port, 0 for a free one.
+        clock: The clock on which the simulator is served.
+
+    Raises:
+        ConnectError: The port is taken.
+    """
+    return TcpHost(
+        _AssistDevice(simulator),
+        _SCHEME,
+        ("127.0.0.1", port),
+        clock=clock,
+        lock=simulator.lock,
+    )
+
+
+class _AssistDevice:
+    """Implements :class:`~robolink_simulators.hosting.seam.WireDevice`."""
+
+    def __init__(self, simulator: Assisted) -> None:
+        self._simulator = simulator
+
+    def connect(self, now_ns: int) -> "_AssistLink":  # noqa: ARG002 - time plays no part
+        return _AssistLink(self._simulator)
+
+    def advance(self, now_ns: int) -> None:
+        """Nothing happens here by itself."""
+
+    def next_change(self) -> int | None:
+        return None
+
+
+class _AssistLink:
+    """Implements :class:`~robolink_simulators.hosting.seam.DeviceLink`."""
+
+    def __init__(self, simulator: Assisted) -> None:
+        self._simulator = simulator
+        self._held = b""
+        self._out = b""
+        self.closed = False
+
+    def receive(self, data: bytes, now_ns: int) -> None:
+        self._held += data
+        if len(self._held) > _MAX_LINE:
+            self.closed = True
+        while not self.closed and b"\n" in self._held:
+            line, _, self._held = self._held.partition(b"\n")
+            self._simulator.advance(now_ns)
+            self._out += self._answered(line)
+
+    def outgoing(self) -> bytes:
+        out, self._out = self._out, b""
+        return out
+
+    def _answered(self, line: bytes) -> bytes:
+        try:
+            request = json.loads(line)
+        except (ValueError, RecursionError):
+            request = None
+        if not isinstance(request, dict):
+            self.closed = True
+            return b""
+        try:
+            answer = {"ok": True, **perform(self._simulator, request)}
+        except (RobolinkError, SpelRefusal, BlockRefused) as error:
+            answer = {"ok": False, "error": str(error)}
+        return json.dumps(answer).encode() + b"\n"
+
+
+class AssistClient:
+    """Talks to an assist port.
+
+    Args:
+        url: ``assist+tcp://127.0.0.1:PORT``.
+        timeout_s: Longest wait for an answer.
+
+    Raises:
+        ConfigError: It is not an assist URL.
+        ConnectError: Nobody listens there.
+    """
+
+    def __init__(self, url: str, *, timeout_s: float = 5.0) -> None:
+        parts = urlsplit(url)
+        if parts.scheme != _SCHEME or not parts.hostname or not parts.port:
+            raise ConfigError(
+                tr("{url!r} is not an assist URL.", url=url),
+                remedy=tr("Take the one that 'robolink sim' prints."),
+            )
+        self._url = url
+        try:
+            self._socket = socket.create_connection((parts.hostname, parts.port), timeout_s)
+        except OSError as error:
+            raise ConnectError(
+                tr("No simulator listens on {url}.", url=url),
+                remedy=tr("Start one with 'robolink sim epson' or 'robolink sim softmotion'."),
+            ) from error
+        self._lines = self._socket.makefile("rb")
+
+    def do(self, act: str, **parameters: object) -> dict[str, Any]:
+        """Have something done and return what it gives.
+
+        Raises:
+            ConfigError: The simulator cannot do it, and says why.
+            TransportBrokenError: The simulator is gone.
+        """
+        try:
+            self._socket.sendall(json.dumps({"do": act, **parameters}).encode() + b"\n")
+            line = self._lines.readline()
+        except OSError as error:
+            raise self._broken() from error
+        if not line:
+            raise self._broken()
+        answer: dict[str, Any] = json.loads(line)
+        if not answer.pop("ok"):
+            raise ConfigError(str(answer["error"]))
+        return answer
+
+    def look(self, tool: int | None = None) -> Look:
+        """Return the vector, in base axes, that the operator sees from the tip to the pin."""
+        return Look(**(self.do("look") if tool is None else self.do("look", tool=tool)))
+
+    def way_along(self, axis: Axis, length_mm: float, tool: int) -> XyzMm:
+        """Return the way, in base axes, that the operator sees an axis of a tool lead."""
+        answer = self.do("way_along", axis=axis, length_mm=length_mm, tool=tool)
+        x_mm, y_mm, z_mm = answer["way_mm"]
+        return x_mm, y_mm, z_mm
+
+    def jog_onto_pin(self) -> dict[str, float]:
+        """Jog the tip onto the pin on the pendant (Teach only); return the flange pose."""
+        flange: dict[str, float] = self.do("jog_onto_pin")["flange"]
+        return flange
+
+    def see(self, mark: int) -> list[tuple[float, float]]:
+        """Take a picture and return the pixels at which something looks like a mark."""
+        return [(x, y) for x, y in self.do("see", mark=mark)["seen"]]
+
+    def truth(self) -> dict[str, Any]:
+        """Return where the tips and the pin really are."""
+        return self.do("truth")
+
+    def close(self) -> None:
+        """Close the connection."""
+        self._lines.close()
+        self._socket.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def _broken(self) -> TransportBrokenError:
+        return TransportBrokenError(
+            tr("The simulator behind {url} is gone.", url=self._url),
+            remedy=tr("Start it again."),
+        )
+
+
+class InProcessEyes:
+    """Looks at a simulator of this process, as :class:`AssistClient` does at a served one."""
+
+    def __init__(self, simulator: Assisted) -> None:
+        self._simulator = simulator
+
+    def look(self, tool: int | None = None) -> Look:
+        """Return the vector, in base axes, that the operator sees from the tip to the pin."""
+        with self._simulator.lock:
+            return self._simulator.world.operator.look(tool)
+
+    def way_along(self, axis: Axis, length_mm: float, tool: int) -> XyzMm:
+        """Return the way, in base axes, that the operator sees an axis of a tool lead."""
+        with self._simulator.lock:
+            return self._simulator.world.operator.way_along(axis, length_mm, tool)
+
+
+def simulator_at(url: str) -> Assisted:
+    """Return the simulator of this process that a sim URL names.
+
+    Raises:
+        ConfigError: It is no sim URL, or no simulator has that name.
+    """
+    parts = urlsplit(url)
+    named = _IN_PROCESS.get(parts.scheme)
+    if named is None:
+        raise ConfigError(
+            tr("{url!r} is not a sim URL.", url=url),
+            remedy=tr("Known are: {known}.", known=", ".join(f"{it}://NAME" for it in _IN_PROCESS)),
+        )
+    return named(parts.hostname or "")
+
+
+@contextmanager
+def open_eyes(url: str) -> Iterator[AssistClient | InProcessEyes]:
+    """Open the operator's eyes on a simulator.
+
+    Args:
+        url: An assist URL, or that of a simulator of this process: ``epson+sim://NAME`` or
+            ``softmotion+sim://NAME``.
+
+    Raises:
+        ConfigError: It is neither, or no simulator has that name.
+        ConnectError: Nobody listens there.
+    """
+    if urlsplit(url).scheme in _IN_PROCESS:
+        yield InProcessEyes(simulator_at(url))
+    else:
+        with AssistClient(url) as client:
+            yield client

@@ -1,0 +1,128 @@
+"""An up-looking camera as it really stands, and what its picture shows.
+
+A pinhole: lengths at the height of focus have the stated scale, and things above it look
+smaller. A lens that leans sees the plane askew, and things above or below it beside where they
+are. The finder errs by Gaussian noise, now and then by much more, and now and then finds nothing.
+"""
+
+import math
+import random
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Final
+
+from robolink_simulators.cell.places import XyzMm
+
+_LENS_MM: Final = 120.0
+"""From lens to the plane of focus (assumed)."""
+
+_DEPTH_MM: Final = 2.0
+"""Depth of field to each side (assumed); what is farther off is not found."""
+
+Pixel = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class CameraOptics:
+    """What a camera does to a place.
+
+    Attributes:
+        um_per_px_x, um_per_px_y: Length of a pixel along the image's two axes, at focus.
+        turn_deg: Direction of the image's first axis in the base.
+        shear_deg: By how much the second axis is off a right angle.
+        mirrored: Whether the image is mirrored against the base seen from above.
+        tilt_deg: By how much the lens leans.
+        tilt_toward_deg: Toward which direction of the base.
+        noise_px: Standard deviation of a found place, per axis.
+        outlier_share: Share of the places that are wrong by ``outlier_px``.
+        outlier_px: By how much those are wrong, in any direction.
+        miss_share: Share of the pictures in which nothing is found.
+        size_px: Width and height of the image.
+    """
+
+    um_per_px_x: float = 20.0
+    um_per_px_y: float = 20.0
+    turn_deg: float = 3.0
+    shear_deg: float = 0.0
+    mirrored: bool = True
+    tilt_deg: float = 0.0
+    tilt_toward_deg: float = 0.0
+    noise_px: float = 0.1
+    outlier_share: float = 0.0
+    outlier_px: float = 40.0
+    miss_share: float = 0.0
+    size_px: tuple[int, int] = (1280, 1024)
+
+    @property
+    def mm_per_px(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """The matrix from pixels to the base at focus, for a lens that does not lean."""
+        first, second = (math.radians(self.turn_deg + at) for at in (0.0, 90.0 + self.shear_deg))
+        sx, sy = self.um_per_px_x / 1000, self.um_per_px_y / 1000
+        if self.mirrored:
+            sy = -sy
+        return (
+            (sx * math.cos(first), sy * math.cos(second)),
+            (sx * math.sin(first), sy * math.sin(second)),
+        )
+
+    def pixel(self, dx: float, dy: float, dz: float) -> Pixel | None:
+        """Return where a place shows, seen from the middle of the focus, mm; ``None`` if nowhere.
+
+        Args:
+            dx: From the point of the base that the middle of the image looks at, along X.
+            dy: Along Y.
+            dz: Above it.
+        """
+        if abs(dz) > _DEPTH_MM:
+            return None
+        toward = math.radians(self.tilt_toward_deg)
+        along_x, along_y = math.cos(toward), math.sin(toward)
+        lean = math.radians(self.tilt_deg)
+        # Along the lean, across it, and along the axis of the lens.
+        out, across = dx * along_x + dy * along_y, dy * along_x - dx * along_y
+        out, up = (
+            out * math.cos(lean) - dz * math.sin(lean),
+            out * math.sin(lean) + dz * math.cos(lean),
+        )
+        shrunk = _LENS_MM / (_LENS_MM + up)
+        out, across = out * shrunk, across * shrunk
+        x, y = out * along_x - across * along_y, out * along_y + across * along_x
+        (a, b), (c, d) = self.mm_per_px
+        area = a * d - b * c
+        width, height = self.size_px
+        px, py = (d * x - b * y) / area + width / 2, (a * y - c * x) / area + height / 2
+        return (px, py) if 0 <= px <= width and 0 <= py <= height else None
+
+
+@dataclass(slots=True)
+class SimulatedCamera:
+    """A camera in the cell.
+
+    Attributes:
+        middle_mm: Point of the base that the middle of the image looks at, in focus.
+        optics: What it does to a place.
+        rng: Source of its errors.
+    """
+
+    middle_mm: XyzMm
+    optics: CameraOptics
+    rng: random.Random
+
+    def picture(self, places: Iterable[XyzMm]) -> tuple[Pixel, ...]:
+        """Return where the finder finds each of some places that are in the image."""
+        optics, rng = self.optics, self.rng
+        missed = rng.random() < optics.miss_share
+        found = list[Pixel]()
+        for place in places:
+            pixel = optics.pixel(*(a - b for a, b in zip(place, self.middle_mm, strict=True)))
+            if pixel is not None and not missed:
+                found.append(self._found(pixel))
+        return tuple(found)
+
+    def _found(self, pixel: Pixel) -> Pixel:
+        optics, rng = self.optics, self.rng
+        x, y = (rng.gauss(at, optics.noise_px) for at in pixel)
+        if rng.random() < optics.outlier_share:
+            way = rng.uniform(0.0, math.tau)
+            x, y = x + optics.outlier_px * math.cos(way), y + optics.outlier_px * math.sin(way)
+        return x, y

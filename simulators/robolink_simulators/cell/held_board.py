@@ -1,0 +1,44 @@
+"""A board that the mounted nozzle holds, never quite as it should."""
+
+import random
+from dataclasses import dataclass, replace
+from typing import Final
+
+from robolink.model import ToolOffset, rotate_xy
+
+DRAWING_MM: Final = ((20.0, 12.5), (-20.0, 12.5), (-20.0, -12.5), (20.0, -12.5))
+"""Fiducials of the simulated board: a rectangle about its middle."""
+
+
+@dataclass(frozen=True, slots=True)
+class SimulatedBoard:
+    """A board at the tip of a nozzle.
+
+    Attributes:
+        shift_mm: From the nozzle's tip to the board's middle, in the nozzle's axes.
+        turn_deg: By how much the board is turned against the nozzle.
+        drawing_mm: Its fiducials, about its middle.
+    """
+
+    shift_mm: tuple[float, float]
+    turn_deg: float
+    drawing_mm: tuple[tuple[float, float], ...] = DRAWING_MM
+
+    @classmethod
+    def grasped(cls, rng: random.Random) -> "SimulatedBoard":
+        """Return a board as a nozzle takes it up: some tenths of a mm, and a degree, off."""
+        x_mm, y_mm = (round(rng.uniform(-0.5, 0.5), 4) for _ in range(2))
+        return cls((x_mm, y_mm), round(rng.uniform(-1.5, 1.5), 4))
+
+    def frame(self, tip: ToolOffset) -> ToolOffset:
+        """Return the board's frame on the flange, for a nozzle with its tip there."""
+        dx, dy = rotate_xy(*self.shift_mm, tip.u_deg)
+        return replace(tip, x_mm=tip.x_mm + dx, y_mm=tip.y_mm + dy, u_deg=tip.u_deg + self.turn_deg)
+
+    def fiducials(self, tip: ToolOffset) -> tuple[ToolOffset, ...]:
+        """Return where the fiducials are on the flange."""
+        frame = self.frame(tip)
+        turned = [rotate_xy(x, y, frame.u_deg) for x, y in self.drawing_mm]
+        return tuple(
+            replace(frame, x_mm=frame.x_mm + dx, y_mm=frame.y_mm + dy) for dx, dy in turned
+        )

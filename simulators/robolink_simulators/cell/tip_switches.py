@@ -1,0 +1,89 @@
+"""What a nozzle can trip: a light beam, a touch plate. Fed with the true place of its tip."""
+
+import math
+import random
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+from robolink_simulators.cell.places import XyzMm
+
+Lean = tuple[float, float]
+"""By how much a bent nozzle's shaft lies beside its tip, X and Y in mm per mm above the tip."""
+
+UPRIGHT: Final[Lean] = (0.0, 0.0)
+
+
+class Shake:
+    """By how much a sensor switches beside its place: drawn anew for each motion.
+
+    Args:
+        sigma_mm: Standard deviation, per axis.
+        rng: Source of the scatter.
+    """
+
+    def __init__(self, sigma_mm: float, rng: random.Random) -> None:
+        self._sigma_mm = sigma_mm
+        self._rng = rng
+        self._motion = -1
+        self._by_mm: XyzMm = (0.0, 0.0, 0.0)
+
+    def of(self, motion: int) -> XyzMm:
+        """Return it for the motion of that number; the same as long as the number is."""
+        if self._motion != motion:
+            self._motion = motion
+            x, y, z = (self._rng.gauss(0.0, self._sigma_mm) for _ in range(3))
+            self._by_mm = (x, y, z)
+        return self._by_mm
+
+
+class TipSwitch(Protocol):
+    """Something that is on or off, depending on where a tip is."""
+
+    def trips(self, tip_mm: XyzMm, lean: Lean = UPRIGHT) -> bool:
+        """Tell whether a nozzle with its tip there switches it on."""
+
+
+@dataclass(frozen=True, slots=True)
+class LightBeam:
+    """A light beam, level or nearly so, that the nozzle's shaft breaks.
+
+    Attributes:
+        through_mm: A point of the beam.
+        heading_deg: Its direction, counter-clockwise from X.
+        nozzle_radius_mm: Half the thickness of what breaks it.
+        radius_mm: Half the thickness of the beam itself.
+        tilt_deg: By how much it rises along its heading.
+    """
+
+    through_mm: XyzMm
+    heading_deg: float
+    nozzle_radius_mm: float = 0.25
+    radius_mm: float = 0.0
+    tilt_deg: float = 0.0
+
+    def trips(self, tip_mm: XyzMm, lean: Lean = UPRIGHT) -> bool:
+        """Tell whether the nozzle breaks the beam."""
+        x, y, z = self.through_mm
+        heading = math.radians(self.heading_deg)
+        along_x, along_y = math.cos(heading), math.sin(heading)
+        dx, dy = tip_mm[0] - x, tip_mm[1] - y
+        above_mm = z + (dx * along_x + dy * along_y) * math.tan(math.radians(self.tilt_deg))
+        above_mm -= tip_mm[2]
+        dx, dy = dx + lean[0] * above_mm, dy + lean[1] * above_mm
+        beside_mm = abs(dy * along_x - dx * along_y)
+        return above_mm >= 0 and beside_mm <= self.nozzle_radius_mm + self.radius_mm
+
+
+@dataclass(frozen=True, slots=True)
+class TouchPlate:
+    """A level plate that switches when a tip touches it.
+
+    Attributes:
+        z_mm: Its height.
+    """
+
+    z_mm: float
+
+    def trips(self, tip_mm: XyzMm, lean: Lean = UPRIGHT) -> bool:  # noqa: ARG002 - the tip touches
+        """Tell whether the tip touches it, or is below it."""
+        return tip_mm[2] <= self.z_mm

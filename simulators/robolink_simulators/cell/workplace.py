@@ -1,0 +1,184 @@
+"""The place where a simulated robot works: tips, a pin, a camera, a board.
+
+Ground truth. The controller knows none of it; only what it stores.
+"""
+
+import math
+import random
+from collections.abc import Hashable
+from dataclasses import asdict, replace
+from typing import Any, Final, Protocol
+
+from robolink.model import TIP, Pose, ToolOffset
+from robolink_simulators.cell.camera import Pixel, SimulatedCamera
+from robolink_simulators.cell.held_board import SimulatedBoard
+from robolink_simulators.cell.places import Axis, Direction, axis_of
+from robolink_simulators.cell.places import XyzMm as XyzMm
+from robolink_simulators.cell.tip_switches import UPRIGHT, Lean
+from robolink_simulators.cell.world_parameters import WorldParameters
+
+MOUNTED_TOOL: Final = 1
+"""The tool number of the nozzle on the arm."""
+
+
+class Handled(Protocol):
+    """A robot as a person at the cell meets it."""
+
+    def placement(self) -> Hashable:
+        """Return a value that stays equal as long as the robot stands still."""
+
+    def flange(self) -> Pose:
+        """Return the commanded flange pose."""
+
+    def tip_mm(self, tip: ToolOffset | None) -> XyzMm:
+        """Return where a physical tip is, given where it sits on the flange."""
+
+    def turned(self, direction: Direction) -> Direction:
+        """Return how a direction on the flange lies in the base."""
+
+    def carry(self, tip: ToolOffset | None, by_mm: XyzMm) -> None:
+        """Jog until the tip has moved that far; the flange turns as little as possible.
+
+        What it cannot reach it refuses with the error of its own controller.
+        """
+
+    def loosen(self, parameters: WorldParameters) -> None:
+        """Give the axes the play that the parameters say."""
+
+
+class Workplace:
+    """What is true around a robot.
+
+    Args:
+        robot: Who works here.
+        tips: The physical tip of each tool number, seen from the flange.
+        pin_mm: Tip of the reference pin.
+        seed: Decides the next nozzles, where the camera is, and how a board is held.
+        replaced: What the next nozzle differs from where no tip is known yet.
+        parameters: What goes wrong here; see :meth:`set_up`.
+
+    Attributes:
+        leans: By how much the nozzle of a tool is bent; upright where none is named.
+        camera: The up-looking camera.
+        board: The board that the mounted nozzle holds, ``None`` for none.
+    """
+
+    def __init__(
+        self,
+        robot: Handled,
+        tips: dict[int, ToolOffset],
+        pin_mm: XyzMm,
+        *,
+        seed: int,
+        replaced: ToolOffset,
+        parameters: WorldParameters,
+    ) -> None:
+        self.robot = robot
+        self.tips = tips
+        self.pin_mm = pin_mm
+        self.leans: dict[int, Lean] = {}
+        self.board: SimulatedBoard | None = None
+        self._seed = seed
+        self._random = random.Random(f"nozzles {seed}")
+        self._replaced = replaced
+        rng = random.Random(f"camera {seed}")
+        self.camera = SimulatedCamera(camera_beside(self.tip_mm(), rng), parameters.optics, rng)
+        self.parameters = WorldParameters()
+        self.set_up(parameters)
+
+    def set_up(self, parameters: WorldParameters) -> None:
+        """Give the cell other imperfections; tips, pin and camera stay where they are."""
+        if parameters.tool_turn != self.parameters.tool_turn:
+            u_deg, v_deg, w_deg = parameters.tool_turn
+            tip = self.tips.get(MOUNTED_TOOL, self._replaced)
+            self.tips[MOUNTED_TOOL] = replace(tip, u_deg=u_deg, v_deg=v_deg, w_deg=w_deg)
+        self.parameters = parameters
+        self.operator_sigma_mm = parameters.eye_sigma_mm
+        self.leans[MOUNTED_TOOL] = parameters.lean
+        self.camera.optics = parameters.optics
+        self.robot.loosen(parameters)
+        if not parameters.board_held:
+            self.board = None
+        elif self.board is None:
+            self.board = SimulatedBoard.grasped(random.Random(f"board {self._seed}"))
+
+    def lean_of(self, tool: int) -> Lean:
+        """Return by how much a nozzle is bent, in the flange's axes."""
+        return self.leans.get(tool, UPRIGHT)
+
+    def see(self, mark: int = TIP) -> tuple[Pixel, ...]:
+        """Take a picture and return everything in it that looks like the tip, or a fiducial.
+
+        Fiducials look alike: every one in the image is found, whichever is asked for.
+        """
+        nozzle, board = self.tips.get(MOUNTED_TOOL, ToolOffset()), self.board
+        if mark == TIP:
+            # A held board hides the tip of its nozzle.
+            seen = [tip for tool, tip in self.tips.items() if not (board and tool == MOUNTED_TOOL)]
+        else:
+            seen = list(board.fiducials(nozzle)) if board else []
+        return self.camera.picture(self.robot.tip_mm(place) for place in seen)
+
+    def tip_mm(self, tool: int = MOUNTED_TOOL) -> XyzMm:
+        """Return where a physical tip is now."""
+        return self.robot.tip_mm(self.tips.get(tool))
+
+    def axis(self, axis: Axis, tool: int = MOUNTED_TOOL) -> Direction:
+        """Return how an axis of a physical tool lies in the base now."""
+        return self.robot.turned(axis_of(self.tips.get(tool, ToolOffset()), axis))
+
+    def change_nozzle(self, tool: int = MOUNTED_TOOL) -> ToolOffset:
+        """Put another nozzle on; its tip is some tenths of a mm from the old one's."""
+        self.tips[tool] = exchanged(self.tips.get(tool, self._replaced), self._random)
+        return self.tips[tool]
+
+    def truth(self) -> dict[str, Any]:
+        """Return all of it, ready for JSON."""
+        return {
+            "tips": {str(tool): asdict(tip) for tool, tip in self.tips.items()},
+            "pin_mm": list(self.pin_mm),
+            "operator_sigma_mm": self.operator_sigma_mm,
+            "camera": {
+                "middle_mm": list(self.camera.middle_mm),
+                "mm_per_px": [list(row) for row in self.camera.optics.mm_per_px],
+                "size_px": list(self.camera.optics.size_px),
+            },
+            "board": self._held(),
+            "parameters": asdict(self.parameters),
+        }
+
+    def _held(self) -> dict[str, Any] | None:
+        if self.board is None:
+            return None
+        frame = self.board.frame(self.tips.get(MOUNTED_TOOL, ToolOffset()))
+        return {"frame": asdict(frame), "drawing_mm": [list(at) for at in self.board.drawing_mm]}
+
+
+def exchanged(old: ToolOffset, rng: random.Random) -> ToolOffset:
+    """Return where the tip of another nozzle sits: some tenths of a mm from the old one's."""
+    x_mm, y_mm, z_mm = (_signed(rng, 0.2, 0.6) for _ in range(3))
+    return replace(old, x_mm=old.x_mm + x_mm, y_mm=old.y_mm + y_mm, z_mm=old.z_mm + z_mm).rounded(4)
+
+
+def pin_beside(tip_mm: XyzMm, rng: random.Random) -> XyzMm:
+    """Return a pin some mm beside a tip and below it."""
+    return (
+        round(tip_mm[0] + _signed(rng, 5.0, 9.0), 3),
+        round(tip_mm[1] + _signed(rng, 5.0, 9.0), 3),
+        round(tip_mm[2] - rng.uniform(3.0, 6.0), 3),
+    )
+
+
+def camera_beside(tip_mm: XyzMm, rng: random.Random) -> XyzMm:
+    """Return where a camera looks: nearer to the robot's base than a tip, and below it."""
+    reach_mm = math.hypot(tip_mm[0], tip_mm[1])
+    inward, beside = rng.uniform(12.0, 18.0) / reach_mm, _signed(rng, 4.0, 8.0) / reach_mm
+    return (
+        round(tip_mm[0] * (1 - inward) - tip_mm[1] * beside, 3),
+        round(tip_mm[1] * (1 - inward) + tip_mm[0] * beside, 3),
+        round(tip_mm[2] - rng.uniform(6.0, 9.0), 3),
+    )
+
+
+def _signed(rng: random.Random, low_mm: float, high_mm: float) -> float:
+    return rng.choice((-1.0, 1.0)) * rng.uniform(low_mm, high_mm)

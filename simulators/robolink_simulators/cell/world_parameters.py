@@ -1,0 +1,127 @@
+"""What goes wrong in a simulated cell, and how its camera is built, as named numbers.
+
+The same for every kind of robot. They are given to a simulator when it is made (``--world``, or
+``world.NAME`` in a sim URL), or later through the assist act ``set_world``.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Final
+
+from robolink.errors import ConfigError
+from robolink.messages import tr
+from robolink_simulators.cell.camera import CameraOptics
+from robolink_simulators.cell.tip_switches import Lean
+from robolink_simulators.option_values import values_from_text
+
+PREFIX: Final = "world."
+"""Stands before each name in a sim URL."""
+
+
+@dataclass(frozen=True, slots=True)
+class WorldParameters:
+    """One cell's imperfections.
+
+    Attributes:
+        eye_sigma_mm: Standard deviation of what a person's eye reads, per axis.
+        eye_outlier_share: Share of the readings that are wrong by ``eye_outlier_mm``.
+        eye_outlier_mm: By how much those are wrong, sideways.
+        backlash_deg: Play of the rotary axes behind the encoder.
+        backlash_mm: Play of the linear axes.
+        lean_deg: By how much the mounted nozzle's shaft is bent.
+        lean_toward_deg: Toward which direction, counted from the flange's X.
+        tool_u_deg, tool_v_deg, tool_w_deg: How the mounted tool is turned on the flange.
+        camera_um_per_px_x, camera_um_per_px_y: Length of a pixel at focus.
+        camera_turn_deg, camera_shear_deg, camera_mirrored: How the image lies in the base.
+        camera_tilt_deg, camera_tilt_toward_deg: By how much, and where to, the lens leans.
+        camera_noise_px: Standard deviation of a found place, per axis.
+        camera_outlier_share, camera_outlier_px: Share and size of false finds.
+        camera_miss_share: Share of the pictures in which nothing is found.
+        board_held: Whether the nozzle holds a board, which hides its tip.
+    """
+
+    eye_sigma_mm: float = 0.01
+    eye_outlier_share: float = 0.0
+    eye_outlier_mm: float = 0.5
+    backlash_deg: float = 0.0
+    backlash_mm: float = 0.0
+    lean_deg: float = 0.0
+    lean_toward_deg: float = 0.0
+    tool_u_deg: float = 0.0
+    tool_v_deg: float = 0.0
+    tool_w_deg: float = 0.0
+    camera_um_per_px_x: float = 20.0
+    camera_um_per_px_y: float = 20.0
+    camera_turn_deg: float = 3.0
+    camera_shear_deg: float = 0.0
+    camera_mirrored: bool = True
+    camera_tilt_deg: float = 0.0
+    camera_tilt_toward_deg: float = 0.0
+    camera_noise_px: float = 0.1
+    camera_outlier_share: float = 0.0
+    camera_outlier_px: float = 40.0
+    camera_miss_share: float = 0.0
+    board_held: bool = False
+
+    @property
+    def lean(self) -> Lean:
+        """The bent shaft, in the flange's axes."""
+        beside, toward = math.tan(math.radians(self.lean_deg)), math.radians(self.lean_toward_deg)
+        return beside * math.cos(toward), beside * math.sin(toward)
+
+    @property
+    def tool_turn(self) -> tuple[float, float, float]:
+        """U, V and W of the mounted tool."""
+        return self.tool_u_deg, self.tool_v_deg, self.tool_w_deg
+
+    @property
+    def optics(self) -> CameraOptics:
+        """The camera."""
+        names = [field.name for field in fields(CameraOptics) if field.name != "size_px"]
+        return CameraOptics(**{name: getattr(self, f"camera_{name}") for name in names})
+
+
+def parameter_names() -> tuple[str, ...]:
+    """Return the name of every parameter."""
+    return tuple(field.name for field in fields(WorldParameters))
+
+
+def parameters_from_text(pairs: Mapping[str, str]) -> dict[str, object]:
+    """Return the values of parameters that were given as text, by name.
+
+    Raises:
+        ConfigError: A parameter is unknown, or a value does not fit it.
+    """
+    for name in pairs:
+        if name not in parameter_names():
+            raise ConfigError(
+                tr("The simulated world has no parameter {name!r}.", name=name),
+                remedy=tr("Known are: {names}.", names=", ".join(parameter_names())),
+            )
+    values = values_from_text(WorldParameters, pairs)
+    for name in ("camera_um_per_px_x", "camera_um_per_px_y"):
+        if values.get(name, 1.0) == 0:
+            raise ConfigError(
+                tr("A pixel cannot be 0 long."), remedy=tr("Give {name} above 0.", name=name)
+            )
+    return values
+
+
+def from_options(options: Mapping[str, str]) -> WorldParameters:
+    """Return the world that the options ``world.NAME`` of a sim URL describe.
+
+    Raises:
+        ConfigError: As :func:`parameters_from_text`.
+    """
+    own = {
+        name.removeprefix(PREFIX): value
+        for name, value in options.items()
+        if name.startswith(PREFIX)
+    }
+    return WorldParameters(**parameters_from_text(own))  # type: ignore[arg-type]
+
+
+def plain(options: Mapping[str, str]) -> dict[str, str]:
+    """Return the options of a sim URL that are not about the world."""
+    return {name: value for name, value in options.items() if not name.startswith(PREFIX)}

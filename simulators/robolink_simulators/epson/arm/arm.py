@@ -1,0 +1,233 @@
+"""The simulated arm: where it is at any instant, and what it was told to do.
+
+A motion is a row of legs whose end is known when it starts. Stopping freezes the arm where it
+is (assumed: a real one needs a few milliseconds to come to rest).
+"""
+
+import math
+import random
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import accumulate
+
+from robolink.model import Hand, Pose, ToolOffset
+from robolink_simulators.epson.arm.kinematics import Joints, check_ranges, forward, tip_of
+from robolink_simulators.epson.arm.robots import ScaraModel
+from robolink_simulators.epson.arm.trajectory import (
+    JointLeg,
+    JointPace,
+    Leg,
+    LineLeg,
+    LinePace,
+    plan_go,
+    plan_move,
+)
+
+REST = Joints(45.0, 60.0, 0.0, -105.0)
+"""Where a new arm stands (assumed): bent to the right, fully up, U 0."""
+
+_LOOK_BACK_NS = 1_000_000
+_STILL = 1e-9
+
+_Ways = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class _Travel:
+    start_ns: int
+    legs: tuple[Leg, ...]
+
+    @property
+    def end_ns(self) -> int:
+        return self.start_ns + sum(leg.duration_ns for leg in self.legs)
+
+    def looks(self, since_ns: int, now_ns: int) -> list[int]:
+        """Return when to look at the joints so that each one's last way of turning is seen."""
+        ends = [self.start_ns + total for total in accumulate(leg.duration_ns for leg in self.legs)]
+        instants = {t for end in (*ends, now_ns) for t in (end - _LOOK_BACK_NS, end)}
+        return sorted(t for t in instants if since_ns < t <= now_ns)
+
+    def braked(self, now_ns: int) -> "_Travel":
+        """Return the same travel, left at ``now_ns`` to come to rest."""
+        began_ns, kept = self.start_ns, list[Leg]()
+        for leg in self.legs:
+            if now_ns < began_ns + leg.duration_ns:
+                kept.append(leg.braked(now_ns - began_ns))
+                break
+            kept.append(leg)
+            began_ns += leg.duration_ns
+        return _Travel(self.start_ns, tuple(kept))
+
+    def joints_at(self, now_ns: int) -> Joints:
+        leg, elapsed_ns = self._leg_at(now_ns)
+        return leg.joints_at(elapsed_ns)
+
+    def flange_at(self, now_ns: int) -> Pose:
+        leg, elapsed_ns = self._leg_at(now_ns)
+        return leg.flange_at(elapsed_ns)
+
+    def _leg_at(self, now_ns: int) -> tuple[Leg, int]:
+        elapsed_ns = max(0, now_ns - self.start_ns)
+        for leg in self.legs[:-1]:
+            if elapsed_ns < leg.duration_ns:
+                return leg, elapsed_ns
+            elapsed_ns -= leg.duration_ns
+        return self.legs[-1], elapsed_ns
+
+
+class Arm:
+    """One SCARA arm in simulated time.
+
+    Args:
+        model: Which robot.
+        joints: Where it stands.
+        backlash_deg: Play of joints 1, 2 and 4 behind the encoder: the true joint trails the
+            commanded one by half of it, against the way it last turned (assumed model).
+
+    Attributes:
+        moves_started: Motions begun since the arm was made; a repeated command shows here.
+        backlash_mm: Play of joint 3, likewise; none at first.
+    """
+
+    def __init__(
+        self, model: ScaraModel, joints: Joints = REST, *, backlash_deg: float = 0.0
+    ) -> None:
+        check_ranges(model, joints)
+        self.model = model
+        self.moves_started = 0
+        self.backlash_deg = backlash_deg
+        self.backlash_mm = 0.0
+        self._joints = joints
+        self._now_ns = 0
+        self._travel: _Travel | None = None
+        self._turned = (0.0, 0.0, 0.0, 0.0)
+
+    @property
+    def joints(self) -> Joints:
+        """The commanded joints at the instant last given to :meth:`advance`."""
+        return self._joints
+
+    @property
+    def moving(self) -> bool:
+        """Whether a motion is under way."""
+        return self._travel is not None
+
+    @property
+    def true_joints(self) -> Joints:
+        """Where the joints really are: commanded, less the backlash. No noise."""
+        return self._trailing(self._joints, self._turned)
+
+    def flange(self) -> Pose:
+        """Return the commanded flange pose."""
+        return forward(self.model, self._joints)
+
+    def true_flange(self) -> Pose:
+        """Return the flange pose that a pin, a camera or a light beam meets."""
+        return forward(self.model, self.true_joints)
+
+    def true_flange_at(self, now_ns: int) -> Pose:
+        """Return where the flange will really be, or was, in the motion under way."""
+        if self._travel is None:
+            return self.true_flange()
+        if not self.backlash_deg and not self.backlash_mm:
+            return self._travel.flange_at(now_ns)  # a search asks each millisecond
+        before, then = (self._travel.joints_at(t) for t in (now_ns - _LOOK_BACK_NS, now_ns))
+        return forward(self.model, self._trailing(then, self._ways(before, then)))
+
+    def real_position(self, rng: random.Random, noise_mm: float) -> Pose:
+        """Return the flange pose as RealPos measures it.
+
+        Encoders sit before the play, so backlash does not show; X, Y and Z scatter with the
+        standard deviation ``noise_mm`` (seen in a transcript: 2 um, docs/reference/epson.md 6,
+        vector 11).
+        """
+        pose = self.flange()
+        return replace(
+            pose,
+            x_mm=rng.gauss(pose.x_mm, noise_mm),
+            y_mm=rng.gauss(pose.y_mm, noise_mm),
+            z_mm=rng.gauss(pose.z_mm, noise_mm),
+        )
+
+    def plan_go(self, target: Joints, pace: JointPace, *, radius_mm: float = 0.0) -> JointLeg:
+        """Plan a joint-space motion from here; see :func:`trajectory.plan_go`."""
+        return plan_go(self.model, self._joints, target, pace, radius_mm=radius_mm)
+
+    def plan_move(
+        self, target: Pose, pace: LinePace, *, offset: ToolOffset | None = None
+    ) -> LineLeg:
+        """Plan a straight motion of the tip from here; see :func:`trajectory.plan_move`."""
+        ends = (tip_of(self.flange(), offset), target)
+        return plan_move(self.model, ends, pace, offset=offset, hand=self.hand)
+
+    @property
+    def hand(self) -> Hand:
+        """The arm's present configuration."""
+        return self._joints.hand
+
+    def start(self, legs: Sequence[Leg], now_ns: int) -> int:
+        """Begin one motion made of ``legs`` and return the instant at which it ends."""
+        self.halt(now_ns)
+        self.moves_started += 1
+        self._travel = _Travel(self._now_ns, tuple(legs))
+        return self._travel.end_ns
+
+    def position_at(self, now_ns: int) -> Joints:
+        """Return the commanded joints at an instant not before the last one given."""
+        return self._joints if self._travel is None else self._travel.joints_at(now_ns)
+
+    def advance(self, now_ns: int) -> None:
+        """Let simulated time reach ``now_ns``."""
+        since_ns, self._now_ns = self._now_ns, max(self._now_ns, now_ns)
+        if self._travel is None:
+            return
+        for instant_ns in self._travel.looks(since_ns, self._now_ns):
+            self._take_up(self._travel.joints_at(instant_ns))
+        if self._now_ns >= self._travel.end_ns:
+            self._travel = None
+
+    def next_change(self) -> int | None:
+        """Return when the motion under way ends, ``None`` at rest."""
+        return None if self._travel is None else self._travel.end_ns
+
+    def brake(self, now_ns: int) -> int:
+        """Come to rest with the motion's own deceleration; return when that is."""
+        if self._travel is None:
+            return now_ns
+        self._travel = self._travel.braked(now_ns)
+        return self._travel.end_ns
+
+    def halt(self, now_ns: int) -> None:
+        """Stop where the arm is."""
+        self.advance(now_ns)
+        self._travel = None
+
+    def place(self, joints: Joints, now_ns: int) -> None:
+        """Put the arm somewhere by hand or pendant: not a motion that a program started.
+
+        Raises:
+            OutOfReach: A joint would leave its range.
+        """
+        check_ranges(self.model, joints)
+        self.halt(now_ns)
+        self._take_up(joints)
+
+    def _take_up(self, joints: Joints) -> None:
+        self._turned = self._ways(self._joints, joints)
+        self._joints = joints
+
+    def _ways(self, before: Joints, after: Joints) -> _Ways:
+        """Return which way each joint has turned last, having gone from one to the other."""
+        changes = zip(before.values(), after.values(), self._turned, strict=True)
+        j1, j2, j3, j4 = (_sign(new - old) or way for old, new, way in changes)
+        return j1, j2, j3, j4
+
+    def _trailing(self, joints: Joints, ways: _Ways) -> Joints:
+        half = self.backlash_deg / 2
+        plays = (half, half, self.backlash_mm / 2, half)
+        trails = zip(joints.values(), plays, ways, strict=True)
+        return Joints(*(value - play * way for value, play, way in trails))
+
+
+def _sign(value: float) -> float:
+    return 0.0 if abs(value) < _STILL else math.copysign(1.0, value)

@@ -1,0 +1,44 @@
+"""What a robot is told about its load, its arm and its joints.
+
+Source: docs/reference/spel.md 6.2, 6.3, 7.2.
+"""
+
+from dataclasses import dataclass, field
+from typing import Final
+
+FINE_PULSES: Final = (10, 10, 10, 10)
+"""Default of Fine; per model in the reference, 10 in its sample (docs/reference/spel.md 7.3)."""
+
+
+@dataclass(slots=True)
+class RobotSettings:
+    """Settings without a bearing on where the robot goes, but for the last four.
+
+    The defaults of Weight and Inertia are per model; these are assumed. Which statement resets
+    which of them is documented (docs/reference/spel.md 6.3).
+
+    Attributes:
+        weight_kg: Weight: hand and part.
+        weight_at_mm: Weight: distance of its centre from joint 2.
+        inertia_kg_m2: Inertia of the load.
+        eccentricity_mm: Inertia: distance of its centre from joint 4.
+        fine_pulses: Fine of joints 1 to 4.
+        continuous_path: CP.
+        speed_factor: SpeedFactor in percent; it scales speeds and accelerations.
+        free_joints: Joints that SFree has released.
+        home_pulses: HomeSet of joints 1 to 4, ``None`` before one was given.
+    """
+
+    weight_kg: float = 2.0
+    weight_at_mm: float = 200.0
+    inertia_kg_m2: float = 0.01
+    eccentricity_mm: float = 0.0
+    fine_pulses: tuple[int, int, int, int] = FINE_PULSES
+    continuous_path: bool = False
+    speed_factor: int = 100
+    free_joints: set[int] = field(default_factory=set)
+    home_pulses: tuple[int, int, int, int] | None = None
+
+    def reset(self) -> None:
+        """Set what start-up, Motor On, SFree, SLock and Reset set back."""
+        self.fine_pulses, self.continuous_path = FINE_PULSES, False

@@ -1,0 +1,223 @@
+"""How the simulated arm travels: one leg at a time, each a known function of time.
+
+The time law is ours (assumed): a trapezoid of speed over the share of the path, the same for
+all joints, so that they start and stop together. At Accel 100 a joint reaches its top speed
+in ``FULL_SPEED_AFTER_S``. Real controllers smooth the corners; nothing here depends on that.
+"""
+
+import math
+from dataclasses import dataclass, replace
+from typing import Final, Protocol
+
+from robolink.model import Hand, Pose, ToolOffset
+from robolink.timing import NS_PER_S
+from robolink_simulators.epson.arm.kinematics import Joints, check_ranges, flange_of, forward, solve
+from robolink_simulators.epson.arm.ramps import BrakedRamp, Ramp, TimeLaw
+from robolink_simulators.epson.arm.robots import ScaraModel
+from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
+
+FULL_SPEED_AFTER_S: Final = 0.2
+"""Assumed: time to a joint's top speed at Accel 100."""
+
+_STILL = 1e-9
+_CHECK_EVERY_MM = 2.0
+_CHECK_EVERY_DEG = 2.0
+_MOST_CHECKS = 2000
+
+
+@dataclass(frozen=True, slots=True)
+class JointPace:
+    """How fast a joint-space leg may be; ``tip_limit_mm_s`` is the low-power limit."""
+
+    speed_percent: float
+    accel_percent: float = 100.0
+    decel_percent: float = 100.0
+    tip_limit_mm_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class LinePace:
+    """How fast a straight leg may be; the turn values rule legs that only turn."""
+
+    speed_mm_s: float
+    accel_mm_s2: float
+    decel_mm_s2: float
+    turn_deg_s: float
+    turn_deg_s2: float
+
+
+class Leg(Protocol):
+    """A stretch of motion."""
+
+    @property
+    def duration_ns(self) -> int:
+        """How long it takes."""
+
+    def joints_at(self, elapsed_ns: int) -> Joints:
+        """Return the joints that long after its start; its end from the duration on."""
+
+    def flange_at(self, elapsed_ns: int) -> Pose:
+        """Return the pose of the flange that those joints give."""
+
+    def braked(self, elapsed_ns: int) -> "Leg":
+        """Return the same leg, left that long after its start to come to rest."""
+
+
+def _duration_ns(ramp: TimeLaw | None) -> int:
+    return 0 if ramp is None else math.ceil(ramp.duration_s * NS_PER_S)
+
+
+def _share(ramp: TimeLaw | None, elapsed_ns: int) -> float:
+    return 1.0 if ramp is None else ramp.share_at(elapsed_ns / NS_PER_S)
+
+
+def _braked(ramp: TimeLaw | None, elapsed_ns: int) -> TimeLaw | None:
+    return BrakedRamp(ramp, elapsed_ns / NS_PER_S) if isinstance(ramp, Ramp) else ramp
+
+
+@dataclass(frozen=True, slots=True)
+class JointLeg:
+    """Straight in joint space; all joints start and stop together."""
+
+    model: ScaraModel
+    start: Joints
+    end: Joints
+    ramp: TimeLaw | None
+
+    @property
+    def duration_ns(self) -> int:
+        """How long it takes."""
+        return _duration_ns(self.ramp)
+
+    def flange_at(self, elapsed_ns: int) -> Pose:
+        """Return the pose of the flange that long after the start."""
+        return forward(self.model, self.joints_at(elapsed_ns))
+
+    def joints_at(self, elapsed_ns: int) -> Joints:
+        """Return the joints that long after the start."""
+        share = _share(self.ramp, elapsed_ns)
+        if share >= 1:
+            return self.end
+        pairs = zip(self.start.values(), self.end.values(), strict=True)
+        return Joints(*(a + (b - a) * share for a, b in pairs))
+
+    def braked(self, elapsed_ns: int) -> "JointLeg":
+        """Return the same leg, left to come to rest."""
+        return replace(self, ramp=_braked(self.ramp, elapsed_ns))
+
+
+@dataclass(frozen=True, slots=True)
+class LineLeg:
+    """The tool's tip on a straight line, U turning evenly along it."""
+
+    model: ScaraModel
+    start: Pose
+    end: Pose
+    offset: ToolOffset | None
+    hand: Hand
+    ramp: TimeLaw | None
+
+    @property
+    def duration_ns(self) -> int:
+        """How long it takes."""
+        return _duration_ns(self.ramp)
+
+    def joints_at(self, elapsed_ns: int) -> Joints:
+        """Return the joints that long after the start."""
+        return self.joints_after(_share(self.ramp, min(elapsed_ns, self.duration_ns)))
+
+    def braked(self, elapsed_ns: int) -> "LineLeg":
+        """Return the same leg, left to come to rest."""
+        return replace(self, ramp=_braked(self.ramp, elapsed_ns))
+
+    def flange_at(self, elapsed_ns: int) -> Pose:
+        """Return the pose of the flange that long after the start."""
+        return self._flange_after(_share(self.ramp, min(elapsed_ns, self.duration_ns)))
+
+    def joints_after(self, share: float) -> Joints:
+        """Return the joints after a share of the line."""
+        return solve(self.model, self._flange_after(share), self.hand)
+
+    def _flange_after(self, share: float) -> Pose:
+        a, b = self.start, self.end
+        if share >= 1:
+            return flange_of(b, self.offset)
+        tip = Pose(
+            a.x_mm + (b.x_mm - a.x_mm) * share,
+            a.y_mm + (b.y_mm - a.y_mm) * share,
+            a.z_mm + (b.z_mm - a.z_mm) * share,
+            a.u_deg + (b.u_deg - a.u_deg) * share,
+        )
+        return flange_of(tip, self.offset)
+
+
+def plan_go(
+    model: ScaraModel, start: Joints, end: Joints, pace: JointPace, *, radius_mm: float
+) -> JointLeg:
+    """Plan a joint-space leg.
+
+    Args:
+        model: The robot.
+        start: Where the arm is.
+        end: Where it goes.
+        pace: How fast it may be.
+        radius_mm: Distance of the tip from joint 4, for the low-power limit.
+
+    Raises:
+        OutOfReach: ``end`` lies outside a joint's range.
+    """
+    check_ranges(model, end)
+    deltas = [b - a for a, b in zip(start.values(), end.values(), strict=True)]
+    shares = [abs(d) / top for d, top in zip(deltas, model.top_speed, strict=True)]
+    longest = max(shares)
+    if longest < _STILL:
+        return JointLeg(model, start, end, None)
+    rate = pace.speed_percent / 100 / longest
+    if pace.tip_limit_mm_s is not None:
+        rate = min(rate, pace.tip_limit_mm_s / _tip_travel_bound(model, deltas, radius_mm))
+    accel_unit = 1 / (100 * FULL_SPEED_AFTER_S * longest)
+    rise, fall = pace.accel_percent * accel_unit, pace.decel_percent * accel_unit
+    return JointLeg(model, start, end, Ramp.fastest(rate, rise, fall))
+
+
+def _tip_travel_bound(model: ScaraModel, deltas: list[float], radius_mm: float) -> float:
+    """Bound the tip's path length per whole leg: each link as if it alone carried the tip."""
+    j1, j2, j4 = (math.radians(deltas[joint]) for joint in (0, 1, 3))
+    level = model.a1_mm * abs(j1) + model.a2_mm * abs(j1 + j2) + radius_mm * abs(j1 + j2 + j4)
+    return max(math.hypot(level, deltas[2]), _STILL)
+
+
+def plan_move(
+    model: ScaraModel,
+    ends: tuple[Pose, Pose],
+    pace: LinePace,
+    *,
+    offset: ToolOffset | None,
+    hand: Hand,
+) -> LineLeg:
+    """Plan a straight leg of the tip between two tip poses.
+
+    The whole line is checked before anything moves (assumed: a real controller may notice a
+    line that leaves the envelope only on the way).
+
+    Raises:
+        OutOfReach: The line leaves the envelope or the hand would have to change.
+    """
+    start, end = ends
+    if end.hand is not None and end.hand is not hand:
+        raise SpelRefusal(RefusalKind.OUT_OF_REACH, "A straight motion cannot change the hand")
+    length_mm = math.dist(start.coordinates()[:3], end.coordinates()[:3])
+    turn_deg = abs(end.u_deg - start.u_deg)
+    ramp = None
+    if length_mm > _STILL:
+        rate = min(pace.speed_mm_s / length_mm, model.top_speed[3] / max(turn_deg, _STILL))
+        ramp = Ramp.fastest(rate, pace.accel_mm_s2 / length_mm, pace.decel_mm_s2 / length_mm)
+    elif turn_deg > _STILL:
+        accel = pace.turn_deg_s2 / turn_deg
+        ramp = Ramp.fastest(pace.turn_deg_s / turn_deg, accel, accel)
+    leg = LineLeg(model, start, end, offset, hand, ramp)
+    steps = math.ceil(min(length_mm / _CHECK_EVERY_MM + turn_deg / _CHECK_EVERY_DEG, _MOST_CHECKS))
+    check_ranges(model, leg.joints_after(1.0))
+    for step in range(1, steps):
+        check_ranges(model, leg.joints_after(step / steps))
+    return leg

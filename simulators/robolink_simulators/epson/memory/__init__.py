@@ -1,0 +1,1 @@
+"""What a simulated EPSON controller remembers: tools, points, bits, variables, flash."""

@@ -1,0 +1,64 @@
+"""A row of input, output or memory bits, read by bit or by byte."""
+
+from typing import Final
+
+from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
+
+IO_BITS: Final = 512
+"""Inputs and outputs (docs/reference/spel.md 8: bit numbers 0 to 511)."""
+
+MEMORY_BITS: Final = 1024
+"""Memory bits (docs/reference/spel.md 8: the reference gives 256, 512 and 1024; the largest is
+used)."""
+
+
+class BitBank:
+    """Bits numbered from 0, ports of eight numbered from 0, lowest bit first."""
+
+    def __init__(self, size: int) -> None:
+        self._bits = [False] * size
+
+    def get(self, number: int) -> bool:
+        """Return one bit.
+
+        Raises:
+            Refusal: There is no such bit.
+        """
+        self._check(number)
+        return self._bits[number]
+
+    def set(self, number: int, on: bool) -> None:
+        """Switch one bit.
+
+        Raises:
+            Refusal: There is no such bit.
+        """
+        self._check(number)
+        self._bits[number] = on
+
+    def get_byte(self, port: int) -> int:
+        """Return eight bits as 0 to 255.
+
+        Raises:
+            Refusal: There is no such port.
+        """
+        return sum(self.get(port * 8 + i) << i for i in range(8))
+
+    def set_byte(self, port: int, value: int) -> None:
+        """Switch eight bits.
+
+        Raises:
+            Refusal: There is no such port, or the value is not 0 to 255.
+        """
+        self._check(port * 8)
+        if not 0 <= value <= 0xFF:
+            raise SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, f"Not a byte: {value}")
+        self._bits[port * 8 : port * 8 + 8] = [bool(value >> i & 1) for i in range(8)]
+
+    def clear(self) -> None:
+        """Switch every bit off."""
+        self._bits = [False] * len(self._bits)
+
+    def _check(self, number: int) -> None:
+        if not 0 <= number < len(self._bits):
+            raise SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, f"There is no bit {number}")

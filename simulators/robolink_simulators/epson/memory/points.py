@@ -1,0 +1,179 @@
+"""SPEL+ point values, planar locals and the point memory P0 to P999 (docs/reference/spel.md 5)."""
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+from robolink.model import Hand, Pose, rotate_xy
+from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
+
+AXES: Final = "XYZUVW"
+"""The order of a point's coordinates."""
+
+HIGHEST_POINT: Final = 999
+HIGHEST_LOCAL: Final = 15
+
+Coordinates = tuple[float, float, float, float, float, float]
+"""X, Y, Z in mm and U, V, W in degrees."""
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """A SPEL+ point value.
+
+    Attributes:
+        coordinates: X, Y, Z in mm, U, V, W in degrees, as seen from ``local``.
+        hand: Right unless stated (seen in transcripts: ``/R``).
+        local: The local coordinate system of the coordinates, 0 for the base.
+        given: How many coordinates the statement that made it named.
+    """
+
+    coordinates: Coordinates
+    hand: Hand = Hand.RIGHT
+    local: int = 0
+    given: int = 6
+
+    @classmethod
+    def at(cls, pose: Pose) -> "Point":
+        """Return the point of a pose in the base frame."""
+        return cls(pose.coordinates(), hand=pose.hand or Hand.RIGHT)
+
+    def with_axis(self, axis: str, value: float) -> "Point":
+        """Return the point with one coordinate (a letter of :data:`AXES`) replaced."""
+        index = AXES.index(axis)
+        x, y, z, u, v, w = (value if i == index else old for i, old in enumerate(self.coordinates))
+        return replace(self, coordinates=(x, y, z, u, v, w), given=max(self.given, index + 1))
+
+    def shifted(self, axis: str, by: float) -> "Point":
+        """Return the point with ``by`` added to one coordinate."""
+        return self.with_axis(axis, self.coordinates[AXES.index(axis)] + by)
+
+    def plus(self, other: "Point", sign: int = 1) -> "Point":
+        """Add coordinate by coordinate; hand and local stay this point's (inferred)."""
+        x, y, z, u, v, w = (
+            a + sign * b for a, b in zip(self.coordinates, other.coordinates, strict=True)
+        )
+        return replace(self, coordinates=(x, y, z, u, v, w))
+
+
+@dataclass(frozen=True, slots=True)
+class Local:
+    """A planar local coordinate system, seen from the base (V and W are 0 on a SCARA)."""
+
+    x_mm: float = 0.0
+    y_mm: float = 0.0
+    z_mm: float = 0.0
+    u_deg: float = 0.0
+
+    def to_base(self, coordinates: Coordinates) -> Coordinates:
+        """Express coordinates of this local in the base frame."""
+        x, y, z, u, v, w = coordinates
+        dx_mm, dy_mm = rotate_xy(x, y, self.u_deg)
+        return (self.x_mm + dx_mm, self.y_mm + dy_mm, self.z_mm + z, u + self.u_deg, v, w)
+
+    def from_base(self, coordinates: Coordinates) -> Coordinates:
+        """Express base coordinates in this local."""
+        x, y, z, u, v, w = coordinates
+        in_x, in_y = rotate_xy(x - self.x_mm, y - self.y_mm, -self.u_deg)
+        return (in_x, in_y, z - self.z_mm, u - self.u_deg, v, w)
+
+
+class LocalTable:
+    """Locals 1 to 15; local 0 is the base and always there."""
+
+    def __init__(self) -> None:
+        self._locals: dict[int, Local] = {0: Local()}
+
+    def get(self, number: int) -> Local:
+        """Return a local.
+
+        Raises:
+            Refusal: It is not defined.
+        """
+        if number not in self._locals:
+            raise SpelRefusal(RefusalKind.LOCAL_UNDEFINED, f"Local {number} is not defined")
+        return self._locals[number]
+
+    def define(self, number: int, local: Local) -> None:
+        """Define local 1 to 15.
+
+        Raises:
+            Refusal: There is no such local to define.
+        """
+        if not 1 <= number <= HIGHEST_LOCAL:
+            raise SpelRefusal(
+                RefusalKind.VALUE_OUT_OF_RANGE, f"There is no local {number} to define"
+            )
+        self._locals[number] = local
+
+    def to_base(self, point: Point) -> Point:
+        """Express a point in the base frame."""
+        coordinates = self.get(point.local).to_base(point.coordinates)
+        return replace(point, coordinates=coordinates, local=0)
+
+    def convert(self, point: Point, number: int) -> Point:
+        """Express a point in another local (the modifier ``@n``, docs/reference/spel.md 5.2)."""
+        if number == point.local:
+            return point
+        base = self.to_base(point)
+        return replace(base, coordinates=self.get(number).from_base(base.coordinates), local=number)
+
+
+class PointTable:
+    """The point memory of one robot."""
+
+    def __init__(self) -> None:
+        self._points: dict[int, Point] = {}
+        self._labels: dict[str, int] = {}
+
+    def label(self, number: int, name: str) -> None:
+        """Give a point a name; where it was the name of another point, it is moved."""
+        self.defined(number)
+        self._labels[name.lower()] = number
+
+    def labelled(self, name: str) -> int | None:
+        """Return the number of the point with a name."""
+        return self._labels.get(name.lower())
+
+    def get(self, number: int) -> Point:
+        """Return a stored point.
+
+        Raises:
+            Refusal: The number does not exist (0 to 999) or nothing is stored.
+        """
+        if not self.defined(number):
+            raise SpelRefusal(RefusalKind.POINT_UNDEFINED, f"Point P{number} is not defined")
+        return self._points[number]
+
+    def defined(self, number: int) -> bool:
+        """Tell whether a point is stored.
+
+        Raises:
+            Refusal: The number does not exist.
+        """
+        if not 0 <= number <= HIGHEST_POINT:
+            raise SpelRefusal(RefusalKind.SUBSCRIPT, f"There is no point P{number}")
+        return number in self._points
+
+    def store(self, number: int, point: Point) -> None:
+        """Store a point.
+
+        Raises:
+            Refusal: The number does not exist.
+        """
+        self.defined(number)
+        self._points[number] = point
+
+    def delete(self, first: int, last: int) -> None:
+        """Forget a range of points; undefined ones are fine (docs/reference/spel.md 5.1)."""
+        for number in self.numbers(first, last):
+            del self._points[number]
+
+    def numbers(self, first: int = 0, last: int = HIGHEST_POINT) -> list[int]:
+        """Return the numbers of the stored points in a range.
+
+        Raises:
+            Refusal: The range runs backwards.
+        """
+        if first > last:
+            raise SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, f"Point range {first}, {last}")
+        return sorted(number for number in self._points if first <= number <= last)

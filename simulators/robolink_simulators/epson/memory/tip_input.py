@@ -1,0 +1,65 @@
+"""An input that the tip of a nozzle switches: a sensor, its delay and its scatter."""
+
+import random
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from robolink.model import ToolOffset, rotate_xy
+from robolink.timing import NS_PER_S
+from robolink_simulators.cell.tip_switches import Lean, Shake, TipSwitch
+from robolink_simulators.epson.arm.arm import Arm
+from robolink_simulators.epson.arm.kinematics import tip_of
+
+
+@dataclass(frozen=True, slots=True)
+class Nozzle:
+    """What is mounted.
+
+    Attributes:
+        tip: Where its tip is, seen from the flange.
+        lean: By how much its shaft leans, in the flange's axes.
+    """
+
+    tip: ToolOffset | None
+    lean: Lean
+
+
+class TipInput:
+    """Implements :data:`~robolink_simulators.epson.memory.input_bits.Sense`.
+
+    Args:
+        switch: What the tip meets.
+        arm: Which carries the nozzle.
+        nozzle: Tells what is mounted.
+        latency_s: How late the input follows.
+        noise_mm: Standard deviation, per axis, of where it switches; drawn anew for each
+            motion.
+        rng: Source of that noise.
+    """
+
+    def __init__(
+        self,
+        switch: TipSwitch,
+        arm: Arm,
+        nozzle: Callable[[], Nozzle],
+        *,
+        latency_s: float,
+        noise_mm: float,
+        rng: random.Random,
+    ) -> None:
+        self._switch = switch
+        self._arm = arm
+        self._nozzle = nozzle
+        self._latency_ns = round(latency_s * NS_PER_S)
+        self._shake = Shake(noise_mm, rng)
+
+    def __call__(self, instant_ns: int | None) -> bool:
+        """Tell whether the input is on at an instant of the motion, ``None`` for now."""
+        arm, nozzle = self._arm, self._nozzle()
+        if instant_ns is None:
+            flange = arm.true_flange()
+        else:
+            flange = arm.true_flange_at(instant_ns - self._latency_ns)
+        tip, (dx_mm, dy_mm, dz_mm) = tip_of(flange, nozzle.tip), self._shake.of(arm.moves_started)
+        place = (tip.x_mm + dx_mm, tip.y_mm + dy_mm, tip.z_mm + dz_mm)
+        return self._switch.trips(place, rotate_xy(*nozzle.lean, flange.u_deg))

@@ -1,0 +1,193 @@
+"""One client's connection to the simulated controller: codec, login, what leaves and when."""
+
+from collections import deque
+from collections.abc import Sequence
+from typing import Final, Protocol
+
+from robolink.errors import LocalProtocolError, RemoteProtocolError
+from robolink.protocols.epson_text import (
+    NEED_DATA,
+    BadRequest,
+    EpsonTextCodec,
+    ErrorCode,
+    Refusal,
+    Reply,
+    Request,
+    Role,
+)
+from robolink.timing import NS_PER_S
+from robolink_simulators.epson.options import EpsonOptions
+from robolink_simulators.epson.remote.exchange import PendingRequest
+from robolink_simulators.faults import Departure
+
+_SILENCE_NS: Final = 100_000_000
+"""How long nothing must come for a request without a line end to be whole (inferred)."""
+
+_TERMINATORS: Final = {"crlf": b"\r\n", "cr": b"\r", "lf": b"\n"}
+
+
+class ServedRequest(Protocol):
+    """The controller, as its connections see it."""
+
+    options: EpsonOptions
+
+    @property
+    def now_ns(self) -> int:
+        """The simulated time."""
+
+    def advance(self, now_ns: int) -> None:
+        """Let simulated time reach ``now_ns``."""
+
+    def take(self, link: "EpsonLink", event: Request | BadRequest) -> None:
+        """Deal with a request."""
+
+    def leaving(self, exchange: PendingRequest, reply: bytes) -> Sequence[Departure]:
+        """Count a reply and return what of it leaves, when."""
+
+    def announce(self, exchange: PendingRequest, reply: bytes) -> None:
+        """Tell whoever watches that a reply is about to leave."""
+
+    def forget(self, link: "EpsonLink") -> None:
+        """The connection is over."""
+
+
+class EpsonLink:
+    """Implements :class:`~robolink_simulators.hosting.seam.DeviceLink`.
+
+    A client that has not logged in within the login time-out is cut off, and so is one that
+    stays after its logout (assumed).
+    """
+
+    def __init__(self, controller: ServedRequest, now_ns: int) -> None:
+        options = controller.options
+        self._controller = controller
+        self._codec = EpsonTextCodec(
+            Role.DEVICE,
+            terminator=_TERMINATORS[options.terminator],
+            unterminated=options.requests_end_with_silence,
+        )
+        self._outbox: deque[tuple[int, bytes | None]] = deque()
+        self._over = False
+        self._anonymous_since_ns: int | None = now_ns
+        self._silent_from_ns: int | None = None
+
+    @property
+    def closed(self) -> bool:
+        """Whether the controller has ended this connection, after what is outgoing."""
+        return bool(self._outbox) and self._outbox[0][1] is None and self._due
+
+    def receive(self, data: bytes, now_ns: int) -> None:
+        """Take bytes from the client; ``b""`` means that it is gone."""
+        self._controller.advance(now_ns)
+        if self._over:
+            return
+        if not data:
+            self._end()
+            return
+        try:
+            self._read(data)
+        except RemoteProtocolError:
+            self.cut()
+
+    @property
+    def drained(self) -> bool:
+        """Whether nothing will happen on this connection any more."""
+        return self._over and (not self._outbox or self.closed)
+
+    def outgoing(self) -> bytes:
+        """Take what is ready for the client, ``b""`` for nothing."""
+        if not self._outbox:
+            return b""
+        ready = b""
+        while self._outbox and self._due:
+            data = self._outbox[0][1]
+            if data is None:
+                break
+            ready += data
+            self._outbox.popleft()
+        return ready
+
+    def next_change(self) -> int | None:
+        """Return when something leaves, or when the login time-out passes."""
+        leaving = self._outbox[0][0] if self._outbox else None
+        if leaving is not None and leaving > self._controller.now_ns:
+            return leaving
+        deadlines = (self._login_deadline(), self._silent_from_ns)
+        return min((at_ns for at_ns in deadlines if at_ns is not None), default=None)
+
+    def supervise(self, now_ns: int) -> None:
+        """End a request after which nothing came; cut whoever did not log in for too long."""
+        if self._silent_from_ns is not None and now_ns >= self._silent_from_ns:
+            self._silent_from_ns = None
+            self._codec.end_of_request()
+            self._serve()
+        deadline = self._login_deadline()
+        if deadline is not None and now_ns >= deadline:
+            self.cut()
+
+    def logged_in(self, logged_in: bool, now_ns: int) -> None:
+        """Start or end the wait for a login."""
+        self._anonymous_since_ns = None if logged_in else now_ns
+
+    def answer(self, exchange: PendingRequest, event: Reply | Refusal) -> None:
+        """Let an answer leave, as the faults planned for it allow."""
+        if self._over:
+            return
+        try:
+            reply = self._codec.send(event)
+        except LocalProtocolError:
+            # Longer than 4060 bytes, or not to be framed: how a controller answers then is
+            # not documented.
+            reply = self._codec.send(Refusal(exchange.name, ErrorCode.SYSTEM))
+        departures = self._controller.leaving(exchange, reply)
+        try:
+            self._controller.announce(exchange, reply)
+        finally:
+            self._depart(departures)
+
+    def push(self, data: bytes) -> None:
+        """Send bytes that nobody asked for."""
+        self._post(data, self._controller.now_ns)
+
+    def cut(self) -> None:
+        """End the connection from the controller's side, after what is on its way."""
+        if not self._over:
+            self._post(None, self._controller.now_ns)
+            self._end()
+
+    @property
+    def _due(self) -> bool:
+        return self._outbox[0][0] <= self._controller.now_ns
+
+    def _depart(self, departures: Sequence[Departure]) -> None:
+        now_ns = self._controller.now_ns
+        for after_s, data in departures:
+            self._post(data, now_ns + round(after_s * NS_PER_S))
+            if data is None:
+                self._end()
+
+    def _read(self, data: bytes) -> None:
+        self._codec.receive_data(data)
+        self._serve()
+        begun = self._controller.options.requests_end_with_silence and self._codec.bytes_held
+        self._silent_from_ns = self._controller.now_ns + _SILENCE_NS if begun else None
+
+    def _serve(self) -> None:
+        while not self._over and (event := self._codec.next_event()) is not NEED_DATA:
+            if isinstance(event, (Request, BadRequest)):
+                self._controller.take(self, event)
+
+    def _post(self, data: bytes | None, at_ns: int) -> None:
+        # One stream: nothing overtakes what was sent before it.
+        self._outbox.append((max(at_ns, self._outbox[-1][0] if self._outbox else 0), data))
+
+    def _end(self) -> None:
+        self._over = True
+        self._anonymous_since_ns = self._silent_from_ns = None
+        self._controller.forget(self)
+
+    def _login_deadline(self) -> int | None:
+        timeout_s = self._controller.options.login_timeout_s
+        if self._anonymous_since_ns is None or timeout_s == 0:
+            return None
+        return self._anonymous_since_ns + round(timeout_s * NS_PER_S)

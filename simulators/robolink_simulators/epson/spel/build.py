@@ -1,0 +1,220 @@
+"""The parser's reductions turned into the values of :mod:`_tree`, bottom up."""
+
+from typing import Any, cast
+
+from lark import Token, Transformer, v_args
+
+from robolink_simulators.epson.spel.tree import (
+    AssignCoordinate,
+    AssignPoint,
+    AssignVariable,
+    Base,
+    Binary,
+    Coordinates,
+    Expression,
+    If,
+    KeywordStatement,
+    LabelledPoint,
+    Literal,
+    Modifier,
+    ModifierKind,
+    MotionOptions,
+    MotionStatement,
+    Name,
+    PointExpression,
+    PointFunction,
+    Print,
+    Statement,
+    StoredPoint,
+    Unary,
+    Until,
+)
+
+Items = tuple[Expression, ...]
+
+_RADIX = {"&h": 16, "&o": 8, "&b": 2}
+_HIGHEST_INT32 = 2**31 - 1
+_COORDINATE_FLAGS = frozenset({"R", "L", "A", "B", "F", "NF"})
+
+
+def number_value(text: str) -> int | float:
+    """Return the value of a numeric literal.
+
+    Decimal integers that no Long holds are reals (inferred from Str$(99999999999999), which
+    prints with an exponent, docs/reference/spel.md 3.2).
+    """
+    lower = text.lower()
+    if lower[:2] in _RADIX:
+        return int(lower[2:], _RADIX[lower[:2]])
+    if lower.isdigit() and int(lower) <= _HIGHEST_INT32:
+        return int(lower)
+    return float(lower)
+
+
+@v_args(inline=True)
+class TreeBuilder(Transformer[Token, tuple[Statement, ...]]):
+    """One method per named rule of the grammar."""
+
+    def start(self, *statements: Statement) -> tuple[Statement, ...]:
+        """Collect the statements of a line."""
+        return statements
+
+    def items(self, *items: Expression) -> Items:
+        """Collect what stands between commas."""
+        return items
+
+    def print(self, *parts: object) -> Print:
+        """Build Print or its alias ``?``."""
+        items, trailing = parts[-2:]
+        return Print(cast(Items, items or ()), trailing is None)
+
+    def command(self, word: Token, items: Items | None, trailing: Token | None) -> KeywordStatement:
+        """Build a keyword statement."""
+        return KeywordStatement(word.lower(), items or (), trailing is not None)
+
+    def motion(self, verb: Token, *parts: PointExpression | MotionOptions) -> MotionStatement:
+        """Build a motion and join its options, which stand in any order."""
+        targets = tuple(part for part in parts if isinstance(part, PointExpression))
+        options = [part for part in parts if isinstance(part, MotionOptions)]
+        words = frozenset[str]().union(*(option.words for option in options))
+        limz = next((option.limz for option in options if option.limz is not None), None)
+        untils = [option.until for option in options if option.until is not None]
+        until = untils[0] if untils else None
+        return MotionStatement(verb.lower(), targets, MotionOptions(words, limz, until))
+
+    def plain_option(self, word: Token) -> MotionOptions:
+        """Build CP, ROT, LJM or an arch number."""
+        return MotionOptions(frozenset({word.lower()}))
+
+    def limz_option(self, word: Token, value: Expression | None) -> MotionOptions:
+        """Build LimZ with or without a height."""
+        return MotionOptions(frozenset({word.lower()}), value)
+
+    def until_option(self, word: Token, condition: Expression | None) -> MotionOptions:
+        """Build Till or Find with or without a condition."""
+        until = Until(word.lower(), condition)
+        return MotionOptions(frozenset({until.word}), until=until)
+
+    def assign_point(self, word: Token, value: Expression | Coordinates) -> AssignPoint:
+        """Build ``P1 = ...``."""
+        return AssignPoint(Literal(int(word[1:])), value)
+
+    def assign_computed_point(
+        self, _: Token, number: Expression, value: Expression | Coordinates
+    ) -> AssignPoint:
+        """Build ``P(n) = ...``."""
+        return AssignPoint(number, value)
+
+    def assign_variable(self, word: Token, value: Expression | Coordinates) -> AssignVariable:
+        """Build ``name = ...``."""
+        return AssignVariable(word.lower(), value)
+
+    def assign_coordinate(
+        self, word: Token, point: PointExpression, value: Expression
+    ) -> AssignCoordinate:
+        """Build ``CX(P1) = ...``."""
+        return AssignCoordinate(word[1:].upper(), point, value)
+
+    def branch(self, *statements: Statement) -> tuple[Statement, ...]:
+        """Collect the statements of one branch."""
+        return statements
+
+    def if_line(
+        self,
+        _if: Token,
+        condition: Expression,
+        _then: Token,
+        then: tuple[Statement, ...],
+        *otherwise: Any,  # noqa: ANN401 - the word Else and its branch, or nothing
+    ) -> If:
+        """Build a single-line If."""
+        return If(condition, then, otherwise[-1] if otherwise and otherwise[-1] else ())
+
+    def labelled(self, word: Token, *modifiers: Modifier) -> PointExpression:
+        """Build a point that is named in a motion."""
+        return PointExpression(LabelledPoint(word.lower()), modifiers=modifiers)
+
+    def error_on(self, _: Token) -> Name:
+        """Build ``Error On``, which a client writes for ErrorOn."""
+        return Name("erroron")
+
+    def coordinates(self, *values: Expression) -> Coordinates:
+        """Build a coordinate list; flags were read as divisions, and are tried first.
+
+        ``0 /R /1`` arrives as ``(0 / R) / 1`` (docs/reference/spel.md 14.1, item 2).
+        """
+        last, flags = values[-1], list[Modifier]()
+        while isinstance(last, Binary) and last.operator == "/":
+            match last.right:
+                case Name(name, None) if name.upper() in _COORDINATE_FLAGS:
+                    word = name.upper()
+                case Literal(int(local)):
+                    word = str(local)
+                case _:
+                    break
+            flags.insert(0, Modifier(ModifierKind.FLAG, word))
+            last = last.left
+        return Coordinates((*values[:-1], last), tuple(flags))
+
+    def point(self, base: Base, *rest: Any) -> PointExpression:  # noqa: ANN401 - mixed children
+        """Build a point expression."""
+        if rest and isinstance(rest[0], Token):
+            sign = 1 if rest[0] == "+" else -1
+            return PointExpression(base, sign, rest[1], rest[2:])
+        return PointExpression(base, modifiers=rest)
+
+    def numbered_point(self, word: Token) -> StoredPoint:
+        """Build ``P1``."""
+        return StoredPoint(Literal(int(word[1:])))
+
+    def computed_point(self, _: Token, number: Expression) -> StoredPoint:
+        """Build ``P(n)``."""
+        return StoredPoint(number)
+
+    def point_function(self, word: Token, items: Items | None) -> PointFunction:
+        """Build XY(..) and its kin."""
+        return PointFunction(word.lower(), items or ())
+
+    def flag(self, word: Token) -> Modifier:
+        """Build ``/R`` or ``/1``."""
+        return Modifier(ModifierKind.FLAG, word[1:].strip().upper())
+
+    def at_local(self, word: Token) -> Modifier:
+        """Build ``@1``."""
+        return Modifier(ModifierKind.CONVERT, word[1:].strip())
+
+    def shift(self, word: Token, value: Expression | Token) -> Modifier:
+        """Build ``+X(..)``, ``-TLZ(..)`` or ``+X50``."""
+        amount = _as_expression(value)
+        if word[0] == "-":
+            amount = Unary("-", amount)
+        return Modifier(ModifierKind.SHIFT, word[1:].strip().upper(), amount)
+
+    def replace(self, word: Token, value: Expression | Token) -> Modifier:
+        """Build ``:Z(..)``."""
+        return Modifier(ModifierKind.REPLACE, word[1:].strip().upper(), _as_expression(value))
+
+    def unary(self, word: Token, operand: Expression) -> Unary:
+        """Build a sign or Not."""
+        return Unary(word.lower(), operand)
+
+    def binary(self, left: Expression, word: Token, right: Expression) -> Binary:
+        """Build an operation."""
+        return Binary(word.lower(), left, right)
+
+    def number(self, word: Token) -> Literal:
+        """Build a number."""
+        return Literal(number_value(word))
+
+    def text(self, word: Token) -> Literal:
+        """Build a string; one that is still open at the end ends there."""
+        closed = len(word) > 1 and word.endswith('"')
+        return Literal(word[1:-1] if closed else word[1:])
+
+    def name(self, word: Token, items: Items | None) -> Name:
+        """Build a constant, a variable or a call."""
+        return Name(word.lower(), items)
+
+
+def _as_expression(value: Expression | Token) -> Expression:
+    return Literal(number_value(value)) if isinstance(value, Token) else value

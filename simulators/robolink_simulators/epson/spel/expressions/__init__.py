@@ -1,0 +1,1 @@
+"""Expressions of SPEL+: values, operators, functions, and how they print."""

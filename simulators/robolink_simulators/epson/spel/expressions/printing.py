@@ -1,0 +1,118 @@
+"""How values print. Points and Where come from twins.
+
+Source: docs/reference/spel.md 3.2, 3.3, 5.6; docs/reference/epson.md 3.3.
+"""
+
+import re
+from collections.abc import Sequence
+from typing import Final, Literal
+
+from robolink.protocols.spel import PrintedPoint, decimal, format_point
+from robolink_simulators.epson.memory.points import Point
+from robolink_simulators.epson.options import EpsonOptions
+from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
+from robolink_simulators.epson.spel.expressions.values import Number, Value, out_of_range
+
+CRLF: Final = "\r\n"
+LONGEST_PRINT: Final = 256
+"""Bytes that one Print may show (docs/reference/spel.md 3.2); what more does is assumed to be an
+error."""
+
+_EXPONENT_FROM = 1e14
+_EXPONENT_BELOW = 1e-4
+_MARKS = re.compile(r"([#0,]*)(?:\.([#0]*))?")
+
+
+def number_text(value: Number) -> str:
+    """Return a number as Print and Str$ show it.
+
+    Integers plain, reals with 14 digits and no trailing zeros, ``1.000000E+014`` for large
+    and very small ones: the rule that fits most samples of the reference
+    (docs/reference/spel.md 3.2).
+    """
+    if isinstance(value, int):
+        return str(value)
+    rounded = float(f"{value:.6e}")
+    if rounded == 0:
+        return "0"
+    if not _EXPONENT_BELOW <= abs(rounded) < _EXPONENT_FROM:
+        mantissa, exponent = f"{value:.6e}".split("e")
+        return f"{mantissa}E{exponent[0]}{int(exponent[1:]):03d}"
+    return f"{value:.14g}"
+
+
+def point_text(point: Point, options: EpsonOptions) -> str:
+    """Return a point as Print shows it: ``X: -182.632 Y: ... /R /0`` after a blank.
+
+    Six coordinates even on a SCARA (seen in a transcript); option ``point_coordinates`` shows
+    four for a point that was given four.
+    """
+    four = options.point_coordinates == "given" and point.given <= 4
+    coordinates: Literal["six", "four"] = "four" if four else "six"
+    printed = PrintedPoint.of(point.coordinates, hand=point.hand, local=point.local)
+    return format_point(printed, coordinates=coordinates)
+
+
+def point_line(number: int, point: Point) -> str:
+    """Return a line of PList on a SCARA: ``P1   = XY(  200.000, ... ) /R /0``.
+
+    Source: docs/reference/epson.md 3.3.
+    """
+    values = ",".join(decimal(value).rjust(9) for value in point.coordinates[:4])
+    printed = PrintedPoint.of(point.coordinates, hand=point.hand, local=point.local)
+    flags = " ".join(f"/{flag}" for flag in printed.flags)
+    return f"P{number:<3} = XY({values} ) {flags}"
+
+
+def joined(values: Sequence[Value], options: EpsonOptions) -> str:
+    """Return what Print shows for its items.
+
+    Raises:
+        Refusal: It is longer than Print can show.
+    """
+    text = ""
+    for position, value in enumerate(values):
+        is_number = isinstance(value, (int, float))
+        if is_number and not position and options.number_lead_blank:
+            text += " "
+        if position and (is_number or options.comma_blank == "always"):
+            text += " "
+        text += value_text(value, options)
+    if len(text) > LONGEST_PRINT:
+        raise out_of_range(f"Print of more than {LONGEST_PRINT} bytes")
+    return text
+
+
+def value_text(value: Value, options: EpsonOptions) -> str:
+    """Return one item as Print shows it."""
+    match value:
+        case bool():
+            return str(options.true_value) if value else "0"
+        case str():
+            return value
+        case Point():
+            return point_text(value, options)
+        case _:
+            return number_text(value)
+
+
+def formatted(value: Number, layout: str) -> str:
+    """Return a number laid out by the marks of FmtStr$: ``0 # . ,`` (docs/reference/spel.md 3.3).
+
+    Raises:
+        Refusal: The layout holds other marks; dates are not simulated.
+    """
+    marks = _MARKS.fullmatch(layout)
+    if marks is None:
+        raise SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, f"Unknown format {layout!r}")
+    before, after = marks[1], marks[2]
+    places = len(after or "")
+    whole, _, fraction = f"{abs(value):.{places}f}".partition(".")
+    while fraction and len(fraction) > (after or "").rfind("0") + 1 and fraction[-1] == "0":
+        fraction = fraction[:-1]
+    digits = whole.lstrip("0").rjust(before.count("0"), "0")
+    if "," in before:
+        digits = re.sub(r"(?<=\d)(?=(\d{3})+$)", ",", digits)
+    point = "." if after is not None else ""
+    sign = "-" if value < 0 and (digits + fraction).strip("0,") else ""
+    return f"{sign}{digits}{point}{fraction}"

@@ -1,0 +1,137 @@
+"""Functions that tell the state of the controller, its errors and its waits.
+
+Source: docs/reference/spel.md 4.4, 9.
+
+That the command window may call those which programs may call from special tasks only is left
+open; they are answered (the default of docs/reference/spel.md 4.4).
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Final
+
+from robolink_simulators.epson.condition import Mode, Task
+from robolink_simulators.epson.spel.expressions.values import Value, as_integer, out_of_range
+from robolink_simulators.epson.spel.session import Session
+
+Arguments = Sequence[Value]
+StateFunction = Callable[[Session, Arguments], Value]
+
+_VERSION: Final = {5: 5_040_000, 7: 7_050_400, 8: 8_010_000}
+"""CtrlInfo(9): major, minor, revision and build, two digits each but the first."""
+
+_HIGHEST_LANGUAGE: Final = 6
+
+
+def _error_text(session: Session, arguments: Arguments) -> Value:
+    number = as_integer(arguments[0])
+    if len(arguments) > 1 and not 0 <= as_integer(arguments[1]) <= _HIGHEST_LANGUAGE:
+        raise out_of_range("No such language")
+    return session.messages.get(number, f"Error {number}")
+
+
+def _system_error(session: Session, arguments: Arguments) -> Value:
+    """Return the controller's error, or its warning for 1."""
+    condition = session.condition
+    wanted_error = not arguments or as_integer(arguments[0]) == 0
+    return condition.code if condition.error is wanted_error else 0
+
+
+def _controller(session: Session, arguments: Arguments) -> Value:
+    """Return CtrlInfo(i); what is not simulated is 0."""
+    condition, options = session.condition, session.options
+    flags = condition.flags()
+    ready = (
+        flags.ready
+        | flags.running << 1
+        | flags.paused << 2
+        | flags.emergency_stop << 8
+        | flags.safeguard << 9
+        | flags.error << 10
+        | flags.serious_error << 11
+        | flags.warning << 12
+    )
+    told = {
+        1: ready,
+        4: int(options.dry_run),
+        5: session.machine.control_device,
+        6: 1,
+        7: 1,
+        9: _VERSION[options.rc_plus],
+    }
+    index = as_integer(arguments[0])
+    if not 0 <= index <= 16:
+        raise out_of_range(f"CtrlInfo({index})")
+    return told.get(index, 0)
+
+
+def _stat(session: Session, arguments: Arguments) -> Value:
+    """Return Stat(0) and Stat(1); further tasks are not simulated."""
+    condition, machine = session.condition, session.machine
+    running, paused = condition.task is Task.RUNNING, condition.task is Task.PAUSED
+    words = {
+        0: running
+        | running << 16
+        | paused << 17
+        | condition.error << 18
+        | (condition.mode is Mode.TEACH) << 19
+        | condition.flags().emergency_stop << 20
+        | (not machine.power_high) << 21
+        | (not condition.guard_open) << 22
+        | 1 << 23
+        | (condition.mode is Mode.TEST) << 26,
+        1: machine.sensed
+        | machine.till_met << 1
+        | machine.motors_on << 4
+        | (not machine.power_high) << 6
+        | (0b1111 << 8 if machine.motors_on else 0),
+        2: 0,
+    }
+    index = as_integer(arguments[0])
+    if index not in words:
+        raise out_of_range(f"Stat({index})")
+    return int(words[index])
+
+
+def _robot(session: Session, arguments: Arguments) -> Value:
+    """Return RobotInfo(i)."""
+    machine = session.machine
+    words = {
+        0: machine.motors_on << 3 | machine.power_high << 4 | 1 << 8 | machine.till_met << 14,
+        1: 0,
+        2: 0,
+        3: 0b1111 if machine.motors_on else 0,
+        4: 0,
+        5: 0,
+    }
+    index = as_integer(arguments[0])
+    if index not in words:
+        raise out_of_range(f"RobotInfo({index})")
+    return int(words[index])
+
+
+def _robot_text(session: Session, arguments: Arguments) -> Value:
+    """Return RobotInfo$(i): name, model, default point file, serial number."""
+    texts = {0: "Robot1", 1: session.machine.model.name, 2: "robot1.pts", 4: session.machine.serial}
+    index = as_integer(arguments[0])
+    if index not in texts:
+        raise out_of_range(f"RobotInfo$({index})")
+    return texts[index]
+
+
+STATE_FUNCTIONS: Final[dict[str, tuple[range, StateFunction]]] = {
+    "safetyon": (range(1), lambda s, _: s.condition.guard_open),
+    "estopon": (range(1), lambda s, _: s.condition.flags().emergency_stop),
+    "erroron": (range(1), lambda s, _: s.condition.error),
+    "teachon": (range(1), lambda s, _: s.condition.mode is Mode.TEACH),
+    "pauseon": (range(1), lambda s, _: s.condition.task is Task.PAUSED),
+    "syserr": (range(2), _system_error),
+    "err": (range(2), lambda s, _: s.memory.last_error),
+    "errmsg$": (range(1, 3), _error_text),
+    "ctrlinfo": (range(1, 2), _controller),
+    "stat": (range(1, 2), _stat),
+    "robotinfo": (range(1, 2), _robot),
+    "robotinfo$": (range(1, 2), _robot_text),
+    "robotname$": (range(1), lambda s, _: _robot_text(s, (0,))),
+    "tw": (range(1), lambda s, _: s.memory.timed_out),
+}
+"""Name to the numbers of arguments allowed and the function."""

@@ -1,0 +1,91 @@
+"""Values of expressions and how one kind becomes another (docs/reference/spel.md 2.1)."""
+
+import math
+
+from robolink_simulators.epson.memory.points import Point
+from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
+
+Number = int | float
+Value = bool | int | float | str | Point
+"""A Boolean, an integer, a real, a string or a point."""
+
+LONGEST_STRING = 255
+_TRUE = -1
+_LARGEST_INT = 2**63 - 1
+
+
+def out_of_range(text: str) -> SpelRefusal:
+    """Return the refusal of a value that is not allowed."""
+    return SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, text)
+
+
+def _mismatch(wanted: str) -> SpelRefusal:
+    return SpelRefusal(RefusalKind.TYPE_MISMATCH, f"Type mismatch: {wanted} expected")
+
+
+def as_number(value: Value) -> Number:
+    """Return a number; True counts as -1 (documented constant, docs/reference/spel.md 1.2).
+
+    Raises:
+        Refusal: A string or a point.
+    """
+    if isinstance(value, bool):
+        return _TRUE if value else 0
+    if isinstance(value, (int, float)):
+        return value
+    raise _mismatch("a number")
+
+
+def as_integer(value: Value) -> int:
+    """Return a whole number, cut toward zero (the reference leaves it open).
+
+    Raises:
+        Refusal: A string or a point.
+    """
+    return int(as_number(value))
+
+
+def as_text(value: Value) -> str:
+    """Return a string.
+
+    Raises:
+        Refusal: Anything else.
+    """
+    if isinstance(value, str):
+        return value
+    raise _mismatch("a string")
+
+
+def as_point(value: Value) -> Point:
+    """Return a point.
+
+    Raises:
+        Refusal: Anything else.
+    """
+    if isinstance(value, Point):
+        return value
+    raise _mismatch("a point")
+
+
+def truth(value: Value) -> bool:
+    """Tell whether a condition holds: anything that is not zero.
+
+    Raises:
+        Refusal: A string or a point.
+    """
+    return as_number(value) != 0
+
+
+def checked(value: Value) -> Value:
+    """Refuse a result that its type cannot hold (what happens is left open: an error here).
+
+    Raises:
+        Refusal: Beyond Int64, not finite, or a string of more than 255 characters.
+    """
+    if isinstance(value, float) and not math.isfinite(value):
+        raise out_of_range("Overflow")
+    if isinstance(value, int) and abs(value) > _LARGEST_INT:
+        raise out_of_range("Overflow")
+    if isinstance(value, str) and len(value) > LONGEST_STRING:
+        raise out_of_range("String longer than 255 characters")
+    return value

@@ -1,0 +1,116 @@
+"""Text to statements. The parser is built on first use, parsed texts are remembered."""
+
+import re
+from collections.abc import Sequence
+from functools import lru_cache
+from importlib.resources import files
+from typing import Final
+
+from lark import Lark, Token
+from lark.exceptions import LarkError
+
+from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
+from robolink_simulators.epson.spel.build import TreeBuilder
+from robolink_simulators.epson.spel.tree import Statement
+
+_PROGRAM_WORDS = """
+    if elseif else endif select case default send for next do loop while until goto gosub return
+    call function fend exit declare global preserve boolean byte ubyte short integer ushort int32
+    long uint32 int64 uint64 real double string onerr trap xqt halt resume quit pause startmain
+    synclock syncunlock rundialog simget gshow vrun vget vset vload vsave vcls vdeftool vdefarm
+    vdeflocal vgocenter vteach vstatsreset vstatssave
+"""
+
+PROGRAM_ONLY: Final = frozenset(_PROGRAM_WORDS.split())
+"""Statements that exist in programs only (docs/reference/spel.md 13, class E)."""
+
+_WORDS_OF_OTHER_ROBOTS = """
+    brake jumptlz avoidsingularity singularityangle singularityspeed singularitydist
+    j1angle j4angle hand elbow wrist j1flag j2flag j4flag j6flag vsd
+"""
+
+OF_OTHER_ROBOTS: Final = frozenset(_WORDS_OF_OTHER_ROBOTS.split())
+"""Statements that the reference allows, for arms that this simulator has none of."""
+
+_WORDS_NOT_SIMULATED = """
+    arch armclr armset atrq autoljm box dispdev ecpset enctemper finedist hofs hordr hour jrange
+    limittorque limittorquelp limittorquestop limzmargin mcordr msgbox olaccel olrate opencom
+    opennet outreal parsestr performmode plane plocal ptpboost ptrq qpdecelr qpdecels shutdown
+    softcp speedrlimitation syncrobots taskstate tclim tcspeed time xylim xylimmode diffpoint
+    arc3 atclr bgo boxclr calib clearpoints closecom closenet close cls copy ctreset curve cvmove
+    date del ecpclr eresume error exportpoints flush fmtstr homeclr hofsjointaccuracy importpoints
+    input inputbox jtran latchenable line loadpoints localclr mcal mkdir opbcd palletclr
+    pdescription planeclr ptclr ptran qp randomize read redim rename resetelapsedtime savepoints
+    setcom setin setinreal setinw setlatch setnet setsw signal simset taskwait tc tmreset toff ton
+    vcal vcalpoints waitnet waitpos waitsig write writebin xylimclr abortmotion
+    cont restart recover vdefgetmotionrange vdefsetmotionrange vshowmodel vtrain
+    sysconfig workque_list cnv_quelist history clearhistory
+"""
+
+NOT_SIMULATED: Final = frozenset(_WORDS_NOT_SIMULATED.split())
+"""Statements that the reference allows in the command window (docs/reference/spel.md 13, classes A
+to D)."""
+
+_FUNCTION_WORDS = """
+    abs accelmax acos agl agltopls align armdef asc asin atan atan2 athome bclr bset btst chr$ cos
+    ctr ctrldev ctrlinfo curpos date$ degtorad dist ecpdef elapsedtime era erf$ erl err errmsg$
+    erroron ert estopon eval findpos fix fmtstr$ hex$ homedef in inbcd inpos inreal insidebox instr
+    int inw iodef iolabel$ ionumber ja js jt latchpos latchstate lcase$ left$ len ljm localdef lof
+    lset$ lshift ltrim$ memin meminw memsw mhour mid$ mytask oport pagl pauseon pdef plabel$ pls
+    pnumber posfound ppls ptptime radtodeg realpls realpos realtorque right$ rnd robotinfo
+    robotinfo$ robotmodel$ robotname$ robotserial$ robottype rset$ rshift rtrim$ safetyon sgn sin
+    space$ sqr stat str$ sw syserr tab$ tan targetok taskdone taskinfo taskinfo$ tcpspeed teachon
+    tillon time$ tldef tmr trim$ tw ubound ucase$ val vxtrans xy xylimdef
+"""
+
+FUNCTION_ONLY: Final = frozenset(_FUNCTION_WORDS.split())
+"""Words that are functions and never statements (docs/reference/spel.md 13, class F)."""
+
+_REFUSED_WORDS: Final = (
+    (PROGRAM_ONLY, RefusalKind.NOT_ALLOWED_HERE, "is allowed in programs only"),
+    (FUNCTION_ONLY, RefusalKind.FUNCTION_ONLY, "is a function and no statement"),
+    (OF_OTHER_ROBOTS, RefusalKind.OTHER_ROBOT, "is for another kind of robot"),
+    (NOT_SIMULATED, RefusalKind.NOT_SIMULATED, "is not simulated"),
+)
+
+_STATEMENT_WORDS = re.compile(r"""(?:^|;)\s*([a-z][a-z0-9_]*\$?)|"[^"]*"|'.*""", re.IGNORECASE)
+
+
+@lru_cache(maxsize=1)
+def _parser() -> Lark:
+    grammar = files(__package__).joinpath("grammar.lark").read_text(encoding="utf-8")
+    return Lark(
+        grammar,
+        parser="lalr",
+        lexer="contextual",
+        transformer=TreeBuilder(),
+        g_regex_flags=re.IGNORECASE,
+    )
+
+
+@lru_cache(maxsize=1024)
+def parse(text: str) -> tuple[Statement, ...]:
+    """Return the statements in one line, separated by semicolons.
+
+    Raises:
+        Refusal: The line is not SPEL+, or holds a statement that only programs may use.
+    """
+    try:
+        statements: Sequence[Statement] = _parser().parse(text)  # type: ignore[assignment]
+    except LarkError as error:
+        raise _refusal(text, error) from error
+    return tuple(statements)
+
+
+def _refusal(text: str, error: LarkError) -> SpelRefusal:
+    for match in _STATEMENT_WORDS.finditer(text):
+        word = match.group(1) or ""
+        for words, kind, why in _REFUSED_WORDS:
+            if word.lower() in words:
+                return SpelRefusal(kind, f"{word} {why}")
+    token = getattr(error, "token", None)
+    near = token if isinstance(token, Token) else getattr(error, "char", "")
+    return SpelRefusal(
+        RefusalKind.SYNTAX,
+        f"Syntax error near {str(near)!r}",
+    )

@@ -1,0 +1,63 @@
+"""What an expression or a statement can reach."""
+
+import random
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from robolink_simulators.epson.condition import Condition
+from robolink_simulators.epson.machine import Machine
+from robolink_simulators.epson.memory.variables import Variables
+from robolink_simulators.epson.options import EpsonOptions
+from robolink_simulators.epson.spel.tree import Binary, Expression, Literal, Name
+
+
+def _at_power_on() -> Expression:
+    """Return the condition of a bare Till, Find or Sense: ``Sw(0) = On``.
+
+    Source: docs/reference/spel.md 6.3.
+    """
+    return Binary("=", Name("sw", (Literal(0),)), Name("on"))
+
+
+@dataclass(slots=True)
+class WindowMemory:
+    """What statements leave behind for the next ones; a restart forgets it.
+
+    Attributes:
+        till: Condition of a bare Till.
+        find: Condition of a bare Find.
+        sense: Condition of a bare Sense.
+        wait_limit_s: TMOut: longest Wait without a time of its own, 0 for ever.
+        timed_out: TW: whether the last Wait for a condition ran out of time.
+        last_error: Err: number of the last statement that failed, 0 for none.
+    """
+
+    till: Expression = field(default_factory=_at_power_on)
+    find: Expression = field(default_factory=_at_power_on)
+    sense: Expression = field(default_factory=_at_power_on)
+    wait_limit_s: int = 0
+    timed_out: bool = False
+    last_error: int = 0
+
+
+@dataclass(slots=True)
+class Session:
+    """The machine, the controller's state and habits, and what was said before.
+
+    Attributes:
+        machine: The robot and its memory.
+        options: The controller's habits and error numbers.
+        rng: The dice of RealPos.
+        condition: What GetStatus shows.
+        variables: The project's Global Preserve variables.
+        messages: Texts of error numbers.
+        memory: What earlier statements have set.
+    """
+
+    machine: Machine
+    options: EpsonOptions
+    rng: random.Random
+    condition: Condition
+    variables: Variables
+    messages: Mapping[int, str]
+    memory: WindowMemory = field(default_factory=WindowMemory)

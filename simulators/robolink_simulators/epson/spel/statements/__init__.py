@@ -1,0 +1,1 @@
+"""Statements of SPEL+: motion, tools, points, settings and waits."""

@@ -1,0 +1,61 @@
+"""Jump and Jump3: up, across, down (docs/reference/spel.md 7.1)."""
+
+from dataclasses import replace
+
+from robolink.model import Pose
+from robolink_simulators.epson.arm.kinematics import Joints, flange_of, solve
+from robolink_simulators.epson.arm.motion_parameters import LIMZ_MARGIN_MM, MotionPhase
+from robolink_simulators.epson.arm.trajectory import Leg
+from robolink_simulators.epson.machine import Machine
+from robolink_simulators.epson.memory.points import Point
+from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
+from robolink_simulators.epson.spel.statements.legs import go_leg, line_leg, pose_of
+
+DESCENT = 2
+"""Which leg of a Jump is the descent; Sense is looked at just before it (documented)."""
+
+
+def jump(machine: Machine, point: Point, limz_mm: float | None) -> list[Leg]:
+    """Plan a gate motion: up to LimZ, across, down (documented as C7, the default).
+
+    LimZ is compared with joint 3, not with the tip (assumed: its default of 0 would else be
+    out of reach under every tool that hangs down). The modifier's height counts in the
+    target's local (documented).
+
+    Raises:
+        Refusal: Start or target lie above LimZ; the start's number is documented (4005).
+    """
+    height_mm = machine.parameters.limz_mm
+    if limz_mm is not None:
+        height_mm = limz_mm + machine.locals.get(point.local).z_mm
+    start, end = machine.arm.joints, machine.joints_for(point)
+    for joints, what in ((start, "The motion starts"), (end, "The target lies")):
+        if joints.j3_mm > height_mm + LIMZ_MARGIN_MM:
+            raise SpelRefusal(RefusalKind.ABOVE_LIMZ, f"{what} above LimZ")
+    up = replace(start, j3_mm=max(start.j3_mm, height_mm))
+    across = replace(end, j3_mm=max(end.j3_mm, height_mm))
+    return [
+        go_leg(machine, start, up, phase=MotionPhase.DEPART),
+        go_leg(machine, up, across),
+        go_leg(machine, across, end, phase=MotionPhase.APPROACH),
+    ]
+
+
+def jump3(machine: Machine, points: tuple[Point, Point, Point]) -> list[Leg]:
+    """Plan Jump3: straight to the first point, point to point to the second, straight on.
+
+    LimZ has no bearing on it (documented).
+
+    Raises:
+        Refusal: A point is out of reach.
+    """
+    depart, approach, end = (pose_of(machine, point) for point in points)
+    return [
+        line_leg(machine, machine.tip(), depart),
+        go_leg(machine, _joints(machine, depart), _joints(machine, approach)),
+        line_leg(machine, approach, end),
+    ]
+
+
+def _joints(machine: Machine, tip: Pose) -> Joints:
+    return solve(machine.model, flange_of(tip, machine.offset), tip.hand or machine.arm.hand)

@@ -1,0 +1,284 @@
+"""Keyword statements about tools, the home position, switches and conditions.
+
+Source: docs/reference/spel.md 6, 8.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Final, NamedTuple
+
+from robolink.model import ToolOffset
+from robolink.protocols.spel import PrintedWhere, format_tool_listing, format_where
+from robolink.timing import NS_PER_S
+from robolink_simulators.epson.arm.kinematics import Joints
+from robolink_simulators.epson.arm.trajectory import Leg
+from robolink_simulators.epson.machine import Machine
+from robolink_simulators.epson.memory.bits import BitBank
+from robolink_simulators.epson.memory.points import Point
+from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
+from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
+from robolink_simulators.epson.spel.expressions.machine_functions import SIX_JOINTS, pulses_of
+from robolink_simulators.epson.spel.expressions.printing import CRLF, number_text
+from robolink_simulators.epson.spel.expressions.values import out_of_range
+from robolink_simulators.epson.spel.statements.legs import go_leg
+from robolink_simulators.epson.spel.statements.motion import require_drives
+from robolink_simulators.epson.spel.statements.points import POINT_STATEMENTS, point_argument
+from robolink_simulators.epson.spel.statements.robot import ROBOT_SETTINGS
+from robolink_simulators.epson.spel.statements.settings import SETTINGS, accel
+from robolink_simulators.epson.spel.statements.waiting import (
+    is_condition,
+    seconds_of,
+    shown_condition,
+)
+from robolink_simulators.epson.spel.tree import Expression, KeywordStatement
+
+SHORTEST_PULSE_S: Final = 0.01
+LONGEST_PULSE_S: Final = 10.0
+"""Times after which On and Off switch back (docs/reference/spel.md 8)."""
+
+
+class TimedBit(NamedTuple):
+    """A bit that changes some time after the statement began."""
+
+    bank: BitBank
+    number: int
+    on: bool
+    after_ns: int
+
+
+class StatementOutcome(NamedTuple):
+    """What a statement printed, how long it takes, and what moves meanwhile."""
+
+    output: str = ""
+    duration_ns: int = 0
+    legs: Sequence[Leg] = ()
+    timed: TimedBit | None = None
+
+
+def run_command(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
+    """Carry out a keyword statement.
+
+    Raises:
+        Refusal: It cannot be carried out; nothing was changed.
+    """
+    if command.open_ended and command.name != "plist":
+        raise SpelRefusal(RefusalKind.SYNTAX, f"{command.name} does not end with a comma")
+    session = evaluator.session
+    setting = SETTINGS.get(command.name) or ROBOT_SETTINGS.get(command.name)
+    if setting is not None or command.name == "accel":
+        numbers = [evaluator.number(argument) for argument in command.arguments]
+        if setting is None:
+            return StatementOutcome(accel(session.machine, numbers, session.options.accel_max))
+        return StatementOutcome(setting(session.machine, numbers))
+    if command.name in POINT_STATEMENTS:
+        return StatementOutcome(POINT_STATEMENTS[command.name](evaluator, command))
+    return _HANDLERS[command.name](evaluator, command)
+
+
+def _expect(command: KeywordStatement, *counts: int) -> tuple[Expression, ...]:
+    if len(command.arguments) not in counts:
+        raise SpelRefusal(
+            RefusalKind.SYNTAX,
+            f"{command.name} does not take {len(command.arguments)} arguments here",
+        )
+    return command.arguments
+
+
+def _tlset(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
+    session, arguments = evaluator.session, _expect(command, 0, 1, 2, 5, 7)
+    tools = session.machine.tools
+    if len(arguments) <= 1:
+        shown = tools.defined()
+        if arguments:
+            tool = evaluator.integer(arguments[0])
+            offset = tools.get(tool)
+            shown = {} if offset is None else {tool: offset}
+        listing = format_tool_listing(shown, layout=session.options.tool_listing)
+        return StatementOutcome(listing + CRLF if listing else "")
+    # Flags and local of the point are ignored (documented, docs/reference/spel.md 6.1).
+    x, y, z, *angles = point_argument(evaluator, arguments[1:]).coordinates
+    if session.options.angle_wrap:
+        angles = [angle if -180 <= angle <= 180 else _wrapped(angle) for angle in angles]
+    tools.set(evaluator.integer(arguments[0]), ToolOffset(x, y, z, *angles))
+    return StatementOutcome()
+
+
+def _wrapped(angle_deg: float) -> float:
+    return (angle_deg + 180.0) % 360.0 - 180.0
+
+
+def _tlclr(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
+    (tool,) = _expect(command, 1)
+    session = evaluator.session
+    in_force = session.options.clear_selected_tool
+    session.machine.tools.clear(evaluator.integer(tool), in_force=in_force)
+    return StatementOutcome()
+
+
+def _tool(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
+    arguments, tools = _expect(command, 0, 1), evaluator.session.machine.tools
+    if not arguments:
+        # Bare Tool prints the number alone (seen: a client reads it as an integer).
+        return StatementOutcome(number_text(tools.selected) + CRLF)
+    tools.select(evaluator.integer(arguments[0]))
+    return StatementOutcome()
+
+
+def _where(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
+    arguments, session = _expect(command, 0, 1), evaluator.session
+    machine = session.machine
+    local = evaluator.integer(arguments[0]) if arguments else 0
+    here = machine.locals.convert(Point.at(machine.tip()), local)
+    joints = machine.arm.joints
+    printed = PrintedWhere(here.coordinates, joints.values(), tuple(pulses_of(session, joints)))
+    return StatementOutcome(format_where(printed, width=session.options.where_width) + CRLF)
+
+
+def _switch(command: KeywordStatement, evaluator: Evaluator, *, on: bool) -> StatementOutcome:
+    """Switch a bit, for a time if one stands there (documented, docs/reference/spel.md 8)."""
+    arguments, machine = _expect(command, 1, 2, 3), evaluator.session.machine
+    bank = machine.memory if command.name.startswith("mem") else machine.outputs
+    number = evaluator.integer(arguments[0])
+    if len(arguments) == 1:
+        bank.set(number, on)
+        machine.timed_bits.forget(bank, number)
+        return StatementOutcome()
+    if bank is machine.memory:
+        raise SpelRefusal(RefusalKind.SYNTAX, "A memory bit takes no time")
+    seconds = float(evaluator.number(arguments[1]))
+    if not SHORTEST_PULSE_S <= seconds <= LONGEST_PULSE_S:
+        raise out_of_range(f"A time of {seconds} s")
+    goes_on = len(arguments) > 2 and evaluator.integer(arguments[2]) == 0
+    bank.set(number, on)
+    duration_ns = round(seconds * NS_PER_S)
+    pulse = TimedBit(bank, number, not on, duration_ns)
+    return StatementOutcome(duration_ns=0 if goes_on else duration_ns, timed=pulse)
+
+
+def _on(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
+    return _switch(command, evaluator, on=True)
+
+
+def _off(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
+    return _switch(command, evaluator, on=False)
+
+
+def _port(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
+    """Set a byte or a word of outputs or memory bits."""
+    at, value = (evaluator.integer(argument) for argument in _expect(command, 2))
+    machine = evaluator.session.machine
+    bank = machine.memory if command.name.startswith("mem") else machine.outputs
+    if not command.name.endswith("w"):
+        bank.set_byte(at, value)
+        return StatementOutcome()
+    if not 0 <= value <= 0xFFFF:
+        raise out_of_range(f"Not a word: {value}")
+    bank.set_byte(2 * at, value & 0xFF)
+    bank.set_byte(2 * at + 1, value >> 8)
+    return StatementOutcome()
+
+
+def _wait_limit(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
+    memory = evaluator.session.memory
+    arguments = _expect(command, 0, 1)
+    if not arguments:
+        return StatementOutcome(number_text(memory.wait_limit_s) + CRLF)
+    memory.wait_limit_s = int(seconds_of(evaluator, arguments[0]))
+    return StatementOutcome()
+
+
+def _keep_condition(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
+    """Set the condition that a bare Till, Find or Sense stands for, or show it."""
+    memory, arguments = evaluator.session.memory, _expect(command, 0, 1)
+    if not arguments:
+        return StatementOutcome(shown_condition(getattr(memory, command.name)) + CRLF)
+    if not is_condition(arguments[0]):
+        raise SpelRefusal(RefusalKind.SYNTAX, f"{command.name} needs a condition")
+    setattr(memory, command.name, arguments[0])
+    return StatementOutcome()
+
+
+def _pulse(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
+    """Show the pulses, or go point to point to pulses."""
+    if len(command.arguments) == SIX_JOINTS:
+        raise SpelRefusal(RefusalKind.OTHER_ROBOT, "This robot has four joints")
+    arguments = _expect(command, 0, 4)
+    if not arguments:
+        return StatementOutcome(_line_of_where(evaluator, 2))
+    machine = evaluator.session.machine
+    require_drives(machine)
+    counts = [evaluator.integer(argument) for argument in arguments]
+    return StatementOutcome(legs=[_leg_to_pulses(machine, counts)])
+
+
+def _home(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
+    """Go to the home position, all joints at once (documented: in the order of Hordr)."""
+    _expect(command, 0)
+    machine = evaluator.session.machine
+    home = machine.settings.home_pulses
+    if home is None:
+        raise SpelRefusal(RefusalKind.HOME_UNDEFINED, "No home position is set")
+    require_drives(machine)
+    return StatementOutcome(legs=[_leg_to_pulses(machine, home)])
+
+
+def _leg_to_pulses(machine: Machine, counts: Sequence[int]) -> Leg:
+    scales = zip(counts, machine.model.pulses_per_unit, strict=True)
+    return go_leg(machine, machine.arm.joints, Joints(*(count / scale for count, scale in scales)))
+
+
+def _joint(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
+    _expect(command, 0)
+    return StatementOutcome(_line_of_where(evaluator, 1))
+
+
+def _line_of_where(evaluator: Evaluator, line: int) -> str:
+    shown = _where(evaluator, KeywordStatement("where", (), open_ended=False)).output
+    return shown.splitlines()[line] + CRLF
+
+
+def _base(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
+    """Show the base, or accept the one that there is."""
+    if not command.arguments:
+        values = ", ".join(["0.000"] * 6)
+        return StatementOutcome(f"Base: {values}{CRLF}")
+    if any(point_argument(evaluator, command.arguments).coordinates):
+        raise SpelRefusal(RefusalKind.NOT_SIMULATED, "The base cannot be moved here")
+    return StatementOutcome()
+
+
+def _reset(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
+    """Reset parameters and outputs; errors are the device's to clear.
+
+    Source: docs/reference/spel.md 6.3.
+    """
+    _expect(command, 0)
+    session = evaluator.session
+    session.machine.reset_motion_parameters()
+    if session.options.reset_outputs_off:
+        session.machine.clear_outputs()
+    return StatementOutcome()
+
+
+_HANDLERS: Final[dict[str, Callable[[Evaluator, KeywordStatement], StatementOutcome]]] = {
+    "tlset": _tlset,
+    "tlclr": _tlclr,
+    "tool": _tool,
+    "where": _where,
+    "joint": _joint,
+    "base": _base,
+    "pulse": _pulse,
+    "home": _home,
+    "on": _on,
+    "off": _off,
+    "memon": _on,
+    "memoff": _off,
+    "out": _port,
+    "outw": _port,
+    "memout": _port,
+    "memoutw": _port,
+    "tmout": _wait_limit,
+    "till": _keep_condition,
+    "find": _keep_condition,
+    "sense": _keep_condition,
+    "reset": _reset,
+}

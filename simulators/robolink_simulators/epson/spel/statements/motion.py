@@ -1,0 +1,144 @@
+"""Go, Move, Jump, Arc and their relatives (docs/reference/spel.md 7.1)."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import pairwise
+from typing import Final
+
+from robolink.model import rotate_xy
+from robolink_simulators.epson.arm.trajectory import Leg
+from robolink_simulators.epson.machine import Machine
+from robolink_simulators.epson.memory.points import Coordinates, Point
+from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
+from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
+from robolink_simulators.epson.spel.expressions.values import out_of_range
+from robolink_simulators.epson.spel.statements.jump import jump, jump3
+from robolink_simulators.epson.spel.statements.legs import arc_leg, go_leg, line_leg, pose_of
+from robolink_simulators.epson.spel.tree import MotionStatement
+
+_SAME_MM = 0.001
+_SAME_DEG = 0.001
+
+# CP blends into the next motion; here every motion ends at rest (assumed simplification).
+# LJM leaves a SCARA's point unchanged (documented). C0 to C7 all rise to LimZ, as C7 does.
+_UNTIL_WORDS: Final = frozenset({"till", "find"})
+_LINE_WORDS: Final = frozenset({"cp", "rot"}) | _UNTIL_WORDS
+_GATE_WORDS: Final = frozenset({"cp", "sense", *(f"c{n}" for n in range(8))}) | _UNTIL_WORDS
+_WORDS: Final = {
+    "go": frozenset({"cp", "ljm"}) | _UNTIL_WORDS,
+    "tgo": frozenset({"cp"}) | _UNTIL_WORDS,
+    "bgo": frozenset({"cp"}) | _UNTIL_WORDS,
+    "pass": frozenset({"cp", "ljm"}),
+    "move": _LINE_WORDS,
+    "tmove": _LINE_WORDS,
+    "bmove": _LINE_WORDS,
+    "arc": _LINE_WORDS,
+    "jump": frozenset({"limz"}) | _GATE_WORDS,
+    "jump3": frozenset({"ljm"}) | _GATE_WORDS,
+    "jump3cp": frozenset({"ljm", "rot"}) | _GATE_WORDS,
+}
+_WAYPOINTS: Final = {"arc": 2, "jump3": 3, "jump3cp": 3}
+
+
+def plan(evaluator: Evaluator, motion: MotionStatement) -> list[Leg]:
+    """Return the legs of a motion; nothing moves yet.
+
+    Targets are for the selected tool's tip.
+
+    Raises:
+        Refusal: Motors off, a free joint, a target out of reach, a wrong option ...
+    """
+    machine = evaluator.session.machine
+    wrong = motion.options.words - _WORDS[motion.verb]
+    if wrong:
+        raise SpelRefusal(RefusalKind.SYNTAX, f"{motion.verb} knows no {', '.join(sorted(wrong))}")
+    if len(motion.options.words & {*_UNTIL_WORDS, "sense"}) > 1:
+        raise SpelRefusal(RefusalKind.SYNTAX, "A motion takes one of Till, Find and Sense")
+    points = [evaluator.point(target) for target in motion.targets]
+    if motion.verb != "pass" and len(points) != _WAYPOINTS.get(motion.verb, 1):
+        raise SpelRefusal(RefusalKind.SYNTAX, f"{motion.verb} does not take {len(points)} points")
+    require_drives(machine)
+    limz = motion.options.limz
+    match motion.verb:
+        case "jump":
+            height_mm = None if limz is None else float(evaluator.number(limz))
+            return jump(machine, points[0], height_mm)
+        case "jump3" | "jump3cp":
+            return jump3(machine, (points[0], points[1], points[2]))
+        case "arc":
+            return [arc_leg(machine, *(pose_of(machine, point) for point in points))]
+        case "pass":
+            return _passing(machine, points)
+        case verb:
+            target = _TARGETS[verb](machine, points[0])
+            if verb.endswith("move"):
+                return [_line(machine, target, rot="rot" in motion.options.words)]
+            return [go_leg(machine, machine.arm.joints, machine.joints_for(target))]
+
+
+def require_drives(machine: Machine) -> None:
+    """Hold a motion back that the drives would not carry out.
+
+    Raises:
+        Refusal: The motors are off, or a joint is free (documented for SFree, but not its
+            number).
+    """
+    if not machine.motors_on:
+        raise SpelRefusal(RefusalKind.MOTORS_OFF, "Motors are off")
+    if machine.settings.free_joints:
+        free = ", ".join(map(str, sorted(machine.settings.free_joints)))
+        raise SpelRefusal(RefusalKind.JOINT_FREE, f"Joint {free} is free")
+
+
+def _passing(machine: Machine, points: list[Point]) -> list[Leg]:
+    """Go by each point; here each is stood at for an instant (assumed simplification)."""
+    joints = [machine.arm.joints, *(machine.joints_for(point) for point in points)]
+    return [go_leg(machine, a, b) for a, b in pairwise(joints)]
+
+
+def _absolute(_: Machine, point: Point) -> Point:
+    return point
+
+
+def _in_tool(machine: Machine, point: Point) -> Point:
+    """Shift along the axes of the selected tool; the hand stays (documented)."""
+    tip = Point.at(machine.tip())
+    dx_mm, dy_mm = rotate_xy(*point.coordinates[:2], tip.coordinates[3])
+    x, y, z, u, v, w = tip.coordinates
+    _, _, dz_mm, du_deg, _, _ = point.coordinates
+    moved: Coordinates = (x + dx_mm, y + dy_mm, z + dz_mm, u + du_deg, v, w)
+    return replace(tip, coordinates=moved)
+
+
+def _in_local(machine: Machine, point: Point) -> Point:
+    """Shift along the axes of the local named in the point, 0 for the base (documented)."""
+    return machine.locals.convert(Point.at(machine.tip()), point.local).plus(point)
+
+
+_TARGETS: Final[dict[str, Callable[[Machine, Point], Point]]] = {
+    "go": _absolute,
+    "move": _absolute,
+    "tgo": _in_tool,
+    "tmove": _in_tool,
+    "bgo": _in_local,
+    "bmove": _in_local,
+}
+
+
+def _line(machine: Machine, target: Point, *, rot: bool) -> Leg:
+    """Plan a straight motion.
+
+    Raises:
+        Refusal: Only the orientation changes and ROT is missing, or ROT stands and nothing
+            turns over a distance (both documented, docs/reference/spel.md 7.1; their numbers are
+            not).
+    """
+    end, tip = pose_of(machine, target), machine.tip()
+    travels = math.dist(end.coordinates()[:3], tip.coordinates()[:3]) > _SAME_MM
+    turns = abs(end.u_deg - tip.u_deg) > _SAME_DEG
+    if turns and not travels and not rot:
+        raise out_of_range("The motion only turns the tool: ROT is needed")
+    if rot and travels and not turns:
+        raise out_of_range("ROT, but the tool does not turn")
+    return line_leg(machine, tip, end)

@@ -1,0 +1,104 @@
+"""Keyword statements about points, locals and pallets; each returns what it prints.
+
+Source: docs/reference/spel.md 5.
+"""
+
+from collections.abc import Callable
+from typing import Final
+
+from robolink_simulators.epson.memory.points import HIGHEST_POINT, Local, Point
+from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
+from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
+from robolink_simulators.epson.spel.expressions.machine_functions import coordinates_of
+from robolink_simulators.epson.spel.expressions.printing import CRLF, point_line
+from robolink_simulators.epson.spel.expressions.values import as_text, out_of_range
+from robolink_simulators.epson.spel.tree import Expression, KeywordStatement
+
+
+def _expect(command: KeywordStatement, *counts: int) -> tuple[Expression, ...]:
+    if len(command.arguments) not in counts:
+        raise SpelRefusal(
+            RefusalKind.SYNTAX,
+            f"{command.name} does not take {len(command.arguments)} arguments here",
+        )
+    return command.arguments
+
+
+def point_argument(evaluator: Evaluator, arguments: tuple[Expression, ...]) -> Point:
+    """Return a point, or the old list of bare numbers (docs/reference/spel.md 5.1).
+
+    Raises:
+        Refusal: They are neither.
+    """
+    if len(arguments) == 1:
+        return evaluator.point_of(arguments[0])
+    return coordinates_of([evaluator.number(argument) for argument in arguments])
+
+
+def _here(evaluator: Evaluator, command: KeywordStatement) -> str:
+    (target,) = _expect(command, 1)
+    machine = evaluator.session.machine
+    machine.points.store(evaluator.stored_number(target), Point.at(machine.tip()))
+    return ""
+
+
+def _plist(evaluator: Evaluator, command: KeywordStatement) -> str:
+    arguments = _expect(command, 1) if command.open_ended else _expect(command, 0, 1, 2)
+    numbers = [evaluator.integer(argument) for argument in arguments]
+    first = numbers[0] if numbers else 0
+    last = first if len(numbers) == 1 else HIGHEST_POINT
+    if command.open_ended:
+        last = HIGHEST_POINT
+    if len(numbers) == 2:
+        last = numbers[1]
+    points = evaluator.session.machine.points
+    lines = [point_line(n, points.get(n)) + CRLF for n in points.numbers(first, last)]
+    return "".join(lines)
+
+
+def _pdel(evaluator: Evaluator, command: KeywordStatement) -> str:
+    numbers = [evaluator.integer(argument) for argument in _expect(command, 1, 2)]
+    evaluator.session.machine.points.delete(numbers[0], numbers[-1])
+    return ""
+
+
+def _local(evaluator: Evaluator, command: KeywordStatement) -> str:
+    arguments = _expect(command, 1, 2, 5, 7)
+    number, locals_ = evaluator.integer(arguments[0]), evaluator.session.machine.locals
+    if len(arguments) == 1:
+        # The layout is not shown anywhere: as ArmSet prints (assumed).
+        local = locals_.get(number)
+        values = (local.x_mm, local.y_mm, local.z_mm, local.u_deg, 0.0, 0.0)
+        return f"Local {number}: " + ", ".join(f"{v:.3f}" for v in values) + CRLF
+    x, y, z, u, v, w = point_argument(evaluator, arguments[1:]).coordinates
+    if v != 0 or w != 0:
+        raise out_of_range("V and W of a local are 0 on a SCARA")
+    locals_.define(number, Local(x, y, z, u))
+    return ""
+
+
+def _label(evaluator: Evaluator, command: KeywordStatement) -> str:
+    number, name = _expect(command, 2)
+    points = evaluator.session.machine.points
+    points.label(evaluator.integer(number), as_text(evaluator.value(name)))
+    return ""
+
+
+def _pallet(evaluator: Evaluator, command: KeywordStatement) -> str:
+    """Define a pallet from three or four corners, columns and rows; Outside is not simulated."""
+    number, *corners, columns, rows = _expect(command, 6, 7)
+    points = [evaluator.point_of(corner) for corner in corners]
+    counts = (evaluator.integer(columns), evaluator.integer(rows))
+    evaluator.session.machine.pallets.define(evaluator.integer(number), points, *counts)
+    return ""
+
+
+POINT_STATEMENTS: Final[dict[str, Callable[[Evaluator, KeywordStatement], str]]] = {
+    "here": _here,
+    "plist": _plist,
+    "pdel": _pdel,
+    "plabel": _label,
+    "pallet": _pallet,
+    "local": _local,
+}
+"""Keyword to what carries it out."""

@@ -1,0 +1,152 @@
+"""Keyword statements about load, arm, free joints and the home position.
+
+Source: docs/reference/spel.md 6.2, 7.2, 7.3.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Final
+
+from robolink_simulators.epson.machine import Machine
+from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
+from robolink_simulators.epson.spel.expressions.printing import CRLF, number_text
+from robolink_simulators.epson.spel.expressions.values import Number, out_of_range
+
+Numbers = Sequence[Number]
+Setting = Callable[[Machine, Numbers], str]
+
+_JOINTS: Final = 4
+_HIGHEST_FINE: Final = 65535
+_HEAVIEST_KG: Final = 20.0
+"""Assumed; per model in the reference, where too much is an error."""
+
+
+def _expect(values: Numbers, *counts: int) -> None:
+    if len(values) not in counts:
+        raise SpelRefusal(RefusalKind.SYNTAX, f"{len(values)} values, not one of {counts}")
+
+
+def _within(value: Number, low: float, high: float) -> float:
+    if not low <= value <= high:
+        raise out_of_range(f"Allowed are {low:g} to {high:g}")
+    return float(value)
+
+
+def _weight(machine: Machine, values: Numbers) -> str:
+    settings = machine.settings
+    _expect(values, 0, 1, 2)
+    if not values:
+        return f"{settings.weight_kg:.3f}, {settings.weight_at_mm:.3f}" + CRLF
+    settings.weight_kg = _within(values[0], 0, _HEAVIEST_KG)
+    if len(values) > 1:
+        settings.weight_at_mm = _within(values[1], 0, 10_000)
+    return ""
+
+
+def _inertia(machine: Machine, values: Numbers) -> str:
+    settings = machine.settings
+    _expect(values, 0, 1, 2)
+    if not values:
+        return f"{settings.inertia_kg_m2:.3f}, {settings.eccentricity_mm:.3f}" + CRLF
+    settings.inertia_kg_m2 = _within(values[0], 0, 10)
+    if len(values) > 1:
+        settings.eccentricity_mm = _within(values[1], 0, 10_000)
+    return ""
+
+
+def _fine(machine: Machine, values: Numbers) -> str:
+    _expect(values, 0, _JOINTS)
+    if not values:
+        return ", ".join(map(str, machine.settings.fine_pulses)) + CRLF
+    a, b, c, d = (int(_within(value, 0, _HIGHEST_FINE)) for value in values)
+    machine.settings.fine_pulses = (a, b, c, d)
+    return ""
+
+
+def _speed_factor(machine: Machine, values: Numbers) -> str:
+    _expect(values, 0, 1)
+    if not values:
+        return number_text(machine.settings.speed_factor) + CRLF
+    machine.settings.speed_factor = int(_within(values[0], 1, 100))
+    return ""
+
+
+def _continuous_path(machine: Machine, values: Numbers) -> str:
+    _expect(values, 0, 1)
+    if not values:
+        return number_text(int(machine.settings.continuous_path)) + CRLF
+    machine.settings.continuous_path = bool(values[0])
+    return ""
+
+
+def _numbered(kind: RefusalKind) -> Setting:
+    """Return Arm or ECP: number 0 is there, no other was ever defined."""
+
+    def choose(_: Machine, values: Numbers) -> str:
+        _expect(values, 0, 1)
+        if not values:
+            return "0" + CRLF
+        if not 0 <= values[0] <= 15:
+            raise out_of_range(f"There is no number {values[0]}")
+        if values[0]:
+            raise SpelRefusal(kind, f"Number {values[0]} is not defined")
+        return ""
+
+    return choose
+
+
+def _joints(values: Numbers) -> set[int]:
+    return {int(_within(value, 1, _JOINTS)) for value in values}
+
+
+def _free(machine: Machine, values: Numbers) -> str:
+    if not values:
+        raise SpelRefusal(RefusalKind.SYNTAX, "SFree needs a joint")
+    machine.settings.free_joints |= _joints(values)
+    machine.reset_motion_parameters()
+    return ""
+
+
+def _lock(machine: Machine, values: Numbers) -> str:
+    if not machine.motors_on:
+        raise SpelRefusal(RefusalKind.MOTORS_OFF, "Motors are off")
+    machine.settings.free_joints -= _joints(values) or set(range(1, _JOINTS + 1))
+    machine.reset_motion_parameters()
+    return ""
+
+
+def _home_set(machine: Machine, values: Numbers) -> str:
+    if len(values) > _JOINTS:
+        raise SpelRefusal(RefusalKind.OTHER_ROBOT, "This robot has four joints")
+    _expect(values, 0, _JOINTS)
+    home = machine.settings.home_pulses
+    if values:
+        a, b, c, d = map(int, values)
+        machine.settings.home_pulses = (a, b, c, d)
+        return ""
+    if home is None:
+        raise SpelRefusal(RefusalKind.HOME_UNDEFINED, "No home position is set")
+    return f"{home[0]} {home[1]}{CRLF}{home[2]} {home[3]}{CRLF}"
+
+
+def _range(machine: Machine, values: Numbers) -> str:
+    if values:
+        raise SpelRefusal(RefusalKind.NOT_SIMULATED, "The range is the model's own here")
+    limits = zip(machine.model.ranges, machine.model.pulses_per_unit, strict=True)
+    pulses = [round(end * scale) for travel, scale in limits for end in (travel.low, travel.high)]
+    return ", ".join(map(str, pulses)) + CRLF
+
+
+ROBOT_SETTINGS: Final[dict[str, Setting]] = {
+    "weight": _weight,
+    "inertia": _inertia,
+    "fine": _fine,
+    "speedfactor": _speed_factor,
+    "cp": _continuous_path,
+    "arm": _numbered(RefusalKind.ARM_UNDEFINED),
+    "ecp": _numbered(RefusalKind.ECP_UNDEFINED),
+    "sfree": _free,
+    "slock": _lock,
+    "homeset": _home_set,
+    "range": _range,
+}
+"""Keyword to what sets or shows it; what is shown comes back as text."""

@@ -1,0 +1,153 @@
+"""``Wait`` for a condition; the conditions that Till, Find and Sense keep.
+
+Source: docs/reference/spel.md 4.6, 7.1.
+"""
+
+from typing import Final
+
+from robolink.timing import NS_PER_S
+from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
+from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
+from robolink_simulators.epson.spel.expressions.printing import number_text
+from robolink_simulators.epson.spel.expressions.values import out_of_range, truth
+from robolink_simulators.epson.spel.tree import (
+    Binary,
+    Expression,
+    KeywordStatement,
+    Literal,
+    Name,
+    PointExpression,
+    Unary,
+)
+
+LONGEST_WAIT_S: Final = 2_147_483
+"""Longest Wait (docs/reference/spel.md 4.6)."""
+
+NEVER_NS: Final = 2**62
+
+_JUDGING: Final = frozenset({"=", "<>", "<", ">", "<=", ">=", "and", "or", "xor", "mask"})
+_EVENT_WORDS = """
+    sw in inw oport out outw memsw memin meminw ctr getrobotinsidebox getrobotinsideplane
+    mcalcomplete motor lof erroron safetyon estopon teachon pauseon athome latchstate windowsstatus
+"""
+_EVENTS: Final = frozenset(_EVENT_WORDS.split())
+
+
+def is_condition(expression: Expression) -> bool:
+    """Tell whether Wait waits for it to hold, and does not take it for a number of seconds.
+
+    A comparison, a logical operation and a bare event are conditions (documented,
+    docs/reference/spel.md 4.6); everything else is a time.
+    """
+    match expression:
+        case Binary(operator, left, right):
+            return operator in _JUDGING or is_condition(left) or is_condition(right)
+        case Unary(operator, operand):
+            return operator == "not" or is_condition(operand)
+        case Name(name):
+            return name in _EVENTS
+        case _:
+            return False
+
+
+class Waiting:
+    """A Wait under way.
+
+    Args:
+        evaluator: What evaluates the condition. A variable on its right side is read each time
+            (documented: once, when the wait begins).
+        condition: What is waited for.
+        start_ns: When it began.
+        limit_s: The time that the statement names, ``None`` for TMOut's.
+    """
+
+    def __init__(
+        self, evaluator: Evaluator, condition: Expression, start_ns: int, limit_s: float | None
+    ) -> None:
+        self._evaluator = evaluator
+        self._condition = condition
+        self._own_limit = limit_s is not None
+        session = evaluator.session
+        seconds = (session.memory.wait_limit_s or None) if limit_s is None else limit_s
+        self._end_ns = NEVER_NS if seconds is None else start_ns + round(seconds * NS_PER_S)
+
+    def holds(self) -> bool:
+        """Tell whether the condition holds now.
+
+        Raises:
+            Refusal: It cannot be evaluated.
+        """
+        return truth(self._evaluator.value(self._condition))
+
+    def next_look(self, seen_ns: int) -> int:
+        """Return when it has to be looked at again."""
+        try:
+            if self.holds():
+                return seen_ns + 1  # switched just now
+        except SpelRefusal:
+            return seen_ns + 1  # whoever looks then is told why
+        coming_ns = self._evaluator.session.machine.timed_bits.next_change()
+        return min(self._end_ns, NEVER_NS if coming_ns is None else coming_ns)
+
+    def is_over(self, now_ns: int) -> bool:
+        """Tell whether it ends, and note for TW how.
+
+        Raises:
+            Refusal: TMOut's time ran out (documented: error 2280).
+        """
+        memory = self._evaluator.session.memory
+        if self.holds():
+            memory.timed_out = False
+            return True
+        if now_ns < self._end_ns:
+            return False
+        memory.timed_out = True
+        if not self._own_limit:
+            raise SpelRefusal(RefusalKind.WAIT_TIMED_OUT, "The time of TMOut ran out")
+        return True
+
+
+def wait_limit(evaluator: Evaluator, command: KeywordStatement) -> float | None:
+    """Return the time that ``Wait condition, time`` names, ``None`` for none.
+
+    Raises:
+        Refusal: It is no time, or more than one stands there.
+    """
+    _, *rest = command.arguments
+    if len(rest) > 1:
+        raise SpelRefusal(RefusalKind.SYNTAX, "Wait takes a condition and a time")
+    return seconds_of(evaluator, rest[0]) if rest else None
+
+
+def seconds_of(evaluator: Evaluator, expression: Expression) -> float:
+    """Return a time to wait.
+
+    Raises:
+        Refusal: It is negative or too long.
+    """
+    seconds = float(evaluator.number(expression))
+    if not 0 <= seconds <= LONGEST_WAIT_S:
+        raise out_of_range(f"Wait of {seconds} s")
+    return seconds
+
+
+def shown_condition(expression: Expression) -> str:
+    """Return a condition as a bare Till shows it (its format is not documented)."""
+    match expression:
+        case Literal(str(text)):
+            return f'"{text}"'
+        case Literal(value) if not isinstance(value, str):
+            return number_text(value)
+        case Name(name, None):
+            return name.capitalize()
+        case Name(name, arguments):
+            return f"{name.capitalize()}({', '.join(map(shown_condition, arguments or ()))})"
+        case Unary(operator, operand):
+            return f"{operator.capitalize()} {shown_condition(operand)}"
+        case Binary(operator, left, right):
+            sides = (shown_condition(left), operator.capitalize(), shown_condition(right))
+            return " ".join(sides)
+        case PointExpression():
+            return "point"
+        case _:
+            return "?"

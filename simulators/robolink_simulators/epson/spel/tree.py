@@ -1,0 +1,188 @@
+"""Statements and expressions after parsing: plain values, nothing evaluated yet."""
+
+from dataclasses import dataclass
+from enum import Enum
+
+
+@dataclass(frozen=True, slots=True)
+class Literal:
+    """A number or a string as written."""
+
+    value: int | float | str
+
+
+@dataclass(frozen=True, slots=True)
+class Name:
+    """A constant, a variable or a function call; ``name`` is lower case."""
+
+    name: str
+    arguments: "tuple[Expression, ...] | None" = None
+
+
+@dataclass(frozen=True, slots=True)
+class Unary:
+    """``-``, ``+`` or ``not`` in front of an operand."""
+
+    operator: str
+    operand: "Expression"
+
+
+@dataclass(frozen=True, slots=True)
+class Binary:
+    """Two operands; ``operator`` is lower case."""
+
+    operator: str
+    left: "Expression"
+    right: "Expression"
+
+
+@dataclass(frozen=True, slots=True)
+class StoredPoint:
+    """``P1`` or ``P(expression)``."""
+
+    number: "Expression"
+
+
+@dataclass(frozen=True, slots=True)
+class LabelledPoint:
+    """A point by its name; ``name`` is lower case."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class PointFunction:
+    """XY, Here, TLSet(n) ...: a function that gives a point."""
+
+    name: str
+    arguments: "tuple[Expression, ...]" = ()
+
+
+class ModifierKind(Enum):
+    """What a modifier behind a point does (docs/reference/spel.md 5.2)."""
+
+    FLAG = "/"
+    CONVERT = "@"
+    SHIFT = "+"
+    REPLACE = ":"
+
+
+@dataclass(frozen=True, slots=True)
+class Modifier:
+    """One modifier; ``word`` is the flag or the axis in upper case."""
+
+    kind: ModifierKind
+    word: str
+    value: "Expression | None" = None
+
+
+@dataclass(frozen=True, slots=True)
+class PointExpression:
+    """A base point, another added or subtracted, and modifiers."""
+
+    base: "Base"
+    sign: int = 0
+    other: "Base | None" = None
+    modifiers: tuple[Modifier, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Coordinates:
+    """The old coordinate list ``100, 200, -20, 0 /R``."""
+
+    values: "tuple[Expression, ...]"
+    modifiers: tuple[Modifier, ...] = ()
+
+
+Base = StoredPoint | LabelledPoint | PointFunction
+"""What a point expression begins with."""
+
+Expression = Literal | Name | Unary | Binary | PointExpression
+
+
+@dataclass(frozen=True, slots=True)
+class Print:
+    """``Print``; ``newline`` is false when the statement ends with a comma."""
+
+    items: tuple[Expression, ...]
+    newline: bool
+
+
+@dataclass(frozen=True, slots=True)
+class KeywordStatement:
+    """A keyword and its arguments; ``open_ended`` when they end with a comma."""
+
+    name: str
+    arguments: tuple[Expression, ...]
+    open_ended: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Until:
+    """``Till``, ``Find`` or ``Sense`` behind a motion; bare, its condition is the stored one."""
+
+    word: str
+    condition: Expression | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class MotionOptions:
+    """The words behind a motion's target."""
+
+    words: frozenset[str] = frozenset()
+    limz: Expression | None = None
+    until: Until | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class MotionStatement:
+    """``Go``, ``Move``, ``Jump`` ... and their points; ``verb`` is lower case."""
+
+    verb: str
+    targets: tuple[PointExpression, ...]
+    options: MotionOptions
+
+
+@dataclass(frozen=True, slots=True)
+class AssignPoint:
+    """``P1 = ...``."""
+
+    number: Expression
+    value: Expression | Coordinates
+
+
+@dataclass(frozen=True, slots=True)
+class AssignVariable:
+    """``name = ...``."""
+
+    name: str
+    value: Expression | Coordinates
+
+
+@dataclass(frozen=True, slots=True)
+class AssignCoordinate:
+    """``CX(P1) = ...``; ``axis`` is upper case."""
+
+    axis: str
+    point: PointExpression
+    value: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class If:
+    """``If condition Then statements Else statements`` on one line."""
+
+    condition: Expression
+    then: "tuple[Statement, ...]"
+    otherwise: "tuple[Statement, ...]" = ()
+
+
+Statement = (
+    Print
+    | KeywordStatement
+    | MotionStatement
+    | AssignPoint
+    | AssignVariable
+    | AssignCoordinate
+    | If
+)

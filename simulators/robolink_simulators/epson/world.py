@@ -1,0 +1,222 @@
+"""The truth behind a simulated EPSON robot: where its tips really are, and who looks at them."""
+
+import random
+from collections.abc import Callable, Hashable
+from dataclasses import asdict, replace
+from typing import Any, Final
+
+from robolink.errors import ConfigError
+from robolink.messages import tr
+from robolink.model import Pose, ToolOffset, rotate_xy
+from robolink_simulators.cell.person import Look as Look
+from robolink_simulators.cell.person import SimulatedOperator
+from robolink_simulators.cell.places import Direction
+from robolink_simulators.cell.tip_switches import TipSwitch
+from robolink_simulators.cell.workplace import MOUNTED_TOOL as MOUNTED_TOOL
+from robolink_simulators.cell.workplace import Workplace, XyzMm, exchanged, pin_beside
+from robolink_simulators.cell.world_parameters import WorldParameters
+from robolink_simulators.epson.arm.kinematics import Joints, inverse, tip_of
+from robolink_simulators.epson.machine import Machine
+from robolink_simulators.epson.memory.points import Point
+from robolink_simulators.epson.memory.tip_input import Nozzle, TipInput
+
+STORED: Final = ToolOffset(12.0, -3.5, -20.0)
+"""What the controller holds for tool 1 at first: the nozzle that was there before."""
+
+
+class World(Workplace):
+    """Ground truth around an EPSON robot.
+
+    Args:
+        machine: The robot in this world.
+        tips: The physical tip of each tool number, seen from the flange.
+        pin_mm: X, Y, Z of the tip of the reference pin, in base coordinates.
+        seed: Decides the next nozzles and the errors of the eye.
+        pendant_live: Whether the pendant may move the arm (Teach mode).
+        now_ns: The simulated time.
+        parameters: What goes wrong here.
+
+    Attributes:
+        operator: The person at the cell.
+    """
+
+    def __init__(
+        self,
+        machine: Machine,
+        tips: dict[int, ToolOffset],
+        pin_mm: XyzMm,
+        *,
+        seed: int,
+        pendant_live: Callable[[], bool],
+        now_ns: Callable[[], int],
+        parameters: WorldParameters | None = None,
+    ) -> None:
+        super().__init__(
+            _HandledArm(machine, now_ns),
+            tips,
+            pin_mm,
+            seed=seed,
+            replaced=STORED,
+            parameters=parameters or WorldParameters(),
+        )
+        self.machine = machine
+        self.operator = PendantOperator(self, pendant_live=pendant_live, now_ns=now_ns, seed=seed)
+
+    @classmethod
+    def seeded(
+        cls,
+        machine: Machine,
+        seed: int,
+        *,
+        pendant_live: Callable[[], bool],
+        now_ns: Callable[[], int],
+        parameters: WorldParameters | None = None,
+    ) -> "World":
+        """Set up a nozzle change: tool 1 is stored and selected, but its tip is elsewhere.
+
+        The arm is put where the physical tip stands some mm beside the pin and above it.
+        """
+        rng = random.Random(f"world {seed}")
+        tips = {MOUNTED_TOOL: exchanged(STORED, rng)}
+        stroke_mm = -machine.model.ranges[2].low
+        machine.arm.place(Joints(45.0, 60.0, -0.4 * stroke_mm, -105.0), 0)
+        machine.tools.restore(
+            {
+                "selected": MOUNTED_TOOL,
+                "offsets": {str(MOUNTED_TOOL): list(STORED.components())},
+                "flash_writes": 0,
+            }
+        )
+        tip = tip_of(machine.arm.flange(), tips[MOUNTED_TOOL])
+        pin_mm = pin_beside((tip.x_mm, tip.y_mm, tip.z_mm), rng)
+        return cls(
+            machine,
+            tips,
+            pin_mm,
+            seed=seed,
+            pendant_live=pendant_live,
+            now_ns=now_ns,
+            parameters=parameters,
+        )
+
+    def connect(
+        self,
+        number: int,
+        switch: TipSwitch,
+        tool: int = MOUNTED_TOOL,
+        *,
+        latency_s: float = 0.0,
+        noise_mm: float = 0.0,
+    ) -> None:
+        """Let a beam or a plate that the tip meets switch an input of the controller.
+
+        Args:
+            number: The input.
+            switch: What the tip meets.
+            tool: Whose tip.
+            latency_s: How late the input follows.
+            noise_mm: Standard deviation, per axis, of where it switches.
+        """
+        sense = TipInput(
+            switch,
+            self.machine.arm,
+            lambda: Nozzle(self.tips.get(tool), self.lean_of(tool)),
+            latency_s=latency_s,
+            noise_mm=noise_mm,
+            rng=random.Random(f"input {number} {self._seed}"),
+        )
+        self.machine.inputs.connect(number, sense)
+
+    def truth(self) -> dict[str, Any]:
+        """Return all of it, ready for JSON."""
+        stored = self.machine.tools.defined()
+        return {
+            **super().truth(),
+            "stored": {str(tool): asdict(offset) for tool, offset in stored.items()},
+            "selected_tool": self.machine.tools.selected,
+        }
+
+
+class PendantOperator(SimulatedOperator):
+    """The person at an EPSON cell, who jogs with the pendant and teaches points.
+
+    Args:
+        world: What there is to see.
+        pendant_live: Whether the pendant may move the arm (Teach mode).
+        now_ns: The simulated time.
+        seed: Seed of the eye's errors.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        *,
+        pendant_live: Callable[[], bool],
+        now_ns: Callable[[], int],
+        seed: int,
+    ) -> None:
+        super().__init__(world, require_jogging=self._require_pendant, seed=seed)
+        self._machine = world.machine
+        self._pendant_live = pendant_live
+        self._now_ns = now_ns
+
+    def teach_point(self, number: int, u_deg: float) -> Pose:
+        """Turn the tool to ``u_deg``, jog its tip onto the pin, teach the flange pose there.
+
+        As with Tool 0 selected on the pendant. Returns that pose.
+
+        Raises:
+            ConfigError: As :meth:`jog_onto_pin`.
+            OutOfReach: The arm cannot get there.
+        """
+        self._require_pendant()
+        arm = self._machine.arm
+        turned = replace(arm.flange(), u_deg=u_deg)
+        arm.place(inverse(arm.model, turned, arm.hand), self._now_ns())
+        flange = self.jog_onto_pin()
+        self._machine.points.store(number, Point.at(flange))
+        return flange
+
+    def _require_pendant(self) -> None:
+        if not self._pendant_live():
+            raise ConfigError(
+                tr("The pendant moves the arm in Teach mode only."),
+                remedy=tr("Turn the mode selector to Teach first."),
+            )
+
+
+class _HandledArm:
+    """Implements :class:`~robolink_simulators.cell.workplace.Handled`."""
+
+    def __init__(self, machine: Machine, now_ns: Callable[[], int]) -> None:
+        self._machine = machine
+        self._now_ns = now_ns
+
+    def placement(self) -> Hashable:
+        return self._machine.arm.joints
+
+    def flange(self) -> Pose:
+        return self._machine.arm.flange()
+
+    def tip_mm(self, tip: ToolOffset | None) -> XyzMm:
+        met = tip_of(self._machine.arm.true_flange(), tip)
+        return (met.x_mm, met.y_mm, met.z_mm)
+
+    def turned(self, direction: Direction) -> Direction:
+        x, y, z = direction
+        return (*rotate_xy(x, y, self._machine.arm.true_flange().u_deg), z)
+
+    def carry(self, tip: ToolOffset | None, by_mm: XyzMm) -> None:  # noqa: ARG002 - U stays, so the flange goes as far as the tip
+        arm = self._machine.arm
+        flange = arm.flange()
+        target = replace(
+            flange,
+            x_mm=flange.x_mm + by_mm[0],
+            y_mm=flange.y_mm + by_mm[1],
+            z_mm=flange.z_mm + by_mm[2],
+        )
+        arm.place(inverse(arm.model, target, arm.hand), self._now_ns())
+
+    def loosen(self, parameters: WorldParameters) -> None:
+        arm = self._machine.arm
+        arm.backlash_deg, arm.backlash_mm = parameters.backlash_deg, parameters.backlash_mm

@@ -1,0 +1,1 @@
+"""Hosts for field buses: Modbus servers and CANopen nodes."""

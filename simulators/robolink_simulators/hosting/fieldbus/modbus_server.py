@@ -1,0 +1,182 @@
+"""A Modbus server in a thread of its own. The only simulator module that imports pymodbus.
+
+pymodbus renames what it offers in minor releases, and its action hook fires for read-backs
+too (docs/decisions/0012-modbus-and-canopen-libraries.md); all of that is dealt with here. Nothing
+is kept in its own registers.
+"""
+
+import asyncio
+import logging
+import threading
+from collections.abc import Callable, Coroutine
+from dataclasses import dataclass
+from typing import Any, Final
+
+from pymodbus.constants import ExcCodes
+from pymodbus.exceptions import NoSuchIdException
+from pymodbus.pdu import ModbusPDU
+from pymodbus.server import ModbusSerialServer, ModbusTcpServer
+from pymodbus.simulator import DataType, SimData, SimDevice
+
+from robolink_simulators.cell.clock import ScaledClock
+from robolink_simulators.hosting.fieldbus.plc_registers import PlcRegisters
+from robolink_simulators.softmotion.mailbox.words.exchange import ServedAccess
+from robolink_simulators.softmotion.mailbox.words.places import REGISTERS, Bank
+
+# It writes to standard error when nobody listens; clients are told by their answers.
+logging.getLogger("pymodbus").addHandler(logging.NullHandler())
+
+_READS: Final = {1: Bank.HOLDING, 2: Bank.INPUT, 3: Bank.HOLDING, 4: Bank.INPUT}
+_COIL_FUNCTIONS: Final = frozenset({1, 2, 5, 15})
+_WORD_BITS: Final = 16
+_NANOSECONDS: Final = 1_000_000_000
+_ALL_UNITS: Final = 0
+_SETTLING_S: Final = 0.02
+"""A connection made just now has to be accepted before it can be closed."""
+
+Server = ModbusTcpServer | ModbusSerialServer
+
+
+@dataclass(frozen=True, slots=True)
+class SerialLine:
+    """A serial line to serve.
+
+    Attributes:
+        path: The device.
+        unit: The only unit that answers.
+    """
+
+    path: str
+    unit: int
+
+
+class ModbusServerThread:
+    """Serves registers until it is closed.
+
+    Args:
+        registers: What is served.
+        clock: The simulated time, in which answers are delayed.
+        place: Host and port to listen on, or a serial port.
+
+    Raises:
+        OSError: It cannot listen there.
+    """
+
+    def __init__(
+        self, registers: PlcRegisters, clock: ScaledClock, place: tuple[str, int] | SerialLine
+    ) -> None:
+        self._registers = registers
+        self._clock = clock
+        self._loop = asyncio.new_event_loop()
+        self._thread = threading.Thread(target=self._run, name="modbus host", daemon=True)
+        self._thread.start()
+        try:
+            self._server = self._wait_for(self._started(place))
+        except BaseException:
+            self._end_thread()
+            raise
+
+    @property
+    def port(self) -> int:
+        """The TCP port."""
+        transport: Any = self._server.transport
+        number: int = transport.sockets[0].getsockname()[1]
+        return number
+
+    def cut(self) -> None:
+        """Close every connection; any thread may call it."""
+        self._loop.call_soon_threadsafe(self._cut)
+
+    def close(self) -> None:
+        """Stop serving. Idempotent."""
+        if not self._loop.is_closed():
+            self._wait_for(self._stopped())
+            self._end_thread()
+
+    def _run(self) -> None:
+        asyncio.set_event_loop(self._loop)
+        self._loop.run_forever()
+
+    def _end_thread(self) -> None:
+        self._loop.call_soon_threadsafe(self._loop.stop)
+        self._thread.join()
+        self._loop.close()
+
+    def _wait_for(self, work: Coroutine[Any, Any, Any]) -> Any:  # noqa: ANN401 - whatever it gives
+        return asyncio.run_coroutine_threadsafe(work, self._loop).result()
+
+    async def _started(self, place: tuple[str, int] | SerialLine) -> Server:
+        # Unit 0 stands for all; to be silent a server must know that units may be missing.
+        habits: dict[str, Any] = {"ignore_missing_devices": True}
+        server: Server
+        if isinstance(place, SerialLine):
+            habits["trace_pdu"] = _only_for(place.unit)
+            server = ModbusSerialServer(self._device(), port=place.path, **habits)
+        else:
+            server = ModbusTcpServer(self._device(), address=place, **habits)
+        try:
+            await server.serve_forever(background=True)
+        except RuntimeError as error:  # it keeps the reason to itself
+            raise OSError(str(error)) from error
+        return server
+
+    async def _stopped(self) -> None:
+        await asyncio.sleep(_SETTLING_S)
+        await self._server.shutdown()
+        await asyncio.sleep(_SETTLING_S)
+
+    def _device(self) -> SimDevice:
+        words = [SimData(0, count=REGISTERS, values=0, datatype=DataType.REGISTERS)]
+        # By the word: each value is looked at several times, and there are 65,536 bits.
+        bits = [SimData(0, values=[0] * REGISTERS, datatype=DataType.BITS)]
+        banks = (bits, bits, words, words)
+        return SimDevice(id=_ALL_UNITS, simdata=banks, action=self._act)
+
+    async def _act(
+        self,
+        function: int,
+        start: int,
+        address: int,
+        count: int,
+        registers: list[int],
+        values: list[int] | list[bool] | None,
+    ) -> ExcCodes | None:
+        """Do a request on our registers; ``registers`` are those that are answered with."""
+        coils = function in _COIL_FUNCTIONS
+        first = address // _WORD_BITS if coils else address
+        if values is None and function not in _READS:
+            # A read-back, or the read half of a combined function.
+            words = self._registers.peek(Bank.HOLDING, first, count)
+        elif values is None:
+            served = self._registers.read(_READS[function], first, count)
+            words = list(served.words)
+            await self._let_go(served)
+        else:
+            if coils:
+                served = self._registers.switch(address, [bool(bit) for bit in values])
+            else:
+                served = self._registers.write(address, [int(word) for word in values])
+            await self._let_go(served)
+            return None
+        registers[first - start : first - start + count] = words
+        return None
+
+    async def _let_go(self, served: ServedAccess) -> None:
+        if served.cut:
+            self._cut()
+        if served.delay_s:
+            at_ns = self._clock.now_ns() + round(served.delay_s * _NANOSECONDS)
+            await asyncio.sleep(self._clock.real_seconds(at_ns))
+        if not served.answered:
+            raise NoSuchIdException
+
+    def _cut(self) -> None:
+        for connection in tuple(self._server.active_connections.values()):
+            connection.close()
+
+
+def _only_for(unit: int) -> Callable[[bool, ModbusPDU], ModbusPDU | None]:
+    def heard(sending: bool, pdu: ModbusPDU) -> ModbusPDU | None:
+        return pdu if sending or pdu.dev_id == unit else None
+
+    return heard

@@ -1,0 +1,100 @@
+"""The registers and coils of a simulated PLC, with its mailbox among them."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Final
+
+from robolink_simulators.cell.clock import ScaledClock
+from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
+from robolink_simulators.softmotion.mailbox.words.exchange import ServedAccess
+from robolink_simulators.softmotion.mailbox.words.places import (
+    REGISTERS,
+    Bank,
+    MailboxPlace,
+    places_of,
+)
+
+_WORD_BITS: Final = 16
+
+
+class PlcRegisters:
+    """Holding and input registers; coils overlay the first, discrete inputs the second.
+
+    As CODESYS does it (documented, docs/reference/softmotion.md 4.1). Registers beside the mailbox
+    only keep what is written.
+
+    Args:
+        simulator: The PLC.
+        clock: The simulated time.
+    """
+
+    def __init__(self, simulator: SoftMotionSimulator, clock: ScaledClock) -> None:
+        self._simulator = simulator
+        self._clock = clock
+        self._places = places_of(simulator.options.mailbox)
+        self._plain = {bank: [0] * REGISTERS for bank in Bank}
+
+    def read(self, bank: Bank, address: int, count: int) -> ServedAccess:
+        """Serve a client that reads registers."""
+        with self._simulator.lock:
+            now_ns = self._clock.now_ns()
+            self._simulator.hear(now_ns)
+            words = self._plain[bank][address : address + count]
+            served = ServedAccess()
+            for place, start, end in self._parts(bank, address, count):
+                first = place.first + start - place.start
+                if place.written:
+                    part = self._simulator.plc.program.inbox.words[first : first + end - start]
+                else:
+                    served = self._simulator.read(first, end - start, now_ns)
+                    part = served.words
+                if part:
+                    words[start - address : end - address] = part
+            return replace(served, words=tuple(words))
+
+    def write(self, address: int, words: Sequence[int]) -> ServedAccess:
+        """Serve a client that writes holding registers."""
+        with self._simulator.lock:
+            now_ns = self._clock.now_ns()
+            self._simulator.hear(now_ns)
+            self._plain[Bank.HOLDING][address : address + len(words)] = words
+            served = ServedAccess()
+            for place, start, end in self._parts(Bank.HOLDING, address, len(words)):
+                if place.written:
+                    part = words[start - address : end - address]
+                    served = self._simulator.write(start - place.start, part, now_ns)
+            return served
+
+    def switch(self, coil: int, bits: Sequence[bool]) -> ServedAccess:
+        """Serve a client that writes coils, and with them bits of holding registers."""
+        with self._simulator.lock:
+            first, last = coil // _WORD_BITS, (coil + len(bits) - 1) // _WORD_BITS
+            words = self.peek(Bank.HOLDING, first, last - first + 1)
+            for number, bit in enumerate(bits, coil - first * _WORD_BITS):
+                mask = 1 << number % _WORD_BITS
+                word = words[number // _WORD_BITS]
+                words[number // _WORD_BITS] = word | mask if bit else word & ~mask
+            return self.write(first, words)
+
+    def peek(self, bank: Bank, address: int, count: int) -> list[int]:
+        """Return registers as part of another exchange, a read-back for example."""
+        with self._simulator.lock:
+            plc = self._simulator.plc
+            words = self._plain[bank][address : address + count]
+            for place, start, end in self._parts(bank, address, count):
+                first, size = place.first + start - place.start, end - start
+                if place.written:
+                    part = plc.program.inbox.words[first : first + size]
+                else:
+                    part = plc.read(first, size, self._simulator.now_ns)
+                words[start - address : end - address] = part
+            return words
+
+    def _parts(
+        self, bank: Bank, address: int, count: int
+    ) -> Iterator[tuple[MailboxPlace, int, int]]:
+        """Give each block that a range touches, and where the common part starts and ends."""
+        for place in self._places:
+            start, end = max(address, place.start), min(address + count, place.end)
+            if place.bank is bank and start < end:
+                yield place, start, end

@@ -1,0 +1,1 @@
+"""Simulators that live in this process and are shared by name."""

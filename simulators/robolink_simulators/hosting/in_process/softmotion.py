@@ -1,0 +1,103 @@
+"""``softmotion+sim://NAME``: simulated PLCs that live in this process and are shared by name."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Final
+
+from robolink.errors import ConfigError
+from robolink.messages import tr
+from robolink.timing import Clock
+from robolink.transport import LinkUrl
+from robolink_simulators.cell.clock import ManualClock
+from robolink_simulators.cell.world_parameters import from_options, plain
+from robolink_simulators.hosting.in_process.mailbox_link import InProcessMailboxLink
+from robolink_simulators.hosting.in_process.named import NamedSimulators, seed_from_text
+from robolink_simulators.softmotion.catalogue import NAMES, parameter_names
+from robolink_simulators.softmotion.mailbox.option_text import option_names, options_from_text
+from robolink_simulators.softmotion.mailbox.parameters import parameters_from_text
+from robolink_simulators.softmotion.mailbox.simulator import (
+    DEFAULT_KINEMATICS,
+    SoftMotionSimulator,
+)
+
+_OWN_OPTIONS: Final = ("kinematics", "seed", "state")
+
+_named: Final = NamedSimulators[SoftMotionSimulator]("softmotion+sim")
+
+
+def open_softmotion(
+    link_url: LinkUrl, *, timeout_s: float = 3.0, clock: Clock | None = None
+) -> InProcessMailboxLink:
+    """Connect to the simulated PLC of that name; it is made when there is none yet.
+
+    Args:
+        link_url: ``softmotion+sim://NAME``, with ``kinematics`` (``+Kin_CAxis`` is written
+            ``%2BKin_CAxis``), ``seed``, ``state`` (a file that keeps what is retained), any
+            parameter of the kinematics, ``world.NAME`` (see ``WorldParameters``), and any field
+            of ``GroupOptions`` and ``MailboxOptions`` as options.
+        timeout_s: Longest wait for an answer, in simulated time.
+        clock: A :class:`ManualClock` becomes the clock of a new simulator. Any other clock
+            is left aside: simulated time is the simulator's own.
+
+    Raises:
+        ConfigError: An option is unknown, does not fit, or contradicts how the simulator of
+            that name was made.
+    """
+    named = _named.open(link_url, link_url.options, clock, _made)
+    return InProcessMailboxLink(link_url.identity, named.simulator, named.clock, timeout_s)
+
+
+def simulator_named(name: str) -> SoftMotionSimulator:
+    """Return the simulator behind ``softmotion+sim://NAME``.
+
+    Raises:
+        ConfigError: Nothing was opened or registered under that name.
+    """
+    return _named.find(name).simulator
+
+
+def register(name: str, simulator: SoftMotionSimulator, *, clock: ManualClock | None = None) -> str:
+    """Serve a simulator under ``softmotion+sim://NAME`` and return that URL.
+
+    Raises:
+        ConfigError: The name is taken.
+    """
+    return _named.register(name, simulator, clock)
+
+
+def unregister(name: str) -> None:
+    """Forget a simulator; open links go on. An unknown name is fine."""
+    _named.unregister(name)
+
+
+def clock_of(name: str) -> ManualClock:
+    """Return the clock of the simulator of that name.
+
+    Raises:
+        ConfigError: There is none.
+    """
+    return _named.find(name).clock
+
+
+def _made(options: Mapping[str, str]) -> SoftMotionSimulator:
+    # A plus that was not escaped has become a space.
+    kinematics = options.get("kinematics", DEFAULT_KINEMATICS).replace(" ", "+")
+    of_machine = parameter_names(kinematics) if kinematics in NAMES else ()
+    names = (*_OWN_OPTIONS, *of_machine, *option_names())
+    unknown = sorted(set(plain(options)) - set(names))
+    if unknown:
+        raise ConfigError(
+            tr("The PLC simulator has no option {name!r}.", name=unknown[0]),
+            remedy=tr("Known are: {names}.", names=", ".join(names)),
+        )
+    state = options.get("state")
+    habits = {name: value for name, value in options.items() if name in option_names()}
+    parameters = {name: value for name, value in options.items() if name in of_machine}
+    return SoftMotionSimulator(
+        kinematics,
+        seed=seed_from_text(options.get("seed", "1")),
+        parameters=parameters_from_text(parameters),
+        options=options_from_text(habits),
+        state_path=Path(state) if state else None,
+        world=from_options(options),
+    )

@@ -1,0 +1,156 @@
+"""A transport into a simulated device of this process, as nasty as TCP."""
+
+import random
+from contextlib import AbstractContextManager
+
+from robolink.errors import TransportBrokenError, TransportClosedError, TransportTimeoutError
+from robolink.messages import tr
+from robolink.timing import Deadline
+from robolink.transport import LinkUrl
+from robolink_simulators.cell.clock import ManualClock
+from robolink_simulators.hosting.seam import DeviceLink, WireDevice
+
+_CHUNK_BYTES = 65536
+
+
+class InProcessTransport:
+    """Implements :class:`robolink.transport.Transport`; waiting lets simulated time pass.
+
+    Args:
+        link_url: Where it leads.
+        device: The device; one link to it is opened.
+        clock: The device's clock. Deadlines are read against it.
+        lock: Held while the device is touched.
+        durable: Whether the device keeps its tools beyond this process.
+        splitter: Cuts what arrives into pieces of random length; ``None`` hands it out whole.
+    """
+
+    def __init__(
+        self,
+        link_url: LinkUrl,
+        device: WireDevice,
+        clock: ManualClock,
+        lock: AbstractContextManager[object],
+        *,
+        durable: bool = False,
+        splitter: random.Random | None = None,
+    ) -> None:
+        self._identity = link_url.identity
+        self._place = link_url.place
+        options = "&".join(f"{name}={value}" for name, value in link_url.options.items())
+        self._url = f"{self._identity}?{options}" if options else self._identity
+        self._device = device
+        self._clock = clock
+        self._lock = lock
+        self._durable = durable
+        self._splitter = splitter
+        self._arrived = b""
+        self._closed = False
+        with lock:
+            self._link: DeviceLink = device.connect(clock.now_ns())
+
+    @property
+    def url(self) -> str:
+        """The URL with its options."""
+        return self._url
+
+    @property
+    def identity(self) -> str:
+        """Which simulator."""
+        return self._identity
+
+    @property
+    def place(self) -> str:
+        """Its name."""
+        return self._place
+
+    @property
+    def durable(self) -> bool:
+        """Whether the simulator keeps its tools in a file."""
+        return self._durable
+
+    @property
+    def clock(self) -> ManualClock:
+        """The simulator's clock."""
+        return self._clock
+
+    def send(self, data: bytes, *, deadline: Deadline, secret: bool = False) -> None:  # noqa: ARG002 - bytes arrive at once, and nothing is recorded here
+        """See :meth:`robolink.transport.Transport.send`."""
+        with self._lock:
+            self._pump()
+            if self._link.closed:
+                raise TransportBrokenError(
+                    tr("{identity} cut the connection.", identity=self._identity),
+                    remedy=tr("Connect again."),
+                    controller=self._identity,
+                )
+            if data:
+                self._link.receive(data, self._clock.now_ns())
+
+    def receive(self, *, deadline: Deadline) -> bytes:
+        """See :meth:`robolink.transport.Transport.receive`."""
+        while True:
+            with self._lock:
+                data = self._taken()
+                if data is not None:
+                    return data
+                if not self._wait_once(deadline):
+                    raise TransportTimeoutError(
+                        tr("{identity} did not answer in time.", identity=self._identity),
+                        remedy=tr("Look at the simulator's log, then connect again."),
+                        controller=self._identity,
+                    )
+
+    def receive_waiting(self) -> bytes | None:
+        """See :meth:`robolink.transport.Transport.receive_waiting`."""
+        with self._lock:
+            return self._taken()
+
+    def wait_readable(self, *, deadline: Deadline) -> bool:
+        """See :meth:`robolink.transport.Transport.wait_readable`."""
+        while True:
+            with self._lock:
+                if self._closed:
+                    return True
+                self._pump()
+                if self._arrived or self._link.closed:
+                    return True
+                if not self._wait_once(deadline):
+                    return False
+
+    def close(self) -> None:
+        """See :meth:`robolink.transport.Transport.close`."""
+        with self._lock:
+            if not self._closed:
+                self._closed = True
+                self._link.receive(b"", self._clock.now_ns())
+
+    def _pump(self) -> None:
+        if self._closed:
+            raise TransportClosedError(
+                tr("The connection to {identity} is closed.", identity=self._identity),
+                remedy=tr("Connect again."),
+                controller=self._identity,
+            )
+        self._device.advance(self._clock.now_ns())
+        self._arrived += self._link.outgoing()
+
+    def _taken(self) -> bytes | None:
+        self._pump()
+        if not self._arrived:
+            return b"" if self._link.closed else None
+        most = min(len(self._arrived), _CHUNK_BYTES)
+        count = most if self._splitter is None else self._splitter.randint(1, most)
+        taken, self._arrived = self._arrived[:count], self._arrived[count:]
+        return taken
+
+    def _wait_once(self, deadline: Deadline) -> bool:
+        """Let time pass up to the device's next change; False when the deadline has passed."""
+        now_ns = self._clock.now_ns()
+        if now_ns >= deadline.at_ns:
+            return False
+        change = self._device.next_change()
+        until_ns = deadline.at_ns if change is None else min(change, deadline.at_ns)
+        # A change that is overdue must not stop the time.
+        self._clock.advance_to(max(until_ns, now_ns + 1))
+        return True

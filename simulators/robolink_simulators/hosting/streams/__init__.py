@@ -1,0 +1,1 @@
+"""Hosts for byte streams: TCP ports and serial cables."""

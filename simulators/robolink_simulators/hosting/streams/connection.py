@@ -1,0 +1,83 @@
+"""One accepted TCP connection and the device link behind it."""
+
+import contextlib
+import selectors
+import socket
+from typing import Final
+
+from robolink_simulators.hosting.seam import DeviceLink
+
+_CHUNK_BYTES: Final = 65536
+_MOST_UNSENT: Final = 1 << 20
+
+
+class Connection:
+    """Moves bytes between a socket and a device link; registers itself with the selector."""
+
+    def __init__(
+        self, client: socket.socket, link: DeviceLink, selector: selectors.BaseSelector
+    ) -> None:
+        client.setblocking(False)
+        client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._client = client
+        self._link = link
+        self._selector = selector
+        self._unsent = b""
+        self._watched = selectors.EVENT_READ
+        self.finished = False
+        selector.register(client, self._watched, self.serve)
+
+    def serve(self, events: int, now_ns: int) -> None:
+        """Deal with what the selector saw."""
+        if not events & selectors.EVENT_READ or self.finished:
+            return
+        try:
+            data = self._client.recv(_CHUNK_BYTES)
+        except BlockingIOError:
+            return
+        except OSError:
+            data = b""  # a reset: the client is gone all the same
+        self._link.receive(data, now_ns)
+        if not data:
+            self._close()
+
+    def flush(self) -> None:
+        """Send what is ready, then close if the device has ended the link."""
+        if self.finished:
+            return
+        self._unsent += self._link.outgoing()
+        if self._unsent:
+            self._send()
+        if self._link.closed and not self._unsent:
+            self._close()
+
+    def drop(self, now_ns: int) -> None:
+        """The host stops serving."""
+        if not self.finished:
+            self._link.receive(b"", now_ns)
+            self._close()
+
+    def _send(self) -> None:
+        try:
+            self._unsent = self._unsent[self._client.send(self._unsent) :]
+        except BlockingIOError:
+            pass
+        except OSError:
+            self._unsent = b""  # the next read finds the end
+        if len(self._unsent) > _MOST_UNSENT:
+            # A client that never reads must not eat our memory; the next read finds the end.
+            self._unsent = b""
+            with contextlib.suppress(OSError):
+                self._client.shutdown(socket.SHUT_RDWR)
+        self._watch(selectors.EVENT_READ | (selectors.EVENT_WRITE if self._unsent else 0))
+
+    def _watch(self, events: int) -> None:
+        if events != self._watched:
+            self._watched = events
+            self._selector.modify(self._client, events, self.serve)
+
+    def _close(self) -> None:
+        if not self.finished:
+            self.finished = True
+            self._selector.unregister(self._client)
+            self._client.close()

@@ -1,0 +1,109 @@
+"""Serves a device on a TCP port, loopback unless told otherwise."""
+
+import selectors
+import socket
+from contextlib import AbstractContextManager
+
+from robolink.errors import ConnectError
+from robolink.messages import tr
+from robolink_simulators.cell.clock import ScaledClock
+from robolink_simulators.hosting.loopback import require_loopback
+from robolink_simulators.hosting.seam import WireDevice
+from robolink_simulators.hosting.streams.connection import Connection
+from robolink_simulators.hosting.streams.wire_host import WireHost
+
+
+class TcpHost(WireHost):
+    """A listening port and its connections.
+
+    Args:
+        device: What to serve.
+        scheme: Of the URL that leads here.
+        address: Host and port to bind to.
+        clock: The simulated time.
+        lock: Held while the device is touched.
+        allow_remote: Whether an address that other machines can reach is taken.
+    """
+
+    def __init__(
+        self,
+        device: WireDevice,
+        scheme: str,
+        address: tuple[str, int],
+        *,
+        clock: ScaledClock,
+        lock: AbstractContextManager[object],
+        allow_remote: bool = False,
+    ) -> None:
+        self._listener = _listening(address, allow_remote=allow_remote)
+        self._scheme = scheme
+        self._connections: dict[int, Connection] = {}
+        self._address = self._listener.getsockname()[:2]
+        super().__init__(device, clock=clock, lock=lock)
+        self.selector.register(self._listener, selectors.EVENT_READ, self._accept)
+        self.start()
+
+    @property
+    def url(self) -> str:
+        """Where clients connect to."""
+        host, port = self._address
+        return (
+            f"{self._scheme}://[{host}]:{port}"
+            if ":" in host
+            else f"{self._scheme}://{host}:{port}"
+        )
+
+    @property
+    def connections(self) -> int:
+        """How many clients are connected."""
+        return len(self._connections)
+
+    def flush(self) -> None:
+        """See :meth:`WireHost.flush`."""
+        for number, connection in tuple(self._connections.items()):
+            connection.flush()
+            if connection.finished:
+                del self._connections[number]
+
+    def shut(self, now_ns: int) -> None:
+        """See :meth:`WireHost.shut`."""
+        for connection in self._connections.values():
+            connection.drop(now_ns)
+        self._connections.clear()
+        self._listener.close()
+
+    def _accept(self, _events: int, now_ns: int) -> None:
+        try:
+            client, _ = self._listener.accept()
+        except OSError:
+            return  # it left before it was let in
+        connection = Connection(client, self._device.connect(now_ns), self.selector)
+        self._connections[client.fileno()] = connection
+
+
+def _listening(address: tuple[str, int], *, allow_remote: bool) -> socket.socket:
+    host, port = address
+    require_loopback(host, allow_remote=allow_remote)
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    listener = socket.socket(family, socket.SOCK_STREAM)
+    try:
+        if hasattr(socket, "SO_EXCLUSIVEADDRUSE"):
+            # Windows: SO_REUSEADDR would let two programs share the port.
+            listener.setsockopt(socket.SOL_SOCKET, socket.SO_EXCLUSIVEADDRUSE, 1)
+        else:
+            listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.bind((host, port))
+        listener.listen()
+        listener.setblocking(False)
+    except (OSError, OverflowError) as error:
+        listener.close()
+        raise ConnectError(
+            tr(
+                "The simulator cannot listen on {host} port {port}: {cause}.",
+                host=host,
+                port=port,
+                cause=getattr(error, "strerror", None) or error,
+            ),
+            remedy=tr("Use another port; 0 takes a free one."),
+        ) from error
+    return listener

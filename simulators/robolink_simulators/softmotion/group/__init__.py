@@ -1,0 +1,1 @@
+"""A simulated SoftMotion axis group as its function blocks show it."""

@@ -1,0 +1,1 @@
+"""Kinematics of simulated SoftMotion machines: frames, coordinates, positions, orientations."""

@@ -1,0 +1,1 @@
+"""The commands of the mailbox program, by what they are about."""

@@ -1,0 +1,56 @@
+"""What the mailbox program makes of the complaints of function blocks.
+
+Source: docs/reference/softmotion.md 1.4.
+"""
+
+from typing import Final
+
+from robolink.protocols.mailbox import ErrorClass
+from robolink_simulators.softmotion.group.condition import SmcGroupState
+from robolink_simulators.softmotion.smc_errors import ErrorKind
+
+_CLASSES: Final = {
+    ErrorKind.NOTHING_TO_RESET: ErrorClass.NOTHING_TO_RESET,
+    ErrorKind.NO_SUCH_MOVEMENT: ErrorClass.NO_SUCH_MOVEMENT,
+    ErrorKind.NOT_AT_CONTINUE_POSITION: ErrorClass.WRONG_STATE,
+    ErrorKind.TOOL_INCOMPATIBLE: ErrorClass.TOOL_INCOMPATIBLE,
+    ErrorKind.NO_ORIENTATION_IMAGE: ErrorClass.NO_ORIENTATION_IMAGE,
+    ErrorKind.AXES_MISMATCH: ErrorClass.NO_KINEMATICS,
+    ErrorKind.UNREACHABLE: ErrorClass.UNREACHABLE,
+    ErrorKind.AXIS_LIMIT: ErrorClass.UNREACHABLE,
+    ErrorKind.CONFIGURATION: ErrorClass.UNREACHABLE,
+    ErrorKind.NO_EDGE: ErrorClass.NO_EDGE,
+    ErrorKind.PARAMETER: ErrorClass.OPERAND,
+    ErrorKind.DYNAMICS: ErrorClass.DYNAMICS,
+    ErrorKind.NO_POWER: ErrorClass.AXIS,
+    ErrorKind.AXIS_ERROR: ErrorClass.AXIS,
+    ErrorKind.INTERRUPTED_BY_SINGLE_AXIS: ErrorClass.INTERRUPTED_BY_AXIS,
+}
+
+_STATES: Final = {
+    SmcGroupState.DISABLED: ErrorClass.DISABLED,
+    SmcGroupState.STANDBY: ErrorClass.WRONG_STATE,
+    SmcGroupState.MOVING: ErrorClass.MOVING,
+    SmcGroupState.HOMING: ErrorClass.MOVING,
+    SmcGroupState.STOPPING: ErrorClass.STOPPING,
+    SmcGroupState.ERROR_STOP: ErrorClass.ERRORSTOP,
+}
+
+
+class Rejected(Exception):
+    """The program, or a block that it called, will not carry a command out.
+
+    Attributes:
+        error_class: Why.
+        raw: ErrorID of the block, 0 when the program itself refused, or nobody knows it.
+    """
+
+    def __init__(self, error_class: ErrorClass, raw: int = 0) -> None:
+        super().__init__(error_class.name)
+        self.error_class = error_class
+        self.raw = raw
+
+
+def class_of(kind: ErrorKind, state: SmcGroupState) -> ErrorClass:
+    """Return the class of a complaint that a block made in this state of the group."""
+    return _STATES[state] if kind is ErrorKind.WRONG_STATE else _CLASSES[kind]

@@ -1,0 +1,157 @@
+"""The commands that the mailbox program has accepted, until their end and beyond."""
+
+from collections import deque
+from typing import Final
+
+from robolink.protocols.mailbox import Command, CommandState, ErrorClass, Finished, Opcode
+from robolink_simulators.softmotion.function_blocks import BlockExecution, BlockState
+from robolink_simulators.softmotion.group.axis_group import AxisGroup
+from robolink_simulators.softmotion.group.condition import SmcGroupState
+from robolink_simulators.softmotion.mailbox.commands.complaints import class_of
+from robolink_simulators.softmotion.smc_errors import SmcError
+
+MOVEMENTS: Final = frozenset({Opcode.MOVE_DIRECT, Opcode.MOVE_LINEAR, Opcode.MOVE_UNTIL_INPUT})
+
+_MOST_ENDS: Final = 4
+_STATES: Final = {
+    BlockState.BUSY: CommandState.BUFFERED,
+    BlockState.ACTIVE: CommandState.ACTIVE,
+    BlockState.DONE: CommandState.DONE,
+    BlockState.COMMAND_ABORTED: CommandState.ABORTED,
+    BlockState.ERROR: CommandState.ERROR,
+}
+
+
+class Job:
+    """One accepted command.
+
+    Args:
+        command: The command.
+        execution: The block that carries it out.
+
+    Attributes:
+        state: How far it is.
+        error_class: Why it ended otherwise than done.
+        raw: ErrorID of the block.
+        cause: Why it will end aborted, when the program itself ends it.
+    """
+
+    def __init__(self, command: Command, execution: BlockExecution) -> None:
+        self.command = command
+        self.execution = execution
+        self.state = CommandState.BUFFERED
+        self.error_class = ErrorClass.NONE
+        self.raw = 0
+        self.cause = ErrorClass.NONE
+
+    @property
+    def is_movement(self) -> bool:
+        """Whether it is a movement, and so no command that keeps others waiting."""
+        return self.command.opcode in MOVEMENTS
+
+    @property
+    def is_jog(self) -> bool:
+        """Whether it is a jog."""
+        return self.command.opcode == Opcode.JOG
+
+    def follow(self, group: AxisGroup) -> None:
+        """Take over what the block shows now."""
+        if self.state.final:
+            return
+        outputs = self.execution.outputs
+        self.state = _STATES[outputs.state]
+        if outputs.error is not None:
+            self._complain(outputs.error, group.state)
+        elif self.state is CommandState.ABORTED:
+            self._explain_abort(group)
+        elif self._interrupted(group):
+            self.state = CommandState.INTERRUPTED
+
+    def reject(self, error_class: ErrorClass, raw: int) -> None:
+        """End it in error."""
+        self.state, self.error_class, self.raw = CommandState.ERROR, error_class, raw
+
+    def end(self) -> Finished:
+        """Return its entry among the finished ones."""
+        return Finished(self.command.sequence, self.state, self.error_class)
+
+    def _complain(self, error: SmcError, state: SmcGroupState) -> None:
+        self.error_class, self.raw = class_of(error.kind, state), error.number
+
+    def _explain_abort(self, group: AxisGroup) -> None:
+        error = group.status().error
+        if self.cause:
+            self.error_class = self.cause
+        elif error is not None:
+            self._complain(error, group.state)
+
+    def _interrupted(self, group: AxisGroup) -> bool:
+        number = self.execution.movement_number
+        return bool(number) and number == group.interrupted_movement
+
+
+class Jobs:
+    """Which commands are unfinished, and how the last ones ended.
+
+    Args:
+        group: Carries them out.
+
+    Attributes:
+        acknowledged: The command in the response block.
+    """
+
+    def __init__(self, group: AxisGroup) -> None:
+        self._group = group
+        self._unfinished: list[Job] = []
+        self._ends: deque[Finished] = deque([Finished()] * _MOST_ENDS, maxlen=_MOST_ENDS)
+        self.acknowledged: Job | None = None
+
+    @property
+    def ends(self) -> tuple[Finished, Finished, Finished, Finished]:
+        """The last ends of movements, and of what was cut short, newest first."""
+        first, second, third, fourth = self._ends
+        return (first, second, third, fourth)
+
+    @property
+    def movements(self) -> list[Job]:
+        """The unfinished movements, oldest first."""
+        return [job for job in self._unfinished if job.is_movement]
+
+    @property
+    def moving(self) -> list[Job]:
+        """The unfinished movements and jogs."""
+        return [job for job in self._unfinished if job.is_movement or job.is_jog]
+
+    @property
+    def in_work(self) -> bool:
+        """Whether a command is unfinished that is neither movement nor jog."""
+        return len(self.moving) < len(self._unfinished)
+
+    @property
+    def active_movement(self) -> int:
+        """Sequence of the movement that runs or is interrupted, 0 for none."""
+        status = self._group.status()
+        number = status.active_movement or status.interrupted_movement
+        found = (job for job in self.movements if job.execution.movement_number == number)
+        return next((job.command.sequence for job in found), 0)
+
+    def add(self, job: Job) -> None:
+        """Take in a command; one that has ended by now is only acknowledged."""
+        self.acknowledged = job
+        job.follow(self._group)
+        if job.state is CommandState.ABORTED:
+            job.error_class = ErrorClass.STOPPING  # another block has precedence
+        elif not job.state.final:
+            self._unfinished.append(job)
+
+    def follow(self) -> None:
+        """Look how far everything is, and note what has ended."""
+        for job in self._unfinished:
+            job.follow(self._group)
+            if job.state.final and (job.is_movement or job.state is CommandState.ABORTED):
+                self.note(job.end())
+        self._unfinished = [job for job in self._unfinished if not job.state.final]
+
+    def note(self, end: Finished) -> None:
+        """Add an end to the last ones."""
+        self._ends.appendleft(end)

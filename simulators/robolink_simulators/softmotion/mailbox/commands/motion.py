@@ -1,0 +1,130 @@
+"""The opcodes that move the axis group, or change its state (docs/mailbox.md, "Movements")."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from types import MappingProxyType
+from typing import Final
+
+from robolink.protocols.mailbox import Answer, Command, ErrorClass, Opcode
+from robolink_simulators.softmotion.function_blocks import BlockExecution
+from robolink_simulators.softmotion.group.axis_group import AxisGroup
+from robolink_simulators.softmotion.group.condition import SmcGroupState
+from robolink_simulators.softmotion.kinematics.coordinates import CoordSystem
+from robolink_simulators.softmotion.mailbox.commands.complaints import Rejected
+from robolink_simulators.softmotion.mailbox.commands.jobs import Job, Jobs
+from robolink_simulators.softmotion.mailbox.commands.operands import require_finite, require_operand
+from robolink_simulators.softmotion.mailbox.commands.told import Handler, Told, done
+from robolink_simulators.softmotion.mailbox.words.units import UserUnits
+from robolink_simulators.softmotion.motion.jog import COORDINATES, JogCommand
+from robolink_simulators.softmotion.motion.movement import EdgeWatch, SmcBufferMode
+from robolink_simulators.softmotion.motion.paths import Dynamics
+from robolink_simulators.softmotion.motion.planner import Target
+from robolink_simulators.softmotion.signals import SIGNALS
+
+MOST_MOVEMENTS: Final = 4
+_MASKS: Final = range(1 << COORDINATES)
+
+
+class MotionDesk:
+    """Calls the blocks of the axis group.
+
+    Args:
+        group: The axis group.
+        units: Of the mailbox.
+        jobs: The commands that were accepted.
+
+    Attributes:
+        opcodes: What it can do.
+    """
+
+    def __init__(self, group: AxisGroup, units: UserUnits, jobs: Jobs) -> None:
+        self._group = group
+        self._units = units
+        self._jobs = jobs
+        self._releases: list[BlockExecution] = []
+        self.opcodes: Mapping[int, Handler] = MappingProxyType(
+            {
+                Opcode.ENABLE: lambda _: Told(group.enable()),
+                Opcode.DISABLE: lambda _: Told(group.disable()),
+                Opcode.RESET: lambda _: Told(group.reset()),
+                Opcode.CONTINUE: lambda _: Told(group.resume()),
+                Opcode.INTERRUPT: lambda _: Told(group.interrupt()),
+                Opcode.HALT: lambda _: Told(group.halt()),
+                Opcode.STOP: self._stop,
+                Opcode.JOG: self._jog,
+                Opcode.MOVE_DIRECT: self._move_direct,
+                Opcode.MOVE_LINEAR: self._move_linear,
+                Opcode.MOVE_UNTIL_INPUT: self._move_until_input,
+            }
+        )
+
+    def latched(self, job: Job) -> Answer | None:
+        """Return where a movement until an input met the edge, if it has by now."""
+        tcp = job.execution.latched
+        return None if tcp is None else Answer.of_pose(self._units.given(tcp))
+
+    def follow(self) -> None:
+        """A release is done when the group has left Stopping."""
+        if self._group.state is not SmcGroupState.STOPPING:
+            for release in self._releases:
+                release.finish()
+            self._releases.clear()
+
+    def _stop(self, command: Command) -> Told:
+        if require_operand(command.operands[0], range(2)) == 0:
+            return Told(self._group.stop())
+        if self._group.state is not SmcGroupState.STOPPING:
+            return done()  # nothing is held (assumed)
+        self._group.release_stop()
+        release = BlockExecution()
+        self._releases.append(release)
+        return Told(release)
+
+    def _jog(self, command: Command) -> Told:
+        forward, backward, system, _ = command.operands
+        for mask in (forward, backward):
+            require_operand(mask, _MASKS)
+        require_operand(system, range(len(CoordSystem)))
+        pressed = JogCommand(forward, backward, CoordSystem(system), Dynamics(*command.dynamics))
+        if not any(pressed.directions):
+            return self._end_jog()
+        dynamics = self._units.dynamics(command.dynamics, factors=pressed.by_factor)
+        return Told(self._group.jog(replace(pressed, dynamics=dynamics)))
+
+    def _end_jog(self) -> Told:
+        jog = self._group.motion.jog
+        if jog is not None:
+            jog.release()
+        return done()
+
+    def _move_direct(self, command: Command) -> Told:
+        target, mode = self._target(command)
+        factors = self._units.dynamics(command.dynamics, factors=True)
+        return Told(self._group.move_direct_absolute(target, factors, mode=mode))
+
+    def _move_linear(self, command: Command) -> Told:
+        return self._on_a_line(command, None)
+
+    def _move_until_input(self, command: Command) -> Told:
+        signal, run_on, *_ = command.operands
+        number = require_operand(abs(signal), range(SIGNALS))
+        stops = require_operand(run_on, range(2)) == 0
+        return self._on_a_line(command, EdgeWatch(number, falling=signal < 0, stops=stops))
+
+    def _on_a_line(self, command: Command, watch: EdgeWatch | None) -> Told:
+        target, mode = self._target(command)
+        dynamics = self._units.dynamics(command.dynamics)
+        return Told(self._group.move_linear_absolute(target, dynamics, mode=mode, watch=watch))
+
+    def _target(self, command: Command) -> tuple[Target, SmcBufferMode]:
+        _, _, system, mode = command.operands
+        require_operand(system, range(len(CoordSystem)))
+        require_operand(mode, range(len(SmcBufferMode)))
+        require_finite(command.pose)
+        if len(self._jobs.movements) >= MOST_MOVEMENTS:
+            raise Rejected(ErrorClass.QUEUE_FULL)
+        if system == CoordSystem.ACS:
+            position = self._units.axes(command.pose, self._group.kinematics.kinds)
+        else:
+            position = self._units.pose(command.pose)
+        return Target(position, CoordSystem(system)), SmcBufferMode(mode)

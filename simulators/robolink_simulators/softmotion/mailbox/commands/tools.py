@@ -1,0 +1,173 @@
+"""The opcodes about tools and kinematics (docs/mailbox.md, "Tools")."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Final
+
+from robolink.protocols.mailbox import (
+    Answer,
+    Command,
+    ErrorClass,
+    Kinematics,
+    Opcode,
+    Six,
+    find_kinematics,
+    kinematics_word,
+)
+from robolink_simulators.softmotion.catalogue import (
+    NAMES,
+    machine_named,
+    parameter_names,
+)
+from robolink_simulators.softmotion.group.axis_group import AxisGroup
+from robolink_simulators.softmotion.group.condition import ReadToolMode
+from robolink_simulators.softmotion.kinematics.coordinates import CoordRef
+from robolink_simulators.softmotion.mailbox.commands.complaints import Rejected, class_of
+from robolink_simulators.softmotion.mailbox.commands.operands import (
+    require_finite,
+    require_operand,
+    require_slot,
+)
+from robolink_simulators.softmotion.mailbox.commands.told import Handler, Told, done
+from robolink_simulators.softmotion.mailbox.retained import RetainedMemory
+from robolink_simulators.softmotion.mailbox.words.units import UserUnits
+from robolink_simulators.softmotion.motion.movement import ToolInForce
+from robolink_simulators.softmotion.smc_errors import BlockRefused
+
+_NO_TOOL: Final[Six] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+_COUPLING: Final = "+"
+
+
+class ToolDesk:
+    """Keeps the slots and calls the tool blocks.
+
+    Args:
+        group: The axis group.
+        memory: Keeps the slots.
+        units: Of the mailbox.
+        parameters: Of the machine, by the names of its kinematics.
+
+    Attributes:
+        selected: The slot that was selected last, 0 for none.
+        opcodes: What it can do.
+    """
+
+    def __init__(
+        self,
+        group: AxisGroup,
+        memory: RetainedMemory,
+        units: UserUnits,
+        parameters: Mapping[str, float],
+    ) -> None:
+        self._group = group
+        self._memory = memory
+        self._units = units
+        self._parameters = parameters
+        self._applied = group.tool
+        self.selected = 0
+        self.opcodes: Mapping[int, Handler] = MappingProxyType(
+            {
+                Opcode.WRITE_TOOL: self._write,
+                Opcode.SELECT_TOOL: self._select,
+                Opcode.READ_TOOL: self._read,
+                Opcode.CLEAR_TOOL: self._clear,
+                Opcode.SET_KINEMATICS: self._set_kinematics,
+            }
+        )
+
+    @property
+    def tool_known(self) -> bool:
+        """Whether the tool that is set is the one that the mailbox has set."""
+        return self._group.tool is self._applied
+
+    @property
+    def kinematics_code(self) -> int:
+        """The word that names the kinematics."""
+        position, _, orientation = self._group.kinematics.name.partition(_COUPLING)
+        codes = [find_kinematics(name) or 0 for name in (position, orientation)]
+        return kinematics_word(*codes)
+
+    def forget(self) -> None:
+        """The group has no tool any more."""
+        self.selected = 0
+        self._applied = self._group.tool
+
+    def preset(self, number: int, tool: CoordRef) -> None:
+        """Define a slot and select it, as somebody did earlier today."""
+        self._memory.define(number, self._units.given(tool), "nozzle")
+        self._apply(number, self._memory.slot(number).tool, "nozzle")
+
+    def set_tool(self) -> Answer:
+        """Return the tool in force for movements to come."""
+        return self._answer(self._group.tool)
+
+    def _write(self, command: Command) -> Told:
+        number = require_slot(command.operands[0])
+        require_finite(command.pose)
+        if not (command.name.isascii() and command.name.isprintable()):
+            raise Rejected(ErrorClass.OPERAND)
+        told = done()
+        if number == self.selected:
+            told = self._apply(number, command.pose, command.name)
+        if told.execution.outputs.done:
+            self._memory.define(number, command.pose, command.name)
+        return told
+
+    def _select(self, command: Command) -> Told:
+        number = command.operands[0]
+        if number == 0:
+            told = self._apply(0, _NO_TOOL, "")
+        else:
+            slot = self._memory.slot(require_slot(number))
+            if not slot.defined:
+                raise Rejected(ErrorClass.SLOT_EMPTY)
+            told = self._apply(number, slot.tool, slot.name)
+        return Told(told.execution, self.set_tool())
+
+    def _read(self, command: Command) -> Told:
+        mode = require_operand(command.operands[0], range(len(ReadToolMode)))
+        try:
+            tool = self._group.read_tool(ReadToolMode(mode))
+        except BlockRefused as refused:
+            error_class = class_of(refused.kind, self._group.state)
+            number = self._group.options.numbers.error(refused.kind).number
+            raise Rejected(error_class, number) from None
+        return done(self._answer(tool))
+
+    def _clear(self, command: Command) -> Told:
+        number = require_slot(command.operands[0])
+        if number == self.selected:
+            raise Rejected(ErrorClass.WRONG_STATE)
+        self._memory.clear(number)
+        return done()
+
+    def _set_kinematics(self, command: Command) -> Told:
+        position, orientation, *_ = command.operands
+        name = _block_name(position)
+        if orientation:
+            name += _COUPLING + _block_name(orientation)
+        if name not in NAMES:
+            raise Rejected(ErrorClass.NO_KINEMATICS)
+        known = parameter_names(name)
+        parameters = {key: value for key, value in self._parameters.items() if key in known}
+        execution = self._group.set_kin_transform(machine_named(name, parameters).kinematics)
+        if execution.outputs.done:
+            self.forget()
+        return Told(execution)
+
+    def _apply(self, number: int, tool: Six, name: str) -> Told:
+        execution = self._group.set_tool(self._units.tool(tool), name)
+        if execution.outputs.done:
+            self.selected = number
+            self._applied = self._group.tool
+        return Told(execution)
+
+    def _answer(self, tool: ToolInForce) -> Answer:
+        return Answer.of_pose(self._units.given(CoordRef.of(tool.frame)))
+
+
+def _block_name(code: int) -> str:
+    try:
+        return Kinematics(code).block_name
+    except ValueError:
+        raise Rejected(ErrorClass.OPERAND) from None

@@ -1,0 +1,1 @@
+"""The words of the mailbox on a field bus: blocks in and out, places, units, faults, watchdog."""

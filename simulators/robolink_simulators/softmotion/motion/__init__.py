@@ -1,0 +1,1 @@
+"""Movements of a simulated axis group: planned, queued, jogged, followed in time."""

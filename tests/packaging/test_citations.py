@@ -25,7 +25,7 @@ GAP = r"\s+(?:(?:#|//|\*)\s+)?"
 
 NUMBER = r"(?:F\d\d|\d{1,2}(?:\.\d{1,2})?)(?![\d/]|\.\d)"
 CITED = re.compile(
-    rf"(?P<page>docs/[\w./-]*\w)"
+    r"(?<![\w/])(?P<page>docs/(?:[\w./-]*\.(?:md|json)|decisions/\d{4}[\w-]*))"
     rf"(?:{GAP}(?P<numbers>{NUMBER}(?:,{GAP}{NUMBER})*)(?!\w)"
     rf'|,{GAP}"(?P<heading>[^"]+)")?'
 )
@@ -100,6 +100,17 @@ def test_every_link_leads_to_a_heading():
     pages = ((f, t) for f, t in texts() if f.suffix == ".md")
     wrong = [f"{f.relative_to(ROOT)}: {w}" for f, t in pages for w in wrong_links(f, t)]
     assert not wrong, "\n".join(wrong)
+
+
+def test_the_index_lists_every_page():
+    index = (ROOT / "docs/README.md").read_text(encoding="utf-8")
+    decisions = (ROOT / "docs/decisions/README.md").read_text(encoding="utf-8")
+    for page in (ROOT / "docs").glob("*.md"):
+        assert page.name == "README.md" or f"]({page.name})" in index, page.name
+    for page in (ROOT / "docs/reference").glob("*.md"):
+        assert f"](reference/{page.name})" in index, page.name
+    for page in (ROOT / "docs/decisions").glob("[0-9]*.md"):
+        assert f"]({page.name})" in decisions, page.name
 
 
 def test_no_page_is_cited_by_its_name_alone_but_one_that_lies_beside_it_or_in_docs():

@@ -10,6 +10,7 @@ from typing import Final
 from robolink.durable_files import sync_folder, write_whole
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink.ways import Way, way
 
 MOST_BYTES: Final = 4_000_000
 """No cell file, recipe, map, backup or list of poses is nearly as long."""
@@ -81,7 +82,7 @@ _AT_ONCE: Final = (
 def _taken(path: Path) -> ConfigError:
     return ConfigError(
         tr("{path} exists already; it was not written over.", path=path),
-        remedy=tr("Give another name, or --force to replace it."),
+        remedy=tr("Give another name, or {overwrite} to replace it.", overwrite=way(Way.OVERWRITE)),
     )
 
 

@@ -20,6 +20,7 @@ from robolink.transport import (
     open_transport,
     parse_url,
 )
+from robolink.ways import Way, way
 
 if TYPE_CHECKING:
     from robolink.controllers.plc_map import PlcMapController
@@ -118,7 +119,10 @@ def _connect_softmotion(
     if trace is not None:
         raise ConfigError(
             tr("The dialogue with a PLC mailbox cannot be recorded."),
-            remedy=tr("Leave --record out; a network capture shows the registers."),
+            remedy=tr(
+                "Leave {record} out; a network capture shows the registers.",
+                record=way(Way.RECORD),
+            ),
         )
     from robolink.controllers.softmotion import open_softmotion
 
@@ -140,7 +144,10 @@ def _connect_plc(
     if trace is not None:
         raise ConfigError(
             tr("The dialogue with a PLC's registers cannot be recorded."),
-            remedy=tr("Leave --record out; a network capture shows the registers."),
+            remedy=tr(
+                "Leave {record} out; a network capture shows the registers.",
+                record=way(Way.RECORD),
+            ),
         )
 
     from robolink.controllers.plc_map import open_plc_map

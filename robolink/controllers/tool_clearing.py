@@ -12,6 +12,7 @@ from contextlib import AbstractContextManager, suppress
 from robolink.errors import ControllerError, RobolinkError, SelectedToolError, ToolError
 from robolink.messages import tr
 from robolink.model import ANY, Expected, ToolReceipt, ToolTable
+from robolink.ways import Way, way
 
 
 def clear_after_selecting(
@@ -72,8 +73,9 @@ def require_replacement(tool: int, then_select: int | None) -> None:
         raise SelectedToolError(
             tr("Tool {tool} is selected, so it was not cleared.", tool=tool),
             remedy=tr(
-                "Say which tool the machine is to have in its place: --then-select NUMBER, 0 for "
-                "the flange; the programs of the machine go on with that one."
+                "Say which tool the machine is to have in its place: {then_select}, 0 for the "
+                "flange; the programs of the machine go on with that one.",
+                then_select=way(Way.THEN_SELECT),
             ),
         )
 

@@ -27,6 +27,7 @@ from robolink.recipe._sources import OneTouchSource
 from robolink.runner import Operator
 from robolink.stations import find_stations
 from robolink.transaction import ChangedSince, changed_since, earlier_corrections
+from robolink.ways import Way, way
 
 
 class RecipeRun:
@@ -181,13 +182,17 @@ class RecipeRun:
         return _switched(listener, stopped=stopped)
 
     def _require_role(self) -> None:
-        if not any(plan.gate.accepted_change_mm for plan in self.plan.tools):
+        if not any(plan.criteria.accepted_change_mm for plan in self.plan.tools):
             return
         signature = self._controller.outcomes.signature
         if signature.role == Role.OPERATOR:
             raise NotAllowedError(
                 tr("Letting a tool jump takes an engineer."),
-                remedy=tr("Nothing was moved. Give --operator, or leave --accept-jump out."),
+                remedy=tr(
+                    "Nothing was moved. Give {operator}, or leave {accept_jump} out.",
+                    operator=way(Way.OPERATOR),
+                    accept_jump=way(Way.ACCEPT_JUMP),
+                ),
             )
 
 

@@ -16,8 +16,9 @@ from robolink.errors import (
     ToolChangedError,
     ToolError,
 )
+from robolink.methods import PointsSource
 from robolink.model import ANY, ToolOffset, Verdict
-from robolink.nozzle_change import ChangePlan, GivenPoses, NozzleChange, ToolPlan
+from robolink.nozzle_change import ChangePlan, NozzleChange, ToolPlan
 from robolink.register_maps import RegisterTable
 from robolink.runner import Question
 from robolink.transaction import Wanted, change_tools, recover
@@ -409,7 +410,7 @@ def test_an_unconfirmed_map_is_refused_before_a_person_has_measured_anything():
     def measured():
         raise AssertionError("nobody was to measure")
 
-    plan = ChangePlan((ToolPlan(1, GivenPoses(measured)),), ask_before_write=False)
+    plan = ChangePlan((ToolPlan(1, PointsSource(measured)),), ask_before_write=False)
     with bench_of(NO_HANDSHAKE, confirmed=False).connect() as controller:
         with pytest.raises(ConfigError, match="nobody has confirmed it"):
             NozzleChange(controller, plan, operator=Nobody()).run(write=True)

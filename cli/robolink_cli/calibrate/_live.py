@@ -9,12 +9,12 @@ from robolink.nozzle_change import (
     ChangePlan,
     NozzleChange,
     Proposal,
-    TipSource,
     ToolReport,
     preview,
     require_inside,
     require_ready,
 )
+from robolink.procedures import TipSource
 from robolink.transaction import earlier_corrections
 from robolink_cli.calibrate._frame import Frame
 from robolink_cli.calibrate._listener import CalibrationListener
@@ -38,7 +38,7 @@ from robolink_cli.views.planned_steps import steps_payload
 
 class _LiveListener(CalibrationListener):
     def __init__(self, draft: ReportDraft, plan: ChangePlan, impact: ImpactRequest | None) -> None:
-        super().__init__(draft, plan.tools[0].gate, impact)
+        super().__init__(draft, plan.tools[0].criteria, impact)
         self._source = plan.tools[0].source
 
     def proposed(self, proposals: Sequence[Proposal]) -> None:

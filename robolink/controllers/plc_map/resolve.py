@@ -13,6 +13,7 @@ from robolink.controllers.plc_map.tools import RegisterToolTable
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import Finding, Marker, MarkerKind, Verdict, read_offset
+from robolink.ways import Way, way
 
 
 class RegisterResolver:
@@ -38,7 +39,7 @@ class RegisterResolver:
         if marker.kind is not MarkerKind.SET or "tool" not in marker.details:
             raise ConfigError(
                 tr("The marker of {when} cannot be understood.", when=marker.begun_at),
-                remedy=tr("Look at the machine, then 'robolink recover --forget'."),
+                remedy=tr("Look at the machine, then {forget}.", forget=way(Way.FORGET_MARKER)),
             )
         finding = examine_write(self._tools, marker)
         if finding.verdict is not Verdict.DONE or not self._tools.handshake.answers:

@@ -21,6 +21,7 @@ from robolink.errors import NotReadyError, NotReadyReason, StoppedError
 from robolink.messages import tr
 from robolink.model import InputEdge, MarkerKind, MotionProfile, MotionTerms, Path, Pose, WorkBox
 from robolink.protocols import spel
+from robolink.ways import Way, way
 
 
 class EpsonGroup:
@@ -200,7 +201,8 @@ class EpsonGroup:
                 reason=NotReadyReason.NO_REMOTE_TIMEOUT,
                 remedy=tr(
                     "Set a time-out on the controller's Remote Ethernet page and state it with "
-                    "--remote-timeout; without it a lost link leaves a moving robot unwatched."
+                    "{timeout}; without it a lost link leaves a moving robot unwatched.",
+                    timeout=way(Way.REMOTE_TIMEOUT),
                 ),
                 controller=self._parts.session.identity,
                 request=statement,

@@ -20,6 +20,7 @@ from robolink.controllers.markers import MarkerStore, ProcedureLock, unrestored_
 from robolink.errors import ConfigError, RemoteProtocolError, RobolinkError
 from robolink.messages import tr
 from robolink.model import Marker, MarkerKind
+from robolink.ways import Way, way
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +67,9 @@ class InForce:
         except (KeyError, TypeError, ValueError) as error:
             raise ConfigError(
                 tr("The marker of {when} cannot be understood.", when=marker.begun_at),
-                remedy=tr("Select the right tool by hand, then 'robolink recover --forget'."),
+                remedy=tr(
+                    "Select the right tool by hand, then {forget}.", forget=way(Way.FORGET_MARKER)
+                ),
             ) from error
         return cls(tool, PowerAndSpeed(bool(high), (a, b, c), (d, e, f)))
 

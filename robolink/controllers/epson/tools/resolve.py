@@ -18,6 +18,7 @@ from robolink.controllers.markers import MarkerStore
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import Finding, Marker, MarkerKind, Verdict
+from robolink.ways import Way, way
 
 
 class EpsonResolver:
@@ -56,7 +57,7 @@ class EpsonResolver:
             return examine_write(self._tools, marker)
         raise ConfigError(
             tr("The marker of {when} cannot be understood.", when=marker.begun_at),
-            remedy=tr("Look at the controller, then 'robolink recover --forget'."),
+            remedy=tr("Look at the controller, then {forget}.", forget=way(Way.FORGET_MARKER)),
         )
 
     def settle(self, finding: Finding) -> None:

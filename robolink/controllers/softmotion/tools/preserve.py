@@ -15,6 +15,7 @@ from robolink.controllers.softmotion.tools.table import SoftMotionToolTable
 from robolink.errors import ConfigError, RobolinkError
 from robolink.messages import tr
 from robolink.model import Marker, MarkerKind
+from robolink.ways import Way, way
 
 
 class Preserver:
@@ -74,6 +75,8 @@ def tool_before(marker: Marker) -> int:
     if not isinstance(tool, int):
         raise ConfigError(
             tr("The marker of {when} cannot be understood.", when=marker.begun_at),
-            remedy=tr("Select the right tool by hand, then 'robolink recover --forget'."),
+            remedy=tr(
+                "Select the right tool by hand, then {forget}.", forget=way(Way.FORGET_MARKER)
+            ),
         )
     return tool

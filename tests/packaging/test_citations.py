@@ -10,6 +10,8 @@ The numbers of faults (F and two digits) are headings of docs/reference/faults.m
 """
 
 import re
+import subprocess
+import sys
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -111,6 +113,11 @@ def test_the_index_lists_every_page():
         assert f"](reference/{page.name})" in index, page.name
     for page in (ROOT / "docs/decisions").glob("[0-9]*.md"):
         assert f"]({page.name})" in decisions, page.name
+
+
+def test_the_picture_of_the_rooms_is_that_of_the_import_contracts():
+    drawn = [sys.executable, str(ROOT / "docs/site/rooms.py"), "--check"]
+    assert subprocess.run(drawn, check=False).returncode == 0
 
 
 def test_no_page_is_cited_by_its_name_alone_but_one_that_lies_beside_it_or_in_docs():

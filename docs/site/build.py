@@ -37,10 +37,15 @@ def exported(source: str) -> list[str]:
     return names
 
 
-def directive(value: object) -> str:
+def described(path: str, value: object) -> list[str]:
+    """Return what makes Sphinx describe a thing, in reStructuredText."""
+    if hasattr(value, "__origin__"):  # an alias of a type brings the words of that type
+        return [f".. py:data:: {path}", "", f"   Stands for ``{value}``."]
     if inspect.isclass(value):
-        return "autoexception" if issubclass(value, BaseException) else "autoclass"
-    return "autofunction" if inspect.isroutine(value) else "autodata"
+        kind = "autoexception" if issubclass(value, BaseException) else "autoclass"
+    else:
+        kind = "autofunction" if inspect.isroutine(value) else "autodata"
+    return [f".. {kind}:: {path}"]
 
 
 def packages() -> dict[str, dict[str, object]]:
@@ -78,7 +83,7 @@ def api_page(package: str, names: dict[str, str], things: dict[str, object]) -> 
         lines += ["Also here: " + ", ".join(away) + ".", ""]
     for name, at in names.items():
         if at == package:
-            lines += [f".. {directive(things[name])}:: {package}.{name}", ""]
+            lines += [*described(f"{package}.{name}", things[name]), ""]
     return "\n".join(lines)
 
 

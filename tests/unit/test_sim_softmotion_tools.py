@@ -15,7 +15,7 @@ from robolink_simulators.softmotion import (
     ToolInForce,
     machine_named,
 )
-from robolink_simulators.softmotion.kinematics.catalogue import NAMES
+from robolink_simulators.softmotion.catalogue import NAMES
 from robolink_simulators.softmotion.kinematics.frames import zyz
 from robolink_simulators.softmotion.kinematics.positions import Gantry3
 

@@ -25,7 +25,7 @@ from sqlalchemy.schema import CreateIndex, CreateTable
 from sqlalchemy.sql.ddl import DDLElement
 
 from robolink.errors import JournalError
-from robolink.journal._chain import FIRST
+from robolink.journal.store.chain import FIRST
 from robolink.journal.store.tables import HEAD, IN_A_CHANGE, SCHEMA_VERSION
 from robolink.messages import tr
 from robolink.ways import Way, way

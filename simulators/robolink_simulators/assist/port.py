@@ -23,7 +23,7 @@ from robolink_simulators.epson.refusals import SpelRefusal
 from robolink_simulators.hosting.in_process import epson as in_process
 from robolink_simulators.hosting.in_process import softmotion as plc_in_process
 from robolink_simulators.hosting.streams.tcp_host import TcpHost
-from robolink_simulators.softmotion.group.smc_errors import BlockRefused
+from robolink_simulators.softmotion.smc_errors import BlockRefused
 
 _MAX_LINE: Final = 65536
 _SCHEME: Final = "assist+tcp"

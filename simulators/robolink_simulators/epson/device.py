@@ -21,8 +21,8 @@ from robolink_simulators.epson.arm.robots import find_robot
 from robolink_simulators.epson.card import ControllerCard
 from robolink_simulators.epson.companion import Companion
 from robolink_simulators.epson.condition import Condition, Mode, Task
+from robolink_simulators.epson.flash import Flash, forget_volatile
 from robolink_simulators.epson.machine import Machine
-from robolink_simulators.epson.memory.flash import Flash, forget_volatile
 from robolink_simulators.epson.memory.variables import project_variables
 from robolink_simulators.epson.mishaps import EpsonMishaps
 from robolink_simulators.epson.options import EpsonOptions

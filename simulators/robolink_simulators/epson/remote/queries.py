@@ -13,7 +13,7 @@ from robolink_simulators.epson.condition import Condition
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.options import EpsonOptions
 from robolink_simulators.epson.remote.io_commands import Fields, Served
-from robolink_simulators.epson.remote.refused import malformed, number
+from robolink_simulators.epson.request_refusals import malformed, number
 
 _SCARA: Final = "3"
 _NOT_APPLICABLE: Final = "-1"

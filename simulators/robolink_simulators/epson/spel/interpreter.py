@@ -10,7 +10,7 @@ from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.variables import Variables
 from robolink_simulators.epson.options import EpsonOptions
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
-from robolink_simulators.epson.remote.refused import RequestRefused
+from robolink_simulators.epson.request_refusals import RequestRefused
 from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
 from robolink_simulators.epson.spel.expressions.printing import CRLF, joined, number_text
 from robolink_simulators.epson.spel.expressions.values import Value, as_number, truth

@@ -12,7 +12,7 @@ from robolink.transport import LinkUrl
 from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.cell.world_parameters import from_options, plain
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.epson.option_text import option_names, options_from_text
+from robolink_simulators.epson.options import option_names, options_from_text
 from robolink_simulators.hosting.in_process.named import NamedSimulators, seed_from_text
 from robolink_simulators.hosting.in_process.transport import InProcessTransport
 from robolink_simulators.serial_numbers import drawn_serial

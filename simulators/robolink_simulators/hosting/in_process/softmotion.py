@@ -12,7 +12,7 @@ from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.cell.world_parameters import from_options, plain
 from robolink_simulators.hosting.in_process.mailbox_link import InProcessMailboxLink
 from robolink_simulators.hosting.in_process.named import NamedSimulators, seed_from_text
-from robolink_simulators.softmotion.kinematics.catalogue import NAMES, parameter_names
+from robolink_simulators.softmotion.catalogue import NAMES, parameter_names
 from robolink_simulators.softmotion.mailbox.option_text import option_names, options_from_text
 from robolink_simulators.softmotion.mailbox.parameters import parameters_from_text
 from robolink_simulators.softmotion.mailbox.simulator import (

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from enum import IntEnum
 
-from robolink_simulators.softmotion.group.smc_errors import SmcError
 from robolink_simulators.softmotion.kinematics.kinematics import AxisValues, Configuration
+from robolink_simulators.softmotion.smc_errors import SmcError
 
 
 class SmcGroupState(IntEnum):

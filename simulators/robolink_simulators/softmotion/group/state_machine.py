@@ -2,17 +2,17 @@
 
 from collections.abc import Callable
 
-from robolink_simulators.softmotion.group.blocks import BlockExecution
+from robolink_simulators.softmotion.function_blocks import BlockExecution
 from robolink_simulators.softmotion.group.condition import SmcGroupState
-from robolink_simulators.softmotion.group.options import GroupOptions
-from robolink_simulators.softmotion.group.smc_errors import (
+from robolink_simulators.softmotion.motion.axes import Axis
+from robolink_simulators.softmotion.motion.motion import GroupMotion
+from robolink_simulators.softmotion.options import GroupOptions
+from robolink_simulators.softmotion.smc_errors import (
     BlockRefused,
     ErrorKind,
     Overruled,
     SmcError,
 )
-from robolink_simulators.softmotion.motion.axes import Axis
-from robolink_simulators.softmotion.motion.motion import GroupMotion
 
 
 class StateMachine:

@@ -1,17 +1,17 @@
 """The blocks about tool, kinematics and position (docs/reference/softmotion.md 1, 2.3)."""
 
-from robolink_simulators.softmotion.group.blocks import BlockExecution
+from robolink_simulators.softmotion.function_blocks import BlockExecution
 from robolink_simulators.softmotion.group.condition import (
     ActualPosition,
     ReadToolMode,
     SmcGroupState,
 )
 from robolink_simulators.softmotion.group.core import GroupCore, block
-from robolink_simulators.softmotion.group.smc_errors import BlockRefused, ErrorKind
 from robolink_simulators.softmotion.kinematics.coordinates import CoordRef, CoordSystem
 from robolink_simulators.softmotion.kinematics.frames import NO_TURN, Frame
 from robolink_simulators.softmotion.kinematics.kinematics import KinematicsModel
 from robolink_simulators.softmotion.motion.movement import ToolInForce
+from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind
 
 
 class ToolBlocks(GroupCore):

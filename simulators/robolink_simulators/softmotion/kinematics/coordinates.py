@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import Self
 
-from robolink_simulators.softmotion.group.smc_errors import BlockRefused, ErrorKind
 from robolink_simulators.softmotion.kinematics.frames import ORIGIN, Frame, zyz, zyz_angles
+from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind
 
 
 class CoordSystem(IntEnum):

@@ -7,9 +7,9 @@ from typing import Final
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_simulators.option_values import values_from_text
-from robolink_simulators.softmotion.group.options import GroupOptions, SmcNumbers
 from robolink_simulators.softmotion.mailbox.options import MailboxOptions
 from robolink_simulators.softmotion.mailbox.words.places import require_places
+from robolink_simulators.softmotion.options import GroupOptions, SmcNumbers
 
 _NUMBERS: Final = "numbers."
 _LONGEST_CYCLE_US: Final = 1_000_000

@@ -20,8 +20,8 @@ from robolink.protocols.mailbox import (
     WordOrder,
     opcodes_of,
 )
+from robolink_simulators.softmotion.function_blocks import BlockExecution
 from robolink_simulators.softmotion.group.axis_group import AxisGroup
-from robolink_simulators.softmotion.group.blocks import BlockExecution
 from robolink_simulators.softmotion.mailbox.commands.complaints import Rejected
 from robolink_simulators.softmotion.mailbox.commands.jobs import Job, Jobs
 from robolink_simulators.softmotion.mailbox.commands.motion import MotionDesk

@@ -6,9 +6,9 @@ from enum import IntEnum
 from typing import Final
 
 from robolink.timing import NS_PER_S
-from robolink_simulators.softmotion.group.smc_errors import BlockRefused, ErrorKind
 from robolink_simulators.softmotion.kinematics.kinematics import AxisKind
 from robolink_simulators.softmotion.motion.profile import Pace, SpeedProfile
+from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind
 
 _ROUNDING = 1e-9
 _STILL = 1e-9

@@ -4,8 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from robolink.timing import NS_PER_S
-from robolink_simulators.softmotion.group.blocks import BlockExecution
-from robolink_simulators.softmotion.group.smc_errors import BlockRefused, ErrorKind
+from robolink_simulators.softmotion.function_blocks import BlockExecution
 from robolink_simulators.softmotion.kinematics.coordinates import CoordinateTransforms, CoordSystem
 from robolink_simulators.softmotion.kinematics.frames import (
     Frame,
@@ -25,6 +24,7 @@ from robolink_simulators.softmotion.kinematics.kinematics import (
 )
 from robolink_simulators.softmotion.motion.axes import Axis
 from robolink_simulators.softmotion.motion.paths import Dynamics, axes_for_tcp, require_inside
+from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind
 
 COORDINATES = 6
 

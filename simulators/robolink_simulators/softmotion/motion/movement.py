@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 from robolink.timing import NS_PER_S
-from robolink_simulators.softmotion.group.blocks import BlockExecution
+from robolink_simulators.softmotion.function_blocks import BlockExecution
 from robolink_simulators.softmotion.kinematics.coordinates import CoordRef
 from robolink_simulators.softmotion.kinematics.frames import ORIGIN, Frame
 from robolink_simulators.softmotion.kinematics.kinematics import AxisValues

@@ -6,7 +6,7 @@ from typing import Final
 from robolink.model import Hand, rotate_xy
 from robolink_simulators.epson.memory.points import AXES, HIGHEST_LOCAL, Point
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
-from robolink_simulators.epson.remote.refused import RequestRefused
+from robolink_simulators.epson.request_refusals import RequestRefused
 from robolink_simulators.epson.spel.expressions.functions import PLAIN_FUNCTIONS
 from robolink_simulators.epson.spel.expressions.machine_functions import (
     MACHINE_FUNCTIONS,

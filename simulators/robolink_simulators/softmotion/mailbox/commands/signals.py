@@ -5,9 +5,9 @@ from types import MappingProxyType
 
 from robolink.protocols.mailbox import Answer, Command, Opcode
 from robolink_simulators.softmotion.group.axis_group import AxisGroup
-from robolink_simulators.softmotion.group.signals import SIGNALS
 from robolink_simulators.softmotion.mailbox.commands.operands import require_operand
 from robolink_simulators.softmotion.mailbox.commands.told import Handler, Told, done
+from robolink_simulators.softmotion.signals import SIGNALS
 
 
 class SignalDesk:

@@ -7,7 +7,7 @@ Evidence marks as in docs/reference/softmotion.md: [D] vendor documentation, [F]
 from dataclasses import dataclass
 from typing import Literal
 
-from robolink_simulators.softmotion.group.smc_errors import ErrorKind, SmcError
+from robolink_simulators.softmotion.smc_errors import ErrorKind, SmcError
 
 
 @dataclass(frozen=True, slots=True)

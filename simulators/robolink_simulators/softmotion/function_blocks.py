@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from enum import Enum
 
-from robolink_simulators.softmotion.group.smc_errors import SmcError
 from robolink_simulators.softmotion.kinematics.coordinates import CoordRef
+from robolink_simulators.softmotion.smc_errors import SmcError
 
 
 class BlockState(Enum):

@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass
 from typing import Final
 
 from robolink.errors import LeaseHeldError
-from robolink.journal.leases.processes import LeaseHolder
+from robolink.journal._processes import LeaseHolder
 from robolink.messages import tr
 from robolink.model import EntryKind, NewEntry
 

@@ -8,7 +8,7 @@ from robolink.errors import JournalError
 from robolink.model import EntryKind, Marker, NewEntry, Recorded, Signature, Who
 
 if TYPE_CHECKING:
-    from robolink.journal.logs.outcome_log import JournalOutcomeLog
+    from robolink.journal._outcome_log import JournalOutcomeLog
 
 
 class LookingLog:

@@ -6,10 +6,10 @@ from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Final
 
 from robolink.errors import JournalError, OutcomeUnknownError
+from robolink.journal._lease import Lease
+from robolink.journal._naming import Names, Naming
+from robolink.journal._processes import BootClock, LeaseHolder, this_process
 from robolink.journal._traces import leave_trace, traces_of
-from robolink.journal.leases.lease import Lease
-from robolink.journal.leases.processes import BootClock, LeaseHolder, this_process
-from robolink.journal.logs.naming import Names, Naming
 from robolink.messages import tr
 from robolink.model import EntryKind, Marker, MarkerKind, NewEntry, Recorded, Signature, Who
 from robolink.timing import Clock

@@ -13,9 +13,9 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Final
 
 from robolink.errors import LeaseHeldError, LeaseLostError
-from robolink.journal._chain import canonical, storable
-from robolink.journal.leases.processes import LeaseHolder
-from robolink.journal.leases.sightings import FREE, LEASE_S, LeaseSighting
+from robolink.journal._processes import LeaseHolder
+from robolink.journal._sightings import FREE, LEASE_S, LeaseSighting
+from robolink.journal.store.chain import canonical, storable
 from robolink.messages import tr
 from robolink.model import NewEntry, new_operation
 from robolink.timing import NS_PER_S, Clock, Deadline, wall_label

@@ -2,7 +2,7 @@
 
 Numbers of ``SMC_ERROR`` are no stable public API (docs/reference/softmotion.md 1.4): each complaint
 has a kind of ours, the vendor's symbol where a document names it, and a number that
-:class:`~robolink_simulators.softmotion.group.options.SmcNumbers` can fill in.
+:class:`~robolink_simulators.softmotion.options.SmcNumbers` can fill in.
 """
 
 from dataclasses import dataclass

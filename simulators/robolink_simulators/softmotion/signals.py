@@ -3,8 +3,8 @@
 from collections.abc import Callable
 from typing import Final
 
-from robolink_simulators.softmotion.group.smc_errors import BlockRefused, ErrorKind
 from robolink_simulators.softmotion.kinematics.kinematics import AxisValues
+from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind
 
 SIGNALS: Final = 32
 """How many inputs, and how many outputs, there are (assumed)."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from robolink.config._files import CELL_FILE, config_files, read_document
 from robolink.config._problems import dotted, problems_of
+from robolink.config._reach import Expected
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.toml_files import Problem
@@ -36,6 +37,17 @@ class Cell:
     url: str
     settings: "CellSettings"
     origins: Mapping[str, Path]
+
+    @property
+    def expected(self) -> Expected:
+        """What even a look has to heed."""
+        return Expected(
+            self.name,
+            tool=self.settings.tool,
+            robot=self.settings.robot,
+            robot_file=str(self.origins.get("robot", "")),
+            people=self.settings.people,
+        )
 
 
 def find_cell(name: str) -> Cell:

@@ -24,7 +24,7 @@ from robolink.closing import ClosedAtExit
 from robolink.durable_files import make_folder, state_folder
 from robolink.errors import RobolinkError
 from robolink.messages import tr
-from robolink.model import ControllerStatus
+from robolink.model import ControllerStatus, is_own_name
 from robolink.stopping._far_end import far_end_of
 
 KIND: Final = "holders"
@@ -58,6 +58,8 @@ class StopListener(ClosedAtExit):
         controller: What is stopped.
         url: How it was reached.
         who: Who holds it, and for what, as a person is told.
+        name: Under which name the controller is on record (``controller.outcomes.identity``), so
+            that a stop finds it by another address, too; empty where that is not known.
         heard: Called with who stopped it, in the listener's thread, before the stop.
 
     Raises:
@@ -70,6 +72,7 @@ class StopListener(ClosedAtExit):
         url: str,
         *,
         who: str = "",
+        name: str = "",
         heard: Callable[[str], None] | None = None,
     ) -> None:
         self._controller = controller
@@ -77,12 +80,14 @@ class StopListener(ClosedAtExit):
         self._token = os.urandom(16).hex()
         folder = state_folder(KIND)
         make_folder(folder)
-        name = f"{os.getpid()}-{self._token[:8]}"
-        self._card = folder / f"{name}.json"
-        self._socket, self._path = _listening(folder / f"{name}.sock")
+        file = f"{os.getpid()}-{self._token[:8]}"
+        own = name if is_own_name(name) else ""
+        self._card = folder / f"{file}.json"
+        self._socket, self._path = _listening(folder / f"{file}.sock")
         self._wake, self._awake = socket.socketpair()
         card: dict[str, object] = {
-            "keys": sorted(far_end_of(url)),
+            "keys": sorted(far_end_of(url) | ({own} if own else set())),
+            "controller": own,
             "place": self._path or list(self._socket.getsockname()),
             "token": self._token,
             "pid": os.getpid(),

@@ -84,7 +84,7 @@ def agree_to_motion(question: str, *, yes: bool, in_tool: bool = True) -> None:
     if REACHED in meta:
         from robolink_cli.stopping.notes import heed_stop
 
-        heed_stop(meta[REACHED], yes=yes)
+        heed_stop(meta[REACHED], meta[WATCHED], yes=yes)
     if in_tool and WATCHED in meta:
         from robolink_cli.session.selected_tool import heed_selection
 

@@ -19,6 +19,7 @@ from robolink.model import (
     Capabilities,
     ControllerFacts,
     ControllerStatus,
+    Identity,
     Ledger,
     Marker,
     MarkerKind,
@@ -52,7 +53,8 @@ class PlcMapController:
         self.register_map = register_map
         self._registers = Registers(client)
         self._outcomes = outcomes
-        outcomes.ask(IdentityReader(self._registers, register_map).read)
+        self._who = IdentityReader(self._registers, register_map)
+        outcomes.ask(self._who.read)
         self._lock = ProcedureLock(client.identity, self._registers.latch)
         self._markers = MarkerStore(client.identity, outcomes, self._registers.latch)
         self._tools = RegisterToolTable(
@@ -113,6 +115,24 @@ class PlcMapController:
     def exchanges(self) -> int:
         """Requests sent so far."""
         return self._registers.exchanges
+
+    def who(self) -> Identity:
+        """Return which PLC this is: what a person confirms about a map holds for that one.
+
+        Raises:
+            TransportError, RemoteProtocolError: The link failed, or its number does not stand
+                still.
+            NotReadyError: The map knows where the PLC's number stands, and there is none now.
+        """
+        found = self._who.read()
+        if found.certain:
+            return found
+        raise NotReadyError(
+            tr("The number by which the map knows {identity} reads zero.", identity=self.identity),
+            reason=NotReadyReason.NOT_REMOTE,
+            remedy=tr("Look whether the PLC's program runs, then try again; nothing was written."),
+            controller=self.identity,
+        )
 
     def require_probe(self) -> None:
         """Compare the PLC's constant with the map's, if there is one.
@@ -260,9 +280,9 @@ class PlcMapController:
             )
 
     def _require_confirmed(self, request: str) -> None:
-        """Refuse a change by a map without a probe that nobody has compared; sends nothing."""
+        """Refuse a change by a map without a probe that nobody has compared; writes nothing."""
         if self.register_map.probe is None and not confirmation_of(
-            self.identity, self.register_map
+            self.who().name, self.register_map
         ):
             raise ConfigError(
                 tr(

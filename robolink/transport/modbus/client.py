@@ -41,6 +41,12 @@ class Exchange(Protocol):
     def units(self) -> range:
         """The units that can be asked."""
 
+    def takes_s(self, sent_bytes: int, answered_bytes: int) -> float:
+        """Return how long frames of so many bytes take on the line; 0 on a network.
+
+        Counted are the bytes behind the unit and before the checksum, as in a PDU.
+        """
+
     def ask(self, request: ModbusRequest, deadline: Deadline) -> ModbusReply:
         """Send ``request`` once and return its own answer, which may be a refusal.
 
@@ -99,6 +105,14 @@ class ModbusClient:
     def clock(self) -> Clock:
         """The clock on which deadlines are kept."""
         return self._transport.clock
+
+    def read_takes_s(self, count: int) -> float:
+        """Return how long a read of so many registers takes on the line alone; 0 on a network."""
+        return self._exchange.takes_s(5, 2 + 2 * count)
+
+    def write_takes_s(self, count: int) -> float:
+        """Return how long a write of so many registers takes on the line alone; 0 on a network."""
+        return self._exchange.takes_s(6 + 2 * count, 5)
 
     def read_holding(self, address: int, count: int, *, unit: int | None = None) -> tuple[int, ...]:
         """Return holding registers (function 3), at most 125."""

@@ -112,6 +112,11 @@ class ModbusMailboxLink:
         """The client's clock."""
         return self._client.clock
 
+    @property
+    def whole_look_s(self) -> float:
+        """See :meth:`robolink.transport.MailboxLink.whole_look_s`."""
+        return self._client.read_takes_s(RESPONSE_WORDS) + self._client.write_takes_s(1)
+
     def write_command(self, words: Sequence[int]) -> None:
         """See :meth:`robolink.transport.MailboxLink.write_command`; one function 16."""
         self._client.write_registers(self._places.command, require_words(words, COMMAND_WORDS))

@@ -1,5 +1,6 @@
 """Who an EPSON controller is, and what else it says about itself and its robots."""
 
+from collections.abc import Sequence
 from typing import Final
 
 from robolink.controllers.epson.link.answers import NOT_EXECUTED
@@ -17,6 +18,17 @@ _QUERY: Final = spel.print_robot_serial()
 _NOT_NOW: Final = frozenset({20, 21})
 """Refusals that say nothing about the query itself: the controller is busy
 (docs/reference/epson.md 1.6)."""
+
+
+def name_from(number: Sequence[str], robots: Sequence[str]) -> str:
+    """Return the name of a controller, empty where nobody has set any number.
+
+    Args:
+        number: The answer to GetContNo.
+        robots: The answer to GetRobotSerial; its first field counts the robots.
+    """
+    numbers = [text for text in (*number, "+".join(robots[1:])) if text not in _UNSET]
+    return f"epson:{'/'.join(numbers)}" if numbers else ""
 
 
 class IdentityReader:
@@ -46,9 +58,7 @@ class IdentityReader:
             robots = self._asked("GetRobotSerial", "0") or ()
         except _BusyNow:
             return Identity(place, address, place, certain=False)
-        # The first field of the robots' answer counts them.
-        numbers = [text for text in (*number, "+".join(robots[1:])) if text not in _UNSET]
-        return Identity(f"epson:{'/'.join(numbers)}" if numbers else place, address, place)
+        return Identity(name_from(number, robots) or place, address, place)
 
     def _asked(self, name: str, *parameters: str) -> tuple[str, ...] | None:
         """Return the fields of an answer; ``None`` where the firmware does not know the query."""

@@ -153,6 +153,21 @@ class StopLine:
             controller=self._transport.identity,
         )
 
+    def who(self) -> str:
+        """Ask, now that it stands, who the controller is; it is asked for nothing else.
+
+        Returns:
+            Its name, empty where this firmware tells none without an Execute.
+        """
+        from robolink.controllers.epson.link.identity import name_from
+
+        try:
+            number = self._ask(Request("GetContNo")).fields
+            robots = self._ask(Request("GetRobotSerial", ("0",))).fields
+        except RobolinkError:
+            return ""
+        return name_from([text.strip() for text in number], [text.strip() for text in robots])
+
     def leave(self, flags: StatusFlags) -> None:
         """Log out, where that does no harm: not while another device may begin a task.
 

@@ -196,7 +196,7 @@ class CommandSender:
         """Write a command and return it with the snapshot that acknowledges it."""
         request = describe(draft)
         with self._exchanging(request):
-            before = self._snapshots.take()
+            before = self._before(draft)
             self._require_able(draft, before)
             command = self._addressed(draft, before)
             words = self._encode(command)
@@ -224,6 +224,16 @@ class CommandSender:
                     remedy=tr("Look for a gateway that changes registers, or a bad line."),
                 )
             )
+
+    def _before(self, draft: Command) -> Response:
+        """Return a snapshot of before a command.
+
+        What ends a movement of ours on a slow line does not wait for one: whoever waited on the
+        movement has read the last one, and beats no more.
+        """
+        if draft.only_ends and self._wire.motions.unfinished and self._wire.whole_look_s > 0:
+            return self._snapshots.latest
+        return self._snapshots.take()
 
     @contextmanager
     def _exchanging(self, request: str) -> Iterator[None]:

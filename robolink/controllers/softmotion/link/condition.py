@@ -1,6 +1,7 @@
 """The state of an axis group in the words that all controllers share, and what it forbids."""
 
-from robolink.errors import NotReadyError, NotReadyReason
+from robolink.controllers.softmotion.link.heartbeat import MOST_LOOK_S
+from robolink.errors import ConfigError, NotReadyError, NotReadyReason
 from robolink.messages import tr
 from robolink.model import ControllerStatus
 from robolink.protocols.mailbox import Bits, GroupState, Response, error_meaning
@@ -62,6 +63,33 @@ def require_permit(now: Response, *, controller: str, request: str) -> None:
             reason=NotReadyReason.NOT_REMOTE,
             remedy=tr(
                 "Its program gives the permit (xPermit): bring the machine to its service state."
+            ),
+            controller=controller,
+            request=request,
+        )
+
+
+def require_beats(whole_look_s: float, *, controller: str, request: str) -> None:
+    """Hold back what must be kept going on a line that is too slow for it (design part 7).
+
+    Args:
+        whole_look_s: How long a look at the response block and a beat take on the line.
+        controller: Its name in the error.
+        request: What is held back.
+
+    Raises:
+        ConfigError: No beat would arrive while the block is read.
+    """
+    if whole_look_s > MOST_LOOK_S:
+        raise ConfigError(
+            tr(
+                "This line is too slow for movements: one look at the PLC takes {look:.2f} s, and "
+                "what moves is halted after 0.5 s without a sign of this computer.",
+                look=whole_look_s,
+            ),
+            remedy=tr(
+                "Set the PLC's serial line and baud in the URL to 9600 or more, or move by Modbus "
+                "TCP. Tools can be read, written and selected as it is. Nothing was sent."
             ),
             controller=controller,
             request=request,

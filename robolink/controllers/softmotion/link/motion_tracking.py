@@ -32,6 +32,11 @@ class MotionTracker:
         return self.jogging or None in self._ends.values()
 
     @property
+    def alone(self) -> bool:
+        """Whether there is one movement and no more, so that the head shows how it fares."""
+        return len(self._ends) == 1
+
+    @property
     def unread(self) -> bool:
         """Whether there are movements whose end nobody has taken."""
         return bool(self._ends)

@@ -137,6 +137,13 @@ class Snapshots:
         self._wire = wire
         self._heartbeat = PlcHeartbeat()
         self._met: Response | None = None
+        self._latest: Response | None = None
+
+    @property
+    def latest(self) -> Response:
+        """The last whole snapshot; known after :meth:`meet`."""
+        assert self._latest is not None  # noqa: S101 - a controller is made after the meeting
+        return self._latest
 
     @property
     def met(self) -> Response:
@@ -180,6 +187,7 @@ class Snapshots:
         self._require_met(now)
         self._heartbeat.note(now.plc_heartbeat, self._wire.clock.now_ns())
         self._wire.motions.note(now)
+        self._latest = now
         return now
 
     def slot(self, number: int, *, keep: bool = False) -> Slot:

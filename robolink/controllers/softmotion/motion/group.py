@@ -5,6 +5,7 @@ import math
 from robolink.controllers.softmotion.io import SoftMotionIo
 from robolink.controllers.softmotion.link.answers import describe
 from robolink.controllers.softmotion.link.condition import (
+    require_beats,
     require_enabled,
     require_permit,
     require_power,
@@ -58,6 +59,7 @@ class SoftMotionGroup:
     def require_able(self, purpose: str) -> None:
         """Refuse what no movement could begin in now; see :class:`robolink.model.MotionGroup`."""
         identity = self._mailbox.identity
+        require_beats(self._mailbox.wire.whole_look_s, controller=identity, request=purpose)
         now = self._mailbox.snapshots.take()
         require_permit(now, controller=identity, request=purpose)
         require_enabled(now, controller=identity, request=purpose)
@@ -161,10 +163,12 @@ class SoftMotionGroup:
         """
         draft = Command(0, Opcode.CONTINUE)
         request = describe(draft)
+        mailbox = self._mailbox
+        require_beats(mailbox.wire.whole_look_s, controller=mailbox.identity, request=request)
         self._starter.require_settled(request)
-        self._mailbox.prepare(draft, request)
-        with self._mailbox.markers.doubt(request):
-            self._mailbox.commands.carry_out(draft)
+        mailbox.prepare(draft, request)
+        with mailbox.markers.doubt(request):
+            mailbox.commands.carry_out(draft)
 
     def abort_unfinished(self) -> None:
         """Halt what was sent here and not seen to its end."""

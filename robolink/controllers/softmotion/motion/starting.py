@@ -2,6 +2,7 @@
 
 from robolink.controllers.softmotion.link.answers import describe
 from robolink.controllers.softmotion.link.condition import (
+    require_beats,
     require_enabled,
     require_power,
     require_still,
@@ -66,11 +67,13 @@ class MovementStarter:
         """Hold back what may not start now; see :mod:`._condition`.
 
         Raises:
+            ConfigError: The line is too slow for any movement.
             NotReadyError: The group, its drives, the machine or another movement forbid it.
             OutcomeUnknownError: Something earlier is unsettled.
             LeaseHeldError, LeaseLostError: Another client owns the mailbox.
         """
         mailbox = self._mailbox
+        require_beats(mailbox.wire.whole_look_s, controller=mailbox.identity, request=request)
         self.require_settled(request)
         now = mailbox.prepare(draft, request)
         require_enabled(now, controller=mailbox.identity, request=request)

@@ -33,6 +33,7 @@ CITED = re.compile(
 )
 LINK = re.compile(r"\]\((?![a-z]+:)(?P<page>[^)#\s]*)(?:#(?P<anchor>[^)\s]+))?\)")
 FAULTS = re.compile(r"\((?:[^()]{0,60}[;,] )?(?P<numbers>F\d\d(?:, F\d\d)*)[).;]")
+FILE = re.compile(r"`((?:robolink|cli|simulators|tests|docs|companions)/[\w./*-]*)`")
 BARE = re.compile(r"(?<![\w./{}-])(?P<name>[a-z][\w-]*\.md)(?![\w#])")
 UNKNOWN = re.compile(rf"\bdesign{GAP}(?:parts?{GAP})?\d")
 
@@ -113,6 +114,14 @@ def test_the_index_lists_every_page():
         assert f"](reference/{page.name})" in index, page.name
     for page in (ROOT / "docs/decisions").glob("[0-9]*.md"):
         assert f"]({page.name})" in decisions, page.name
+
+
+@pytest.mark.parametrize("page", ["architecture.md", "contributing.md"])
+def test_every_file_that_a_guide_names_exists(page):
+    text = (ROOT / "docs" / page).read_text(encoding="utf-8")
+    named = {name for name in FILE.findall(text) if "NAME" not in name and "LANGUAGE" not in name}
+    assert named
+    assert not [name for name in sorted(named) if not list(ROOT.glob(name))]
 
 
 def test_the_picture_of_the_rooms_is_that_of_the_import_contracts():

@@ -18,9 +18,9 @@ import threading
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from types import TracebackType
-from typing import Final, Protocol, Self
+from typing import Final, Protocol
 
+from robolink.closing import ClosedAtExit
 from robolink.durable_files import make_folder, state_folder
 from robolink.errors import RobolinkError
 from robolink.messages import tr
@@ -49,7 +49,7 @@ class Stoppable(Protocol):
         """Read its state."""
 
 
-class StopListener:
+class StopListener(ClosedAtExit):
     """Listens while a controller is held; a context manager.
 
     Leave it before the controller is closed: it then waits for a stop that is under way.
@@ -110,17 +110,6 @@ class StopListener:
     def _close_sockets(self) -> None:
         for one in (self._socket, self._wake, self._awake):
             one.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def _publish(self, card: dict[str, object]) -> None:
         """Write where to knock; not synced to the disk, because it dies with the process."""

@@ -10,6 +10,8 @@ The numbers of faults (F and two digits) are headings of docs/reference/faults.m
 """
 
 import re
+import subprocess
+import sys
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -25,12 +27,13 @@ GAP = r"\s+(?:(?:#|//|\*)\s+)?"
 
 NUMBER = r"(?:F\d\d|\d{1,2}(?:\.\d{1,2})?)(?![\d/]|\.\d)"
 CITED = re.compile(
-    rf"(?P<page>docs/[\w./-]*\w)"
+    r"(?<![\w/])(?P<page>docs/(?:[\w./-]*\.(?:md|json)|decisions/\d{4}[\w-]*))"
     rf"(?:{GAP}(?P<numbers>{NUMBER}(?:,{GAP}{NUMBER})*)(?!\w)"
     rf'|,{GAP}"(?P<heading>[^"]+)")?'
 )
 LINK = re.compile(r"\]\((?![a-z]+:)(?P<page>[^)#\s]*)(?:#(?P<anchor>[^)\s]+))?\)")
 FAULTS = re.compile(r"\((?:[^()]{0,60}[;,] )?(?P<numbers>F\d\d(?:, F\d\d)*)[).;]")
+FILE = re.compile(r"`((?:robolink|cli|simulators|tests|docs|companions)/[\w./*-]*)`")
 BARE = re.compile(r"(?<![\w./{}-])(?P<name>[a-z][\w-]*\.md)(?![\w#])")
 UNKNOWN = re.compile(rf"\bdesign{GAP}(?:parts?{GAP})?\d")
 
@@ -100,6 +103,30 @@ def test_every_link_leads_to_a_heading():
     pages = ((f, t) for f, t in texts() if f.suffix == ".md")
     wrong = [f"{f.relative_to(ROOT)}: {w}" for f, t in pages for w in wrong_links(f, t)]
     assert not wrong, "\n".join(wrong)
+
+
+def test_the_index_lists_every_page():
+    index = (ROOT / "docs/README.md").read_text(encoding="utf-8")
+    decisions = (ROOT / "docs/decisions/README.md").read_text(encoding="utf-8")
+    for page in (ROOT / "docs").glob("*.md"):
+        assert page.name == "README.md" or f"]({page.name})" in index, page.name
+    for page in (ROOT / "docs/reference").glob("*.md"):
+        assert f"](reference/{page.name})" in index, page.name
+    for page in (ROOT / "docs/decisions").glob("[0-9]*.md"):
+        assert f"]({page.name})" in decisions, page.name
+
+
+@pytest.mark.parametrize("page", ["architecture.md", "contributing.md"])
+def test_every_file_that_a_guide_names_exists(page):
+    text = (ROOT / "docs" / page).read_text(encoding="utf-8")
+    named = {name for name in FILE.findall(text) if "NAME" not in name and "LANGUAGE" not in name}
+    assert named
+    assert not [name for name in sorted(named) if not list(ROOT.glob(name))]
+
+
+def test_the_picture_of_the_rooms_is_that_of_the_import_contracts():
+    drawn = [sys.executable, str(ROOT / "docs/site/rooms.py"), "--check"]
+    assert subprocess.run(drawn, check=False).returncode == 0
 
 
 def test_no_page_is_cited_by_its_name_alone_but_one_that_lies_beside_it_or_in_docs():

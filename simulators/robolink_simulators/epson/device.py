@@ -47,7 +47,7 @@ RequestHook = Callable[[int, str], None]
 
 
 class EpsonSimulator:
-    """Implements :class:`~robolink_simulators.hosting.seam.WireDevice`.
+    """Implements ``hosting.seam.WireDevice``.
 
     Args:
         robot: Name of a SCARA model.

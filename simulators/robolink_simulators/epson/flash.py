@@ -1,10 +1,6 @@
 """What a controller keeps over a power cycle, as one small file."""
 
-import contextlib
 import json
-import os
-import tempfile
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 
@@ -14,6 +10,7 @@ from robolink.named_files import read_named
 from robolink_simulators.epson.arm.robot_settings import RobotSettings
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.points import LocalTable, PointTable
+from robolink_simulators.state_files import save_state
 
 SCHEMA: Final = "robolink/sim-state/1"
 
@@ -78,17 +75,7 @@ class Flash:
             "serial": self._machine.serial,
             "tools": self._machine.tools.to_state(),
         }
-        try:
-            _replace_durably(self._path, document)
-        except OSError as error:
-            raise ConfigError(
-                tr(
-                    "The simulator cannot save its state in {path}: {cause}.",
-                    path=self._path,
-                    cause=error.strerror or error,
-                ),
-                remedy=tr("Name a file in a folder that can be written."),
-            ) from error
+        save_state(self._path, document)
 
     def _mark(self) -> tuple[int, int]:
         return (self._machine.tools.flash_writes, self._machine.tools.selected)
@@ -104,29 +91,3 @@ def forget_volatile(machine: Machine, now_ns: int) -> None:
     machine.timed_bits.clear()
     machine.settings = RobotSettings(home_pulses=machine.settings.home_pulses)
     machine.points, machine.locals = PointTable(), LocalTable()
-
-
-def _replace_durably(path: Path, document: Mapping[str, object]) -> None:
-    """Put the new file in the place of the old one; a crash leaves one of them whole."""
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            json.dump(document, file)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(name, path)
-    except BaseException:
-        with contextlib.suppress(OSError):
-            os.unlink(name)
-        raise
-    _sync_folder(path.parent)
-
-
-def _sync_folder(folder: Path) -> None:
-    # Windows cannot open a folder; there the rename itself has to do.
-    with contextlib.suppress(OSError):
-        handle = os.open(folder, os.O_RDONLY)
-        try:
-            os.fsync(handle)
-        finally:
-            os.close(handle)

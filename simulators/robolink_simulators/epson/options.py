@@ -9,9 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Final, Literal
 
-from robolink.errors import ConfigError
-from robolink.messages import tr
-from robolink_simulators.option_values import values_from_text
+from robolink_simulators.option_values import require_known, values_from_text
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,12 +171,7 @@ def options_from_text(pairs: Mapping[str, str]) -> EpsonOptions:
     Raises:
         ConfigError: An option is unknown, or a value does not fit it.
     """
-    for name in pairs:
-        if name not in option_names():
-            raise ConfigError(
-                tr("The EPSON simulator has no option {name!r}.", name=name),
-                remedy=tr("Known are: {names}.", names=", ".join(option_names())),
-            )
+    require_known(pairs, option_names(), kind="EPSON")
     numbers = values_from_text(SpelNumbers, pairs, prefix=_NUMBERS)
     own = values_from_text(EpsonOptions, pairs)
     return replace(EpsonOptions(), **own, numbers=replace(SpelNumbers(), **numbers))

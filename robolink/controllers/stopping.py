@@ -8,7 +8,6 @@ the functions below is needed afterwards, or for one kind of controller only.
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from robolink.errors import (
-    ConfigError,
     ConnectError,
     RejectedError,
     RemoteProtocolError,
@@ -19,7 +18,7 @@ from robolink.messages import tr
 from robolink.transport import LinkUrl, parse_url
 
 if TYPE_CHECKING:
-    from robolink.model import ControllerStatus, Secret
+    from robolink.model import Controller, ControllerStatus, Secret
     from robolink.timing import Clock
     from robolink.transport import TraceSink
 
@@ -29,7 +28,7 @@ mailbox, is no reason to leave the robot moving."""
 
 
 def stop_now(
-    url: str,
+    url: "str | Controller",
     *,
     password: "str | Secret | None" = None,
     timeout_s: float = 3.0,
@@ -42,7 +41,7 @@ def stop_now(
     reset. Nothing is recorded.
 
     Args:
-        url: Which controller.
+        url: Which controller. One that is open already is stopped over the link that it has.
         password: An EPSON controller's remote password, if one is set.
         timeout_s: Longest wait for the connection, and for one answer.
         clock: Replaces the machine's clock; a simulator brings its own.
@@ -57,18 +56,17 @@ def stop_now(
         OutcomeUnknownError: It was told to stop and does not come to rest.
         TransportError, RemoteProtocolError: Whether it stops is not known.
     """
+    if not isinstance(url, str):
+        url.stop()
+        return url.status()
     link = parse_url(url)
     kinds = {"epson": _stop_epson, "softmotion": _stop_group, "plc": _stop_map}
-    if link.kind not in kinds:
-        raise ConfigError(
-            tr("robolink does not know controllers of the kind {kind!r}.", kind=link.kind),
-            remedy=tr("Write for example epson+tcp://192.168.0.1:5000."),
-        )
+    stop = kinds.get(link.kind, _stop_other)
     given = password if isinstance(password, str) else password.reveal() if password else ""
     means = _Means(given, timeout_s, clock, trace)
     for tries_left in reversed(range(_TRIES)):
         try:
-            return kinds[link.kind](link, means)
+            return stop(link, means)
         except (TransportError, RemoteProtocolError) as error:
             if isinstance(error, ConnectError) or not tries_left:
                 raise
@@ -154,6 +152,28 @@ def _stop_group(link: LinkUrl, means: _Means) -> "ControllerStatus":
         return status_of(now)
     finally:
         wire.close()
+
+
+def _stop_other(link: LinkUrl, means: _Means) -> "ControllerStatus":
+    """Stop a controller of a kind that another package brings, by what it offers for that."""
+    from robolink import __version__
+    from robolink.controllers.registry import ConnectionTerms, find_opener
+    from robolink.journal import GlancingLog, signature_here
+    from robolink.model import Secret
+
+    signature = signature_here(__version__)
+    terms = ConnectionTerms(
+        signature,
+        password=Secret(means.password) if means.password else None,
+        timeout_s=means.timeout_s,
+        clock=means.clock,
+        trace=means.trace,
+        # It opens no journal before something has to be recorded.
+        outcomes=GlancingLog(link.address, signature=signature),
+    )
+    with find_opener(link)(link, terms) as controller:
+        controller.stop()
+        return controller.status()
 
 
 def _stop_map(link: LinkUrl, means: _Means) -> "ControllerStatus":

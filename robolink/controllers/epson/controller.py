@@ -38,13 +38,11 @@ from robolink.model import (
     MarkerKind,
     NewEntry,
     OutcomeLog,
-    Secret,
 )
 from robolink.protocols.epson_text import Preference
 from robolink.standing import note_standing
 from robolink.stop_latch import StopLatch
 from robolink.timing import Clock
-from robolink.transport import Transport
 
 
 class EpsonController:
@@ -333,26 +331,3 @@ class EpsonController:
         self.close()
         if error is not None:
             note_standing(error, self.ledger.standing())
-
-
-def open_epson(
-    transport: Transport,
-    *,
-    outcomes: OutcomeLog,
-    password: Secret | None = None,
-    timeout_s: float = 3.0,
-    remote_timeout_s: float = 60.0,
-) -> EpsonController:
-    """Log in and return the controller; the transport is closed when that fails.
-
-    Raises:
-        LoginRefusedError: Wrong or missing password. One attempt is made.
-        LoginUnansweredError: Nobody answers; another client may be logged in.
-    """
-    session = EpsonSession(transport, timeout_s=timeout_s)
-    try:
-        session.login(password)
-    except BaseException:
-        session.close()
-        raise
-    return EpsonController(session, outcomes, remote_timeout_s=remote_timeout_s)

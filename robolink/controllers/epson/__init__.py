@@ -3,11 +3,11 @@
 from typing import TYPE_CHECKING
 
 from robolink.lazy_exports import lazy_exports
+from robolink.model import ValueReceipt as ValueReceipt
 from robolink.protocols.epson_text import VariableType as VariableType
 
 if TYPE_CHECKING:
     from robolink.controllers.epson.controller import EpsonController as EpsonController
-    from robolink.controllers.epson.io.values import ValueReceipt as ValueReceipt
     from robolink.controllers.epson.io.variables import EpsonVariables as EpsonVariables
     from robolink.controllers.epson.io.variables import typed_value as typed_value
     from robolink.controllers.epson.io.variables import variable_type as variable_type
@@ -20,7 +20,6 @@ else:
             "controller": "EpsonController",
             "opening": "open_epson",
             "tools.published": "PublishedTools",
-            "io.values": "ValueReceipt",
             "io.variables": "EpsonVariables typed_value variable_type",
         },
     )

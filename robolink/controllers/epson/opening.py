@@ -6,11 +6,11 @@ from robolink.controllers.epson.controller import EpsonController
 from robolink.controllers.epson.link.session import EpsonSession
 from robolink.controllers.registry import ConnectionTerms
 from robolink.errors import JournalError, LoginUnansweredError
-from robolink.model import OutcomeLog, Secret
+from robolink.model import Controller, OutcomeLog, Secret
 from robolink.transport import LinkUrl, TracingTransport, Transport, open_transport
 
 
-def open_epson_url(url: LinkUrl, terms: ConnectionTerms, /) -> EpsonController:
+def open_epson_url(url: LinkUrl, terms: ConnectionTerms, /) -> Controller:
     """Connect to the controller at a URL; see :class:`~robolink.controllers.ControllerOpener`.
 
     Raises:

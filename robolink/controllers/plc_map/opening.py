@@ -8,13 +8,13 @@ from robolink.controllers.plc_map.controller import PlcMapController
 from robolink.controllers.registry import ConnectionTerms
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink.model import OutcomeLog
+from robolink.model import Controller, OutcomeLog
 from robolink.register_maps import RegisterMap, load_map
 from robolink.timing import Clock
 from robolink.transport import LinkUrl, open_modbus
 
 
-def open_plc_map_url(url: LinkUrl, terms: ConnectionTerms, /) -> PlcMapController:
+def open_plc_map_url(url: LinkUrl, terms: ConnectionTerms, /) -> Controller:
     """Connect to the PLC at a URL; see :class:`~robolink.controllers.ControllerOpener`.
 
     Raises:

@@ -10,11 +10,11 @@ from robolink.controllers.softmotion.link.snapshots import Snapshots
 from robolink.controllers.softmotion.link.wire import MailboxWire
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink.model import OutcomeLog
+from robolink.model import Controller, OutcomeLog
 from robolink.transport import LinkUrl, MailboxLink, open_mailbox_link, open_quick_link
 
 
-def open_softmotion_url(url: LinkUrl, terms: ConnectionTerms, /) -> SoftMotionController:
+def open_softmotion_url(url: LinkUrl, terms: ConnectionTerms, /) -> Controller:
     """Connect to the PLC at a URL; see :class:`~robolink.controllers.ControllerOpener`.
 
     Raises:

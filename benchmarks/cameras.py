@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from robolink.calibration import BoardDrawing, CalibrationResult
+from robolink.methods import BoardSource, CameraAffineSource, CameraSource
 from robolink.model import ToolOffset
-from robolink.nozzle_change import CameraToFind, HeldBoard, UpCamera
 from tests.contract._camera_cell import camera_station, cell_of, furnish, run_source
 from tests.contract._sensor_cell import SensorCell
 
@@ -59,13 +59,13 @@ class Tally:
 
 def camera(cell: SensorCell) -> tuple[Any, ToolOffset]:
     """Return a source with a calibrated camera, and the truth."""
-    return UpCamera(cell.url, camera_station(cell)), cell.truth
+    return CameraSource(cell.url, camera_station(cell)), cell.truth
 
 
 def camera_affine(cell: SensorCell) -> tuple[Any, ToolOffset]:
     """Return a source with a camera to be found, and the truth."""
     station = camera_station(cell, known=False)
-    return CameraToFind(cell.url, replace(station, x_mm=station.x_mm + 0.7)), cell.truth
+    return CameraAffineSource(cell.url, replace(station, x_mm=station.x_mm + 0.7)), cell.truth
 
 
 def board(cell: SensorCell, count: int) -> tuple[Any, ToolOffset]:
@@ -73,7 +73,7 @@ def board(cell: SensorCell, count: int) -> tuple[Any, ToolOffset]:
     furnish(cell, board_held=True)
     held = cell.simulator.world.board
     drawing = BoardDrawing(held.drawing_mm[:count])
-    return HeldBoard(cell.url, camera_station(cell), drawing), held.frame(cell.truth)
+    return BoardSource(cell.url, camera_station(cell), drawing), held.frame(cell.truth)
 
 
 SOURCES: Final[dict[str, Callable[[SensorCell], tuple[Any, ToolOffset]]]] = {

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from enum import StrEnum
 
 
-class Point(StrEnum):
+class Checkpoint(StrEnum):
     """What kind of point a thread passes."""
 
     LOCK = "lock"
@@ -36,13 +36,13 @@ class Point(StrEnum):
     """Between two steps of a procedure."""
 
 
-Observer = Callable[[Point, str], None]
+Observer = Callable[[Checkpoint, str], None]
 """Called by the thread that passes a point, with its kind and what goes on."""
 
 _observer: Observer | None = None
 
 
-def checkpoint(point: Point, what: str = "") -> None:
+def checkpoint(point: Checkpoint, what: str = "") -> None:
     """Pass a point at which another thread may come in between.
 
     Args:

@@ -6,16 +6,17 @@ from robolink.backup._values import COMPONENTS, TOOLS, ToolState
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import ToolOffset, angle_difference_deg
+from robolink.ways import Way, way
 
 _LENGTHS = 3
 
 
 @dataclass(frozen=True, slots=True)
-class Tolerance:
+class ComparisonTolerance:
     """The largest difference that counts as none.
 
-    By default half the last digit that a controller prints (design part 4): values that it
-    prints alike are equal.
+    By default half the last digit that a controller prints (docs/reference/rules.md 3): values that
+    it prints alike are equal.
 
     Raises:
         ConfigError: One is negative or no number.
@@ -28,7 +29,7 @@ class Tolerance:
         if not (0 <= self.length_mm < float("inf") and 0 <= self.angle_deg < float("inf")):
             raise ConfigError(
                 tr("A tolerance must be a number from 0 up."),
-                remedy=tr("For example --tolerance 0.05."),
+                remedy=tr("For example {tolerance}.", tolerance=way(Way.LENGTH_TOLERANCE)),
             )
 
 
@@ -116,7 +117,7 @@ class Comparison:
 def compare(
     expected: ToolState,
     found: ToolState,
-    tolerance: Tolerance | None = None,
+    tolerance: ComparisonTolerance | None = None,
     *,
     selection_counts: bool = True,
 ) -> Comparison:
@@ -129,7 +130,7 @@ def compare(
         selection_counts: Whether another tool in force is a difference. While a program runs
             it selects tools by itself.
     """
-    limits = tolerance or Tolerance()
+    limits = tolerance or ComparisonTolerance()
     return Comparison(
         tuple(_tool(tool, expected, found, limits) for tool in TOOLS),
         expected.selected,
@@ -138,7 +139,9 @@ def compare(
     )
 
 
-def _tool(tool: int, expected: ToolState, found: ToolState, limits: Tolerance) -> ToolComparison:
+def _tool(
+    tool: int, expected: ToolState, found: ToolState, limits: ComparisonTolerance
+) -> ToolComparison:
     wanted, stored = expected.tools[tool], found.tools[tool]
     if wanted is None or stored is None:
         return ToolComparison(tool, wanted, stored)

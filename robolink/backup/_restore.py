@@ -15,10 +15,11 @@ from robolink.errors import (
 )
 from robolink.messages import tr
 from robolink.model import ControllerFacts, ToolOffset, ToolReceipt, ToolTable
+from robolink.ways import Way, way
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class RestoreChange:
     """One tool that the backup knows otherwise.
 
     Attributes:
@@ -43,16 +44,16 @@ class RestorePlan:
         select: The tool to put in force, ``None`` to leave that as it is.
     """
 
-    changes: tuple[Change, ...]
+    changes: tuple[RestoreChange, ...]
     select: int | None = None
 
     @property
-    def writes(self) -> tuple[Change, ...]:
+    def writes(self) -> tuple[RestoreChange, ...]:
         """The tools that get a value."""
         return tuple(change for change in self.changes if change.wanted is not None)
 
     @property
-    def clears(self) -> tuple[Change, ...]:
+    def clears(self) -> tuple[RestoreChange, ...]:
         """The tools that lose theirs."""
         return tuple(change for change in self.changes if change.wanted is None)
 
@@ -114,7 +115,7 @@ def plan_restore(
     for tool in wanted:
         _check_index(tool)
     differing = (tool for tool in compare(backup.state, now).differing if tool.tool in wanted)
-    changes = [Change(tool.tool, tool.found, tool.expected) for tool in differing]
+    changes = [RestoreChange(tool.tool, tool.found, tool.expected) for tool in differing]
     changes.sort(key=lambda change: (change.wanted is None, change.tool))
     select = backup.state.selected if selected and backup.state.selected != now.selected else None
     plan = RestorePlan(tuple(changes), select)
@@ -150,7 +151,7 @@ def restore(
     return tuple(receipts)
 
 
-def _set(tools: ToolTable, change: Change, tell: Callable[[str], None]) -> ToolReceipt:
+def _set(tools: ToolTable, change: RestoreChange, tell: Callable[[str], None]) -> ToolReceipt:
     if change.wanted is None:
         receipt = tools.clear(change.tool, expected=change.now)
         tell(tr("tool {tool}: cleared, read back", tool=change.tool))
@@ -191,7 +192,9 @@ def _check_selection(plan: RestorePlan, now: ToolState) -> None:
                 "The backup has tool {tool} in force, but that would not be defined.",
                 tool=plan.select,
             ),
-            remedy=tr("Restore that tool too, or leave --selected out."),
+            remedy=tr(
+                "Restore that tool too, or leave {selected} out.", selected=way(Way.SELECTED_TOO)
+            ),
         )
     in_force = now.selected if plan.select is None else plan.select
     if any(change.tool == in_force for change in plan.clears):
@@ -201,8 +204,10 @@ def _check_selection(plan: RestorePlan, now: ToolState) -> None:
                 tool=in_force,
             ),
             remedy=tr(
-                "Select another tool first, add --selected, or name the other tools with --tool. "
-                "Nothing was written."
+                "Select another tool first, add {selected}, or name the other tools with {tools}. "
+                "Nothing was written.",
+                selected=way(Way.SELECTED_TOO),
+                tools=way(Way.TOOLS),
             ),
         )
 
@@ -211,8 +216,9 @@ def _another(cause: str) -> ConfigError:
     return ConfigError(
         tr("This backup is not of this controller: {cause}.", cause=cause),
         remedy=tr(
-            "Check the -c option and the file. If it is meant for this controller all the same, "
-            "give --other-controller."
+            "Check which controller is named, and the file. If it is meant for this controller "
+            "all the same, {other}.",
+            other=way(Way.OTHER_CONTROLLER),
         ),
     )
 

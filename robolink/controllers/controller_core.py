@@ -10,10 +10,9 @@ from contextlib import AbstractContextManager
 from types import TracebackType
 from typing import Final, Self
 
-from robolink.controllers.driver_link import DriverLink
+from robolink.controllers.driver_link import DriverLink, advise_emergency_stop
 from robolink.controllers.preserving import Preserver
 from robolink.controllers.resolving import MarkerResolver
-from robolink.controllers.stopping import advise_emergency_stop
 from robolink.errors import RobolinkError
 from robolink.model import (
     Act,

@@ -1,6 +1,6 @@
 """What every part of a driver works with, and the one way in which it changes something.
 
-The command classes of design part 4 (faults_and_speed.md A3):
+The command classes of docs/reference/rules.md 1:
 
 =====  ==========================================  =======================================
 class  on an EPSON controller                      when no answer comes
@@ -21,7 +21,13 @@ from contextlib import AbstractContextManager
 from typing import Generic, TypeVar
 
 from robolink.controllers.markers import MarkerStore, ProcedureLock
-from robolink.errors import ConfigError, ControllerFaultError, RejectedError, UnclearAnswerError
+from robolink.errors import (
+    ConfigError,
+    ControllerFaultError,
+    RejectedError,
+    RobolinkError,
+    UnclearAnswerError,
+)
 from robolink.messages import tr
 from robolink.model import EntryKind, Marker, MarkerKind, NewEntry, OutcomeLog
 from robolink.stop_latch import StopLatch
@@ -172,3 +178,11 @@ class DriverLink:
             unclear.remedy = command.told_by(found) or unclear.remedy
             raise unclear
         return found
+
+
+def advise_emergency_stop(error: RobolinkError) -> RobolinkError:
+    """Put in front of an error of a stop what a person has to do first."""
+    error.remedy = " ".join(
+        (tr("The stop is not confirmed: press the emergency stop."), error.remedy)
+    ).rstrip()
+    return error

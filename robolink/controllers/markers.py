@@ -9,7 +9,7 @@ from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from typing import Final
 
-from robolink.checkpoints import Point, checkpoint
+from robolink.checkpoints import Checkpoint, checkpoint
 from robolink.errors import (
     BusyError,
     JournalError,
@@ -52,7 +52,7 @@ class ProcedureLock:
             BusyError: Another thread holds it.
             StoppedError: A stop is in force, or came meanwhile.
         """
-        checkpoint(Point.PROCEDURE, request)
+        checkpoint(Checkpoint.PROCEDURE, request)
         if not self._lock.acquire(blocking=False):
             raise BusyError(
                 tr("{request} has to wait: another operation is under way.", request=request),

@@ -21,7 +21,7 @@ from robolink.timing import Deadline
 
 _POLL_S: Final = 0.02
 _REST_S: Final = 5.0
-"""Longest time from a stop to a state that shows rest (design part 4)."""
+"""Longest time from a stop to a state that shows rest (docs/reference/rules.md 5)."""
 
 
 class PolledGroup(MotionGroupCore):

@@ -1,9 +1,9 @@
 """What was in force before a procedure is put back at its end, whatever that end is.
 
 A calibration works in Tool 0, and the selection of an EPSON controller survives power-off
-(epson.md 3.1): left there, the next program would drive the flange where the nozzle tip belongs.
-So a durable marker names the cell's own tool before anything is changed, and goes only when that
-tool has been read back (design part 4).
+(docs/reference/epson.md 3.1): left there, the next program would drive the flange where the nozzle
+tip belongs. So a durable marker names the cell's own tool before anything is changed, and goes only
+when that tool has been read back (docs/reference/rules.md 4).
 """
 
 from collections.abc import Iterator, Mapping
@@ -14,6 +14,7 @@ from robolink.controllers.motion_group import MotionGroupCore
 from robolink.errors import ConfigError, JournalError, RobolinkError
 from robolink.messages import tr
 from robolink.model import EntryKind, Finding, Marker, MarkerKind, NewEntry, ToolTable, Verdict
+from robolink.ways import Way, way
 
 
 class Preserver:
@@ -124,7 +125,7 @@ def not_understood(marker: Marker) -> ConfigError:
     """Return the error for the marker of a procedure that something else has written."""
     return ConfigError(
         tr("The marker of {when} cannot be understood.", when=marker.begun_at),
-        remedy=tr("Select the right tool by hand, then 'robolink recover --forget'."),
+        remedy=tr("Select the right tool by hand, then {forget}.", forget=way(Way.FORGET_MARKER)),
     )
 
 

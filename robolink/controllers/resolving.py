@@ -17,6 +17,7 @@ from robolink.model import (
     plain_offset,
     read_offset,
 )
+from robolink.ways import Way, way
 
 _KINDS = {
     Verdict.DONE: EntryKind.DONE,
@@ -117,7 +118,7 @@ class MarkerResolver:
             return examine_write(self._tools, marker)
         raise ConfigError(
             tr("The marker of {when} cannot be understood.", when=marker.begun_at),
-            remedy=tr("Look at the controller, then 'robolink recover --forget'."),
+            remedy=tr("Look at the controller, then {forget}.", forget=way(Way.FORGET_MARKER)),
         )
 
     def settle(self, finding: Finding) -> None:

@@ -1,10 +1,12 @@
 """A stop from outside: reach the controller, stop it, see it rest, leave.
 
 Nothing stands before the Abort, Stop or 2003 frame: no journal, no lease, no question, and no
-import that the frame does not need (design part 4, docs/decisions/0017). What is imported inside
-the functions below is needed afterwards, or for one kind of controller only.
+import that the frame does not need (docs/decisions/0017-a-stop-has-its-own-way-to-the-wire.md).
+What is imported inside the functions below is needed afterwards, or for one kind of controller
+only.
 """
 
+from contextlib import suppress
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from robolink.errors import (
@@ -18,6 +20,9 @@ from robolink.messages import tr
 from robolink.transport import LinkUrl, parse_url
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from robolink.controllers.softmotion.link.wire import MailboxWire
     from robolink.model import Controller, ControllerStatus, Secret
     from robolink.timing import Clock
     from robolink.transport import TraceSink
@@ -34,6 +39,7 @@ def stop_now(
     timeout_s: float = 3.0,
     clock: "Clock | None" = None,
     trace: "TraceSink | None" = None,
+    met: "Callable[[str], None] | None" = None,
 ) -> "ControllerStatus":
     """Bring a controller to rest, whoever moves it, and return the state that shows it.
 
@@ -47,6 +53,8 @@ def stop_now(
         clock: Replaces the machine's clock; a simulator brings its own.
         trace: Called with (time in ns, "sent" or "received", bytes) for all traffic with an
             EPSON controller but the login frame.
+        met: Called with the name under which the controller is on record, once it stands and
+            where it says of itself who it is.
 
     Raises:
         ConfigError: The URL is wrong.
@@ -63,7 +71,7 @@ def stop_now(
     kinds = {"epson": _stop_epson, "softmotion": _stop_group, "plc": _stop_map}
     stop = kinds.get(link.kind, _stop_other)
     given = password if isinstance(password, str) else password.reveal() if password else ""
-    means = _Means(given, timeout_s, clock, trace)
+    means = _Means(given, timeout_s, clock, trace, met)
     for tries_left in reversed(range(_TRIES)):
         try:
             return stop(link, means)
@@ -93,14 +101,6 @@ def stop_requests(url: str) -> tuple[str, ...]:
     return ()
 
 
-def advise_emergency_stop(error: RobolinkError) -> RobolinkError:
-    """Put in front of an error of a stop what a person has to do first."""
-    error.remedy = " ".join(
-        (tr("The stop is not confirmed: press the emergency stop."), error.remedy)
-    ).rstrip()
-    return error
-
-
 class _Means(NamedTuple):
     """With what a controller is reached; see :func:`stop_now`."""
 
@@ -108,6 +108,7 @@ class _Means(NamedTuple):
     timeout_s: float
     clock: "Clock | None"
     trace: "TraceSink | None"
+    met: "Callable[[str], None] | None"
 
 
 def _stop_epson(link: LinkUrl, means: _Means) -> "ControllerStatus":
@@ -125,6 +126,8 @@ def _stop_epson(link: LinkUrl, means: _Means) -> "ControllerStatus":
         flags, code = line.stop()
         from robolink.controllers.epson.link.answers import status_from_flags
 
+        if means.met is not None and (name := line.who()):
+            means.met(name)
         line.leave(flags)
         return status_from_flags(flags, code)
     finally:
@@ -149,9 +152,21 @@ def _stop_group(link: LinkUrl, means: _Means) -> "ControllerStatus":
         now = bring_group_to_rest(commands, snapshots, wire.clock, controller=wire.identity)
         from robolink.controllers.softmotion.link.condition import status_of
 
+        if means.met is not None:
+            _tell_which(wire, means.met)
         return status_of(now)
     finally:
         wire.close()
+
+
+def _tell_which(wire: "MailboxWire", met: "Callable[[str], None]") -> None:
+    """Say which PLC stands now, where its program has a number."""
+    from robolink.controllers.softmotion.link.device import identity_of, read_device_id
+
+    with suppress(RobolinkError):
+        device_id = read_device_id(wire)
+        if device_id is not None:
+            met(identity_of(wire, device_id).name)
 
 
 def _stop_other(link: LinkUrl, means: _Means) -> "ControllerStatus":

@@ -29,6 +29,7 @@ from robolink.errors import (
 )
 from robolink.messages import tr
 from robolink.model import ANY, Expected, ToolOffset, ToolReceipt
+from robolink.ways import Way, way
 
 
 class ToolTableCore(ABC):
@@ -90,6 +91,10 @@ class ToolTableCore(ABC):
     def _requests(self, tool: int, requested: ToolOffset | None) -> tuple[str, ...]:
         """Return all that :meth:`_set` sends besides its reads, as it stands on the wire."""
         return (self._as_sent(self._request(tool, requested)),)
+
+    def _clear_request(self, tool: int) -> str:
+        """Return what clearing is called before it is known whether that is possible."""
+        return self._request(tool, None)
 
     def _storable(self, tool: int, offset: ToolOffset) -> ToolOffset:
         """Return what the controller can hold of an offset."""
@@ -159,7 +164,7 @@ class ToolTableCore(ABC):
     ) -> ToolReceipt:
         """Clear and read back; see :class:`robolink.model.ToolTable`."""
         self.require_writable(tool)
-        with self._driver.lock.held(self._request(tool, None)):
+        with self._driver.lock.held(self._clear_request(tool)):
             self._require_clearable(tool)
             if not self._would_lose_selection(tool, expected, then_select):
                 return self._set(tool, None, expected)
@@ -257,7 +262,8 @@ class ToolTableCore(ABC):
                 raise
 
     def _require_defined(self, tool: int) -> ToolOffset:
-        # Tool n on an undefined tool leaves an EPSON controller in error (epson.md 1.5).
+        # Tool n on an undefined tool leaves an EPSON controller in error
+        # (docs/reference/epson.md 1.5).
         offset = self.read(tool)
         if offset is None:
             raise UndefinedToolError(
@@ -323,8 +329,9 @@ def require_replacement(tool: int, then_select: int | None) -> int:
         raise SelectedToolError(
             tr("Tool {tool} is selected, so it was not cleared.", tool=tool),
             remedy=tr(
-                "Say which tool the machine is to have in its place: --then-select NUMBER, 0 for "
-                "the flange; the programs of the machine go on with that one."
+                "Say which tool the machine is to have in its place: {then_select}, 0 for the "
+                "flange; the programs of the machine go on with that one.",
+                then_select=way(Way.THEN_SELECT),
             ),
         )
     return then_select

@@ -1,4 +1,6 @@
-"""Compare-and-set of a tool offset: the same for every kind of controller (design part 4).
+"""Compare-and-set of a tool offset: the same for every kind of controller.
+
+Source: docs/reference/rules.md 2.
 
 Read; equal to what is wanted: nothing is written, because a write wears the controller's
 memory; not what was expected: nothing is written either; else a durable intent, one write,

@@ -6,10 +6,10 @@ from dataclasses import fields
 from typing import TYPE_CHECKING, Any, Final, cast
 
 from robolink.errors import JournalError
-from robolink.journal._chain import ChainCheck
-from robolink.journal._records import Filter, Verification
-from robolink.journal.leases.processes import Holder
-from robolink.journal.logs.outcome_log import JournalOutcomeLog
+from robolink.journal._outcome_log import JournalOutcomeLog
+from robolink.journal._processes import LeaseHolder
+from robolink.journal._records import ChainVerification, Filter
+from robolink.journal.store.chain import ChainCheck
 from robolink.messages import tr
 from robolink.model import EntryKind, Marker, Recorded, Signature
 from robolink.timing import Clock
@@ -58,7 +58,7 @@ class Journal:
         controller: str,
         *,
         signature: Signature | None = None,
-        holder: Holder | None = None,
+        holder: LeaseHolder | None = None,
         clock: Clock | None = None,
     ) -> JournalOutcomeLog:
         """Return the log of one controller.
@@ -133,7 +133,7 @@ class Journal:
                 return _entry(row)
         return None
 
-    def verify(self, progress: Callable[[int, int], None] | None = None) -> Verification:
+    def verify(self, progress: Callable[[int, int], None] | None = None) -> ChainVerification:
         """Check that no entry was changed and none is missing.
 
         Args:
@@ -155,7 +155,7 @@ class Journal:
             if progress is not None:
                 progress(check.checked, max(last, check.checked))
         problems += check.problems_at_end(head)
-        return Verification(check.checked, tuple(problems), check.number, check.hash)
+        return ChainVerification(check.checked, tuple(problems), check.number, check.hash)
 
     def count(self) -> int:
         """Return how many entries there are.

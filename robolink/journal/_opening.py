@@ -4,8 +4,8 @@ import threading
 from typing import TYPE_CHECKING, Final
 
 from robolink.errors import JournalError
-from robolink.journal._places import Place, default_location, memory_place, place_of
-from robolink.journal.logs.looking import LookingLog
+from robolink.journal._looking import LookingLog
+from robolink.journal._places import JournalPlace, default_location, memory_place, place_of
 from robolink.model import OutcomeLog, Signature
 
 if TYPE_CHECKING:
@@ -82,7 +82,7 @@ def close_files() -> None:
                 journal.close()
 
 
-def _open(place: Place, *, read_only: bool) -> "Journal":
+def _open(place: JournalPlace, *, read_only: bool) -> "Journal":
     from robolink.journal._journal import Journal
     from robolink.journal.store.store import Store  # here, because it loads SQLAlchemy
 

@@ -13,7 +13,7 @@ _SQLITE: Final = "sqlite:///"
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class JournalPlace:
     """Where one journal is: a file, a server, or the memory of this process.
 
     Attributes:
@@ -52,24 +52,26 @@ def may_exist(location: str) -> bool:
     return path is None or path.exists()
 
 
-def place_of(location: str) -> Place:
+def place_of(location: str) -> JournalPlace:
     """Understand a URL or a path.
 
     A PostgreSQL URL without a driver means psycopg. Nothing is opened.
 
     Raises:
-        JournalError: It is neither a file nor a PostgreSQL database.
+        JournalError: It is neither a file nor a PostgreSQL database; a pipe, for which SQLite
+            would wait for ever, is no file.
     """
     if "://" not in location:
         location = _file_location(Path(location))
     if location.startswith(_SQLITE) and location != _SQLITE:
         path = Path(location.removeprefix(_SQLITE)).absolute()
-        return Place(_file_location(path), str(path), path=path)
+        _require_regular(path)
+        return JournalPlace(_file_location(path), str(path), path=path)
     scheme, _, rest = location.partition("://")
     if scheme in ("postgresql", "postgresql+psycopg") and rest:
         url = f"postgresql+psycopg://{rest}"
         shown = f"postgresql+psycopg://{_without_password(rest)}"
-        return Place(shown, shown, url=url)
+        return JournalPlace(shown, shown, url=url)
     raise JournalError(
         tr("robolink keeps no journal in {scheme!r} databases.", scheme=scheme),
         remedy=tr(
@@ -79,10 +81,22 @@ def place_of(location: str) -> Place:
     )
 
 
-def memory_place(identity: str) -> Place:
+def memory_place(identity: str) -> JournalPlace:
     """Return the place of a journal that ends with this process."""
     name = tr("in memory, of {identity}", identity=identity)
-    return Place("sqlite://", name)
+    return JournalPlace("sqlite://", name)
+
+
+def _require_regular(path: Path) -> None:
+    try:
+        special = path.exists() and not path.is_file()
+    except OSError:
+        return  # opening it says why
+    if special:
+        raise JournalError(
+            tr("The journal {path} is no regular file.", path=path),
+            remedy=tr("Name a file, or a PostgreSQL database, in ROBOLINK_JOURNAL."),
+        )
 
 
 def _file_location(path: Path) -> str:

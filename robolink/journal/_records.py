@@ -6,7 +6,7 @@ from robolink.model import EntryKind
 
 
 @dataclass(frozen=True, slots=True)
-class Verification:
+class ChainVerification:
     """Whether the record is whole.
 
     Attributes:

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from robolink.model._geometry import rotate_xy as rotate_xy
     from robolink.model._identity import Identity as Identity
     from robolink.model._identity import Who as Who
+    from robolink.model._identity import is_own_name as is_own_name
     from robolink.model._journal_entries import EntryKind as EntryKind
     from robolink.model._journal_entries import NewEntry as NewEntry
     from robolink.model._journal_entries import Recorded as Recorded
@@ -72,7 +73,7 @@ else:
             "_facts": "ControllerFacts",
             "_findings": "Finding Resolver Verdict",
             "_geometry": "Hand Pose angle_difference_deg rotate_xy",
-            "_identity": "Identity Who",
+            "_identity": "Identity Who is_own_name",
             "_journal_entries": "EntryKind NewEntry Recorded Signature",
             "_ledger": "Account Ledger",
             "_motion": "Motion MotionGroup MotionOutcome MotionProfile MotionTerms Path WorkBox",

@@ -31,7 +31,7 @@ class InputEdge:
         """Refuse an input that shows already what the movement waits for.
 
         An EPSON controller would take such a movement for finished at once, and a PLC would drive
-        on to the target, the tip perhaps in contact (spel.md 7.1, design part 7).
+        on to the target, the tip perhaps in contact (docs/reference/spel.md 7.1, docs/mailbox.md).
 
         Args:
             on: Whether the input is on before the movement begins.

@@ -1,50 +1,37 @@
 """The nozzle change: measure the new tips, write their offsets, prove them, or undo it."""
 
-from robolink.nozzle_change._camera_to_find import CameraToFind as CameraToFind
-from robolink.nozzle_change._change import Earlier as Earlier
-from robolink.nozzle_change._change import NozzleChange as NozzleChange
-from robolink.nozzle_change._crossed_beams import CrossedBeams as CrossedBeams
-from robolink.nozzle_change._deferred import Deferred as Deferred
-from robolink.nozzle_change._flange import flange_pose as flange_pose
-from robolink.nozzle_change._gate import Gate as Gate
-from robolink.nozzle_change._given_poses import GivenPoses as GivenPoses
-from robolink.nozzle_change._given_poses import PointReader as PointReader
-from robolink.nozzle_change._given_poses import PosesFound as PosesFound
-from robolink.nozzle_change._given_poses import taught_poses as taught_poses
-from robolink.nozzle_change._held_board import HeldBoard as HeldBoard
-from robolink.nozzle_change._listener import Listener as Listener
-from robolink.nozzle_change._listener import Moment as Moment
-from robolink.nozzle_change._one_touch import OneTouch as OneTouch
-from robolink.nozzle_change._pin_record import LastTouch as LastTouch
-from robolink.nozzle_change._pin_record import find_last_touch as find_last_touch
-from robolink.nozzle_change._plan import ChangePlan as ChangePlan
-from robolink.nozzle_change._plan import Limits as Limits
-from robolink.nozzle_change._plan import ToolPlan as ToolPlan
-from robolink.nozzle_change._plan import require_ready as require_ready
-from robolink.nozzle_change._pose_methods import ManyTouches as ManyTouches
-from robolink.nozzle_change._pose_methods import PivotTouches as PivotTouches
-from robolink.nozzle_change._pose_methods import PoseMethod as PoseMethod
-from robolink.nozzle_change._pose_methods import SixPoints as SixPoints
-from robolink.nozzle_change._pose_methods import TwoTouches as TwoTouches
-from robolink.nozzle_change._preview import PlannedStep as PlannedStep
-from robolink.nozzle_change._preview import flange_now as flange_now
-from robolink.nozzle_change._preview import foresee as foresee
-from robolink.nozzle_change._preview import preview as preview
-from robolink.nozzle_change._preview import require_inside as require_inside
-from robolink.nozzle_change._proposal import ChangeReport as ChangeReport
-from robolink.nozzle_change._proposal import Proposal as Proposal
-from robolink.nozzle_change._proposal import ToolReport as ToolReport
-from robolink.nozzle_change._source import Bench as Bench
-from robolink.nozzle_change._source import Equipped as Equipped
-from robolink.nozzle_change._source import MovingSource as MovingSource
-from robolink.nozzle_change._source import TipSource as TipSource
-from robolink.nozzle_change._station_learning import learn_station as learn_station
-from robolink.nozzle_change._tilted_pin import TiltedPin as TiltedPin
-from robolink.nozzle_change._tilting import require_tilting as require_tilting
-from robolink.nozzle_change._touch_probe import TouchProbe as TouchProbe
-from robolink.nozzle_change._touch_solvers import Absolute as Absolute
-from robolink.nozzle_change._touch_solvers import Difference as Difference
-from robolink.nozzle_change._touch_solvers import difference_from_last as difference_from_last
-from robolink.nozzle_change._touching import PinAndPerson as PinAndPerson
-from robolink.nozzle_change._up_camera import UpCamera as UpCamera
-from robolink.nozzle_change._verdict import Verdict as Verdict
+from typing import TYPE_CHECKING
+
+from robolink.lazy_exports import lazy_exports
+
+if TYPE_CHECKING:
+    from robolink.nozzle_change._acceptance import AcceptanceCriteria as AcceptanceCriteria
+    from robolink.nozzle_change._change import Earlier as Earlier
+    from robolink.nozzle_change._change import NozzleChange as NozzleChange
+    from robolink.nozzle_change._listener import Listener as Listener
+    from robolink.nozzle_change._listener import Moment as Moment
+    from robolink.nozzle_change._plan import ChangePlan as ChangePlan
+    from robolink.nozzle_change._plan import Limits as Limits
+    from robolink.nozzle_change._plan import ToolPlan as ToolPlan
+    from robolink.nozzle_change._plan import require_ready as require_ready
+    from robolink.nozzle_change._preview import PlannedStep as PlannedStep
+    from robolink.nozzle_change._preview import flange_now as flange_now
+    from robolink.nozzle_change._preview import foresee as foresee
+    from robolink.nozzle_change._preview import preview as preview
+    from robolink.nozzle_change._preview import require_inside as require_inside
+    from robolink.nozzle_change._proposal import ChangeReport as ChangeReport
+    from robolink.nozzle_change._proposal import Proposal as Proposal
+    from robolink.nozzle_change._proposal import ToolReport as ToolReport
+    from robolink.nozzle_change._proposal import Verdict as Verdict
+
+__getattr__ = lazy_exports(
+    __name__,
+    {
+        "_acceptance": "AcceptanceCriteria",
+        "_change": "Earlier NozzleChange",
+        "_listener": "Listener Moment",
+        "_plan": "ChangePlan Limits ToolPlan require_ready",
+        "_preview": "PlannedStep flange_now foresee preview require_inside",
+        "_proposal": "ChangeReport Proposal ToolReport Verdict",
+    },
+)

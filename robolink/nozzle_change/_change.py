@@ -1,6 +1,6 @@
 """The nozzle change: measure the new tips, write their offsets, prove them, or take all back.
 
-Order (design parts 4 and 8): read the old values; measure, in Tool 0 where the robot moves;
+Order (docs/reference/rules.md 4, 6): read the old values; measure, in Tool 0 where the robot moves;
 judge; propose; on a yes write with compare-and-set and read back; turn about the new tips;
 keep, or write the old values back once. Several tools are all measured before the first is
 written. Whatever happens, the tool, power mode and speed of before are put back at the end.
@@ -18,8 +18,8 @@ from robolink.nozzle_change._measuring import Measuring
 from robolink.nozzle_change._plan import ChangePlan, ToolPlan
 from robolink.nozzle_change._proposal import ChangeReport, Proposal, ToolReport
 from robolink.nozzle_change._records import decision_entry, refusal_entry, verification_entry
-from robolink.nozzle_change._source import Bench
 from robolink.nozzle_change._station_check import Proposals, check_stations, stations_found
+from robolink.procedures import MeasurementContext
 from robolink.runner import Operator
 from robolink.transaction import ToolChange, Wanted
 
@@ -91,34 +91,34 @@ class NozzleChange:
             # What the write would be refused for is said before a person has measured anything.
             for one in self._plan.tools:
                 self._controller.tools.require_writable(one.tool)
-        plan, listener, bench = self._plan, self._listener, self._bench()
-        measuring = Measuring(bench, listener)
+        plan, listener, context = self._plan, self._listener, self._context()
+        measuring = Measuring(context, listener)
         measuring.go_to(plan.safe, tr("go to the safe pose"))
-        listener.moment(Moment.START, bench)
+        listener.moment(Moment.START, context)
         proposals: Proposals = [(one, measuring.propose(one)) for one in plan.tools]
         proposals = self._checked(proposals)
         listener.proposed([proposal for _, proposal in proposals])
         self._judge(proposals)
         if write:
-            listener.moment(Moment.BEFORE_WRITE, bench)
-            self._ask(bench)
-            reports = self._write(bench, proposals)
+            listener.moment(Moment.BEFORE_WRITE, context)
+            self._ask(context)
+            reports = self._write(context, proposals)
         else:
             reports = tuple(
-                ToolReport(proposal, None, None, one.gate.verdicts(proposal))
+                ToolReport(proposal, None, None, one.criteria.verdicts(proposal))
                 for one, proposal in proposals
             )
         measuring.go_to(plan.safe, tr("go to the safe pose"))
-        listener.moment(Moment.END, bench)
+        listener.moment(Moment.END, context)
         return ChangeReport(self._controller.outcomes.change, reports)
 
-    def _bench(self) -> Bench:
+    def _context(self) -> MeasurementContext:
         start = None
         if self._plan.moves:
             self._controller.tools.select(0)
             start = self._controller.groups[0].pose()
         settings = self._plan.limits.settings
-        return Bench(
+        return MeasurementContext(
             self._controller,
             self._operator,
             start=start,
@@ -132,19 +132,19 @@ class NozzleChange:
             return check_stations(self._controller, proposals)
         except CalibrationError as error:
             for plan, _ in proposals:
-                self._controller.outcomes.append(refusal_entry(plan.tool, plan.gate, error))
+                self._controller.outcomes.append(refusal_entry(plan.tool, plan.criteria, error))
             raise
 
     def _judge(self, proposals: Proposals) -> None:
         for plan, proposal in proposals:
             try:
-                plan.gate.judge_change(
+                plan.criteria.judge_change(
                     proposal, earlier_mm=self._earlier(plan.tool), remedy=plan.source.remedy
                 )
             except BaseException as error:
-                self._controller.outcomes.append(refusal_entry(plan.tool, plan.gate, error))
+                self._controller.outcomes.append(refusal_entry(plan.tool, plan.criteria, error))
                 raise
-            if plan.gate.jumps(proposal):
+            if plan.criteria.jumps(proposal):
                 require_engineer(
                     self._controller.outcomes,
                     tr(
@@ -154,13 +154,13 @@ class NozzleChange:
                     ),
                 )
 
-    def _ask(self, bench: Bench) -> None:
+    def _ask(self, context: MeasurementContext) -> None:
         outcomes = self._controller.outcomes
         if not self._plan.ask_before_write:
             outcomes.append(decision_entry(tr("accepted beforehand"), accepted=True))
             return
         numbers = ", ".join(str(plan.tool) for plan in self._plan.tools)
-        accepted = bench.runner().confirm(tr("Write this to tool {tool}?", tool=numbers))
+        accepted = context.runner().confirm(tr("Write this to tool {tool}?", tool=numbers))
         verdict = tr("accepted") if accepted else tr("declined")
         outcomes.append(decision_entry(verdict, accepted=accepted))
         if not accepted:
@@ -168,7 +168,7 @@ class NozzleChange:
                 tr("The proposal was not accepted."), remedy=tr("Nothing was written.")
             )
 
-    def _write(self, bench: Bench, proposals: Proposals) -> tuple[ToolReport, ...]:
+    def _write(self, context: MeasurementContext, proposals: Proposals) -> tuple[ToolReport, ...]:
         """Write all, verify each, keep all; an error on the way takes all back."""
         verify = any(plan.verify and plan.moving for plan, _ in proposals)
         wanted = [
@@ -184,8 +184,8 @@ class NozzleChange:
                 ToolReport(
                     proposal,
                     receipt,
-                    self._verify(bench, plan, proposal, receipt),
-                    plan.gate.verdicts(proposal),
+                    self._verify(context, plan, proposal, receipt),
+                    plan.criteria.verdicts(proposal),
                 )
                 for (plan, proposal), receipt in zip(proposals, receipts, strict=True)
             )
@@ -194,19 +194,19 @@ class NozzleChange:
         return reports
 
     def _verify(
-        self, bench: Bench, plan: ToolPlan, proposal: Proposal, receipt: ToolReceipt
+        self, context: MeasurementContext, plan: ToolPlan, proposal: Proposal, receipt: ToolReceipt
     ) -> VerifyResult | None:
         source = plan.moving
         if source is None or not plan.verify:
             return None
-        tool, gate = receipt.tool, plan.gate
-        with bench.telling(lambda done: self._listener.step(tool, done)):
+        tool, criteria = receipt.tool, plan.criteria
+        with context.telling(lambda done: self._listener.step(tool, done)):
             result = source.verify(
-                bench,
+                context,
                 tool,
                 proposal.result,
                 tip=proposal.tip,
-                tolerance_mm=gate.drift_tolerance_mm,
+                tolerance_mm=criteria.drift_tolerance_mm,
             )
         self._controller.outcomes.append(verification_entry(tool, result))
         self._listener.verified(tool, result)
@@ -216,7 +216,7 @@ class NozzleChange:
                     "The tip drifts {drift:.3f} mm when the tool turns; {limit:.3f} mm are "
                     "allowed.",
                     drift=result.max_drift_mm,
-                    limit=gate.drift_tolerance_mm,
+                    limit=criteria.drift_tolerance_mm,
                 ),
                 remedy=tr("Check that the nozzle sits firmly and measure again."),
                 controller=self._controller.identity,

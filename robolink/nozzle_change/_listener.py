@@ -7,7 +7,7 @@ from robolink.calibration import VerifyResult
 from robolink.errors import CalibrationError
 from robolink.model import ToolReceipt
 from robolink.nozzle_change._proposal import Proposal
-from robolink.nozzle_change._source import Bench
+from robolink.procedures import MeasurementContext
 from robolink.runner import StepDone
 
 
@@ -27,7 +27,7 @@ class Listener:
     Whatever a method raises ends the change, as Ctrl-C would at that place.
     """
 
-    def moment(self, moment: Moment, bench: Bench, tool: int | None = None) -> None:
+    def moment(self, moment: Moment, context: MeasurementContext, tool: int | None = None) -> None:
         """Stand between two phases; ``tool`` where the moment belongs to one."""
 
     def step(self, tool: int, done: StepDone) -> None:
@@ -36,7 +36,7 @@ class Listener:
     def refused(self, tool: int, error: CalibrationError, *, again: bool) -> None:
         """Hear that a measurement is not believed, and whether it is taken again."""
 
-    def adjusted(self, proposal: Proposal, bench: Bench) -> Proposal:  # noqa: ARG002 - for overriding
+    def adjusted(self, proposal: Proposal, context: MeasurementContext) -> Proposal:  # noqa: ARG002 - for overriding
         """Return what is to be proposed instead of the bare measurement."""
         return proposal
 

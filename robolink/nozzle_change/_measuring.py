@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
-from robolink.calibration import Ask, Look, Offer, Seek, travel
 from robolink.errors import CalibrationError, ConfigError, RobolinkError
 from robolink.messages import tr
 from robolink.model import NewEntry, Pose
@@ -11,20 +10,20 @@ from robolink.nozzle_change._listener import Listener, Moment
 from robolink.nozzle_change._plan import ToolPlan
 from robolink.nozzle_change._proposal import Proposal
 from robolink.nozzle_change._records import calibration_entry, decision_entry, refusal_entry
-from robolink.nozzle_change._source import Bench
-from robolink.runner import StepDone
+from robolink.procedures import MeasurementContext, approach_path
+from robolink.runner import Ask, Confirm, Look, Seek, StepDone
 
 
 class Measuring:
     """Measures the tools of one change.
 
     Args:
-        bench: What the sources work with.
+        context: What the sources work with.
         listener: Told of steps and refusals.
     """
 
-    def __init__(self, bench: Bench, listener: Listener) -> None:
-        self._bench = bench
+    def __init__(self, context: MeasurementContext, listener: Listener) -> None:
+        self._context = context
         self._listener = listener
 
     def propose(self, plan: ToolPlan) -> Proposal:
@@ -47,24 +46,24 @@ class Measuring:
         """Drive the flange to ``pose``: up, over, down; nowhere when there is none."""
         if pose is None:
             return
-        controller = self._bench.controller
+        controller = self._context.controller
         controller.tools.select(0)
         here = controller.groups[0].pose()
         target = Pose(*pose.coordinates(), hand=here.hand, local=here.local, tool=0)
-        self._bench.run(travel(target, here=here, purpose=purpose))
+        self._context.run(approach_path(target, here=here, purpose=purpose))
 
     def _attempt(self, plan: ToolPlan) -> Proposal:
-        bench, tool = self._bench, plan.tool
+        context, tool = self._context, plan.tool
         self.go_to(plan.approach, tr("go to where tool {tool} is measured", tool=tool))
-        self._listener.moment(Moment.BEFORE_MEASURE, bench, tool)
-        before = bench.controller.tools.read(tool)
+        self._listener.moment(Moment.BEFORE_MEASURE, context, tool)
+        before = context.controller.tools.read(tool)
         with self._watched(plan):
-            result = plan.source.measure(bench, tool, before)
-            plan.gate.judge_fit(result)
-            proposal = self._listener.adjusted(Proposal(tool, before, result), bench)
-        entry = calibration_entry(proposal, plan.gate, source=plan.source.sentence)
-        bench.controller.outcomes.append(entry)
-        self._listener.moment(Moment.AFTER_MEASURE, bench, tool)
+            result = plan.source.measure(context, tool, before)
+            plan.criteria.judge_fit(result)
+            proposal = self._listener.adjusted(Proposal(tool, before, result), context)
+        entry = calibration_entry(proposal, plan.criteria, source=plan.source.sentence)
+        context.controller.outcomes.append(entry)
+        self._listener.moment(Moment.AFTER_MEASURE, context, tool)
         self.go_to(plan.retreat, tr("go away from where tool {tool} is measured", tool=tool))
         return proposal
 
@@ -72,25 +71,25 @@ class Measuring:
     def _watched(self, plan: ToolPlan) -> Iterator[None]:
         """Tell of each step; when the measurement ends early, keep its poses on record."""
         poses: list[Pose] = []
-        log = self._bench.controller.outcomes
+        log = self._context.controller.outcomes
 
         def on_step(done: StepDone) -> None:
             if done.pose is not None and isinstance(done.step, (Ask, Seek, Look)):
                 poses.append(done.pose)
-            if isinstance(done.step, Offer) and done.accepted is not None:
+            if isinstance(done.step, Confirm) and done.accepted is not None:
                 answer = tr("accepted") if done.accepted else tr("declined")
                 details = {"question": done.step.question, "tool": plan.tool}
                 log.append(decision_entry(answer, **details))
             self._listener.step(plan.tool, done)
 
-        with self._bench.telling(on_step):
+        with self._context.telling(on_step):
             try:
                 yield
             except BaseException as error:
-                self._record_end(refusal_entry(plan.tool, plan.gate, error, poses=poses))
+                self._record_end(refusal_entry(plan.tool, plan.criteria, error, poses=poses))
                 raise
 
     def _record_end(self, entry: NewEntry) -> None:
         # The error that is under way matters more than that it cannot be recorded.
         with suppress(ConfigError, RobolinkError):
-            self._bench.controller.outcomes.append(entry)
+            self._context.controller.outcomes.append(entry)

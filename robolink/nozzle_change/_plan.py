@@ -3,12 +3,12 @@
 import math
 from dataclasses import dataclass, field
 
+from robolink.methods import TwoPoseSource
 from robolink.model import Pose, ToolOffset, WorkBox, plain_offset
-from robolink.nozzle_change._gate import Gate
+from robolink.nozzle_change._acceptance import AcceptanceCriteria
 from robolink.nozzle_change._pin_record import touch_details
 from robolink.nozzle_change._proposal import Proposal
-from robolink.nozzle_change._source import Equipped, MovingSource, TipSource
-from robolink.nozzle_change._touching import PinAndPerson
+from robolink.procedures import MovingSource, RequiresSensor, TipSource
 from robolink.runner import RunSettings
 
 
@@ -56,7 +56,7 @@ class ToolPlan:
     Attributes:
         tool: Number of the tool whose nozzle was changed.
         source: Where its measurement comes from.
-        gate: What a measurement must be like to be believed.
+        criteria: What a measurement must be like to be believed.
         verify: Whether to turn about the new tip after the write, where the source can.
         attempts: How often it is measured before a refusal ends the change.
         approach: Flange pose from which it is measured, ``None`` for wherever the robot is.
@@ -65,8 +65,8 @@ class ToolPlan:
     """
 
     tool: int
-    source: TipSource = field(default_factory=PinAndPerson)
-    gate: Gate = field(default_factory=Gate)
+    source: TipSource = field(default_factory=TwoPoseSource)
+    criteria: AcceptanceCriteria = field(default_factory=AcceptanceCriteria)
     verify: bool = True
     attempts: int = 1
     approach: Pose | None = None
@@ -121,8 +121,8 @@ def require_ready(plan: ChangePlan) -> None:
     """Find out whether the cameras of a plan are there, before anything moves.
 
     Raises:
-        CalibrationError, ConfigError, ConnectError: As :meth:`Equipped.require_ready`.
+        CalibrationError, ConfigError, ConnectError: As :meth:`RequiresSensor.require_ready`.
     """
     for one in plan.tools:
-        if isinstance(one.source, Equipped):
+        if isinstance(one.source, RequiresSensor):
             one.source.require_ready()

@@ -4,18 +4,7 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from robolink.calibration import (
-    Ask,
-    Look,
-    Move,
-    Offer,
-    Procedure,
-    Seek,
-    SeenAt,
-    Shown,
-    Tell,
-    travel,
-)
+from robolink.calibration import flange_of
 from robolink.errors import CalibrationError, LimitError
 from robolink.messages import tr
 from robolink.model import (
@@ -29,10 +18,20 @@ from robolink.model import (
     SpotUnit,
     ToolOffset,
 )
-from robolink.nozzle_change._flange import flange_of
 from robolink.nozzle_change._plan import ChangePlan
-from robolink.nozzle_change._source import MovingSource
-from robolink.runner import RunSettings
+from robolink.procedures import MovingSource, approach_path
+from robolink.runner import (
+    Ask,
+    Confirm,
+    Look,
+    Move,
+    Notify,
+    Procedure,
+    RunSettings,
+    Seek,
+    SeenAt,
+    TeachPrompt,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +52,7 @@ class PlannedStep:
     profile: MotionProfile | None = None
     edge: InputEdge | None = None
     refusal: str = ""
-    shown: Shown | None = None
+    shown: TeachPrompt | None = None
 
     def requests(self, group: MotionGroup) -> tuple[str, ...]:
         """Return what the step would send besides its reads, as it stands on the wire."""
@@ -133,7 +132,7 @@ def _procedures(
 def _journey(target: Pose | None, purpose: str, here: Pose) -> Procedure[object]:
     if target is not None:
         goal = Pose(*target.coordinates(), hand=here.hand, local=here.local, tool=0)
-        yield from travel(goal, here=here, purpose=purpose)
+        yield from approach_path(goal, here=here, purpose=purpose)
     return None
 
 
@@ -155,7 +154,7 @@ def _follow(
         return here
     try:
         while True:
-            if isinstance(step, (Tell, Offer)):
+            if isinstance(step, (Notify, Confirm)):
                 # What it would say depends on poses that nobody took.
                 step = procedure.send(None)
                 continue

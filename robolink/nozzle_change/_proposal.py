@@ -1,4 +1,4 @@
-"""What was measured, next to what is stored, and what became of it."""
+"""What a limit says about a proposal."""
 
 import math
 from collections.abc import Mapping
@@ -7,7 +7,28 @@ from typing import Literal
 
 from robolink.calibration import CalibrationResult, VerifyResult
 from robolink.model import ToolOffset, ToolReceipt
-from robolink.nozzle_change._verdict import Verdict
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """What one limit says about a proposal.
+
+    Attributes:
+        code: With which code a measurement beyond the limit is refused.
+        name: What is limited, in words.
+        found_mm: What was found.
+        limit_mm: What is allowed.
+    """
+
+    code: str
+    name: str
+    found_mm: float
+    limit_mm: float
+
+    @property
+    def passed(self) -> bool:
+        """Whether it is allowed."""
+        return self.found_mm <= self.limit_mm
 
 
 @dataclass(frozen=True, slots=True)

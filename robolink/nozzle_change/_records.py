@@ -3,15 +3,16 @@
 from collections.abc import Sequence
 from dataclasses import asdict, fields
 
-from robolink.calibration import CalibrationResult, SeenAt, VerifyResult
+from robolink.calibration import CalibrationResult, VerifyResult
 from robolink.errors import CalibrationError, RobolinkError
 from robolink.messages import tr
 from robolink.model import EntryKind, NewEntry, Pose, describe_offset, plain_offset
-from robolink.nozzle_change._gate import Gate
+from robolink.nozzle_change._acceptance import AcceptanceCriteria
 from robolink.nozzle_change._proposal import Proposal
+from robolink.runner import SeenAt
 
 
-def calibration_entry(proposal: Proposal, gate: Gate, *, source: str) -> NewEntry:
+def calibration_entry(proposal: Proposal, criteria: AcceptanceCriteria, *, source: str) -> NewEntry:
     """Return the record of a measurement that was believed, with all that it rests on."""
     result = proposal.result
     details: dict[str, object] = {
@@ -27,20 +28,20 @@ def calibration_entry(proposal: Proposal, gate: Gate, *, source: str) -> NewEntr
     return NewEntry(
         EntryKind.CALIBRATION,
         tool=proposal.tool,
-        tolerance=gate.tolerance,
+        tolerance=criteria.tolerance,
         verdict=verdict,
         details=details,
     )
 
 
 def refusal_entry(
-    tool: int, gate: Gate, error: BaseException, *, poses: Sequence[Pose] = ()
+    tool: int, criteria: AcceptanceCriteria, error: BaseException, *, poses: Sequence[Pose] = ()
 ) -> NewEntry:
     """Return the record of a measurement that was not believed, or not finished.
 
     Args:
         tool: Number of the tool.
-        gate: What was allowed.
+        criteria: What was allowed.
         error: What ended it.
         poses: The touches so far; they are for the record and never used again.
     """
@@ -49,7 +50,7 @@ def refusal_entry(
     return NewEntry(
         EntryKind.REFUSED,
         tool=tool,
-        tolerance=gate.tolerance,
+        tolerance=criteria.tolerance,
         verdict=why,
         details={"code": code, "poses": [_pose(pose) for pose in poses], **_seen(poses)},
     )

@@ -7,12 +7,14 @@ from dataclasses import replace
 from robolink.calibration import StationShift, TipShift, judge_shifts
 from robolink.errors import CalibrationError
 from robolink.messages import tr
+from robolink.methods import KEPT
 from robolink.model import Controller, EntryKind, NewEntry, rotate_xy
-from robolink.nozzle_change._camera_to_find import CameraToFind
-from robolink.nozzle_change._pin_record import FULL_METHODS, KEPT, found_pin
+from robolink.nozzle_change._pin_record import FULL_METHODS, found_pin
 from robolink.nozzle_change._plan import ToolPlan
 from robolink.nozzle_change._proposal import Proposal
+from robolink.procedures import FindsStation
 from robolink.stations import Station, find_stations, station_entry
+from robolink.ways import Way, way
 
 Proposals = Sequence[tuple[ToolPlan, Proposal]]
 
@@ -49,8 +51,8 @@ def stations_found(proposals: Proposals) -> Iterator[NewEntry]:
     """Yield what calibrations that were kept say about where pins are, and how cameras see."""
     for plan, proposal in proposals:
         found = found_pin(plan.pin, proposal) if plan.pin else None
-        if isinstance(plan.source, CameraToFind):
-            found = plan.source.found(proposal.result, proposal.tool)
+        if isinstance(plan.source, FindsStation):
+            found = plan.source.found_station(proposal.result, proposal.tool)
         if found is not None:
             yield station_entry(found)
 
@@ -125,9 +127,9 @@ def _refusal(station: str, shift: StationShift) -> CalibrationError:
         "station_moved",
         _sentence(station, shift),
         remedy=tr(
-            "Nothing was written. Fasten the pin, find it again with a full calibration ('robolink "
-            "calibrate n-angle --station {station}'), then touch it with each tool.",
-            station=station,
+            "Nothing was written. Fasten the pin, find it again with a full calibration "
+            "({calibrate}), then touch it with each tool.",
+            calibrate=way(Way.CALIBRATE_AT, station=station),
         ),
     )
 

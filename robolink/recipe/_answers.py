@@ -5,10 +5,11 @@ from dataclasses import dataclass, field
 
 from robolink.errors import ConfigError, DeclinedError
 from robolink.messages import tr
-from robolink.nozzle_change import Bench
+from robolink.procedures import MeasurementContext
 from robolink.recipe._recipe import Recipe
 from robolink.recipe._tables import Prompt
 from robolink.runner import MOST_REFUSED, parse_decimal
+from robolink.ways import Way, way
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,23 +41,23 @@ class Answers:
         return self.texts.get(number)
 
     def missing(self, recipe: Recipe) -> Iterator[str]:
-        """Yield what nobody answered beforehand, as the options that would."""
+        """Yield what nobody answered beforehand, as what would."""
         for number, prompt in enumerate(recipe.prompts, start=1):
             if self.prepared(number, prompt) is None:
                 yield _option(number, prompt)
         if recipe.z == "kept" and not self.yes:
-            yield "--yes"
+            yield way(Way.YES)
         if recipe.z == "typed":
             for tool in recipe.tools:
                 if tool.number not in self.z_mm:
-                    yield f"--z {tool.number}=MM"
+                    yield way(Way.HEIGHT, tool=tool.number)
 
 
 def require_answers(answers: Answers, recipe: Recipe) -> None:
     """Refuse, before anything is sent, to run where a question would find nobody.
 
     Raises:
-        ConfigError: Names the options that are missing.
+        ConfigError: Names what is missing.
     """
     options = ", ".join(dict.fromkeys(answers.missing(recipe)))
     if options:
@@ -66,13 +67,13 @@ def require_answers(answers: Answers, recipe: Recipe) -> None:
         )
 
 
-def ask_prompt(bench: Bench, prompt: Prompt) -> str:
+def ask_prompt(context: MeasurementContext, prompt: Prompt) -> str:
     """Put a question of the recipe to the person and return the answer.
 
     Raises:
         DeclinedError: A yes was needed.
     """
-    runner = bench.runner()
+    runner = context.runner()
     if prompt.answer != "yes":
         return runner.ask_text(prompt.text)
     if not runner.confirm(prompt.text):
@@ -83,13 +84,13 @@ def ask_prompt(bench: Bench, prompt: Prompt) -> str:
     return "yes"
 
 
-def ask_height(bench: Bench, tool: int, name: str) -> float:
+def ask_height(context: MeasurementContext, tool: int, name: str) -> float:
     """Ask for Z of a new tip, mm from the flange.
 
     Raises:
         DeclinedError: No number was typed, however often it was asked.
     """
-    runner = bench.runner()
+    runner = context.runner()
     for _ in range(MOST_REFUSED):
         text = runner.ask_text(
             tr(
@@ -101,14 +102,14 @@ def ask_height(bench: Bench, tool: int, name: str) -> float:
         try:
             return parse_decimal(text)
         except ConfigError as error:
-            bench.operator.tell(str(error))
+            context.operator.tell(str(error))
     raise DeclinedError(
         tr("No number was typed for Z of tool {tool}, however often it was asked.", tool=tool),
         remedy=tr("Nothing was written. Start again with the length of the new tip at hand."),
     )
 
 
-def confirm_height(bench: Bench, tool: int, name: str) -> None:
+def confirm_height(context: MeasurementContext, tool: int, name: str) -> None:
     """Ask whether the new tip is as long as the old one.
 
     Raises:
@@ -119,7 +120,7 @@ def confirm_height(bench: Bench, tool: int, name: str) -> None:
         tool=tool,
         name=name,
     )
-    if not bench.runner().confirm(question):
+    if not context.runner().confirm(question):
         raise DeclinedError(
             tr("The new tip of tool {tool} is not as long as the old one.", tool=tool),
             remedy=tr('Nothing was written. Use a recipe with z = "typed" or "measured".'),
@@ -128,7 +129,9 @@ def confirm_height(bench: Bench, tool: int, name: str) -> None:
 
 def _option(number: int, prompt: Prompt) -> str:
     if prompt.answer == "yes":
-        return "--yes"
-    if prompt.answer in ("nozzle", "lot"):
-        return f"--{prompt.answer} ID"
-    return f"--answer {number}=TEXT"
+        return way(Way.YES)
+    if prompt.answer == "nozzle":
+        return way(Way.NOZZLE)
+    if prompt.answer == "lot":
+        return way(Way.LOT)
+    return way(Way.ANSWER, number=number)

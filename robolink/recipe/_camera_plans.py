@@ -1,11 +1,13 @@
 """From a recipe to an up-looking camera."""
 
-from robolink.calibration import CameraStation, LookPlan, PatternPlan
+from robolink import methods
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink.nozzle_change import CameraToFind, HeldBoard, TipSource, UpCamera
+from robolink.procedures import LookPlan, TipSource
 from robolink.recipe._sources import BoardSource, CameraAffineSource, LookingSource
 from robolink.recipe._tables import Station
+from robolink.stations import CameraStation
+from robolink.ways import Way, way
 
 
 def from_camera(
@@ -26,7 +28,7 @@ def from_camera(
     if sensor is None:
         raise ConfigError(
             tr("The recipe does not say which camera sees the tip."),
-            remedy=tr("Give --sensor, or write source.sensor."),
+            remedy=tr("Give {sensor}, or write source.sensor.", sensor=way(Way.SENSOR)),
         )
     station = CameraStation(*place.place_mm, source.model)
     look = LookPlan(
@@ -36,10 +38,10 @@ def from_camera(
         beside_mm=source.beside_mm,
     )
     if isinstance(source, CameraAffineSource):
-        plan = PatternPlan(look, source.span_mm)
-        return CameraToFind(sensor, station, plan, sigma_mm=sigma_mm, name=place.id)
+        plan = methods.PatternPlan(look, source.span_mm)
+        return methods.CameraAffineSource(sensor, station, plan, sigma_mm=sigma_mm, name=place.id)
     if isinstance(source, BoardSource):
         drawing = source.drawing
         assert drawing is not None  # noqa: S101 - the recipe was checked
-        return HeldBoard(sensor, station, drawing, look, sigma_mm=sigma_mm)
-    return UpCamera(sensor, station, look, sigma_mm=sigma_mm)
+        return methods.BoardSource(sensor, station, drawing, look, sigma_mm=sigma_mm)
+    return methods.CameraSource(sensor, station, look, sigma_mm=sigma_mm)

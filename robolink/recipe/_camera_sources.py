@@ -4,14 +4,9 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from robolink.calibration import (
-    HALF_ROUND_DEG,
-    LEAST_SPACING_MM,
-    LEAST_SPAN_MM,
-    TWO_ANGLES_DEG,
-    BoardDrawing,
-    CameraModel,
-)
+from robolink.calibration import LEAST_SPACING_MM, BoardDrawing, CameraModel
+from robolink.methods import LEAST_SPAN_MM
+from robolink.procedures import HALF_ROUND_DEG, TWO_ANGLES_DEG
 from robolink.recipe._tables import Angle, Table
 
 Pair = Annotated[tuple[float, ...], Field(strict=False, min_length=2, max_length=2)]

@@ -2,9 +2,9 @@
 
 from collections.abc import Iterator
 
-from robolink.calibration import CrossingPlan, ProbePlan
 from robolink.config import Problem
 from robolink.messages import tr
+from robolink.methods import CrossingPlan, ZTouchPlan
 from robolink.recipe._draft import Draft
 from robolink.recipe._sources import BeamsSource, TouchSource
 
@@ -31,7 +31,7 @@ def course(draft: Draft) -> Iterator[Problem]:
                 "source.until_mm",
                 tr("has nothing to leave out; use repeats = 3, or 2 with sigma_mm or turn_deg"),
             )
-    elif not ProbePlan(speeds_mm_s=source.speeds_mm_s).may_end_early(sigma_stated=sigma_stated):
+    elif not ZTouchPlan(speeds_mm_s=source.speeds_mm_s).may_end_early(sigma_stated=sigma_stated):
         yield Problem(
             "source.until_mm",
             tr("has nothing to leave out; give 7 speeds_mm_s, or 4 with tolerances.sigma_mm"),

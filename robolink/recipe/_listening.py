@@ -8,7 +8,8 @@ from robolink.calibration import VerifyResult
 from robolink.errors import CalibrationError, ConfigError
 from robolink.messages import tr
 from robolink.model import Controller, EntryKind, NewEntry, Signature, ToolReceipt
-from robolink.nozzle_change import Bench, Listener, Moment, Proposal
+from robolink.nozzle_change import Listener, Moment, Proposal
+from robolink.procedures import MeasurementContext
 from robolink.recipe._answers import Answers, ask_height, ask_prompt, confirm_height
 from robolink.recipe._proposing import proposed
 from robolink.recipe._recipe import Recipe
@@ -60,25 +61,25 @@ class RecipeListener(Listener):
         self._names = {tool.number: tool.name or "" for tool in recipe.tools}
         self.switched: dict[int, bool] = {}
 
-    def moment(self, moment: Moment, bench: Bench, tool: int | None = None) -> None:
+    def moment(self, moment: Moment, context: MeasurementContext, tool: int | None = None) -> None:
         """Ask what is to be asked, then switch what is to be switched."""
-        self._audience.moment(moment, bench, tool)
+        self._audience.moment(moment, context, tool)
         if moment is Moment.AFTER_MEASURE:
             # The id belonged to that tool; the value that is kept says it again.
             self._sign(self._signature)
         for number, prompt in enumerate(self._recipe.prompts, start=1):
             if _meant(prompt, moment, tool):
-                self._ask(bench, number, prompt, tool)
+                self._ask(context, number, prompt, tool)
         for output in self._recipe.outputs:
             if _meant(output, moment, tool):
                 self._switch(output)
 
-    def adjusted(self, proposal: Proposal, bench: Bench) -> Proposal:
+    def adjusted(self, proposal: Proposal, context: MeasurementContext) -> Proposal:
         """Return what the recipe proposes from a measurement."""
         tool = proposal.tool
         typed = None
         if not self._taking_reference:
-            typed = self._height(bench, tool)
+            typed = self._height(context, tool)
         made = proposed(
             self._recipe,
             proposal,
@@ -113,20 +114,22 @@ class RecipeListener(Listener):
         """Pass it on."""
         self._audience.told(sentence)
 
-    def _height(self, bench: Bench, tool: int) -> float | None:
+    def _height(self, context: MeasurementContext, tool: int) -> float | None:
         name = self._names[tool]
         if self._recipe.z == "typed":
             given = self._answers.z_mm.get(tool)
-            return ask_height(bench, tool, name) if given is None else given
+            return ask_height(context, tool, name) if given is None else given
         if self._recipe.z == "kept" and not self._answers.yes:
-            confirm_height(bench, tool, name)
+            confirm_height(context, tool, name)
         return None
 
-    def _ask(self, bench: Bench, number: int, prompt: Prompt, tool: int | None) -> None:
+    def _ask(
+        self, context: MeasurementContext, number: int, prompt: Prompt, tool: int | None
+    ) -> None:
         answer = self._answers.prepared(number, prompt)
         given = answer is not None
         if answer is None:
-            answer = ask_prompt(bench, prompt)
+            answer = ask_prompt(context, prompt)
         if prompt.answer == "nozzle" and tool is not None:
             self._nozzles[tool] = answer
             self._sign(replace(self._signature, nozzle=answer))

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 
-from robolink.calibration import BeamStation
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.recipe._recipe import Recipe
@@ -15,6 +14,7 @@ from robolink.recipe._sources import (
     TouchSource,
 )
 from robolink.stations import (
+    BeamStation,
     Station,
     StationKind,
     beam_station,

@@ -2,19 +2,11 @@
 
 from dataclasses import replace
 
-from robolink.calibration import Course, NeedleLimits, TouchPlan
+from robolink import methods
+from robolink.calibration import NeedleLimits
 from robolink.messages import tr
 from robolink.model import Controller
-from robolink.nozzle_change import (
-    Absolute,
-    Deferred,
-    OneTouch,
-    PinAndPerson,
-    TiltedPin,
-    TipSource,
-    difference_from_last,
-    require_tilting,
-)
+from robolink.procedures import LazySource, SamplingPolicy, TipSource, TouchPlan
 from robolink.recipe._recipe import Recipe
 from robolink.recipe._sources import OneTouchSource, OperatorSource, PinSource, PivotSource
 from robolink.recipe._tables import Tool
@@ -29,35 +21,35 @@ def from_pin(source: PinSource, controller: Controller, tool: Tool, recipe: Reci
     touch = TouchPlan(lift_mm=source.lift_mm, clearance_mm=source.clearance_mm)
     if isinstance(source, OneTouchSource):
         return _once(source, touch, controller, tool, recipe)
-    sigma_mm, course = recipe.tolerances.sigma_mm, Course(source.until_mm, retake=source.retake)
+    sigma_mm, sampling = (
+        recipe.tolerances.sigma_mm,
+        SamplingPolicy(source.until_mm, retake=source.retake),
+    )
     if isinstance(source, PivotSource):
-        return _tilted(source, touch, course, controller, sigma_mm)
-    return _turned(source, touch, course, sigma_mm)
+        return _tilted(source, touch, sampling, controller, sigma_mm)
+    return _turned(source, touch, sampling, sigma_mm)
 
 
 def _turned(
-    source: OperatorSource, touch: TouchPlan, course: Course, sigma_mm: float | None
+    source: OperatorSource, touch: TouchPlan, sampling: SamplingPolicy, sigma_mm: float | None
 ) -> TipSource:
-    return PinAndPerson(
-        replace(touch, turn_deg=source.turn_deg),
-        turns_deg=source.turns_deg,
-        sigma_mm=sigma_mm,
-        course=course,
-    )
+    if not source.turns_deg:
+        return methods.TwoPoseSource(replace(touch, turn_deg=source.turn_deg), sigma_mm)
+    return methods.NAngleSource(source.turns_deg, touch, sigma_mm, sampling)
 
 
 def _tilted(
     source: PivotSource,
     touch: TouchPlan,
-    course: Course,
+    sampling: SamplingPolicy,
     controller: Controller,
     sigma_mm: float | None,
 ) -> TipSource:
-    from robolink.calibration import telling_tilts  # numpy, which other recipes do without
+    from robolink.methods import informative_tilts  # numpy, which other recipes do without
 
-    require_tilting(controller, source.kind)
-    tilts = telling_tilts(source.count - 1, source.tilt_deg)
-    return TiltedPin(tilts, touch, sigma_mm=sigma_mm, course=course)
+    methods.require_tilting(controller, source.kind)
+    tilts = informative_tilts(source.count - 1, source.tilt_deg)
+    return methods.PivotSource(tilts, touch, sigma_mm=sigma_mm, sampling=sampling)
 
 
 def _once(
@@ -74,17 +66,17 @@ def _once(
         pin = Pin(*station.place_mm, station.sigma_mm or 0.0)
         # Whoever does not know how sure the pin is cannot say how sure the tip is.
         sigma_mm = tolerances.sigma_mm if station.sigma_mm else None
-        return OneTouch(Absolute(pin, sigma_mm), touch)
+        return methods.OneTouchSource(methods.Absolute(pin, sigma_mm), touch)
     limits = NeedleLimits(
         max_change_mm=tolerances.jump_mm,
         tolerance_mm=tolerances.interval_mm or NeedleLimits().tolerance_mm,
         max_changes=source.max_changes,
     )
 
-    def make() -> OneTouch:
-        solver = difference_from_last(
+    def make() -> methods.OneTouchSource:
+        solver = methods.difference_from_last(
             controller, tool.number, station.id, sigma_mm=tolerances.sigma_mm, limits=limits
         )
-        return OneTouch(solver, touch)
+        return methods.OneTouchSource(solver, touch)
 
-    return Deferred(make, sentence=tr("measured on the robot: one pin touched once"))
+    return LazySource(make, sentence=tr("measured on the robot: one pin touched once"))

@@ -4,7 +4,8 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from robolink.calibration import MIN_ROTATION_DEG, telling_order
+from robolink.calibration import MIN_ROTATION_DEG
+from robolink.methods import most_informative_order
 from robolink.recipe._tables import Angle, Length, Method, Table
 
 
@@ -52,7 +53,7 @@ class OperatorSource(Table):
             return ()
         turns = self.touches_deg[1:]
         # Angles that the person wrote are taken in the person's order.
-        return telling_order(turns) if self.angles_deg is None and self.until_mm else turns
+        return most_informative_order(turns) if self.angles_deg is None and self.until_mm else turns
 
     @property
     def agrees_always(self) -> bool:

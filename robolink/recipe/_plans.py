@@ -1,22 +1,11 @@
 """From a recipe to the plan of a nozzle change."""
 
-from robolink.calibration import BeamStation, Course, CrossingPlan, ProbePlan, TouchStation
+from robolink import methods
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import Controller, Pose
-from robolink.nozzle_change import (
-    ChangePlan,
-    CrossedBeams,
-    Gate,
-    GivenPoses,
-    Limits,
-    ManyTouches,
-    TipSource,
-    ToolPlan,
-    TouchProbe,
-    TwoTouches,
-    taught_poses,
-)
+from robolink.nozzle_change import AcceptanceCriteria, ChangePlan, Limits, ToolPlan
+from robolink.procedures import SamplingPolicy, TipSource
 from robolink.recipe._camera_plans import from_camera
 from robolink.recipe._pin_plans import from_pin
 from robolink.recipe._recipe import Recipe
@@ -28,6 +17,8 @@ from robolink.recipe._sources import (
     TouchSource,
 )
 from robolink.recipe._tables import Station, Tool
+from robolink.stations import BeamStation, TouchStation
+from robolink.ways import Way, way
 
 
 def plan_of(
@@ -52,14 +43,14 @@ def plan_of(
         ConfigError: This kind of controller has no taught points, or no camera is named.
     """
     tolerances = recipe.tolerances
-    gate = Gate(
+    criteria = AcceptanceCriteria(
         max_change_mm=tolerances.jump_mm,
         rms_mm=tolerances.rms_mm,
         max_residual_mm=tolerances.max_mm,
         interval_mm=tolerances.interval_mm,
         drift_tolerance_mm=tolerances.drift_mm,
         accepted_change_mm=accepted_change_mm,
-        accepted_with="--accept-jump",
+        accepted_with=way(Way.ACCEPT_JUMP),
     )
     box, speeds, safe = recipe.box, recipe.speeds, recipe.poses.safe
     return ChangePlan(
@@ -67,7 +58,7 @@ def plan_of(
             ToolPlan(
                 tool.number,
                 _source(recipe, controller, tool, sensor),
-                gate,
+                criteria,
                 verify=recipe.verifies,
                 attempts=recipe.attempts,
                 approach=tool.approach.pose if tool.approach else None,
@@ -121,7 +112,7 @@ def _from_beams(source: BeamsSource, sigma_mm: float | None) -> TipSource:
         (first.input, second.input),
         off_when_broken=source.off_when_broken,
     )
-    plan = CrossingPlan(
+    plan = methods.CrossingPlan(
         search_mm=source.search_mm,
         aside_mm=source.aside_mm,
         dip_mm=source.dip_mm,
@@ -131,22 +122,24 @@ def _from_beams(source: BeamsSource, sigma_mm: float | None) -> TipSource:
         shaft_mm=source.shaft_mm,
         max_lean_deg=source.max_lean_deg,
     )
-    course = Course(source.until_mm, retake=source.retake)
-    return CrossedBeams(station, plan, turn_deg=source.turn_deg, sigma_mm=sigma_mm, course=course)
+    sampling = SamplingPolicy(source.until_mm, retake=source.retake)
+    return methods.BeamsSource(
+        station, plan, turn_deg=source.turn_deg, sigma_mm=sigma_mm, sampling=sampling
+    )
 
 
 def _from_touch(source: TouchSource, place: Station, sigma_mm: float | None) -> TipSource:
     station = TouchStation(*place.place_mm, source.input, off_when_touched=source.off_when_touched)
-    plan = ProbePlan(
+    plan = methods.ZTouchPlan(
         clearance_mm=source.clearance_mm,
         beyond_mm=source.beyond_mm,
         back_off_mm=source.back_off_mm,
         lift_mm=source.lift_mm,
         speeds_mm_s=source.speeds_mm_s,
     )
-    course = Course(source.until_mm, retake=source.retake)
-    return TouchProbe(
-        station, plan, sigma_mm=sigma_mm, proof_turn_deg=source.proof_turn_deg, course=course
+    sampling = SamplingPolicy(source.until_mm, retake=source.retake)
+    return methods.ZTouchSource(
+        station, plan, sigma_mm=sigma_mm, proof_turn_deg=source.proof_turn_deg, sampling=sampling
     )
 
 
@@ -162,12 +155,16 @@ def _from_points(
         )
 
     def read() -> tuple[Pose, ...]:
-        return taught_poses(points, numbers)
+        return methods.taught_poses(points, numbers)
 
     names = ", ".join(f"P{number}" for number in numbers)
     sigma_mm = recipe.tolerances.sigma_mm
-    method = ManyTouches(sigma_mm) if source.method == "n_angle" else TwoTouches(sigma_mm)
-    return GivenPoses(
+    method = (
+        methods.ManyTouches(sigma_mm)
+        if source.method == "n_angle"
+        else methods.TwoTouches(sigma_mm)
+    )
+    return methods.PointsSource(
         read,
         method,
         taught_tool=source.taught_tool,

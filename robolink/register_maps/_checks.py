@@ -6,14 +6,14 @@ from itertools import combinations
 from typing import Final
 
 from robolink.messages import tr
-from robolink.register_maps._map import CommitKind, RegisterMap, Slot, span_of
+from robolink.register_maps._map import CommitKind, MapSlot, RegisterMap, span_of
 from robolink.register_maps._numbers import Number
-from robolink.register_maps._places import LAST_ADDRESS, Signal, Table, Word, describe_place
+from robolink.register_maps._places import LAST_ADDRESS, RegisterTable, Signal, Word, describe_place
 from robolink.register_maps._tables import CommitBitKeys, LevelKeys, MapFile
 from robolink.toml_files import Problem
 
 _MOST_READ: Final = 125
-"""Registers that one request reads (softmotion.md 4.3)."""
+"""Registers that one request reads (docs/reference/softmotion.md 4.3)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +24,7 @@ class _Claim:
     """
 
     where: str
-    table: Table
+    table: RegisterTable
     addresses: range
     bit: int | None = None
     on: int | None = None
@@ -66,7 +66,7 @@ def _twice(file: MapFile) -> Iterator[Problem]:
                 yield Problem(f"{key}#{position}.number", what)
 
 
-def _slot(position: int, slot: Slot, found: RegisterMap) -> Iterator[Problem]:
+def _slot(position: int, slot: MapSlot, found: RegisterMap) -> Iterator[Problem]:
     where = f"tools#{position}"
     unreadable = list(_unreadable(where, slot.components))
     if unreadable:

@@ -28,11 +28,16 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.named_files import read_named
 from robolink.register_maps._map import COMPONENTS
-from robolink.register_maps._places import LAST_ADDRESS, Table
+from robolink.register_maps._places import LAST_ADDRESS, RegisterTable
 from robolink.register_maps._variable_names import component_of
 
 _REGISTER: Final = re.compile(r"([0134])(\d{4,5})")
-_TABLES: Final = {"0": Table.COIL, "1": Table.DISCRETE, "3": Table.INPUT, "4": Table.HOLDING}
+_TABLES: Final = {
+    "0": RegisterTable.COIL,
+    "1": RegisterTable.DISCRETE,
+    "3": RegisterTable.INPUT,
+    "4": RegisterTable.HOLDING,
+}
 _TYPES: Final = {
     "int16": {"int", "int16"},
     "uint16": {"uint", "uint16", "word"},
@@ -46,7 +51,7 @@ _MOST_BYTES: Final = 1_000_000
 
 
 @dataclass(frozen=True, slots=True)
-class Draft:
+class MapDraft:
     """The beginning of a map.
 
     Attributes:
@@ -68,7 +73,7 @@ class _BadRowError(ValueError):
     """A row cannot be used; the text says why."""
 
 
-def draft_from_csv(path: Path) -> Draft:
+def draft_from_csv(path: Path) -> MapDraft:
     """Return the beginning of a map; rows that cannot be used are named and left out.
 
     Raises:
@@ -112,7 +117,7 @@ def draft_from_csv(path: Path) -> Draft:
         )
     used = {tool: components for tool, components in tools.items() if components}
     text = "\n".join(_lines(path.stem, used, left, [*notes, *bad])) + "\n"
-    return Draft(text, found, tuple(name for name, _ in left), tuple(bad), tuple(notes))
+    return MapDraft(text, found, tuple(name for name, _ in left), tuple(bad), tuple(notes))
 
 
 def _rows(path: Path) -> Iterator[tuple[int, dict[str, str]]]:

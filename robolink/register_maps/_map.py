@@ -6,7 +6,7 @@ from enum import StrEnum
 from typing import Final
 
 from robolink.register_maps._numbers import Number
-from robolink.register_maps._places import Signal, Table, Word, Words
+from robolink.register_maps._places import RegisterTable, RegisterWords, Signal, Word
 
 COMPONENTS: Final = ("x", "y", "z", "u", "v", "w")
 """Components of a tool offset and of a pose, in the order of :class:`robolink.model.Pose`."""
@@ -18,8 +18,9 @@ ANGLES: Final = frozenset("uvw")
 class AllZero(StrEnum):
     """What a slot means whose registers are all zero.
 
-    A CODESYS PLC zeroes what clients may write when its watchdog expires (softmotion.md 0.6),
-    so that all zeros may be a lost link and no tool (faults_and_speed.md F30).
+    A CODESYS PLC zeroes what clients may write when its watchdog expires
+    (docs/reference/softmotion.md 4.1), so that all zeros may be a lost link and no tool
+    (docs/reference/faults.md F30).
     """
 
     REFUSE = "refuse"
@@ -28,7 +29,7 @@ class AllZero(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Slot:
+class MapSlot:
     """Where one tool stands.
 
     Attributes:
@@ -44,7 +45,7 @@ class Slot:
     defined: Signal | None = None
 
     @property
-    def table(self) -> Table:
+    def table(self) -> RegisterTable:
         """The table in which all components stand."""
         return next(iter(self.components.values())).table
 
@@ -103,7 +104,7 @@ class Commit:
 
 
 @dataclass(frozen=True, slots=True)
-class Probe:
+class MapProbe:
     """A constant in the PLC that tells word order and offset."""
 
     number: Number
@@ -141,12 +142,12 @@ class RegisterMap:
 
     name: str
     sha256: str
-    slots: Mapping[int, Slot]
+    slots: Mapping[int, MapSlot]
     commit: Commit = field(default_factory=Commit)
-    probe: Probe | None = None
+    probe: MapProbe | None = None
     permit: Signal | None = None
     selected: Word | None = None
-    device_id: Words | None = None
+    device_id: RegisterWords | None = None
     flange: Mapping[str, Number] = field(default_factory=dict)
     inputs: Mapping[int, Input] = field(default_factory=dict)
     all_zero: AllZero = AllZero.REFUSE

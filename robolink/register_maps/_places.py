@@ -2,7 +2,7 @@
 
 Addresses count from 0, as on the wire. What a manual prints as 40001 is holding register 0;
 whoever reads a place is shown both, because tools disagree about which one they mean
-(softmotion.md 4.4, ecosystem.md 3.1).
+(docs/reference/softmotion.md 4.4).
 """
 
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from robolink.messages import tr
 LAST_ADDRESS: Final = 0xFFFF
 
 
-class Table(StrEnum):
+class RegisterTable(StrEnum):
     """A table of a Modbus server, as a map names it."""
 
     HOLDING = "holding"
@@ -25,12 +25,12 @@ class Table(StrEnum):
     @property
     def holds_bits(self) -> bool:
         """Whether its places are single bits."""
-        return self in (Table.COIL, Table.DISCRETE)
+        return self in (RegisterTable.COIL, RegisterTable.DISCRETE)
 
     @property
     def writable(self) -> bool:
         """Whether a client may write it."""
-        return self in (Table.HOLDING, Table.COIL)
+        return self in (RegisterTable.HOLDING, RegisterTable.COIL)
 
     def reference(self, address: int) -> str:
         """Return the number that a manual gives an address: holding register 0 is ``40001``."""
@@ -38,10 +38,15 @@ class Table(StrEnum):
         return f"{_FIRST_DIGITS[self]}{address + 1:0{digits}d}"
 
 
-_FIRST_DIGITS: Final = {Table.COIL: 0, Table.DISCRETE: 1, Table.INPUT: 3, Table.HOLDING: 4}
+_FIRST_DIGITS: Final = {
+    RegisterTable.COIL: 0,
+    RegisterTable.DISCRETE: 1,
+    RegisterTable.INPUT: 3,
+    RegisterTable.HOLDING: 4,
+}
 
 
-def describe_place(table: Table, address: int, bit: int | None = None) -> str:
+def describe_place(table: RegisterTable, address: int, bit: int | None = None) -> str:
     """Return a place as a person reads it, its number given both ways."""
     reference = table.reference(address)
     if bit is None:
@@ -63,7 +68,7 @@ class Signal:
         off: What is written to switch it off.
     """
 
-    table: Table
+    table: RegisterTable
     address: int
     bit: int | None = None
     on: int = 1
@@ -84,7 +89,7 @@ class Signal:
 class Word:
     """A register that holds a whole number from 0 to 65535."""
 
-    table: Table
+    table: RegisterTable
     address: int
 
     @property
@@ -94,10 +99,10 @@ class Word:
 
 
 @dataclass(frozen=True, slots=True)
-class Words:
+class RegisterWords:
     """Registers in a row that hold a number of the machine's own."""
 
-    table: Table
+    table: RegisterTable
     address: int
     count: int
 

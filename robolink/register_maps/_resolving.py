@@ -12,12 +12,12 @@ from robolink.register_maps._map import (
     Commit,
     CommitKind,
     Input,
-    Probe,
+    MapProbe,
+    MapSlot,
     RegisterMap,
-    Slot,
 )
 from robolink.register_maps._numbers import Number, NumberType
-from robolink.register_maps._places import Signal, Table, Word, Words
+from robolink.register_maps._places import RegisterTable, RegisterWords, Signal, Word
 from robolink.register_maps._tables import (
     CommitBitKeys,
     FlangeKeys,
@@ -73,12 +73,12 @@ class Resolving:
             largest_mm=file.largest_mm,
         )
 
-    def _slot(self, position: int, keys: ToolKeys) -> Slot:
+    def _slot(self, position: int, keys: ToolKeys) -> MapSlot:
         path = f"tools#{position}"
         components = self._components(path, keys)
         if not components:
             self._tell(path, tr("names no component: give at least one of x y z u v w"))
-        return Slot(keys.number, keys.name, components, _signal(keys.defined))
+        return MapSlot(keys.number, keys.name, components, _signal(keys.defined))
 
     def _components(self, path: str, keys: ToolKeys | FlangeKeys) -> dict[str, Number]:
         found: dict[str, Number] = {}
@@ -98,7 +98,7 @@ class Resolving:
             )
         return found
 
-    def _probe(self) -> Probe | None:
+    def _probe(self) -> MapProbe | None:
         keys = self._file.probe
         if keys is None:
             return None
@@ -106,7 +106,7 @@ class Resolving:
             self._tell("probe", tr("is compared as it stands: take unit and scale out"))
         plain = keys.model_copy(update={"scale": 1.0, "unit": None})
         number = self._number("probe", plain, angle=None)
-        return None if number is None else Probe(number, keys.value)
+        return None if number is None else MapProbe(number, keys.value)
 
     def _number(self, path: str, keys: NumberKeys, *, angle: bool | None) -> Number | None:
         """Return a number; ``angle`` is ``None`` for one that is neither length nor angle."""
@@ -125,7 +125,7 @@ class Resolving:
             self._tell(f"{path}.scale", tr("must not be 0"))
             return None
         return Number(
-            Table(keys.table or common.table),
+            RegisterTable(keys.table or common.table),
             keys.address,
             kind,
             low_word_first=order == "low_first",
@@ -173,12 +173,14 @@ def _signal(keys: SignalKeys | None) -> Signal | None:
 
 
 def _some_signal(keys: SignalKeys) -> Signal:
-    return Signal(Table(keys.table), keys.address, keys.bit, keys.on, keys.off)
+    return Signal(RegisterTable(keys.table), keys.address, keys.bit, keys.on, keys.off)
 
 
 def _word(keys: WordKeys | None) -> Word | None:
-    return None if keys is None else Word(Table(keys.table), keys.address)
+    return None if keys is None else Word(RegisterTable(keys.table), keys.address)
 
 
-def _words(keys: WordsKeys | None) -> Words | None:
-    return None if keys is None else Words(Table(keys.table), keys.address, keys.words)
+def _words(keys: WordsKeys | None) -> RegisterWords | None:
+    return (
+        None if keys is None else RegisterWords(RegisterTable(keys.table), keys.address, keys.words)
+    )

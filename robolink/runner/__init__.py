@@ -2,8 +2,8 @@
 
 The runner owns what a procedure must not know: limits, deadlines, the clock, and the watch
 over the controller while a person is asked. Remote control cuts an idle client off after the
-remote time-out (60 s by default, epson.md 1.1), and a person may take half an hour; so the
-prompt is polled, and the status is read between polls. That also shows an emergency stop or
+remote time-out (60 s by default, docs/reference/epson.md 1.1), and a person may take half an hour;
+so the prompt is polled, and the status is read between polls. That also shows an emergency stop or
 an open guard at once.
 """
 
@@ -18,5 +18,15 @@ from robolink.runner._runner import Runner as Runner
 from robolink.runner._runner import StepDone as StepDone
 from robolink.runner._runner import ask_for_pose as ask_for_pose
 from robolink.runner._settings import RunSettings as RunSettings
+from robolink.runner._steps import Ask as Ask
+from robolink.runner._steps import Confirm as Confirm
+from robolink.runner._steps import Look as Look
+from robolink.runner._steps import Move as Move
+from robolink.runner._steps import Notify as Notify
+from robolink.runner._steps import Procedure as Procedure
+from robolink.runner._steps import Seek as Seek
+from robolink.runner._steps import SeenAt as SeenAt
+from robolink.runner._steps import Step as Step
+from robolink.runner._steps import TeachPrompt as TeachPrompt
 from robolink.runner._yes_no import ask_yes_no as ask_yes_no
 from robolink.runner._yes_no import yes_or_no as yes_or_no

@@ -5,8 +5,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Final, TypeVar
 
-from robolink.calibration import Ask, Look, Move, Offer, Procedure, Seek, SeenAt, Shown, Step, Tell
-from robolink.checkpoints import Point, checkpoint
+from robolink.checkpoints import Checkpoint, checkpoint
 from robolink.errors import (
     CalibrationError,
     ConfigError,
@@ -33,8 +32,21 @@ from robolink.model import (
 from robolink.runner._jog_steps import jog_target, way_in_words
 from robolink.runner._operator import Operator, Question
 from robolink.runner._settings import RunSettings
+from robolink.runner._steps import (
+    Ask,
+    Confirm,
+    Look,
+    Move,
+    Notify,
+    Procedure,
+    Seek,
+    SeenAt,
+    Step,
+    TeachPrompt,
+)
 from robolink.runner._yes_no import ask_yes_no
 from robolink.sensing import seen_once
+from robolink.ways import Way, way
 
 POLL_S = 1.0
 """Longest time between two status reads while a person is asked (design: at most 5 s)."""
@@ -49,10 +61,10 @@ stands in for one, would go on like that."""
 T = TypeVar("T")
 
 _QUESTIONS: Final = {
-    Shown.PIN: Question.PLACE,
-    Shown.ROOM: Question.ROOM,
-    Shown.ALONG_X: Question.ALONG_X,
-    Shown.ALONG_Z: Question.ALONG_Z,
+    TeachPrompt.PIN: Question.PLACE,
+    TeachPrompt.ROOM: Question.ROOM,
+    TeachPrompt.ALONG_X: Question.ALONG_X,
+    TeachPrompt.ALONG_Z: Question.ALONG_Z,
 }
 
 
@@ -120,7 +132,7 @@ class Runner:
         try:
             step = next(procedure)
             while True:
-                checkpoint(Point.STEP, type(step).__name__)
+                checkpoint(Checkpoint.STEP, type(step).__name__)
                 self._require_going()
                 try:
                     done = self._take(step)
@@ -176,10 +188,10 @@ class Runner:
         return after
 
     def _take(self, step: Step) -> StepDone:
-        if isinstance(step, Tell):
+        if isinstance(step, Notify):
             self._operator.tell(step.text)
             return StepDone(step)
-        if isinstance(step, Offer):
+        if isinstance(step, Confirm):
             return StepDone(step, accepted=self.confirm(step.question) if self._offers else None)
         return StepDone(step, self._moved(step))
 
@@ -198,7 +210,10 @@ class Runner:
         if camera is None:
             raise ConfigError(
                 tr("A camera is needed, and none was named."),
-                remedy=tr("Name it with --sensor, in the recipe, or in the cell file."),
+                remedy=tr(
+                    "Name it with {sensor}, in the recipe, or in the cell file.",
+                    sensor=way(Way.SENSOR),
+                ),
             )
         self._controller.clock.sleep(camera.settle_s)
         pose = self._group.pose()
@@ -324,7 +339,7 @@ class Runner:
         """Return the next line typed, reading the status at least once a second meanwhile."""
         while True:
             line = self._operator.poll(POLL_S)
-            checkpoint(Point.QUESTION, line or "")
+            checkpoint(Checkpoint.QUESTION, line or "")
             self._watch()
             if line is not None:
                 return line
@@ -352,7 +367,7 @@ def _ended_by_operator() -> DeclinedError:
 
 def _answer(done: StepDone) -> Pose | bool | None:
     """Return what a procedure is sent for a step: an offer that nobody heard is not accepted."""
-    return done.accepted is True if isinstance(done.step, Offer) else done.pose
+    return done.accepted is True if isinstance(done.step, Confirm) else done.pose
 
 
 def ask_for_pose(instruction: str) -> Procedure[Pose]:

@@ -13,5 +13,8 @@ from robolink.stations._places import sensor_of as sensor_of
 from robolink.stations._places import touch_station as touch_station
 from robolink.stations._records import Found as Found
 from robolink.stations._records import station_entry as station_entry
+from robolink.stations._sensors import BeamStation as BeamStation
+from robolink.stations._sensors import CameraStation as CameraStation
+from robolink.stations._sensors import TouchStation as TouchStation
 from robolink.stations._station import Station as Station
 from robolink.stations._station import StationKind as StationKind

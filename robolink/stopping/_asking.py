@@ -25,7 +25,7 @@ _RESTS_S: Final = 8.0
 
 
 @dataclass(frozen=True, slots=True)
-class Holder:
+class ControllerHolder:
     """A process on this computer that has a controller, and listens.
 
     Attributes:
@@ -33,6 +33,7 @@ class Holder:
         token: What opens it.
         pid: Its number.
         who: Who it is, and what it does, as a person is told.
+        controller: Which controller that is, as it said of itself; empty where it did not.
         card: The file that says so.
     """
 
@@ -40,6 +41,7 @@ class Holder:
     token: str
     pid: int
     who: str
+    controller: str
     card: Path
 
     def ask_to_stop(self, who: str) -> str:
@@ -121,8 +123,11 @@ class HolderGoneError(Exception):
         self.pid = pid
 
 
-def holders_of(keys: Set[str]) -> Iterator[Holder]:
-    """Yield the processes on this computer that hold a far end, the latest first.
+def holders_of(keys: Set[str]) -> Iterator[ControllerHolder]:
+    """Yield the processes on this computer that hold a controller, the latest first.
+
+    Args:
+        keys: Its far end (:func:`.far_end_of`), and its own name where that is known.
 
     What a process that is gone has left is taken away.
     """
@@ -137,7 +142,7 @@ def holders_of(keys: Set[str]) -> Iterator[Holder]:
             yield holder
 
 
-def _read(card: Path, keys: Set[str]) -> Holder | None:
+def _read(card: Path, keys: Set[str]) -> ControllerHolder | None:
     try:
         said = json.loads(card.read_bytes())
         held, place, pid = set(said["keys"]), said["place"], int(said["pid"])
@@ -148,7 +153,8 @@ def _read(card: Path, keys: Set[str]) -> Holder | None:
             card.with_suffix(".sock").unlink(missing_ok=True)
             return None
         where = place if isinstance(place, str) else (str(place[0]), int(place[1]))
-        return Holder(where, str(said["token"]), pid, str(said["who"]), card)
+        controller = str(said.get("controller", ""))
+        return ControllerHolder(where, str(said["token"]), pid, str(said["who"]), controller, card)
     except (OSError, ValueError, TypeError, KeyError, IndexError):
         return None
 

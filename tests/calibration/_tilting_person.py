@@ -6,8 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from robolink.calibration import Ask, Move, Offer, Shown, Tell, TouchPlan, rotation_of
+from robolink.calibration import rotation_of
 from robolink.model import Hand, Pose, ToolOffset
+from robolink.procedures import TouchPlan
+from robolink.runner import Ask, Confirm, Move, Notify, TeachPrompt
 
 STORED = ToolOffset(12.0, -3.5, -20.0)
 TIP = ToolOffset(12.4, -3.2, -20.5)
@@ -60,7 +62,7 @@ class Person:
 
     def _answer(self, step, tip):
         match step:
-            case Ask(shown=Shown.PIN):
+            case Ask(shown=TeachPrompt.PIN):
                 error = self._error()
                 if len(self.touches) + 1 in self._slips:
                     error[0] += 0.4
@@ -74,11 +76,11 @@ class Person:
                 before, self._here = self._here, replace(step.target, **kept)
                 self.steps.append((step, before, self._here))
                 return self._here
-            case Tell():
+            case Notify():
                 self.told.append(step.text)
                 return None
             case Ask():
                 return self._shown(step)
-            case Offer():
+            case Confirm():
                 self.offers.append(step.question)
                 return len(self.offers) <= self._accepts

@@ -22,7 +22,7 @@ from robolink.calibration import (
     update_guard,
     verify_drift,
 )
-from robolink.calibration._one_touch import Pin
+from robolink.calibration.pin.one_touch import Pin
 from robolink.model import Hand, Pose, ToolOffset
 from tests.calibration._simulated import pivoting, refused, touching
 

@@ -4,10 +4,9 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from robolink.calibration import better_fit, solve_two_pose, tool_fits, two_of
+from robolink.calibration import better_fit, flange_pose, solve_two_pose, tool_fits, two_of
 from robolink.errors import CalibrationError, ConfigError
 from robolink.model import Pose, ToolOffset, rotate_xy
-from robolink.nozzle_change import flange_pose
 
 PIN = (310.0, 195.0)
 STORED = {1: ToolOffset(12, -3.5, -20), 2: ToolOffset(-8, 40, -15, 30), 3: ToolOffset(0, 25, 0)}

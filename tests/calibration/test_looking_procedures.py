@@ -5,25 +5,19 @@ from dataclasses import replace
 
 import pytest
 
-from robolink.calibration import (
-    BoardDrawing,
-    CameraModel,
-    CameraStation,
-    Look,
-    LookPlan,
-    Move,
-    Offer,
-    PatternPlan,
-    SeenAt,
-    Tell,
-    find_camera,
-    look_at_board,
-    look_at_tip,
-    verify_board,
-    verify_by_looking,
-)
+from robolink.calibration import BoardDrawing, CameraModel
 from robolink.errors import CalibrationError
+from robolink.methods import (
+    PatternPlan,
+    measure_board,
+    measure_camera,
+    measure_camera_affine,
+    verify_board,
+)
 from robolink.model import Pose, Spot, SpotUnit, ToolOffset, rotate_xy
+from robolink.procedures import LookPlan, verify_by_looking
+from robolink.runner import Confirm, Look, Move, Notify, SeenAt
+from robolink.stations import CameraStation
 from tests.calibration._simulated import refused
 
 MODEL = CameraModel(((0.02, 0.001), (0.001, -0.02)), (287.0, 90.0))
@@ -56,11 +50,11 @@ class IdealCell:
         try:
             step = next(procedure)
             while True:
-                if isinstance(step, Tell):
+                if isinstance(step, Notify):
                     self.told.append(step.text)
                     step = procedure.send(None)
                     continue
-                if isinstance(step, Offer):
+                if isinstance(step, Confirm):
                     self.offers.append(step.question)
                     step = procedure.send(len(self.offers) == 1)
                     continue
@@ -113,7 +107,7 @@ def miss(offset, true):
 
 @pytest.mark.parametrize("unit", list(SpotUnit))
 def test_a_tip_and_what_the_camera_is_off_by_are_told_apart(unit):
-    result = tip_cell(unit=unit).run(look_at_tip(STATION, LookPlan(), here=HERE, stored=STORED))
+    result = tip_cell(unit=unit).run(measure_camera(STATION, LookPlan(), here=HERE, stored=STORED))
     assert miss(result.offset, TIP) < 1e-9
     assert (result.offset.z_mm, result.offset.u_deg) == (STORED.z_mm, STORED.u_deg)
     assert result.camera_error_mm == pytest.approx(OFF_MM)
@@ -124,7 +118,7 @@ def test_a_tip_and_what_the_camera_is_off_by_are_told_apart(unit):
 
 def test_a_single_look_believes_the_camera_and_says_so():
     plan = LookPlan(turns_deg=(0.0,))
-    result = tip_cell().run(look_at_tip(STATION, plan, here=HERE, stored=STORED))
+    result = tip_cell().run(measure_camera(STATION, plan, here=HERE, stored=STORED))
     assert miss(result.offset, TIP) == pytest.approx(math.hypot(*OFF_MM))
     assert result.camera_error_mm is None
     assert result.half_width95 == ()
@@ -132,7 +126,7 @@ def test_a_single_look_believes_the_camera_and_says_so():
 
 def test_the_tool_is_lifted_before_it_turns_and_every_place_is_met_from_one_side():
     cell, plan = tip_cell(), LookPlan()
-    cell.run(look_at_tip(STATION, plan, here=HERE, stored=STORED))
+    cell.run(measure_camera(STATION, plan, here=HERE, stored=STORED))
     in_focus_mm = STATION.z_mm - STORED.z_mm
     before = HERE
     for index, step in enumerate(cell.steps):
@@ -152,7 +146,7 @@ def test_the_tool_is_lifted_before_it_turns_and_every_place_is_met_from_one_side
 
 def test_after_the_first_look_the_tip_is_brought_to_the_middle():
     cell = tip_cell(off_mm=(0.0, 0.0))
-    result = cell.run(look_at_tip(STATION, LookPlan(), here=HERE, stored=STORED))
+    result = cell.run(measure_camera(STATION, LookPlan(), here=HERE, stored=STORED))
     for seen in result.inputs:
         assert STATION.base_mm(seen) == pytest.approx((STATION.x_mm, STATION.y_mm))
 
@@ -161,7 +155,7 @@ def test_a_find_far_from_where_it_is_expected_is_not_followed():
     cell = tip_cell()
     cell.wrong = {1: 300.0}
     with refused("far_off"):
-        cell.run(look_at_tip(STATION, LookPlan(), here=HERE, stored=STORED))
+        cell.run(measure_camera(STATION, LookPlan(), here=HERE, stored=STORED))
     assert len(cell.looks) == 1
     assert cell.frame.z_mm == STATION.z_mm - STORED.z_mm + LookPlan().lift_mm
 
@@ -170,14 +164,14 @@ def test_a_first_look_that_means_nothing_ends_lifted_too():
     cell = tip_cell(off_mm=(2000.0, 0.0))
     plan = LookPlan(search_mm=5000.0)
     with refused("implausible_offset"):
-        cell.run(look_at_tip(STATION, plan, here=HERE, stored=STORED))
+        cell.run(measure_camera(STATION, plan, here=HERE, stored=STORED))
     assert cell.frame.z_mm == STATION.z_mm - STORED.z_mm + plan.lift_mm
 
 
 def test_the_look_that_fits_worst_is_offered_and_taken_again():
     cell = tip_cell()
     cell.wrong = {3: 20.0}
-    result = cell.run(look_at_tip(STATION, LookPlan(), here=HERE, stored=STORED, retake=True))
+    result = cell.run(measure_camera(STATION, LookPlan(), here=HERE, stored=STORED, retake=True))
     assert cell.offers[0].startswith("Look 2, at U 60.0, fits worst: it is 0.2")
     assert len(cell.offers) == 2
     assert len(cell.looks) == 1 + 4 + 1
@@ -190,7 +184,7 @@ def test_the_look_that_fits_worst_is_offered_and_taken_again():
 def test_a_camera_of_unknown_pose_is_found_with_the_tip():
     blank = replace(STATION, x_mm=300.8, y_mm=79.5, model=None)
     cell = tip_cell(off_mm=(0.0, 0.0))
-    result = cell.run(find_camera(blank, PatternPlan(), here=HERE, stored=STORED))
+    result = cell.run(measure_camera_affine(blank, PatternPlan(), here=HERE, stored=STORED))
     assert miss(result.offset, TIP) < 1e-9
     for found, true in zip(result.camera.mm_per_px, MODEL.mm_per_px, strict=True):
         assert found == pytest.approx(true)
@@ -202,7 +196,7 @@ def test_a_camera_of_unknown_pose_is_found_with_the_tip():
 def test_a_camera_that_is_not_as_it_was_is_refused():
     before = replace(MODEL, mm_per_px=((0.0215, 0.001), (0.001, -0.02)))
     station = replace(STATION, model=before)
-    procedure = find_camera(station, PatternPlan(), here=HERE, stored=STORED)
+    procedure = measure_camera_affine(station, PatternPlan(), here=HERE, stored=STORED)
     with refused("camera_changed"):
         tip_cell().run(procedure)
 
@@ -217,21 +211,21 @@ def test_a_camera_that_is_not_as_it_was_is_refused():
 def test_a_pattern_that_cannot_tell_is_refused_before_anything_moves(plan, code):
     cell = tip_cell()
     with refused(code):
-        cell.run(find_camera(STATION, plan, here=HERE, stored=STORED))
+        cell.run(measure_camera_affine(STATION, plan, here=HERE, stored=STORED))
     assert cell.steps == []
 
 
 def test_pixels_that_mean_nothing_are_refused():
     station = replace(STATION, model=None)
     with refused("camera_not_calibrated"):
-        tip_cell().run(look_at_tip(station, LookPlan(), here=HERE, stored=STORED))
+        tip_cell().run(measure_camera(station, LookPlan(), here=HERE, stored=STORED))
 
 
 @pytest.mark.parametrize("blind", [1, 3])
 def test_what_is_not_seen_is_refused_with_the_tool_lifted(blind):
     cell = tip_cell(blind=blind)
     with refused("tip_not_seen"):
-        cell.run(look_at_tip(STATION, LookPlan(), here=HERE, stored=STORED))
+        cell.run(measure_camera(STATION, LookPlan(), here=HERE, stored=STORED))
     assert cell.frame.z_mm == STATION.z_mm - STORED.z_mm + LookPlan().lift_mm
     assert len(cell.looks) == blind
 
@@ -239,7 +233,7 @@ def test_what_is_not_seen_is_refused_with_the_tool_lifted(blind):
 def test_a_board_and_what_the_camera_is_off_by_are_told_apart():
     plan = LookPlan(turns_deg=(0.0, 120.0))
     cell = IdealCell(fiducials(HELD))
-    result = cell.run(look_at_board(STATION, plan, BOARD, here=HERE, stored=STORED))
+    result = cell.run(measure_board(STATION, plan, BOARD, here=HERE, stored=STORED))
     assert miss(result.offset, HELD) < 1e-9
     assert result.offset.u_deg == pytest.approx(HELD.u_deg)
     assert result.camera_error_mm == pytest.approx(OFF_MM)
@@ -250,7 +244,7 @@ def test_a_board_and_what_the_camera_is_off_by_are_told_apart():
 def test_two_fiducials_at_one_angle_are_epsons_board():
     pair, plan = BoardDrawing.of_two(40.0), LookPlan(turns_deg=(0.0,))
     cell = IdealCell(fiducials(HELD, pair), off_mm=(0.0, 0.0))
-    result = cell.run(look_at_board(STATION, plan, pair, here=HERE, stored=STORED))
+    result = cell.run(measure_board(STATION, plan, pair, here=HERE, stored=STORED))
     assert result.method == "board"
     assert miss(result.offset, HELD) < 1e-9
     assert result.offset.u_deg == pytest.approx(HELD.u_deg)
@@ -267,7 +261,7 @@ def test_a_drawing_that_is_not_the_boards_is_refused(drawn, code):
     pair = BoardDrawing.of_two(40.0)
     cell = IdealCell(fiducials(HELD, pair))
     with refused(code):
-        cell.run(look_at_board(STATION, LookPlan(), BoardDrawing(drawn), here=HERE, stored=STORED))
+        cell.run(measure_board(STATION, LookPlan(), BoardDrawing(drawn), here=HERE, stored=STORED))
 
 
 def test_the_proof_shows_an_error_and_not_the_cameras():

@@ -5,22 +5,15 @@ import random
 
 import pytest
 
-from robolink.calibration import (
-    Ask,
-    Course,
-    Move,
-    Offer,
-    Tell,
-    TouchPlan,
-    n_angle,
-    planar_sigma_gain,
-    telling_order,
-)
+from robolink.calibration import planar_sigma_gain
+from robolink.methods import measure_n_angle, most_informative_order
 from robolink.model import Pose, ToolOffset, rotate_xy
+from robolink.procedures import SamplingPolicy, TouchPlan
+from robolink.runner import Ask, Confirm, Move, Notify
 
 TIP = ToolOffset(12.3, -3.9, -20.0)
 PIN = (300.0, 100.0, -60.0)
-EVENLY_8 = telling_order([45.0 * number for number in range(1, 8)])
+EVENLY_8 = most_informative_order([45.0 * number for number in range(1, 8)])
 
 
 class Person:
@@ -46,10 +39,10 @@ class Person:
                         here = answer = self._touch(here.u_deg)
                     case Move():
                         here = answer = step.target
-                    case Tell():
+                    case Notify():
                         self.told.append(step.text)
                         answer = None
-                    case Offer():
+                    case Confirm():
                         self.offers.append(step.question)
                         answer = len(self.offers) <= self._accepts
                 step = procedure.send(answer)
@@ -66,8 +59,12 @@ class Person:
 
 def course(person, *, turns_deg=EVENLY_8, sigma_mm=None, **how):
     return person.run(
-        n_angle(
-            TouchPlan(), turns_deg=turns_deg, stored=TIP, sigma_mm=sigma_mm, course=Course(**how)
+        measure_n_angle(
+            TouchPlan(),
+            turns_deg=turns_deg,
+            stored=TIP,
+            sigma_mm=sigma_mm,
+            sampling=SamplingPolicy(**how),
         )
     )
 

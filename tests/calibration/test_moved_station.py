@@ -6,7 +6,7 @@ import pytest
 from scipy.stats import chi2
 
 from robolink.calibration import TipShift, judge_shifts
-from robolink.calibration._moved_station import chi_square_limit
+from robolink.calibration.quality.moved_station import chi_square_limit
 
 SIGMA = 0.015
 

@@ -9,7 +9,7 @@ from scipy.optimize import least_squares
 from scipy.stats import t as student
 
 from robolink.calibration import Robust, Tolerance, solve_n_angle, solve_two_pose
-from robolink.calibration._student import student_t95
+from robolink.calibration.core.statistics import student_t95
 from robolink.errors import ConfigError
 from robolink.model import ToolOffset
 from tests.calibration._simulated import PIN, refused, shaken, touching

@@ -5,9 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from robolink.calibration import Shown, WayPlan, rotation_of, six_point, telling_tilts
+from robolink.calibration import rotation_of
 from robolink.errors import CalibrationError
+from robolink.methods import AxisTeachPlan, informative_tilts, measure_six_point
 from robolink.model import Path, Pose, ToolOffset
+from robolink.runner import TeachPrompt
 from tests.calibration._tilting_person import (
     FRAMES,
     PIN,
@@ -23,8 +25,8 @@ TURN_DEG = (15.0, 8.0, -5.0)
 TOOL = ToolOffset(*TIP.components()[:3], *TURN_DEG)
 AXES = rotation_of(Pose(0.0, 0.0, 0.0, *TURN_DEG))
 X, Y, Z = AXES.T
-WAYS = {Shown.ALONG_X: X, Shown.ALONG_Z: Z}
-ANY_Z = {Shown.ALONG_X: X, Shown.ALONG_Z: 0.7 * X + 0.7 * Z}
+WAYS = {TeachPrompt.ALONG_X: X, TeachPrompt.ALONG_Z: Z}
+ANY_Z = {TeachPrompt.ALONG_X: X, TeachPrompt.ALONG_Z: 0.7 * X + 0.7 * Z}
 
 
 class Guide(Person):
@@ -42,7 +44,7 @@ class Guide(Person):
     def _shown(self, step):
         self.asked.append(step.shown)
         here = self._here
-        if step.shown is Shown.ROOM:
+        if step.shown is TeachPrompt.ROOM:
             # A flange that points down needs the room of a way below it.
             down_mm = min(0.0, *(60 * (rotation_of(here) @ way)[2] for way in self._ways.values()))
             way, turn_deg, error = (0.0, 0.0, -down_mm), 0.0, self._error()
@@ -63,7 +65,11 @@ class Guide(Person):
 
 
 def measured(guide, **more):
-    return guide.run(six_point(PLAN, WayPlan(**more), tilts=telling_tilts(5, 20.0), stored=STORED))
+    return guide.run(
+        measure_six_point(
+            PLAN, AxisTeachPlan(**more), tilts=informative_tilts(5, 20.0), stored=STORED
+        )
+    )
 
 
 @pytest.mark.parametrize("start", FRAMES)
@@ -73,7 +79,7 @@ def test_exact_poses_give_all_six_whichever_way_the_flange_points(start, second_
     result = measured(guide, second_is=second_is)
     assert result.method == "six_point"
     assert result.offset.components() == pytest.approx(TOOL.components(), abs=1e-8)
-    assert guide.asked == [Shown.ROOM, Shown.ALONG_X, Shown.ALONG_Z]
+    assert guide.asked == [TeachPrompt.ROOM, TeachPrompt.ALONG_X, TeachPrompt.ALONG_Z]
     assert result.inputs[-1].u_deg == pytest.approx(start.u_deg)
 
 
@@ -123,7 +129,7 @@ def test_a_way_that_cannot_be_used_is_said_at_once_and_shown_again(shows, what, 
 def test_after_the_third_time_it_ends_with_the_name_of_what_is_wrong(show, code, asked):
     guide = Guide(shows=[show] * 6)
     if code == "axes_not_square":
-        guide = Guide(ways={Shown.ALONG_X: X + Z, Shown.ALONG_Z: Z})
+        guide = Guide(ways={TeachPrompt.ALONG_X: X + Z, TeachPrompt.ALONG_Z: Z})
     with pytest.raises(CalibrationError) as refused:
         measured(guide)
     assert refused.value.code == code

@@ -5,17 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from robolink.calibration import (
-    Course,
-    OverPin,
-    Tilt,
-    pivot,
-    rotation_of,
-    telling_tilts,
-    verify_by_tilting,
-)
+from robolink.calibration import rotation_of
 from robolink.errors import CalibrationError
+from robolink.methods import OverPin, Tilt, informative_tilts, measure_pivot, verify_by_tilting
 from robolink.model import Path, Pose, ToolOffset
+from robolink.procedures import SamplingPolicy
 from tests.calibration._tilting_person import (
     FRAMES,
     PIN,
@@ -29,9 +23,11 @@ from tests.calibration._tilting_person import (
 
 
 def course(person, *, count=6, tilt_deg=20.0, sigma_mm=None, **how):
-    tilts = telling_tilts(count - 1, tilt_deg)
+    tilts = informative_tilts(count - 1, tilt_deg)
     return person.run(
-        pivot(PLAN, tilts=tilts, stored=STORED, sigma_mm=sigma_mm, course=Course(**how))
+        measure_pivot(
+            PLAN, tilts=tilts, stored=STORED, sigma_mm=sigma_mm, sampling=SamplingPolicy(**how)
+        )
     )
 
 

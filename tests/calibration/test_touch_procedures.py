@@ -5,15 +5,10 @@ from dataclasses import replace
 
 import pytest
 
-from robolink.calibration import (
-    Ask,
-    Move,
-    TouchPlan,
-    contact_pose,
-    two_pose,
-    verify_by_turning,
-)
+from robolink.methods import measure_two_pose
 from robolink.model import Path, Pose, ToolOffset, rotate_xy
+from robolink.procedures import TouchPlan, contact_pose, verify_by_turning
+from robolink.runner import Ask, Move
 
 PIN = (310.0, 95.0, -40.0)
 PLAN = TouchPlan(lift_mm=10, clearance_mm=2)
@@ -56,7 +51,7 @@ def drive(procedure, person):
 
 def measured(tip, stored, start_u_deg=0.0):
     person = PerfectPerson(tip, start=Pose(300, 100, 0, start_u_deg, tool=0))
-    return drive(two_pose(PLAN, stored=stored), person), person
+    return drive(measure_two_pose(PLAN, stored=stored), person), person
 
 
 @pytest.mark.parametrize("start_u_deg", [0.0, 15.0, -120.0, 180.0])

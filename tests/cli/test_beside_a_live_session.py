@@ -8,8 +8,8 @@ from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_tcp
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 import robolink
-from robolink.journal import Holder, open_journal
-from robolink.journal.leases.processes import BootClock, this_process
+from robolink.journal import LeaseHolder, open_journal
+from robolink.journal._processes import BootClock, this_process
 from robolink.model import Marker, MarkerKind, Signature
 from robolink.timing import NS_PER_S
 
@@ -44,7 +44,7 @@ class LateClock(BootClock):
 def session(plc, *, clock=None, **holder):
     """Return the log of another process that calibrates."""
     own = this_process()
-    other = replace(Holder("ann", "pc-7", pid=own.pid, boot=own.boot), **holder)
+    other = replace(LeaseHolder("ann", "pc-7", pid=own.pid, boot=own.boot), **holder)
     log = open_journal().log(
         plc, holder=other, clock=clock, signature=Signature(operator="Ann Lee")
     )
@@ -75,7 +75,7 @@ def test_what_would_interfere_is_refused_with_the_holder_s_name(plc, run, comman
 
 def test_who_only_holds_the_lease_is_told_too(plc, run):
     own = this_process()
-    holder = Holder(os_user="ann", host="pc-7", pid=own.pid, boot=own.boot)
+    holder = LeaseHolder(os_user="ann", host="pc-7", pid=own.pid, boot=own.boot)
     with open_journal().log(plc, holder=holder).hold("a question to the person"):
         assert "a question to the person" in run("-c", plc, "status")[1]
 

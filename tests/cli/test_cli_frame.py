@@ -152,7 +152,7 @@ class UnfinishedController:
         self.closed = False
         self.more = more
         self.latch, self.ledger = StopLatch(URL), Ledger()
-        self.trouble, self.remarks = None, ()
+        self.trouble, self.remarks, self.identity = None, (), URL
 
     def at_work(self):
         return ""

@@ -171,8 +171,8 @@ def test_calibrate_takes_its_limits_from_the_cell(cell, simulator, monkeypatch, 
         plan.limits.box_mm,
         one.source.touch.lift_mm,
         one.source.touch.clearance_mm,
-        one.gate.max_change_mm,
-        one.gate.drift_tolerance_mm,
+        one.criteria.max_change_mm,
+        one.criteria.drift_tolerance_mm,
     ) == expected
 
 

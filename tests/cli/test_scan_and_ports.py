@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import pytest
 from robolink_cli import main
 from robolink_cli.commands.computer import scanning
-from robolink_cli.commands.computer.scanning import Probe, State, parse_range
+from robolink_cli.commands.computer.scanning import AddressProbe, State, parse_range
 
 from robolink.errors import ConfigError
 
@@ -114,7 +114,7 @@ def test_256_addresses_are_tried_a_few_at_a_time_and_told_in_order(monkeypatch):
         most.append(len(running))
         time.sleep(0.001)
         running.remove(address)
-        return Probe(address, State.SILENT, 0.0)
+        return AddressProbe(address, State.SILENT, 0.0)
 
     monkeypatch.setattr(scanning, "_probe", probe)
     wanted = parse_range("192.0.2.0/24")

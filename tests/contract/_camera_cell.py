@@ -7,9 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
-from robolink.calibration import CameraModel, CameraStation
+from robolink.calibration import CameraModel
 from robolink.controllers.softmotion import SoftMotionController
 from robolink.model import ToolOffset
+from robolink.stations import CameraStation
 from tests.contract._sensor_cell import TOOL, SensorCell, plc_sensor_cell, sensor_cell
 
 KINDS: Final[dict[str, Callable[[int], AbstractContextManager[SensorCell]]]] = {

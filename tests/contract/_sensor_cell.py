@@ -16,19 +16,20 @@ from robolink_simulators.hosting.in_process.epson import register, unregister
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 
 import robolink
-from robolink.calibration import Ask, Beam, BeamStation, Look, Move, Seek, TouchStation
+from robolink.calibration import Beam
 from robolink.model import Controller, InputEdge, Pose, ToolOffset
 from robolink.nozzle_change import (
+    AcceptanceCriteria,
     ChangePlan,
-    Gate,
     Listener,
     NozzleChange,
     PlannedStep,
-    TipSource,
     ToolPlan,
     preview,
 )
-from robolink.runner import Question, StepDone
+from robolink.procedures import TipSource
+from robolink.runner import Ask, Look, Move, Question, Seek, StepDone
+from robolink.stations import BeamStation, TouchStation
 
 TOOL = 1
 HEADINGS = (3.0, 88.0)
@@ -167,7 +168,7 @@ class SensorCell:
 
     def change(self, source: TipSource, listener: Listener | None = None, **plan: Any) -> Any:
         """Return a change of the nozzle that asks nobody."""
-        one = ToolPlan(TOOL, source, Gate(**plan))
+        one = ToolPlan(TOOL, source, AcceptanceCriteria(**plan))
         return lambda controller, write=True: (
             NozzleChange(
                 controller,

@@ -14,19 +14,20 @@ from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.hosting.in_process import softmotion
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
-from robolink.calibration import Ask, TouchPlan, telling_tilts
 from robolink.errors import ConfigError, VerifyError
+from robolink.methods import PivotSource, informative_tilts
 from robolink.model import Pose, ToolOffset
 from robolink.nozzle_change import (
+    AcceptanceCriteria,
     ChangePlan,
-    Gate,
     Limits,
     Listener,
     NozzleChange,
-    TiltedPin,
     ToolPlan,
     flange_now,
 )
+from robolink.procedures import TouchPlan
+from robolink.runner import Ask
 from tests.contract._method_cell import method_cell
 from tests.contract._softmotion_cell import served
 
@@ -77,8 +78,8 @@ def eyes(simulator):
 
 
 def change(controller, simulator, *, listener=None, verify=True):
-    source = TiltedPin(telling_tilts(2, 20.0), TouchPlan())
-    one = ToolPlan(1, source, Gate(), verify=verify)
+    source = PivotSource(informative_tilts(2, 20.0), TouchPlan())
+    one = ToolPlan(1, source, AcceptanceCriteria(), verify=verify)
     plan = ChangePlan((one,), QUICK, ask_before_write=False)
     return NozzleChange(controller, plan, operator=eyes(simulator), listener=listener)
 
@@ -179,8 +180,10 @@ def test_six_axes_are_sent_v_and_w_but_four_are_refused(tmp_path, monkeypatch):
     """No six-axis EPSON arm is simulated: the requests alone are looked at."""
     with method_cell("epson", tmp_path, monkeypatch) as cell:
         robot = "robolink.controllers.epson"
-        monkeypatch.setattr(f"{robot}._motion.EpsonGroup.axes", lambda _: {"joints": (0.0,) * 6})
-        monkeypatch.setattr(f"{robot}._robot.Robot.six_axes", property(lambda _: True))
+        monkeypatch.setattr(
+            f"{robot}.motion.group.EpsonGroup.axes", lambda _: {"joints": (0.0,) * 6}
+        )
+        monkeypatch.setattr(f"{robot}.link.robot.Robot.six_axes", property(lambda _: True))
         shown = cell.run("calibrate", "pivot", "--tool", "1", "--dry-run", "--json")
         assert shown.code == 0, shown.err
         sent = [line for step in shown.document["steps"] for line in step["requests"]]
@@ -199,4 +202,4 @@ def test_limits_lie_about_the_tip_of_a_flange_that_points_down():
 
 def test_an_undefined_tool_is_not_swung_about():
     with pytest.raises(ConfigError, match="not defined"):
-        TiltedPin(telling_tilts(3, 20.0)).procedure(None, Pose(0, 0, 0, 0))
+        PivotSource(informative_tilts(3, 20.0)).procedure(None, Pose(0, 0, 0, 0))

@@ -7,10 +7,13 @@ from robolink_cli.prompts.operator import AssistedOperator
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
-from robolink.calibration import Ask, Shown, TouchPlan, WayPlan, rotation_of, telling_tilts
+from robolink.calibration import rotation_of
 from robolink.errors import VerifyError
+from robolink.methods import AxisTeachPlan, SixPointSource, informative_tilts
 from robolink.model import Pose, ToolOffset
-from robolink.nozzle_change import ChangePlan, Gate, Listener, NozzleChange, TiltedPin, ToolPlan
+from robolink.nozzle_change import AcceptanceCriteria, ChangePlan, Listener, NozzleChange, ToolPlan
+from robolink.procedures import TouchPlan
+from robolink.runner import Ask, TeachPrompt
 from tests.contract._method_cell import method_cell
 from tests.contract._softmotion_cell import served
 from tests.contract.test_calibrate_pivot import FIVE, QUICK, STORED, plc, run
@@ -40,8 +43,10 @@ def person(simulator, way_mm=12.0):
 
 
 def change(controller, simulator, *, listener=None, verify=True):
-    source = TiltedPin(telling_tilts(2, 20.0), TouchPlan(), ways=WayPlan(10.0))
-    plan = ChangePlan((ToolPlan(1, source, Gate(), verify=verify),), QUICK, ask_before_write=False)
+    source = SixPointSource(informative_tilts(2, 20.0), TouchPlan(), ways=AxisTeachPlan(10.0))
+    plan = ChangePlan(
+        (ToolPlan(1, source, AcceptanceCriteria(), verify=verify),), QUICK, ask_before_write=False
+    )
     return NozzleChange(controller, plan, operator=person(simulator), listener=listener)
 
 
@@ -104,7 +109,7 @@ def test_a_tip_that_slips_is_found_and_place_and_orientation_come_back():
 def test_ctrl_c_on_a_way_puts_the_tool_back_and_writes_nothing():
     class Leaves(Listener):
         def step(self, tool, done):
-            if isinstance(done.step, Ask) and done.step.shown is Shown.ALONG_X:
+            if isinstance(done.step, Ask) and done.step.shown is TeachPrompt.ALONG_X:
                 raise KeyboardInterrupt
 
     simulator = turned_simulator()
@@ -149,8 +154,10 @@ def test_six_axes_of_an_arm_would_do_it_too(tmp_path, monkeypatch):
     """No six-axis EPSON arm is simulated: the steps and requests alone are looked at."""
     with method_cell("epson", tmp_path, monkeypatch) as cell:
         robot = "robolink.controllers.epson"
-        monkeypatch.setattr(f"{robot}._motion.EpsonGroup.axes", lambda _: {"joints": (0.0,) * 6})
-        monkeypatch.setattr(f"{robot}._robot.Robot.six_axes", property(lambda _: True))
+        monkeypatch.setattr(
+            f"{robot}.motion.group.EpsonGroup.axes", lambda _: {"joints": (0.0,) * 6}
+        )
+        monkeypatch.setattr(f"{robot}.link.robot.Robot.six_axes", property(lambda _: True))
         shown = cell.run("calibrate", "six-point", "--tool", "1", "--dry-run", "--json")
         assert shown.code == 0, shown.err
         steps = shown.document["steps"]

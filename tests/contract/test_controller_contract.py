@@ -5,24 +5,24 @@ from contextlib import contextmanager
 
 import pytest
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_tcp
 from robolink_simulators.hosting.in_process import epson as in_process
 from robolink_simulators.hosting.in_process import softmotion as plc_in_process
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 import robolink
+from robolink.controllers import ConnectionTerms
+from robolink.journal import signature_here
 from robolink.model import Controller, ToolOffset
 from robolink.testing import (
     MOVING_CHECKS,
     READING_CHECKS,
     WRITING_CHECKS,
-    ContractBrokenError,
     MemoryController,
     MemoryMachine,
     Subject,
-    check_controller,
 )
-from tests.contract.third_kind import BenchServer
+from robolink.transport import parse_url
+from tests.contract.third_kind import BenchServer, open_bench
 from tests.unit._plc_bench import COMMIT_BIT, Bench
 
 
@@ -63,7 +63,8 @@ def plc_map() -> Iterator[Subject]:
 @contextmanager
 def third_kind() -> Iterator[Subject]:
     with BenchServer() as server:
-        yield Subject(server.connect)
+        url, terms = parse_url(server.url), ConnectionTerms(signature_here("test"))
+        yield Subject(lambda: open_bench(url, terms))
 
 
 KINDS = {kind.__name__: kind for kind in (memory, epson, softmotion, plc_map, third_kind)}

@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import pytest
 
-from robolink.calibration import Beam, CrossingPlan, trace_beams
+from robolink.calibration import Beam
 from robolink.controllers.softmotion import SoftMotionController
 from robolink.errors import CalibrationError, LimitError, VerifyError
+from robolink.methods import BeamsSource, CrossingPlan, trace_beams
 from robolink.model import WorkBox
-from robolink.nozzle_change import CrossedBeams
 from robolink.runner import Runner, RunSettings
 from tests.contract._sensor_cell import (
     HEADINGS,
@@ -50,7 +50,7 @@ def cell():
 )
 def test_a_change_ends_with_the_true_offset_written_and_proved(cell, shape, wiring):
     cell.mount_beams(cell.beams(**shape), **wiring)
-    report = cell.run(CrossedBeams(cell.station))
+    report = cell.run(BeamsSource(cell.station))
     assert miss_mm(cell.stored, cell.truth) < BARELY_MM
     assert cell.stored.z_mm == report.proposal.before.z_mm
     assert report.verification.passed
@@ -60,7 +60,7 @@ def test_a_change_ends_with_the_true_offset_written_and_proved(cell, shape, wiri
 def test_play_in_the_joints_cancels_between_the_two_directions(cell):
     cell.mount_beams(cell.beams())
     cell.simulator.machine.arm.backlash_deg = 0.005
-    cell.run(CrossedBeams(cell.station))
+    cell.run(BeamsSource(cell.station))
     assert miss_mm(cell.stored, cell.truth) < 1.5 * BARELY_MM
 
 
@@ -68,7 +68,7 @@ def test_a_needle_change_takes_less_than_20_s_of_the_robots_time(cell, capsys):
     cell.mount_beams(cell.beams(radius_mm=0.1), latency_s=0.002, noise_mm=0.003)
     with cell.connected() as controller:
         began_ns = cell.clock.now_ns()
-        cell.change(CrossedBeams(cell.station))(controller)
+        cell.change(BeamsSource(cell.station))(controller)
         took_s = (cell.clock.now_ns() - began_ns) / 1e9
     with capsys.disabled():
         sys.stdout.write(f"\nneedle change on crossed beams: {took_s:.1f} s of robot time\n")
@@ -83,7 +83,7 @@ def test_the_stated_scatter_gives_an_interval_that_holds_the_truth():
     for seed in range(1, 9):
         with sensor_cell(seed) as cell:
             cell.mount_beams(cell.beams(), noise_mm=noise_mm)
-            source = CrossedBeams(cell.station, plan, sigma_mm=sigma_mm)
+            source = BeamsSource(cell.station, plan, sigma_mm=sigma_mm)
             result = cell.run(source, write=False).proposal.result
             errors = (
                 result.offset.x_mm - cell.truth.x_mm,
@@ -96,7 +96,7 @@ def test_the_stated_scatter_gives_an_interval_that_holds_the_truth():
 
 def test_repeated_crossings_tell_their_own_scatter(cell):
     cell.mount_beams(cell.beams(), noise_mm=0.01)
-    source = CrossedBeams(cell.station, CrossingPlan(repeats=3, shaft_mm=0.0))
+    source = BeamsSource(cell.station, CrossingPlan(repeats=3, shaft_mm=0.0))
     result = cell.run(source, write=False).proposal.result
     assert result.dof == 8
     assert 0.003 < result.sigma_mm < 0.02
@@ -108,7 +108,7 @@ def test_moved_beams_fail_the_proof_and_the_old_value_comes_back(cell):
     cell.mount_beams((first, shifted(second, 0.3)))
     before = cell.stored
     with pytest.raises(VerifyError, match=r"drifts 0\.(59|60)"):
-        cell.run(CrossedBeams(cell.station))
+        cell.run(BeamsSource(cell.station))
     assert cell.stored == before
     assert cell.simulator.machine.tools.selected == TOOL
 
@@ -116,21 +116,21 @@ def test_moved_beams_fail_the_proof_and_the_old_value_comes_back(cell):
 def test_measured_at_two_angles_moved_beams_do_no_harm(cell):
     first, second = cell.beams()
     cell.mount_beams((first, shifted(second, 0.3)))
-    result = cell.run(CrossedBeams(cell.station, turn_deg=180.0), write=False).proposal.result
+    result = cell.run(BeamsSource(cell.station, turn_deg=180.0), write=False).proposal.result
     assert miss_mm(result.offset, cell.truth) < BARELY_MM
 
 
 def test_both_beams_may_switch_the_same_input(cell):
     cell.mount_beams((EitherOf(cell.beams()), EitherOf(cell.beams())))
     same = replace(cell.station, inputs=(3, 3))
-    cell.run(CrossedBeams(same))
+    cell.run(BeamsSource(same))
     assert miss_mm(cell.stored, cell.truth) < BARELY_MM
 
 
 def test_inputs_may_go_off_while_a_beam_is_broken(cell):
     first, second = cell.beams()
     cell.mount_beams((Inverted(first), Inverted(second)))
-    cell.run(CrossedBeams(replace(cell.station, off_when_broken=True)))
+    cell.run(BeamsSource(replace(cell.station, off_when_broken=True)))
     assert miss_mm(cell.stored, cell.truth) < BARELY_MM
 
 
@@ -138,7 +138,7 @@ def refused(cell, code, station=None, listener=None):
     """Run into a refusal: nothing written, the tip above the beams, the tool put back."""
     before = cell.stored
     with pytest.raises(CalibrationError) as refusal:
-        cell.run(CrossedBeams(station or cell.station), listener)
+        cell.run(BeamsSource(station or cell.station), listener)
     assert refusal.value.code == code
     assert refusal.value.remedy
     assert cell.stored == before
@@ -173,7 +173,7 @@ def test_a_bent_needle_is_refused(cell, lean_deg):
 def test_a_needle_that_leans_a_little_is_measured(cell):
     cell.mount_beams(cell.beams())
     cell.simulator.world.leans[TOOL] = (math.tan(math.radians(0.5)), 0.0)
-    cell.run(CrossedBeams(cell.station))
+    cell.run(BeamsSource(cell.station))
     assert miss_mm(cell.stored, cell.truth) < 0.03
 
 
@@ -181,17 +181,17 @@ def test_beams_outside_the_limits_are_not_driven_to(cell):
     cell.mount_beams(cell.beams())
     deep = replace(cell.station, z_mm=cell.place_mm[2] - 40.0)
     with cell.connected() as controller:
-        (foreseen, *_) = [s for s in cell.foresee(controller, CrossedBeams(deep)) if s.refusal]
+        (foreseen, *_) = [s for s in cell.foresee(controller, BeamsSource(deep)) if s.refusal]
         assert "Z" in foreseen.refusal
         with pytest.raises(LimitError):
-            cell.change(CrossedBeams(deep))(controller)
+            cell.change(BeamsSource(deep))(controller)
     assert cell.tip_z_mm > cell.place_mm[2]
 
 
 def test_every_step_is_foreseen_before_anything_moves(cell):
     cell.mount_beams(cell.beams())
     followed = Followed()
-    source = CrossedBeams(cell.station)
+    source = BeamsSource(cell.station)
     with cell.connected() as controller:
         foreseen = cell.foresee(controller, source)
         assert cell.simulator.machine.arm.moves_started == 0
@@ -217,7 +217,7 @@ class Halfway(Followed):
 
 def test_the_proof_knows_when_another_offset_than_the_measured_one_is_written(cell):
     cell.mount_beams(cell.beams())
-    report = cell.run(CrossedBeams(cell.station), Halfway())
+    report = cell.run(BeamsSource(cell.station), Halfway())
     assert miss_mm(cell.stored, cell.truth) > 0.05
     assert report.verification.max_drift_mm < 2 * BARELY_MM
 
@@ -235,7 +235,7 @@ def test_a_pin_whose_tip_is_known_finds_beams_that_serve_for_a_needle(cell):
         found = runner.run(trace_beams(guess, CrossingPlan(), here=group.pose(), tip=pin))
         cell.simulator.world.change_nozzle()
         station = replace(cell.station, beams=found)
-        cell.change(CrossedBeams(station))(controller)
+        cell.change(BeamsSource(station))(controller)
     assert miss_mm(cell.stored, cell.truth) < 0.02
 
 
@@ -248,7 +248,7 @@ def test_a_sensor_that_dies_before_the_proof_takes_the_value_back(cell):
             cell.simulator.machine.inputs.set(3, False)
 
     with pytest.raises(CalibrationError, match="did not switch"):
-        cell.run(CrossedBeams(cell.station), Unplugged())
+        cell.run(BeamsSource(cell.station), Unplugged())
     assert cell.stored == before
     assert cell.simulator.machine.tools.selected == TOOL
 
@@ -259,6 +259,6 @@ def test_a_plc_is_measured_by_the_same_procedure():
         with cell.connected() as controller:
             assert isinstance(controller, SoftMotionController)
             controller.take()
-            report = cell.change(CrossedBeams(cell.station))(controller)
+            report = cell.change(BeamsSource(cell.station))(controller)
     assert miss_mm(report.proposal.offset, cell.truth) < 0.02
     assert report.verification.max_drift_mm < 0.04

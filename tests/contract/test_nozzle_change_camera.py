@@ -6,10 +6,12 @@ from dataclasses import replace
 
 import pytest
 
-from robolink.calibration import BoardDrawing, CameraCalibration, LookPlan, Move
+from robolink.calibration import BoardDrawing, CameraCalibration
 from robolink.errors import CalibrationError, VerifyError
+from robolink.methods import BoardSource, CameraAffineSource, CameraSource
 from robolink.model import ToolOffset
-from robolink.nozzle_change import CameraToFind, HeldBoard, UpCamera
+from robolink.procedures import LookPlan
+from robolink.runner import Move
 from tests.contract._camera_cell import (
     camera_model,
     camera_station,
@@ -55,7 +57,7 @@ def inside(result, truth):
 
 def test_a_nozzle_is_measured_written_and_proved(any_cell, capsys):
     began_ns = any_cell.clock.now_ns()
-    report = run_source(any_cell, UpCamera(any_cell.url, camera_station(any_cell)))
+    report = run_source(any_cell, CameraSource(any_cell.url, camera_station(any_cell)))
     with capsys.disabled():
         took_s = seconds_of(any_cell, began_ns)
         sys.stdout.write(f"\nnozzle before a camera: {took_s:.1f} s of robot time\n")
@@ -73,7 +75,7 @@ def test_a_nozzle_is_measured_written_and_proved(any_cell, capsys):
 
 def test_a_camera_that_was_moved_shifts_nothing_and_is_told(cell):
     moved = moved_station(cell, 0.4, -0.3)
-    report = run_source(cell, UpCamera(cell.url, moved))
+    report = run_source(cell, CameraSource(cell.url, moved))
     result = report.proposal.result
     assert miss_mm(result.offset, cell.truth) < FINE_MM
     assert result.camera_error_mm == pytest.approx((0.4, -0.3), abs=FINE_MM)
@@ -85,14 +87,14 @@ def test_a_single_look_believes_a_moved_camera_and_the_proof_does_not(cell):
     moved = moved_station(cell, 0.4, 0.0)
     before = cell.stored
     with pytest.raises(VerifyError, match=r"drifts 0\.(79|80|81)"):
-        run_source(cell, UpCamera(cell.url, moved, LookPlan(turns_deg=(0.0,))))
+        run_source(cell, CameraSource(cell.url, moved, LookPlan(turns_deg=(0.0,))))
     assert cell.stored == before
 
 
 def test_a_camera_of_unknown_pose_is_found_with_the_nozzle(cell, capsys):
     blank = replace(camera_station(cell, known=False), x_mm=camera_station(cell).x_mm + 1)
     began_ns = cell.clock.now_ns()
-    report = run_source(cell, CameraToFind(cell.url, blank))
+    report = run_source(cell, CameraAffineSource(cell.url, blank))
     with capsys.disabled():
         took_s = seconds_of(cell, began_ns)
         sys.stdout.write(f"\ncamera and nozzle found together: {took_s:.1f} s of robot time\n")
@@ -114,7 +116,7 @@ def test_a_held_board_is_measured_written_and_proved(kind, count, capsys):
         held = cell.simulator.world.board
         drawing = BoardDrawing(held.drawing_mm[:count])
         began_ns = cell.clock.now_ns()
-        report = run_source(cell, HeldBoard(cell.url, camera_station(cell), drawing))
+        report = run_source(cell, BoardSource(cell.url, camera_station(cell), drawing))
         with capsys.disabled():
             took_s = seconds_of(cell, began_ns)
             sys.stdout.write(f"\nboard with {count} fiducials: {took_s:.1f} s of robot time\n")
@@ -140,7 +142,7 @@ def test_a_held_board_is_measured_written_and_proved(kind, count, capsys):
 )
 def test_what_a_cell_is_like_does_little_harm(cell, trouble, within_mm):
     furnish(cell, **trouble)
-    report = run_source(cell, UpCamera(cell.url, camera_station(cell)))
+    report = run_source(cell, CameraSource(cell.url, camera_station(cell)))
     assert miss_mm(report.proposal.result.offset, cell.truth) < within_mm
     assert report.verification.passed
 
@@ -151,7 +153,7 @@ def test_play_in_the_joints_does_no_harm_because_places_are_met_from_one_side(ce
     careless = replace(kept, beside_mm=0.0)
     misses = [
         miss_mm(
-            run_source(cell, UpCamera(cell.url, station, plan), write=False).proposal.tip,
+            run_source(cell, CameraSource(cell.url, station, plan), write=False).proposal.tip,
             cell.truth,
         )
         for plan in (kept, careless)
@@ -174,7 +176,7 @@ def refused(cell, code, source):
 
 def test_a_tip_that_is_not_seen_is_refused_lifted(cell):
     furnish(cell, camera_miss_share=1.0)
-    error = refused(cell, "tip_not_seen", UpCamera(cell.url, camera_station(cell)))
+    error = refused(cell, "tip_not_seen", CameraSource(cell.url, camera_station(cell)))
     assert "0 of 3 pictures" in str(error)
     assert cell.tip_z_mm > cell.simulator.world.camera.middle_mm[2] + 8.0
 
@@ -182,13 +184,13 @@ def test_a_tip_that_is_not_seen_is_refused_lifted(cell):
 def test_two_tips_in_the_image_are_refused(cell):
     tip = cell.truth
     cell.simulator.world.tips[2] = ToolOffset(tip.x_mm + 3.0, tip.y_mm, tip.z_mm)
-    error = refused(cell, "several_tips_seen", UpCamera(cell.url, camera_station(cell)))
+    error = refused(cell, "several_tips_seen", CameraSource(cell.url, camera_station(cell)))
     assert "2 tips" in str(error)
 
 
 def test_a_board_that_is_not_there_is_refused(cell):
     drawing = BoardDrawing.of_two(40.0)
-    refused(cell, "fiducial_not_seen", HeldBoard(cell.url, camera_station(cell), drawing))
+    refused(cell, "fiducial_not_seen", BoardSource(cell.url, camera_station(cell), drawing))
 
 
 def test_a_board_whose_marks_are_too_near_to_each_other_is_refused(cell):
@@ -196,7 +198,7 @@ def test_a_board_whose_marks_are_too_near_to_each_other_is_refused(cell):
     world = cell.simulator.world
     world.board = replace(world.board, drawing_mm=((4.0, 0.0), (-4.0, 0.0)))
     drawing = BoardDrawing.of_two(8.0)
-    refused(cell, "several_fiducials_seen", HeldBoard(cell.url, camera_station(cell), drawing))
+    refused(cell, "several_fiducials_seen", BoardSource(cell.url, camera_station(cell), drawing))
 
 
 @pytest.mark.parametrize(
@@ -210,7 +212,7 @@ def test_a_drawing_that_is_not_the_boards_is_refused(cell, drawing, code):
     furnish(cell, board_held=True)
     world = cell.simulator.world
     world.board = replace(world.board, drawing_mm=((20.0, 0.0), (-20.0, 0.0)))
-    refused(cell, code, HeldBoard(cell.url, camera_station(cell), drawing))
+    refused(cell, code, BoardSource(cell.url, camera_station(cell), drawing))
     assert cell.tip_z_mm > world.camera.middle_mm[2]
 
 
@@ -220,31 +222,31 @@ def test_a_board_far_from_where_it_is_expected_is_refused_lifted(cell):
     pair = ((20.0, 0.0), (-20.0, 0.0))
     world.board = replace(world.board, shift_mm=(4.5, 4.5), drawing_mm=pair)
     drawing = BoardDrawing.of_two(40.0)
-    refused(cell, "far_off", HeldBoard(cell.url, camera_station(cell), drawing))
+    refused(cell, "far_off", BoardSource(cell.url, camera_station(cell), drawing))
     assert cell.tip_z_mm > world.camera.middle_mm[2] + 8.0
 
 
 def test_a_camera_that_changed_is_refused(cell):
     station = camera_station(cell)
     furnish(cell, camera_um_per_px_x=21.0)
-    refused(cell, "camera_changed", CameraToFind(cell.url, station))
+    refused(cell, "camera_changed", CameraAffineSource(cell.url, station))
 
 
 def test_a_camera_that_means_nothing_is_refused_before_anything_moves(cell):
     blank = camera_station(cell, known=False)
-    refused(cell, "camera_not_calibrated", UpCamera(cell.url, blank))
+    refused(cell, "camera_not_calibrated", CameraSource(cell.url, blank))
     assert cell.simulator.machine.arm.moves_started == 0
 
 
 def test_a_sensor_that_nobody_brings_is_refused_before_anything_moves(cell):
-    error = refused(cell, "sensor_not_found", UpCamera("basler", camera_station(cell)))
+    error = refused(cell, "sensor_not_found", CameraSource("basler", camera_station(cell)))
     assert "epson+sim" in error.remedy
     assert cell.simulator.machine.arm.moves_started == 0
 
 
 def test_every_step_is_foreseen_before_anything_moves(cell):
     followed = Followed()
-    source = UpCamera(cell.url, camera_station(cell))
+    source = CameraSource(cell.url, camera_station(cell))
     with cell.connected() as controller:
         foreseen = cell.foresee(controller, source)
         assert cell.simulator.machine.arm.moves_started == 0

@@ -5,12 +5,12 @@ from dataclasses import replace
 import pytest
 from robolink_simulators.epson.options import EpsonOptions
 
-from robolink.calibration import Move, ProbePlan, Seek
 from robolink.errors import CalibrationError, VerifyError
-from robolink.nozzle_change import TouchProbe
+from robolink.methods import ZTouchPlan, ZTouchSource
+from robolink.runner import Move, Seek
 from tests.contract._sensor_cell import TOOL, Followed, sensor_cell
 
-SLOWEST_MM_S, FASTEST_MM_S = min(ProbePlan().speeds_mm_s), max(ProbePlan().speeds_mm_s)
+SLOWEST_MM_S, FASTEST_MM_S = min(ZTouchPlan().speeds_mm_s), max(ZTouchPlan().speeds_mm_s)
 DECEL_MM_S2 = 200.0
 BRAKING_MM = FASTEST_MM_S**2 / (2 * DECEL_MM_S2)
 
@@ -37,7 +37,7 @@ def cell():
 def test_a_change_ends_with_the_length_and_latency_that_braking_lets_be_known(latency_s):
     with sensor_cell(options=EpsonOptions(real_pos_noise_mm=0.0)) as cell:
         cell.mount_plate(latency_s=latency_s)
-        report = cell.run(TouchProbe(cell.plate))
+        report = cell.run(ZTouchSource(cell.plate))
         found, drift = report.proposal.result, report.verification.drifts[0]
         stored, expected_mm = cell.stored, cell.truth.z_mm - LEFT_OF_BRAKING_MM
         assert stored is not None
@@ -49,14 +49,14 @@ def test_a_change_ends_with_the_length_and_latency_that_braking_lets_be_known(la
 
 def test_a_change_ends_with_the_true_length_written_and_proved(cell):
     cell.mount_plate()
-    report = cell.run(TouchProbe(cell.plate))
+    report = cell.run(ZTouchSource(cell.plate))
     assert cell.stored.z_mm == pytest.approx(cell.truth.z_mm, abs=BARELY_MM)
     assert abs(report.verification.drifts[0].dz_mm) < 2 * BARELY_MM
 
 
 def test_the_interval_holds_the_true_length(cell):
     cell.mount_plate(noise_mm=0.005)
-    result = cell.run(TouchProbe(cell.plate), write=False).proposal.result
+    result = cell.run(ZTouchSource(cell.plate), write=False).proposal.result
     (half,) = result.half_width95
     assert abs(result.offset.z_mm - cell.truth.z_mm) <= half < 0.2
 
@@ -64,9 +64,9 @@ def test_the_interval_holds_the_true_length(cell):
 def test_the_tip_stops_at_the_touch_and_retreats_before_anything_else(cell):
     cell.mount_plate()
     followed = Followed()
-    cell.run(TouchProbe(cell.plate), followed, write=False)
+    cell.run(ZTouchSource(cell.plate), followed, write=False)
     touch_mm = cell.plate.z_mm - cell.truth.z_mm
-    assert len(followed.edges) == len(ProbePlan().speeds_mm_s)
+    assert len(followed.edges) == len(ZTouchPlan().speeds_mm_s)
     for done in followed.edges:
         assert done.pose.z_mm > touch_mm - BRAKING_MM - 0.01
         after = followed.steps[followed.steps.index(done) + 1]
@@ -78,7 +78,7 @@ def test_the_tip_stops_at_the_touch_and_retreats_before_anything_else(cell):
 def test_a_plate_that_was_moved_is_not_noticed_by_touching_it_alone(cell):
     cell.mount_plate()
     higher = replace(cell.plate, z_mm=cell.plate.z_mm + 0.4)
-    report = cell.run(TouchProbe(higher))
+    report = cell.run(ZTouchSource(higher))
     assert cell.stored.z_mm == pytest.approx(cell.truth.z_mm + 0.4, abs=BARELY_MM)
     assert report.verification.passed
 
@@ -93,7 +93,7 @@ def test_a_nozzle_that_slips_after_the_write_fails_the_proof(cell):
             cell.simulator.world.tips[TOOL] = longer
 
     with pytest.raises(VerifyError, match=r"drifts 0\.(49|50)"):
-        cell.run(TouchProbe(cell.plate), Slips())
+        cell.run(ZTouchSource(cell.plate), Slips())
     assert cell.stored == before
 
 
@@ -102,17 +102,17 @@ def test_a_length_that_jumps_is_refused_by_the_limit_of_the_change(cell):
     before = cell.stored
     cell.simulator.world.tips[TOOL] = replace(cell.truth, z_mm=before.z_mm - 2.6)
     with pytest.raises(CalibrationError, match=r"would move by 2\.[56]") as refusal:
-        cell.run(TouchProbe(cell.plate))
+        cell.run(ZTouchSource(cell.plate))
     assert refusal.value.code == "implausible_change"
     assert cell.stored == before
-    cell.run(TouchProbe(cell.plate), max_change_mm=3.0)
+    cell.run(ZTouchSource(cell.plate), max_change_mm=3.0)
     assert cell.stored.z_mm == pytest.approx(before.z_mm - 2.6, abs=BARELY_MM)
 
 
 def refused(cell, code, listener=None):
     before = cell.stored
     with pytest.raises(CalibrationError) as refusal:
-        cell.run(TouchProbe(cell.plate), listener)
+        cell.run(ZTouchSource(cell.plate), listener)
     assert refusal.value.code == code
     assert refusal.value.remedy
     assert cell.stored == before
@@ -121,7 +121,7 @@ def refused(cell, code, listener=None):
 
 
 def test_a_surface_that_is_not_there_is_sought_so_far_and_no_further(cell):
-    lowest = cell.plate.z_mm - ProbePlan().beyond_mm - cell.stored.z_mm
+    lowest = cell.plate.z_mm - ZTouchPlan().beyond_mm - cell.stored.z_mm
     followed = Followed()
     refused(cell, "no_edge", followed)
     assert not followed.edges

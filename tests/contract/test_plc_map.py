@@ -23,8 +23,9 @@ from robolink.errors import (
     ToolIndexError,
     TransportTimeoutError,
 )
+from robolink.methods import PointsSource
 from robolink.model import Verdict
-from robolink.nozzle_change import ChangePlan, GivenPoses, NozzleChange, ToolPlan
+from robolink.nozzle_change import ChangePlan, NozzleChange, ToolPlan
 from robolink.register_maps import confirm, load_map
 from robolink.runner import Question
 from robolink.transaction import recover
@@ -55,7 +56,7 @@ class Served:
         self.host = self.serve(self.plc, self.path, clock=ScaledClock(10.0))
         self.url = self.host.url
         with self.connect() as controller:
-            confirm(controller.identity, self.map, by="test", compared="1.x")
+            confirm(controller.who().name, self.map, by="test", compared="1.x")
         return self
 
     def __exit__(self, *_details):
@@ -204,7 +205,7 @@ def test_a_calibration_takes_its_poses_from_a_person(served):
             robolink.Pose(300 - stored.x_mm - 0.2, 100 - stored.y_mm, -20, 0),
             robolink.Pose(300 + stored.x_mm + 0.2, 100 + stored.y_mm, -20, 180),
         )
-        plan = ChangePlan((ToolPlan(1, GivenPoses(lambda: poses)),), ask_before_write=False)
+        plan = ChangePlan((ToolPlan(1, PointsSource(lambda: poses)),), ask_before_write=False)
         report = NozzleChange(controller, plan, operator=Person()).run(write=True)
         assert controller.tools.read(1).x_mm == pytest.approx(stored.x_mm + 0.2, abs=0.001)
         assert controller.tools.read(1).z_mm == stored.z_mm

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 from robolink_cli import main
-from robolink_simulators.cell.held_board import HeldBoard
+from robolink_simulators.cell.held_board import SimulatedBoard
 
 from robolink.journal import EntryKind, memory_journal
 from tests.contract._camera_cell import KINDS, cell_of, furnish, recipe_here, stored_in
@@ -105,7 +105,7 @@ def test_a_difference_carries_the_stored_value_along_with_a_board_that_turned(he
     assert code == 0, messages
     assert stored_in(cell) == value, "the first run records the reference and writes nothing"
     before = world.board.frame(cell.truth)
-    world.board = HeldBoard.grasped(random.Random(2))
+    world.board = SimulatedBoard.grasped(random.Random(2))
     after = world.board.frame(cell.truth)
     code, document, messages = run(path)
     assert code == 0, messages

@@ -14,7 +14,7 @@ from typing import Final
 
 import pytest
 
-from robolink.checkpoints import Point, observed
+from robolink.checkpoints import Checkpoint, observed
 from robolink.controllers.epson import EpsonController
 from robolink.controllers.plc_map import PlcMapController
 from robolink.controllers.softmotion import SoftMotionController
@@ -29,7 +29,7 @@ _WAIT_S: Final = 60.0
 class Placement:
     """A point of a run: its kind, what goes on, and in which step of the procedure."""
 
-    point: Point
+    point: Checkpoint
     what: str
     step: int
 
@@ -93,17 +93,17 @@ class Placements:
 
         return closed
 
-    def _passed(self, point: Point, what: str) -> None:
+    def _passed(self, point: Checkpoint, what: str) -> None:
         if threading.current_thread() is not threading.main_thread():
-            if point is Point.LOCK:
+            if point is Checkpoint.LOCK:
                 self._at_lock.set()
             return
-        if point in (Point.STEP, Point.PROCEDURE):
+        if point in (Checkpoint.STEP, Checkpoint.PROCEDURE):
             self._step += 1
-        if point is Point.EXCHANGE and what == self._held:
+        if point is Checkpoint.EXCHANGE and what == self._held:
             self._held = ""
         here = Placement(point, what, self._step)
-        if point is Point.HELD:
+        if point is Checkpoint.HELD:
             self._held = what
         if self._stopper is not None:
             if not self._held:
@@ -112,11 +112,11 @@ class Placements:
             self.distinct[here] = None
             if here == self._at:
                 assert self._controller is not None
-                self._stop(self._controller, held=point is Point.HELD)
+                self._stop(self._controller, held=point is Checkpoint.HELD)
 
     def _placeable(self, here: Placement) -> bool:
         # Once the logout is on its way there is no session left that could stop anything.
-        over = here.point in (Point.HELD, Point.EXCHANGE) and here.what == "Logout"
+        over = here.point in (Checkpoint.HELD, Checkpoint.EXCHANGE) and here.what == "Logout"
         return self._controller is not None and here not in self.distinct and not over
 
     def _stop(self, controller: Controller, *, held: bool) -> None:

@@ -19,8 +19,8 @@ from robolink.protocols.mailbox import (
     DEVICE_START,
     RESPONSE,
     SLOT,
+    ExportProfile,
     Opcode,
-    Profile,
     structured_text_types,
 )
 
@@ -34,13 +34,15 @@ def objects():
     return canopen.import_od(str(SHIPPED / "robolink_mailbox.eds"), node_id=5)
 
 
-@pytest.mark.parametrize("name", plc_texts(Profile.FULL, 0))
+@pytest.mark.parametrize("name", plc_texts(ExportProfile.FULL, 0))
 def test_no_shipped_file_is_stale(name):
-    assert (SHIPPED / name).read_text() == plc_texts(Profile.FULL, 0)[name], AGAIN
+    assert (SHIPPED / name).read_text() == plc_texts(ExportProfile.FULL, 0)[name], AGAIN
 
 
 def test_the_register_map_counts_from_the_base():
-    rows = list(csv.DictReader(io.StringIO(plc_texts(Profile.TOOLS, 100)["register_map.csv"])))
+    rows = list(
+        csv.DictReader(io.StringIO(plc_texts(ExportProfile.TOOLS, 100)["register_map.csv"]))
+    )
     found = {(row["block"], row["name"]): row for row in rows}
     assert found["command", "seq_head"]["address"] == "100"
     assert found["command", "seq_head"]["reference"] == "40101"
@@ -52,7 +54,7 @@ def test_the_register_map_counts_from_the_base():
 
 
 def test_the_registers_of_a_bank_follow_each_other():
-    rows = list(csv.DictReader(io.StringIO(plc_texts(Profile.TOOLS, 0)["register_map.csv"])))
+    rows = list(csv.DictReader(io.StringIO(plc_texts(ExportProfile.TOOLS, 0)["register_map.csv"])))
     for kind in "43":
         bank = [row for row in rows if row["reference"].startswith(kind)]
         free = 0
@@ -63,7 +65,7 @@ def test_the_registers_of_a_bank_follow_each_other():
 
 
 def test_the_page_of_the_tools_profile_names_no_motion():
-    page = plc_texts(Profile.TOOLS, 0)["register_map.md"]
+    page = plc_texts(ExportProfile.TOOLS, 0)["register_map.md"]
     assert "WRITE_TOOL" in page
     assert "MOVE_LINEAR" not in page
 
@@ -133,7 +135,10 @@ def test_the_structures_have_the_size_and_order_of_the_blocks(name, layout):
 
 
 def test_the_types_of_the_tools_profile_name_no_motion():
-    tools, full = structured_text_types(Profile.TOOLS), structured_text_types(Profile.FULL)
+    tools, full = (
+        structured_text_types(ExportProfile.TOOLS),
+        structured_text_types(ExportProfile.FULL),
+    )
     assert "OP_MOVE_LINEAR" not in tools
     assert all(f"OP_{code.name} := {code.value}" in full for code in Opcode)
     assert "CAPABILITIES : UINT := 1;" in tools
@@ -142,7 +147,7 @@ def test_the_types_of_the_tools_profile_name_no_motion():
 
 def test_what_is_compiled_into_a_machine_is_plain_ascii_under_0bsd():
     for name in ("robolink_mailbox_types.st", "robolink_mailbox.eds"):
-        text = plc_texts(Profile.FULL, 0)[name]
+        text = plc_texts(ExportProfile.FULL, 0)[name]
         assert text.isascii()
         assert "SPDX-License-Identifier: 0BSD" in text
 
@@ -150,7 +155,7 @@ def test_what_is_compiled_into_a_machine_is_plain_ascii_under_0bsd():
 def test_the_export_writes_all_files_and_keeps_changed_ones(tmp_path, capsys):
     folder = tmp_path / "plc"
     assert main.run(["plc", "export", str(folder), "--base", "100"]) == 0
-    assert {path.name for path in folder.iterdir()} == set(plc_texts(Profile.TOOLS, 100))
+    assert {path.name for path in folder.iterdir()} == set(plc_texts(ExportProfile.TOOLS, 100))
     assert main.run(["plc", "export", str(folder), "--base", "100"]) == 0
     changed = folder / "robolink_mailbox_types.st"
     changed.write_text("// mine")
@@ -165,7 +170,7 @@ def test_the_export_as_a_document(tmp_path, capsys):
     assert main.run(["plc", "export", str(tmp_path), "--profile", "full", "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
     assert (document["schema"], document["profile"]) == ("robolink/plc-export/1", "full")
-    assert len(document["files"]) == len(plc_texts(Profile.FULL, 0))
+    assert len(document["files"]) == len(plc_texts(ExportProfile.FULL, 0))
 
 
 def test_a_folder_that_cannot_be_made_is_told(tmp_path, capsys):

@@ -9,9 +9,9 @@ from robolink_simulators.cell.clock import ManualClock
 
 from robolink.journal import (
     EntryKind,
-    Holder,
     Journal,
     JournalOutcomeLog,
+    LeaseHolder,
     memory_journal,
     this_process,
 )
@@ -21,7 +21,9 @@ IDENTITY: Final = "epson+tcp://192.168.0.1:5000"
 HERE: Final = this_process()
 ANNA: Final = replace(HERE, operator="Anna", os_user="anna")
 BERT: Final = replace(HERE, operator="Bert", os_user="bert")
-ELSEWHERE: Final = Holder(os_user="carl", host="pc-2", pid=77, process_start="", boot="another")
+ELSEWHERE: Final = LeaseHolder(
+    os_user="carl", host="pc-2", pid=77, process_start="", boot="another"
+)
 
 
 @dataclass
@@ -31,7 +33,7 @@ class Leases:
     journal: Journal
     clock: ManualClock = field(default_factory=lambda: ManualClock(start_ns=1_000_000_000_000))
 
-    def log(self, holder: Holder, clock: ManualClock | None = None) -> JournalOutcomeLog:
+    def log(self, holder: LeaseHolder, clock: ManualClock | None = None) -> JournalOutcomeLog:
         """Return the log of a holder, whose clock may be another."""
         return self.journal.log(IDENTITY, holder=holder, clock=clock or self.clock)
 

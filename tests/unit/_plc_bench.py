@@ -9,7 +9,7 @@ from robolink_simulators.plc.memory import OutsideError
 from robolink.controllers.plc_map import PlcMapController
 from robolink.errors import RejectedError, TransportTimeoutError
 from robolink.journal import memory_journal
-from robolink.register_maps import Table, confirm, load_map
+from robolink.register_maps import RegisterTable, confirm, load_map
 
 EXAMPLES = Path("examples/plc-maps")
 COMMIT_BIT = EXAMPLES / "commit-bit.toml"
@@ -31,22 +31,22 @@ class LocalClient:
         self._writes = 0
 
     def read_holding(self, address, count):
-        return self._read(Table.HOLDING, address, count)
+        return self._read(RegisterTable.HOLDING, address, count)
 
     def read_input(self, address, count):
-        return self._read(Table.INPUT, address, count)
+        return self._read(RegisterTable.INPUT, address, count)
 
     def read_coils(self, address, count):
-        return self._read(Table.COIL, address, count)
+        return self._read(RegisterTable.COIL, address, count)
 
     def read_discrete(self, address, count):
-        return self._read(Table.DISCRETE, address, count)
+        return self._read(RegisterTable.DISCRETE, address, count)
 
     def write_registers(self, address, values):
-        self._write(Table.HOLDING, address, list(values))
+        self._write(RegisterTable.HOLDING, address, list(values))
 
     def write_coil(self, address, value):
-        self._write(Table.COIL, address, [int(value)])
+        self._write(RegisterTable.COIL, address, [int(value)])
 
     def close(self):
         self.cut = True
@@ -85,7 +85,8 @@ class Bench:
         self.plc = PlcSimulator(self.map, seed=3)
         self.program = self.plc.program
         if confirmed:
-            confirm(identity, self.map, by="test", compared="1.x")
+            with self.connect() as controller:
+                confirm(controller.who().name, self.map, by="test", compared="1.x")
 
     def connect(self):
         """Return a driver; ``client`` of the bench is what it speaks through."""

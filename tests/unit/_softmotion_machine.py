@@ -6,7 +6,7 @@ from robolink_simulators.softmotion import (
     CoordSystem,
     Dynamics,
     GroupOptions,
-    GroupState,
+    SmcGroupState,
     Target,
     machine_named,
 )
@@ -65,7 +65,7 @@ def in_error(**options):
     """Return a group in ErrorStop."""
     group = standing(options=GroupOptions(**options))
     group.fail_axis(1)
-    assert group.state is GroupState.ERROR_STOP
+    assert group.state is SmcGroupState.ERROR_STOP
     return group
 
 

@@ -12,7 +12,7 @@ from robolink_simulators.epson.options import EpsonOptions
 from robolink_simulators.hosting.in_process.epson import register, unregister
 
 import robolink
-from robolink.journal import Holder, Journal, JournalOutcomeLog, memory_journal
+from robolink.journal import Journal, JournalOutcomeLog, LeaseHolder, memory_journal
 from robolink.model import Controller, EntryKind, Recorded, Signature, ToolOffset
 from robolink.transaction import Wanted
 
@@ -47,7 +47,7 @@ class Cell:
         return self.journal.log(
             self.identity,
             signature=Signature(operator=operator, **signed),
-            holder=Holder(os_user=operator, host="here", boot="today"),
+            holder=LeaseHolder(os_user=operator, host="here", boot="today"),
             clock=self.clock,
         )
 

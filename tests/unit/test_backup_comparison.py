@@ -7,8 +7,8 @@ import pytest
 from robolink.backup import (
     TOOLS,
     Backup,
-    Change,
-    Tolerance,
+    ComparisonTolerance,
+    RestoreChange,
     ToolState,
     compare,
     plan_restore,
@@ -57,10 +57,10 @@ def test_the_bound_itself_is_allowed(change_mm, equal):
 
 def test_lengths_and_angles_have_tolerances_of_their_own():
     found = replace(TIP, x_mm=12.3, u_deg=TIP.u_deg - 0.3)
-    limits = Tolerance(length_mm=0.5)
+    limits = ComparisonTolerance(length_mm=0.5)
     (tool,) = compare(state(t1=TIP), state(t1=found), limits).differing
     assert [part.name for part in tool.components if not part.equal] == ["u_deg"]
-    assert compare(state(t1=TIP), state(t1=found), Tolerance(0.5, 0.5)).equal
+    assert compare(state(t1=TIP), state(t1=found), ComparisonTolerance(0.5, 0.5)).equal
 
 
 def test_angles_are_compared_around_the_circle():
@@ -73,7 +73,7 @@ def test_a_tool_that_only_one_side_defines_differs_whatever_the_tolerance(turned
     expected, found = state(), state(t4=ToolOffset())
     if turned:
         expected, found = found, expected
-    (tool,) = compare(expected, found, Tolerance(1000, 180)).differing
+    (tool,) = compare(expected, found, ComparisonTolerance(1000, 180)).differing
     assert (tool.tool, tool.components) == (4, ())
 
 
@@ -87,16 +87,16 @@ def test_another_tool_in_force_is_a_difference_unless_told():
 @pytest.mark.parametrize("bad", [-1.0, float("nan"), float("inf")])
 def test_a_tolerance_is_a_number_from_0_up(bad):
     with pytest.raises(ConfigError, match="tolerance"):
-        Tolerance(bad)
+        ComparisonTolerance(bad)
     with pytest.raises(ConfigError, match="tolerance"):
-        Tolerance(angle_deg=bad)
+        ComparisonTolerance(angle_deg=bad)
 
 
 def test_a_plan_writes_first_and_clears_last():
     wanted = state(t1=TIP, t9=TIP)
     now = state(t1=TIP, t2=TIP, t9=ToolOffset(1))
     plan = plan_restore(backup_of(wanted), now)
-    assert plan.changes == (Change(9, ToolOffset(1), TIP), Change(2, TIP, None))
+    assert plan.changes == (RestoreChange(9, ToolOffset(1), TIP), RestoreChange(2, TIP, None))
     assert plan.select is None
 
 
@@ -131,7 +131,7 @@ def test_the_tool_in_force_is_never_cleared():
     with pytest.raises(ToolError, match="Tool 1 is in force"):
         plan_restore(wanted, now)
     plan = plan_restore(wanted, now, selected=True)
-    assert (plan.select, plan.clears) == (2, (Change(1, TIP, None),))
+    assert (plan.select, plan.clears) == (2, (RestoreChange(1, TIP, None),))
 
 
 @pytest.mark.parametrize(("tool", "error"), [(0, ReservedToolError), (16, ToolIndexError)])
@@ -150,7 +150,7 @@ OTHERS = {
 def test_another_controller_is_refused_by_what_it_says(what):
     with pytest.raises(ConfigError, match=what) as caught:
         require_same_controller(backup_of(state()), URL, OTHERS[what])
-    assert "--other-controller" in caught.value.remedy
+    assert "require_same_controller" in caught.value.remedy
 
 
 def test_the_same_robot_at_another_address_is_the_same():

@@ -10,12 +10,12 @@ from robolink.errors import RemoteProtocolError
 from robolink.protocols.epson_text import (
     COMMANDS,
     NEED_DATA,
-    Command,
     EndOfStream,
     EpsonTextCodec,
     Event,
     ParameterForm,
     Refusal,
+    RemoteCommand,
     Reply,
     Request,
     Role,
@@ -34,7 +34,7 @@ VARIABLES = st.one_of(
 STATEMENTS = st.text([c for c in PRINTABLE if c != '"'], max_size=60)
 
 
-def parameters_of(command: Command) -> st.SearchStrategy[tuple[str, ...]]:
+def parameters_of(command: RemoteCommand) -> st.SearchStrategy[tuple[str, ...]]:
     match command.form:
         case ParameterForm.STATEMENT:
             return st.tuples(STATEMENTS)

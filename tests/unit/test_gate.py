@@ -5,7 +5,7 @@ import pytest
 from robolink.calibration import CalibrationResult
 from robolink.errors import CalibrationError
 from robolink.model import ToolOffset
-from robolink.nozzle_change import Gate, Proposal
+from robolink.nozzle_change import AcceptanceCriteria, Proposal
 
 BEFORE = ToolOffset(12.0, -3.5, -20.0)
 XY, XYZ = ("x_mm", "y_mm"), ("x_mm", "y_mm", "z_mm")
@@ -39,16 +39,16 @@ def test_a_jump_of_z_alone_is_implausible_where_z_was_measured(measured, z_from,
     longer = proposal(ToolOffset(12.0, -3.5, -23.0), measured, z_from)
     assert longer.change_mm == pytest.approx(change_mm)
     if not change_mm:
-        Gate().judge_change(longer)
+        AcceptanceCriteria().judge_change(longer)
         return
     with pytest.raises(CalibrationError, match="would move by 3") as refused:
-        Gate().judge_change(longer)
+        AcceptanceCriteria().judge_change(longer)
     assert refused.value.code == "implausible_change"
 
 
 def test_the_lengths_count_together_and_only_the_plane_has_to_shrink():
     both = proposal(ToolOffset(12.6, -4.3, -21.0), XYZ)
     assert both.change_mm == pytest.approx(2**0.5)
-    Gate().judge_change(both, earlier_mm=[1.1])
+    AcceptanceCriteria().judge_change(both, earlier_mm=[1.1])
     with pytest.raises(CalibrationError, match="they grow"):
-        Gate().judge_change(both, earlier_mm=[0.9])
+        AcceptanceCriteria().judge_change(both, earlier_mm=[0.9])

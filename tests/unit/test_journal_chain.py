@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robolink.journal import EntryKind, NewEntry, Signature, Verification, memory_journal
+from robolink.journal import ChainVerification, EntryKind, NewEntry, Signature, memory_journal
 from robolink.journal.store.tables import ENTRIES
 from robolink.model import new_operation
 
@@ -61,7 +61,7 @@ def test_any_sequence_of_entries_verifies_and_comes_back_as_it_was_given(appends
     for controller, signature, entries in appends:
         journal.log(controller, signature=signature).append(*entries)
         given_entries += entries
-    assert journal.verify() == Verification(len(given_entries), ())
+    assert journal.verify() == ChainVerification(len(given_entries), ())
     assert journal.count() == len(given_entries)
     found = list(journal.entries(newest_first=False))
     assert [entry.number for entry in found] == list(range(1, len(found) + 1))
@@ -160,4 +160,4 @@ def test_details_that_are_no_plain_json_are_refused_and_leave_nothing(value):
         log.append(NewEntry(EntryKind.RAW), NewEntry(EntryKind.RAW, details={"value": value}))
     assert journal.verify().checked == 1
     log.append(NewEntry(EntryKind.RAW))
-    assert journal.verify() == Verification(2, ())
+    assert journal.verify() == ChainVerification(2, ())

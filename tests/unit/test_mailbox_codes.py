@@ -10,9 +10,9 @@ from robolink.protocols.mailbox import (
     Capability,
     CommandState,
     ErrorClass,
+    ExportProfile,
     Kinematics,
     Opcode,
-    Profile,
     Response,
     WordOrder,
     beats_for,
@@ -26,7 +26,7 @@ from robolink.protocols.mailbox import (
     opcodes_of,
 )
 
-# softmotion.md 4.4
+# docs/reference/softmotion.md 4.4
 LOW_FIRST = (0xFEC5, 0x7BB2, 0xB0F2, 0x4028)
 
 
@@ -35,19 +35,19 @@ def test_every_opcode_has_its_facts():
 
 
 def test_the_tools_profile_holds_no_motion():
-    assert opcodes_of(Profile.TOOLS) == (
+    assert opcodes_of(ExportProfile.TOOLS) == (
         Opcode.WRITE_TOOL,
         Opcode.SELECT_TOOL,
         Opcode.READ_TOOL,
         Opcode.CLEAR_TOOL,
         Opcode.OWNERSHIP,
     )
-    assert Profile.TOOLS.capabilities is Capability.TOOLS
+    assert ExportProfile.TOOLS.capabilities is Capability.TOOLS
 
 
 def test_the_full_profile_holds_everything():
-    assert opcodes_of(Profile.FULL) == tuple(Opcode)
-    assert all(capability in Profile.FULL.capabilities for capability in Capability)
+    assert opcodes_of(ExportProfile.FULL) == tuple(Opcode)
+    assert all(capability in ExportProfile.FULL.capabilities for capability in Capability)
 
 
 def test_only_stop_halt_and_ownership_need_no_owner():

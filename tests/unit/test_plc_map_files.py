@@ -5,7 +5,14 @@ from pathlib import Path
 import pytest
 
 from robolink.errors import ConfigError
-from robolink.register_maps import AllZero, CommitKind, NumberType, Table, check_map, load_map
+from robolink.register_maps import (
+    AllZero,
+    CommitKind,
+    NumberType,
+    RegisterTable,
+    check_map,
+    load_map,
+)
 
 GOOD = """
 schema = "robolink/plc-map/1"
@@ -72,7 +79,7 @@ def test_a_map_says_what_is_known_of_its_file(write):
 
 def test_tools_in_input_registers_can_only_be_read(write):
     found = load_map(write(GOOD.replace('type = "REAL"', 'type = "REAL"\ntable = "input"')))
-    assert found.slots[1].table is Table.INPUT
+    assert found.slots[1].table is RegisterTable.INPUT
     assert not found.writable
 
 

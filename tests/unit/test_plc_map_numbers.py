@@ -8,11 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from robolink_simulators.plc import frames
 
-from robolink.register_maps import Number, NumberType, Table
+from robolink.register_maps import Number, NumberType, RegisterTable
 
 numbers = st.builds(
     Number,
-    table=st.just(Table.HOLDING),
+    table=st.just(RegisterTable.HOLDING),
     address=st.just(100),
     type=st.sampled_from(NumberType),
     low_word_first=st.booleans(),
@@ -22,8 +22,8 @@ numbers = st.builds(
 
 
 def test_the_words_of_a_probe_are_those_of_a_codesys_plc():
-    real = Number(Table.INPUT, 0, NumberType.REAL, low_word_first=True)
-    lreal = Number(Table.INPUT, 0, NumberType.LREAL, low_word_first=True)
+    real = Number(RegisterTable.INPUT, 0, NumberType.REAL, low_word_first=True)
+    lreal = Number(RegisterTable.INPUT, 0, NumberType.LREAL, low_word_first=True)
     assert real.encode(12.3456) == (0x8794, 0x4145)
     assert lreal.encode(12.3456) == (0xFEC5, 0x7BB2, 0xB0F2, 0x4028)
 
@@ -51,20 +51,20 @@ def test_pymodbus_puts_the_same_words_there(number, value):
 
 
 def test_a_whole_number_that_does_not_fit_is_refused():
-    number = Number(Table.HOLDING, 0, NumberType.INT16, factor=0.001)
+    number = Number(RegisterTable.HOLDING, 0, NumberType.INT16, factor=0.001)
     assert number.encode(-32.768) == (0x8000,)
     for value in (32.768, -32.769, 1e300):
         with pytest.raises(OverflowError):
             number.encode(value)
     with pytest.raises(OverflowError):
-        Number(Table.HOLDING, 0, NumberType.UINT16).encode(-1.0)
+        Number(RegisterTable.HOLDING, 0, NumberType.UINT16).encode(-1.0)
     with pytest.raises(OverflowError):
-        Number(Table.HOLDING, 0, NumberType.REAL).encode(1e300)
+        Number(RegisterTable.HOLDING, 0, NumberType.REAL).encode(1e300)
 
 
 def test_words_in_the_wrong_order_and_no_numbers_are_absurd():
-    real = Number(Table.HOLDING, 0, NumberType.REAL)
-    swapped = Number(Table.HOLDING, 0, NumberType.REAL, low_word_first=True)
+    real = Number(RegisterTable.HOLDING, 0, NumberType.REAL)
+    swapped = Number(RegisterTable.HOLDING, 0, NumberType.REAL, low_word_first=True)
     for value in (12.3456, 0.25, -7.5):
         assert real.is_absurd(real.decode(swapped.encode(value)))
         assert not real.is_absurd(real.decode(real.encode(value)))
@@ -74,7 +74,7 @@ def test_words_in_the_wrong_order_and_no_numbers_are_absurd():
 
 
 def test_float32_is_equal_within_one_unit_in_the_last_place():
-    real = Number(Table.HOLDING, 0, NumberType.REAL)
+    real = Number(RegisterTable.HOLDING, 0, NumberType.REAL)
     stored = real.decode(real.encode(1234.5678))
     assert stored == pytest.approx(1234.5677490234375, abs=1e-12)
     (bits,) = struct.unpack(">I", struct.pack(">f", stored))
@@ -85,11 +85,11 @@ def test_float32_is_equal_within_one_unit_in_the_last_place():
 @pytest.mark.parametrize(
     ("table", "address", "shown"),
     [
-        (Table.HOLDING, 0, "40001"),
-        (Table.HOLDING, 100, "40101"),
-        (Table.INPUT, 9999, "310000"),
-        (Table.COIL, 0, "00001"),
-        (Table.DISCRETE, 65535, "165536"),
+        (RegisterTable.HOLDING, 0, "40001"),
+        (RegisterTable.HOLDING, 100, "40101"),
+        (RegisterTable.INPUT, 9999, "310000"),
+        (RegisterTable.COIL, 0, "00001"),
+        (RegisterTable.DISCRETE, 65535, "165536"),
     ],
 )
 def test_an_address_has_the_number_that_manuals_print(table, address, shown):

@@ -16,9 +16,10 @@ from robolink.errors import (
     ToolChangedError,
     ToolError,
 )
+from robolink.methods import PointsSource
 from robolink.model import ANY, ToolOffset, Verdict
-from robolink.nozzle_change import ChangePlan, GivenPoses, NozzleChange, ToolPlan
-from robolink.register_maps import Table
+from robolink.nozzle_change import ChangePlan, NozzleChange, ToolPlan
+from robolink.register_maps import RegisterTable
 from robolink.runner import Question
 from robolink.transaction import Wanted, change_tools, recover
 from tests.unit._plc_bench import COMMIT_BIT, LEVEL, NO_HANDSHAKE, Bench
@@ -146,7 +147,7 @@ def test_a_plc_that_does_not_answer_leaves_the_outcome_unknown_and_no_request(co
         assert len(controller.outcomes.open_markers()) == 1
         with pytest.raises(OutcomeUnknownError, match="not settled"):
             controller.require_settled("a move")
-    assert commit_bit.program.memory.read(Table.COIL, range(2000, 2001)) == [0]
+    assert commit_bit.program.memory.read(RegisterTable.COIL, range(2000, 2001)) == [0]
 
 
 def test_registers_alone_do_not_prove_a_takeover_and_recovery_asks_once_more(commit_bit):
@@ -263,7 +264,7 @@ def test_registers_that_cannot_be_put_back_leave_the_outcome_unknown(commit_bit)
 
 
 def test_a_request_that_a_dead_client_left_is_taken_back_first(commit_bit):
-    commit_bit.program.memory.write(Table.COIL, 2000, [1])
+    commit_bit.program.memory.write(RegisterTable.COIL, 2000, [1])
     commit_bit.program.written(0)
     with commit_bit.connect() as controller:
         controller.tools.write(1, NEW, expected=ANY)
@@ -305,7 +306,7 @@ def test_nothing_is_written_before_a_person_confirmed_a_map_without_a_probe():
 
 def test_a_probe_that_went_wrong_after_connecting_holds_a_write_back(commit_bit):
     with commit_bit.connect() as controller:
-        commit_bit.program.memory.zero(Table.INPUT)
+        commit_bit.program.memory.zero(RegisterTable.INPUT)
         with pytest.raises(RemoteProtocolError, match=r"should be 12\.3456, but reads 0"):
             controller.tools.write(1, NEW, expected=ANY)
     assert commit_bit.plc.writes == []
@@ -330,13 +331,13 @@ def test_registers_that_do_not_keep_what_is_written_are_noticed(no_handshake):
 
 
 def test_all_zeros_are_a_lost_link_or_no_tool_as_the_map_says(no_handshake, level):
-    no_handshake.program.memory.zero(Table.HOLDING)
+    no_handshake.program.memory.zero(RegisterTable.HOLDING)
     with no_handshake.connect() as controller:
         with pytest.raises(RemoteProtocolError, match="link was lost"):
             controller.tools.read(1)
         with pytest.raises(ToolError, match="cannot be made undefined"):
             controller.tools.clear(1, expected=ANY)
-    level.program.memory.zero(Table.HOLDING)
+    level.program.memory.zero(RegisterTable.HOLDING)
     with level.connect() as controller:
         assert controller.tools.read(2) is None
         controller.tools.write(2, NEW, expected=None)
@@ -409,7 +410,7 @@ def test_an_unconfirmed_map_is_refused_before_a_person_has_measured_anything():
     def measured():
         raise AssertionError("nobody was to measure")
 
-    plan = ChangePlan((ToolPlan(1, GivenPoses(measured)),), ask_before_write=False)
+    plan = ChangePlan((ToolPlan(1, PointsSource(measured)),), ask_before_write=False)
     with bench_of(NO_HANDSHAKE, confirmed=False).connect() as controller:
         with pytest.raises(ConfigError, match="nobody has confirmed it"):
             NozzleChange(controller, plan, operator=Nobody()).run(write=True)
@@ -417,7 +418,7 @@ def test_an_unconfirmed_map_is_refused_before_a_person_has_measured_anything():
 
 def test_a_number_that_cannot_be_true_is_not_taken_for_an_offset(commit_bit):
     with commit_bit.connect() as controller:
-        commit_bit.program.memory.write(Table.HOLDING, 100, [0x4148, 0x0000])
+        commit_bit.program.memory.write(RegisterTable.HOLDING, 100, [0x4148, 0x0000])
         with pytest.raises(RemoteProtocolError, match=r"X at 40101 \(address 100\) reads"):
             controller.tools.read(1)
 

@@ -13,16 +13,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robolink.calibration import (
-    TWO_ANGLES_DEG,
-    CrossingPlan,
-    LookPlan,
-    PatternPlan,
-    ProbePlan,
-    TouchPlan,
-)
 from robolink.errors import ConfigError
-from robolink.nozzle_change import Gate, Limits, Moment
+from robolink.methods import CrossingPlan, PatternPlan, ZTouchPlan
+from robolink.nozzle_change import AcceptanceCriteria, Limits, Moment
+from robolink.procedures import TWO_ANGLES_DEG, LookPlan, TouchPlan
 from robolink.recipe import (
     BeamsSource,
     BoardSource,
@@ -149,8 +143,8 @@ def test_what_is_left_out_is_as_in_a_calibration_by_hand():
         "percent": limits.speed_percent,
         "mm_s": limits.speed_mm_s,
     }
-    assert recipe.tolerances.jump_mm == Gate().max_change_mm
-    assert recipe.tolerances.drift_mm == Gate().drift_tolerance_mm
+    assert recipe.tolerances.jump_mm == AcceptanceCriteria().max_change_mm
+    assert recipe.tolerances.drift_mm == AcceptanceCriteria().drift_tolerance_mm
     assert (recipe.verifies, recipe.attempts, source.turns_deg) == (True, 1, ())
 
 
@@ -186,7 +180,7 @@ def test_what_is_left_out_about_a_pattern_a_board_and_tilted_touches_is_as_in_th
 
 def test_what_is_left_out_about_touches_is_as_in_the_library():
     told = {name: field.default for name, field in TouchSource.model_fields.items()}
-    plan = ProbePlan()
+    plan = ZTouchPlan()
     assert {field.name: getattr(plan, field.name) for field in fields(plan)}.items() <= told.items()
 
 

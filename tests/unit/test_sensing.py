@@ -7,8 +7,8 @@ import pytest
 from robolink_simulators.sensors import open_in_process
 
 from robolink.errors import CalibrationError, ConfigError, ConnectError, TransportBrokenError
+from robolink.methods import CameraAffineSource, CameraSource
 from robolink.model import TIP, Spot, SpotUnit, TipSensor
-from robolink.nozzle_change import CameraToFind, UpCamera
 from robolink.sensing import SENSORS_GROUP, open_sensor, seen_once
 from tests.contract._camera_cell import camera_model, camera_station, cell_of, run_source
 from tests.contract._sensor_cell import miss_mm
@@ -166,11 +166,11 @@ def test_a_camera_that_answers_in_millimetres_needs_no_station_model(plug_in):
     with cell_of("epson") as cell:
         plug_in("metric", lambda _: MetricCamera(cell))
         blank = camera_station(cell, known=False)
-        report = run_source(cell, UpCamera("metric", blank))
+        report = run_source(cell, CameraSource("metric", blank))
         assert miss_mm(report.proposal.result.offset, cell.truth) < 0.008
         assert report.verification.passed
         with pytest.raises(ConfigError, match="answers in millimetres already"):
-            run_source(cell, CameraToFind("metric", blank))
+            run_source(cell, CameraAffineSource("metric", blank))
 
 
 @pytest.mark.parametrize("error", [TransportBrokenError("cable"), ValueError("driver")])
@@ -186,7 +186,7 @@ def test_a_camera_that_dies_on_the_way_ends_it_with_the_tool_lifted_and_put_back
         before = cell.stored
         plug_in("dying", lambda _: Dying(cell))
         with pytest.raises(CalibrationError, match="The camera bench failed") as refusal:
-            run_source(cell, UpCamera("dying", camera_station(cell)))
+            run_source(cell, CameraSource("dying", camera_station(cell)))
         assert refusal.value.code == "sensor_failed"
         assert refusal.value.__cause__ is error
         assert cell.tip_z_mm > cell.simulator.world.camera.middle_mm[2] + 8.0
@@ -198,6 +198,6 @@ def test_numbers_that_are_none_are_refused(plug_in):
     with cell_of("epson") as cell:
         plug_in("broken", lambda _: Pictures(*[[(math.nan, 1.0)]] * 3))
         with pytest.raises(CalibrationError) as refusal:
-            run_source(cell, UpCamera("broken", camera_station(cell)))
+            run_source(cell, CameraSource("broken", camera_station(cell)))
         assert refusal.value.code == "non_finite"
         assert cell.tip_z_mm > cell.simulator.world.camera.middle_mm[2] + 8.0

@@ -11,7 +11,7 @@ from robolink_simulators.epson.arm.motion_parameters import MotionParameters
 from robolink_simulators.epson.arm.ramps import Ramp
 from robolink_simulators.epson.arm.robots import find_robot
 from robolink_simulators.epson.arm.trajectory import JointPace, LinePace
-from robolink_simulators.epson.refusals import OutOfReach, Refusal
+from robolink_simulators.epson.refusals import OutOfReach, SpelRefusal
 
 from robolink.model import Hand, Pose, ToolOffset
 
@@ -148,7 +148,7 @@ def test_a_line_through_an_unreachable_region_is_refused_before_it_starts():
 
 def test_a_line_cannot_change_the_hand():
     arm = Arm(T6)
-    with pytest.raises(Refusal, match="hand"):
+    with pytest.raises(SpelRefusal, match="hand"):
         arm.plan_move(Pose(300, 300, 0, 0, hand=Hand.LEFT), LINE)
 
 

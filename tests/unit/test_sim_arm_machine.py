@@ -6,7 +6,7 @@ from robolink_simulators.epson.arm.robots import find_robot
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.bits import BitBank
 from robolink_simulators.epson.memory.points import Local, Point
-from robolink_simulators.epson.refusals import Refusal, RefusalKind
+from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 
 from robolink.model import ToolOffset
 
@@ -41,7 +41,7 @@ def test_the_joints_for_a_point_bring_the_selected_tip_there(machine):
 
 
 def test_an_undefined_tool_cannot_be_selected(machine):
-    with pytest.raises(Refusal) as refused:
+    with pytest.raises(SpelRefusal) as refused:
         machine.tools.select(5)
     assert refused.value.kind is RefusalKind.TOOL_UNDEFINED
     assert machine.tools.selected == 0
@@ -57,7 +57,7 @@ def test_an_undefined_tool_cannot_be_selected(machine):
 )
 def test_only_tools_1_to_15_can_be_written(machine, tool, kind):
     for write in (lambda: machine.tools.set(tool, NOZZLE), lambda: machine.tools.clear(tool)):
-        with pytest.raises(Refusal) as refused:
+        with pytest.raises(SpelRefusal) as refused:
             write()
         assert refused.value.kind is kind
     assert machine.flash_writes == 0
@@ -113,5 +113,5 @@ def test_a_byte_is_eight_bits_with_the_lowest_first():
     ],
 )
 def test_a_bit_or_a_value_that_does_not_exist_is_refused(use):
-    with pytest.raises(Refusal):
+    with pytest.raises(SpelRefusal):
         use(BitBank(16))

@@ -3,7 +3,7 @@ import math
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from robolink_simulators.softmotion import CoordRef, CoordSystem, ErrorKind, Refused
+from robolink_simulators.softmotion import BlockRefused, CoordRef, CoordSystem, ErrorKind
 from robolink_simulators.softmotion.kinematics.coordinates import CoordinateTransforms
 from robolink_simulators.softmotion.kinematics.frames import (
     NO_TURN,
@@ -114,6 +114,6 @@ def test_tcs_stands_at_the_tcp():
 
 @pytest.mark.parametrize("system", [CoordSystem.ACS, CoordSystem.WCS, CoordSystem.TCS])
 def test_a_system_without_a_place_of_its_own_cannot_be_put_anywhere(system):
-    with pytest.raises(Refused) as caught:
+    with pytest.raises(BlockRefused) as caught:
         CoordinateTransforms().place(system, ORIGIN)
     assert caught.value.kind is ErrorKind.PARAMETER

@@ -5,10 +5,10 @@ from itertools import pairwise
 
 import pytest
 from robolink_simulators.softmotion import (
-    BufferMode,
     CoordSystem,
     ErrorKind,
-    GroupState,
+    SmcBufferMode,
+    SmcGroupState,
     Target,
 )
 
@@ -29,7 +29,7 @@ from tests.unit._softmotion_machine import (
 def test_interrupted_in_a_corner_the_first_arrives_and_the_second_goes_on():
     group = standing()
     first = moved(group, x_mm=-40)
-    second = moved(group, x_mm=-40, z_mm=40, mode=BufferMode.BLENDING_LOW)
+    second = moved(group, x_mm=-40, z_mm=40, mode=SmcBufferMode.BLENDING_LOW)
     while not second.outputs.active:
         group.advance(group.next_change())
     passing(group, 0.03)
@@ -54,7 +54,7 @@ def test_an_interrupted_movement_stays_busy_and_goes_on_along_its_way():
     assert interrupt.outputs.busy
     settled(group)
     assert interrupt.outputs.done
-    assert group.state is GroupState.STANDBY
+    assert group.state is SmcGroupState.STANDBY
     assert move.outputs.busy
     assert group.status().interrupted_movement == 1
     assert tcp_mm(group)[0] > target.position[0] + 1
@@ -67,7 +67,7 @@ def test_an_interrupted_movement_stays_busy_and_goes_on_along_its_way():
 def test_what_waits_is_interrupted_too():
     group = standing()
     moved(group, x_mm=-40)
-    waiting = moved(group, x_mm=-40, z_mm=10, mode=BufferMode.BUFFERED)
+    waiting = moved(group, x_mm=-40, z_mm=10, mode=SmcBufferMode.BUFFERED)
     passing(group, 0.2)
     group.interrupt()
     settled(group)

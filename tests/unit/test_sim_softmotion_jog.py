@@ -1,4 +1,4 @@
-"""Jogging of a simulated axis group; numbers are those of softmotion.md 7."""
+"""Jogging of a simulated axis group; numbers are those of docs/reference/softmotion.md 5."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -11,8 +11,8 @@ from robolink_simulators.softmotion import (
     CoordSystem,
     Dynamics,
     ErrorKind,
-    GroupState,
     JogCommand,
+    SmcGroupState,
 )
 from robolink_simulators.softmotion.kinematics.frames import (
     NO_TURN,
@@ -108,7 +108,7 @@ def test_the_second_button_ends_a_jog():
     group.jog(JogCommand(1, 1, CoordSystem.MCS, SLOW))
     settled(group)
     assert jog.outputs.done
-    assert group.state is GroupState.STANDBY
+    assert group.state is SmcGroupState.STANDBY
 
 
 def test_turning_the_c_axis_keeps_the_tip_of_a_long_tool():
@@ -137,7 +137,7 @@ def test_a_jog_speeds_up_runs_evenly_and_slows_down():
     settled(group)
     assert 0.9 <= places[-1][0] - group.tcp().shift_mm[0] <= 1.1
     assert not group.status().jogging
-    assert group.state is GroupState.STANDBY
+    assert group.state is SmcGroupState.STANDBY
 
 
 def test_in_acs_an_axis_is_jogged_by_factors_up_to_its_limit():
@@ -150,7 +150,7 @@ def test_in_acs_an_axis_is_jogged_by_factors_up_to_its_limit():
     passing(group, 2)
     assert group.values[0] == -170
     assert group.values[3] == 300
-    assert group.state is GroupState.MOVING
+    assert group.state is SmcGroupState.MOVING
     group.jog(STILL_AXES)
     settled(group)
     assert jog.outputs.done
@@ -171,7 +171,7 @@ def test_a_jog_ends_where_the_workspace_ends():
     jog = group.jog(FORWARD_X)
     passing(group, 60)
     assert kind(jog) is ErrorKind.UNREACHABLE
-    assert group.state is GroupState.STANDBY
+    assert group.state is SmcGroupState.STANDBY
     assert group.tcp().shift_mm[0] > 320
 
 
@@ -221,7 +221,7 @@ def test_a_movement_ends_a_jog():
 def test_a_jog_that_makes_no_sense_is_refused(command, expected):
     group = standing()
     assert kind(group.jog(command)) is expected
-    assert group.state is GroupState.STANDBY
+    assert group.state is SmcGroupState.STANDBY
     assert not group.status().jogging
 
 

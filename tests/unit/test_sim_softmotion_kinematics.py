@@ -1,8 +1,8 @@
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from robolink_simulators.softmotion import CoordRef, ErrorKind, Refused, machine_named
-from robolink_simulators.softmotion.kinematics.catalogue import NAMES, parameter_names
+from robolink_simulators.softmotion import BlockRefused, CoordRef, ErrorKind, machine_named
+from robolink_simulators.softmotion.catalogue import NAMES, parameter_names
 from robolink_simulators.softmotion.kinematics.coupled import CAxis, Coupled, scara3_z
 from robolink_simulators.softmotion.kinematics.five_axes import FiveAxes
 from robolink_simulators.softmotion.kinematics.frames import (
@@ -91,7 +91,7 @@ def test_an_unnamed_configuration_keeps_the_present_elbow():
 
 @pytest.mark.parametrize("x_mm", [501.0, 99.0])
 def test_a_scara_refuses_what_is_too_far_out_or_too_far_in(x_mm):
-    with pytest.raises(Refused) as caught:
+    with pytest.raises(BlockRefused) as caught:
         Scara2Z(300, 200).axes_for(Frame((x_mm, 0.0, 0.0)), ANY_CONFIGURATION, (0.0, 0.0, 0.0))
     assert caught.value.kind is ErrorKind.UNREACHABLE
 
@@ -110,7 +110,7 @@ def test_the_fixed_angle_of_a_c_axis_turns_the_flange():
 
 @pytest.mark.parametrize("name", [name for name in NAMES if "CAxis" in name])
 def test_a_c_axis_refuses_an_orientation_that_points_the_other_way(name):
-    with pytest.raises(Refused):
+    with pytest.raises(BlockRefused):
         machine_named(name).kinematics.orientation_image(about(X_AXIS, 180))
 
 
@@ -131,7 +131,7 @@ def test_five_axes_take_up_the_closest_orientation_there_is(wanted, beside):
     rotation = zyz(*wanted)
     try:
         image = FiveAxes().orientation_image(rotation)
-    except Refused:
+    except BlockRefused:
         return
     closest_deg = axis_and_angle(product(transposed(image.rotation), rotation))[1]
     other = FiveAxes().flange((0.0, 0.0, 0.0, *beside)).rotation
@@ -139,7 +139,7 @@ def test_five_axes_take_up_the_closest_orientation_there_is(wanted, beside):
 
 
 def test_five_axes_refuse_an_orientation_that_every_inclination_is_equally_far_from():
-    with pytest.raises(Refused):
+    with pytest.raises(BlockRefused):
         FiveAxes().orientation_image(about(X_AXIS, 90))
     assert FiveAxes().orientation_image(about(Y_AXIS, 90)).rotation[0][2] == pytest.approx(1)
 

@@ -11,11 +11,11 @@ from robolink_simulators.softmotion import (
     CoordSystem,
     Dynamics,
     ErrorKind,
-    GroupState,
+    SmcGroupState,
     Target,
     machine_named,
 )
-from robolink_simulators.softmotion.kinematics.catalogue import NAMES
+from robolink_simulators.softmotion.catalogue import NAMES
 from robolink_simulators.softmotion.kinematics.frames import Z_AXIS, turned
 from robolink_simulators.softmotion.kinematics.kinematics import Configuration
 
@@ -157,7 +157,7 @@ def test_a_target_out_of_reach_is_refused_and_nothing_moves(target, expected, li
     group = standing()
     command = group.move_linear_absolute if line else group.move_direct_absolute
     assert kind(command(target, LINE if line else FACTORS)) is expected
-    assert group.state is GroupState.STANDBY
+    assert group.state is SmcGroupState.STANDBY
     assert group.movements_started == 0
 
 

@@ -3,7 +3,7 @@ from itertools import pairwise
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from robolink_simulators.softmotion.motion.profile import Pace, Profile
+from robolink_simulators.softmotion.motion.profile import Pace, SpeedProfile
 
 rates = st.floats(1e-3, 1e3)
 paces = st.builds(Pace, rates, rates, rates)
@@ -16,7 +16,7 @@ def samples(profile, count=60):
 @settings(max_examples=80, deadline=None)
 @given(paces, st.floats(0, 0.99))
 def test_a_profile_goes_from_its_start_to_the_end_within_its_limits(pace, start):
-    profile = Profile.fastest(start, pace)
+    profile = SpeedProfile.fastest(start, pace)
     shares = samples(profile)
     assert shares[0] == pytest.approx(start)
     assert profile.share_at(profile.duration_s) == 1
@@ -29,7 +29,7 @@ def test_a_profile_goes_from_its_start_to_the_end_within_its_limits(pace, start)
 @settings(max_examples=80, deadline=None)
 @given(paces, st.floats(0.001, 0.999), rates)
 def test_a_braked_profile_keeps_its_past_and_comes_to_rest_on_the_path(pace, part, fall):
-    profile = Profile.fastest(0.0, pace)
+    profile = SpeedProfile.fastest(0.0, pace)
     at_s = profile.duration_s * part
     braked = profile.braked(at_s, fall)
     assert braked.share_at(at_s / 2) == pytest.approx(profile.share_at(at_s / 2), abs=1e-9)
@@ -42,22 +42,22 @@ def test_a_braked_profile_keeps_its_past_and_comes_to_rest_on_the_path(pace, par
 
 
 def test_braking_twice_keeps_the_harder_end():
-    profile = Profile.fastest(0.0, Pace(1.0, 10.0, 10.0)).braked(0.5, 5.0)
+    profile = SpeedProfile.fastest(0.0, Pace(1.0, 10.0, 10.0)).braked(0.5, 5.0)
     again = profile.braked(0.55, 10.0)
     assert again.end < profile.end
     assert again.duration_s < profile.duration_s
 
 
 def test_braking_after_the_end_changes_nothing():
-    profile = Profile.fastest(0.0, Pace(1.0, 10.0, 10.0))
+    profile = SpeedProfile.fastest(0.0, Pace(1.0, 10.0, 10.0))
     assert profile.braked(profile.duration_s, 1.0) is profile
 
 
 def test_braking_before_anything_moves_stays_where_it_is():
-    braked = Profile.fastest(0.25, Pace(1.0, 10.0, 10.0)).braked(0.0, 1.0)
+    braked = SpeedProfile.fastest(0.25, Pace(1.0, 10.0, 10.0)).braked(0.0, 1.0)
     assert (braked.end, braked.duration_s) == (0.25, 0)
 
 
 def test_without_a_way_to_go_it_has_arrived():
-    profile = Profile.fastest(0.0, None)
+    profile = SpeedProfile.fastest(0.0, None)
     assert (profile.end, profile.duration_s, profile.share_at(0)) == (1.0, 0, 1.0)

@@ -6,8 +6,8 @@ from itertools import pairwise
 import pytest
 from robolink_simulators.softmotion import (
     AxisGroup,
-    BufferMode,
     ErrorKind,
+    SmcBufferMode,
     Target,
     machine_named,
 )
@@ -26,13 +26,13 @@ from tests.unit._softmotion_machine import (
     way,
 )
 
-BLENDING = [mode for mode in BufferMode if mode.blends]
+BLENDING = [mode for mode in SmcBufferMode if mode.blends]
 
 
 def test_buffered_movements_run_one_after_another():
     group = standing()
     first = moved(group, x_mm=-20)
-    second = moved(group, x_mm=-20, z_mm=10, mode=BufferMode.BUFFERED)
+    second = moved(group, x_mm=-20, z_mm=10, mode=SmcBufferMode.BUFFERED)
     while not first.outputs.done:
         assert not second.outputs.active
         group.advance(group.next_change())
@@ -45,7 +45,7 @@ def test_buffered_movements_run_one_after_another():
 @pytest.mark.parametrize("mode", BLENDING)
 @pytest.mark.parametrize("line", [True, False])
 def test_a_blended_corner_is_smooth_and_the_second_movement_counts_as_active(mode, line):
-    """The second is active from the start of the blend (softmotion.md 2.1)."""
+    """The second is active from the start of the blend (docs/reference/softmotion.md 2.1)."""
     group = standing()
     corner = shifted(group, x_mm=-40) if line else in_axes(50, 30, 0, 0)
     end = shifted(group, x_mm=-40, z_mm=30) if line else in_axes(50, 60, 0, 40)
@@ -73,7 +73,7 @@ def test_a_blended_corner_is_smooth_and_the_second_movement_counts_as_active(mod
 
 def test_blending_saves_time_and_never_reaches_the_corner():
     ends_ns, nearest_mm = {}, {}
-    for mode in (BufferMode.BUFFERED, BufferMode.BLENDING_LOW):
+    for mode in (SmcBufferMode.BUFFERED, SmcBufferMode.BLENDING_LOW):
         group = standing()
         x, y, z, *_ = group.read_actual_position().values
         corner = (x - 40, y, z)
@@ -84,9 +84,9 @@ def test_blending_saves_time_and_never_reaches_the_corner():
             passing(group, 0.001)
             nearest_mm[mode] = min(nearest_mm[mode], math.dist(tcp_mm(group), corner))
         ends_ns[mode] = group.now_ns
-    assert ends_ns[BufferMode.BLENDING_LOW] < ends_ns[BufferMode.BUFFERED]
-    assert nearest_mm[BufferMode.BUFFERED] < 0.01
-    assert nearest_mm[BufferMode.BLENDING_LOW] > 1
+    assert ends_ns[SmcBufferMode.BLENDING_LOW] < ends_ns[SmcBufferMode.BUFFERED]
+    assert nearest_mm[SmcBufferMode.BUFFERED] < 0.01
+    assert nearest_mm[SmcBufferMode.BLENDING_LOW] > 1
 
 
 def test_a_corner_that_leaves_the_workspace_is_a_group_error():
@@ -99,10 +99,10 @@ def test_a_corner_that_leaves_the_workspace_is_a_group_error():
     moves = [
         group.move_linear_absolute(Target((-210, 210, 0, 0, 0, 0)), LINE),
         group.move_linear_absolute(
-            Target((210, 210, 0, 0, 0, 0)), gentle, mode=BufferMode.BUFFERED
+            Target((210, 210, 0, 0, 0, 0)), gentle, mode=SmcBufferMode.BUFFERED
         ),
         group.move_linear_absolute(
-            Target((210, -210, 0, 0, 0, 0)), brisk, mode=BufferMode.BLENDING_HIGH
+            Target((210, -210, 0, 0, 0, 0)), brisk, mode=SmcBufferMode.BLENDING_HIGH
         ),
     ]
     settled(group)
@@ -116,7 +116,9 @@ def test_a_corner_that_leaves_the_workspace_is_a_group_error():
 def test_a_line_after_a_direct_movement_does_not_blend():
     group = standing()
     first = group.move_direct_absolute(in_axes(50, 30, 0, 0), FACTORS)
-    second = group.move_linear_absolute(in_axes(55, 30, 0, 0), LINE, mode=BufferMode.BLENDING_NEXT)
+    second = group.move_linear_absolute(
+        in_axes(55, 30, 0, 0), LINE, mode=SmcBufferMode.BLENDING_NEXT
+    )
     while not second.outputs.active:
         group.advance(group.next_change())
     assert first.outputs.done
@@ -125,7 +127,7 @@ def test_a_line_after_a_direct_movement_does_not_blend():
 def test_an_aborting_movement_takes_over_at_once_and_arrives():
     group = standing()
     first = moved(group, x_mm=-60)
-    waiting = moved(group, x_mm=-70, mode=BufferMode.BUFFERED)
+    waiting = moved(group, x_mm=-70, mode=SmcBufferMode.BUFFERED)
     passing(group, 0.25)
     second = moved(group, z_mm=15)
     assert first.outputs.aborted

@@ -1,13 +1,13 @@
-"""Stop and halt of a simulated axis group; numbers are those of softmotion.md 7."""
+"""Stop and halt of a simulated axis group; numbers are those of docs/reference/softmotion.md 5."""
 
 import pytest
 from robolink_simulators.softmotion import (
-    BufferMode,
     CoordSystem,
     ErrorKind,
     GroupOptions,
-    GroupState,
     JogCommand,
+    SmcBufferMode,
+    SmcGroupState,
 )
 
 from tests.unit._softmotion_machine import (
@@ -30,7 +30,7 @@ def stopped(**options):
     group = standing(options=GroupOptions(**options))
     group.stop()
     settled(group)
-    assert state_of(group) is GroupState.STOPPING
+    assert state_of(group) is SmcGroupState.STOPPING
     return group
 
 
@@ -49,14 +49,14 @@ def test_a_stop_holds_the_group_until_execute_falls(during):
     assert move is None or move.outputs.aborted
     assert jogging is None or jogging.outputs.aborted
     passing(group, 5)
-    assert state_of(group) is GroupState.STOPPING
+    assert state_of(group) is SmcGroupState.STOPPING
     refused = group.move_linear_absolute(shifted(group, x_mm=1), LINE)
     assert kind(refused) is ErrorKind.WRONG_STATE
     assert kind(group.jog(jog)) is ErrorKind.WRONG_STATE
     group.release_stop()
-    assert state_of(group) is GroupState.STOPPING
+    assert state_of(group) is SmcGroupState.STOPPING
     at_cycle(group)
-    assert state_of(group) is GroupState.STANDBY
+    assert state_of(group) is SmcGroupState.STANDBY
 
 
 def test_a_movement_during_a_stop_may_be_aborted_instead():
@@ -73,10 +73,10 @@ def test_a_stop_released_early_still_comes_to_rest_first():
     group.release_stop()
     at_cycle(group)
     assert stop.outputs.busy
-    assert state_of(group) is GroupState.STOPPING
+    assert state_of(group) is SmcGroupState.STOPPING
     settled(group)
     assert stop.outputs.done
-    assert state_of(group) is GroupState.STANDBY
+    assert state_of(group) is SmcGroupState.STANDBY
 
 
 def test_a_second_stop_joins_the_first():
@@ -90,10 +90,10 @@ def test_a_second_stop_joins_the_first():
     group.release_stop()
     group.stop()
     settled(group)
-    assert state_of(group) is GroupState.STOPPING
+    assert state_of(group) is SmcGroupState.STOPPING
     group.release_stop()
     settled(group)
-    assert state_of(group) is GroupState.STANDBY
+    assert state_of(group) is SmcGroupState.STANDBY
 
 
 @pytest.mark.parametrize("block", ["halt", "interrupt", "resume"])
@@ -104,17 +104,17 @@ def test_a_stop_overrules_every_other_way_of_coming_to_rest(block):
 def test_halting_goes_through_moving_to_standby_also_from_standby():
     group = standing()
     halt = group.halt()
-    assert state_of(group) is GroupState.MOVING
+    assert state_of(group) is SmcGroupState.MOVING
     at_cycle(group)
     assert halt.outputs.done
-    assert state_of(group) is GroupState.MOVING
+    assert state_of(group) is SmcGroupState.MOVING
     at_cycle(group)
-    assert state_of(group) is GroupState.STANDBY
+    assert state_of(group) is SmcGroupState.STANDBY
 
 
 def test_halting_ends_every_movement_and_rests_before_the_target():
     group = standing()
-    first, second = moved(group, x_mm=-60), moved(group, x_mm=-60, mode=BufferMode.BUFFERED)
+    first, second = moved(group, x_mm=-60), moved(group, x_mm=-60, mode=SmcBufferMode.BUFFERED)
     passing(group, 0.3)
     before = group.read_actual_position().values
     halt = group.halt()
@@ -139,10 +139,10 @@ def test_a_new_movement_ends_a_halt():
 
 
 @pytest.mark.parametrize("block", ["stop", "halt", "interrupt", "resume"])
-@pytest.mark.parametrize("state", [GroupState.DISABLED, GroupState.ERROR_STOP])
+@pytest.mark.parametrize("state", [SmcGroupState.DISABLED, SmcGroupState.ERROR_STOP])
 def test_nothing_can_come_to_rest_in_disabled_or_error(block, state):
-    group = in_error() if state is GroupState.ERROR_STOP else standing()
-    if state is GroupState.DISABLED:
+    group = in_error() if state is SmcGroupState.ERROR_STOP else standing()
+    if state is SmcGroupState.DISABLED:
         group.disable()
     assert kind(getattr(group, block)()) is ErrorKind.WRONG_STATE
     assert state_of(group) is state

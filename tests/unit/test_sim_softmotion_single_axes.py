@@ -1,10 +1,10 @@
-"""Axes of a group that move alone; numbers are those of softmotion.md 7."""
+"""Axes of a group that move alone; numbers are those of docs/reference/softmotion.md 5."""
 
 import pytest
 from robolink_simulators.softmotion import (
     AxisState,
     ErrorKind,
-    GroupState,
+    SmcGroupState,
 )
 
 from tests.unit._softmotion_machine import (
@@ -23,16 +23,16 @@ def test_a_single_axis_may_move_in_standby_and_ends_a_group_movement_in_error():
     """Behaviour 14."""
     group = standing()
     single = group.move_axis(2, 40.0)
-    assert state_of(group) is GroupState.STANDBY
+    assert state_of(group) is SmcGroupState.STANDBY
     assert group.axes[2].state is AxisState.DISCRETE_MOTION
     settled(group)
     assert single.outputs.done
     assert group.values[2] == 40.0
-    assert state_of(group) is GroupState.STANDBY
+    assert state_of(group) is SmcGroupState.STANDBY
     move = moved(group, x_mm=-20)
     passing(group, 0.1)
     assert kind(group.move_axis(2, 0.0)) is ErrorKind.INTERRUPTED_BY_SINGLE_AXIS
-    assert state_of(group) is GroupState.ERROR_STOP
+    assert state_of(group) is SmcGroupState.ERROR_STOP
     error = group.status().error
     assert error.symbol == "SMC_AXIS_GROUP_INTERRUPTED_BY_SINGLE_AXIS"
     assert error.number == 0
@@ -45,7 +45,7 @@ def test_a_group_movement_while_an_axis_moves_alone_is_a_group_error():
     passing(group, 0.01)
     move = group.move_linear_absolute(shifted(group, x_mm=-20), LINE)
     assert kind(move) is ErrorKind.INTERRUPTED_BY_SINGLE_AXIS
-    assert state_of(group) is GroupState.ERROR_STOP
+    assert state_of(group) is SmcGroupState.ERROR_STOP
     assert single.outputs.aborted
     settled(group)
     assert group.values[2] < 40.0
@@ -57,7 +57,7 @@ def test_a_disabled_group_lets_its_axes_move_alone():
     single = group.move_axis(0, 50.0)
     settled(group)
     assert single.outputs.done
-    assert state_of(group) is GroupState.DISABLED
+    assert state_of(group) is SmcGroupState.DISABLED
 
 
 @pytest.mark.parametrize(

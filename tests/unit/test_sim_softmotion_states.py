@@ -1,4 +1,4 @@
-"""States of a simulated axis group; numbers are those of softmotion.md 7."""
+"""States of a simulated axis group; numbers are those of docs/reference/softmotion.md 5."""
 
 from dataclasses import replace
 
@@ -6,10 +6,10 @@ import pytest
 from robolink_simulators.softmotion import (
     AxisState,
     BlockState,
-    BufferMode,
     ErrorKind,
     GroupOptions,
-    GroupState,
+    SmcBufferMode,
+    SmcGroupState,
     SmcNumbers,
 )
 
@@ -37,10 +37,10 @@ def test_enabling_twice_and_disabling_when_disabled_are_errors():
     assert kind(again) is ErrorKind.WRONG_STATE
     assert again.outputs.error.number == 11000
     assert again.outputs.error.symbol == "SMC_AXIS_GROUP_WRONG_STATE"
-    assert state_of(group) is GroupState.STANDBY
+    assert state_of(group) is SmcGroupState.STANDBY
     assert group.disable().outputs.done
     assert kind(group.disable()) is ErrorKind.WRONG_STATE
-    assert state_of(group) is GroupState.DISABLED
+    assert state_of(group) is SmcGroupState.DISABLED
 
 
 def test_resetting_in_standby_says_that_there_is_nothing_to_reset():
@@ -49,7 +49,7 @@ def test_resetting_in_standby_says_that_there_is_nothing_to_reset():
     reset = group.reset()
     assert kind(reset) is ErrorKind.NOTHING_TO_RESET
     assert reset.outputs.error.number == 120
-    assert state_of(group) is GroupState.STANDBY
+    assert state_of(group) is SmcGroupState.STANDBY
 
 
 def test_a_movement_that_has_arrived_is_over_a_cycle_before_standby():
@@ -58,12 +58,12 @@ def test_a_movement_that_has_arrived_is_over_a_cycle_before_standby():
     target = shifted(group, x_mm=-20)
     move = group.move_linear_absolute(target, LINE)
     while not move.outputs.done:
-        assert state_of(group) is GroupState.MOVING
+        assert state_of(group) is SmcGroupState.MOVING
         at_cycle(group)
     assert group.read_actual_position().values[:3] == pytest.approx(target.position[:3])
-    assert state_of(group) is GroupState.MOVING
+    assert state_of(group) is SmcGroupState.MOVING
     at_cycle(group)
-    assert state_of(group) is GroupState.STANDBY
+    assert state_of(group) is SmcGroupState.STANDBY
     assert group.next_change() is None
 
 
@@ -79,13 +79,13 @@ def test_an_axis_in_error_stays_so_without_power_until_it_is_reset():
 @pytest.mark.parametrize("as_error", [False, True])
 def test_an_axis_error_ends_everything_at_once(as_error):
     group = standing(options=GroupOptions(queue_on_error="error" if as_error else "aborted"))
-    moves = [moved(group, x_mm=-40), moved(group, x_mm=-50, mode=BufferMode.BUFFERED)]
+    moves = [moved(group, x_mm=-40), moved(group, x_mm=-50, mode=SmcBufferMode.BUFFERED)]
     passing(group, 0.2)
     group.fail_axis(1, 16)
     stood = group.values
     expected = BlockState.ERROR if as_error else BlockState.COMMAND_ABORTED
     assert [move.outputs.state for move in moves] == [expected, expected]
-    assert state_of(group) is GroupState.ERROR_STOP
+    assert state_of(group) is SmcGroupState.ERROR_STOP
     assert group.status().error.number == 16
     assert {axis.state for axis in group.axes} == {AxisState.ERRORSTOP}
     passing(group, 1)
@@ -100,7 +100,7 @@ def test_an_error_during_a_stop_aborts_it_and_unlocks_the_group():
     group.fail_axis(0)
     assert stop.outputs.aborted
     group.reset()
-    assert state_of(group) is GroupState.STANDBY
+    assert state_of(group) is SmcGroupState.STANDBY
     assert moved(group, x_mm=-10).outputs.busy
 
 
@@ -108,7 +108,7 @@ def test_a_reset_leads_from_error_to_standby_and_takes_the_error_away():
     group = in_error()
     assert kind(group.move_linear_absolute(shifted(group, x_mm=1), LINE)) is ErrorKind.WRONG_STATE
     assert group.reset().outputs.done
-    assert state_of(group) is GroupState.STANDBY
+    assert state_of(group) is SmcGroupState.STANDBY
     assert group.status().error is None
     assert {axis.state for axis in group.axes} == {AxisState.STANDSTILL}
 
@@ -117,12 +117,12 @@ def test_an_axis_that_fails_while_the_group_is_disabled_is_reset_there():
     group = standing()
     group.disable()
     group.fail_axis(0)
-    assert state_of(group) is GroupState.DISABLED
+    assert state_of(group) is SmcGroupState.DISABLED
     group.enable()
     assert kind(group.move_direct_absolute(in_axes(0, 0, 0, 0), FACTORS)) is ErrorKind.AXIS_ERROR
     group.disable()
     assert group.reset().outputs.done
-    assert state_of(group) is GroupState.DISABLED
+    assert state_of(group) is SmcGroupState.DISABLED
 
 
 def test_disabling_is_for_standby_only_unless_the_options_say_otherwise():
@@ -137,14 +137,14 @@ def test_disabling_is_for_standby_only_unless_the_options_say_otherwise():
     passing(group, 0.2)
     assert group.disable().outputs.done
     assert move.outputs.aborted
-    assert state_of(group) is GroupState.DISABLED
+    assert state_of(group) is SmcGroupState.DISABLED
     assert in_error(disable_from="any").disable().outputs.done
 
 
 def test_enabling_does_not_power_the_drives():
     group = standing()
     group.power(on=False)
-    assert state_of(group) is GroupState.STANDBY
+    assert state_of(group) is SmcGroupState.STANDBY
     assert not group.status().powered
     refused = group.move_linear_absolute(shifted(group, x_mm=-10), LINE)
     assert kind(refused) is ErrorKind.NO_POWER
@@ -157,7 +157,7 @@ def test_power_lost_while_moving_is_a_group_error():
     passing(group, 0.2)
     group.power(on=False)
     assert move.outputs.aborted
-    assert state_of(group) is GroupState.ERROR_STOP
+    assert state_of(group) is SmcGroupState.ERROR_STOP
     assert {axis.state for axis in group.axes} == {AxisState.POWER_OFF}
     group.power(on=True)
     assert group.reset().outputs.done
@@ -176,7 +176,7 @@ def test_axes_are_coupled_in_moving_and_freed_as_the_version_does(follow):
 def test_the_status_tells_what_is_active_and_waits():
     group = standing()
     first = moved(group, x_mm=-20)
-    second = moved(group, x_mm=-30, mode=BufferMode.BUFFERED)
+    second = moved(group, x_mm=-30, mode=SmcBufferMode.BUFFERED)
     assert (first.movement_number, second.movement_number) == (1, 2)
     passing(group, 0.1)
     status = group.status()
@@ -207,7 +207,7 @@ def test_time_may_pass_in_any_pieces():
     for piece_ns in (1_234_567, CYCLE_NS, 50 * CYCLE_NS):
         group = standing()
         moved(group, x_mm=-40)
-        moved(group, z_mm=10, mode=BufferMode.BLENDING_LOW)
+        moved(group, z_mm=10, mode=SmcBufferMode.BLENDING_LOW)
         while group.now_ns < 100 * CYCLE_NS:
             group.advance(min(group.now_ns + piece_ns, 100 * CYCLE_NS))
         ways.append(group.values)

@@ -1,21 +1,21 @@
-"""Tools of a simulated axis group; numbers are those of softmotion.md 7."""
+"""Tools of a simulated axis group; numbers are those of docs/reference/softmotion.md 5."""
 
 from dataclasses import dataclass
 
 import pytest
 from robolink_simulators.softmotion import (
     AxisGroup,
-    BufferMode,
+    BlockRefused,
     CoordRef,
     ErrorKind,
     GroupOptions,
-    GroupState,
     ReadToolMode,
-    Refused,
-    Tool,
+    SmcBufferMode,
+    SmcGroupState,
+    ToolInForce,
     machine_named,
 )
-from robolink_simulators.softmotion.kinematics.catalogue import NAMES
+from robolink_simulators.softmotion.catalogue import NAMES
 from robolink_simulators.softmotion.kinematics.frames import zyz
 from robolink_simulators.softmotion.kinematics.positions import Gantry3
 
@@ -44,7 +44,7 @@ def shift_of(group, mode=ReadToolMode.SET):
     return group.read_tool(mode).frame.shift_mm
 
 
-def commanded(group, how, *, x_mm=-20.0, mode=BufferMode.BUFFERED):
+def commanded(group, how, *, x_mm=-20.0, mode=SmcBufferMode.BUFFERED):
     if how == CP:
         return moved(group, x_mm=x_mm, mode=mode)
     values = group.values
@@ -56,7 +56,7 @@ def test_no_tool_is_set_in_disabled():
     group = standing()
     group.disable()
     assert kind(set_to(group, z=50)) is ErrorKind.WRONG_STATE
-    assert group.read_tool() == Tool()
+    assert group.read_tool() == ToolInForce()
 
 
 def test_no_tool_is_set_in_error_stop_and_the_old_one_outlives_the_reset():
@@ -78,7 +78,7 @@ def test_a_tool_that_does_not_fit_leaves_the_old_one():
     assert kind(refused) is ErrorKind.TOOL_INCOMPATIBLE
     assert refused.outputs.error.symbol == TOOL_SYMBOL
     assert shift_of(group) == (0, 0, 20)
-    assert group.state is GroupState.STANDBY
+    assert group.state is SmcGroupState.STANDBY
 
 
 def test_on_two_arms_a_shift_along_z_with_any_rotation_fits():
@@ -99,7 +99,10 @@ def test_a_polar_kinematics_takes_shifts_along_z_only():
 
 @pytest.mark.parametrize("name", [n for n in NAMES if n not in ("Kin_Scara2_Z", "Kin_Polar_Z")])
 def test_a_kinematics_whose_orientation_is_known_takes_any_tool(name):
-    """Behaviour 7, and a C axis behind an arm lifts its restriction (softmotion.md 0.3)."""
+    """Behaviour 7, and a C axis behind an arm lifts its restriction.
+
+    Source: docs/reference/softmotion.md 3.1.
+    """
     group = standing(name)
     assert set_to(group, 1, 2, 3, 4, 5, 6).outputs.done
     assert shift_of(group) == (1, 2, 3)
@@ -111,7 +114,7 @@ def test_exchanging_the_kinematics_takes_the_tool_off(other):
     group = standing("Kin_Scara2_Z+Kin_CAxis")
     set_to(group, 1, 2, 3)
     assert group.set_kin_transform(machine_named(other).kinematics).outputs.done
-    assert group.read_tool() == Tool()
+    assert group.read_tool() == ToolInForce()
     assert group.kinematics.name == other
     assert len(group.axes) == len(group.kinematics.kinds)
     assert kind(set_to(group, x=1)) is (
@@ -191,7 +194,7 @@ def test_a_tool_counts_for_movements_commanded_after_it():
     assert first.outputs.active
     assert shift_of(group, ReadToolMode.ACTIVE_MOVEMENT) == (0, 0, -10)
     assert shift_of(group, ReadToolMode.LAST_COMMANDED) == (0, 0, -10)
-    moved(group, x_mm=-30, mode=BufferMode.BUFFERED)
+    moved(group, x_mm=-30, mode=SmcBufferMode.BUFFERED)
     assert shift_of(group, ReadToolMode.ACTIVE_MOVEMENT) == (0, 0, -10)
     assert shift_of(group, ReadToolMode.LAST_COMMANDED) == (0, 0, -30)
     assert shift_of(group) == (0, 0, -30)
@@ -199,7 +202,7 @@ def test_a_tool_counts_for_movements_commanded_after_it():
 
 @pytest.mark.parametrize("mode", [ReadToolMode.ACTIVE_MOVEMENT, ReadToolMode.LAST_COMMANDED])
 def test_the_tool_of_no_movement_cannot_be_read(mode):
-    with pytest.raises(Refused) as caught:
+    with pytest.raises(BlockRefused) as caught:
         standing().read_tool(mode)
     assert caught.value.kind is ErrorKind.NO_SUCH_MOVEMENT
 
@@ -215,11 +218,11 @@ def test_whether_the_last_commanded_tool_outlives_its_movement_is_an_option(kept
     if kept:
         assert shift_of(group, ReadToolMode.LAST_COMMANDED) == (0, 0, -10)
     else:
-        with pytest.raises(Refused):
+        with pytest.raises(BlockRefused):
             group.read_tool(ReadToolMode.LAST_COMMANDED)
 
 
-@pytest.mark.parametrize("mode", [BufferMode.ABORTING, BufferMode.BLENDING_HIGH])
+@pytest.mark.parametrize("mode", [SmcBufferMode.ABORTING, SmcBufferMode.BLENDING_HIGH])
 @pytest.mark.parametrize("changed", [True, False])
 def test_a_tool_change_between_two_lines_makes_the_second_wait(mode, changed):
     group = standing()
@@ -241,7 +244,7 @@ def test_a_tool_change_beside_a_direct_movement_leaves_aborting_alone(before, af
     first = commanded(group, before)
     passing(group, 0.05)
     set_to(group, z=-30)
-    second = commanded(group, after, mode=BufferMode.ABORTING)
+    second = commanded(group, after, mode=SmcBufferMode.ABORTING)
     assert first.outputs.aborted
     settled(group)
     assert second.outputs.done
@@ -252,14 +255,14 @@ def test_interrupted_movements_go_on_with_their_old_tool():
     set_to(group, z=-10)
     start = shifted(group)
     first = moved(group, x_mm=-60)
-    second = moved(group, x_mm=-60, z_mm=5, mode=BufferMode.BUFFERED)
+    second = moved(group, x_mm=-60, z_mm=5, mode=SmcBufferMode.BUFFERED)
     passing(group, 0.2)
     group.interrupt()
     settled(group)
     set_to(group, z=-30)
     assert group.resume().outputs.done
     assert shift_of(group, ReadToolMode.ACTIVE_MOVEMENT) == (0, 0, -10)
-    later = moved(group, mode=BufferMode.BUFFERED)
+    later = moved(group, mode=SmcBufferMode.BUFFERED)
     assert shift_of(group, ReadToolMode.LAST_COMMANDED) == (0, 0, -30)
     while not second.outputs.done:
         group.advance(group.next_change())

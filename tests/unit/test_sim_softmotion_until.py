@@ -2,13 +2,13 @@
 
 import pytest
 from robolink_simulators.softmotion import (
-    BufferMode,
+    BlockRefused,
     CoordSystem,
     EdgeWatch,
     ErrorKind,
     GroupOptions,
-    GroupState,
-    Refused,
+    SmcBufferMode,
+    SmcGroupState,
     Target,
 )
 
@@ -39,7 +39,7 @@ def test_a_movement_until_an_input_stops_past_the_edge_and_tells_where_it_was():
     assert move.outputs.done
     assert -32.5 - 0.4 <= -20 + move.latched.z_mm <= -32.5
     assert -50 < tcp_mm(group)[2] < -20 + move.latched.z_mm
-    assert group.state is GroupState.STANDBY
+    assert group.state is SmcGroupState.STANDBY
 
 
 def test_a_drive_latches_at_the_edge_itself():
@@ -106,7 +106,7 @@ def test_an_input_switched_by_hand_ends_it_too():
 def test_nothing_can_be_buffered_behind_an_unknown_end():
     group = standing()
     group.move_linear_absolute(DOWN, LINE, watch=EdgeWatch(5))
-    after = group.move_linear_absolute(shifted(group), LINE, mode=BufferMode.BUFFERED)
+    after = group.move_linear_absolute(shifted(group), LINE, mode=SmcBufferMode.BUFFERED)
     assert kind(after) is ErrorKind.WRONG_STATE
     assert moved(group, z_mm=10)
 
@@ -116,7 +116,7 @@ def test_there_are_32_inputs_and_outputs(number):
     group = standing()
     watched = group.move_linear_absolute(DOWN, LINE, watch=EdgeWatch(number))
     assert kind(watched) is ErrorKind.PARAMETER
-    with pytest.raises(Refused):
+    with pytest.raises(BlockRefused):
         group.outputs.switch(number, True)
     group.outputs.switch(31, True)
     assert group.outputs.read(31)

@@ -6,16 +6,16 @@ import pytest
 from robolink_simulators.cell.tip_switches import LightBeam, TouchPlate
 from robolink_simulators.softmotion import (
     AxisGroup,
+    BlockRefused,
     CoordSystem,
     EdgeWatch,
     ErrorKind,
     GroupOptions,
-    Refused,
     SoftMotionWorld,
     Target,
     machine_named,
 )
-from robolink_simulators.softmotion.kinematics.catalogue import NAMES
+from robolink_simulators.softmotion.catalogue import NAMES
 from robolink_simulators.softmotion.kinematics.frames import zyx_angles
 
 from robolink.errors import ConfigError
@@ -87,7 +87,7 @@ def test_nobody_jogs_a_machine_that_moves():
 def test_a_pin_out_of_reach_is_refused():
     world = world_of()
     world.pin_mm = (2000.0, 0.0, 0.0)
-    with pytest.raises(Refused) as caught:
+    with pytest.raises(BlockRefused) as caught:
         world.operator.jog_onto_pin()
     assert caught.value.kind is ErrorKind.UNREACHABLE
 

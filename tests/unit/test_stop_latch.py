@@ -4,7 +4,7 @@ import threading
 
 import pytest
 
-from robolink.checkpoints import Point, checkpoint, observed
+from robolink.checkpoints import Checkpoint, checkpoint, observed
 from robolink.controllers.epson.link.requests import command_class_of
 from robolink.controllers.softmotion.link.commands import command_class_of as class_of_command
 from robolink.errors import NotReadyError, NotReadyReason, OutcomeUnknownError, StoppedError
@@ -180,11 +180,11 @@ def test_what_moves_a_plc_is_held_back_and_what_ends_it_is_not():
 
 def test_checkpoints_are_seen_while_somebody_looks_and_cost_nothing_else():
     seen = []
-    checkpoint(Point.STEP, "before")
+    checkpoint(Checkpoint.STEP, "before")
     with observed(lambda point, what: seen.append((point, what))):
-        checkpoint(Point.STEP, "meanwhile")
+        checkpoint(Checkpoint.STEP, "meanwhile")
         with observed(lambda _point, _what: None):
-            checkpoint(Point.STEP, "somebody else looks")
-        checkpoint(Point.LOCK)
-    checkpoint(Point.STEP, "after")
-    assert seen == [(Point.STEP, "meanwhile"), (Point.LOCK, "")]
+            checkpoint(Checkpoint.STEP, "somebody else looks")
+        checkpoint(Checkpoint.LOCK)
+    checkpoint(Checkpoint.STEP, "after")
+    assert seen == [(Checkpoint.STEP, "meanwhile"), (Checkpoint.LOCK, "")]

@@ -15,8 +15,8 @@ from robolink_cli.options.motion import motion_option
 from robolink_cli.options.sensor import sensor_option
 
 if TYPE_CHECKING:
-    from robolink.calibration import CameraStation
     from robolink.model import Controller
+    from robolink.stations import CameraStation
 
 
 @dataclass(frozen=True, slots=True)

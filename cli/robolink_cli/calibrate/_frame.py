@@ -18,7 +18,8 @@ from robolink_cli.session.context import CliContext
 
 if TYPE_CHECKING:
     from robolink.model import Controller
-    from robolink.nozzle_change import ChangePlan, Gate, Limits, PoseMethod, TipSource
+    from robolink.nozzle_change import AcceptanceCriteria, ChangePlan, Limits
+    from robolink.procedures import PoseMethod, TipSource
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +29,7 @@ class Frame:
     Attributes:
         context: What the command was told about controller, person and nozzle.
         tool: Number of the tool.
-        gate: What a measurement must be like to be believed.
+        criteria: What a measurement must be like to be believed.
         limits: Where and how fast the robot may go.
         verify: Whether to prove the new tip after the write.
         assist: A simulator's stand-in for the person.
@@ -42,7 +43,7 @@ class Frame:
 
     context: CliContext
     tool: int
-    gate: "Gate"
+    criteria: "AcceptanceCriteria"
     limits: "Limits"
     verify: bool
     assist: str | None
@@ -94,7 +95,7 @@ class Frame:
         """Return what is to be done with the measurements of ``source``."""
         from robolink.nozzle_change import ChangePlan, ToolPlan
 
-        one = ToolPlan(self.tool, source, self.gate, verify=self.verify, pin=self.pin)
+        one = ToolPlan(self.tool, source, self.criteria, verify=self.verify, pin=self.pin)
         return ChangePlan((one,), limits=self.limits, ask_before_write=not self.yes)
 
 
@@ -128,10 +129,10 @@ def frame_from(
         ReservedToolError, ToolIndexError: There is no such tool to calibrate.
         ConfigError: Options exclude each other, or the report cannot be written.
     """
-    from robolink.nozzle_change import Gate, Limits
+    from robolink.nozzle_change import AcceptanceCriteria, Limits
 
     _require_tool(tool)
-    gate = Gate(
+    criteria = AcceptanceCriteria(
         max_change_mm=min(max_change_mm, jump_limit_mm(context.cell)),
         accepted_change_mm=max_change_mm,
         accepted_with="--max-change",
@@ -143,7 +144,7 @@ def frame_from(
     return Frame(
         context.with_nozzle(nozzle, lot),
         tool,
-        gate,
+        criteria,
         Limits(box_mm=box_mm, speed_mm_s=speed_mm_s),
         verify=not no_verify,
         assist=assist,

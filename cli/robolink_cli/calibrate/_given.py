@@ -6,19 +6,18 @@ from functools import partial
 from robolink.calibration import ToolFit
 from robolink.errors import DeclinedError
 from robolink.messages import tr
+from robolink.methods import PointsSource
 from robolink.model import Controller
 from robolink.nozzle_change import (
-    Bench,
     ChangePlan,
-    GivenPoses,
     Listener,
     Moment,
     NozzleChange,
-    PoseMethod,
     Proposal,
     ToolPlan,
     ToolReport,
 )
+from robolink.procedures import MeasurementContext, PoseMethod
 from robolink.transaction import earlier_corrections
 from robolink_cli.calibrate._frame import Frame
 from robolink_cli.calibrate._listener import CalibrationListener
@@ -26,7 +25,7 @@ from robolink_cli.calibrate._pins import remark_on_pin
 from robolink_cli.console.render import note, say
 from robolink_cli.options.impact import impact_payload, show_impact
 from robolink_cli.options.pose_source import PoseSource
-from robolink_cli.options.report import Draft, reporting
+from robolink_cli.options.report import ReportDraft, reporting
 from robolink_cli.prompts.consent import agree, on_terminal
 from robolink_cli.prompts.operator import terminal
 from robolink_cli.session.context import CliContext, open_controller
@@ -40,14 +39,14 @@ class _PosesListener(CalibrationListener):
 
     def __init__(
         self,
-        draft: Draft,
+        draft: ReportDraft,
         frame: Frame,
-        given: GivenPoses,
+        given: PointsSource,
         *,
         controller: Controller,
         taught_tool: int,
     ) -> None:
-        super().__init__(draft, frame.gate, frame.impact)
+        super().__init__(draft, frame.criteria, frame.impact)
         self._controller = controller
         self._frame = frame
         self._given = given
@@ -72,7 +71,7 @@ class _PosesListener(CalibrationListener):
         if self.impact is not None:
             show_impact(proposal.tool, self.impact)
 
-    def moment(self, moment: Moment, bench: Bench, tool: int | None = None) -> None:  # noqa: ARG002 - one tool only
+    def moment(self, moment: Moment, bench: MeasurementContext, tool: int | None = None) -> None:  # noqa: ARG002 - one tool only
         if moment is Moment.BEFORE_WRITE:
             _agree_to_write(self._frame.tool, yes=self._frame.yes)
             back_up_first(bench.controller)
@@ -124,11 +123,11 @@ def calibrate_from_poses(
         method = method_for(controller)
         # A pin that is kept needs its height.
         needs = {*method.needs, "z_mm"} if frame.pin else {*method.needs}
-        given = GivenPoses(
+        given = PointsSource(
             lambda: source.poses(controller, sorted(needs)),
             method,
             taught_tool=source.taught_tool,
-            plausible_mm=frame.gate.limit_mm,
+            plausible_mm=frame.criteria.limit_mm,
             sentence=source.sentence,
         )
         listener = _PosesListener(
@@ -150,9 +149,9 @@ def calibrate_from_poses(
 
 
 def _carry_out(
-    controller: Controller, frame: Frame, given: GivenPoses, listener: Listener
+    controller: Controller, frame: Frame, given: PointsSource, listener: Listener
 ) -> ToolReport:
-    one = ToolPlan(frame.tool, given, frame.gate, verify=False, pin=frame.pin)
+    one = ToolPlan(frame.tool, given, frame.criteria, verify=False, pin=frame.pin)
     change = NozzleChange(
         controller,
         ChangePlan((one,), ask_before_write=False),
@@ -165,7 +164,7 @@ def _carry_out(
 
 
 def _dry_run(
-    controller: Controller, frame: Frame, given: GivenPoses, listener: Listener
+    controller: Controller, frame: Frame, given: PointsSource, listener: Listener
 ) -> dict[str, object]:
     """Propose and judge; return the document with what would be sent."""
     before = controller.tools.read(frame.tool)
@@ -173,10 +172,10 @@ def _dry_run(
     proposal = Proposal(frame.tool, before, given.found.result)
     if not frame.context.json:
         listener.proposed([proposal])
-    frame.gate.judge_fit(proposal.result)
-    frame.gate.judge_change(proposal, remedy=given.remedy)
+    frame.criteria.judge_fit(proposal.result)
+    frame.criteria.judge_change(proposal, remedy=given.remedy)
     requests = list(controller.tools.preview_write(frame.tool, proposal.offset))
-    judged = judged_payload(proposal, frame.gate.verdicts(proposal))
+    judged = judged_payload(proposal, frame.criteria.verdicts(proposal))
     return {"dry_run": True, "requests": requests, **judged}
 
 

@@ -2,9 +2,9 @@
 
 from robolink.calibration import Impact, VerifyResult
 from robolink.model import Controller, Pose, ToolReceipt
-from robolink.nozzle_change import Gate, Listener, Proposal
+from robolink.nozzle_change import AcceptanceCriteria, Listener, Proposal
 from robolink_cli.options.impact import ImpactRequest, judge
-from robolink_cli.options.report import Draft
+from robolink_cli.options.report import ReportDraft
 from robolink_cli.views.calibration import show_proposal, show_verdicts
 
 
@@ -15,9 +15,11 @@ class CalibrationListener(Listener):
         impact: What the change means for taught points, once it was proposed.
     """
 
-    def __init__(self, draft: Draft, gate: Gate, impact: ImpactRequest | None) -> None:
+    def __init__(
+        self, draft: ReportDraft, criteria: AcceptanceCriteria, impact: ImpactRequest | None
+    ) -> None:
         self._draft = draft
-        self._gate = gate
+        self._criteria = criteria
         self._request = impact
         self._points: dict[int, Pose | None] | None = None
         self.impact: Impact | None = None
@@ -40,4 +42,4 @@ class CalibrationListener(Listener):
         self.impact = judge(self._points, old=proposal.before, new=proposal.offset)
         self._draft.propose(proposal, source=source, warnings=warnings, impact=self.impact)
         show_proposal(proposal)
-        show_verdicts(self._gate.verdicts(proposal))
+        show_verdicts(self._criteria.verdicts(proposal))

@@ -9,18 +9,18 @@ from robolink.nozzle_change import (
     ChangePlan,
     NozzleChange,
     Proposal,
-    TipSource,
     ToolReport,
     preview,
     require_inside,
     require_ready,
 )
+from robolink.procedures import TipSource
 from robolink.transaction import earlier_corrections
 from robolink_cli.calibrate._frame import Frame
 from robolink_cli.calibrate._listener import CalibrationListener
 from robolink_cli.calibrate._pins import remark_on_pin
 from robolink_cli.options.impact import ImpactRequest, impact_payload, show_impact
-from robolink_cli.options.report import Draft, reporting
+from robolink_cli.options.report import ReportDraft, reporting
 from robolink_cli.prompts.consent import agree_to_motion, motion_question
 from robolink_cli.prompts.operator import operator_at
 from robolink_cli.session.context import open_controller
@@ -37,8 +37,8 @@ from robolink_cli.views.planned_steps import steps_payload
 
 
 class _LiveListener(CalibrationListener):
-    def __init__(self, draft: Draft, plan: ChangePlan, impact: ImpactRequest | None) -> None:
-        super().__init__(draft, plan.tools[0].gate, impact)
+    def __init__(self, draft: ReportDraft, plan: ChangePlan, impact: ImpactRequest | None) -> None:
+        super().__init__(draft, plan.tools[0].criteria, impact)
         self._source = plan.tools[0].source
 
     def proposed(self, proposals: Sequence[Proposal]) -> None:
@@ -56,7 +56,7 @@ class LiveCalibration:
         controller: Controller,
         plan: ChangePlan,
         *,
-        draft: Draft,
+        draft: ReportDraft,
         assist_url: str | None = None,
         impact: ImpactRequest | None = None,
     ) -> None:

@@ -1,8 +1,8 @@
 """How a tip is taken off the pin and brought back, as the options of a command say."""
 
-from robolink.calibration import TouchPlan
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink.procedures import TouchPlan
 
 
 def touch_plan(lift_mm: float, clearance_mm: float, *, turn_deg: float = 180.0) -> TouchPlan:

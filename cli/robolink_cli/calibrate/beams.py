@@ -12,7 +12,7 @@ from robolink_cli.options.motion import motion_option
 
 if TYPE_CHECKING:
     from robolink.model import Controller
-    from robolink.nozzle_change import TipSource
+    from robolink.procedures import TipSource
 
 
 @click.command("beams")
@@ -97,7 +97,8 @@ def beams(
     The station is declared in the cell file, or was learnt with 'station learn'. Afterwards the tip
     turns half a turn about itself and crosses the beams again.
     """
-    from robolink.calibration import Course, CrossingPlan
+    from robolink.methods import CrossingPlan
+    from robolink.procedures import SamplingPolicy
 
     plan = CrossingPlan(
         search_mm=search_mm,
@@ -118,14 +119,14 @@ def beams(
             tr("With {count} repeats --until has nothing to leave out.", count=repeats),
             remedy=tr("Give --repeats 3 or more; with --sigma or --turn, 2 or more."),
         )
-    frame, course = frame.at(station), Course(until_mm, retake=True)
+    frame, sampling = frame.at(station), SamplingPolicy(until_mm, retake=True)
 
     def source(controller: "Controller") -> "TipSource":
-        from robolink.nozzle_change import CrossedBeams
+        from robolink.methods import BeamsSource
         from robolink.stations import StationKind, beam_station
         from robolink_cli.calibrate._pins import station_at
 
         place = beam_station(station_at(frame, controller, StationKind.BEAMS))
-        return CrossedBeams(place, plan, turn_deg=turn_deg, sigma_mm=sigma_mm, course=course)
+        return BeamsSource(place, plan, turn_deg=turn_deg, sigma_mm=sigma_mm, sampling=sampling)
 
     frame.measure(source)

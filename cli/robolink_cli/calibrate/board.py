@@ -13,7 +13,7 @@ from robolink_cli.calibrate._options import calibration_options, sigma_option
 if TYPE_CHECKING:
     from robolink.calibration import BoardDrawing
     from robolink.model import Controller
-    from robolink.nozzle_change import TipSource
+    from robolink.procedures import TipSource
 
 
 @click.command("board")
@@ -51,16 +51,16 @@ def board(
     The tool that is stored says where the board is expected: the fiducials must then lie in the
     image one at a time. Say where they are with --spacing, or with --fiducial for each of them.
     """
-    from robolink.calibration import LookPlan
+    from robolink.procedures import LookPlan
 
     drawing = _drawing(fiducials, spacing_mm)
     plan = LookPlan(turns_deg=angles_from(angles), pictures=pictures, lift_mm=lift_mm)
 
     def source(controller: "Controller") -> "TipSource":
-        from robolink.nozzle_change import HeldBoard
+        from robolink.methods import BoardSource
 
         sensor, station = camera.look_up(frame, controller)
-        return HeldBoard(sensor, station, drawing, plan, sigma_mm=sigma_mm, retake=True)
+        return BoardSource(sensor, station, drawing, plan, sigma_mm=sigma_mm, retake=True)
 
     frame.measure(source)
 

@@ -10,7 +10,7 @@ from robolink_cli.calibrate._options import calibration_options, sigma_option
 
 if TYPE_CHECKING:
     from robolink.model import Controller
-    from robolink.nozzle_change import TipSource
+    from robolink.procedures import TipSource
 
 
 @click.command("camera")
@@ -33,14 +33,14 @@ def camera(
     camera answers in millimetres. Looks at several angles tell the tip from what the camera itself
     is off by; a single one believes the camera.
     """
-    from robolink.calibration import LookPlan
+    from robolink.procedures import LookPlan
 
     plan = LookPlan(turns_deg=angles_from(angles), pictures=pictures, lift_mm=lift_mm)
 
     def source(controller: "Controller") -> "TipSource":
-        from robolink.nozzle_change import UpCamera
+        from robolink.methods import CameraSource
 
         sensor, station = camera.look_up(frame, controller)
-        return UpCamera(sensor, station, plan, sigma_mm=sigma_mm, retake=True)
+        return CameraSource(sensor, station, plan, sigma_mm=sigma_mm, retake=True)
 
     frame.measure(source)

@@ -12,7 +12,7 @@ from robolink_cli.options.motion import motion_option
 
 if TYPE_CHECKING:
     from robolink.model import Controller
-    from robolink.nozzle_change import TipSource
+    from robolink.procedures import TipSource
 
 
 @click.command("camera-affine")
@@ -52,18 +52,19 @@ def camera_affine(
     """
     from dataclasses import replace
 
-    from robolink.calibration import LookPlan, PatternPlan
+    from robolink.methods import PatternPlan
+    from robolink.procedures import LookPlan
 
     look = LookPlan(turns_deg=angles_from(angles), pictures=pictures, lift_mm=lift_mm)
     plan = PatternPlan(look, span_mm)
 
     def source(controller: "Controller") -> "TipSource":
-        from robolink.nozzle_change import CameraToFind
+        from robolink.methods import CameraAffineSource
 
         sensor, station = camera.look_up(frame, controller)
         if new_camera:
             station = replace(station, model=None)
-        return CameraToFind(
+        return CameraAffineSource(
             sensor, station, plan, sigma_mm=sigma_mm, retake=True, name=camera.station
         )
 

@@ -58,19 +58,19 @@ def n_angle(
 
     With --points, --pose or --poses the touches exist already: nothing moves.
     """
-    from robolink.calibration import Course, telling_order
-    from robolink.nozzle_change import ManyTouches, PinAndPerson
+    from robolink.methods import ManyTouches, NAngleSource, most_informative_order
+    from robolink.procedures import SamplingPolicy
     from robolink_cli.calibrate._touch_plan import touch_plan
 
     frame = frame.at_pin(station)
     touch = touch_plan(lift_mm, clearance_mm)
-    turns_deg = telling_order(_turns(count, angles))
+    turns_deg = most_informative_order(_turns(count, angles))
     if poses is not None:
         frame.solve(poses, lambda _controller: ManyTouches(sigma_mm))
         return
-    course = Course(until_mm, retake=True)
+    sampling = SamplingPolicy(until_mm, retake=True)
     frame.measure(
-        lambda _controller: PinAndPerson(touch, turns_deg, sigma_mm=sigma_mm, course=course)
+        lambda _controller: NAngleSource(turns_deg, touch, sigma_mm=sigma_mm, sampling=sampling)
     )
 
 

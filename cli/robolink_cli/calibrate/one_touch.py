@@ -11,8 +11,8 @@ from robolink_cli.options.motion import motion_option
 from robolink_cli.options.pose_source import PoseSource, pose_source_options
 
 if TYPE_CHECKING:
+    from robolink.methods import Absolute, Difference
     from robolink.model import Controller
-    from robolink.nozzle_change import Absolute, Difference
 
 
 @click.command("one-touch")
@@ -62,7 +62,7 @@ def one_touch(
     What is written is the stored offset moved by how much the tip differs from the old one. The
     uncertainty adds up over such changes, until a full calibration is due.
     """
-    from robolink.nozzle_change import OneTouch
+    from robolink.methods import OneTouchSource
     from robolink_cli.calibrate._touch_plan import touch_plan
 
     frame = frame.at_pin(station, finds_pin=False)
@@ -76,11 +76,11 @@ def one_touch(
     if poses is not None:
         frame.solve(poses, solver)
         return
-    frame.measure(lambda controller: OneTouch(solver(controller), touch))
+    frame.measure(lambda controller: OneTouchSource(solver(controller), touch))
 
 
 def _absolute(frame: Frame, controller: "Controller", sigma_mm: float | None) -> "Absolute":
-    from robolink.nozzle_change import Absolute
+    from robolink.methods import Absolute
     from robolink.stations import StationKind, pin_of
     from robolink_cli.calibrate._pins import station_at
 
@@ -99,14 +99,14 @@ def _difference(
         ConfigError: Nothing tells how well a touch repeats, or the station is no pin.
     """
     from robolink.calibration import NeedleLimits
-    from robolink.nozzle_change import difference_from_last
+    from robolink.methods import difference_from_last
     from robolink.stations import StationKind
     from robolink_cli.calibrate._pins import station_at
 
     station_at(frame, controller, StationKind.PIN)
     limits = NeedleLimits(
-        max_change_mm=frame.gate.limit_mm,
-        tolerance_mm=frame.gate.interval_mm or NeedleLimits().tolerance_mm,
+        max_change_mm=frame.criteria.limit_mm,
+        tolerance_mm=frame.criteria.interval_mm or NeedleLimits().tolerance_mm,
         max_changes=max_changes,
     )
     return difference_from_last(controller, frame.tool, frame.pin, sigma_mm=sigma_mm, limits=limits)

@@ -17,8 +17,8 @@ from robolink_cli.calibrate._tilting import tilt_options
 from robolink_cli.options.pose_source import PoseSource, pose_source_options
 
 if TYPE_CHECKING:
+    from robolink.methods import PivotSource
     from robolink.model import Controller
-    from robolink.nozzle_change import TiltedPin
 
 
 @click.command("pivot")
@@ -54,8 +54,8 @@ def pivot(
 
     With --points, --pose or --poses the touches exist already: nothing moves.
     """
-    from robolink.calibration import Course, telling_tilts
-    from robolink.nozzle_change import PivotTouches, TiltedPin, require_tilting
+    from robolink.methods import PivotSource, PivotTouches, informative_tilts, require_tilting
+    from robolink.procedures import SamplingPolicy
     from robolink_cli.calibrate._touch_plan import touch_plan
 
     frame = frame.at_pin(station)
@@ -63,10 +63,10 @@ def pivot(
     if poses is not None:
         frame.solve(poses, lambda _controller: PivotTouches(sigma_mm))
         return
-    tilts, course = telling_tilts(count - 1, tilt_deg), Course(until_mm, retake=True)
+    tilts, sampling = informative_tilts(count - 1, tilt_deg), SamplingPolicy(until_mm, retake=True)
 
-    def source(controller: "Controller") -> "TiltedPin":
+    def source(controller: "Controller") -> "PivotSource":
         require_tilting(controller, "pivot")
-        return TiltedPin(tilts, touch, sigma_mm=sigma_mm, course=course)
+        return PivotSource(tilts, touch, sigma_mm=sigma_mm, sampling=sampling)
 
     frame.measure(source)

@@ -19,8 +19,8 @@ from robolink_cli.options.motion import motion_option
 from robolink_cli.options.pose_source import PoseSource, pose_source_options
 
 if TYPE_CHECKING:
+    from robolink.methods import SixPointSource
     from robolink.model import Controller
-    from robolink.nozzle_change import TiltedPin
 
 
 @click.command("six-point")
@@ -76,8 +76,14 @@ def six_point(
     turned; the last two, in this order, after a way along +X and one along +Z, both from the last
     pose on the pin. Nothing moves.
     """
-    from robolink.calibration import Course, WayPlan, telling_tilts
-    from robolink.nozzle_change import SixPoints, TiltedPin, require_tilting
+    from robolink.methods import (
+        AxisTeachPlan,
+        SixPoints,
+        SixPointSource,
+        informative_tilts,
+        require_tilting,
+    )
+    from robolink.procedures import SamplingPolicy
     from robolink_cli.calibrate._touch_plan import touch_plan
 
     frame = frame.at_pin(station)
@@ -85,12 +91,12 @@ def six_point(
     if poses is not None:
         frame.solve(poses, lambda _controller: SixPoints(second_is, sigma_mm))
         return
-    tilts, course = telling_tilts(count - 1, tilt_deg), Course(until_mm, retake=True)
-    ways, limits = WayPlan(way_mm, second_is), frame.limits
+    tilts, sampling = informative_tilts(count - 1, tilt_deg), SamplingPolicy(until_mm, retake=True)
+    ways, limits = AxisTeachPlan(way_mm, second_is), frame.limits
     frame = replace(frame, limits=replace(limits, box_up_mm=limits.box_up_mm + way_mm))
 
-    def source(controller: "Controller") -> "TiltedPin":
+    def source(controller: "Controller") -> "SixPointSource":
         require_tilting(controller, "six-point")
-        return TiltedPin(tilts, touch, sigma_mm=sigma_mm, course=course, ways=ways)
+        return SixPointSource(tilts, touch, sigma_mm=sigma_mm, sampling=sampling, ways=ways)
 
     frame.measure(source)

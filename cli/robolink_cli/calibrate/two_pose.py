@@ -43,7 +43,7 @@ def two_pose(
     With --points, --pose or --poses the two poses exist already: nothing moves, no tool is
     selected, and nothing is proved by turning about the new tip.
     """
-    from robolink.nozzle_change import PinAndPerson, TwoTouches
+    from robolink.methods import TwoPoseSource, TwoTouches
     from robolink_cli.calibrate._touch_plan import touch_plan
 
     frame = frame.at_pin(station)
@@ -51,4 +51,4 @@ def two_pose(
     if poses is not None:
         frame.solve(poses, lambda _controller: TwoTouches(sigma_mm))
         return
-    frame.measure(lambda _controller: PinAndPerson(touch, sigma_mm=sigma_mm))
+    frame.measure(lambda _controller: TwoPoseSource(touch, sigma_mm=sigma_mm))

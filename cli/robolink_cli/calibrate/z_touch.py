@@ -12,7 +12,7 @@ from robolink_cli.options.motion import motion_option
 
 if TYPE_CHECKING:
     from robolink.model import Controller
-    from robolink.nozzle_change import TipSource
+    from robolink.procedures import TipSource
 
 
 @click.command("z-touch")
@@ -70,14 +70,15 @@ def z_touch(
     After each touch from the third on it says how well they agree and how sure Z is; at the end the
     one that fits worst is named and may be made again.
     """
-    from robolink.calibration import Course, ProbePlan
+    from robolink.methods import ZTouchPlan
+    from robolink.procedures import SamplingPolicy
 
     if clearance_mm >= lift_mm:
         raise ConfigError(
             tr("The clearance must be smaller than the lift."),
             remedy=tr("For example --lift 10 --clearance 2."),
         )
-    plan = ProbePlan(
+    plan = ZTouchPlan(
         clearance_mm=clearance_mm,
         beyond_mm=beyond_mm,
         lift_mm=lift_mm,
@@ -88,16 +89,16 @@ def z_touch(
             tr("{speeds!r} are too few touches for --until to leave any out.", speeds=speeds),
             remedy=tr("Give 7 or more --speeds; with --sigma, 4 or more."),
         )
-    frame, course = frame.at(station), Course(until_mm, retake=True)
+    frame, sampling = frame.at(station), SamplingPolicy(until_mm, retake=True)
 
     def source(controller: "Controller") -> "TipSource":
-        from robolink.nozzle_change import TouchProbe
+        from robolink.methods import ZTouchSource
         from robolink.stations import StationKind, touch_station
         from robolink_cli.calibrate._pins import station_at
 
         place = touch_station(station_at(frame, controller, StationKind.TOUCH))
-        return TouchProbe(
-            place, plan, sigma_mm=sigma_mm, proof_turn_deg=proof_turn_deg, course=course
+        return ZTouchSource(
+            place, plan, sigma_mm=sigma_mm, proof_turn_deg=proof_turn_deg, sampling=sampling
         )
 
     frame.measure(source)

@@ -74,7 +74,7 @@ def judge(
     """Return what the change does at ``points``.
 
     ``None`` when no points were asked for, or when the tool was undefined: a program cannot
-    have driven to them with it (epson.md 1.5).
+    have driven to them with it (docs/reference/epson.md 1.5).
     """
     from robolink.calibration import impact_on
 

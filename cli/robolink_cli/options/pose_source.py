@@ -71,7 +71,7 @@ class PoseSource:
             CalibrationError: ``undefined_point``, or ``non_finite`` in a file.
             ConfigError: The file cannot be used, or a pose does not state what is needed.
         """
-        from robolink.nozzle_change import taught_poses
+        from robolink.methods import taught_poses
         from robolink.pose_files import read_poses
         from robolink_cli.session.capabilities import points_of
 

@@ -65,7 +65,7 @@ def report_request(path: Path | None, *, force: bool) -> ReportRequest | None:
     return ReportRequest(path, replace=force)
 
 
-class Draft:
+class ReportDraft:
     """What is known of a tool change so far.
 
     There is something to report from :meth:`propose` on.
@@ -174,7 +174,7 @@ class Draft:
 
 
 @contextmanager
-def reporting(request: ReportRequest | None, controller: "Controller") -> "Iterator[Draft]":
+def reporting(request: ReportRequest | None, controller: "Controller") -> "Iterator[ReportDraft]":
     """Collect what a command finds out, and write it at the end, whatever the end is.
 
     A report that cannot be written changes nothing about how the command ends: it is said.
@@ -182,7 +182,7 @@ def reporting(request: ReportRequest | None, controller: "Controller") -> "Itera
     """
     from robolink.model import ControllerFacts
 
-    draft = Draft(controller, ControllerFacts() if request is None else controller.facts())
+    draft = ReportDraft(controller, ControllerFacts() if request is None else controller.facts())
     try:
         yield draft
     except BaseException as error:
@@ -191,7 +191,7 @@ def reporting(request: ReportRequest | None, controller: "Controller") -> "Itera
     _save(request, draft, None)
 
 
-def _save(request: ReportRequest | None, draft: Draft, error: BaseException | None) -> None:
+def _save(request: ReportRequest | None, draft: ReportDraft, error: BaseException | None) -> None:
     from robolink.report import save
 
     if request is None or not draft.complete:

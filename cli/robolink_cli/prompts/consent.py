@@ -58,7 +58,7 @@ def on_terminal() -> bool:
 
 
 def agree(question: str, *, yes: bool) -> None:
-    """Ask on a terminal; off it, the command itself is the consent (design part 9).
+    """Ask on a terminal; off it, the command itself is the consent (docs/reference/rules.md 7).
 
     Raises:
         DeclinedError: The answer was no.
@@ -84,7 +84,7 @@ def agree_to_motion(question: str, *, yes: bool, in_tool: bool = True) -> None:
     if REACHED in meta:
         from robolink_cli.stopping.notes import heed_stop
 
-        heed_stop(meta[REACHED], yes=yes)
+        heed_stop(meta[REACHED], meta[WATCHED], yes=yes)
     if in_tool and WATCHED in meta:
         from robolink_cli.session.selected_tool import heed_selection
 
@@ -149,8 +149,8 @@ def asked_for_text(question: str) -> str:
 def _answer() -> str:
     """Return the next line, reading the status between polls of the prompt.
 
-    An idle client is cut off after the remote time-out (epson.md 1.1), and a person may take
-    longer than that to look into the cell.
+    An idle client is cut off after the remote time-out (docs/reference/epson.md 1.1), and a person
+    may take longer than that to look into the cell.
     """
     from robolink.runner import POLL_S
     from robolink_cli.prompts.operator import terminal

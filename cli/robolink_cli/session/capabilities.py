@@ -8,8 +8,8 @@ from robolink.messages import tr
 if TYPE_CHECKING:
     from robolink.controllers.epson import EpsonController
     from robolink.controllers.softmotion import SoftMotionController
+    from robolink.methods import PointReader
     from robolink.model import Controller, DigitalIo
-    from robolink.nozzle_change import PointReader
     from robolink.protocols.epson_text import Preference
 
 

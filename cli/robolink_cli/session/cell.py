@@ -10,7 +10,7 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 
 if TYPE_CHECKING:
-    from robolink.config import Cell
+    from robolink.config import Cell, Expected
     from robolink.model import Controller
 
 
@@ -23,7 +23,7 @@ def link_options(cell: "Cell") -> dict[str, Any]:
     """Return what a cell says about reaching its controller, by the names of the options.
 
     A cell whose file states no remote time-out has none: it cannot be read over the wire
-    (epson.md 1.1), so nothing moves until a person states it.
+    (docs/reference/epson.md 1.1), so nothing moves until a person states it.
     """
     settings = cell.settings
     said: dict[str, Any] = {"remote_timeout_s": settings.remote_timeout_s or 0.0}
@@ -52,29 +52,28 @@ def with_cell_limits(
     return chosen
 
 
-def require_expected_robot(controller: "Controller", cell: "Cell") -> None:
+def require_expected_robot(controller: "Controller", cell: "Expected") -> None:
     """Refuse to work on another robot than the cell file names.
 
     Raises:
         ConfigError: The controller has another robot, or does not say which.
     """
-    expected = cell.settings.robot
-    if expected is None:
+    if cell.robot is None:
         return
     found = controller.facts().robot_models
-    if expected.casefold() not in (model.casefold() for model in found):
+    if cell.robot.casefold() not in (model.casefold() for model in found):
         raise ConfigError(
             tr(
                 "The cell {cell} has a robot {expected}, but at {url} there is: {found}.",
-                cell=cell.name,
-                expected=expected,
+                cell=cell.cell,
+                expected=cell.robot,
                 url=controller.identity,
                 found=", ".join(found) or tr("a robot that does not say its model"),
             ),
             remedy=tr(
                 "Check the address first. If the cell file is wrong, correct 'robot' in {path} or "
                 "take it out.",
-                path=cell.origins["robot"],
+                path=cell.robot_file,
             ),
         )
 

@@ -30,14 +30,14 @@ from robolink_cli.stopping.listening import listening_for_stop, remember_address
 from robolink_cli.stopping.request import StopRequest
 
 if TYPE_CHECKING:
-    from robolink.config import Cell, Reach
+    from robolink.config import Cell, Expected, Reach
     from robolink.model import Controller, Marker, Secret
 
 WATCHED = "robolink.watched"
 """Where a prompt finds the controller whose status it must read while a person thinks."""
 
 CELL = "robolink.cell"
-"""Where it finds the cell that was named, ``None`` for none."""
+"""Where it finds what the cell file says, ``None`` where no cell was named."""
 
 REACHED = "robolink.reached"
 """Where it finds by which URL that controller was reached."""
@@ -98,6 +98,13 @@ class CliContext(NamedTuple):
                 ),
             )
         return self.url
+
+    @property
+    def expected(self) -> "Expected | None":
+        """What the cell file says that even a look has to heed; ``None`` without a cell."""
+        if self.cell is not None:
+            return self.cell.expected
+        return self.reach.expected if self.reach is not None else None
 
     def note(self, text: str) -> None:
         """Show a remark beside the result, on stderr."""
@@ -214,7 +221,7 @@ def open_controller(
         raise context.doubt
     password = password_of(context)
     signature = replace(
-        signature_of(context.operator, context.cell, changes=changes),
+        signature_of(context.operator, context.expected, changes=changes),
         nozzle=context.nozzle,
         lot=context.lot,
         station=context.station,
@@ -234,11 +241,11 @@ def open_controller(
         nullcontext() if calms else controller.latch.ending(tr("The command")),
     ):
         click.get_current_context().meta.update(
-            {WATCHED: controller, REACHED: url, CELL: context.cell}
+            {WATCHED: controller, REACHED: url, CELL: context.expected}
         )
         remember_address(context)
         with (
-            listening_for_stop(controller, context),
+            listening_for_stop(controller, context, looks=unhindered),
             _saying_what_is_left(controller, context, quiet=quiet, looks=looks, calms=calms),
         ):
             yield controller
@@ -257,7 +264,7 @@ def _saying_what_is_left(
     Raises:
         RobolinkError: The journal or the robot is not as the command needs it.
     """
-    named = context.cell.name if context.cell else context.require_url()
+    named = context.expected.cell if context.expected else context.require_url()
     lenient = looks or calms
     trouble = controller.outcomes.trouble
     if trouble is not None and not lenient:
@@ -268,8 +275,8 @@ def _saying_what_is_left(
     beside = not quiet and note_at_work(controller.outcomes, named)
     if not (quiet or beside):
         note_unsettled(controller, found, named)
-    if context.cell and not calms:
-        _check_robot(controller, context.cell, looks=looks)
+    if context.expected and not calms:
+        _check_robot(controller, context.expected, looks=looks)
     if found and not (quiet or calms or beside):
         from robolink_cli.prompts.restore_offer import offer_to_restore
 
@@ -342,7 +349,7 @@ def password_of(context: CliContext) -> "Secret | None":
     )
 
 
-def _check_robot(controller: "Controller", cell: "Cell", *, looks: bool) -> None:
+def _check_robot(controller: "Controller", cell: "Expected", *, looks: bool) -> None:
     try:
         require_expected_robot(controller, cell)
     except ConfigError as error:

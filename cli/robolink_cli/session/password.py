@@ -6,8 +6,10 @@ from pathlib import Path
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import Secret
+from robolink.named_files import OthersMayReadError, read_named
 
 KEYRING_SERVICE = "robolink"
+_MOST_BYTES = 100_000
 
 
 def find_password(
@@ -30,7 +32,8 @@ def find_password(
             stands there may be another cell's password.
 
     Raises:
-        ConfigError: The file cannot be read, or others than its owner may read it.
+        ConfigError: The file cannot be read, is no regular file or is too long, or others than
+            its owner may read it.
     """
     stored = from_keyring(identity)
     if stored is not None:
@@ -47,7 +50,8 @@ def from_places(path: str | None, variable: str | None) -> Secret | None:
         variable: The variable, in place of ROBOLINK_PASSWORD.
 
     Raises:
-        ConfigError: The file cannot be read, or others than its owner may read it.
+        ConfigError: The file cannot be read, is no regular file or is too long, or others than
+            its owner may read it.
     """
     if path:
         return _from_file(Path(path))
@@ -73,14 +77,13 @@ def from_keyring(identity: str) -> Secret | None:
 
 def _from_file(path: Path) -> Secret:
     try:
-        with path.open(encoding="utf-8") as file:
-            # Windows keeps access in lists, not in these bits.
-            if os.name == "posix" and os.fstat(file.fileno()).st_mode & 0o077:
-                raise ConfigError(
-                    tr("Others than its owner may read the password file {path}.", path=path),
-                    remedy=tr("Run: chmod 600 {path}", path=path),
-                )
-            return Secret(file.readline().rstrip("\r\n"))
+        lines = read_named(path, most_bytes=_MOST_BYTES, secret=True).splitlines()
+        return Secret(lines[0].decode("utf-8-sig") if lines else "")
+    except OthersMayReadError as error:
+        raise ConfigError(
+            tr("Others than its owner may read the password file {path}.", path=path),
+            remedy=tr("Run: chmod 600 {path}", path=path),
+        ) from error
     except (OSError, UnicodeError) as error:
         # The cause of a UnicodeError would show bytes of the password.
         cause = error.strerror if isinstance(error, OSError) else tr("it is not UTF-8 text")

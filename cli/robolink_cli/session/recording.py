@@ -29,12 +29,13 @@ def recording(path: str | None, controller: str) -> "Iterator[TraceSink | None]"
     if path is None:
         yield None
         return
+    from robolink.named_files import append_to_named
     from robolink.timing import wall_label
     from robolink.transport import DialogueLog, Direction, opening_line, passage_line
 
     log = DialogueLog(controller, wall_label())
     try:
-        file = Path(path).open("a", encoding="ascii", newline="\n")  # noqa: SIM115 - closed below
+        file = append_to_named(Path(path))
     except OSError as error:
         raise ConfigError(
             tr("The recording {path} cannot be written: {cause}.", path=path, cause=error.strerror),

@@ -15,10 +15,13 @@ if TYPE_CHECKING:
 
 
 @contextmanager
-def listening_for_stop(controller: "Controller", context: "CliContext") -> Iterator[None]:
+def listening_for_stop(
+    controller: "Controller", context: "CliContext", *, looks: bool
+) -> Iterator[None]:
     """Listen for the ``stop`` of another terminal while the block has the controller.
 
-    A simulator inside this process is nobody else's to stop.
+    A simulator inside this process is nobody else's to stop. A command that looks or calms is
+    found by its address alone: it does not wait for the journal, which knows the name.
     """
     from robolink.stopping import StopListener
 
@@ -26,8 +29,13 @@ def listening_for_stop(controller: "Controller", context: "CliContext") -> Itera
     if "+sim://" in url:
         yield
         return
+    name = ""
+    if not looks:
+        from robolink_cli.stopping.notes import own_name_of
+
+        name = own_name_of(controller)
     try:
-        listener = StopListener(controller, url, who=_who(context), heard=_say_who)
+        listener = StopListener(controller, url, who=_who(context), name=name, heard=_say_who)
     except OSError as error:
         note(
             tr(
@@ -56,8 +64,8 @@ def remember_address(context: "CliContext") -> None:
             password_file=settings.password_file or "",
             password_env=settings.password_env or "",
             timeout_s=settings.timeout_s or 0.0,
-            # A look at a cell that names its robot, or people, needs the whole of its file.
-            proof="" if settings.robot or settings.people else proof_of_files(),
+            proof=proof_of_files(),
+            expected=context.cell.expected,
         ),
     )
 

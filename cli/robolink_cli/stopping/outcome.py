@@ -88,6 +88,8 @@ class Telling:
 
     def _noted(self) -> list[str]:
         outcome = self._outcome
+        from robolink_cli.stopping.notes import last_known
+
         if "+sim://" in outcome.url:
             return []  # it ends with this process, and nobody else moves it
         try:
@@ -96,6 +98,8 @@ class Telling:
                 _shown(outcome.url),
                 who_asks(self._request),
                 confirmed=outcome.error is None,
+                controller=outcome.controller,
+                last_known="" if outcome.controller else last_known(outcome.url),
             )
         except OSError as error:
             return [

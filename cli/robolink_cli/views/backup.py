@@ -3,7 +3,7 @@
 from dataclasses import asdict
 from pathlib import Path
 
-from robolink.backup import Backup, Comparison, Tolerance, ToolComparison
+from robolink.backup import Backup, Comparison, ComparisonTolerance, ToolComparison
 from robolink.messages import tr
 from robolink_cli.console.render import say, table
 from robolink_cli.views.documents import number, offset_payload
@@ -47,7 +47,7 @@ def show_backup(backup: Backup, file: Path) -> None:
         say(tr("Tool {selected} is in force.", selected=backup.state.selected))
 
 
-def comparison_payload(comparison: Comparison, tolerance: Tolerance) -> dict[str, object]:
+def comparison_payload(comparison: Comparison, tolerance: ComparisonTolerance) -> dict[str, object]:
     """Return every tool that differs, with all its components."""
     return {
         "equal": comparison.equal,
@@ -63,7 +63,7 @@ def comparison_payload(comparison: Comparison, tolerance: Tolerance) -> dict[str
     }
 
 
-def show_comparison(comparison: Comparison, tolerance: Tolerance, identity: str) -> None:
+def show_comparison(comparison: Comparison, tolerance: ComparisonTolerance, identity: str) -> None:
     """Print a row for each component of each tool that differs."""
     rows = [row for tool in comparison.differing for row in _rows(tool)]
     if rows:

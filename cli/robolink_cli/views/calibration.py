@@ -2,9 +2,10 @@
 
 from collections.abc import Mapping, Sequence
 
-from robolink.calibration import Shown, VerifyResult
+from robolink.calibration import VerifyResult
 from robolink.messages import tr
 from robolink.nozzle_change import PlannedStep, Proposal, ToolReport, Verdict
+from robolink.runner import TeachPrompt
 from robolink_cli.console.render import note, say
 from robolink_cli.views.documents import (
     offset_payload,
@@ -112,8 +113,8 @@ def report_payload(report: ToolReport) -> dict[str, object]:
 def show_course(steps: Sequence[PlannedStep]) -> None:
     """Say how a measurement will go, before anybody is asked."""
     moves = sum(step.target is not None for step in steps)
-    asks = sum(step.shown is Shown.PIN for step in steps)
-    ways = sum(step.shown in (Shown.ALONG_X, Shown.ALONG_Z) for step in steps)
+    asks = sum(step.shown is TeachPrompt.PIN for step in steps)
+    ways = sum(step.shown in (TeachPrompt.ALONG_X, TeachPrompt.ALONG_Z) for step in steps)
     if ways:
         plan = tr(
             "The plan: touches of the pin by a person: {asks}; ways along the tool's axes shown by "

@@ -37,7 +37,8 @@ class ConditionReader:
     def read(self, *, published: Callable[[], PublishedTools | None]) -> dict[str, object]:
         """Return plain JSON; what needs Execute is ``None`` where Execute is not available.
 
-        While production runs only the flags and the alarms are read (epson.md 1.2, 1.3).
+        While production runs only the flags and the alarms are read (docs/reference/epson.md 1.2,
+        1.3).
 
         Args:
             published: Reads the tools as the companion program published them.

@@ -130,8 +130,8 @@ class EpsonController(ControllerCore):
     def execute_raw(self, statement: str) -> str:
         """Run a SPEL+ statement as it was typed, and put it on record.
 
-        Only here does text that a person typed reach the controller (design part 6). It has to
-        be answered within the time-out, so it is not for movements.
+        Only here does text that a person typed reach the controller (docs/reference/rules.md 8). It
+        has to be answered within the time-out, so it is not for movements.
 
         Args:
             statement: One line of SPEL+ as the command window takes it.
@@ -168,9 +168,9 @@ class EpsonController(ControllerCore):
     def _take_leave(self) -> None:
         """Abort what nobody waited on, and log out where that does no harm.
 
-        Logging out while a task runs raises an error on the controller (epson.md 1.1), so
-        the connection is just closed then. So it is when another device starts the cell: a
-        task could begin between the look and the logout.
+        Logging out while a task runs raises an error on the controller
+        (docs/reference/epson.md 1.1), so the connection is just closed then. So it is when another
+        device starts the cell: a task could begin between the look and the logout.
         """
         if self._link.session.alive:
             self.groups[0].abort_unfinished()

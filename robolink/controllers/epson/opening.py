@@ -28,8 +28,8 @@ def open_epson_url(url: LinkUrl, terms: ConnectionTerms, /) -> Controller:
             remote_timeout_s=terms.remote_timeout_s,
         )
     except LoginUnansweredError:
-        # One client at a time is served (epson.md 1.1). The lease may say who that is, if the
-        # journal can be read.
+        # One client at a time is served (docs/reference/epson.md 1.1). The lease may say who that
+        # is, if the journal can be read.
         with suppress(JournalError):
             outcomes.look()
         raise

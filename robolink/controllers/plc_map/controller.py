@@ -8,7 +8,14 @@ from robolink.controllers.plc_map.registers import RegisterClient
 from robolink.controllers.plc_map.resolve import RegisterResolver
 from robolink.controllers.plc_map.tools import RegisterToolTable
 from robolink.controllers.preserving import Preserver
-from robolink.model import Act, Capabilities, ControllerFacts, ControllerStatus, OutcomeLog
+from robolink.model import (
+    Act,
+    Capabilities,
+    ControllerFacts,
+    ControllerStatus,
+    Identity,
+    OutcomeLog,
+)
 from robolink.register_maps import RegisterMap
 
 
@@ -54,6 +61,16 @@ class PlcMapController(ControllerCore):
     def exchanges(self) -> int:
         """Requests sent so far."""
         return self._plc.registers.exchanges
+
+    def who(self) -> Identity:
+        """Return which PLC this is: what a person confirms about a map holds for that one.
+
+        Raises:
+            TransportError, RemoteProtocolError: The link failed, or its number does not stand
+                still.
+            NotReadyError: The map knows where the PLC's number stands, and there is none now.
+        """
+        return self._plc.who()
 
     def require_probe(self) -> None:
         """Compare the PLC's constant with the map's, if there is one.

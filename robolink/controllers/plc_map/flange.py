@@ -9,6 +9,7 @@ from robolink.errors import RejectedError
 from robolink.messages import tr
 from robolink.model import Pose
 from robolink.register_maps import span_of
+from robolink.ways import Way, way
 
 _FAR_MM: Final = 100_000.0
 _FAR_DEG: Final = 36_000.0
@@ -41,8 +42,9 @@ class FlangeReader(MotionGroupCore):
             raise RejectedError(
                 tr("This PLC does not tell where the flange is."),
                 remedy=tr(
-                    "Read the poses at the HMI and give them with --pose; or add [flange] to the "
-                    "map, if the PLC has registers for it."
+                    "Read the poses at the HMI and give them with {poses}; or add [flange] to the "
+                    "map, if the PLC has registers for it.",
+                    poses=way(Way.GIVEN_POSES),
                 ),
                 controller=self._registers.identity,
             )

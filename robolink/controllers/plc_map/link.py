@@ -5,7 +5,7 @@ from robolink.controllers.plc_map.probe import IdentityReader, require_probe
 from robolink.controllers.plc_map.registers import RegisterClient, Registers
 from robolink.errors import ConfigError, NotReadyError, NotReadyReason, RejectedError
 from robolink.messages import tr
-from robolink.model import OutcomeLog
+from robolink.model import Identity, OutcomeLog
 from robolink.register_maps import RegisterMap, confirmation_of
 
 
@@ -27,7 +27,8 @@ class MappedPlc(DriverLink):
     ) -> None:
         registers = self.registers = Registers(client)
         self.register_map = register_map
-        outcomes.ask(IdentityReader(registers, register_map).read)
+        self._identity = IdentityReader(registers, register_map)
+        outcomes.ask(self._identity.read)
         super().__init__(
             client.identity, registers.clock, registers.latch, outcomes, gate=registers.gate
         )
@@ -43,6 +44,24 @@ class MappedPlc(DriverLink):
         return RejectedError(
             tr("A PLC with a register map is neither moved nor stopped by robolink."),
             remedy=tr("Do it at the machine; in danger press the emergency stop."),
+            controller=self.identity,
+        )
+
+    def who(self) -> Identity:
+        """Return which PLC this is: what a person confirms about a map holds for that one.
+
+        Raises:
+            TransportError, RemoteProtocolError: The link failed, or its number does not stand
+                still.
+            NotReadyError: The map knows where the PLC's number stands, and there is none now.
+        """
+        found = self._identity.read()
+        if found.certain:
+            return found
+        raise NotReadyError(
+            tr("The number by which the map knows {identity} reads zero.", identity=self.identity),
+            reason=NotReadyReason.NOT_REMOTE,
+            remedy=tr("Look whether the PLC's program runs, then try again; nothing was written."),
             controller=self.identity,
         )
 
@@ -69,9 +88,9 @@ class MappedPlc(DriverLink):
             )
 
     def require_confirmed(self, request: str) -> None:
-        """Refuse a change by a map without a probe that nobody has compared; sends nothing."""
+        """Refuse a change by a map without a probe that nobody has compared; writes nothing."""
         if self.register_map.probe is None and not confirmation_of(
-            self.identity, self.register_map
+            self.who().name, self.register_map
         ):
             raise ConfigError(
                 tr(

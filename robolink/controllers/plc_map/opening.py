@@ -12,6 +12,7 @@ from robolink.model import Controller, OutcomeLog
 from robolink.register_maps import RegisterMap, load_map
 from robolink.timing import Clock
 from robolink.transport import LinkUrl, open_modbus
+from robolink.ways import Way, way
 
 
 def open_plc_map_url(url: LinkUrl, terms: ConnectionTerms, /) -> Controller:
@@ -24,7 +25,10 @@ def open_plc_map_url(url: LinkUrl, terms: ConnectionTerms, /) -> Controller:
     if terms.trace is not None:
         raise ConfigError(
             tr("The dialogue with a PLC's registers cannot be recorded."),
-            remedy=tr("Leave --record out; a network capture shows the registers."),
+            remedy=tr(
+                "Leave {record} out; a network capture shows the registers.",
+                record=way(Way.RECORD),
+            ),
         )
     return open_plc_map(url, outcomes=terms.record_at, timeout_s=terms.timeout_s, clock=terms.clock)
 

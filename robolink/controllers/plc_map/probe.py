@@ -1,7 +1,7 @@
 """Whether the PLC is the one of the map: its constant, and the number that it is known by.
 
 Wrong word order and addresses off by one are the mistakes that users of Modbus report most
-(softmotion.md 4.4); both make plausible numbers.
+(docs/reference/softmotion.md 4.4); both make plausible numbers.
 """
 
 from dataclasses import replace
@@ -12,13 +12,13 @@ from robolink.controllers.plc_map.registers import Registers
 from robolink.errors import RejectedError, RemoteProtocolError
 from robolink.messages import tr
 from robolink.model import Identity
-from robolink.register_maps import Number, Probe, RegisterMap, describe_place
+from robolink.register_maps import MapProbe, Number, RegisterMap, describe_place
 
 _AROUND: Final = 8
 """How many registers before and behind its place it is looked for."""
 
 
-def require_probe(registers: Registers, probe: Probe | None) -> None:
+def require_probe(registers: Registers, probe: MapProbe | None) -> None:
     """Read the constant, if there is one, and refuse a PLC in which it is another.
 
     Raises:
@@ -42,7 +42,7 @@ def require_probe(registers: Registers, probe: Probe | None) -> None:
     )
 
 
-def _diagnosis(registers: Registers, probe: Probe) -> str:
+def _diagnosis(registers: Registers, probe: MapProbe) -> str:
     number = probe.number
     found = _found(registers, probe)
     if found is None:
@@ -65,7 +65,7 @@ def _diagnosis(registers: Registers, probe: Probe) -> str:
     return " ".join(hints)
 
 
-def _found(registers: Registers, probe: Probe) -> Number | None:
+def _found(registers: Registers, probe: MapProbe) -> Number | None:
     """Look for the constant in every order, nearest first."""
     number = probe.number
     count = len(number.registers)
@@ -104,6 +104,7 @@ class IdentityReader:
             return Identity(place, address, place)
         words = self._registers.read_twice(self._place.table, self._place.registers)
         if not any(words):
-            # Zeroed by a watchdog, or the program has not started (softmotion.md 4.1).
+            # Zeroed by a watchdog, or the program has not started
+            # (docs/reference/softmotion.md 4.1).
             return Identity(place, address, place, certain=False)
         return Identity(f"plc:{''.join(f'{word:04X}' for word in words)}", address, place)

@@ -5,11 +5,11 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Final, Protocol
 
-from robolink.checkpoints import Point, checkpoint
+from robolink.checkpoints import Checkpoint, checkpoint
 from robolink.errors import RemoteProtocolError
 from robolink.interrupts import InterruptGate
 from robolink.messages import tr
-from robolink.register_maps import Signal, Table, Word, describe_place
+from robolink.register_maps import RegisterTable, Signal, Word, describe_place
 from robolink.stop_latch import CommandClass, StopLatch
 from robolink.timing import Clock
 
@@ -85,23 +85,23 @@ class Registers:
         """The clock on which its time passes."""
         return self._client.clock
 
-    def read(self, table: Table, addresses: range) -> tuple[int, ...]:
+    def read(self, table: RegisterTable, addresses: range) -> tuple[int, ...]:
         """Return what stands there, in one request."""
         readers = {
-            Table.HOLDING: self._client.read_holding,
-            Table.INPUT: self._client.read_input,
-            Table.COIL: self._client.read_coils,
-            Table.DISCRETE: self._client.read_discrete,
+            RegisterTable.HOLDING: self._client.read_holding,
+            RegisterTable.INPUT: self._client.read_input,
+            RegisterTable.COIL: self._client.read_coils,
+            RegisterTable.DISCRETE: self._client.read_discrete,
         }
         with self.gate:
             self.exchanges += 1
             return tuple(map(int, readers[table](addresses.start, len(addresses))))
 
-    def read_twice(self, table: Table, addresses: range) -> tuple[int, ...]:
+    def read_twice(self, table: RegisterTable, addresses: range) -> tuple[int, ...]:
         """Return what stands there as soon as two reads agree.
 
-        A server may change registers between the words of one answer (softmotion.md 4.1,
-        faults_and_speed.md F31).
+        A server may change registers between the words of one answer
+        (docs/reference/softmotion.md 4.1, docs/reference/faults.md F31).
 
         Raises:
             RemoteProtocolError: No two reads in a row agree.
@@ -150,14 +150,14 @@ class Registers:
         value = signal.on if on else signal.off
         with self._admitted(signal.place, kind):
             self.exchanges += 1
-            if signal.table is Table.COIL:
+            if signal.table is RegisterTable.COIL:
                 self._client.write_coil(signal.address, bool(value))
             else:
                 self._client.write_registers(signal.address, [value])
 
     def write(self, address: int, words: Sequence[int]) -> None:
         """Write holding registers in one request (function 16); raises like :meth:`switch`."""
-        with self._admitted(describe_place(Table.HOLDING, address), CommandClass.WRITE):
+        with self._admitted(describe_place(RegisterTable.HOLDING, address), CommandClass.WRITE):
             self.exchanges += 1
             self._client.write_registers(address, words)
 
@@ -170,11 +170,11 @@ class Registers:
     def _admitted(self, place: str, kind: CommandClass) -> Iterator[None]:
         """Hold the lock of a write that no stop forbids."""
         request = tr("the write to {place}", place=place)
-        checkpoint(Point.LOCK, request)
+        checkpoint(Checkpoint.LOCK, request)
         try:
             with self.gate, self._writing:
-                checkpoint(Point.HELD, request)
+                checkpoint(Checkpoint.HELD, request)
                 self.latch.admit(kind, request)
                 yield
         finally:
-            checkpoint(Point.EXCHANGE, request)
+            checkpoint(Checkpoint.EXCHANGE, request)

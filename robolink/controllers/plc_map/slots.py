@@ -9,7 +9,7 @@ from robolink.controllers.plc_map.values import OffsetValues, Words, runs
 from robolink.errors import OutcomeUnknownError, RejectedError, StoppedError, ToolError
 from robolink.messages import tr
 from robolink.model import ToolOffset
-from robolink.register_maps import AllZero, RegisterMap, Slot, Table, describe_place
+from robolink.register_maps import AllZero, MapSlot, RegisterMap, RegisterTable, describe_place
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,13 +43,13 @@ class Slots:
         self.values = OffsetValues(register_map, registers.identity)
         self.handshake = Handshake(registers, register_map.commit)
 
-    def read(self, slot: Slot) -> ToolOffset | None:
+    def read(self, slot: MapSlot) -> ToolOffset | None:
         """Read a tool, ``None`` when it is undefined."""
         if slot.defined is not None and not self._registers.is_on(slot.defined):
             return None
         return self.values.offset(slot, self._words(slot))
 
-    def content(self, slot: Slot, offset: ToolOffset | None) -> SlotContent:
+    def content(self, slot: MapSlot, offset: ToolOffset | None) -> SlotContent:
         """Return what stands for an offset, or for no tool.
 
         Raises:
@@ -69,12 +69,12 @@ class Slots:
             controller=self._registers.identity,
         )
 
-    def requests(self, slot: Slot, content: SlotContent) -> tuple[str, ...]:
+    def requests(self, slot: MapSlot, content: SlotContent) -> tuple[str, ...]:
         """Return all that :meth:`bring_into_force` writes, in words and in this order."""
         requests = [
             tr(
                 "write {place}: {values}",
-                place=describe_place(Table.HOLDING, address),
+                place=describe_place(RegisterTable.HOLDING, address),
                 values=" ".join(f"{value:04X}" for value in values),
             )
             for address, values in runs(content.words)
@@ -85,7 +85,7 @@ class Slots:
             requests.append(on if content.defined else off)
         return (*requests, *self.handshake.requests(slot.tool))
 
-    def bring_into_force(self, slot: Slot, content: SlotContent, request: str) -> None:
+    def bring_into_force(self, slot: MapSlot, content: SlotContent, request: str) -> None:
         """Write ``content``, then ask the PLC; after a refusal what was there stands there again.
 
         Raises:
@@ -101,7 +101,7 @@ class Slots:
 
         self._or_put_back(slot, kept, write_and_ask)
 
-    def take_over(self, slot: Slot, before: ToolOffset | None, request: str) -> None:
+    def take_over(self, slot: MapSlot, before: ToolOffset | None, request: str) -> None:
         """Ask the PLC once to take over what stands there; raises as :meth:`bring_into_force`.
 
         Args:
@@ -112,7 +112,7 @@ class Slots:
         kept = self.content(slot, before)
         self._or_put_back(slot, kept, lambda: self.handshake.carry_out(slot.tool, request))
 
-    def _or_put_back(self, slot: Slot, kept: SlotContent, act: Callable[[], None]) -> None:
+    def _or_put_back(self, slot: MapSlot, kept: SlotContent, act: Callable[[], None]) -> None:
         """Act; if it is refused or stopped, let the registers show again what is in force."""
         try:
             act()
@@ -132,7 +132,7 @@ class Slots:
                 ) from error
             raise
 
-    def _restored(self, slot: Slot, kept: SlotContent) -> bool:
+    def _restored(self, slot: MapSlot, kept: SlotContent) -> bool:
         """Put ``kept`` back where it does not stand, with one write; tell whether it stands."""
         if kept.is_part_of(self._stored(slot)):
             return True
@@ -142,19 +142,19 @@ class Slots:
             return False
         return kept.is_part_of(self._stored(slot))
 
-    def _write(self, slot: Slot, content: SlotContent) -> None:
+    def _write(self, slot: MapSlot, content: SlotContent) -> None:
         for address, values in runs(content.words):
             self._registers.write(address, values)
         if slot.defined is not None and slot.defined.writable:
             self._registers.switch(slot.defined, content.defined)
 
-    def _stored(self, slot: Slot) -> SlotContent:
+    def _stored(self, slot: MapSlot) -> SlotContent:
         flagged = _has_flag(slot) and not self._registers.is_on(slot.defined)
         return SlotContent(self._words(slot), defined=not flagged)
 
-    def _words(self, slot: Slot) -> Words:
+    def _words(self, slot: MapSlot) -> Words:
         return dict(zip(slot.span, self._registers.read_twice(slot.table, slot.span), strict=True))
 
 
-def _has_flag(slot: Slot) -> bool:
+def _has_flag(slot: MapSlot) -> bool:
     return slot.defined is not None and slot.defined.writable

@@ -112,6 +112,9 @@ class RegisterToolTable(ToolTableCore):
         slot = self._map.slots[tool]
         return self._slots.requests(slot, self._slots.content(slot, requested))
 
+    def _clear_request(self, tool: int) -> str:
+        return tr("tool {tool}", tool=tool)
+
     def _storable(self, tool: int, offset: ToolOffset) -> ToolOffset:
         return self._slots.values.rounded(self._map.slots[tool], offset)
 

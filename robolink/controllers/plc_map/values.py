@@ -11,9 +11,9 @@ from robolink.register_maps import (
     COMPONENTS,
     LREAL_TOLERANCE,
     AllZero,
+    MapSlot,
     Number,
     RegisterMap,
-    Slot,
 )
 
 Words = dict[int, int]
@@ -27,7 +27,7 @@ class OffsetValues:
         self._map = register_map
         self._identity = identity
 
-    def offset(self, slot: Slot, words: Words) -> ToolOffset | None:
+    def offset(self, slot: MapSlot, words: Words) -> ToolOffset | None:
         """Return the tool that registers hold; ``None`` for zeros that mean none.
 
         Raises:
@@ -60,7 +60,7 @@ class OffsetValues:
         )
         return x, y, z, u, v, w
 
-    def registers(self, slot: Slot, offset: ToolOffset) -> Words:
+    def registers(self, slot: MapSlot, offset: ToolOffset) -> Words:
         """Return the registers that hold ``offset`` as nearly as they can.
 
         Raises:
@@ -87,7 +87,7 @@ class OffsetValues:
         self._require_believable(slot, words)
         return words
 
-    def _require_believable(self, slot: Slot, words: Words) -> None:
+    def _require_believable(self, slot: MapSlot, words: Words) -> None:
         """Refuse registers that the map would take for no tool, or for none that can be true."""
         if not any(words.values()) and self._map.all_zero is not AllZero.TOOL:
             raise LimitError(
@@ -114,7 +114,7 @@ class OffsetValues:
                 controller=self._identity,
             ) from error
 
-    def rounded(self, slot: Slot, offset: ToolOffset) -> ToolOffset:
+    def rounded(self, slot: MapSlot, offset: ToolOffset) -> ToolOffset:
         """Return the offset that the registers would hold; raises as :meth:`registers`."""
         words = self.registers(slot, offset)
         return ToolOffset(*self.numbers(slot.components, words, largest_mm=self._map.largest_mm))
@@ -122,7 +122,8 @@ class OffsetValues:
     def same(self, a: ToolOffset | None, b: ToolOffset | None) -> bool:
         """Tell whether registers hold both alike; undefined equals undefined only.
 
-        Whole numbers: half a step; REAL: one unit in the last place; LREAL: 1e-9 (design 4).
+        Whole numbers: half a step; REAL: one unit in the last place; LREAL: 1e-9
+        (docs/reference/rules.md 3).
         """
         if a is None or b is None:
             return a is b
@@ -155,7 +156,7 @@ class OffsetValues:
             controller=self._identity,
         )
 
-    def _encode(self, slot: Slot, name: str, value: float) -> tuple[int, ...]:
+    def _encode(self, slot: MapSlot, name: str, value: float) -> tuple[int, ...]:
         number = slot.components[name]
         limit = 360.0 if name in ANGLES else self._map.largest_mm
         try:
@@ -179,7 +180,7 @@ class OffsetValues:
             controller=self._identity,
         )
 
-    def _all_zero(self, slot: Slot) -> RemoteProtocolError:
+    def _all_zero(self, slot: MapSlot) -> RemoteProtocolError:
         return RemoteProtocolError(
             tr(
                 "All registers of tool {tool} are zero: a PLC whose link was lost shows just that.",

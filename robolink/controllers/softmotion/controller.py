@@ -147,7 +147,7 @@ class SoftMotionController(ControllerCore):
         """Clear the group's error and release a held stop, because a person asked for it.
 
         Nothing is sent where there is nothing to reset: SoftMotion calls that an error
-        (softmotion.md 2.2).
+        (docs/reference/softmotion.md 2.2).
 
         Raises:
             NotReadyError: The machine does not permit it.
@@ -183,7 +183,7 @@ class SoftMotionController(ControllerCore):
     ) -> None:
         """Put another kinematics in force (MC_SetKinTransform), and prove it.
 
-        The tool is identity and no slot is selected afterwards (softmotion.md 0.5).
+        The tool is identity and no slot is selected afterwards (docs/reference/softmotion.md 1.1).
 
         Raises:
             NotReadyError: The group moves, or the machine does not permit it.
@@ -203,7 +203,10 @@ class SoftMotionController(ControllerCore):
         self._mailbox.wire.close()
 
     def _left(self, state: GroupState, now: Response) -> Response:
-        """Give the group the cycles that it needs to leave a state (softmotion.md 2.2)."""
+        """Give the group the cycles that it needs to leave a state.
+
+        Source: docs/reference/softmotion.md 2.2.
+        """
         deadline = Deadline.after(self.clock, _LEAVING_S)
         while now.group_state == state and not deadline.expired:
             now = self._mailbox.snapshots.news(now)

@@ -12,6 +12,7 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import Controller, OutcomeLog
 from robolink.transport import LinkUrl, MailboxLink, open_mailbox_link, open_quick_link
+from robolink.ways import Way, way
 
 
 def open_softmotion_url(url: LinkUrl, terms: ConnectionTerms, /) -> Controller:
@@ -24,7 +25,10 @@ def open_softmotion_url(url: LinkUrl, terms: ConnectionTerms, /) -> Controller:
     if terms.trace is not None:
         raise ConfigError(
             tr("The dialogue with a PLC mailbox cannot be recorded."),
-            remedy=tr("Leave --record out; a network capture shows the registers."),
+            remedy=tr(
+                "Leave {record} out; a network capture shows the registers.",
+                record=way(Way.RECORD),
+            ),
         )
     opener = open_quick_link if terms.glance else open_mailbox_link
     link = opener(url, timeout_s=terms.timeout_s, clock=terms.clock)

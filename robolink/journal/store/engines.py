@@ -13,7 +13,7 @@ from sqlalchemy.pool import NullPool, Pool, StaticPool
 
 from robolink.durable_files import make_folder, sync_folder
 from robolink.errors import JournalError
-from robolink.journal._places import Place
+from robolink.journal._places import JournalPlace
 from robolink.journal.store.prepared import Prepared
 from robolink.messages import tr
 
@@ -54,7 +54,7 @@ class Backend:
     self_checks: tuple[Prepared, ...] = ()
 
 
-def backend_of(place: Place, *, read_only: bool) -> Backend:
+def backend_of(place: JournalPlace, *, read_only: bool) -> Backend:
     """Return the database at ``place``; nothing is opened yet.
 
     Raises:
@@ -127,7 +127,7 @@ def _uri(path: Path, options: str) -> str:
     return f"file:{quote(path.as_posix())}?{options}"
 
 
-def _require_file(place: Place) -> None:
+def _require_file(place: JournalPlace) -> None:
     if place.path is not None and not place.path.exists():
         raise JournalError(
             tr("There is no journal {name}.", name=place.name),
@@ -147,7 +147,7 @@ def _make_file(path: Path) -> None:
     sync_folder(path.parent)
 
 
-def _postgresql(place: Place, *, read_only: bool) -> Backend:
+def _postgresql(place: JournalPlace, *, read_only: bool) -> Backend:
     try:
         engine = create_engine(
             place.url,

@@ -8,9 +8,9 @@ from typing import Any, Final, TypeAlias, TypeVar
 
 from sqlalchemy import Connection, Select, bindparam, func, insert, select, update
 
-from robolink.journal._chain import canonical, digest, storable
 from robolink.journal._records import Filter
-from robolink.journal.store.prepared import Prepared, Runner
+from robolink.journal.store.chain import canonical, digest, storable
+from robolink.journal.store.prepared import Prepared, StatementRunner
 from robolink.journal.store.tables import ENTRIES, HEAD, IN_A_CHANGE
 from robolink.model import EntryKind, NewEntry, Signature
 
@@ -42,7 +42,7 @@ _COUNT: Final = select(func.count()).select_from(ENTRIES)
 class EntryRows:
     """The append-only record over one connection."""
 
-    def __init__(self, connection: Connection, runner: Runner) -> None:
+    def __init__(self, connection: Connection, runner: StatementRunner) -> None:
         self._connection = connection
         self._runner = runner
         self._head: _Head | None = None  # a guess: others add entries too

@@ -6,12 +6,12 @@ from typing import Final
 
 from sqlalchemy import BindParameter, bindparam, insert, select, update
 
-from robolink.journal._chain import storable
-from robolink.journal.leases.sightings import FREE, Sighting
-from robolink.journal.store.prepared import UNLESS_THERE, Prepared, Runner
+from robolink.journal._sightings import FREE, LeaseSighting
+from robolink.journal.store.chain import storable
+from robolink.journal.store.prepared import UNLESS_THERE, Prepared, StatementRunner
 from robolink.journal.store.tables import LEASES
 
-_SEEN: Final = tuple(field.name for field in fields(Sighting))
+_SEEN: Final = tuple(field.name for field in fields(LeaseSighting))
 _OF: Final = LEASES.c.controller == bindparam("of_controller")
 _OURS: Final = (
     _OF,
@@ -38,13 +38,13 @@ _INSERT: Final = Prepared(insert(LEASES), UNLESS_THERE)
 class LeaseRows:
     """Who may change which controller, over one connection."""
 
-    def __init__(self, runner: Runner) -> None:
+    def __init__(self, runner: StatementRunner) -> None:
         self._runner = runner
 
-    def sight(self, controller: str) -> Sighting:
+    def sight(self, controller: str) -> LeaseSighting:
         """Return the lease as it is now; one that never was held is free."""
         rows = self._runner.rows(_SELECT, {"of_controller": storable(controller)})
-        return Sighting(*rows[0]) if rows else Sighting()
+        return LeaseSighting(*rows[0]) if rows else LeaseSighting()
 
     def renew(self, controller: str, epoch: int, token: str, now_ns: int) -> bool:
         """Count one more beat; return whether the lease still is this holder's."""
@@ -55,7 +55,7 @@ class LeaseRows:
         """Free the lease; one that was lost is left alone."""
         self._runner.run(_RELEASE, _own(controller, epoch, token))
 
-    def take(self, controller: str, seen: Sighting, claim: Mapping[str, object]) -> int:
+    def take(self, controller: str, seen: LeaseSighting, claim: Mapping[str, object]) -> int:
         """Take the lease if it still is as it was seen.
 
         Returns:

@@ -6,8 +6,8 @@ from typing import Final, NamedTuple
 from sqlalchemy import BindParameter, bindparam, delete, func, insert, select, update
 
 from robolink.errors import JournalError
-from robolink.journal._chain import canonical, storable
-from robolink.journal.store.prepared import UNLESS_THERE, Prepared, Runner
+from robolink.journal.store.chain import canonical, storable
+from robolink.journal.store.prepared import UNLESS_THERE, Prepared, StatementRunner
 from robolink.journal.store.tables import MARKERS
 from robolink.messages import tr
 from robolink.model import Marker, MarkerKind
@@ -46,7 +46,7 @@ _SELECT_ALL: Final = Prepared(_LISTING)
 class MarkerRows:
     """What is not settled, over one connection."""
 
-    def __init__(self, runner: Runner) -> None:
+    def __init__(self, runner: StatementRunner) -> None:
         self._runner = runner
 
     def put(self, controller: str, marker: Marker) -> bool:

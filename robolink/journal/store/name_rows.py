@@ -9,8 +9,8 @@ from typing import Final
 
 from sqlalchemy import BindParameter, bindparam, func, insert, select, update
 
-from robolink.journal._chain import storable
-from robolink.journal.store.prepared import UNLESS_THERE, Prepared, Runner
+from robolink.journal.store.chain import storable
+from robolink.journal.store.prepared import UNLESS_THERE, Prepared, StatementRunner
 from robolink.journal.store.tables import ADDRESSES, ENTRIES, FORMER_NAMES, LEASES, MARKERS
 
 _OF: Final[BindParameter[object]] = bindparam("of_name")
@@ -69,7 +69,7 @@ class NameRows:
             for reading only, has none, and there each name is its own.
     """
 
-    def __init__(self, runner: Runner, *, known: bool) -> None:
+    def __init__(self, runner: StatementRunner, *, known: bool) -> None:
         self._runner = runner
         self._known = known
 

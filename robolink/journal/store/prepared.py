@@ -21,7 +21,7 @@ UNLESS_THERE: Final = " ON CONFLICT DO NOTHING"
 """Ends an insert that leaves alone what is there; both databases say it alike."""
 
 
-class Words(NamedTuple):
+class SqlText(NamedTuple):
     """A statement as one database is told.
 
     Attributes:
@@ -51,21 +51,21 @@ class Prepared:
     def __init__(self, statement: ClauseElement, ending: str = "") -> None:
         self._statement = statement
         self._ending = ending
-        self._words: dict[str, Words] = {}
+        self._words: dict[str, SqlText] = {}
 
-    def words(self, dialect: Dialect) -> Words:
+    def words(self, dialect: Dialect) -> SqlText:
         """Return it as a database is told."""
         known = self._words.get(dialect.name)
         if known is None:
             compiled: Any = self._statement.compile(dialect=dialect)
             names = tuple(compiled.positiontup or ())
             given = {name: value for name, value in compiled.params.items() if value is not None}
-            known = Words(compiled.string + self._ending, names, given)
+            known = SqlText(compiled.string + self._ending, names, given)
             self._words[dialect.name] = known
         return known
 
 
-class Runner:
+class StatementRunner:
     """Runs prepared statements over one connection, and ends its transactions."""
 
     def __init__(self, connection: Connection) -> None:

@@ -10,8 +10,8 @@ if TYPE_CHECKING:
     from robolink.protocols.epson_text._codec import EpsonTextCodec as EpsonTextCodec
     from robolink.protocols.epson_text._codes import ErrorCode as ErrorCode
     from robolink.protocols.epson_text._commands import COMMANDS as COMMANDS
-    from robolink.protocols.epson_text._commands import Command as Command
     from robolink.protocols.epson_text._commands import ParameterForm as ParameterForm
+    from robolink.protocols.epson_text._commands import RemoteCommand as RemoteCommand
     from robolink.protocols.epson_text._commands import ReplyShape as ReplyShape
     from robolink.protocols.epson_text._commands import find_command as find_command
     from robolink.protocols.epson_text._events import BadRequest as BadRequest
@@ -33,7 +33,7 @@ else:
         {
             "_codec": "EpsonTextCodec",
             "_codes": "ErrorCode",
-            "_commands": "COMMANDS Command ParameterForm ReplyShape find_command",
+            "_commands": "COMMANDS RemoteCommand ParameterForm ReplyShape find_command",
             "_events": "BadRequest EndOfStream Event Refusal Reply Request",
             "_preferences": "Preference parse_preferences preferences_field",
             "_status": "StatusFlags parse_status status_fields",

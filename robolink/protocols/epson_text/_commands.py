@@ -1,4 +1,4 @@
-"""Every Remote Ethernet command, once (epson.md 1.2, 1.3, 1.8).
+"""Every Remote Ethernet command, once (docs/reference/epson.md 1.2, 1.3, 1.8).
 
 Flag names are the field names of ``StatusFlags``. A precondition is judged by the state in
 which the request finds the controller; for the commands that are legal during an Execute,
@@ -40,7 +40,7 @@ class ReplyShape(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Command:
+class RemoteCommand:
     """What one command demands and gives.
 
     Attributes:
@@ -51,11 +51,12 @@ class Command:
         forbids: Status flags that must be off.
         form: How its parameters are written.
         reply: What a successful reply carries.
-        in_monitoring: Served to a client that may only monitor (epson.md 1.3).
+        in_monitoring: Served to a client that may only monitor (docs/reference/epson.md 1.3).
         during_execute: RC+ version from which it is served while an Execute runs.
         since: RC+ version that introduced it.
-        extended: Not in the public command table; older firmware answers 11 (epson.md 1.8).
-        bare: Clients send it without its parameter too (epson_corrections.md 1.2); a device
+        extended: Not in the public command table; older firmware answers 11
+            (docs/reference/epson.md 1.8).
+        bare: Clients send it without its parameter too (docs/reference/epson.md 1.10); a device
             decides what that means.
     """
 
@@ -79,14 +80,16 @@ class Command:
 
 _AUTO: Final = frozenset({"auto"})
 _READY: Final = frozenset({"auto", "ready"})
-_READY_ONLY: Final = frozenset({"ready"})  # epson.md 1.2 note 2: Auto is missing there
+# Auto is missing there (docs/reference/epson.md 1.2, note 2).
+_READY_ONLY: Final = frozenset({"ready"})
 _UNSAFE: Final = frozenset({"emergency_stop", "safeguard"})
-# One manual prints "Safeguard on" for Start; the guard must be closed (epson.md 1.2 note 1).
+# One manual prints "Safeguard on" for Start; the guard must be closed (docs/reference/epson.md 1.2
+# note 1).
 _UNFIT: Final = _UNSAFE | {"error"}
 
 
-def _query(name: str, parameters: int = 0, *, during_execute: int | None = None) -> Command:
-    return Command(
+def _query(name: str, parameters: int = 0, *, during_execute: int | None = None) -> RemoteCommand:
+    return RemoteCommand(
         name,
         parameters,
         parameters,
@@ -96,12 +99,12 @@ def _query(name: str, parameters: int = 0, *, during_execute: int | None = None)
     )
 
 
-def _output(name: str, needs: frozenset[str]) -> Command:
-    return Command(name, 2, 2, needs, during_execute=7)
+def _output(name: str, needs: frozenset[str]) -> RemoteCommand:
+    return RemoteCommand(name, 2, 2, needs, during_execute=7)
 
 
-def _extended(name: str, parameters: int = 0) -> Command:
-    return Command(
+def _extended(name: str, parameters: int = 0) -> RemoteCommand:
+    return RemoteCommand(
         name,
         parameters,
         parameters,
@@ -115,19 +118,19 @@ def _extended(name: str, parameters: int = 0) -> Command:
 _VARIABLE: Final = ParameterForm.VARIABLE
 _STATEMENT: Final = ParameterForm.STATEMENT
 
-COMMANDS: Final[tuple[Command, ...]] = (
-    Command("Login", 1, 1, form=ParameterForm.PASSWORD, in_monitoring=True, bare=True),
-    Command("Logout", in_monitoring=True),
-    Command("Start", 1, 1, _READY, _UNFIT),
-    Command("Stop", needs=_AUTO),
-    Command("Pause", needs=frozenset({"auto", "running"})),
-    Command("Continue", needs=frozenset({"auto", "paused"})),
-    Command("Reset", needs=_READY),
-    Command("SetMotorsOn", 1, 1, _READY, _UNSAFE, bare=True),
-    Command("SetMotorsOff", 1, 1, _READY, bare=True),
-    Command("SetCurRobot", 1, 1, _READY),
+COMMANDS: Final[tuple[RemoteCommand, ...]] = (
+    RemoteCommand("Login", 1, 1, form=ParameterForm.PASSWORD, in_monitoring=True, bare=True),
+    RemoteCommand("Logout", in_monitoring=True),
+    RemoteCommand("Start", 1, 1, _READY, _UNFIT),
+    RemoteCommand("Stop", needs=_AUTO),
+    RemoteCommand("Pause", needs=frozenset({"auto", "running"})),
+    RemoteCommand("Continue", needs=frozenset({"auto", "paused"})),
+    RemoteCommand("Reset", needs=_READY),
+    RemoteCommand("SetMotorsOn", 1, 1, _READY, _UNSAFE, bare=True),
+    RemoteCommand("SetMotorsOff", 1, 1, _READY, bare=True),
+    RemoteCommand("SetCurRobot", 1, 1, _READY),
     _query("GetCurRobot"),
-    Command("Home", 1, 1, _READY, _UNFIT, bare=True),
+    RemoteCommand("Home", 1, 1, _READY, _UNFIT, bare=True),
     _query("GetIO", 1),
     _query("GetMemIO", 1),
     _output("SetIO", _READY_ONLY),
@@ -140,14 +143,14 @@ COMMANDS: Final[tuple[Command, ...]] = (
     _query("GetMemIOWord", 1),
     _output("SetIOWord", _READY),
     _output("SetMemIOWord", _READY),
-    Command("GetVariable", 1, 3, form=_VARIABLE, reply=ReplyShape.FIELDS, in_monitoring=True),
-    Command("SetVariable", 2, 3, _READY, form=_VARIABLE),
+    RemoteCommand("GetVariable", 1, 3, form=_VARIABLE, reply=ReplyShape.FIELDS, in_monitoring=True),
+    RemoteCommand("SetVariable", 2, 3, _READY, form=_VARIABLE),
     _query("GetStatus", during_execute=5),
-    Command("Execute", 1, 1, _READY, _UNFIT, form=_STATEMENT, reply=ReplyShape.TEXT),
-    Command("Abort", needs=_AUTO, during_execute=5),
-    Command("GetAlm", reply=ReplyShape.FIELDS, in_monitoring=True, since=7),
+    RemoteCommand("Execute", 1, 1, _READY, _UNFIT, form=_STATEMENT, reply=ReplyShape.TEXT),
+    RemoteCommand("Abort", needs=_AUTO, during_execute=5),
+    RemoteCommand("GetAlm", reply=ReplyShape.FIELDS, in_monitoring=True, since=7),
     # Its preconditions are not documented; Auto is what accepts remote commands at all.
-    Command("ResetAlm", 1, 1, _AUTO, since=7),
+    RemoteCommand("ResetAlm", 1, 1, _AUTO, since=7),
     _extended("GetContName"),
     _extended("GetContNo"),
     _extended("GetContVer"),
@@ -172,14 +175,14 @@ COMMANDS: Final[tuple[Command, ...]] = (
     _extended("GetHealthRB", 3),
     _extended("GetPartWarning", 1),
 )
-"""The table, in the order of epson.md 1.2, then 1.8."""
+"""The table, in the order of docs/reference/epson.md 1.2, then 1.8."""
 
-_BY_NAME: Final[Mapping[str, Command]] = MappingProxyType(
+_BY_NAME: Final[Mapping[str, RemoteCommand]] = MappingProxyType(
     {command.name.lower(): command for command in COMMANDS}
 )
 
 
-def find_command(name: str) -> Command | None:
+def find_command(name: str) -> RemoteCommand | None:
     """Return the command called ``name`` in any case, ``None`` when there is none."""
     # The Kelvin sign and its like are lower-cased to ASCII letters; they are no names.
     return _BY_NAME.get(name.lower()) if name.isascii() else None

@@ -6,7 +6,7 @@ refused.
 
 from robolink.errors import LocalProtocolError
 from robolink.messages import tr
-from robolink.protocols.epson_text._commands import Command, ParameterForm, find_command
+from robolink.protocols.epson_text._commands import ParameterForm, RemoteCommand, find_command
 from robolink.protocols.epson_text._events import Refusal, Reply, Request
 from robolink.protocols.epson_text._parameters import MAX_TEXT, QUOTE, write_parameters
 
@@ -76,7 +76,7 @@ def write_refusal(refusal: Refusal, encoding: str) -> bytes:
     return _encoded(refusal, f"!{refusal.name},{int(refusal.code)}", encoding)
 
 
-def _misfit(command: Command, parameters: tuple[str, ...]) -> str:
+def _misfit(command: RemoteCommand, parameters: tuple[str, ...]) -> str:
     if not command.min_parameters <= len(parameters) <= command.max_parameters:
         return tr(
             "it takes {least} to {most} parameters, not {count}",

@@ -1,4 +1,4 @@
-"""The PLC mailbox: blocks of 16-bit words between a client and a SoftMotion PLC (design part 7).
+"""The PLC mailbox: blocks of 16-bit words between a client and a SoftMotion PLC (docs/mailbox.md).
 
 HOST encodes commands and decodes responses and slots; DEVICE decodes commands and encodes
 responses and slots.
@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from robolink.protocols.mailbox._codes import CommandState as CommandState
     from robolink.protocols.mailbox._codes import CoordinateSystem as CoordinateSystem
     from robolink.protocols.mailbox._codes import ErrorClass as ErrorClass
+    from robolink.protocols.mailbox._codes import ExportProfile as ExportProfile
     from robolink.protocols.mailbox._codes import GroupState as GroupState
-    from robolink.protocols.mailbox._codes import Profile as Profile
     from robolink.protocols.mailbox._codes import ReadMode as ReadMode
     from robolink.protocols.mailbox._codes import error_meaning as error_meaning
     from robolink.protocols.mailbox._frames import frames_match as frames_match
@@ -89,7 +89,7 @@ else:
             "blocks.layout": "BlockError BlockFault Field Four Layout Six WordType Words",
             "_codes": (
                 "Bits BufferMode Capability CommandState CoordinateSystem ErrorClass "
-                "GroupState Profile ReadMode error_meaning"
+                "GroupState ExportProfile ReadMode error_meaning"
             ),
             "blocks.command": "Command decode_command encode_command",
             "blocks.device": "decode_device_id encode_device_id",

@@ -1,6 +1,6 @@
 """What the mailbox can be told to do; numbers follow SRCI where it has one.
 
-SRCI's numbers are those of softmotion.md 4.6; 30001 and up are the mailbox's own.
+SRCI's numbers are those of docs/reference/softmotion.md 4.6; 30001 and up are the mailbox's own.
 """
 
 from collections.abc import Mapping
@@ -9,7 +9,7 @@ from enum import IntEnum
 from types import MappingProxyType
 from typing import Final
 
-from robolink.protocols.mailbox._codes import Capability, Profile
+from robolink.protocols.mailbox._codes import Capability, ExportProfile
 
 
 class Opcode(IntEnum):
@@ -148,7 +148,7 @@ OPCODES: Final[Mapping[Opcode, OpcodeFacts]] = MappingProxyType(
 """Every opcode, in the order of its number."""
 
 
-def opcodes_of(profile: Profile) -> tuple[Opcode, ...]:
+def opcodes_of(profile: ExportProfile) -> tuple[Opcode, ...]:
     """Return the opcodes that a program of ``profile`` holds."""
     able = profile.capabilities
     return tuple(code for code, facts in OPCODES.items() if facts.capability in able)

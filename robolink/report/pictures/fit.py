@@ -9,7 +9,7 @@ from robolink.calibration import CalibrationResult
 from robolink.messages import tr
 from robolink.report._markup import element
 from robolink.report._values import Report
-from robolink.report.pictures.panel import SIDE, Panel, dot_names, side_by_side
+from robolink.report.pictures.panel import SIDE, PlotPanel, dot_names, side_by_side
 from robolink.report.pictures.shapes import circle, ellipse, words
 
 _LOWEST_MM: Final = 0.005
@@ -59,7 +59,7 @@ def _in_the_plane(result: CalibrationResult) -> tuple[tuple[float, ...], ...]:
 
 def _residuals(result: CalibrationResult) -> Element:
     """Draw the residual of each pose from above, in base axes."""
-    panel = Panel(max(*result.residual_distances_mm, _LOWEST_MM) * 1.2)
+    panel = PlotPanel(max(*result.residual_distances_mm, _LOWEST_MM) * 1.2)
     places = [panel.at(residual[0], residual[1]) for residual in _in_the_plane(result)]
     rms_mm = result.rms_mm or 0.0
     rms = circle(panel.at(0, 0), round(rms_mm * panel.per_mm, 2), class_="rms")
@@ -77,7 +77,7 @@ def _residuals(result: CalibrationResult) -> Element:
 def _interval(result: CalibrationResult, axes: Axes) -> Element:
     """Draw the interval about the measured tip, in the axes of the flange."""
     halves = [result.half_width95[result.measured.index(name)] for name in ("x_mm", "y_mm")]
-    panel = Panel(max(*halves, _LOWEST_MM) * 1.4)
+    panel = PlotPanel(max(*halves, _LOWEST_MM) * 1.4)
     middle = panel.at(0, 0)
     long_mm, short_mm, turn_deg = axes
     shape = ellipse(

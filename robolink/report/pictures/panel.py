@@ -15,7 +15,7 @@ SIDE: Final = 230.0
 _GAP: Final = 60.0
 
 
-class Panel:
+class PlotPanel:
     """A square piece of a plane with its middle at (0, 0).
 
     Attributes:

@@ -10,7 +10,7 @@ from robolink.messages import tr
 from robolink.model import ToolOffset
 from robolink.report._markup import element
 from robolink.report._values import Report
-from robolink.report.pictures.panel import Panel, dot_names, side_by_side
+from robolink.report.pictures.panel import PlotPanel, dot_names, side_by_side
 from robolink.report.pictures.shapes import arrow, circle
 
 _LOWEST_MM: Final = 0.05
@@ -33,7 +33,7 @@ def tip(report: Report) -> Iterator[Element]:
 def _change(before: ToolOffset, after: ToolOffset) -> Element:
     """Draw the movement of the tip in the flange's XY plane, from above, both axes alike."""
     dx_mm, dy_mm = after.x_mm - before.x_mm, after.y_mm - before.y_mm
-    panel = Panel(max(math.hypot(dx_mm, dy_mm), _LOWEST_MM) * 1.35)
+    panel = PlotPanel(max(math.hypot(dx_mm, dy_mm), _LOWEST_MM) * 1.35)
     start, end = panel.at(0, 0), panel.at(dx_mm, dy_mm)
     return element(
         "g",
@@ -46,7 +46,7 @@ def _change(before: ToolOffset, after: ToolOffset) -> Element:
 def _drift(result: VerifyResult) -> Element:
     """Draw where the tip stood at each angle, and the circle that is allowed."""
     largest_mm = max(result.max_drift_mm, result.tolerance_mm, _LOWEST_MM)
-    panel = Panel(largest_mm * 1.2)
+    panel = PlotPanel(largest_mm * 1.2)
     middle = panel.at(0, 0)
     places = [panel.at(drift.dx_mm, drift.dy_mm) for drift in result.drifts]
     dots = [circle(place, 3.2) for place in places]

@@ -9,21 +9,21 @@ import json
 import socket
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from types import TracebackType
-from typing import Any, Final, Self
+from typing import Any, Final
 from urllib.parse import urlsplit
 
+from robolink.closing import ClosedAtExit
 from robolink.errors import ConfigError, ConnectError, RobolinkError, TransportBrokenError
 from robolink.messages import tr
 from robolink_simulators.assist.acts import Assisted, perform
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.cell.person import Look
 from robolink_simulators.cell.places import Axis, XyzMm
-from robolink_simulators.epson.refusals import Refusal
+from robolink_simulators.epson.refusals import SpelRefusal
 from robolink_simulators.hosting.in_process import epson as in_process
 from robolink_simulators.hosting.in_process import softmotion as plc_in_process
 from robolink_simulators.hosting.streams.tcp_host import TcpHost
-from robolink_simulators.softmotion.group.smc_errors import Refused
+from robolink_simulators.softmotion.smc_errors import BlockRefused
 
 _MAX_LINE: Final = 65536
 _SCHEME: Final = "assist+tcp"
@@ -101,12 +101,12 @@ class _AssistLink:
             return b""
         try:
             answer = {"ok": True, **perform(self._simulator, request)}
-        except (RobolinkError, Refusal, Refused) as error:
+        except (RobolinkError, SpelRefusal, BlockRefused) as error:
             answer = {"ok": False, "error": str(error)}
         return json.dumps(answer).encode() + b"\n"
 
 
-class AssistClient:
+class AssistClient(ClosedAtExit):
     """Talks to an assist port.
 
     Args:
@@ -181,17 +181,6 @@ class AssistClient:
         """Close the connection."""
         self._lines.close()
         self._socket.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def _broken(self) -> TransportBrokenError:
         return TransportBrokenError(

@@ -95,7 +95,7 @@ class CameraOptics:
 
 
 @dataclass(slots=True)
-class UpCamera:
+class SimulatedCamera:
     """A camera in the cell.
 
     Attributes:

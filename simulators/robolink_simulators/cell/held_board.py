@@ -11,7 +11,7 @@ DRAWING_MM: Final = ((20.0, 12.5), (-20.0, 12.5), (-20.0, -12.5), (20.0, -12.5))
 
 
 @dataclass(frozen=True, slots=True)
-class HeldBoard:
+class SimulatedBoard:
     """A board at the tip of a nozzle.
 
     Attributes:
@@ -25,7 +25,7 @@ class HeldBoard:
     drawing_mm: tuple[tuple[float, float], ...] = DRAWING_MM
 
     @classmethod
-    def grasped(cls, rng: random.Random) -> "HeldBoard":
+    def grasped(cls, rng: random.Random) -> "SimulatedBoard":
         """Return a board as a nozzle takes it up: some tenths of a mm, and a degree, off."""
         x_mm, y_mm = (round(rng.uniform(-0.5, 0.5), 4) for _ in range(2))
         return cls((x_mm, y_mm), round(rng.uniform(-1.5, 1.5), 4))

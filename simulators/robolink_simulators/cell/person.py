@@ -19,7 +19,7 @@ class Look:
     dz_mm: float
 
 
-class Operator:
+class SimulatedOperator:
     """A person at the cell: looks at the tip, and jogs it onto the pin.
 
     The eye errs by the same amount however often it looks at one placement of the arm; each

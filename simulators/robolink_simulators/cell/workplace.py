@@ -10,8 +10,8 @@ from dataclasses import asdict, replace
 from typing import Any, Final, Protocol
 
 from robolink.model import TIP, Pose, ToolOffset
-from robolink_simulators.cell.camera import Pixel, UpCamera
-from robolink_simulators.cell.held_board import HeldBoard
+from robolink_simulators.cell.camera import Pixel, SimulatedCamera
+from robolink_simulators.cell.held_board import SimulatedBoard
 from robolink_simulators.cell.places import Axis, Direction, axis_of
 from robolink_simulators.cell.places import XyzMm as XyzMm
 from robolink_simulators.cell.tip_switches import UPRIGHT, Lean
@@ -77,12 +77,12 @@ class Workplace:
         self.tips = tips
         self.pin_mm = pin_mm
         self.leans: dict[int, Lean] = {}
-        self.board: HeldBoard | None = None
+        self.board: SimulatedBoard | None = None
         self._seed = seed
         self._random = random.Random(f"nozzles {seed}")
         self._replaced = replaced
         rng = random.Random(f"camera {seed}")
-        self.camera = UpCamera(camera_beside(self.tip_mm(), rng), parameters.optics, rng)
+        self.camera = SimulatedCamera(camera_beside(self.tip_mm(), rng), parameters.optics, rng)
         self.parameters = WorldParameters()
         self.set_up(parameters)
 
@@ -100,7 +100,7 @@ class Workplace:
         if not parameters.board_held:
             self.board = None
         elif self.board is None:
-            self.board = HeldBoard.grasped(random.Random(f"board {self._seed}"))
+            self.board = SimulatedBoard.grasped(random.Random(f"board {self._seed}"))
 
     def lean_of(self, tool: int) -> Lean:
         """Return by how much a nozzle is bent, in the flange's axes."""

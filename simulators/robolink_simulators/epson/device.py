@@ -21,16 +21,16 @@ from robolink_simulators.epson.arm.robots import find_robot
 from robolink_simulators.epson.card import ControllerCard
 from robolink_simulators.epson.companion import Companion
 from robolink_simulators.epson.condition import Condition, Mode, Task
+from robolink_simulators.epson.flash import Flash, forget_volatile
 from robolink_simulators.epson.machine import Machine
-from robolink_simulators.epson.memory.flash import Flash, forget_volatile
 from robolink_simulators.epson.memory.variables import project_variables
-from robolink_simulators.epson.mishaps import Mishaps
+from robolink_simulators.epson.mishaps import EpsonMishaps
 from robolink_simulators.epson.options import EpsonOptions
-from robolink_simulators.epson.panel import Panel
+from robolink_simulators.epson.panel import EpsonPanel
 from robolink_simulators.epson.remote.client_slot import ClientSlot
-from robolink_simulators.epson.remote.command_window import CommandWindow
+from robolink_simulators.epson.remote.command_window import SpelWindow
 from robolink_simulators.epson.remote.commands import CommandDesk
-from robolink_simulators.epson.remote.exchange import Exchange
+from robolink_simulators.epson.remote.exchange import PendingRequest
 from robolink_simulators.epson.remote.link import EpsonLink
 from robolink_simulators.epson.remote.queries import Alarms
 from robolink_simulators.epson.remote.service import Service
@@ -47,7 +47,7 @@ RequestHook = Callable[[int, str], None]
 
 
 class EpsonSimulator:
-    """Implements :class:`~robolink_simulators.hosting.seam.WireDevice`.
+    """Implements ``hosting.seam.WireDevice``.
 
     Args:
         robot: Name of a SCARA model.
@@ -143,7 +143,7 @@ class EpsonSimulator:
             variables=self.variables,
             messages=self.card.messages,
         )
-        self._window = CommandWindow(interpreter, self.condition, self.options)
+        self._window = SpelWindow(interpreter, self.condition, self.options)
         self._slot = ClientSlot(self.options.remote_timeout_s)
         self._desk = CommandDesk(
             self.machine,
@@ -161,7 +161,7 @@ class EpsonSimulator:
             options=self.options,
             password=password.reveal() if password else "",
         )
-        self.panel = Panel(
+        self.panel = EpsonPanel(
             self.machine,
             self.condition,
             self._window,
@@ -170,7 +170,7 @@ class EpsonSimulator:
             options=self.options,
             acting=self.acting,
         )
-        self._mishaps = Mishaps(self.panel)
+        self._mishaps = EpsonMishaps(self.panel)
 
     @property
     def now_ns(self) -> int:
@@ -245,7 +245,7 @@ class EpsonSimulator:
                 link.cut()
             return
         self._requests += 1
-        exchange = Exchange(self._requests, event.name, self.faults.take(shown), link)
+        exchange = PendingRequest(self._requests, event.name, self.faults.take(shown), link)
         if exchange.meets(FaultAction.DISCONNECT_BEFORE):
             link.cut()
             return
@@ -257,7 +257,7 @@ class EpsonSimulator:
             self._service.carry_out(link, exchange, event, self._now_ns)
             self._flash.save_changes()
 
-    def leaving(self, exchange: Exchange, reply: bytes) -> Sequence[Departure]:
+    def leaving(self, exchange: PendingRequest, reply: bytes) -> Sequence[Departure]:
         """Count a reply and return what of it leaves, when."""
         self._flash.save_changes()
         self.exchanges += 1
@@ -266,7 +266,7 @@ class EpsonSimulator:
             return ((0.0, reply),)
         return self.faults.departures(reply, exchange.faults)
 
-    def announce(self, exchange: Exchange, reply: bytes) -> None:
+    def announce(self, exchange: PendingRequest, reply: bytes) -> None:
         """Tell the hook that a reply is about to leave."""
         if self.on_reply is not None:
             self.on_reply(exchange.number, shown_reply(reply))
@@ -296,7 +296,7 @@ class EpsonSimulator:
             self._stepping = False
 
     def _supervise(self, now_ns: int) -> None:
-        """Keep the time-outs of epson.md 1.1."""
+        """Keep the time-outs of docs/reference/epson.md 1.1."""
         unfinished = self._service.unfinished
         self._slot.settle(unfinished=unfinished)
         deadline = self._slot.deadline(unfinished=unfinished)

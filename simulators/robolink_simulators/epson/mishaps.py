@@ -3,14 +3,14 @@
 from collections.abc import Callable, Sequence
 
 from robolink.timing import NS_PER_S
-from robolink_simulators.epson.panel import Panel
+from robolink_simulators.epson.panel import EpsonPanel
 from robolink_simulators.faults import Fault, FaultAction
 
 
-class Mishaps:
+class EpsonMishaps:
     """Does to the panel what a fault plan says, when it says."""
 
-    def __init__(self, panel: Panel) -> None:
+    def __init__(self, panel: EpsonPanel) -> None:
         self._panel = panel
         self._planned: list[tuple[int, Callable[[], None]]] = []
 

@@ -7,11 +7,11 @@ from robolink_simulators.epson.condition import Condition, Mode, Task
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.options import EpsonOptions
 from robolink_simulators.epson.remote.client_slot import ClientSlot
-from robolink_simulators.epson.remote.command_window import CommandWindow
+from robolink_simulators.epson.remote.command_window import SpelWindow
 from robolink_simulators.epson.remote.queries import Alarms
 
 
-class Panel:
+class EpsonPanel:
     """Buttons, doors, selector, errors: what hands can touch. Any thread may act.
 
     Args:
@@ -29,7 +29,7 @@ class Panel:
         self,
         machine: Machine,
         condition: Condition,
-        window: CommandWindow,
+        window: SpelWindow,
         slot: ClientSlot,
         alarms: Alarms,
         *,

@@ -35,7 +35,7 @@ class RefusalKind(StrEnum):
     TYPE_MISMATCH = "type_mismatch"
 
 
-class Refusal(Exception):
+class SpelRefusal(Exception):
     """The controller will not do it; nothing was changed and nothing moves.
 
     Attributes:
@@ -49,7 +49,7 @@ class Refusal(Exception):
         self.text = text
 
 
-class OutOfReach(Refusal):
+class OutOfReach(SpelRefusal):
     """A target that the arm cannot take up."""
 
     def __init__(self, text: str) -> None:

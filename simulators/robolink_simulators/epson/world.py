@@ -9,7 +9,7 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import Pose, ToolOffset, rotate_xy
 from robolink_simulators.cell.person import Look as Look
-from robolink_simulators.cell.person import Operator
+from robolink_simulators.cell.person import SimulatedOperator
 from robolink_simulators.cell.places import Direction
 from robolink_simulators.cell.tip_switches import TipSwitch
 from robolink_simulators.cell.workplace import MOUNTED_TOOL as MOUNTED_TOOL
@@ -137,7 +137,7 @@ class World(Workplace):
         }
 
 
-class PendantOperator(Operator):
+class PendantOperator(SimulatedOperator):
     """The person at an EPSON cell, who jogs with the pendant and teaches points.
 
     Args:

@@ -9,7 +9,7 @@ from robolink_simulators.plc.frames import (
     ILLEGAL_FUNCTION,
     NO_SUCH_UNIT,
     Frames,
-    Request,
+    PlcRequest,
     TcpFrames,
 )
 from robolink_simulators.plc.link import PlcLink
@@ -63,7 +63,7 @@ class PlcSimulator:
         changes = [self.program.next_change(), *(link.next_change() for link in self._links)]
         return min((change for change in changes if change is not None), default=None)
 
-    def serve(self, request: Request, frames: Frames) -> list[Departure]:
+    def serve(self, request: PlcRequest, frames: Frames) -> list[Departure]:
         """Carry a request out and return what leaves for it, when."""
         if frames.shared and request.unit != self.unit:
             return []
@@ -74,7 +74,7 @@ class PlcSimulator:
         ignored = FaultAction.IGNORE_WRITE in actions
         return self.faults.departures(self._answer(request, frames, ignored=ignored), met)
 
-    def _answer(self, request: Request, frames: Frames, *, ignored: bool) -> bytes:
+    def _answer(self, request: PlcRequest, frames: Frames, *, ignored: bool) -> bytes:
         if request.unit != self.unit:
             return frames.refusal(request, NO_SUCH_UNIT)
         if request.table is None:

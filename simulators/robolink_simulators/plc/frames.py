@@ -23,7 +23,7 @@ from pymodbus.pdu.register_message import (
     WriteSingleRegisterResponse,
 )
 
-from robolink.register_maps import Number, NumberType, Table
+from robolink.register_maps import Number, NumberType, RegisterTable
 
 ILLEGAL_FUNCTION: Final = 1
 ILLEGAL_ADDRESS: Final = 2
@@ -39,13 +39,22 @@ _TYPES: Final = {
     NumberType.REAL: _DATA.FLOAT32,
     NumberType.LREAL: _DATA.FLOAT64,
 }
-_READ: Final = {1: Table.COIL, 2: Table.DISCRETE, 3: Table.HOLDING, 4: Table.INPUT}
+_READ: Final = {
+    1: RegisterTable.COIL,
+    2: RegisterTable.DISCRETE,
+    3: RegisterTable.HOLDING,
+    4: RegisterTable.INPUT,
+}
 _WRITE_COIL: Final = 5
-_WRITE: Final = {_WRITE_COIL: Table.COIL, 6: Table.HOLDING, 16: Table.HOLDING}
+_WRITE: Final = {
+    _WRITE_COIL: RegisterTable.COIL,
+    6: RegisterTable.HOLDING,
+    16: RegisterTable.HOLDING,
+}
 
 
 @dataclass(frozen=True, slots=True)
-class Request:
+class PlcRequest:
     """What a client asks.
 
     Attributes:
@@ -61,7 +70,7 @@ class Request:
     number: int
     unit: int
     function: int
-    table: Table | None
+    table: RegisterTable | None
     address: int = 0
     count: int = 0
     values: tuple[int, ...] | None = None
@@ -90,18 +99,18 @@ class Frames(ABC):
         self._buffer += data
 
     @abstractmethod
-    def take(self) -> Request | None:
+    def take(self) -> PlcRequest | None:
         """Return the next request, ``None`` while there is no whole one.
 
         Raises:
             ValueError: What came is no frame, and the stream cannot be used any more.
         """
 
-    def answer(self, request: Request, found: Sequence[int] = ()) -> bytes:
+    def answer(self, request: PlcRequest, found: Sequence[int] = ()) -> bytes:
         """Return the frame of an answer; ``found`` is what was read."""
         return self._packed(request, _pdu(request, found))
 
-    def refusal(self, request: Request, code: int) -> bytes:
+    def refusal(self, request: PlcRequest, code: int) -> bytes:
         """Return the frame of an exception."""
         return self._packed(request, ExceptionResponse(request.function, code))
 
@@ -109,18 +118,20 @@ class Frames(ABC):
         frame, self._buffer = self._buffer[:end], self._buffer[end:]
         return frame
 
-    def _request(self, number: int, unit: int, payload: bytes) -> Request:
+    def _request(self, number: int, unit: int, payload: bytes) -> PlcRequest:
         function = payload[0]
         pdu = self._framer.decoder.decode(payload)
         if pdu is None or function not in _READ | _WRITE:
-            return Request(number, unit, function, None)
+            return PlcRequest(number, unit, function, None)
         if function in _READ:
-            return Request(number, unit, function, _READ[function], pdu.address, pdu.count)
+            return PlcRequest(number, unit, function, _READ[function], pdu.address, pdu.count)
         values = pdu.bits[:1] if function == _WRITE_COIL else pdu.registers
         written = tuple(int(value) for value in values)
-        return Request(number, unit, function, _WRITE[function], pdu.address, len(written), written)
+        return PlcRequest(
+            number, unit, function, _WRITE[function], pdu.address, len(written), written
+        )
 
-    def _packed(self, request: Request, pdu: ModbusPDU) -> bytes:
+    def _packed(self, request: PlcRequest, pdu: ModbusPDU) -> bytes:
         payload = bytes([pdu.function_code]) + pdu.encode()
         return self._framer.encode(payload, request.unit, request.number)
 
@@ -133,7 +144,7 @@ class TcpFrames(Frames):
     def __init__(self) -> None:
         super().__init__(FramerSocket(DecodePDU(is_server=True)))
 
-    def take(self) -> Request | None:
+    def take(self) -> PlcRequest | None:
         """See :meth:`Frames.take`."""
         if len(self._buffer) <= _HEADER:
             return None
@@ -158,7 +169,7 @@ class LineFrames(Frames):
     def __init__(self) -> None:
         super().__init__(FramerRTU(DecodePDU(is_server=True)))
 
-    def take(self) -> Request | None:
+    def take(self) -> PlcRequest | None:
         """See :meth:`Frames.take`; raises nothing."""
         if len(self._buffer) < FramerRTU.MIN_SIZE:
             return None
@@ -202,7 +213,7 @@ def decode(number: Number, words: Sequence[int]) -> float:
     return found * number.factor
 
 
-def _pdu(request: Request, found: Sequence[int]) -> ModbusPDU:
+def _pdu(request: PlcRequest, found: Sequence[int]) -> ModbusPDU:
     address, values = request.address, list(request.values or ())
     match request.function:
         case 1:

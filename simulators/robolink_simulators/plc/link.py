@@ -5,10 +5,10 @@ from typing import Protocol
 
 from robolink.timing import NS_PER_S
 from robolink_simulators.faults import Departure
-from robolink_simulators.plc.frames import Frames, Request
+from robolink_simulators.plc.frames import Frames, PlcRequest
 
 
-class Served(Protocol):
+class ServedFrame(Protocol):
     """The PLC, as its connections see it."""
 
     now_ns: int
@@ -16,7 +16,7 @@ class Served(Protocol):
     def advance(self, now_ns: int) -> None:
         """Let simulated time reach ``now_ns``."""
 
-    def serve(self, request: Request, frames: Frames) -> list[Departure]:
+    def serve(self, request: PlcRequest, frames: Frames) -> list[Departure]:
         """Carry a request out and return what leaves for it, when."""
 
 
@@ -28,7 +28,7 @@ class PlcLink:
         frames: How requests and answers are wrapped.
     """
 
-    def __init__(self, plc: Served, frames: Frames) -> None:
+    def __init__(self, plc: ServedFrame, frames: Frames) -> None:
         self._plc = plc
         self._frames = frames
         self._outbox: deque[tuple[int, bytes | None]] = deque()

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 from typing import Final
 
-from robolink.register_maps import Signal, Table
+from robolink.register_maps import RegisterTable, Signal
 
 _BEYOND: Final = 16
 """How far behind the last place of a map a table goes on."""
@@ -20,13 +20,13 @@ class Memory:
         used: The places that a map takes.
     """
 
-    def __init__(self, used: Iterable[tuple[Table, range]]) -> None:
-        self._sizes = dict.fromkeys(Table, 0)
+    def __init__(self, used: Iterable[tuple[RegisterTable, range]]) -> None:
+        self._sizes = dict.fromkeys(RegisterTable, 0)
         for table, addresses in used:
             self._sizes[table] = max(self._sizes[table], addresses.stop + _BEYOND)
-        self._values: dict[tuple[Table, int], int] = {}
+        self._values: dict[tuple[RegisterTable, int], int] = {}
 
-    def read(self, table: Table, addresses: range) -> list[int]:
+    def read(self, table: RegisterTable, addresses: range) -> list[int]:
         """Return what stands there.
 
         Raises:
@@ -35,7 +35,7 @@ class Memory:
         self._require(table, addresses)
         return [self._values.get((table, address), 0) for address in addresses]
 
-    def write(self, table: Table, address: int, values: Sequence[int]) -> None:
+    def write(self, table: RegisterTable, address: int, values: Sequence[int]) -> None:
         """Store ``values`` from ``address`` on; raises as :meth:`read`."""
         self._require(table, range(address, address + len(values)))
         for offset, value in enumerate(values):
@@ -62,10 +62,10 @@ class Memory:
         mask, bit = 1 << signal.bit, signal.on if on else 1 - signal.on
         self._values[place] = self._values.get(place, 0) & ~mask | bit << signal.bit
 
-    def zero(self, table: Table) -> None:
-        """Zero a whole table, as a watchdog does (softmotion.md 4.1)."""
+    def zero(self, table: RegisterTable) -> None:
+        """Zero a whole table, as a watchdog does (docs/reference/softmotion.md 4.1)."""
         self._values = {place: v for place, v in self._values.items() if place[0] is not table}
 
-    def _require(self, table: Table, addresses: range) -> None:
+    def _require(self, table: RegisterTable, addresses: range) -> None:
         if addresses.stop > self._sizes[table]:
             raise OutsideError

@@ -3,7 +3,7 @@
 import random
 from collections.abc import Iterator, Mapping
 
-from robolink.register_maps import ANGLES, CommitKind, Number, RegisterMap, Slot, Table
+from robolink.register_maps import ANGLES, CommitKind, MapSlot, Number, RegisterMap, RegisterTable
 from robolink.timing import NS_PER_S
 from robolink_simulators.plc.frames import decode, encode
 from robolink_simulators.plc.memory import Memory
@@ -128,7 +128,7 @@ class PlcProgram:
         if word is not None:
             self.memory.write(word.table, word.address, [code])
 
-    def _stored(self, slot: Slot) -> Components:
+    def _stored(self, slot: MapSlot) -> Components:
         return {
             name: decode(number, self.memory.read(number.table, number.registers))
             for name, number in slot.components.items()
@@ -139,13 +139,13 @@ class PlcProgram:
             self.memory.write(number.table, number.address, encode(number, values.get(name, 0.0)))
 
 
-def _some_tool(slot: Slot, chance: random.Random) -> Components:
+def _some_tool(slot: MapSlot, chance: random.Random) -> Components:
     """Return an offset that a nozzle may have, to a hundredth of a millimetre or degree."""
     most = {name: 90.0 if name in ANGLES else 20.0 for name in slot.components}
     return {name: round(chance.uniform(-limit, limit), 2) for name, limit in most.items()}
 
 
-def _used(register_map: RegisterMap) -> Iterator[tuple[Table, range]]:
+def _used(register_map: RegisterMap) -> Iterator[tuple[RegisterTable, range]]:
     commit = register_map.commit
     numbers = [n for slot in register_map.slots.values() for n in slot.components.values()]
     numbers += register_map.flange.values()

@@ -7,7 +7,7 @@ from typing import Final
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
-from robolink_simulators.cell.person import Operator
+from robolink_simulators.cell.person import SimulatedOperator
 from robolink_simulators.cell.places import Direction
 from robolink_simulators.cell.tip_switches import Lean, Shake, TipSwitch
 from robolink_simulators.cell.workplace import (
@@ -19,8 +19,7 @@ from robolink_simulators.cell.workplace import (
 )
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.softmotion.group.axis_group import AxisGroup
-from robolink_simulators.softmotion.group.condition import GroupState
-from robolink_simulators.softmotion.group.smc_errors import ErrorKind, Refused
+from robolink_simulators.softmotion.group.condition import SmcGroupState
 from robolink_simulators.softmotion.kinematics.frames import (
     NO_TURN,
     ORIGIN,
@@ -32,6 +31,7 @@ from robolink_simulators.softmotion.kinematics.frames import (
     zyx_angles,
 )
 from robolink_simulators.softmotion.kinematics.kinematics import AxisKind, AxisValues
+from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind
 
 STORED: Final = ToolOffset(12.0, -3.5, -20.0)
 """The nozzle that was there before, on a kinematics that carries any tool."""
@@ -80,7 +80,7 @@ class SoftMotionWorld(Workplace):
         )
         self.group = group
         self.stored = stored
-        self.operator = Operator(self, require_jogging=self._require_rest, seed=seed)
+        self.operator = SimulatedOperator(self, require_jogging=self._require_rest, seed=seed)
 
     @classmethod
     def seeded(
@@ -128,7 +128,7 @@ class SoftMotionWorld(Workplace):
         group.inputs.connect(number, sense)
 
     def _require_rest(self) -> None:
-        if self.group.state not in (GroupState.DISABLED, GroupState.STANDBY):
+        if self.group.state not in (SmcGroupState.DISABLED, SmcGroupState.STANDBY):
             raise ConfigError(
                 tr("The machine cannot be jogged by hand while it moves or is in error."),
                 remedy=tr("Wait for the end of the movement, or reset the error first."),
@@ -175,7 +175,7 @@ class _HandledGroup:
             if max(map(abs, missed)) < _ARRIVED_MM:
                 group.place(axes)
                 return
-        raise Refused(ErrorKind.UNREACHABLE, "The tip cannot be brought there")
+        raise BlockRefused(ErrorKind.UNREACHABLE, "The tip cannot be brought there")
 
 
 def _stance(low: float, high: float) -> float:

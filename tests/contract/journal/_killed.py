@@ -14,7 +14,7 @@ from itertools import count
 from sqlalchemy import Engine, event
 
 from robolink.journal import EntryKind, JournalOutcomeLog, NewEntry, open_journal
-from robolink.journal.store.prepared import Runner
+from robolink.journal.store.prepared import StatementRunner
 from tests.contract.journal._acts import marker
 
 STEPS: tuple[Callable[[JournalOutcomeLog], None], ...] = (
@@ -40,7 +40,7 @@ def kill_at(number: int) -> None:
     event.listen(Engine, "commit", step)
     # Prepared statements go past SQLAlchemy, so it tells nobody of them.
     for name in ("run", "run_many", "rows", "commit"):
-        setattr(Runner, name, _after(step, getattr(Runner, name)))
+        setattr(StatementRunner, name, _after(step, getattr(StatementRunner, name)))
 
 
 def _after(step: Callable[[], None], run: Callable[..., object]) -> Callable[..., object]:

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from robolink.journal import EntryKind, NewEntry, Signature, Verification
+from robolink.journal import ChainVerification, EntryKind, NewEntry, Signature
 from tests.contract.journal._acts import run
 
 CELLS = ("cell-a", "cell-b")
@@ -22,7 +22,7 @@ def test_an_entry_comes_back_with_every_field(journal):
     assert (entry.number, entry.controller, entry.signature) == (1, CELLS[0], signature)
     assert entry.at.endswith("+00:00")
     assert entry.previous == ""
-    assert journal.verify() == Verification(1, ())
+    assert journal.verify() == ChainVerification(1, ())
     assert journal.entry(1) == entry
     assert journal.entry(2) is None
 

@@ -13,7 +13,7 @@ import pytest
 from sqlalchemy import Engine, event
 
 from robolink.errors import JournalError
-from robolink.journal import EntryKind, NewEntry, Verification, memory_journal, open_journal
+from robolink.journal import ChainVerification, EntryKind, NewEntry, memory_journal, open_journal
 from robolink.journal.store.entry_rows import EntryRows
 from tests.contract.journal._acts import marker
 
@@ -126,7 +126,7 @@ def test_an_empty_file_becomes_a_journal(path, open_anew):
     path.parent.mkdir()
     path.touch()
     refused(lambda: open_anew(str(path), read_only=True), path, "is empty")
-    assert open_anew(str(path)).verify() == Verification(0, ())
+    assert open_anew(str(path)).verify() == ChainVerification(0, ())
 
 
 def test_a_damaged_page_is_told_and_what_can_be_read_is_read(filled, open_anew):
@@ -142,7 +142,7 @@ def test_a_damaged_page_is_told_and_what_can_be_read_is_read(filled, open_anew):
         journal.log("cell").open_markers()
         journal.log("other").begin(marker())
 
-    refused(everything, filled, "it is damaged", "journal export --read-only", "by hand")
+    refused(everything, filled, "it is damaged", "read_only=True", "by hand")
     assert open_anew(str(filled), read_only=True).entry(1).verdict == "x" * 50
     assert filled.read_bytes()[page : page + 200] == b"\xff" * 200
 
@@ -190,7 +190,7 @@ def test_nothing_is_sent_when_the_intent_finds_no_space(filled):
     assert "The command was not sent." in shown.stdout
     journal = open_journal(str(filled))
     assert [known.operation for known in journal.log("other").open_markers()] == ["before"]
-    assert journal.verify() == Verification(201, ())
+    assert journal.verify() == ChainVerification(201, ())
     journal.close()
 
 
@@ -227,7 +227,7 @@ def test_what_may_not_be_written_is_read(public, open_anew, of_folder, of_file, 
 
     refused(write, public, "may not write", "Make the file and its folder writable", "was not sent")
     reader = open_anew(str(public), read_only=True)
-    assert reader.verify() == Verification(200, ())
+    assert reader.verify() == ChainVerification(200, ())
     assert [known.operation for known in reader.log("cell").open_markers()] == ["left open"]
 
 

@@ -4,7 +4,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from robolink.journal import NewEntry, Verification
+from robolink.journal import ChainVerification, NewEntry
 from robolink.model import EntryKind
 from tests.contract.journal._killed import STEPS
 
@@ -61,4 +61,4 @@ def test_a_journal_whose_making_was_cut_short_is_made_by_the_next(tmp_path, open
     for number in range(1, len(runs) + 1):
         journal = open_anew(f"{path}-{number}")
         journal.log("cell").append(NewEntry(EntryKind.RAW))
-        assert journal.verify() == Verification(1, ())
+        assert journal.verify() == ChainVerification(1, ())

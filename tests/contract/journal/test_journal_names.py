@@ -3,7 +3,7 @@
 import pytest
 
 from robolink.errors import LeaseHeldError, TransportTimeoutError
-from robolink.journal import Holder
+from robolink.journal import LeaseHolder
 from robolink.journal.store.migrations import MIGRATIONS
 from robolink.model import EntryKind, Identity, NewEntry
 from tests.contract.journal._acts import marker, run
@@ -37,8 +37,8 @@ def test_every_address_of_a_controller_leads_to_its_markers_and_its_record(journ
 
 
 def test_the_lease_of_a_controller_is_one_whatever_the_address(journal):
-    log = met(journal, ROBOT_A, holder=Holder(host="pc-1", pid=1, boot="b"))
-    other = met(journal, ROBOT_A, BY_ADDRESS, holder=Holder(host="pc-1", pid=2, boot="b"))
+    log = met(journal, ROBOT_A, holder=LeaseHolder(host="pc-1", pid=1, boot="b"))
+    other = met(journal, ROBOT_A, BY_ADDRESS, holder=LeaseHolder(host="pc-1", pid=2, boot="b"))
     with log.hold("a calibration"), pytest.raises(LeaseHeldError, match="a calibration"):
         other.begin(marker("b"))
 
@@ -88,8 +88,8 @@ def test_what_stands_under_the_text_of_an_address_belongs_to_who_answers_there(j
 
 
 def test_a_lease_under_the_text_of_an_address_goes_with_it(journal):
-    journal.log(BY_NAME, holder=Holder(host="pc-1", pid=1, boot="b")).begin(marker("a"))
-    log = met(journal, ROBOT_A, holder=Holder(host="pc-1", pid=2, boot="b"))
+    journal.log(BY_NAME, holder=LeaseHolder(host="pc-1", pid=1, boot="b")).begin(marker("a"))
+    log = met(journal, ROBOT_A, holder=LeaseHolder(host="pc-1", pid=2, boot="b"))
     with pytest.raises(LeaseHeldError):
         log.begin(marker("b"))
 

@@ -8,7 +8,7 @@ import pytest
 from robolink_simulators.cell.clock import ManualClock
 
 from robolink.errors import JournalError, LeaseHeldError, LeaseLostError
-from robolink.journal import EntryKind, NewEntry, Verification, open_journal
+from robolink.journal import ChainVerification, EntryKind, NewEntry, open_journal
 from robolink.journal import this_process as here
 from robolink.journal.store.migrations import MIGRATIONS
 from robolink.model import MarkerKind
@@ -86,12 +86,12 @@ def test_many_connections_give_consecutive_numbers(location, open_anew):
             log.append(NewEntry(EntryKind.RAW), NewEntry(EntryKind.RAW))
 
     _together([lambda journal=journal: append(journal) for journal in journals])
-    assert journals[0].verify() == Verification(120, ())
+    assert journals[0].verify() == ChainVerification(120, ())
 
 
 def test_an_empty_database_is_made_a_journal_once_however_many_open_it(location, open_anew):
     _together([lambda: open_anew(location).log(CELLS[0]).append(NewEntry(EntryKind.RAW))] * 5)
-    assert open_anew(location).verify() == Verification(5, ())
+    assert open_anew(location).verify() == ChainVerification(5, ())
 
 
 def _together(acts):
@@ -119,7 +119,7 @@ def test_several_processes_share_one_journal(location, journal):
     for process in processes:
         process.join(timeout=30)
     assert [process.exitcode for process in processes] == [0, 0]
-    assert journal.verify() == Verification(40, ())
+    assert journal.verify() == ChainVerification(40, ())
 
 
 def _work(location, name):
@@ -166,7 +166,7 @@ def test_a_migration_that_fails_leaves_the_older_form(location, journal, open_an
         with pytest.raises(JournalError, match="no_such_table"):
             open_anew(location)
     assert _version(journal) == len(MIGRATIONS)
-    assert journal.verify() == Verification(1, ())
+    assert journal.verify() == ChainVerification(1, ())
 
 
 def test_a_newer_journal_is_read_but_not_written(location, open_anew, monkeypatch):
@@ -189,7 +189,7 @@ def test_a_newer_journal_is_read_but_not_written(location, open_anew, monkeypatc
 def test_a_reader_changes_nothing_and_sees_what_is_added(location, journal, open_anew):
     reader = open_anew(location, read_only=True)
     journal.log(CELLS[0]).append(NewEntry(EntryKind.RAW))
-    assert reader.verify() == Verification(1, ())
+    assert reader.verify() == ChainVerification(1, ())
     assert reader.read_only
     with pytest.raises(JournalError, match="for reading only"):
         reader.log(CELLS[0]).append(NewEntry(EntryKind.RAW))

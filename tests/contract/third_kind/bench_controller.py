@@ -137,7 +137,8 @@ class BenchArm(PolledGroup):
         return bool(*self._link.ask("MOVING"))
 
     def _send_move(self, target: Pose, profile: MotionProfile) -> None:
-        self._link.ask(*self.requests_for(target, profile), CommandClass.ACT)
+        (request,) = self.requests_for(target, profile)
+        self._link.ask(request, CommandClass.ACT)
 
     def _send_stop(self) -> None:
         self._link.ask("HALT", CommandClass.CALM)

@@ -22,9 +22,7 @@ class BenchLink(DriverLink):
         self._own_gate.open()
         self.exchanges = 0
         latch = StopLatch(transport.identity)
-        super().__init__(
-            transport.identity, transport.clock, latch, outcomes, gate=self._own_gate
-        )
+        super().__init__(transport.identity, transport.clock, latch, outcomes, gate=self._own_gate)
 
     def ask(self, request: str, kind: CommandClass = CommandClass.LOOK) -> tuple[float, ...]:
         """Send one line and return the numbers of the answer.

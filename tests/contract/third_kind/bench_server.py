@@ -5,8 +5,7 @@ import threading
 from types import TracebackType
 from typing import Self
 
-import robolink
-from robolink.model import Controller, Pose, ToolOffset
+from robolink.model import Pose, ToolOffset
 from robolink.testing import MemoryMachine
 
 _POLLS_PER_MOVE = 2
@@ -52,10 +51,6 @@ class BenchServer:
         self._server.server_close()
         self._thread.join()
 
-    def connect(self) -> Controller:
-        """Connect a driver to it."""
-        return robolink.connect(self.url)
-
     def answer(self, line: str) -> str:
         """Return the answer to a line; ``NO`` and a reason for what is not done."""
         self.asked.append(line)
@@ -79,7 +74,8 @@ class BenchServer:
             tip = machine.tip(machine.tool)
             return _line(tip.x_mm, tip.y_mm, tip.z_mm, tip.u_deg)
         elif name == "GO":
-            machine.go(Pose(*numbers))
+            x_mm, y_mm, z_mm, u_deg = numbers
+            machine.go(Pose(x_mm, y_mm, z_mm, u_deg))
             self._polls_left = _POLLS_PER_MOVE
         elif name == "MOVING":
             self._polls_left = max(0, self._polls_left - 1)

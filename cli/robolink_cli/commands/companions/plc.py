@@ -44,10 +44,10 @@ def export(folder: Path, profile: str, base: int, force: bool) -> None:
     docs/mailbox.md says what to do with them. Their licence is 0BSD: they may be used in a
     machine without any duty.
     """
-    from robolink.protocols.mailbox import Profile
+    from robolink.protocols.mailbox import ExportProfile
     from robolink_cli.commands.companions.plc_export import export_texts, plc_texts
 
-    texts = plc_texts(Profile(profile), base)
+    texts = plc_texts(ExportProfile(profile), base)
     written = [str(path) for path in export_texts(folder, texts, replace=force)]
     if json_is_on():
         emit_json("robolink/plc-export/1", {"files": written, "profile": profile, "base": base})

@@ -5,9 +5,9 @@ from pathlib import Path
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink.named_files import require_free, save_named
+from robolink.named_files import holds, require_free, save_named
 from robolink.protocols.mailbox import (
-    Profile,
+    ExportProfile,
     electronic_data_sheet,
     register_map_csv,
     register_map_markdown,
@@ -15,7 +15,7 @@ from robolink.protocols.mailbox import (
 )
 
 
-def plc_texts(profile: Profile, base: int) -> Mapping[str, str]:
+def plc_texts(profile: ExportProfile, base: int) -> Mapping[str, str]:
     """Return the files by name; ``base`` is the first register of both blocks."""
     return {
         "register_map.csv": register_map_csv(base),
@@ -35,7 +35,7 @@ def export_texts(folder: Path, texts: Mapping[str, str], *, replace: bool = Fals
     """
     _make(folder)
     files = {folder / name: text.encode() for name, text in texts.items()}
-    stale = {path: data for path, data in files.items() if not _holds(path, data)}
+    stale = {path: data for path, data in files.items() if not holds(path, data)}
     for path in stale:
         require_free(path, replace=replace)
     for path, data in stale.items():
@@ -55,7 +55,3 @@ def _make(folder: Path) -> None:
             ),
             remedy=tr("Name a folder that can be written."),
         ) from error
-
-
-def _holds(path: Path, data: bytes) -> bool:
-    return path.is_file() and path.read_bytes() == data

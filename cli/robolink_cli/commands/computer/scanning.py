@@ -28,7 +28,7 @@ class State(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Probe:
+class AddressProbe:
     """One address, what it did and how long that took."""
 
     address: str
@@ -58,7 +58,7 @@ def parse_range(text: str) -> list[str]:
     return [str(ipaddress.IPv4Address(number)) for number in range(first, last + 1)]
 
 
-def probe_all(addresses: Sequence[str], port: int, timeout_s: float) -> list[Probe]:
+def probe_all(addresses: Sequence[str], port: int, timeout_s: float) -> list[AddressProbe]:
     """Connect to each address and close again; nothing is sent. In the order given."""
     workers = ThreadPoolExecutor(min(_AT_ONCE, len(addresses)), thread_name_prefix="scan")
     try:
@@ -81,7 +81,7 @@ def _ends(text: str) -> tuple[int, int]:
     return int(first), int(ipaddress.IPv4Address(end))
 
 
-def _probe(address: str, port: int, timeout_s: float) -> Probe:
+def _probe(address: str, port: int, timeout_s: float) -> AddressProbe:
     begun = time.perf_counter()
     try:
         socket.create_connection((address, port), timeout=timeout_s).close()
@@ -92,4 +92,4 @@ def _probe(address: str, port: int, timeout_s: float) -> Probe:
         state = State.REFUSED
     except OSError:
         state = State.UNREACHABLE
-    return Probe(address, state, round((time.perf_counter() - begun) * 1000, 1))
+    return AddressProbe(address, state, round((time.perf_counter() - begun) * 1000, 1))

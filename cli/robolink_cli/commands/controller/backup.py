@@ -68,12 +68,12 @@ def compare(
 
     The file may be of another controller: one good file can be compared with many cells.
     """
-    from robolink.backup import Tolerance, load
+    from robolink.backup import ComparisonTolerance, load
     from robolink.backup import compare as compare_tools
     from robolink_cli.session.tool_source import find_tools
     from robolink_cli.views.backup import comparison_payload, show_comparison
 
-    expected, tolerance = load(file), Tolerance(length_mm, angle_deg)
+    expected, tolerance = load(file), ComparisonTolerance(length_mm, angle_deg)
     with open_controller(context) as controller:
         found = find_tools(controller, published=published)
         identity = controller.identity

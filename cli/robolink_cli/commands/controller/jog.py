@@ -84,7 +84,7 @@ def jog(
         if board is None:
             agree_to_motion(question, yes=yes)
         else:
-            heed_selection(controller, context.cell, yes=yes)
+            heed_selection(controller, context.expected, yes=yes)
         if board is not None and not yes:
             agree_by_key(question, board, watch=controller.status)
         with controller.preserved(tr("jog")):

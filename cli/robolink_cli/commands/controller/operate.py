@@ -26,7 +26,7 @@ from robolink_cli.session.context import (
     show_requests,
     stop_request,
 )
-from robolink_cli.stopping.notes import forget_stop
+from robolink_cli.stopping.notes import forget_stop, own_name_of
 
 if TYPE_CHECKING:
     from robolink.model import Controller
@@ -42,7 +42,7 @@ def status(context: CliContext) -> None:
 
     with open_controller(context, looks=True) as controller:
         payload = status_payload(controller)
-        note_doubts(payload, controller, context.cell)
+        note_doubts(payload, controller, context.expected)
     context.emit("status", payload, lambda: show_status(payload))
 
 
@@ -125,7 +125,8 @@ def reset(context: CliContext, dry_run: bool, yes: bool) -> None:
         agree(tr("{effect} Go on?", effect=effect), yes=yes)
         controller.reset_fault()
         state = controller.status().state
-    forget_stop(context)
+        name = own_name_of(controller)
+    forget_stop(context, name)
     payload: dict[str, object] = {"state": state}
     context.emit(
         "reset",

@@ -6,12 +6,13 @@ from contextlib import contextmanager
 
 import click
 
-from robolink.calibration import Ask, Offer, Step, Tell, VerifyResult
+from robolink.calibration import VerifyResult
 from robolink.errors import CalibrationError
 from robolink.messages import tr
 from robolink.model import ToolReceipt
-from robolink.nozzle_change import Bench, Listener, Moment, Proposal
-from robolink.runner import StepDone
+from robolink.nozzle_change import Listener, Moment, Proposal
+from robolink.procedures import MeasurementContext
+from robolink.runner import Ask, Confirm, Notify, Step, StepDone
 from robolink_cli.console.exit_codes import error_body, exit_code
 from robolink_cli.console.render import note, switch_json_on
 from robolink_cli.console.sink import hand_over
@@ -63,7 +64,7 @@ class Progress(Listener):
         self._events = events
         self.tool = 0
 
-    def moment(self, moment: Moment, bench: Bench, tool: int | None = None) -> None:  # noqa: ARG002 - a phase is a phase
+    def moment(self, moment: Moment, bench: MeasurementContext, tool: int | None = None) -> None:  # noqa: ARG002 - a phase is a phase
         """Say which phase begins."""
         if tool is not None:
             self.tool = tool
@@ -114,9 +115,9 @@ def _in_words(step: Step) -> tuple[str, str]:
     match step:
         case Ask():
             return "touch", step.instruction
-        case Tell():
+        case Notify():
             return "remark", step.text
-        case Offer():
+        case Confirm():
             return "offer", step.question
         case _:
             return "move", step.purpose

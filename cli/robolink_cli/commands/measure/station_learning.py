@@ -2,8 +2,10 @@
 
 from robolink.errors import ConfigError, DeclinedError, UndefinedToolError
 from robolink.messages import tr
+from robolink.methods import learn_station
 from robolink.model import Controller, EntryKind, ToolOffset
-from robolink.nozzle_change import Bench, Limits, flange_now, foresee, learn_station, require_inside
+from robolink.nozzle_change import Limits, flange_now, foresee, require_inside
+from robolink.procedures import MeasurementContext
 from robolink.stations import Found, Station, StationKind, find_stations, station_entry
 from robolink_cli.console.render import note, table
 from robolink_cli.prompts.consent import agree_to_motion, motion_question
@@ -57,7 +59,7 @@ def learn(
         ):
             controller.tools.select(0)
             start = controller.groups[0].pose()
-            bench = Bench(controller, operator, start=start, settings=limits.settings)
+            bench = MeasurementContext(controller, operator, start=start, settings=limits.settings)
             found = bench.run(
                 learn_station(known, here=start, tool=tool, tip=tip, sigma_mm=sigma_mm)
             )

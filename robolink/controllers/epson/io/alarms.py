@@ -1,4 +1,7 @@
-"""Alarms: what the controller wants looked after, apart from errors (epson.md 1.2)."""
+"""Alarms: what the controller wants looked after, apart from errors.
+
+Source: docs/reference/epson.md 1.2.
+"""
 
 from robolink.controllers.epson.link.link import EpsonLink
 from robolink.errors import ConfigError, ControllerFaultError, RemoteProtocolError

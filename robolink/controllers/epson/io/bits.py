@@ -1,4 +1,4 @@
-"""Inputs, outputs and memory bits (epson.md 1.2, notes 2 and 5)."""
+"""Inputs, outputs and memory bits (docs/reference/epson.md 1.2, notes 2 and 5)."""
 
 import re
 from operator import eq
@@ -13,7 +13,8 @@ from robolink.protocols import spel
 from robolink.protocols.epson_text import Reply, Request
 
 _HIGHEST: Final = 0xFFFF
-"""Two bytes carry a bit or port number (epson.md 2.2); which exist depends on the hardware."""
+"""Two bytes carry a bit or port number (docs/reference/epson.md 2.2); which exist depends on the
+hardware."""
 
 _BIT: Final = re.compile("[01]")
 _BYTE: Final = re.compile("[0-9A-Fa-f]{2}")

@@ -5,6 +5,7 @@ from robolink.controllers.epson.io.variables import EpsonVariables, equal_values
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import Finding, Marker, Value, Verdict
+from robolink.ways import Way, way
 
 
 class PendingValues:
@@ -31,7 +32,9 @@ class PendingValues:
             case _:
                 raise ConfigError(
                     tr("The marker of {when} cannot be understood.", when=marker.begun_at),
-                    remedy=tr("Look at the controller, then 'robolink recover --forget'."),
+                    remedy=tr(
+                        "Look at the controller, then {forget}.", forget=way(Way.FORGET_MARKER)
+                    ),
                 )
         return _finding(marker, now, kind)
 

@@ -1,4 +1,7 @@
-"""A statement that a person typed: the one door past the typed builders (design part 6)."""
+"""A statement that a person typed: the one door past the typed builders.
+
+Source: docs/reference/rules.md 8.
+"""
 
 from robolink.controllers.epson.link.answers import NOT_EXECUTED
 from robolink.controllers.epson.link.link import EpsonLink

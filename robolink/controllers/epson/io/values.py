@@ -1,7 +1,7 @@
 """Values that a request of their own sets: outputs, memory bits, variables.
 
-Class SET of design part 4: nothing is sent when the value is there already; a durable marker
-stands before the request leaves; the request is sent once; the value is read back. Ctrl-C
+Class SET of docs/reference/rules.md 1: nothing is sent when the value is there already; a durable
+marker stands before the request leaves; the request is sent once; the value is read back. Ctrl-C
 waits for the end of that.
 """
 

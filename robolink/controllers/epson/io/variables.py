@@ -1,4 +1,7 @@
-"""Global Preserve variables (epson.md 1.2 note 4; ranges: spel.md 2)."""
+"""Global Preserve variables.
+
+Source: docs/reference/epson.md 1.2 note 4; ranges: docs/reference/spel.md 2.
+"""
 
 import math
 import re
@@ -15,7 +18,7 @@ from robolink.protocols import spel
 from robolink.protocols.epson_text import Request, VariableType
 
 MOST_ELEMENTS: Final = 100
-"""Elements of an array that one request may ask for (epson.md 1.2 note 4)."""
+"""Elements of an array that one request may ask for (docs/reference/epson.md 1.2 note 4)."""
 
 _NAME: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,31}\$?", re.ASCII)
 # Commas, quotes and parentheses would be cut elsewhere; the rest is left out because nothing
@@ -29,7 +32,7 @@ _RANGES: Final = {
     VariableType.LONG: (-(2**31), 2**31 - 1),
 }
 _RELATIVE: Final = {VariableType.REAL: 5e-6, VariableType.DOUBLE: 5e-14}
-"""Half of the last of the valid digits, 6 and 14 (spel.md 2)."""
+"""Half of the last of the valid digits, 6 and 14 (docs/reference/spel.md 2)."""
 
 
 class EpsonVariables:

@@ -6,7 +6,8 @@ from robolink.model import ControllerStatus
 from robolink.protocols.epson_text import ErrorCode, Refusal, StatusFlags
 
 NOT_EXECUTED = frozenset({10, 11, 12, 13, 14, 15, 16, 20, 21})
-"""Refusals that say that nothing was carried out (epson.md 1.6); 19 and 99 do not say so."""
+"""Refusals that say that nothing was carried out (docs/reference/epson.md 1.6); 19 and 99 do not
+say so."""
 
 
 def rejected(refusal: Refusal, *, controller: str, request: str = "") -> RejectedError:
@@ -40,7 +41,10 @@ def _remedy(code: int) -> str:
 
 
 def status_from_flags(flags: StatusFlags, code: int) -> ControllerStatus:
-    """Translate EPSON's flags (epson.md 1.4) into the words all controllers share."""
+    """Translate EPSON's flags into the words all controllers share.
+
+    Source: docs/reference/epson.md 1.4.
+    """
     return ControllerStatus(
         remote=flags.auto,
         ready=flags.ready,
@@ -61,8 +65,8 @@ def require_ready(status: ControllerStatus, *, controller: str, request: str) ->
     """Hold back an Execute that the controller would refuse, naming the state.
 
     Raises:
-        NotReadyError: The worst condition that stands in the way (epson.md 1.2: Auto,
-            Ready, no error, no emergency stop, guard closed).
+        NotReadyError: The worst condition that stands in the way (docs/reference/epson.md 1.2:
+            Auto, Ready, no error, no emergency stop, guard closed).
     """
     found = _obstacle(status)
     if found is None:

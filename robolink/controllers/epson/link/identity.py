@@ -1,5 +1,6 @@
 """Who an EPSON controller is, and what else it says about itself and its robots."""
 
+from collections.abc import Sequence
 from typing import Final
 
 from robolink.controllers.epson.link.answers import NOT_EXECUTED
@@ -10,21 +11,33 @@ from robolink.model import ControllerFacts, Identity
 from robolink.protocols import spel
 
 _UNSET: Final = frozenset({"", "0"})
-"""What a text reads as when nobody set it (epson.md 1.8)."""
+"""What a text reads as when nobody set it (docs/reference/epson.md 1.8)."""
 
 _QUERY: Final = spel.print_robot_serial()
 
 _NOT_NOW: Final = frozenset({20, 21})
-"""Refusals that say nothing about the query itself: the controller is busy (epson.md 1.6)."""
+"""Refusals that say nothing about the query itself: the controller is busy
+(docs/reference/epson.md 1.6)."""
+
+
+def name_from(number: Sequence[str], robots: Sequence[str]) -> str:
+    """Return the name of a controller, empty where nobody has set any number.
+
+    Args:
+        number: The answer to GetContNo.
+        robots: The answer to GetRobotSerial; its first field counts the robots.
+    """
+    numbers = [text for text in (*number, "+".join(robots[1:])) if text not in _UNSET]
+    return f"epson:{'/'.join(numbers)}" if numbers else ""
 
 
 class IdentityReader:
     """Asks with two requests, which change nothing.
 
     Newer firmware tells the serial numbers of controller and robots at any time, to a client
-    that only monitors too (epson.md 1.8). Older firmware refuses the first query; there the
-    status is read, and where that is ready the robot's serial number is printed through Execute.
-    Else it is known by its address until it can be asked.
+    that only monitors too (docs/reference/epson.md 1.8). Older firmware refuses the first query;
+    there the status is read, and where that is ready the robot's serial number is printed through
+    Execute. Else it is known by its address until it can be asked.
     """
 
     def __init__(self, session: EpsonSession, window: CommandWindow) -> None:
@@ -45,9 +58,7 @@ class IdentityReader:
             robots = self._asked("GetRobotSerial", "0") or ()
         except _BusyNow:
             return Identity(place, address, place, certain=False)
-        # The first field of the robots' answer counts them.
-        numbers = [text for text in (*number, "+".join(robots[1:])) if text not in _UNSET]
-        return Identity(f"epson:{'/'.join(numbers)}" if numbers else place, address, place)
+        return Identity(name_from(number, robots) or place, address, place)
 
     def _asked(self, name: str, *parameters: str) -> tuple[str, ...] | None:
         """Return the fields of an answer; ``None`` where the firmware does not know the query."""
@@ -79,8 +90,8 @@ class _BusyNow(Exception):
 class FactReader:
     """Reads :class:`robolink.model.ControllerFacts`.
 
-    The queries of epson.md 1.8 change nothing and are served while production runs and to a
-    client that may only monitor. Older firmware refuses them; there the robot's model and
+    The queries of docs/reference/epson.md 1.8 change nothing and are served while production runs
+    and to a client that may only monitor. Older firmware refuses them; there the robot's model and
     serial number are printed through Execute, if Execute is available just then.
     """
 
@@ -101,7 +112,7 @@ class FactReader:
             controller_name=self._text("GetContName"),
             controller_type=self._text("GetContType"),
             controller_serial=self._text("GetContNo"),
-            # Blanks stand inside the version and mean nothing (epson.md 1.8).
+            # Blanks stand inside the version and mean nothing (docs/reference/epson.md 1.8).
             firmware=None if firmware is None else "".join(firmware.split()),
             project=self._text("GetPrjName"),
             robot_number=None if number is None else spel.parse_integer(number),

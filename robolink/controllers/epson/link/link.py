@@ -36,5 +36,5 @@ class EpsonLink(DriverLink):
         )
 
     def was_not_executed(self, refusal: RejectedError) -> bool:
-        """Whether a refusal proves that nothing was done (epson.md 1.6)."""
+        """Whether a refusal proves that nothing was done (docs/reference/epson.md 1.6)."""
         return refusal.code in NOT_EXECUTED

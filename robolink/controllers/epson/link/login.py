@@ -4,9 +4,10 @@ from typing import Final
 
 from robolink.errors import LoginRefusedError, LoginUnansweredError
 from robolink.messages import tr
+from robolink.ways import Way, way
 
 PASSWORD_REFUSALS: Final = (13, 98)
-"""The password is wrong, or one is demanded (epson.md 1.6)."""
+"""The password is wrong, or one is demanded (docs/reference/epson.md 1.6)."""
 
 
 def unanswered(controller: str) -> LoginUnansweredError:
@@ -28,9 +29,9 @@ def refused(code: int, controller: str) -> LoginRefusedError:
         tr("The controller refused the login (code {code}).", code=code),
         code=code,
         remedy=tr(
-            "Give the password set in the controller's Remote Ethernet page by "
-            "keyring, --password-file or ROBOLINK_PASSWORD. No second attempt was "
-            "made."
+            "Give the password set in the controller's Remote Ethernet page: {password}. No "
+            "second attempt was made.",
+            password=way(Way.PASSWORD),
         ),
         controller=controller,
         request="Login",

@@ -2,7 +2,7 @@
 
 Two of them make a measurement worthless and everything else look right: in a dry run the robot
 is not moved, and with virtual I/O no input is a real one, while each answer is as ever. Firmware
-that knows the query tells them (epson_corrections.md 5.1); older firmware answers 11, and then
+that knows the query tells them (docs/reference/epson.md 1.11); older firmware answers 11, and then
 nothing is assumed and nothing is said. They are asked for at most once a connection, since a
 change restarts the controller.
 """

@@ -6,7 +6,7 @@ from robolink.controllers.epson.link.window import CommandWindow
 from robolink.protocols import spel
 
 _SIX_AXES = frozenset({5, 7})
-"""RobotType 5 is the six-axis arm, 7 the N series (spel.md 9)."""
+"""RobotType 5 is the six-axis arm, 7 the N series (docs/reference/spel.md 9)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +25,7 @@ class Robot:
 class RobotFacts:
     """Reads the robot once per session; one client at a time means it cannot change.
 
-    Execute acts on the robot chosen with SetCurRobot (epson.md 1.5); robolink never
+    Execute acts on the robot chosen with SetCurRobot (docs/reference/epson.md 1.5); robolink never
     changes that choice.
     """
 

@@ -1,15 +1,15 @@
 """One login on an EPSON controller: a transport, a codec and a lock.
 
 Theory of operation. Remote Ethernet has no transaction numbers; an answer is known by its
-name and by its place in line (epson.md 1.1). So at most two requests are outstanding: one
-Execute, which answers when its statement has ended, and one of the few requests that are
-legal meanwhile. Whoever holds the lock reads; an Execute answer that turns up is put into
+name and by its place in line (docs/reference/epson.md 1.1). So at most two requests are
+outstanding: one Execute, which answers when its statement has ended, and one of the few requests
+that are legal meanwhile. Whoever holds the lock reads; an Execute answer that turns up is put into
 the pending motion's slot. The lock is held for one exchange, never for a motion, so that a
 stop always gets in.
 
 A time-out, a broken link or an answer that nobody asked for ends the session for good: late
 bytes die with the connection and can never be taken for the answer to a later question
-(faults_and_speed.md F01, F06, F09).
+(docs/reference/faults.md F01, F06, F09).
 """
 
 import threading
@@ -17,7 +17,7 @@ from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 
-from robolink.checkpoints import Point, checkpoint
+from robolink.checkpoints import Checkpoint, checkpoint
 from robolink.controllers.epson.link.answers import rejected
 from robolink.controllers.epson.link.login import PASSWORD_REFUSALS, refused, unanswered
 from robolink.controllers.epson.link.requests import command_class_of
@@ -205,10 +205,10 @@ class EpsonSession:
     def _exchanging(self, request: Request) -> Iterator[None]:
         """Hold the exchange lock for ``request``, once it is legal and no stop forbids it."""
         what = _shown(request)
-        checkpoint(Point.LOCK, what)
+        checkpoint(Checkpoint.LOCK, what)
         try:
             with self._gate, self._wire:
-                checkpoint(Point.HELD, what)
+                checkpoint(Checkpoint.HELD, what)
                 self._check_usable(request)
                 self.latch.admit(command_class_of(request), what)
                 if self._pending is not None and request.name == "Abort":
@@ -216,7 +216,7 @@ class EpsonSession:
                     self._pending.abort_requested = True
                 yield
         finally:
-            checkpoint(Point.EXCHANGE, what)
+            checkpoint(Checkpoint.EXCHANGE, what)
 
     def _ask(self, request: Request, *, secret: bool = False) -> Reply | Refusal:
         with self._exchanging(request):
@@ -269,8 +269,8 @@ class EpsonSession:
         name = event.name.lower()
         if name == wanted:
             return True
-        # A refusal may come without a readable name (epson.md 1.6, unverified); it can be
-        # ours only when nothing else is outstanding.
+        # A refusal may come without a readable name (docs/reference/epson.md 1.6, unverified); it
+        # can be ours only when nothing else is outstanding.
         return isinstance(event, Refusal) and not name and self._pending is None
 
     def _expect_silence(self) -> None:

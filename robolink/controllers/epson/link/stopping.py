@@ -1,10 +1,10 @@
 """Bringing an EPSON controller to rest, and knowing that it rests.
 
 Abort ends what Execute runs, whoever began it: also the Execute of a client that has died,
-which goes on without it where the controller's remote time-out is long (epson.md 1.7). Stop
-ends tasks. While an Execute runs only Abort and GetStatus are served (epson.md 1.5), so a Stop
-that was accepted shows, beside the Running flag, that no Execute is left: whether the flag is on
-during an Execute is not documented.
+which goes on without it where the controller's remote time-out is long
+(docs/reference/epson.md 1.7). Stop ends tasks. While an Execute runs only Abort and GetStatus are
+served (docs/reference/epson.md 1.5), so a Stop that was accepted shows, beside the Running flag,
+that no Execute is left: whether the flag is on during an Execute is not documented.
 
 It needs a codec, a transport and a clock; nothing here looks at a record or a file, and nothing is
 imported that the first frame of a stop does not need.
@@ -41,7 +41,7 @@ from robolink.timing import Clock, Deadline
 from robolink.transport import Transport
 
 REST_S: Final = 5.0
-"""Longest time from the first Abort to a state that shows rest (design part 4)."""
+"""Longest time from the first Abort to a state that shows rest (docs/reference/rules.md 5)."""
 
 _POLL_S: Final = 0.02
 _AGAIN_S: Final = 1.0
@@ -90,7 +90,7 @@ def bring_to_rest(ask: Ask, clock: Clock, *, controller: str) -> tuple[StatusFla
 
 
 def _abort(ask: Ask) -> None:
-    # Older firmware has none (epson.md 1.9); the Stop that follows tells what is so.
+    # Older firmware has none (docs/reference/epson.md 1.9); the Stop that follows tells what is so.
     with suppress(RejectedError):
         ask("Abort")
 
@@ -153,11 +153,26 @@ class StopLine:
             controller=self._transport.identity,
         )
 
+    def who(self) -> str:
+        """Ask, now that it stands, who the controller is; it is asked for nothing else.
+
+        Returns:
+            Its name, empty where this firmware tells none without an Execute.
+        """
+        from robolink.controllers.epson.link.identity import name_from
+
+        try:
+            number = self._ask(Request("GetContNo")).fields
+            robots = self._ask(Request("GetRobotSerial", ("0",))).fields
+        except RobolinkError:
+            return ""
+        return name_from([text.strip() for text in number], [text.strip() for text in robots])
+
     def leave(self, flags: StatusFlags) -> None:
         """Log out, where that does no harm: not while another device may begin a task.
 
-        Logging out while a task runs is an error on the controller (epson.md 1.1). Whoever
-        leaves without it just closes the connection, and nothing that fails here matters.
+        Logging out while a task runs is an error on the controller (docs/reference/epson.md 1.1).
+        Whoever leaves without it just closes the connection, and nothing that fails here matters.
         """
         if flags.auto and not flags.paused:
             with suppress(RobolinkError):

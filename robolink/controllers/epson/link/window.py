@@ -28,8 +28,8 @@ _NOT_READY = 20
 class CommandWindow:
     """Runs typed SPEL+ statements that do not move the robot, and explains failures.
 
-    How a failed statement is answered is not documented (epson.md 1.5): anything but ``0``
-    for a command, or but printed text for a query, counts as failure, and the status tells
+    How a failed statement is answered is not documented (docs/reference/epson.md 1.5): anything but
+    ``0`` for a command, or but printed text for a query, counts as failure, and the status tells
     the rest.
     """
 
@@ -61,10 +61,10 @@ class CommandWindow:
     def proving_ready(self, request: str) -> Iterator[None]:
         """Hold ``request`` back unless the queries of a block are answered.
 
-        Execute needs what :meth:`require_ready` looks for (epson.md 1.2), so an answer proves
-        it, and later than the flags could. So they are read first only until they once were
-        right: nothing is sent to a controller that was not seen ready. They are read again when
-        a query is refused, to name what is missing.
+        Execute needs what :meth:`require_ready` looks for (docs/reference/epson.md 1.2), so an
+        answer proves it, and later than the flags could. So they are read first only until they
+        once were right: nothing is sent to a controller that was not seen ready. They are read
+        again when a query is refused, to name what is missing.
 
         Raises:
             NotReadyError: Names the condition.
@@ -131,7 +131,7 @@ class CommandWindow:
         self._was_ready = False
         controller = self._session.identity
         code = answer.code if isinstance(answer, Refusal) else 0
-        # 20 says that a condition is missing; the flags say which (epson.md 1.6).
+        # 20 says that a condition is missing; the flags say which (docs/reference/epson.md 1.6).
         if code in NOT_EXECUTED and code != _NOT_READY and isinstance(answer, Refusal):
             return rejected(answer, controller=controller, request=statement)
         status = self.status()
@@ -185,7 +185,7 @@ class CommandWindow:
     def error_text(self, code: int) -> str:
         """Return the controller's own text for ``code``, empty where it has none.
 
-        GetErrMsg exists on newer firmware only (epson.md 1.8); older ones refuse it.
+        GetErrMsg exists on newer firmware only (docs/reference/epson.md 1.8); older ones refuse it.
         """
         if not code or (self._session.pending and self._session.pending.answer is None):
             return ""

@@ -82,7 +82,7 @@ class EpsonActs:
 
     def _require_resettable(self, status: ControllerStatus) -> None:
         # The flag of an emergency stop stays on after its release until the reset
-        # (epson.md 1.7), so it cannot hold the reset back.
+        # (docs/reference/epson.md 1.7), so it cannot hold the reset back.
         if status.serious_fault or status.running or not status.remote:
             require_ready(status, controller=self._link.identity, request="Reset")
         if status.guard_open:

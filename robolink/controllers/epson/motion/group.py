@@ -18,6 +18,7 @@ from robolink.errors import NotReadyError, NotReadyReason, StoppedError
 from robolink.messages import tr
 from robolink.model import InputEdge, MotionProfile, MotionTerms, Path, Pose, WorkBox
 from robolink.protocols import spel
+from robolink.ways import Way, way
 
 
 class EpsonGroup(MotionGroupCore):
@@ -177,14 +178,15 @@ class EpsonGroup(MotionGroupCore):
 
     def _require_supervision(self, statement: str) -> None:
         # With a remote time-out of 0 the robot may keep moving when this PC is gone
-        # (epson.md 1.1). The value cannot be read over the wire; a person states it.
+        # (docs/reference/epson.md 1.1). The value cannot be read over the wire; a person states it.
         if self._remote_timeout_s <= 0:
             raise NotReadyError(
                 tr("The remote time-out of this controller is stated as 0 (never)."),
                 reason=NotReadyReason.NO_REMOTE_TIMEOUT,
                 remedy=tr(
                     "Set a time-out on the controller's Remote Ethernet page and state it with "
-                    "--remote-timeout; without it a lost link leaves a moving robot unwatched."
+                    "{timeout}; without it a lost link leaves a moving robot unwatched.",
+                    timeout=way(Way.REMOTE_TIMEOUT),
                 ),
                 controller=self._link.identity,
                 request=statement,

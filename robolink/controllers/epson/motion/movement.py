@@ -137,7 +137,7 @@ class EpsonMotion:
         try:
             window.check(statement, answer)
         except (RejectedError, UnclearAnswerError):
-            # How an aborted statement is answered is not documented (epson.md 1.6).
+            # How an aborted statement is answered is not documented (docs/reference/epson.md 1.6).
             if self._pending.abort_requested:
                 return MotionOutcome.STOPPED
             raise

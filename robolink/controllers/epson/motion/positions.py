@@ -14,10 +14,12 @@ def read_position(window: CommandWindow, query: spel.Statement) -> Pose:
 
 
 class EpsonPoints:
-    """The point memory, P0 to P999 (spel.md 5.1). Only read: robolink never changes a taught point.
+    """The point memory, P0 to P999. Only read: robolink never changes a taught point.
+
+    Source: docs/reference/spel.md 5.1.
 
     A point holds coordinates, a hand and a local, but not the tool that was in force when
-    it was taught (epson.md 3.2); so the poses returned here carry ``tool=None``.
+    it was taught (docs/reference/epson.md 3.2); so the poses returned here carry ``tool=None``.
     """
 
     def __init__(self, window: CommandWindow) -> None:
@@ -36,7 +38,7 @@ class EpsonPoints:
         """Read several points, in the order given; same errors as :meth:`read`.
 
         The point is asked for only when it is taught: printing another one would put the
-        controller in error (spel.md 5.1).
+        controller in error (docs/reference/spel.md 5.1).
         """
         wanted = [(number, spel.print_point_defined(number)) for number in numbers]
         if wanted:

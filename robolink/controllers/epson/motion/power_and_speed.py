@@ -15,7 +15,7 @@ _SLACK = 0.0005
 @dataclass(frozen=True, slots=True)
 class PowerAndSpeed:
     """What was in force: power, Speed (percent) and SpeedS (mm/s), each with its
-    departure and approach values (spel.md 7.2).
+    departure and approach values (docs/reference/spel.md 7.2).
     """  # noqa: D205 - one sentence over two lines
 
     power_high: bool
@@ -53,8 +53,8 @@ class Settings:
     def slow_down(self, profile: MotionProfile) -> None:
         """Set Power Low and the profile's speeds, and prove it.
 
-        Login, Motor On, Reset and Abort reset them (spel.md 6.3), so this is done anew
-        before each move.
+        Motor On and Reset put them back, a login and Abort perhaps too (docs/reference/spel.md
+        6.3), so this is done anew before each move.
 
         Raises:
             NotReadyError: The controller does not show what was set; nothing may move.

@@ -1,4 +1,7 @@
-"""A straight movement until an input switches: ``Move ... Till`` or ``Find`` (spel.md 7.1)."""
+"""A straight movement until an input switches: ``Move ... Till`` or ``Find``.
+
+Source: docs/reference/spel.md 7.1.
+"""
 
 from robolink.controllers.epson.link.window import CommandWindow
 from robolink.controllers.epson.motion.movement import EpsonMotion

@@ -1,8 +1,8 @@
 """The tool table as the companion program publishes it: robolink_tools.prg.
 
 Execute is not available while production runs, nor to a client that may only monitor; the
-project's variables are (epson.md 1.3). So the project itself copies its tools into Global
-Preserve variables, and they are read with GetVariable, which changes nothing.
+project's variables are (docs/reference/epson.md 1.3). So the project itself copies its tools into
+Global Preserve variables, and they are read with GetVariable, which changes nothing.
 """
 
 from collections.abc import Mapping

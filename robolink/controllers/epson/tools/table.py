@@ -1,4 +1,4 @@
-"""The tool table of an EPSON controller: TLSet, TLClr, Tool (epson.md 3.1)."""
+"""The tool table of an EPSON controller: TLSet, TLClr, Tool (docs/reference/epson.md 3.1)."""
 
 from collections.abc import Sequence
 from contextlib import suppress
@@ -15,7 +15,7 @@ from robolink.protocols import spel
 from robolink.protocols.epson_text import Request
 
 DECIMALS: Final = 3
-"""Places that a printed point shows (epson.md 3.3, from a real capture)."""
+"""Places that a printed point shows (docs/reference/epson.md 3.3, from a real capture)."""
 
 TOLERANCE: Final = 0.5 * 10**-DECIMALS
 """Two values that this controller prints alike are equal."""
@@ -27,7 +27,7 @@ class EpsonToolTable(ToolTableCore):
     """Tools 1 to 15 in the controller's flash, and the selected one.
 
     Every write is compare-and-set and read back. A value that is stored already is not
-    written again: TLSet wears the flash (epson.md 3.1).
+    written again: TLSet wears the flash (docs/reference/epson.md 3.1).
     """
 
     def __init__(self, link: EpsonLink) -> None:
@@ -52,7 +52,10 @@ class EpsonToolTable(ToolTableCore):
         return {tool: listed.get(tool) for tool in self.indices()}
 
     def selected(self) -> int | None:
-        """Read which tool is in force; the selection survives power-off (epson.md 3.1)."""
+        """Read which tool is in force; the selection survives power-off.
+
+        Source: docs/reference/epson.md 3.1.
+        """
         self._window.require_ready("Print Tool")
         return super().selected()
 

@@ -102,8 +102,8 @@ class Interview:
 
         Logout is the one request after which nothing can be mistaken any more. The line end
         follows in any case. Logging out while a task runs raises an error on the controller
-        (epson.md 1.1), so the connection is just closed then, and also where another device
-        could start one meanwhile; ``None`` is returned.
+        (docs/reference/epson.md 1.1), so the connection is just closed then, and also where another
+        device could start one meanwhile; ``None`` is returned.
         """
         status = self.controller.status()
         if not status.remote or status.running or status.paused:

@@ -22,7 +22,7 @@ def verify_epson(
     timeout_s: float = 3.0,
     trace: TraceSink | None = None,
 ) -> Verification:
-    """Find out what a controller does where documents leave it open (epson.md 8).
+    """Find out what a controller does where documents leave it open (docs/reference/epson.md 7).
 
     Reads only: no value is written, nothing moves, no statement is run that could leave an
     error. While production runs only queries are sent, and less is found out.

@@ -21,7 +21,10 @@ Reading = Callable[[str], tuple[str, OptionValue] | None]
 
 
 def closing_quote(interview: Interview) -> Fact:
-    """Whether Print's own line end stands before the closing quote (epson.md 1.5)."""
+    """Whether Print's own line end stands before the closing quote.
+
+    Source: docs/reference/epson.md 1.5.
+    """
     name, option = tr("line end of Print"), "print_crlf_inside_quotes"
     if interview.printed(spel.print_selected_tool()) is None:
         return Fact(name, interview.why_no_statement(), option)
@@ -34,7 +37,7 @@ def closing_quote(interview: Interview) -> Fact:
 
 
 def number_lead_blank(interview: Interview) -> Fact:
-    """Whether Print shows a blank before a number (epson_corrections.md 3)."""
+    """Whether Print shows a blank before a number (docs/reference/epson.md 1.5)."""
 
     def read(text: str) -> tuple[str, OptionValue]:
         blank = text.startswith(" ")
@@ -45,7 +48,7 @@ def number_lead_blank(interview: Interview) -> Fact:
 
 
 def point_coordinates(interview: Interview) -> Fact:
-    """Whether a point of four coordinates prints with six (epson.md 3.3)."""
+    """Whether a point of four coordinates prints with six (docs/reference/epson.md 3.3)."""
 
     def read(text: str) -> tuple[str, OptionValue]:
         four = len(spel.parse_point(text).coordinates) == 4
@@ -56,7 +59,7 @@ def point_coordinates(interview: Interview) -> Fact:
 
 
 def point_flags(interview: Interview) -> Fact:
-    """Which flags stand behind a printed position (epson.md 8)."""
+    """Which flags stand behind a printed position (docs/reference/epson.md 7)."""
 
     def read(text: str) -> tuple[str, OptionValue]:
         return " ".join(f"/{flag}" for flag in spel.parse_point(text).flags) or tr("none"), ""
@@ -65,7 +68,7 @@ def point_flags(interview: Interview) -> Fact:
 
 
 def where_width(interview: Interview) -> Fact:
-    """How wide a value of Where is (epson.md 3.3)."""
+    """How wide a value of Where is (docs/reference/epson.md 3.3)."""
 
     def read(text: str) -> tuple[str, OptionValue] | None:
         spel.parse_where(text)
@@ -79,7 +82,7 @@ def where_width(interview: Interview) -> Fact:
 
 
 def comma_blank(interview: Interview) -> Fact:
-    """What a comma in Print leaves between two texts (spel.md 3.2)."""
+    """What a comma in Print leaves between two texts (docs/reference/spel.md 3.2)."""
 
     def read(text: str) -> tuple[str, OptionValue] | None:
         shown = {"AB": (tr("nothing"), "numeric"), "A B": (tr("a blank"), "always")}

@@ -15,7 +15,7 @@ _COMMAND_SETS: Final = (5, 7, 8)
 
 
 def status_flags(interview: Interview) -> Fact:
-    """How many flags GetStatus prints (epson.md 1.4)."""
+    """How many flags GetStatus prints (docs/reference/epson.md 1.4)."""
     name = tr("flags in GetStatus")
     fields = interview.ask("GetStatus")
     if isinstance(fields, int) or len(fields[0]) not in (10, 11):
@@ -25,14 +25,14 @@ def status_flags(interview: Interview) -> Fact:
 
 
 def case_echo(interview: Interview) -> Fact:
-    """Whether an answer repeats the name as it was written (epson.md 1.1)."""
+    """Whether an answer repeats the name as it was written (docs/reference/epson.md 1.1)."""
     echoed = interview.echo("getstatus")
     same = tr("as it was written") if echoed == "getstatus" else tr("in a spelling of its own")
     return Fact(tr("name in an answer"), same, evidence=f"$getstatus -> #{echoed}")
 
 
 def extended_queries(interview: Interview) -> Fact:
-    """Whether the firmware knows GetContVer and its kin (epson.md 1.8)."""
+    """Whether the firmware knows GetContVer and its kin (docs/reference/epson.md 1.8)."""
     name, option = tr("extended queries"), "extended_queries"
     answer = interview.ask("GetContVer")
     if not isinstance(answer, int):
@@ -43,7 +43,10 @@ def extended_queries(interview: Interview) -> Fact:
 
 
 def command_set(interview: Interview) -> Fact:
-    """Which RC+ the commands belong to (epson.md 1.9), from the version or the alarms."""
+    """Which RC+ the commands belong to, from the version or the alarms.
+
+    Source: docs/reference/epson.md 1.9.
+    """
     name, option = tr("command set of RC+"), "rc_plus"
     version = interview.ask("GetContVer")
     if not isinstance(version, int):
@@ -58,7 +61,7 @@ def command_set(interview: Interview) -> Fact:
 
 
 def preferences(interview: Interview) -> tuple[Fact, ...]:
-    """The preferences that matter for tools (epson_corrections.md 5.1)."""
+    """The preferences that matter for tools (docs/reference/epson.md 1.11)."""
     names = {
         Preference.RESET_OUTPUTS_OFF: (tr("Reset switches outputs off"), "reset_outputs_off"),
         Preference.OUTPUTS_OFF_AT_ESTOP: (
@@ -91,7 +94,7 @@ def preferences(interview: Interview) -> tuple[Fact, ...]:
 
 
 def terminator(interview: Interview) -> Fact:
-    """Which line end the controller sends (epson.md 1.1)."""
+    """Which line end the controller sends (docs/reference/epson.md 1.1)."""
     name, option = tr("line end"), "terminator"
     ends = {match[1] for match in _STATUS.finditer(interview.heard)}
     if len(ends) != 1:
@@ -101,7 +104,7 @@ def terminator(interview: Interview) -> Fact:
 
 
 def unfinished_request(early: bool | None) -> Fact:
-    """Whether a request without its line end is served (epson.md 1.1)."""
+    """Whether a request without its line end is served (docs/reference/epson.md 1.1)."""
     name, option = tr("request without its line end"), "requests_end_with_silence"
     if early is None:
         return Fact(name, tr("not tried: Logout could stop a program"), option)

@@ -50,7 +50,7 @@ def describe(command: Command) -> str:
 def refused(command: Command, now: Response, error_class: int) -> RejectedError:
     """Return the error for a command that ended in ERROR: the PLC did not do it.
 
-    A refused tool write leaves the slot and the tool as they were (design part 7).
+    A refused tool write leaves the slot and the tool as they were (docs/mailbox.md, "Tools").
     """
     return RejectedError(
         tr(

@@ -1,4 +1,6 @@
-"""Telling the PLC something, once, and knowing what became of it (design part 7).
+"""Telling the PLC something, once, and knowing what became of it.
+
+Source: docs/mailbox.md, "When a command counts".
 
 A command goes out with a number that is new, the owner's token, the epoch and the PLC start
 that was met. Its answer counts as ours only when owner, number and opcode are ours; an answer
@@ -12,7 +14,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from typing import Final
 
-from robolink.checkpoints import Point, checkpoint
+from robolink.checkpoints import Checkpoint, checkpoint
 from robolink.controllers.softmotion.link.answers import (
     Ended,
     command_ended_early,
@@ -194,7 +196,7 @@ class CommandSender:
         """Write a command and return it with the snapshot that acknowledges it."""
         request = describe(draft)
         with self._exchanging(request):
-            before = self._snapshots.take()
+            before = self._before(draft)
             self._require_able(draft, before)
             command = self._addressed(draft, before)
             words = self._encode(command)
@@ -223,16 +225,26 @@ class CommandSender:
                 )
             )
 
+    def _before(self, draft: Command) -> Response:
+        """Return a snapshot of before a command.
+
+        What ends a movement of ours on a slow line does not wait for one: whoever waited on the
+        movement has read the last one, and beats no more.
+        """
+        if draft.only_ends and self._wire.motions.unfinished and self._wire.whole_look_s > 0:
+            return self._snapshots.latest
+        return self._snapshots.take()
+
     @contextmanager
     def _exchanging(self, request: str) -> Iterator[None]:
         """Hold the lock from the look at the latch to the acknowledgement."""
-        checkpoint(Point.LOCK, request)
+        checkpoint(Checkpoint.LOCK, request)
         try:
             with self._lock:
-                checkpoint(Point.HELD, request)
+                checkpoint(Checkpoint.HELD, request)
                 yield
         finally:
-            checkpoint(Point.EXCHANGE, request)
+            checkpoint(Checkpoint.EXCHANGE, request)
 
     def _await_acknowledgement(self, command: Command, before: Response) -> tuple[Response, bool]:
         """Return the snapshot that shows the acknowledgement, or the damage, of a block."""
@@ -292,7 +304,7 @@ class CommandSender:
 
     def _unseen(self, command: Command) -> UnclearAnswerError:
         # Only what a stop ends is kept among the last ends; what had ended before it, well or
-        # not, is not shown any more (design part 7).
+        # not, is not shown any more (docs/mailbox.md, "When a command counts").
         return UnclearAnswerError(
             tr("A stop came before the end of {request!r} was read.", request=describe(command)),
             remedy=tr("Read again what it was to change."),
@@ -324,7 +336,9 @@ def is_own(command: Command, now: Response) -> bool:
 
 
 def _came_too_early(command: Command, before: Response, now: Response) -> bool:
-    """Whether the PLC held a command back, which it then never carries out (design part 7).
+    """Whether the PLC held a command back, which it then never carries out.
+
+    Source: docs/mailbox.md, "When a command counts".
 
     Its number was in none of the ends when it was sent, so an end of that number is its own.
     """

@@ -1,6 +1,7 @@
 """The state of an axis group in the words that all controllers share, and what it forbids."""
 
-from robolink.errors import NotReadyError, NotReadyReason
+from robolink.controllers.softmotion.link.heartbeat import MOST_LOOK_S
+from robolink.errors import ConfigError, NotReadyError, NotReadyReason
 from robolink.messages import tr
 from robolink.model import ControllerStatus
 from robolink.protocols.mailbox import Bits, GroupState, Response, error_meaning
@@ -14,7 +15,7 @@ def is_moving(now: Response) -> bool:
 
 
 def status_of(now: Response) -> ControllerStatus:
-    """Translate a snapshot (design part 7).
+    """Translate a snapshot (docs/mailbox.md).
 
     ``remote`` is the machine's permit, ``paused`` an interrupted movement or a held stop,
     ``ready`` a group at rest that could move: enabled, its drives with power. ``code`` is
@@ -68,8 +69,35 @@ def require_permit(now: Response, *, controller: str, request: str) -> None:
         )
 
 
+def require_beats(whole_look_s: float, *, controller: str, request: str) -> None:
+    """Hold back what must be kept going on a line that is too slow for it (design part 7).
+
+    Args:
+        whole_look_s: How long a look at the response block and a beat take on the line.
+        controller: Its name in the error.
+        request: What is held back.
+
+    Raises:
+        ConfigError: No beat would arrive while the block is read.
+    """
+    if whole_look_s > MOST_LOOK_S:
+        raise ConfigError(
+            tr(
+                "This line is too slow for movements: one look at the PLC takes {look:.2f} s, and "
+                "what moves is halted after 0.5 s without a sign of this computer.",
+                look=whole_look_s,
+            ),
+            remedy=tr(
+                "Set the PLC's serial line and baud in the URL to 9600 or more, or move by Modbus "
+                "TCP. Tools can be read, written and selected as it is. Nothing was sent."
+            ),
+            controller=controller,
+            request=request,
+        )
+
+
 def require_still(now: Response, *, controller: str, request: str) -> None:
-    """Hold back what may not happen while the group moves (faults_and_speed.md F42).
+    """Hold back what may not happen while the group moves (docs/reference/faults.md F42).
 
     Raises:
         NotReadyError: It moves, or an interrupted movement waits to go on.
@@ -93,7 +121,9 @@ def require_still(now: Response, *, controller: str, request: str) -> None:
 
 
 def require_enabled(now: Response, *, controller: str, request: str) -> None:
-    """Hold back what an axis group in this state would refuse (softmotion.md 1.1, 2.2).
+    """Hold back what an axis group in this state would refuse.
+
+    Source: docs/reference/softmotion.md 1.1, 2.2.
 
     Raises:
         NotReadyError: It is in its error state, disabled, or held by a stop.
@@ -138,7 +168,7 @@ def require_power(now: Response, *, controller: str, request: str) -> None:
 
     Raises:
         NotReadyError: It has none. Enabling the group does not switch it on
-            (softmotion.md 2.2).
+            (docs/reference/softmotion.md 2.2).
     """
     if not now.bits & Bits.POWERED:
         raise NotReadyError(

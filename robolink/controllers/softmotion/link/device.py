@@ -1,4 +1,7 @@
-"""Which PLC answers: the number that it drew once, the same on every link (design part 7)."""
+"""Which PLC answers: the number that it drew once, the same on every link.
+
+Source: docs/mailbox.md, "Which PLC this is".
+"""
 
 from typing import Final, Protocol
 
@@ -40,7 +43,7 @@ def read_device_id(link: DeviceReading) -> int | None:
 
 
 def identity_of(wire: MailboxWire, device_id: int | None) -> Identity:
-    """Return who a PLC is, the same over each medium (design part 7).
+    """Return who a PLC is, the same over each medium (docs/mailbox.md, "Which PLC this is").
 
     Args:
         wire: The session.

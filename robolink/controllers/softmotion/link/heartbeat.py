@@ -14,6 +14,10 @@ BUSY_BEAT_S: Final = 0.05
 The rest of that half second is for a computer that has something else to do.
 """
 
+MOST_LOOK_S: Final = 0.4
+"""Where the line alone takes longer for a whole look and a beat, nothing may move: there is no
+beat within the PLC's 0.5 s, of which the PLC itself and the adapters need the rest."""
+
 IDLE_BEAT_S: Final = 1.0
 """Between beats otherwise: an owner that is silent for 10 s may be displaced."""
 
@@ -47,9 +51,15 @@ class ClientHeartbeat:
         self._count = 0
         self._last_ns: int | None = None
 
-    def due(self, now_ns: int, *, busy: bool) -> bool:
-        """Whether it is time for the next word."""
-        period_s = BUSY_BEAT_S if busy else IDLE_BEAT_S
+    def due(self, now_ns: int, *, busy: bool, ahead: bool = False) -> bool:
+        """Whether it is time for the next word.
+
+        Args:
+            now_ns: The time.
+            busy: Whether something moves.
+            ahead: Whether an exchange follows that takes a good part of the PLC's patience.
+        """
+        period_s = (0.0 if ahead else BUSY_BEAT_S) if busy else IDLE_BEAT_S
         return self._last_ns is None or now_ns - self._last_ns >= period_s * NS_PER_S
 
     def word(self, epoch: int, now_ns: int) -> int:

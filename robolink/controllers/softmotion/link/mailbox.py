@@ -22,7 +22,8 @@ from robolink.protocols.mailbox import (
 )
 
 TOLERANCE = 1e-9
-"""Two LREALs this near are equal: user units, and elements of a rotation matrix (design 4)."""
+"""Two LREALs this near are equal: user units, and elements of a rotation matrix
+(docs/reference/rules.md 3)."""
 
 
 class Mailbox(DriverLink):

@@ -1,4 +1,4 @@
-"""Movements that were sent and whose end is not read: at most four (design part 7).
+"""Movements that were sent and whose end is not read: at most four (docs/mailbox.md, "Movements").
 
 The PLC names the last four ends by their sequence. Every snapshot is looked through for them,
 whatever it was read for, because a later end may push an earlier one out.
@@ -30,6 +30,11 @@ class MotionTracker:
     def unfinished(self) -> bool:
         """Whether something of ours may be moving, so that the PLC wants our heartbeat."""
         return self.jogging or None in self._ends.values()
+
+    @property
+    def alone(self) -> bool:
+        """Whether there is one movement and no more, so that the head shows how it fares."""
+        return len(self._ends) == 1
 
     @property
     def unread(self) -> bool:

@@ -2,7 +2,8 @@
 
 The PLC gives the mailbox to whoever asks when nobody owns it, when its owner has been silent
 for 10 s with nothing moving, or when a person insists; each time under a new epoch, so that a
-client that slept through it is refused (design part 7; faults_and_speed.md F46, F47).
+client that slept through it is refused (docs/mailbox.md, "Owners"; docs/reference/faults.md F46,
+F47).
 """
 
 from collections.abc import Callable

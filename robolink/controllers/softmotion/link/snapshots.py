@@ -1,12 +1,12 @@
 """Whole snapshots of a mailbox: never half of one, never another PLC's.
 
 The PLC may write while it is read, so a block counts only when its two ends and its checksum
-agree (faults_and_speed.md F31). Only such snapshots decide anything; the head of the block
+agree (docs/reference/faults.md F31). Only such snapshots decide anything; the head of the block
 says when to read the next one.
 
 Words in a wrong order, or read one register too far, make plausible numbers. So the probe is
-looked for before anything is believed, and the error names what was found (design part 7;
-softmotion.md 4.4; faults_and_speed.md F33, F34, F70).
+looked for before anything is believed, and the error names what was found (docs/mailbox.md;
+docs/reference/softmotion.md 4.4; docs/reference/faults.md F33, F34, F70).
 """
 
 from collections.abc import Callable, Sequence
@@ -137,6 +137,13 @@ class Snapshots:
         self._wire = wire
         self._heartbeat = PlcHeartbeat()
         self._met: Response | None = None
+        self._latest: Response | None = None
+
+    @property
+    def latest(self) -> Response:
+        """The last whole snapshot; known after :meth:`meet`."""
+        assert self._latest is not None  # noqa: S101 - a controller is made after the meeting
+        return self._latest
 
     @property
     def met(self) -> Response:
@@ -180,6 +187,7 @@ class Snapshots:
         self._require_met(now)
         self._heartbeat.note(now.plc_heartbeat, self._wire.clock.now_ns())
         self._wire.motions.note(now)
+        self._latest = now
         return now
 
     def slot(self, number: int, *, keep: bool = False) -> Slot:

@@ -1,8 +1,9 @@
 """Bringing the axis group behind a mailbox to rest, and knowing that it rests.
 
-Stop (opcode 2003) needs neither ownership nor the machine's permit (design part 7). Its block is
-done when the group stands (softmotion.md 2.2). A group that is disabled, in error or held by an
-earlier stop refuses it, and may yet be braking, so there the axes themselves are compared.
+Stop (opcode 2003) needs neither ownership nor the machine's permit (docs/mailbox.md, "What ends by
+itself"). Its block is done when the group stands (docs/reference/softmotion.md 2.2). A group that
+is disabled, in error or held by an earlier stop refuses it, and may yet be braking, so there the
+axes themselves are compared.
 """
 
 from typing import Final
@@ -15,7 +16,7 @@ from robolink.protocols.mailbox import ErrorClass, Response
 from robolink.timing import Clock, Deadline
 
 REST_S: Final = 5.0
-"""Longest time from the stop to a state that shows rest (design part 4)."""
+"""Longest time from the stop to a state that shows rest (docs/reference/rules.md 5)."""
 
 _ALREADY: Final = frozenset({ErrorClass.STOPPING, ErrorClass.DISABLED, ErrorClass.ERRORSTOP})
 _LOOK_S: Final = 0.1
@@ -53,7 +54,7 @@ def bring_group_to_rest(
         if error.code not in _ALREADY:
             raise
         now, stands = snapshots.take(), False
-    # Here, because nothing may stand before the frame of a stop (design part 4).
+    # Here, because nothing may stand before the frame of a stop (docs/reference/rules.md 5).
     from robolink.controllers.softmotion.link.condition import is_moving
 
     while is_moving(now) or not stands:

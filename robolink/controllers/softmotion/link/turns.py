@@ -1,10 +1,10 @@
 """Whose turn it is on the wire: the beat of who waits on a movement goes before everything.
 
 A link carries one exchange at a time, and on a slow serial line one read of the response block
-takes a quarter of a second (softmotion.md 4). A thread that reads and reads would keep the waiter
-from beating for longer than the PLC bears. So while somebody waits on a movement, every other
-thread is let in by the waiter alone: one exchange, just after a beat, before the waiter's own.
-Then no two exchanges lie between two beats.
+takes a quarter of a second (docs/reference/softmotion.md 4.2). A thread that reads and reads would
+keep the waiter from beating for longer than the PLC bears. So while somebody waits on a movement,
+every other thread is let in by the waiter alone: one exchange, just after a beat, before the
+waiter's own. Then no two exchanges lie between two beats.
 """
 
 import threading

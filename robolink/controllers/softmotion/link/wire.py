@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Final, TypeVar
 
-from robolink.checkpoints import Point, checkpoint
+from robolink.checkpoints import Checkpoint, checkpoint
 from robolink.controllers.softmotion.link.heartbeat import ClientHeartbeat
 from robolink.controllers.softmotion.link.motion_tracking import MotionTracker
 from robolink.controllers.softmotion.link.turns import Turns
@@ -76,6 +76,11 @@ class MailboxWire:
         return self._link.place
 
     @property
+    def whole_look_s(self) -> float:
+        """How long the response block and a beat take on the line alone; 0 on a network."""
+        return self._link.whole_look_s
+
+    @property
     def clock(self) -> Clock:
         """The clock on which the PLC's time passes."""
         return self._link.clock
@@ -100,11 +105,11 @@ class MailboxWire:
 
     def read_response(self) -> tuple[int, ...]:
         """Read the response block, after a beat if one is due."""
-        return self._ask(self._link.read_response)
+        return self._ask(self._link.read_response, long=True)
 
     def read_slot(self, slot: int) -> tuple[int, ...]:
         """Read a tool slot, after a beat if one is due."""
-        return self._ask(lambda: self._link.read_slot(slot))
+        return self._ask(lambda: self._link.read_slot(slot), long=True)
 
     def read_device(self) -> tuple[int, ...]:
         """Read the device block, after a beat if one is due.
@@ -136,7 +141,7 @@ class MailboxWire:
         """Wait on what is unfinished: the exchanges of this thread keep it going meanwhile.
 
         Nothing else does. A thread that only looks, or a program that does something else, would
-        else keep a robot moving that nobody watches (design part 7).
+        else keep a robot moving that nobody watches (docs/mailbox.md, "What ends by itself").
         """
         if self._attends:
             yield
@@ -202,21 +207,24 @@ class MailboxWire:
     def _may_beat(self) -> bool:
         return self._attends or not self.motions.unfinished
 
-    def _ask(self, exchange: Callable[[], T]) -> T:
+    def _ask(self, exchange: Callable[[], T], *, long: bool = False) -> T:
+        """Do an exchange after a beat; on a serial line a long one always has one before it."""
+        ahead = long and self.whole_look_s > 0
         self._require_alive()
         with self._turn():
-            self._beat_if_due()
+            self._beat_if_due(ahead=ahead)
             if self._attends and self._turns.let_one_in():
-                self._beat_if_due()
+                self._beat_if_due(ahead=ahead)
             return self._asked(exchange)
 
-    def _beat_if_due(self) -> None:
+    def _beat_if_due(self, *, ahead: bool = False) -> None:
         """Write the heartbeat alone, if we own the mailbox and it is due.
 
         While something is unfinished only who waits on it does (:meth:`attended`).
         """
         busy = self.motions.unfinished
-        if self.epoch and self._may_beat and self._beat.due(self.clock.now_ns(), busy=busy):
+        now_ns = self.clock.now_ns()
+        if self.epoch and self._may_beat and self._beat.due(now_ns, busy=busy, ahead=ahead):
             self._asked(lambda: self._link.beat(self.next_beat()))
 
     def _asked(self, exchange: Callable[[], T]) -> T:
@@ -226,7 +234,7 @@ class MailboxWire:
                 with self._gate:
                     self.exchanges += 1
                     found = exchange()
-                checkpoint(Point.EXCHANGE, "read")
+                checkpoint(Checkpoint.EXCHANGE, "read")
                 return found
             except (TransportError, RemoteProtocolError) as error:
                 lost.append(error)

@@ -1,4 +1,7 @@
-"""How fast: the four numbers that go with a movement or a jog (softmotion.md 2.3)."""
+"""How fast: the four numbers that go with a movement or a jog.
+
+Source: docs/reference/softmotion.md 2.3.
+"""
 
 from typing import Final
 

@@ -6,6 +6,7 @@ from robolink.controllers.motion_group import MotionGroupCore
 from robolink.controllers.softmotion.io import SoftMotionIo
 from robolink.controllers.softmotion.link.answers import describe
 from robolink.controllers.softmotion.link.condition import (
+    require_beats,
     require_enabled,
     require_permit,
     require_power,
@@ -60,6 +61,7 @@ class SoftMotionGroup(MotionGroupCore):
     def require_able(self, purpose: str) -> None:
         """Refuse what no movement could begin in now; see :class:`robolink.model.MotionGroup`."""
         identity = self._mailbox.identity
+        require_beats(self._mailbox.wire.whole_look_s, controller=identity, request=purpose)
         now = self._mailbox.snapshots.take()
         require_permit(now, controller=identity, request=purpose)
         require_enabled(now, controller=identity, request=purpose)
@@ -163,10 +165,12 @@ class SoftMotionGroup(MotionGroupCore):
         """
         draft = Command(0, Opcode.CONTINUE)
         request = describe(draft)
+        mailbox = self._mailbox
+        require_beats(mailbox.wire.whole_look_s, controller=mailbox.identity, request=request)
         self._require_settled(request)
-        self._mailbox.prepare(draft, request)
-        with self._mailbox.markers.doubt(request):
-            self._mailbox.commands.carry_out(draft)
+        mailbox.prepare(draft, request)
+        with mailbox.markers.doubt(request):
+            mailbox.commands.carry_out(draft)
 
     def abort_unfinished(self) -> None:
         """Halt what was sent here and not seen to its end."""
@@ -206,11 +210,13 @@ class SoftMotionGroup(MotionGroupCore):
         """Hold back what may not start now; see the room ``link``.
 
         Raises:
+            ConfigError: The line is too slow for any movement.
             NotReadyError: The group, its drives, the machine or another movement forbid it.
             OutcomeUnknownError: Something earlier is unsettled.
             LeaseHeldError, LeaseLostError: Another client owns the mailbox.
         """
         mailbox = self._mailbox
+        require_beats(mailbox.wire.whole_look_s, controller=mailbox.identity, request=request)
         self._require_settled(request)
         now = mailbox.prepare(draft, request)
         require_enabled(now, controller=mailbox.identity, request=request)

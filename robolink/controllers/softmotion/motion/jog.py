@@ -54,7 +54,7 @@ class Jog:
     """Which way to jog, and how fast.
 
     Axes are 0 to 5: X, Y, Z and turns about the X, Y, Z axis of ``system``, which are not
-    Euler angles (softmotion.md 0.4); in ACS the machine's axes.
+    Euler angles (docs/reference/softmotion.md 2.3); in ACS the machine's axes.
 
     Attributes:
         forward: Axes that go up.

@@ -7,6 +7,7 @@ from robolink.controllers.softmotion.link.answers import describe, motion_failur
 from robolink.controllers.softmotion.link.commands import is_own
 from robolink.controllers.softmotion.link.condition import is_moving
 from robolink.controllers.softmotion.link.mailbox import Mailbox
+from robolink.controllers.softmotion.link.snapshots import LOOK_S
 from robolink.errors import (
     ControllerFaultError,
     MotionTimeoutError,
@@ -21,6 +22,9 @@ from robolink.timing import Deadline
 
 _REST_S = 1.0
 """Longest time between the end of a movement and the rest of its group."""
+
+_LOOKS_APART = 10
+"""Whole looks, in the time that one takes on the line, while nothing is new."""
 
 _HALT_S = 10.0
 """Longest time in which a halt brings a group to rest."""
@@ -132,14 +136,27 @@ class SoftMotionMotion:
         mailbox, sequence = self._mailbox, self.command.sequence
         if self.settled:
             return True
-        now = mailbox.snapshots.take()
+        slow = mailbox.wire.whole_look_s > 0
+        # On a slow line the block that showed its acceptance, or a later one, has to do.
+        now = mailbox.snapshots.latest if slow else mailbox.snapshots.take()
         while mailbox.wire.motions.end_of(sequence) is None:
             if mailbox.wire.motions.missing(sequence, now):
                 raise mailbox.wire.ended(self._vanished())
             if deadline.expired:
                 return False
-            now = mailbox.snapshots.news(now)
+            now = mailbox.snapshots.news(now, wait_s=self._patience_s(deadline))
         return True
+
+    def _patience_s(self, deadline: Deadline) -> float:
+        """Return how long the head alone is looked at while it shows nothing new.
+
+        Of a single movement it shows the end (it is the last command), and whatever else ends it:
+        so on a slow line the whole block, which keeps the beat waiting, is read rarely.
+        """
+        wire = self._mailbox.wire
+        if not wire.motions.alone:
+            return LOOK_S
+        return max(LOOK_S, min(_LOOKS_APART * wire.whole_look_s, deadline.remaining_s()))
 
     def _take_end(self) -> Finished:
         if self._end is None:
@@ -154,8 +171,9 @@ class SoftMotionMotion:
     def _await_rest(self) -> None:
         """Let the group come to rest unless more is under way.
 
-        It counts as moving for a cycle longer than its last movement (softmotion.md 2.2), and
-        a program that watches an input may call that movement done while it still brakes.
+        It counts as moving for a cycle longer than its last movement
+        (docs/reference/softmotion.md 2.2), and a program that watches an input may call that
+        movement done while it still brakes.
         """
         wire, snapshots = self._mailbox.wire, self._mailbox.snapshots
         deadline = Deadline.after(wire.clock, _REST_S)

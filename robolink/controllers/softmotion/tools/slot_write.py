@@ -1,7 +1,7 @@
 """The tool that an axis group itself works with, as the proof of a write or a selection.
 
 A slot of the mailbox program may hold one tool while the group works with another one
-(faults_and_speed.md F43, F44). What is selected counts as changed only when the group's own
+(docs/reference/faults.md F43, F44). What is selected counts as changed only when the group's own
 tool was read too.
 """
 

@@ -1,7 +1,8 @@
 """The tool slots of a PLC mailbox: fifteen that are retained, and the selected one.
 
-SoftMotion has no table of its own (softmotion.md 3.3): the mailbox program keeps the slots,
-and selecting one, or writing the selected one, calls SMC_GroupSetTool (design part 4).
+SoftMotion has no table of its own (docs/reference/softmotion.md 3.3): the mailbox program keeps the
+slots, and selecting one, or writing the selected one, calls SMC_GroupSetTool
+(docs/reference/rules.md 2).
 """
 
 from collections.abc import Sequence

@@ -12,8 +12,8 @@ from robolink.protocols.mailbox._codes import (
     CommandState,
     CoordinateSystem,
     ErrorClass,
+    ExportProfile,
     GroupState,
-    Profile,
     error_meaning,
 )
 from robolink.protocols.mailbox._kinematics import Kinematics
@@ -67,7 +67,7 @@ def _type(field: Field) -> str:
     return field.type.name if field.count == 1 else f"{field.count} {field.type.name}"
 
 
-def register_map_markdown(profile: Profile = Profile.FULL, base: int = 0) -> str:
+def register_map_markdown(profile: ExportProfile = ExportProfile.FULL, base: int = 0) -> str:
     """Return the page: blocks, opcodes of ``profile``, and every table of codes."""
     slots = base + slot_start(1)
     parts = (
@@ -114,7 +114,7 @@ def _block(title: str, layout: Layout, base: int, kind: str, access: str) -> str
     return _section(full_title, ("word", "address", "name", "type", "note"), rows)
 
 
-def _opcodes(profile: Profile) -> str:
+def _opcodes(profile: ExportProfile) -> str:
     rows = (
         (code.value, code.name, facts.does, facts.operands, facts.answer)
         for code, facts in OPCODES.items()

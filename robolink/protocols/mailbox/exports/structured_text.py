@@ -11,8 +11,8 @@ from robolink.protocols.mailbox._codes import (
     CommandState,
     CoordinateSystem,
     ErrorClass,
+    ExportProfile,
     GroupState,
-    Profile,
     ReadMode,
 )
 from robolink.protocols.mailbox._kinematics import Kinematics
@@ -40,7 +40,7 @@ _HEAD: Final = """\
 """
 
 
-def structured_text_types(profile: Profile = Profile.FULL) -> str:
+def structured_text_types(profile: ExportProfile = ExportProfile.FULL) -> str:
     """Return the types; the opcodes and the capability word are those of ``profile``."""
     parts = (
         _HEAD,
@@ -63,7 +63,7 @@ def structured_text_types(profile: Profile = Profile.FULL) -> str:
     return "\n".join(parts)
 
 
-def _constants(profile: Profile) -> str:
+def _constants(profile: ExportProfile) -> str:
     return f"""\
 {{attribute 'qualified_only'}}
 VAR_GLOBAL CONSTANT

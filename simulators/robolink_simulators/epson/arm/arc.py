@@ -1,4 +1,4 @@
-"""A circular motion of the tip: ``Arc mid, end`` (spel.md 7.1)."""
+"""A circular motion of the tip: ``Arc mid, end`` (docs/reference/spel.md 7.1)."""
 
 import cmath
 import math
@@ -10,7 +10,7 @@ from robolink_simulators.epson.arm.kinematics import Joints, check_ranges, flang
 from robolink_simulators.epson.arm.ramps import BrakedRamp, Ramp, TimeLaw
 from robolink_simulators.epson.arm.robots import ScaraModel
 from robolink_simulators.epson.arm.trajectory import LinePace
-from robolink_simulators.epson.refusals import Refusal, RefusalKind
+from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 
 _STRAIGHT = 1e-6
 _CHECKS = 90
@@ -76,16 +76,16 @@ def plan_arc(
 
     Raises:
         Refusal: The three stand in a line, or the hand would have to change (documented,
-            spel.md 7.1; the numbers are not).
+            docs/reference/spel.md 7.1; the numbers are not).
         OutOfReach: The arc leaves the envelope.
     """
     start, mid, end = points
     if any(pose.hand not in (None, hand) for pose in (mid, end)):
-        raise Refusal(RefusalKind.OUT_OF_REACH, "An arc cannot change the hand")
+        raise SpelRefusal(RefusalKind.OUT_OF_REACH, "An arc cannot change the hand")
     a, b, c = (complex(pose.x_mm, pose.y_mm) for pose in points)
     bent = ((b - a) * (c - a).conjugate()).imag
     if abs(bent) < _STRAIGHT:
-        raise Refusal(RefusalKind.VALUE_OUT_OF_RANGE, "The points of the arc stand in a line")
+        raise SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, "The points of the arc stand in a line")
     centre = _centre(a, b, c)
     sweep_rad = cmath.phase((c - centre) / (a - centre))
     through = cmath.phase((b - centre) / (a - centre))

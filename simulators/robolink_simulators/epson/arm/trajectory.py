@@ -14,7 +14,7 @@ from robolink.timing import NS_PER_S
 from robolink_simulators.epson.arm.kinematics import Joints, check_ranges, flange_of, forward, solve
 from robolink_simulators.epson.arm.ramps import BrakedRamp, Ramp, TimeLaw
 from robolink_simulators.epson.arm.robots import ScaraModel
-from robolink_simulators.epson.refusals import Refusal, RefusalKind
+from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 
 FULL_SPEED_AFTER_S: Final = 0.2
 """Assumed: time to a joint's top speed at Accel 100."""
@@ -205,7 +205,7 @@ def plan_move(
     """
     start, end = ends
     if end.hand is not None and end.hand is not hand:
-        raise Refusal(RefusalKind.OUT_OF_REACH, "A straight motion cannot change the hand")
+        raise SpelRefusal(RefusalKind.OUT_OF_REACH, "A straight motion cannot change the hand")
     length_mm = math.dist(start.coordinates()[:3], end.coordinates()[:3])
     turn_deg = abs(end.u_deg - start.u_deg)
     ramp = None

@@ -2,13 +2,14 @@
 
 from typing import Final
 
-from robolink_simulators.epson.refusals import Refusal, RefusalKind
+from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 
 IO_BITS: Final = 512
-"""Inputs and outputs (spel.md 8: bit numbers 0 to 511)."""
+"""Inputs and outputs (docs/reference/spel.md 8: bit numbers 0 to 511)."""
 
 MEMORY_BITS: Final = 1024
-"""Memory bits (spel.md 8: the reference gives 256, 512 and 1024; the largest is used)."""
+"""Memory bits (docs/reference/spel.md 8: the reference gives 256, 512 and 1024; the largest is
+used)."""
 
 
 class BitBank:
@@ -51,7 +52,7 @@ class BitBank:
         """
         self._check(port * 8)
         if not 0 <= value <= 0xFF:
-            raise Refusal(RefusalKind.VALUE_OUT_OF_RANGE, f"Not a byte: {value}")
+            raise SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, f"Not a byte: {value}")
         self._bits[port * 8 : port * 8 + 8] = [bool(value >> i & 1) for i in range(8)]
 
     def clear(self) -> None:
@@ -60,4 +61,4 @@ class BitBank:
 
     def _check(self, number: int) -> None:
         if not 0 <= number < len(self._bits):
-            raise Refusal(RefusalKind.VALUE_OUT_OF_RANGE, f"There is no bit {number}")
+            raise SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, f"There is no bit {number}")

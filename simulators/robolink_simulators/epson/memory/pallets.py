@@ -1,11 +1,11 @@
-"""Pallets: points in rows and columns between corners (spel.md 5.4)."""
+"""Pallets: points in rows and columns between corners (docs/reference/spel.md 5.4)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
 from robolink_simulators.epson.memory.points import Point
-from robolink_simulators.epson.refusals import Refusal, RefusalKind
+from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 
 HIGHEST_PALLET: Final = 15
 _MOST_PLACES: Final = 32766
@@ -39,7 +39,7 @@ class Pallet:
         else:
             column, row = (number - 1 for number in position)
         if not (0 <= column < self.columns and 0 <= row < self.rows):
-            raise Refusal(RefusalKind.VALUE_OUT_OF_RANGE, f"No place {position} on the pallet")
+            raise SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, f"No place {position} on the pallet")
         along, across = _share(column, self.columns), _share(row, self.rows)
         x, y, z = (self._coordinate(axis, along, across) for axis in range(3))
         first = self.corners[0]
@@ -70,7 +70,7 @@ class PalletTable:
             Refusal: It is not defined.
         """
         if number not in self._pallets:
-            raise Refusal(RefusalKind.PALLET_UNDEFINED, f"Pallet {number} is not defined")
+            raise SpelRefusal(RefusalKind.PALLET_UNDEFINED, f"Pallet {number} is not defined")
         return self._pallets[number]
 
     def define(self, number: int, corners: Sequence[Point], columns: int, rows: int) -> None:
@@ -80,7 +80,7 @@ class PalletTable:
             Refusal: There is no such number, or no such size.
         """
         if not 0 <= number <= HIGHEST_PALLET or columns < 1 or rows < 1:
-            raise Refusal(RefusalKind.VALUE_OUT_OF_RANGE, f"Pallet {number}, {columns}, {rows}")
+            raise SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, f"Pallet {number}, {columns}, {rows}")
         if columns * rows > _MOST_PLACES:
-            raise Refusal(RefusalKind.VALUE_OUT_OF_RANGE, f"{columns * rows} places")
+            raise SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, f"{columns * rows} places")
         self._pallets[number] = Pallet(tuple(corners), columns, rows)

@@ -1,10 +1,10 @@
-"""SPEL+ point values, planar locals and the point memory P0 to P999 (spel.md 5)."""
+"""SPEL+ point values, planar locals and the point memory P0 to P999 (docs/reference/spel.md 5)."""
 
 from dataclasses import dataclass, replace
 from typing import Final
 
 from robolink.model import Hand, Pose, rotate_xy
-from robolink_simulators.epson.refusals import Refusal, RefusalKind
+from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 
 AXES: Final = "XYZUVW"
 """The order of a point's coordinates."""
@@ -90,7 +90,7 @@ class LocalTable:
             Refusal: It is not defined.
         """
         if number not in self._locals:
-            raise Refusal(RefusalKind.LOCAL_UNDEFINED, f"Local {number} is not defined")
+            raise SpelRefusal(RefusalKind.LOCAL_UNDEFINED, f"Local {number} is not defined")
         return self._locals[number]
 
     def define(self, number: int, local: Local) -> None:
@@ -100,7 +100,9 @@ class LocalTable:
             Refusal: There is no such local to define.
         """
         if not 1 <= number <= HIGHEST_LOCAL:
-            raise Refusal(RefusalKind.VALUE_OUT_OF_RANGE, f"There is no local {number} to define")
+            raise SpelRefusal(
+                RefusalKind.VALUE_OUT_OF_RANGE, f"There is no local {number} to define"
+            )
         self._locals[number] = local
 
     def to_base(self, point: Point) -> Point:
@@ -109,7 +111,7 @@ class LocalTable:
         return replace(point, coordinates=coordinates, local=0)
 
     def convert(self, point: Point, number: int) -> Point:
-        """Express a point in another local (the modifier ``@n``, spel.md 5.2)."""
+        """Express a point in another local (the modifier ``@n``, docs/reference/spel.md 5.2)."""
         if number == point.local:
             return point
         base = self.to_base(point)
@@ -139,7 +141,7 @@ class PointTable:
             Refusal: The number does not exist (0 to 999) or nothing is stored.
         """
         if not self.defined(number):
-            raise Refusal(RefusalKind.POINT_UNDEFINED, f"Point P{number} is not defined")
+            raise SpelRefusal(RefusalKind.POINT_UNDEFINED, f"Point P{number} is not defined")
         return self._points[number]
 
     def defined(self, number: int) -> bool:
@@ -149,7 +151,7 @@ class PointTable:
             Refusal: The number does not exist.
         """
         if not 0 <= number <= HIGHEST_POINT:
-            raise Refusal(RefusalKind.SUBSCRIPT, f"There is no point P{number}")
+            raise SpelRefusal(RefusalKind.SUBSCRIPT, f"There is no point P{number}")
         return number in self._points
 
     def store(self, number: int, point: Point) -> None:
@@ -162,7 +164,7 @@ class PointTable:
         self._points[number] = point
 
     def delete(self, first: int, last: int) -> None:
-        """Forget a range of points; undefined ones are fine (spel.md 5.1)."""
+        """Forget a range of points; undefined ones are fine (docs/reference/spel.md 5.1)."""
         for number in self.numbers(first, last):
             del self._points[number]
 
@@ -173,5 +175,5 @@ class PointTable:
             Refusal: The range runs backwards.
         """
         if first > last:
-            raise Refusal(RefusalKind.VALUE_OUT_OF_RANGE, f"Point range {first}, {last}")
+            raise SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, f"Point range {first}, {last}")
         return sorted(number for number in self._points if first <= number <= last)

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Final, Literal, TypeAlias
 
 from robolink.model import ToolOffset
-from robolink_simulators.epson.refusals import Refusal, RefusalKind
+from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 
 HIGHEST_TOOL: Final = 15
 
@@ -13,10 +13,10 @@ ClearInForce: TypeAlias = Literal["selects_zero", "keeps", "error"]
 
 
 class ToolMemory:
-    """Tools 1 to 15 and the selected tool; both survive power-off (spel.md 6.1).
+    """Tools 1 to 15 and the selected tool; both survive power-off (docs/reference/spel.md 6.1).
 
     Attributes:
-        flash_writes: TLSet and TLClr executed; each writes the flash (epson.md 3.1).
+        flash_writes: TLSet and TLClr executed; each writes the flash (docs/reference/epson.md 3.1).
     """
 
     def __init__(self) -> None:
@@ -36,7 +36,7 @@ class ToolMemory:
             Refusal: There is no such tool number.
         """
         if not 0 <= tool <= HIGHEST_TOOL:
-            raise Refusal(RefusalKind.VALUE_OUT_OF_RANGE, f"There is no tool {tool}")
+            raise SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, f"There is no tool {tool}")
         return self._offsets.get(tool)
 
     def defined(self) -> dict[int, ToolOffset]:
@@ -59,8 +59,8 @@ class ToolMemory:
         Args:
             tool: Number of the tool.
             in_force: What happens when it is the tool in force. Neither the language reference
-                nor a transcript says (spel.md 6.1): Tool 0 is selected; or the number stays
-                selected, and targets are the flange's; or nothing is cleared.
+                nor a transcript says (docs/reference/spel.md 6.1): Tool 0 is selected; or the
+                number stays selected, and targets are the flange's; or nothing is cleared.
 
         Raises:
             Refusal: Tool 0, no such tool number, or the tool in force where that is an error.
@@ -68,7 +68,7 @@ class ToolMemory:
         self._check_writable(tool)
         selected = self._selected == tool
         if selected and in_force == "error":
-            raise Refusal(RefusalKind.TOOL_IN_FORCE, f"Tool {tool} is selected")
+            raise SpelRefusal(RefusalKind.TOOL_IN_FORCE, f"Tool {tool} is selected")
         self._offsets.pop(tool, None)
         if selected and in_force == "selects_zero":
             self._selected = 0
@@ -78,11 +78,11 @@ class ToolMemory:
         """Put a tool in force.
 
         Raises:
-            Refusal: It is not defined (seen in a client: it needs a reset, epson.md 1.5), or
-                there is no such number.
+            Refusal: It is not defined (seen in a client: it needs a reset,
+                docs/reference/epson.md 1.5), or there is no such number.
         """
         if self.get(tool) is None and tool != 0:
-            raise Refusal(RefusalKind.TOOL_UNDEFINED, f"Tool {tool} is not defined")
+            raise SpelRefusal(RefusalKind.TOOL_UNDEFINED, f"Tool {tool} is not defined")
         self._selected = tool
 
     def to_state(self) -> dict[str, object]:
@@ -112,4 +112,4 @@ class ToolMemory:
     def _check_writable(self, tool: int) -> None:
         self.get(tool)
         if tool == 0:
-            raise Refusal(RefusalKind.TOOL_ZERO_FIXED, "Tool 0 is fixed")
+            raise SpelRefusal(RefusalKind.TOOL_ZERO_FIXED, "Tool 0 is fixed")

@@ -1,4 +1,7 @@
-"""Global Preserve variables, as GetVariable and SetVariable reach them (epson.md 1.2 note 4)."""
+"""Global Preserve variables, as GetVariable and SetVariable reach them.
+
+Source: docs/reference/epson.md 1.2 note 4.
+"""
 
 import math
 import re
@@ -8,7 +11,7 @@ from typing import Final
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.protocols.epson_text import ErrorCode, VariableType
-from robolink_simulators.epson.remote.refused import Refused, malformed
+from robolink_simulators.epson.request_refusals import RequestRefused, malformed
 
 Value = bool | int | float | str
 
@@ -42,7 +45,7 @@ class _Variable:
         """Return where an element stands."""
         pairs = list(zip(subscripts, self.bounds, strict=False))
         if len(subscripts) != len(self.bounds) or any(i > bound for i, bound in pairs):
-            raise Refused(ErrorCode.NO_SUCH_VARIABLE)
+            raise RequestRefused(ErrorCode.NO_SUCH_VARIABLE)
         position = 0
         for i, bound in pairs:
             position = position * (bound + 1) + i
@@ -52,7 +55,7 @@ class _Variable:
         """Return ``count`` elements; the last subscript runs and must not pass its bound."""
         start = self.index(subscripts)
         if subscripts[-1] + count - 1 > self.bounds[-1]:
-            raise Refused(ErrorCode.NO_SUCH_VARIABLE)
+            raise RequestRefused(ErrorCode.NO_SUCH_VARIABLE)
         return self._values[start : start + count]
 
     def get(self, subscripts: Sequence[int]) -> Value:
@@ -103,10 +106,10 @@ class Variables:
             return (self._shown(variable.kind, variable.get(())),)
         stated = rest[1].strip() if len(rest) > 1 else ""
         if variable.kind is VariableType.STRING or not stated.isdecimal():
-            raise Refused(ErrorCode.BAD_COUNT)
+            raise RequestRefused(ErrorCode.BAD_COUNT)
         count = int(stated)
         if not 1 <= count <= _MAX_COUNT:
-            raise Refused(ErrorCode.BAD_COUNT)
+            raise RequestRefused(ErrorCode.BAD_COUNT)
         return tuple(self._shown(variable.kind, v) for v in variable.row(subscripts, count))
 
     def set(self, reference: str, text: str, *rest: str) -> tuple[str, ...]:
@@ -118,7 +121,7 @@ class Variables:
         variable, subscripts = self._find(reference)
         self._check_type(variable, rest)
         if subscripts and variable.kind is VariableType.STRING:
-            raise Refused(ErrorCode.BAD_COUNT)
+            raise RequestRefused(ErrorCode.BAD_COUNT)
         variable.set(subscripts, _parsed(variable.kind, text))
         return ()
 
@@ -139,16 +142,16 @@ class Variables:
         match = _REFERENCE.fullmatch(reference.strip())
         variable = self._variables.get(match[1].lower()) if match else None
         if match is None or variable is None:
-            raise Refused(ErrorCode.NO_SUCH_VARIABLE)
+            raise RequestRefused(ErrorCode.NO_SUCH_VARIABLE)
         subscripts = tuple(int(i) for i in match[2].split(",")) if match[2] else ()
         variable.index(subscripts)
         return variable, subscripts
 
     def _check_type(self, variable: _Variable, stated: Sequence[str]) -> None:
-        # Numbers asked as text, or text as numbers, are 14 (epson_corrections.md 6); that one
+        # Numbers asked as text, or text as numbers, are 14 (docs/reference/epson.md 1.2); that one
         # kind of number asked as another is so too is assumed.
         if stated and stated[0].strip().lower() != variable.kind.lower():
-            raise Refused(ErrorCode.BAD_COUNT)
+            raise RequestRefused(ErrorCode.BAD_COUNT)
 
     def _shown(self, kind: VariableType, value: Value) -> str:
         if kind is VariableType.BOOLEAN:

@@ -1,17 +1,17 @@
-"""The command window: the one statement that Execute runs (epson.md 1.5)."""
+"""The command window: the one statement that Execute runs (docs/reference/epson.md 1.5)."""
 
 from robolink_simulators.epson.condition import Condition
 from robolink_simulators.epson.options import EpsonOptions
-from robolink_simulators.epson.remote.exchange import Exchange
-from robolink_simulators.epson.spel import Execution, Interpreter, SpelError
+from robolink_simulators.epson.remote.exchange import PendingRequest
+from robolink_simulators.epson.spel import Interpreter, SpelError, StatementExecution
 from robolink_simulators.faults import FaultAction
 
 
-class CommandWindow:
+class SpelWindow:
     """Runs one statement at a time and answers the Execute that brought it.
 
     A failed statement puts the controller into its error state (seen: clients must Reset
-    after one, epson.md 1.5); an aborted one does not (assumed).
+    after one, docs/reference/epson.md 1.5); an aborted one does not (assumed).
     """
 
     def __init__(
@@ -20,8 +20,8 @@ class CommandWindow:
         self._interpreter = interpreter
         self._condition = condition
         self._options = options
-        self._running: tuple[Execution, Exchange] | None = None
-        self._aborting: list[Exchange] = []
+        self._running: tuple[StatementExecution, PendingRequest] | None = None
+        self._aborting: list[PendingRequest] = []
         self._aborted = False
 
     @property
@@ -29,7 +29,7 @@ class CommandWindow:
         """Whether a statement runs."""
         return self._running is not None
 
-    def start(self, statement: str, exchange: Exchange, now_ns: int) -> None:
+    def start(self, statement: str, exchange: PendingRequest, now_ns: int) -> None:
         """Begin a statement; the exchange is answered when it has ended."""
         if exchange.meets(FaultAction.IGNORE_WRITE):
             exchange.reply()
@@ -48,7 +48,7 @@ class CommandWindow:
         """Return when the statement will next do something."""
         return None if self._running is None else self._running[0].next_change()
 
-    def abort(self, exchange: Exchange, now_ns: int) -> None:
+    def abort(self, exchange: PendingRequest, now_ns: int) -> None:
         """Serve an Abort: end the statement, if one runs."""
         if self._running is None or self._options.abort_reply_first:
             exchange.reply()
@@ -86,7 +86,7 @@ class CommandWindow:
             waiting.reply()
         self._aborting.clear()
 
-    def _succeed(self, output: str, exchange: Exchange) -> None:
+    def _succeed(self, output: str, exchange: PendingRequest) -> None:
         if not output:
             exchange.reply()
         elif self._options.print_crlf_inside_quotes:
@@ -94,7 +94,7 @@ class CommandWindow:
         else:
             exchange.reply_text(output.removesuffix("\r\n"))
 
-    def _report(self, error: SpelError, exchange: Exchange) -> None:
+    def _report(self, error: SpelError, exchange: PendingRequest) -> None:
         if not self._aborted and self._options.error_state_after_failed_execute:
             self._condition.raise_error(error.number)
         if self._options.execute_failure == "refusal":

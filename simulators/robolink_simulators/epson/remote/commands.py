@@ -1,10 +1,10 @@
-"""Which request is served now, and what it does (epson.md 1.2)."""
+"""Which request is served now, and what it does (docs/reference/epson.md 1.2)."""
 
 from functools import lru_cache
 
 from robolink.protocols.epson_text import (
-    Command,
     ErrorCode,
+    RemoteCommand,
     Request,
     StatusFlags,
     status_fields,
@@ -14,10 +14,10 @@ from robolink_simulators.epson.condition import Condition, Task
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.variables import Variables
 from robolink_simulators.epson.options import EpsonOptions
-from robolink_simulators.epson.refusals import Refusal
+from robolink_simulators.epson.refusals import SpelRefusal
 from robolink_simulators.epson.remote.io_commands import Fields, Served, io_commands
 from robolink_simulators.epson.remote.queries import Alarms, check_robot, query_commands
-from robolink_simulators.epson.remote.refused import Refused, malformed, number
+from robolink_simulators.epson.request_refusals import RequestRefused, malformed, number
 
 _HIGHEST_FUNCTION = {5: 7, 7: 63, 8: 63}
 
@@ -56,7 +56,7 @@ class CommandDesk:
             "reset": self._reset,
         }
 
-    def admit(self, command: Command, *, logged_in: bool, executing: bool) -> None:
+    def admit(self, command: RemoteCommand, *, logged_in: bool, executing: bool) -> None:
         """Check everything that stands in the way of a command.
 
         The order of the checks is assumed: unknown, not logged in, monitoring only, an
@@ -68,18 +68,18 @@ class CommandDesk:
         options = self._options
         unknown = command.since > options.rc_plus
         if unknown or (command.extended and not options.extended_queries):
-            raise Refused(ErrorCode.UNKNOWN_COMMAND)
+            raise RequestRefused(ErrorCode.UNKNOWN_COMMAND)
         if command.name == "Login":
             return
         if not logged_in:
-            raise Refused(ErrorCode.UNKNOWN_COMMAND)
+            raise RequestRefused(ErrorCode.UNKNOWN_COMMAND)
         if self._condition.monitoring_only and not command.in_monitoring:
-            raise Refused(options.monitoring_refusal)
+            raise RequestRefused(options.monitoring_refusal)
         if executing and not command.allowed_during_execute(options.rc_plus):
-            raise Refused(ErrorCode.EXECUTE_RUNNING)
+            raise RequestRefused(ErrorCode.EXECUTE_RUNNING)
         judged = command.needs or command.forbids
         if judged and not _met(command, self._condition.flags()):
-            raise Refused(ErrorCode.NOT_READY)
+            raise RequestRefused(ErrorCode.NOT_READY)
 
     def serve(self, request: Request) -> Fields:
         """Carry a request out.
@@ -89,7 +89,7 @@ class CommandDesk:
         """
         try:
             return self._served[request.name.lower()](*request.parameters)
-        except Refusal as refusal:
+        except SpelRefusal as refusal:
             raise malformed() from refusal
 
     def check_home(self, robot: tuple[str, ...]) -> None:
@@ -138,7 +138,7 @@ class CommandDesk:
 
     def _reset(self) -> Fields:
         if self._condition.serious:
-            raise Refused(ErrorCode.NOT_READY)
+            raise RequestRefused(ErrorCode.NOT_READY)
         self._condition.reset()
         self._machine.reset_motion_parameters()
         if self._options.reset_outputs_off:
@@ -147,7 +147,7 @@ class CommandDesk:
 
 
 @lru_cache(maxsize=512)
-def _met(command: Command, flags: StatusFlags) -> bool:
+def _met(command: RemoteCommand, flags: StatusFlags) -> bool:
     return all(getattr(flags, name) for name in command.needs) and not any(
         getattr(flags, name) for name in command.forbids
     )

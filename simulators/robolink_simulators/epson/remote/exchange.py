@@ -10,12 +10,12 @@ from robolink_simulators.faults import Fault, FaultAction
 class Answering(Protocol):
     """Takes the answer to the client, if it is still there."""
 
-    def answer(self, exchange: "Exchange", event: Reply | Refusal) -> None:
+    def answer(self, exchange: "PendingRequest", event: Reply | Refusal) -> None:
         """Let the answer leave."""
 
 
 @dataclass(frozen=True, slots=True)
-class Exchange:
+class PendingRequest:
     """A request that came in.
 
     Attributes:

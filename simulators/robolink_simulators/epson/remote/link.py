@@ -17,7 +17,7 @@ from robolink.protocols.epson_text import (
 )
 from robolink.timing import NS_PER_S
 from robolink_simulators.epson.options import EpsonOptions
-from robolink_simulators.epson.remote.exchange import Exchange
+from robolink_simulators.epson.remote.exchange import PendingRequest
 from robolink_simulators.faults import Departure
 
 _SILENCE_NS: Final = 100_000_000
@@ -26,7 +26,7 @@ _SILENCE_NS: Final = 100_000_000
 _TERMINATORS: Final = {"crlf": b"\r\n", "cr": b"\r", "lf": b"\n"}
 
 
-class Served(Protocol):
+class ServedRequest(Protocol):
     """The controller, as its connections see it."""
 
     options: EpsonOptions
@@ -41,10 +41,10 @@ class Served(Protocol):
     def take(self, link: "EpsonLink", event: Request | BadRequest) -> None:
         """Deal with a request."""
 
-    def leaving(self, exchange: Exchange, reply: bytes) -> Sequence[Departure]:
+    def leaving(self, exchange: PendingRequest, reply: bytes) -> Sequence[Departure]:
         """Count a reply and return what of it leaves, when."""
 
-    def announce(self, exchange: Exchange, reply: bytes) -> None:
+    def announce(self, exchange: PendingRequest, reply: bytes) -> None:
         """Tell whoever watches that a reply is about to leave."""
 
     def forget(self, link: "EpsonLink") -> None:
@@ -58,7 +58,7 @@ class EpsonLink:
     stays after its logout (assumed).
     """
 
-    def __init__(self, controller: Served, now_ns: int) -> None:
+    def __init__(self, controller: ServedRequest, now_ns: int) -> None:
         options = controller.options
         self._controller = controller
         self._codec = EpsonTextCodec(
@@ -129,7 +129,7 @@ class EpsonLink:
         """Start or end the wait for a login."""
         self._anonymous_since_ns = None if logged_in else now_ns
 
-    def answer(self, exchange: Exchange, event: Reply | Refusal) -> None:
+    def answer(self, exchange: PendingRequest, event: Reply | Refusal) -> None:
         """Let an answer leave, as the faults planned for it allow."""
         if self._over:
             return

@@ -1,14 +1,23 @@
-"""Where a request goes: login, logout, the command window, or the desk (epson.md 1.1, 1.2)."""
+"""Where a request goes: login, logout, the command window, or the desk.
 
-from robolink.protocols.epson_text import BadRequest, Command, ErrorCode, Request, find_command
+Source: docs/reference/epson.md 1.1, 1.2.
+"""
+
+from robolink.protocols.epson_text import (
+    BadRequest,
+    ErrorCode,
+    RemoteCommand,
+    Request,
+    find_command,
+)
 from robolink_simulators.epson.condition import Condition, Task
 from robolink_simulators.epson.options import EpsonOptions
 from robolink_simulators.epson.remote.client_slot import ClientSlot
-from robolink_simulators.epson.remote.command_window import CommandWindow
+from robolink_simulators.epson.remote.command_window import SpelWindow
 from robolink_simulators.epson.remote.commands import CommandDesk
-from robolink_simulators.epson.remote.exchange import Exchange
+from robolink_simulators.epson.remote.exchange import PendingRequest
 from robolink_simulators.epson.remote.link import EpsonLink
-from robolink_simulators.epson.remote.refused import Refused
+from robolink_simulators.epson.request_refusals import RequestRefused
 
 
 class Service:
@@ -26,7 +35,7 @@ class Service:
     def __init__(
         self,
         desk: CommandDesk,
-        window: CommandWindow,
+        window: SpelWindow,
         slot: ClientSlot,
         condition: Condition,
         *,
@@ -46,7 +55,7 @@ class Service:
         return self._window.busy or self._condition.task is not Task.NONE
 
     def carry_out(
-        self, link: EpsonLink, exchange: Exchange, event: Request | BadRequest, now_ns: int
+        self, link: EpsonLink, exchange: PendingRequest, event: Request | BadRequest, now_ns: int
     ) -> None:
         """Do what a request asks, or refuse it."""
         logged_in = self._slot.client is link
@@ -54,20 +63,20 @@ class Service:
             self._slot.heard(now_ns)
         try:
             if isinstance(event, BadRequest):
-                raise Refused(event.code)
+                raise RequestRefused(event.code)
             command = find_command(event.name)
             if command is None:
-                raise Refused(ErrorCode.UNKNOWN_COMMAND)
+                raise RequestRefused(ErrorCode.UNKNOWN_COMMAND)
             self._desk.admit(command, logged_in=logged_in, executing=self._window.busy)
             self._dispatch(link, exchange, command, event, now_ns=now_ns)
-        except Refused as refused:
+        except RequestRefused as refused:
             exchange.refuse(refused.code)
 
     def _dispatch(
         self,
         link: EpsonLink,
-        exchange: Exchange,
-        command: Command,
+        exchange: PendingRequest,
+        command: RemoteCommand,
         request: Request,
         *,
         now_ns: int,
@@ -95,21 +104,21 @@ class Service:
     def _login(self, link: EpsonLink, request: Request, now_ns: int) -> None:
         bare = not request.parameters
         if bare and self._options.login_without_parameter == "error_12":
-            raise Refused(ErrorCode.MALFORMED)
+            raise RequestRefused(ErrorCode.MALFORMED)
         password = "" if bare else request.parameters[0]
         # That a controller without a password takes an empty one only is assumed.
         if password != self._password:
-            raise Refused(ErrorCode.WRONG_PASSWORD)
+            raise RequestRefused(ErrorCode.WRONG_PASSWORD)
         self._slot.admit(link, now_ns)
         link.logged_in(True, now_ns)
 
     def _logout(self, link: EpsonLink, now_ns: int) -> None:
         if self.unfinished:
-            # Logging out while a task runs raises an error (documented, epson.md 1.1); that
-            # the error ends what runs, as errors do, is assumed.
+            # Logging out while a task runs raises an error (documented,
+            # docs/reference/epson.md 1.1); that the error ends what runs, as errors do, is assumed.
             self._window.interrupt(now_ns)
             self._condition.raise_error(self._options.numbers.logged_out_in_task)
             if self._options.logout_while_running == "refused":
-                raise Refused(ErrorCode.NOT_READY)
+                raise RequestRefused(ErrorCode.NOT_READY)
         self._slot.free()
         link.logged_in(False, now_ns)

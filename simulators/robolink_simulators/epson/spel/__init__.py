@@ -5,6 +5,6 @@ Parsing (``_parse``, ``grammar.lark``) knows no machine; evaluation (``_evaluate
 the interpreter runs them one after the other in simulated time.
 """
 
-from robolink_simulators.epson.spel.interpreter import Execution as Execution
 from robolink_simulators.epson.spel.interpreter import Interpreter as Interpreter
 from robolink_simulators.epson.spel.interpreter import SpelError as SpelError
+from robolink_simulators.epson.spel.interpreter import StatementExecution as StatementExecution

@@ -10,16 +10,16 @@ from robolink_simulators.epson.spel.tree import (
     AssignVariable,
     Base,
     Binary,
-    Command,
     Coordinates,
     Expression,
     If,
+    KeywordStatement,
     LabelledPoint,
     Literal,
     Modifier,
     ModifierKind,
-    Motion,
     MotionOptions,
+    MotionStatement,
     Name,
     PointExpression,
     PointFunction,
@@ -41,7 +41,7 @@ def number_value(text: str) -> int | float:
     """Return the value of a numeric literal.
 
     Decimal integers that no Long holds are reals (inferred from Str$(99999999999999), which
-    prints with an exponent, spel.md 3.2).
+    prints with an exponent, docs/reference/spel.md 3.2).
     """
     lower = text.lower()
     if lower[:2] in _RADIX:
@@ -68,11 +68,11 @@ class TreeBuilder(Transformer[Token, tuple[Statement, ...]]):
         items, trailing = parts[-2:]
         return Print(cast(Items, items or ()), trailing is None)
 
-    def command(self, word: Token, items: Items | None, trailing: Token | None) -> Command:
+    def command(self, word: Token, items: Items | None, trailing: Token | None) -> KeywordStatement:
         """Build a keyword statement."""
-        return Command(word.lower(), items or (), trailing is not None)
+        return KeywordStatement(word.lower(), items or (), trailing is not None)
 
-    def motion(self, verb: Token, *parts: PointExpression | MotionOptions) -> Motion:
+    def motion(self, verb: Token, *parts: PointExpression | MotionOptions) -> MotionStatement:
         """Build a motion and join its options, which stand in any order."""
         targets = tuple(part for part in parts if isinstance(part, PointExpression))
         options = [part for part in parts if isinstance(part, MotionOptions)]
@@ -80,7 +80,7 @@ class TreeBuilder(Transformer[Token, tuple[Statement, ...]]):
         limz = next((option.limz for option in options if option.limz is not None), None)
         untils = [option.until for option in options if option.until is not None]
         until = untils[0] if untils else None
-        return Motion(verb.lower(), targets, MotionOptions(words, limz, until))
+        return MotionStatement(verb.lower(), targets, MotionOptions(words, limz, until))
 
     def plain_option(self, word: Token) -> MotionOptions:
         """Build CP, ROT, LJM or an arch number."""
@@ -141,7 +141,7 @@ class TreeBuilder(Transformer[Token, tuple[Statement, ...]]):
     def coordinates(self, *values: Expression) -> Coordinates:
         """Build a coordinate list; flags were read as divisions, and are tried first.
 
-        ``0 /R /1`` arrives as ``(0 / R) / 1`` (spel.md 14.1, item 2).
+        ``0 /R /1`` arrives as ``(0 / R) / 1`` (docs/reference/spel.md 14.1, item 2).
         """
         last, flags = values[-1], list[Modifier]()
         while isinstance(last, Binary) and last.operator == "/":

@@ -9,15 +9,15 @@ from robolink_simulators.epson.condition import Condition
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.variables import Variables
 from robolink_simulators.epson.options import EpsonOptions
-from robolink_simulators.epson.refusals import Refusal, RefusalKind
-from robolink_simulators.epson.remote.refused import Refused
+from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
+from robolink_simulators.epson.request_refusals import RequestRefused
 from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
 from robolink_simulators.epson.spel.expressions.printing import CRLF, joined, number_text
 from robolink_simulators.epson.spel.expressions.values import Value, as_number, truth
 from robolink_simulators.epson.spel.parse import parse
 from robolink_simulators.epson.spel.session import Session, WindowMemory
 from robolink_simulators.epson.spel.statements.jump import DESCENT
-from robolink_simulators.epson.spel.statements.keywords import Outcome, run_command
+from robolink_simulators.epson.spel.statements.keywords import StatementOutcome, run_command
 from robolink_simulators.epson.spel.statements.motion import plan
 from robolink_simulators.epson.spel.statements.until import DescentWatch, Watch
 from robolink_simulators.epson.spel.statements.waiting import (
@@ -31,10 +31,10 @@ from robolink_simulators.epson.spel.tree import (
     AssignCoordinate,
     AssignPoint,
     AssignVariable,
-    Command,
     Coordinates,
     If,
-    Motion,
+    KeywordStatement,
+    MotionStatement,
     Print,
     Statement,
 )
@@ -48,7 +48,7 @@ class SpelError:
     text: str
 
 
-class Execution:
+class StatementExecution:
     """One line under way. Made by :meth:`Interpreter.start`.
 
     Attributes:
@@ -134,7 +134,7 @@ class Execution:
         self.error = error
         self._done = True
 
-    def refuse(self, refusal: Refusal) -> None:
+    def refuse(self, refusal: SpelRefusal) -> None:
         """End the line with the number that the options give for a refusal."""
         session = self._evaluator.session
         session.memory.last_error = getattr(session.options.numbers, refusal.kind)
@@ -143,10 +143,10 @@ class Execution:
     def _attempt(self, change_ns: int) -> None:
         try:
             self._take_up(change_ns)
-        except Refusal as refusal:
+        except SpelRefusal as refusal:
             self.refuse(refusal)
         except RecursionError:
-            self.refuse(Refusal(RefusalKind.SYNTAX, "Expression too deeply nested"))
+            self.refuse(SpelRefusal(RefusalKind.SYNTAX, "Expression too deeply nested"))
 
     def _run(self, statement: Statement) -> None:
         outcome = self._outcome(statement)
@@ -159,97 +159,97 @@ class Execution:
             self._busy_until_ns = machine.arm.start(outcome.legs, start_ns)
         self._busy_until_ns += outcome.duration_ns
 
-    def _begin(self, motion: Motion) -> Outcome:
+    def _begin(self, motion: MotionStatement) -> StatementOutcome:
         machine, start_ns = self._evaluator.session.machine, self._busy_until_ns
         legs, until = plan(self._evaluator, motion), motion.options.until
         machine.till_met = machine.sensed = False
         if until is None:
-            return Outcome(legs=legs)
+            return StatementOutcome(legs=legs)
         if until.word == "sense":
             descent_ns = start_ns + sum(leg.duration_ns for leg in legs[:DESCENT])
             self._watch = DescentWatch(self._evaluator, until, descent_ns)
-            return Outcome(legs=legs)
+            return StatementOutcome(legs=legs)
         watch = Watch(self._evaluator, until)
         if not watch.stops:
             machine.found = None
         if self._stays(watch, start_ns):
             watch.meet(start_ns)
-            return Outcome()
+            return StatementOutcome()
         end_ns = machine.arm.start(legs, start_ns)
         watch.foresee(start_ns, end_ns)
         self._watch = watch
-        return Outcome(duration_ns=end_ns - start_ns)
+        return StatementOutcome(duration_ns=end_ns - start_ns)
 
     def _stays(self, watch: Watch, start_ns: int) -> bool:
         stays = self._evaluator.session.options.till_already_met == "stays"
         return watch.holds(start_ns) and watch.stops and stays
 
-    def _wait(self, command: Command) -> Outcome:
+    def _wait(self, command: KeywordStatement) -> StatementOutcome:
         """Wait for a condition, or for some seconds."""
         evaluator, arguments = self._evaluator, command.arguments
         if not arguments:
-            raise Refusal(RefusalKind.SYNTAX, "Wait needs a time or a condition")
+            raise SpelRefusal(RefusalKind.SYNTAX, "Wait needs a time or a condition")
         limit_s = wait_limit(evaluator, command)
         if not is_condition(arguments[0]):
             if limit_s is not None:
-                raise Refusal(RefusalKind.SYNTAX, "Wait takes one time")
+                raise SpelRefusal(RefusalKind.SYNTAX, "Wait takes one time")
             seconds = seconds_of(evaluator, arguments[0])
-            return Outcome(duration_ns=round(seconds * NS_PER_S))
+            return StatementOutcome(duration_ns=round(seconds * NS_PER_S))
         waiting = Waiting(evaluator, arguments[0], self._busy_until_ns, limit_s)
         if not waiting.is_over(self._busy_until_ns):
             self._waiting = waiting
-        return Outcome()
+        return StatementOutcome()
 
-    def _branch(self, statement: If) -> Outcome:
+    def _branch(self, statement: If) -> StatementOutcome:
         if self._evaluator.session.options.single_line_if == "refused":
-            raise Refusal(RefusalKind.NOT_ALLOWED_HERE, "If is allowed in programs only")
+            raise SpelRefusal(RefusalKind.NOT_ALLOWED_HERE, "If is allowed in programs only")
         holds = truth(self._evaluator.value(statement.condition))
         self._pending += reversed(statement.then if holds else statement.otherwise)
-        return Outcome()
+        return StatementOutcome()
 
-    def _assign(self, name: str, value: Value) -> Outcome:
+    def _assign(self, name: str, value: Value) -> StatementOutcome:
         session = self._evaluator.session
         if session.options.variable_assignment == "refused":
-            # Whether the command window takes variables is left open (spel.md 13).
-            raise Refusal(RefusalKind.NOT_ALLOWED_HERE, f"{name} needs a program")
+            # Whether the command window takes variables is left open (docs/reference/spel.md 13).
+            raise SpelRefusal(RefusalKind.NOT_ALLOWED_HERE, f"{name} needs a program")
         if not session.variables.holds(name):
-            raise Refusal(RefusalKind.NAME_UNDEFINED, f"Nothing is called {name}")
+            raise SpelRefusal(RefusalKind.NAME_UNDEFINED, f"Nothing is called {name}")
         text = value if isinstance(value, str) else number_text(as_number(value))
         try:
             session.variables.set(name, text)
-        except Refused as refused:
-            raise Refusal(RefusalKind.TYPE_MISMATCH, f"{name} cannot hold {text}") from refused
-        return Outcome()
+        except RequestRefused as refused:
+            raise SpelRefusal(RefusalKind.TYPE_MISMATCH, f"{name} cannot hold {text}") from refused
+        return StatementOutcome()
 
-    def _outcome(self, statement: Statement) -> Outcome:
+    def _outcome(self, statement: Statement) -> StatementOutcome:
         evaluator = self._evaluator
         machine = evaluator.session.machine
         match statement:
             case Print(items, newline):
                 values = [evaluator.shown(item) for item in items]
                 end = CRLF if newline else ""
-                return Outcome(joined(values, evaluator.session.options) + end)
-            case Command("wait"):
+                return StatementOutcome(joined(values, evaluator.session.options) + end)
+            case KeywordStatement("wait"):
                 return self._wait(statement)
             case If():
                 return self._branch(statement)
-            case Command():
+            case KeywordStatement():
                 return run_command(evaluator, statement)
-            case Motion():
+            case MotionStatement():
                 return self._begin(statement)
             case AssignPoint(number, value):
                 point = evaluator.point_of(value)
                 machine.points.store(evaluator.integer(number), point)
-                return Outcome()
+                return StatementOutcome()
             case AssignCoordinate(axis, place, value):
                 number_of_point = evaluator.stored_number(place)
                 changed = machine.points.get(number_of_point).with_axis(
                     axis, float(evaluator.number(value))
                 )
                 machine.points.store(number_of_point, changed)
-                return Outcome()
+                return StatementOutcome()
             case AssignVariable(name, Coordinates()):
-                raise Refusal(RefusalKind.TYPE_MISMATCH, f"{name} cannot hold coordinates")
+                raise SpelRefusal(RefusalKind.TYPE_MISMATCH, f"{name} cannot hold coordinates")
             case AssignVariable(name, expression) if not isinstance(expression, Coordinates):
                 return self._assign(name, evaluator.value(expression))
         raise AssertionError(statement)
@@ -291,7 +291,7 @@ class Interpreter:
         """Forget what statements have set: stored conditions, TMOut, TW, Err."""
         self._evaluator.session.memory = WindowMemory()
 
-    def start(self, statement: str, now_ns: int) -> Execution:
+    def start(self, statement: str, now_ns: int) -> StatementExecution:
         """Begin a line at ``now_ns``; what takes no time is done when this returns.
 
         A line that cannot be parsed, or that holds a statement for programs only, gives an
@@ -299,10 +299,10 @@ class Interpreter:
         """
         try:
             statements = parse(statement)
-        except Refusal as refusal:
-            execution = Execution(self._evaluator, (), now_ns)
+        except SpelRefusal as refusal:
+            execution = StatementExecution(self._evaluator, (), now_ns)
             execution.refuse(refusal)
             return execution
-        execution = Execution(self._evaluator, statements, now_ns)
+        execution = StatementExecution(self._evaluator, statements, now_ns)
         execution.advance(now_ns)
         return execution

@@ -59,7 +59,7 @@ class PointFunction:
 
 
 class ModifierKind(Enum):
-    """What a modifier behind a point does (spel.md 5.2)."""
+    """What a modifier behind a point does (docs/reference/spel.md 5.2)."""
 
     FLAG = "/"
     CONVERT = "@"
@@ -109,7 +109,7 @@ class Print:
 
 
 @dataclass(frozen=True, slots=True)
-class Command:
+class KeywordStatement:
     """A keyword and its arguments; ``open_ended`` when they end with a comma."""
 
     name: str
@@ -135,7 +135,7 @@ class MotionOptions:
 
 
 @dataclass(frozen=True, slots=True)
-class Motion:
+class MotionStatement:
     """``Go``, ``Move``, ``Jump`` ... and their points; ``verb`` is lower case."""
 
     verb: str
@@ -177,4 +177,12 @@ class If:
     otherwise: "tuple[Statement, ...]" = ()
 
 
-Statement = Print | Command | Motion | AssignPoint | AssignVariable | AssignCoordinate | If
+Statement = (
+    Print
+    | KeywordStatement
+    | MotionStatement
+    | AssignPoint
+    | AssignVariable
+    | AssignCoordinate
+    | If
+)

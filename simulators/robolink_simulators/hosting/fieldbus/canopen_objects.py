@@ -1,4 +1,4 @@
-"""The object dictionary of a simulated PLC on CANopen (design part 7)."""
+"""The object dictionary of a simulated PLC on CANopen (docs/mailbox.md, "CANopen")."""
 
 import io
 import struct
@@ -23,7 +23,7 @@ from robolink.protocols.mailbox import (
     slot_start,
 )
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
-from robolink_simulators.softmotion.mailbox.words.exchange import Served
+from robolink_simulators.softmotion.mailbox.words.exchange import ServedAccess
 
 COMMAND_OBJECT: Final = 0x2100
 RESPONSE_OBJECT: Final = 0x2101
@@ -40,10 +40,10 @@ Present = Callable[[], int]
 """Tells the simulated time."""
 
 
-class Answering(Protocol):
+class SdoAnswering(Protocol):
     """Takes what becomes of an exchange: late, or not answered at all."""
 
-    def let_go(self, served: Served) -> None:
+    def let_go(self, served: ServedAccess) -> None:
         """Answer in the way that ``served`` says."""
 
 
@@ -57,7 +57,7 @@ class MailboxObjects:
     """
 
     def __init__(
-        self, simulator: SoftMotionSimulator, present: Present, answering: Answering
+        self, simulator: SoftMotionSimulator, present: Present, answering: SdoAnswering
     ) -> None:
         self._simulator = simulator
         self._present = present
@@ -111,13 +111,13 @@ class MailboxObjects:
             self._simulator.advance(now_ns)
             return packed(self._simulator.plc.response(now_ns))
 
-    def _read_copy(self) -> Served:
+    def _read_copy(self) -> ServedAccess:
         with self._simulator.lock:
             if not self._simulator.options.mailbox.snapshot_latched:
                 self._copy = _unpacked(self.fresh(), RESPONSE_WORDS)
             return self._simulator.read_copy(self._copy, self._present())
 
-    def _read(self, first: int, count: int) -> Served:
+    def _read(self, first: int, count: int) -> ServedAccess:
         with self._simulator.lock:
             return self._simulator.read(first, count, self._present())
 
@@ -126,7 +126,7 @@ class MailboxObjects:
             served = self._simulator.write(first, words, self._present())
         self._answering.let_go(served)
 
-    def _given(self, served: Served, count: int | None = None) -> bytes:
+    def _given(self, served: ServedAccess, count: int | None = None) -> bytes:
         self._answering.let_go(served)
         return packed(served.words[:count])
 

@@ -8,7 +8,7 @@ from canopen import LocalNode
 from canopen.sdo.server import SdoServer
 
 from robolink_simulators.hosting.fieldbus.canopen_objects import RESPONSE_OBJECT
-from robolink_simulators.softmotion.mailbox.words.exchange import Served
+from robolink_simulators.softmotion.mailbox.words.exchange import ServedAccess
 
 _REQUEST: Final = 0x600
 _ANSWER: Final = 0x580
@@ -35,7 +35,7 @@ class PlcSdoServer(SdoServer):
         """Let the response change in the middle of its upload, as an unlatched stack would."""
         self._fresh = fresh
 
-    def let_go(self, served: Served) -> None:
+    def let_go(self, served: ServedAccess) -> None:
         """Answer the request under way as ``served`` says."""
         if served.delay_s:
             time.sleep(self._real_seconds(served.delay_s))

@@ -1,13 +1,13 @@
 """Serves a simulated PLC as a Modbus server, over TCP or a serial cable."""
 
-from types import TracebackType
-from typing import Final, Self
+from typing import Final
 from urllib.parse import urlencode
 
+from robolink.closing import ClosedAtExit
 from robolink.errors import ConnectError
 from robolink.messages import tr
 from robolink_simulators.cell.clock import ScaledClock
-from robolink_simulators.hosting.fieldbus.modbus_server import ModbusServerThread, SerialPort
+from robolink_simulators.hosting.fieldbus.modbus_server import ModbusServerThread, SerialLine
 from robolink_simulators.hosting.fieldbus.plc_registers import PlcRegisters
 from robolink_simulators.hosting.loopback import require_loopback
 from robolink_simulators.hosting.streams.serial_cable import (
@@ -21,7 +21,7 @@ from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 _DEFAULT_UNIT: Final = 1
 
 
-class ModbusHost:
+class ModbusHost(ClosedAtExit):
     """A Modbus server in front of a simulated PLC; a context manager.
 
     Args:
@@ -54,17 +54,6 @@ class ModbusHost:
             self._server.close()
             if self._cable is not None:
                 self._cable.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def _look(self) -> None:
         """Cut the connections when the PLC was started anew; a serial line has none."""
@@ -131,7 +120,7 @@ def serve_modbus_rtu(
     clock = _presented(simulator, clock)
     try:
         cable = SerialCable(baud)
-        port = SerialPort(cable.far, unit)
+        port = SerialLine(cable.far, unit)
         server = ModbusServerThread(PlcRegisters(simulator, clock), clock, port)
     except (ImportError, AttributeError, OSError) as error:
         raise no_pseudo_terminal(error) from error

@@ -1,7 +1,8 @@
 """A Modbus server in a thread of its own. The only simulator module that imports pymodbus.
 
 pymodbus renames what it offers in minor releases, and its action hook fires for read-backs
-too (ecosystem.md 1.2); all of that is dealt with here. Nothing is kept in its own registers.
+too (docs/decisions/0012-modbus-and-canopen-libraries.md); all of that is dealt with here. Nothing
+is kept in its own registers.
 """
 
 import asyncio
@@ -19,7 +20,7 @@ from pymodbus.simulator import DataType, SimData, SimDevice
 
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.hosting.fieldbus.plc_registers import PlcRegisters
-from robolink_simulators.softmotion.mailbox.words.exchange import Served
+from robolink_simulators.softmotion.mailbox.words.exchange import ServedAccess
 from robolink_simulators.softmotion.mailbox.words.places import REGISTERS, Bank
 
 # It writes to standard error when nobody listens; clients are told by their answers.
@@ -37,7 +38,7 @@ Server = ModbusTcpServer | ModbusSerialServer
 
 
 @dataclass(frozen=True, slots=True)
-class SerialPort:
+class SerialLine:
     """A serial line to serve.
 
     Attributes:
@@ -62,7 +63,7 @@ class ModbusServerThread:
     """
 
     def __init__(
-        self, registers: PlcRegisters, clock: ScaledClock, place: tuple[str, int] | SerialPort
+        self, registers: PlcRegisters, clock: ScaledClock, place: tuple[str, int] | SerialLine
     ) -> None:
         self._registers = registers
         self._clock = clock
@@ -104,11 +105,11 @@ class ModbusServerThread:
     def _wait_for(self, work: Coroutine[Any, Any, Any]) -> Any:  # noqa: ANN401 - whatever it gives
         return asyncio.run_coroutine_threadsafe(work, self._loop).result()
 
-    async def _started(self, place: tuple[str, int] | SerialPort) -> Server:
+    async def _started(self, place: tuple[str, int] | SerialLine) -> Server:
         # Unit 0 stands for all; to be silent a server must know that units may be missing.
         habits: dict[str, Any] = {"ignore_missing_devices": True}
         server: Server
-        if isinstance(place, SerialPort):
+        if isinstance(place, SerialLine):
             habits["trace_pdu"] = _only_for(place.unit)
             server = ModbusSerialServer(self._device(), port=place.path, **habits)
         else:
@@ -160,7 +161,7 @@ class ModbusServerThread:
         registers[first - start : first - start + count] = words
         return None
 
-    async def _let_go(self, served: Served) -> None:
+    async def _let_go(self, served: ServedAccess) -> None:
         if served.cut:
             self._cut()
         if served.delay_s:

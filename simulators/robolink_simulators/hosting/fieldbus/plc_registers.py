@@ -6,8 +6,13 @@ from typing import Final
 
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
-from robolink_simulators.softmotion.mailbox.words.exchange import Served
-from robolink_simulators.softmotion.mailbox.words.places import REGISTERS, Bank, Place, places_of
+from robolink_simulators.softmotion.mailbox.words.exchange import ServedAccess
+from robolink_simulators.softmotion.mailbox.words.places import (
+    REGISTERS,
+    Bank,
+    MailboxPlace,
+    places_of,
+)
 
 _WORD_BITS: Final = 16
 
@@ -15,8 +20,8 @@ _WORD_BITS: Final = 16
 class PlcRegisters:
     """Holding and input registers; coils overlay the first, discrete inputs the second.
 
-    As CODESYS does it (documented, softmotion.md 4.1). Registers beside the mailbox only keep
-    what is written.
+    As CODESYS does it (documented, docs/reference/softmotion.md 4.1). Registers beside the mailbox
+    only keep what is written.
 
     Args:
         simulator: The PLC.
@@ -29,13 +34,13 @@ class PlcRegisters:
         self._places = places_of(simulator.options.mailbox)
         self._plain = {bank: [0] * REGISTERS for bank in Bank}
 
-    def read(self, bank: Bank, address: int, count: int) -> Served:
+    def read(self, bank: Bank, address: int, count: int) -> ServedAccess:
         """Serve a client that reads registers."""
         with self._simulator.lock:
             now_ns = self._clock.now_ns()
             self._simulator.hear(now_ns)
             words = self._plain[bank][address : address + count]
-            served = Served()
+            served = ServedAccess()
             for place, start, end in self._parts(bank, address, count):
                 first = place.first + start - place.start
                 if place.written:
@@ -47,20 +52,20 @@ class PlcRegisters:
                     words[start - address : end - address] = part
             return replace(served, words=tuple(words))
 
-    def write(self, address: int, words: Sequence[int]) -> Served:
+    def write(self, address: int, words: Sequence[int]) -> ServedAccess:
         """Serve a client that writes holding registers."""
         with self._simulator.lock:
             now_ns = self._clock.now_ns()
             self._simulator.hear(now_ns)
             self._plain[Bank.HOLDING][address : address + len(words)] = words
-            served = Served()
+            served = ServedAccess()
             for place, start, end in self._parts(Bank.HOLDING, address, len(words)):
                 if place.written:
                     part = words[start - address : end - address]
                     served = self._simulator.write(start - place.start, part, now_ns)
             return served
 
-    def switch(self, coil: int, bits: Sequence[bool]) -> Served:
+    def switch(self, coil: int, bits: Sequence[bool]) -> ServedAccess:
         """Serve a client that writes coils, and with them bits of holding registers."""
         with self._simulator.lock:
             first, last = coil // _WORD_BITS, (coil + len(bits) - 1) // _WORD_BITS
@@ -85,7 +90,9 @@ class PlcRegisters:
                 words[start - address : end - address] = part
             return words
 
-    def _parts(self, bank: Bank, address: int, count: int) -> Iterator[tuple[Place, int, int]]:
+    def _parts(
+        self, bank: Bank, address: int, count: int
+    ) -> Iterator[tuple[MailboxPlace, int, int]]:
         """Give each block that a range touches, and where the common part starts and ends."""
         for place in self._places:
             start, end = max(address, place.start), min(address + count, place.end)

@@ -22,7 +22,7 @@ from robolink.protocols.mailbox import (
 from robolink.transport import MailboxHead
 from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
-from robolink_simulators.softmotion.mailbox.words.exchange import Served
+from robolink_simulators.softmotion.mailbox.words.exchange import ServedAccess
 
 _HEAD_WORDS: Final = 10
 _HEARTBEAT: Final = COMMAND["client_heartbeat"].word
@@ -72,6 +72,11 @@ class InProcessMailboxLink:
         """The simulator's clock."""
         return self._clock
 
+    @property
+    def whole_look_s(self) -> float:
+        """0: nothing is carried anywhere."""
+        return 0.0
+
     def write_command(self, words: Sequence[int]) -> None:
         """See :meth:`robolink.transport.MailboxLink.write_command`."""
         self._exchange(lambda now_ns: self._simulator.write(0, words, now_ns))
@@ -108,7 +113,7 @@ class InProcessMailboxLink:
         """See :meth:`robolink.transport.MailboxLink.close`."""
         self._closed = True
 
-    def _exchange(self, serve: Callable[[int], Served]) -> Words:
+    def _exchange(self, serve: Callable[[int], ServedAccess]) -> Words:
         """Have a request served: half of the time passes before, half of it after."""
         with self._simulator.lock:
             if self._closed:

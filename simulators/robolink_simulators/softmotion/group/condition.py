@@ -3,12 +3,15 @@
 from dataclasses import dataclass
 from enum import IntEnum
 
-from robolink_simulators.softmotion.group.smc_errors import SmcError
 from robolink_simulators.softmotion.kinematics.kinematics import AxisValues, Configuration
+from robolink_simulators.softmotion.smc_errors import SmcError
 
 
-class GroupState(IntEnum):
-    """``SMC_AXIS_GROUP_STATE``; the numbers are a field report (softmotion.md 2.1)."""
+class SmcGroupState(IntEnum):
+    """``SMC_AXIS_GROUP_STATE``; the numbers are a field report.
+
+    Source: docs/reference/softmotion.md 2.1.
+    """
 
     DISABLED = 0
     STANDBY = 1
@@ -19,7 +22,7 @@ class GroupState(IntEnum):
 
 
 class ReadToolMode(IntEnum):
-    """Which tool SMC_GroupReadTool gives; numbers of design part 7, opcode 30002."""
+    """Which tool SMC_GroupReadTool gives; numbers of opcode 30002 (docs/mailbox.md)."""
 
     SET = 0
     ACTIVE_MOVEMENT = 1
@@ -40,7 +43,7 @@ class GroupStatus:
         error: The group error.
     """
 
-    state: GroupState
+    state: SmcGroupState
     active_movement: int
     unfinished: int
     interrupted_movement: int

@@ -4,35 +4,35 @@ from collections.abc import Callable, Sequence
 from functools import wraps
 from typing import Concatenate, ParamSpec, TypeVar
 
-from robolink_simulators.softmotion.group.blocks import Execution
-from robolink_simulators.softmotion.group.condition import GroupState, GroupStatus
-from robolink_simulators.softmotion.group.options import GroupOptions
-from robolink_simulators.softmotion.group.signals import InputBits, OutputBits
-from robolink_simulators.softmotion.group.smc_errors import Overruled, Refused
+from robolink_simulators.softmotion.function_blocks import BlockExecution
+from robolink_simulators.softmotion.group.condition import GroupStatus, SmcGroupState
 from robolink_simulators.softmotion.group.state_machine import StateMachine
 from robolink_simulators.softmotion.kinematics.coordinates import CoordinateTransforms
 from robolink_simulators.softmotion.kinematics.frames import Frame
-from robolink_simulators.softmotion.kinematics.kinematics import AxisValues, Kinematics
+from robolink_simulators.softmotion.kinematics.kinematics import AxisValues, KinematicsModel
 from robolink_simulators.softmotion.motion.axes import ASSUMED_LIMITS, Axis, AxisLimits
-from robolink_simulators.softmotion.motion.motion import Motion
-from robolink_simulators.softmotion.motion.movement import Tool
+from robolink_simulators.softmotion.motion.motion import GroupMotion
+from robolink_simulators.softmotion.motion.movement import ToolInForce
 from robolink_simulators.softmotion.motion.paths import require_inside
+from robolink_simulators.softmotion.options import GroupOptions
+from robolink_simulators.softmotion.signals import DigitalInputs, DigitalOutputs
+from robolink_simulators.softmotion.smc_errors import BlockRefused, Overruled
 
 Inputs = ParamSpec("Inputs")
 Core = TypeVar("Core", bound="GroupCore")
 
 
 def block(
-    method: Callable[Concatenate[Core, Execution, Inputs], None],
-) -> Callable[Concatenate[Core, Inputs], Execution]:
+    method: Callable[Concatenate[Core, BlockExecution, Inputs], None],
+) -> Callable[Concatenate[Core, Inputs], BlockExecution]:
     """Make a method a function block: it returns its execution, and complaints are outputs."""
 
     @wraps(method)
-    def executed(core: Core, /, *args: Inputs.args, **kwargs: Inputs.kwargs) -> Execution:
-        execution = Execution()
+    def executed(core: Core, /, *args: Inputs.args, **kwargs: Inputs.kwargs) -> BlockExecution:
+        execution = BlockExecution()
         try:
             method(core, execution, *args, **kwargs)
-        except Refused as refused:
+        except BlockRefused as refused:
             execution.fail(core.options.numbers.error(refused.kind, refused.text))
         except Overruled:
             execution.abort()
@@ -65,7 +65,7 @@ class GroupCore:
 
     def __init__(
         self,
-        kinematics: Kinematics,
+        kinematics: KinematicsModel,
         limits: Sequence[AxisLimits] | None = None,
         options: GroupOptions | None = None,
     ) -> None:
@@ -76,11 +76,11 @@ class GroupCore:
         self._drives = tuple(Axis(n, kind, given) for n, (kind, given) in enumerate(rows))
         self.kinematics = kinematics
         self.transforms = CoordinateTransforms()
-        self.inputs = InputBits()
-        self.outputs = OutputBits()
-        self.tool = Tool()
+        self.inputs = DigitalInputs()
+        self.outputs = DigitalOutputs()
+        self.tool = ToolInForce()
         self.movements_started = 0
-        self.motion = Motion(lambda: self.axes, self.inputs, self.options)
+        self.motion = GroupMotion(lambda: self.axes, self.inputs, self.options)
         self.machine = StateMachine(lambda: self.axes, self.motion, self.options)
 
     @property
@@ -99,7 +99,7 @@ class GroupCore:
         return self.motion.values
 
     @property
-    def state(self) -> GroupState:
+    def state(self) -> SmcGroupState:
         """State of the group."""
         return self.machine.state
 

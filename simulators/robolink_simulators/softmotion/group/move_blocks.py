@@ -1,16 +1,16 @@
-"""The blocks that move an axis group (softmotion.md 2.3, 2.4)."""
+"""The blocks that move an axis group (docs/reference/softmotion.md 2.3, 2.4)."""
 
-from robolink_simulators.softmotion.group.blocks import Execution
-from robolink_simulators.softmotion.group.condition import GroupState
+from robolink_simulators.softmotion.function_blocks import BlockExecution
+from robolink_simulators.softmotion.group.condition import SmcGroupState
 from robolink_simulators.softmotion.group.core import GroupCore, block
-from robolink_simulators.softmotion.group.smc_errors import ErrorKind, Refused
 from robolink_simulators.softmotion.kinematics.frames import ORIGIN, Frame
 from robolink_simulators.softmotion.kinematics.kinematics import AxisValues
-from robolink_simulators.softmotion.motion.jog import Jog, JogCommand
-from robolink_simulators.softmotion.motion.movement import BufferMode, EdgeWatch, Movement
+from robolink_simulators.softmotion.motion.jog import JogCommand, JogMotion
+from robolink_simulators.softmotion.motion.movement import EdgeWatch, Movement, SmcBufferMode
 from robolink_simulators.softmotion.motion.paths import Dynamics, Path
 from robolink_simulators.softmotion.motion.planner import Planner, Target
 from robolink_simulators.softmotion.motion.profile import Pace
+from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind
 
 
 class MoveBlocks(GroupCore):
@@ -19,16 +19,16 @@ class MoveBlocks(GroupCore):
     @block
     def move_linear_absolute(
         self,
-        execution: Execution,
+        execution: BlockExecution,
         target: Target,
         dynamics: Dynamics,
         *,
-        mode: BufferMode = BufferMode.ABORTING,
+        mode: SmcBufferMode = SmcBufferMode.ABORTING,
         watch: EdgeWatch | None = None,
     ) -> None:
         """``MC_MoveLinearAbsolute``: the TCP on a straight line, the elbow on its side.
 
-        With ``watch``, as the companion program's movement until an input (design part 7,
+        With ``watch``, as the companion program's movement until an input (docs/mailbox.md,
         opcode 30008): ``execution.latched`` is the TCP at the edge, in the coordinate system
         of the target; without an edge the block ends in error.
         """
@@ -45,11 +45,11 @@ class MoveBlocks(GroupCore):
     @block
     def move_direct_absolute(
         self,
-        execution: Execution,
+        execution: BlockExecution,
         target: Target,
         factors: Dynamics,
         *,
-        mode: BufferMode = BufferMode.ABORTING,
+        mode: SmcBufferMode = SmcBufferMode.ABORTING,
     ) -> None:
         """``MC_MoveDirectAbsolute``: straight in axis space, by factors of the axes' limits."""
         self.machine.require_motion()
@@ -59,7 +59,7 @@ class MoveBlocks(GroupCore):
         self._begin(path, pace, mode, execution)
 
     @block
-    def jog(self, execution: Execution, command: JogCommand) -> None:
+    def jog(self, execution: BlockExecution, command: JogCommand) -> None:
         """``SMC_GroupJog2``: starts a jog, which aborts what moves, or presses other buttons.
 
         It begins when what moved has come to rest. The execution of the first call tells how
@@ -73,7 +73,7 @@ class MoveBlocks(GroupCore):
         if not any(command.directions):
             execution.finish()
             return
-        jog = Jog(
+        jog = JogMotion(
             command,
             self.kinematics,
             tool=self.tool.frame,
@@ -87,51 +87,51 @@ class MoveBlocks(GroupCore):
         self.motion.jog = jog
 
     @block
-    def move_axis(self, execution: Execution, number: int, target: float) -> None:
+    def move_axis(self, execution: BlockExecution, number: int, target: float) -> None:
         """``MC_MoveAbsolute`` of one member axis: while the group moves, a group error."""
         if not 0 <= number < len(self.axes):
-            raise Refused(ErrorKind.PARAMETER, f"There is no axis {number}")
-        if self.state is GroupState.MOVING:
+            raise BlockRefused(ErrorKind.PARAMETER, f"There is no axis {number}")
+        if self.state is SmcGroupState.MOVING:
             text = f"Axis {number} was commanded alone"
             self.machine.fail(ErrorKind.INTERRUPTED_BY_SINGLE_AXIS, text)
-            raise Refused(ErrorKind.INTERRUPTED_BY_SINGLE_AXIS, text)
-        if self.state not in (GroupState.DISABLED, GroupState.STANDBY):
-            raise Refused(ErrorKind.WRONG_STATE, f"In {self.state.name}")
+            raise BlockRefused(ErrorKind.INTERRUPTED_BY_SINGLE_AXIS, text)
+        if self.state not in (SmcGroupState.DISABLED, SmcGroupState.STANDBY):
+            raise BlockRefused(ErrorKind.WRONG_STATE, f"In {self.state.name}")
         self.motion.start_alone(self.axes[number], target, execution, now_ns=self.now_ns)
 
     def _planner(self) -> Planner:
         return Planner(self.kinematics, self.axes, self.transforms)
 
-    def _effective(self, mode: BufferMode, *, continuous: bool) -> BufferMode:
+    def _effective(self, mode: SmcBufferMode, *, continuous: bool) -> SmcBufferMode:
         """Return Buffered where the tool changes between two CP movements (documented)."""
         last = self.motion.queue.last
         if last is None or last.execution.ended or not last.continuous or not continuous:
             return mode
-        return mode if last.tool == self.tool else BufferMode.BUFFERED
+        return mode if last.tool == self.tool else SmcBufferMode.BUFFERED
 
-    def _start(self, mode: BufferMode) -> AxisValues:
+    def _start(self, mode: SmcBufferMode) -> AxisValues:
         """Return where a movement will begin."""
         queue = self.motion.queue
-        if mode is BufferMode.ABORTING:
+        if mode is SmcBufferMode.ABORTING:
             return queue.axes_if_braked(self.now_ns) or self.values
         if any(movement.watch and movement.watch.stops for movement in queue.unfinished):
             text = "Where a movement until an input ends is not known before"
-            raise Refused(ErrorKind.WRONG_STATE, text)
+            raise BlockRefused(ErrorKind.WRONG_STATE, text)
         return queue.last_axes() or self.values
 
     def _begin(
         self,
         path: Path,
         pace: Pace | None,
-        mode: BufferMode,
-        execution: Execution,
+        mode: SmcBufferMode,
+        execution: BlockExecution,
         *,
         base: Frame = ORIGIN,
         watch: EdgeWatch | None = None,
     ) -> None:
         self.machine.begin_motion()
         self.motion.end_jog()
-        if mode is BufferMode.ABORTING:
+        if mode is SmcBufferMode.ABORTING:
             self.motion.queue.take_over(self.now_ns)
             execution.activate()
         self.movements_started += 1

@@ -1,13 +1,18 @@
-"""The states of an axis group in simulated time (softmotion.md 2.2)."""
+"""The states of an axis group in simulated time (docs/reference/softmotion.md 2.2)."""
 
 from collections.abc import Callable
 
-from robolink_simulators.softmotion.group.blocks import Execution
-from robolink_simulators.softmotion.group.condition import GroupState
-from robolink_simulators.softmotion.group.options import GroupOptions
-from robolink_simulators.softmotion.group.smc_errors import ErrorKind, Overruled, Refused, SmcError
+from robolink_simulators.softmotion.function_blocks import BlockExecution
+from robolink_simulators.softmotion.group.condition import SmcGroupState
 from robolink_simulators.softmotion.motion.axes import Axis
-from robolink_simulators.softmotion.motion.motion import Motion
+from robolink_simulators.softmotion.motion.motion import GroupMotion
+from robolink_simulators.softmotion.options import GroupOptions
+from robolink_simulators.softmotion.smc_errors import (
+    BlockRefused,
+    ErrorKind,
+    Overruled,
+    SmcError,
+)
 
 
 class StateMachine:
@@ -26,9 +31,9 @@ class StateMachine:
     """
 
     def __init__(
-        self, axes: Callable[[], tuple[Axis, ...]], motion: Motion, options: GroupOptions
+        self, axes: Callable[[], tuple[Axis, ...]], motion: GroupMotion, options: GroupOptions
     ) -> None:
-        self.state = GroupState.DISABLED
+        self.state = SmcGroupState.DISABLED
         self.error: SmcError | None = None
         self.stop_held = False
         self.now_ns = 0
@@ -36,7 +41,7 @@ class StateMachine:
         self._motion = motion
         self._options = options
         self._cycle_ns = options.cycle_us * 1000
-        self._ending: list[Execution] = []
+        self._ending: list[BlockExecution] = []
         self._rest_ns: int | None = None
 
     def require_motion(self) -> None:
@@ -48,49 +53,49 @@ class StateMachine:
         """
         if self.stop_held and self._options.movement_while_stopping == "aborted":
             raise Overruled
-        if self.state not in (GroupState.STANDBY, GroupState.MOVING):
-            raise Refused(ErrorKind.WRONG_STATE, f"Not in {self.state.name}")
+        if self.state not in (SmcGroupState.STANDBY, SmcGroupState.MOVING):
+            raise BlockRefused(ErrorKind.WRONG_STATE, f"Not in {self.state.name}")
         if self._motion.interrupting:
-            raise Refused(ErrorKind.WRONG_STATE, "An interrupt is under way")
+            raise BlockRefused(ErrorKind.WRONG_STATE, "An interrupt is under way")
         if any(axis.failed for axis in self._axes()):
-            raise Refused(ErrorKind.AXIS_ERROR, "An axis is in error")
+            raise BlockRefused(ErrorKind.AXIS_ERROR, "An axis is in error")
         if not all(axis.powered for axis in self._axes()):
-            raise Refused(ErrorKind.NO_POWER, "A drive has no power")
+            raise BlockRefused(ErrorKind.NO_POWER, "A drive has no power")
         if any(axis.moving_alone for axis in self._axes()):
             text = "An axis of the group is moving alone"
             self.fail(ErrorKind.INTERRUPTED_BY_SINGLE_AXIS, text)
-            raise Refused(ErrorKind.INTERRUPTED_BY_SINGLE_AXIS, text)
+            raise BlockRefused(ErrorKind.INTERRUPTED_BY_SINGLE_AXIS, text)
 
     def begin_motion(self) -> None:
         """Something begins to move the group; a halt under way ends for it (assumed)."""
         self._abort_endings()
         self._rest_ns = None
-        self.state = GroupState.MOVING
+        self.state = SmcGroupState.MOVING
         for axis in self._axes():
             axis.couple()
 
-    def begin_halt(self, execution: Execution) -> None:
+    def begin_halt(self, execution: BlockExecution) -> None:
         """Come to rest and be in Standby a cycle later."""
         self.begin_motion()
         self._motion.brake(self.now_ns)
         self._ending = [execution]
 
-    def begin_interrupt(self, execution: Execution) -> None:
+    def begin_interrupt(self, execution: BlockExecution) -> None:
         """Come to rest on the path and keep what is left."""
         self._motion.interrupt(self.now_ns)
         self._ending = [execution]
 
-    def begin_stop(self, execution: Execution) -> None:
+    def begin_stop(self, execution: BlockExecution) -> None:
         """Come to rest and stay locked until :meth:`release_stop`; another stop joins in."""
         self.stop_held = True
-        if self.state is GroupState.STOPPING:
+        if self.state is SmcGroupState.STOPPING:
             self._ending.append(execution)
             if self._rest_ns is not None:
                 self._finish_endings()
             return
         self.begin_motion()
         self._motion.brake(self.now_ns)
-        self.state = GroupState.STOPPING
+        self.state = SmcGroupState.STOPPING
         self._ending = [execution]
 
     def release_stop(self) -> None:
@@ -112,7 +117,7 @@ class StateMachine:
             error = SmcError(kind, number, text)
         as_error = self._options.queue_on_error == "error"
         self._end_everything(error if as_error else None)
-        self.state, self.error = GroupState.ERROR_STOP, error
+        self.state, self.error = SmcGroupState.ERROR_STOP, error
         for axis in self._axes():
             axis.fail()
 
@@ -122,9 +127,9 @@ class StateMachine:
         Raises:
             Refused: It is not Disabled.
         """
-        if self.state is not GroupState.DISABLED:
-            raise Refused(ErrorKind.WRONG_STATE, f"Not DISABLED but {self.state.name}")
-        self.state = GroupState.STANDBY
+        if self.state is not SmcGroupState.DISABLED:
+            raise BlockRefused(ErrorKind.WRONG_STATE, f"Not DISABLED but {self.state.name}")
+        self.state = SmcGroupState.STANDBY
 
     def disable(self) -> None:
         """Go to Disabled; what was unfinished ends with CommandAborted.
@@ -132,11 +137,11 @@ class StateMachine:
         Raises:
             Refused: The state does not allow it.
         """
-        anywhere = self._options.disable_from == "any" and self.state is not GroupState.DISABLED
-        if self.state is not GroupState.STANDBY and not anywhere:
-            raise Refused(ErrorKind.WRONG_STATE, f"Not STANDBY but {self.state.name}")
+        anywhere = self._options.disable_from == "any" and self.state is not SmcGroupState.DISABLED
+        if self.state is not SmcGroupState.STANDBY and not anywhere:
+            raise BlockRefused(ErrorKind.WRONG_STATE, f"Not STANDBY but {self.state.name}")
         self._end_everything(None)
-        self.state, self.error = GroupState.DISABLED, None
+        self.state, self.error = SmcGroupState.DISABLED, None
         self._free_axes()
 
     def reset(self) -> None:
@@ -146,17 +151,17 @@ class StateMachine:
             Refused: There is nothing to reset.
         """
         failed = [axis for axis in self._axes() if axis.failed]
-        if self.state is not GroupState.ERROR_STOP and not failed:
-            raise Refused(ErrorKind.NOTHING_TO_RESET, f"Not in {self.state.name}")
+        if self.state is not SmcGroupState.ERROR_STOP and not failed:
+            raise BlockRefused(ErrorKind.NOTHING_TO_RESET, f"Not in {self.state.name}")
         for axis in failed:
             axis.failed = False
-        if self.state is GroupState.ERROR_STOP:
-            self.state, self.error = GroupState.STANDBY, None
+        if self.state is SmcGroupState.ERROR_STOP:
+            self.state, self.error = SmcGroupState.STANDBY, None
 
     def restart(self) -> None:
         """The PLC starts anew: what moved stands still where it is, the group is Disabled."""
         self._end_everything(None)
-        self.state, self.error = GroupState.DISABLED, None
+        self.state, self.error = SmcGroupState.DISABLED, None
         self._free_axes()
 
     def advance(self, now_ns: int) -> None:
@@ -205,19 +210,19 @@ class StateMachine:
     def _guarded(self, act: Callable[[int], None]) -> None:
         try:
             act(self.now_ns)
-        except Refused as refused:
+        except BlockRefused as refused:
             self.fail(refused.kind, refused.text)
 
     def _enter_standby(self) -> None:
         self._rest_ns = None
-        self.state = GroupState.STANDBY
+        self.state = SmcGroupState.STANDBY
         if self._options.axes_follow_group:
             self._free_axes()
 
     @property
     def _settled(self) -> bool:
         """Whether the group is at rest in a state that it will leave for that."""
-        return self._motion.resting and self.state in (GroupState.MOVING, GroupState.STOPPING)
+        return self._motion.resting and self.state in (SmcGroupState.MOVING, SmcGroupState.STOPPING)
 
     def _cycle_after(self, now_ns: int) -> int:
         return (now_ns // self._cycle_ns + 1) * self._cycle_ns

@@ -1,20 +1,26 @@
-"""The blocks about tool, kinematics and position (softmotion.md 1, 2.3)."""
+"""The blocks about tool, kinematics and position (docs/reference/softmotion.md 1, 2.3)."""
 
-from robolink_simulators.softmotion.group.blocks import Execution
-from robolink_simulators.softmotion.group.condition import ActualPosition, GroupState, ReadToolMode
+from robolink_simulators.softmotion.function_blocks import BlockExecution
+from robolink_simulators.softmotion.group.condition import (
+    ActualPosition,
+    ReadToolMode,
+    SmcGroupState,
+)
 from robolink_simulators.softmotion.group.core import GroupCore, block
-from robolink_simulators.softmotion.group.smc_errors import ErrorKind, Refused
 from robolink_simulators.softmotion.kinematics.coordinates import CoordRef, CoordSystem
 from robolink_simulators.softmotion.kinematics.frames import NO_TURN, Frame
-from robolink_simulators.softmotion.kinematics.kinematics import Kinematics
-from robolink_simulators.softmotion.motion.movement import Tool
+from robolink_simulators.softmotion.kinematics.kinematics import KinematicsModel
+from robolink_simulators.softmotion.motion.movement import ToolInForce
+from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind
 
 
 class ToolBlocks(GroupCore):
     """Setting and reading the tool, exchanging the kinematics, reading the position."""
 
     @block
-    def set_tool(self, execution: Execution, tool: CoordRef, name: str = "Tool") -> None:
+    def set_tool(
+        self, execution: BlockExecution, tool: CoordRef, name: str = "ToolInForce"
+    ) -> None:
         """``SMC_GroupSetTool``: counts for movements commanded from now on.
 
         Refused in Disabled and ErrorStop, and when the kinematics cannot honour the shift;
@@ -22,10 +28,10 @@ class ToolBlocks(GroupCore):
         """
         self._require_tool_change()
         self._require_fit(tool)
-        self.tool = Tool(tool.frame(), name)
+        self.tool = ToolInForce(tool.frame(), name)
         execution.finish()
 
-    def read_tool(self, mode: ReadToolMode = ReadToolMode.SET) -> Tool:
+    def read_tool(self, mode: ReadToolMode = ReadToolMode.SET) -> ToolInForce:
         """``SMC_GroupReadTool``, in any state.
 
         Raises:
@@ -43,29 +49,29 @@ class ToolBlocks(GroupCore):
                 if unfinished and movement is not None and movement.execution.ended:
                     movement = None
         if movement is None:
-            raise Refused(ErrorKind.NO_SUCH_MOVEMENT, "There is no such movement")
+            raise BlockRefused(ErrorKind.NO_SUCH_MOVEMENT, "There is no such movement")
         return movement.tool
 
     @block
-    def set_kin_transform(self, execution: Execution, kinematics: Kinematics) -> None:
+    def set_kin_transform(self, execution: BlockExecution, kinematics: KinematicsModel) -> None:
         """``MC_SetKinTransform``: takes the tool off, even with the same kinematics (documented).
 
         Accepted in Disabled and Standby (assumed) for a kinematics that the drives fit;
         interrupted movements end, since their way was another kinematics's (assumed).
         """
-        if self.state not in (GroupState.DISABLED, GroupState.STANDBY):
-            raise Refused(ErrorKind.WRONG_STATE, f"In {self.state.name}")
+        if self.state not in (SmcGroupState.DISABLED, SmcGroupState.STANDBY):
+            raise BlockRefused(ErrorKind.WRONG_STATE, f"In {self.state.name}")
         kinds = tuple(axis.kind for axis in self.drives[: len(kinematics.kinds)])
         if kinds != kinematics.kinds:
-            raise Refused(ErrorKind.AXES_MISMATCH, f"The drives do not fit {kinematics.name}")
+            raise BlockRefused(ErrorKind.AXES_MISMATCH, f"The drives do not fit {kinematics.name}")
         self.motion.abandon_interrupted()
         self.kinematics = kinematics
-        self.tool = Tool()
+        self.tool = ToolInForce()
         execution.finish()
 
     @block
     def set_coordinate_transform(
-        self, execution: Execution, system: CoordSystem, in_wcs: CoordRef
+        self, execution: BlockExecution, system: CoordSystem, in_wcs: CoordRef
     ) -> None:
         """``MC_SetCoordinateTransform``: where MCS, PCS_1 or PCS_2 stands in WCS."""
         self.transforms.place(system, in_wcs.frame())
@@ -74,7 +80,7 @@ class ToolBlocks(GroupCore):
     def read_actual_position(self, system: CoordSystem = CoordSystem.MCS) -> ActualPosition:
         """``MC_GroupReadActualPosition`` of the TCP of the tool that is set.
 
-        It therefore jumps when a tool is set (inferred, softmotion.md 1.1).
+        It therefore jumps when a tool is set (inferred, docs/reference/softmotion.md 1.1).
         """
         if system is CoordSystem.ACS:
             return ActualPosition(self.values, None)
@@ -88,19 +94,19 @@ class ToolBlocks(GroupCore):
         return self.flange() @ self.tool.frame
 
     def _require_tool_change(self) -> None:
-        locked = (GroupState.DISABLED, GroupState.ERROR_STOP)
-        stopping = self.state is GroupState.STOPPING and not self.options.set_tool_while_stopping
+        locked = (SmcGroupState.DISABLED, SmcGroupState.ERROR_STOP)
+        stopping = self.state is SmcGroupState.STOPPING and not self.options.set_tool_while_stopping
         if self.state in locked or stopping:
-            raise Refused(ErrorKind.WRONG_STATE, f"No tool can be set in {self.state.name}")
+            raise BlockRefused(ErrorKind.WRONG_STATE, f"No tool can be set in {self.state.name}")
 
     def _require_fit(self, tool: CoordRef) -> None:
         image = self.kinematics.orientation_image(NO_TURN)
         if image is None:
             text = f"{self.kinematics.name} has no orientation image"
-            raise Refused(ErrorKind.NO_ORIENTATION_IMAGE, text)
+            raise BlockRefused(ErrorKind.NO_ORIENTATION_IMAGE, text)
         shift = tool.frame().shift_mm
         if not image.accepts(shift):
-            raise Refused(
+            raise BlockRefused(
                 ErrorKind.TOOL_INCOMPATIBLE,
                 f"{self.kinematics.name} cannot carry a tool shifted by {shift}",
             )

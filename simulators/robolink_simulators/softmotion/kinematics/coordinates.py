@@ -4,12 +4,15 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import Self
 
-from robolink_simulators.softmotion.group.smc_errors import ErrorKind, Refused
 from robolink_simulators.softmotion.kinematics.frames import ORIGIN, Frame, zyz, zyz_angles
+from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind
 
 
 class CoordSystem(IntEnum):
-    """``SMC_COORD_SYSTEM``: members documented (softmotion.md 2.6), numbers those of design 7."""
+    """``SMC_COORD_SYSTEM``: members documented, numbers those of docs/mailbox.md.
+
+    Source: docs/reference/softmotion.md 2.6.
+    """
 
     ACS = 0
     MCS = 1
@@ -21,7 +24,9 @@ class CoordSystem(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class CoordRef:
-    """``MC_COORD_REF``: shift in mm, A, B, C in degrees (documented, softmotion.md 1.3).
+    """``MC_COORD_REF``: shift in mm, A, B, C in degrees.
+
+    Source: docs/reference/softmotion.md 1.3 (documented).
 
     The user unit of a simulated group is the millimetre.
     """
@@ -94,7 +99,7 @@ class CoordinateTransforms:
             case CoordSystem.TCS:
                 return tcp
             case CoordSystem.ACS:
-                raise Refused(ErrorKind.PARAMETER, "ACS is no Cartesian coordinate system")
+                raise BlockRefused(ErrorKind.PARAMETER, "ACS is no Cartesian coordinate system")
             case CoordSystem.WCS:
                 return self._in_wcs[CoordSystem.MCS].inverse()
             case CoordSystem.PCS_1 | CoordSystem.PCS_2:
@@ -102,4 +107,4 @@ class CoordinateTransforms:
 
     def _require_placed(self, system: CoordSystem) -> None:
         if system not in self._in_wcs:
-            raise Refused(ErrorKind.PARAMETER, f"{system.name} has no place of its own")
+            raise BlockRefused(ErrorKind.PARAMETER, f"{system.name} has no place of its own")

@@ -2,17 +2,17 @@
 
 from dataclasses import dataclass, field
 
-from robolink_simulators.softmotion.group.smc_errors import ErrorKind, Refused
 from robolink_simulators.softmotion.kinematics.frames import Frame, Matrix, subtract, turned
 from robolink_simulators.softmotion.kinematics.kinematics import (
     AxisKind,
     AxisValues,
     Configuration,
-    Kinematics,
+    KinematicsModel,
     near_turn,
 )
 from robolink_simulators.softmotion.kinematics.orientation import OrientationSpace, about_z, yaw_deg
 from robolink_simulators.softmotion.kinematics.positions import Scara2Z
+from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +34,9 @@ class CAxis:
 
 @dataclass(frozen=True, slots=True)
 class Coupled:
-    """``Kin_Coupled`` of a position kinematics and a C axis (documented, softmotion.md 3.1).
+    """``Kin_Coupled`` of a position kinematics and a C axis.
+
+    Source: docs/reference/softmotion.md 3.1 (documented).
 
     The position part may turn the C axis's base about Z, as a SCARA's arms do. A shift of any
     direction fits, because the C axis decides the orientation.
@@ -47,7 +49,7 @@ class Coupled:
         own_name: Name of a kinematics that is such a coupling itself.
     """
 
-    position: Kinematics
+    position: KinematicsModel
     c_axis: CAxis = CAxis()
     c_index: int = 3
     own_name: str = ""
@@ -110,5 +112,7 @@ def scara3_z(
 def _yaw_deg(rotation: Matrix) -> float:
     angle_deg = yaw_deg(rotation)
     if angle_deg is None:
-        raise Refused(ErrorKind.UNREACHABLE, "The Z axis of the flange cannot point the other way")
+        raise BlockRefused(
+            ErrorKind.UNREACHABLE, "The Z axis of the flange cannot point the other way"
+        )
     return angle_deg

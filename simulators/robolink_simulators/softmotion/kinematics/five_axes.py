@@ -3,7 +3,6 @@
 import math
 from dataclasses import dataclass
 
-from robolink_simulators.softmotion.group.smc_errors import ErrorKind, Refused
 from robolink_simulators.softmotion.kinematics.frames import Y_AXIS, Frame, Matrix, about, product
 from robolink_simulators.softmotion.kinematics.kinematics import (
     ANY_CONFIGURATION,
@@ -13,6 +12,7 @@ from robolink_simulators.softmotion.kinematics.kinematics import (
     near_turn,
 )
 from robolink_simulators.softmotion.kinematics.orientation import OrientationSpace, about_z
+from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind
 
 _UNDECIDED = 1e-9
 
@@ -78,7 +78,9 @@ def _turn_and_lean_deg(rotation: Matrix) -> tuple[float, float]:
     (r00, r01, r02), (r10, r11, r12), (r20, _, r22) = rotation
     of_sum, of_difference = (r10 + r02, r00 - r12), (r10 - r02, r00 + r12)
     if min(math.hypot(*of_sum), math.hypot(*of_difference)) < _UNDECIDED:
-        raise Refused(ErrorKind.UNREACHABLE, "No inclination comes closest to this orientation")
+        raise BlockRefused(
+            ErrorKind.UNREACHABLE, "No inclination comes closest to this orientation"
+        )
     total, rest = math.atan2(*of_sum), math.atan2(*of_difference)
     c, i = (total + rest) / 2, (total - rest) / 2
     if math.cos(c) * r11 - math.sin(c) * r01 + math.cos(i) * r22 - math.sin(i) * r20 < 0:

@@ -34,7 +34,7 @@ ANY_CONFIGURATION: Final = Configuration()
 """Says nothing: the only one of a kinematics without an elbow, or the present one."""
 
 
-class Kinematics(Protocol):
+class KinematicsModel(Protocol):
     """Axes to flange and back. Implementations hold parameters only."""
 
     @property
@@ -66,8 +66,8 @@ class Kinematics(Protocol):
     def orientation_image(self, wanted: Matrix) -> OrientationSpace | None:
         """Return what becomes of a programmed flange orientation.
 
-        ``GetFlangeOrientationImage`` (documented, softmotion.md 3.1); ``None`` when the
-        kinematics does not implement the interface.
+        ``GetFlangeOrientationImage`` (documented, docs/reference/softmotion.md 3.1); ``None`` when
+        the kinematics does not implement the interface.
 
         Raises:
             Refused: No orientation is closest to this one.

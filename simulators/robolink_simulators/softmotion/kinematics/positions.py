@@ -1,12 +1,11 @@
 """The position kinematics: three axes that carry a flange.
 
-Geometry as in softmotion.md 3.3; the evidence of each stands at its class.
+Geometry as in docs/reference/softmotion.md 3.3; the evidence of each stands at its class.
 """
 
 import math
 from dataclasses import dataclass
 
-from robolink_simulators.softmotion.group.smc_errors import ErrorKind, Refused
 from robolink_simulators.softmotion.kinematics.frames import NO_TURN, Frame, Matrix
 from robolink_simulators.softmotion.kinematics.kinematics import (
     ANY_CONFIGURATION,
@@ -16,6 +15,7 @@ from robolink_simulators.softmotion.kinematics.kinematics import (
     near_turn,
 )
 from robolink_simulators.softmotion.kinematics.orientation import Freedom, OrientationSpace, about_z
+from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind
 
 _ROUNDING = 1e-9
 
@@ -53,7 +53,7 @@ class Scara2Z:
         l1, l2 = self.arm_length_1_mm, self.arm_length_2_mm
         cosine = (x * x + y * y - l1 * l1 - l2 * l2) / (2 * l1 * l2)
         if not abs(cosine) <= 1 + _ROUNDING:
-            raise Refused(
+            raise BlockRefused(
                 ErrorKind.UNREACHABLE, f"Out of the arm's reach: {math.hypot(x, y):.3f} from axis 0"
             )
         bend = math.acos(max(-1.0, min(1.0, cosine)))

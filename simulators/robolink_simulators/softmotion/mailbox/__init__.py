@@ -1,4 +1,4 @@
-"""The mailbox program of a simulated SoftMotion PLC (design part 7). SIMULATED."""
+"""The mailbox program of a simulated SoftMotion PLC (docs/mailbox.md). SIMULATED."""
 
 from robolink_simulators.softmotion.mailbox.faults import PlcFault as PlcFault
 from robolink_simulators.softmotion.mailbox.faults import PlcFaultAction as PlcFaultAction
@@ -7,4 +7,4 @@ from robolink_simulators.softmotion.mailbox.options import MailboxOptions as Mai
 from robolink_simulators.softmotion.mailbox.simulator import (
     SoftMotionSimulator as SoftMotionSimulator,
 )
-from robolink_simulators.softmotion.mailbox.words.exchange import Served as Served
+from robolink_simulators.softmotion.mailbox.words.exchange import ServedAccess as ServedAccess

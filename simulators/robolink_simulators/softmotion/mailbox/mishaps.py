@@ -9,7 +9,7 @@ from robolink_simulators.softmotion.mailbox.panel import PlcPanel
 Act = Callable[[], None]
 
 
-class Mishaps:
+class PlcMishaps:
     """Does to the panel what a fault plan says, each act at its own instant."""
 
     def __init__(self, panel: PlcPanel) -> None:

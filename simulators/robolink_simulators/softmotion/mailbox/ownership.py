@@ -1,4 +1,4 @@
-"""Who may command the mailbox (design part 7)."""
+"""Who may command the mailbox (docs/mailbox.md)."""
 
 from typing import Final
 
@@ -11,7 +11,7 @@ SILENCE_NS: Final = 10 * NS_PER_S
 """After this long without a sign of its owner a mailbox may be taken, if nothing moves."""
 
 
-class Ownership:
+class MailboxOwnership:
     """The owner's token; a PLC start clears it, and keeps the epoch.
 
     Args:

@@ -1,4 +1,4 @@
-"""The mailbox program of a PLC: what it does with a command, and meanwhile (design part 7).
+"""The mailbox program of a PLC: what it does with a command, and meanwhile (docs/mailbox.md).
 
 Theory of operation. Clients write words. In the next cycle of its task the program looks at
 them: a whole new command is accepted, once, and handed to one of the desks, which call the
@@ -14,14 +14,14 @@ from robolink.protocols.mailbox import (
     Command,
     CommandState,
     ErrorClass,
+    ExportProfile,
     Finished,
     Opcode,
-    Profile,
     WordOrder,
     opcodes_of,
 )
+from robolink_simulators.softmotion.function_blocks import BlockExecution
 from robolink_simulators.softmotion.group.axis_group import AxisGroup
-from robolink_simulators.softmotion.group.blocks import Execution
 from robolink_simulators.softmotion.mailbox.commands.complaints import Rejected
 from robolink_simulators.softmotion.mailbox.commands.jobs import Job, Jobs
 from robolink_simulators.softmotion.mailbox.commands.motion import MotionDesk
@@ -29,7 +29,7 @@ from robolink_simulators.softmotion.mailbox.commands.signals import SignalDesk
 from robolink_simulators.softmotion.mailbox.commands.told import Handler, Told, done
 from robolink_simulators.softmotion.mailbox.commands.tools import ToolDesk
 from robolink_simulators.softmotion.mailbox.options import MailboxOptions
-from robolink_simulators.softmotion.mailbox.ownership import Ownership
+from robolink_simulators.softmotion.mailbox.ownership import MailboxOwnership
 from robolink_simulators.softmotion.mailbox.retained import RetainedMemory
 from robolink_simulators.softmotion.mailbox.words.client_watch import ClientWatch
 from robolink_simulators.softmotion.mailbox.words.inbox import Inbox
@@ -74,11 +74,11 @@ class MailboxProgram:
         *,
         options: MailboxOptions,
     ) -> None:
-        profile = Profile(options.profile)
+        profile = ExportProfile(options.profile)
         self.capabilities = profile.capabilities
         self.inbox = Inbox(WordOrder[options.word_order.upper()])
         self.jobs = Jobs(group)
-        self.ownership = Ownership(memory)
+        self.ownership = MailboxOwnership(memory)
         self.permitted = True
         self._group = group
         self._memory = memory
@@ -145,7 +145,7 @@ class MailboxProgram:
             told = self._carried_out(command, now_ns)
             job = Job(command, told.execution)
         except Rejected as rejected:
-            told = Told(Execution())
+            told = Told(BlockExecution())
             job = Job(command, told.execution)
             job.reject(rejected.error_class, rejected.raw)
         named = self.ownership.answer() if command.opcode == Opcode.OWNERSHIP else Answer()
@@ -214,7 +214,7 @@ class MailboxProgram:
     def _next_cycle_ns(self, now_ns: int) -> int:
         return (now_ns // self._cycle_ns + 1) * self._cycle_ns
 
-    def _handlers_of(self, profile: Profile) -> Mapping[int, Handler]:
+    def _handlers_of(self, profile: ExportProfile) -> Mapping[int, Handler]:
         handlers: dict[int, Handler] = {**self._tools.opcodes, **self._motion.opcodes}
         handlers |= SignalDesk(self._group).opcodes
         held = opcodes_of(profile)

@@ -15,16 +15,16 @@ from typing import Any, Final
 
 from robolink.protocols.mailbox import COMMAND, Opcode, Words
 from robolink_simulators.cell.world_parameters import WorldParameters
-from robolink_simulators.softmotion.kinematics.catalogue import machine_named
+from robolink_simulators.softmotion.catalogue import machine_named
 from robolink_simulators.softmotion.kinematics.coordinates import CoordRef
 from robolink_simulators.softmotion.mailbox.faults import PlcFault, PlcFaultAction
-from robolink_simulators.softmotion.mailbox.mishaps import Mishaps
+from robolink_simulators.softmotion.mailbox.mishaps import PlcMishaps
 from robolink_simulators.softmotion.mailbox.option_text import PlcOptions
 from robolink_simulators.softmotion.mailbox.panel import PlcPanel
 from robolink_simulators.softmotion.mailbox.plc import Plc
 from robolink_simulators.softmotion.mailbox.retained import RetainedFile
 from robolink_simulators.softmotion.mailbox.words.exchange import (
-    Served,
+    ServedAccess,
     WireFaults,
     shown_read,
     shown_write,
@@ -111,7 +111,7 @@ class SoftMotionSimulator:
         self.plc = Plc(machine_named(kinematics, given), given, self.options)
         self.world = SoftMotionWorld.seeded(self.plc.group, seed, world)
         self.panel = PlcPanel(self.plc, self.acting)
-        self._mishaps = Mishaps(self.panel)
+        self._mishaps = PlcMishaps(self.panel)
         self._file = RetainedFile(state_path, self.plc.memory, kinematics)
         switched_on = self._file.restore()
         self.plc.start(0)
@@ -160,21 +160,21 @@ class SoftMotionSimulator:
         )
         return min((change for change in changes if change is not None), default=None)
 
-    def read(self, first: int, count: int, now_ns: int) -> Served:
+    def read(self, first: int, count: int, now_ns: int) -> ServedAccess:
         """Serve a client that reads words of response and slots."""
         shown = shown_read(first, count)
         return self._serve(shown, now_ns, lambda _: self.plc.read(first, count, self._now_ns))
 
-    def write(self, first: int, words: Sequence[int], now_ns: int) -> Served:
+    def write(self, first: int, words: Sequence[int], now_ns: int) -> ServedAccess:
         """Serve a client that writes words of the command block."""
         shown = shown_write(first, words, _opcode_name(words))
         return self._serve(shown, now_ns, lambda faults: self._take(first, words, faults))
 
-    def snapshot(self, now_ns: int) -> Served:
+    def snapshot(self, now_ns: int) -> ServedAccess:
         """Serve a client that has the response copied to where it reads it later."""
         return self._serve("snapshot", now_ns, lambda _: self.plc.response(self._now_ns))
 
-    def read_copy(self, words: Words, now_ns: int) -> Served:
+    def read_copy(self, words: Words, now_ns: int) -> ServedAccess:
         """Serve a client that reads a copy of the response that was made before."""
         return self._serve(shown_read(0, len(words)), now_ns, lambda _: words)
 
@@ -189,14 +189,14 @@ class SoftMotionSimulator:
 
     def _serve(
         self, shown: str, now_ns: int, carry_out: Callable[[Sequence[PlcFault]], Words]
-    ) -> Served:
+    ) -> ServedAccess:
         self.hear(now_ns)
         self._requests += 1
         number = self._requests
         self.log.append((self._now_ns, ">", shown))
         faults = self.faults.take(shown)
         if any(fault.action is PlcFaultAction.DISCONNECT_BEFORE for fault in faults):
-            return Served(answered=False, cut=True)
+            return ServedAccess(answered=False, cut=True)
         self._mishaps.strike(faults, self._now_ns)
         try:
             if self.on_request is not None:

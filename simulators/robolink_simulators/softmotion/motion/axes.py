@@ -6,16 +6,16 @@ from enum import IntEnum
 from typing import Final
 
 from robolink.timing import NS_PER_S
-from robolink_simulators.softmotion.group.smc_errors import ErrorKind, Refused
 from robolink_simulators.softmotion.kinematics.kinematics import AxisKind
-from robolink_simulators.softmotion.motion.profile import Pace, Profile
+from robolink_simulators.softmotion.motion.profile import Pace, SpeedProfile
+from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind
 
 _ROUNDING = 1e-9
 _STILL = 1e-9
 
 
 class AxisState(IntEnum):
-    """``SMC_AXIS_STATE`` (documented, softmotion.md 2.1)."""
+    """``SMC_AXIS_STATE`` (documented, docs/reference/softmotion.md 2.1)."""
 
     POWER_OFF = 0
     ERRORSTOP = 1
@@ -60,7 +60,7 @@ class _Travel:
     start_ns: int
     origin: float
     target: float
-    profile: Profile
+    profile: SpeedProfile
 
     @property
     def end_ns(self) -> int:
@@ -140,14 +140,14 @@ class Axis:
             Refused: No power, an error, or the target lies outside the limits.
         """
         if not self.powered:
-            raise Refused(ErrorKind.NO_POWER, f"Axis {self.number} has no power")
+            raise BlockRefused(ErrorKind.NO_POWER, f"Axis {self.number} has no power")
         if self.failed:
-            raise Refused(ErrorKind.AXIS_ERROR, f"Axis {self.number} is in error")
+            raise BlockRefused(ErrorKind.AXIS_ERROR, f"Axis {self.number} is in error")
         self.require_inside(target)
         distance = max(abs(target - self.value), _STILL)
         ramp = self.limits.acceleration_per_s2 / distance
         pace = Pace(self.limits.velocity_per_s / distance, ramp, ramp)
-        self._travel = _Travel(now_ns, self.value, target, Profile.fastest(0.0, pace))
+        self._travel = _Travel(now_ns, self.value, target, SpeedProfile.fastest(0.0, pace))
 
     def require_inside(self, value: float) -> None:
         """Refuse a value outside the software limits.
@@ -156,7 +156,7 @@ class Axis:
             Refused: Names the axis, the value and the limits.
         """
         if not self.limits.holds(value):
-            raise Refused(
+            raise BlockRefused(
                 ErrorKind.AXIS_LIMIT,
                 f"Axis {self.number} outside its limits: {value:.3f}, "
                 f"allowed {self.limits.low:.3f} to {self.limits.high:.3f}",

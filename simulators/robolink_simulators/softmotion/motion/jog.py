@@ -4,8 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from robolink.timing import NS_PER_S
-from robolink_simulators.softmotion.group.blocks import Execution
-from robolink_simulators.softmotion.group.smc_errors import ErrorKind, Refused
+from robolink_simulators.softmotion.function_blocks import BlockExecution
 from robolink_simulators.softmotion.kinematics.coordinates import CoordinateTransforms, CoordSystem
 from robolink_simulators.softmotion.kinematics.frames import (
     Frame,
@@ -18,9 +17,14 @@ from robolink_simulators.softmotion.kinematics.frames import (
     scale,
     turned,
 )
-from robolink_simulators.softmotion.kinematics.kinematics import AxisKind, AxisValues, Kinematics
+from robolink_simulators.softmotion.kinematics.kinematics import (
+    AxisKind,
+    AxisValues,
+    KinematicsModel,
+)
 from robolink_simulators.softmotion.motion.axes import Axis
 from robolink_simulators.softmotion.motion.paths import Dynamics, axes_for_tcp, require_inside
+from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind
 
 COORDINATES = 6
 
@@ -54,7 +58,7 @@ class JogCommand:
         return self.system is CoordSystem.ACS or any(self.directions[3:])
 
 
-class Jog:
+class JogMotion:
     """A jog under way.
 
     Args:
@@ -72,12 +76,12 @@ class Jog:
     def __init__(
         self,
         command: JogCommand,
-        kinematics: Kinematics,
+        kinematics: KinematicsModel,
         *,
         tool: Frame,
         transforms: CoordinateTransforms,
         axes: Sequence[Axis],
-        execution: Execution,
+        execution: BlockExecution,
     ) -> None:
         self._kinematics = kinematics
         self._tool = tool
@@ -103,9 +107,9 @@ class Jog:
         """
         command.dynamics.require_usable(*((1.0,) if command.by_factor else ()))
         if command.system is not self._command.system and any(self._velocities):
-            raise Refused(ErrorKind.PARAMETER, "The coordinate system cannot change in motion")
+            raise BlockRefused(ErrorKind.PARAMETER, "The coordinate system cannot change in motion")
         if command.system is CoordSystem.ACS and any(command.directions[len(self._axes) :]):
-            raise Refused(ErrorKind.PARAMETER, f"There are only {len(self._axes)} axes")
+            raise BlockRefused(ErrorKind.PARAMETER, f"There are only {len(self._axes)} axes")
         self._command = command
 
     def release(self) -> None:
@@ -180,7 +184,7 @@ def jogged(tcp: Frame, base: Matrix, way_mm: Vector, turn_deg: Vector) -> Frame:
     """Return a TCP moved along, and turned about, the axes of a coordinate system.
 
     A, B and C turn about X, Y and Z through the TCP: they are no Euler angles here
-    (documented, softmotion.md 0.4).
+    (documented, docs/reference/softmotion.md 2.3).
 
     Args:
         tcp: The TCP in MCS.

@@ -2,21 +2,21 @@
 
 from collections.abc import Callable, Sequence
 
-from robolink_simulators.softmotion.group.blocks import Execution
-from robolink_simulators.softmotion.group.options import GroupOptions
-from robolink_simulators.softmotion.group.signals import InputBits
-from robolink_simulators.softmotion.group.smc_errors import ErrorKind, Refused, SmcError
+from robolink_simulators.softmotion.function_blocks import BlockExecution
 from robolink_simulators.softmotion.kinematics.kinematics import AxisValues
 from robolink_simulators.softmotion.motion.axes import Axis
-from robolink_simulators.softmotion.motion.jog import Jog
+from robolink_simulators.softmotion.motion.jog import JogMotion
 from robolink_simulators.softmotion.motion.movement import EdgeWatch, Movement
 from robolink_simulators.softmotion.motion.paths import require_inside
 from robolink_simulators.softmotion.motion.queue import MovementQueue
+from robolink_simulators.softmotion.options import GroupOptions
+from robolink_simulators.softmotion.signals import DigitalInputs
+from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind, SmcError
 
 _HALVINGS = 40
 
 
-class Motion:
+class GroupMotion:
     """The axes, and what is under way on them.
 
     Args:
@@ -33,15 +33,15 @@ class Motion:
     """
 
     def __init__(
-        self, axes: Callable[[], tuple[Axis, ...]], inputs: InputBits, options: GroupOptions
+        self, axes: Callable[[], tuple[Axis, ...]], inputs: DigitalInputs, options: GroupOptions
     ) -> None:
         self._axes = axes
         self._inputs = inputs
         self._options = options
         self._cycle_ns = options.cycle_us * 1000
-        self._singles: list[tuple[Axis, Execution]] = []
+        self._singles: list[tuple[Axis, BlockExecution]] = []
         self.queue = MovementQueue(self._cycle_ns)
-        self.jog: Jog | None = None
+        self.jog: JogMotion | None = None
         self.interrupted: list[Movement] = []
         self.interrupted_at: AxisValues = ()
         self.interrupting = False
@@ -58,7 +58,9 @@ class Motion:
             return False
         return not self.queue.running if self.interrupting else self.queue.empty
 
-    def start_alone(self, axis: Axis, target: float, execution: Execution, *, now_ns: int) -> None:
+    def start_alone(
+        self, axis: Axis, target: float, execution: BlockExecution, *, now_ns: int
+    ) -> None:
         """Begin a single movement of an axis.
 
         Raises:
@@ -188,10 +190,10 @@ class Motion:
                 execution.finish()
         self._singles = [single for single in self._singles if not single[1].ended]
 
-    def _step_jog(self, jog: Jog) -> None:
+    def _step_jog(self, jog: JogMotion) -> None:
         try:
             self._place(jog.step(self.values, self._cycle_ns))
-        except Refused as refused:
+        except BlockRefused as refused:
             jog.execution.fail(self._options.numbers.error(refused.kind, refused.text))
             self.jog = None
             return

@@ -4,16 +4,16 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 from robolink.timing import NS_PER_S
-from robolink_simulators.softmotion.group.blocks import Execution
+from robolink_simulators.softmotion.function_blocks import BlockExecution
 from robolink_simulators.softmotion.kinematics.coordinates import CoordRef
 from robolink_simulators.softmotion.kinematics.frames import ORIGIN, Frame
 from robolink_simulators.softmotion.kinematics.kinematics import AxisValues
 from robolink_simulators.softmotion.motion.paths import JointPath, LinePath, Path
-from robolink_simulators.softmotion.motion.profile import Pace, Profile
+from robolink_simulators.softmotion.motion.profile import Pace, SpeedProfile
 
 
-class BufferMode(IntEnum):
-    """``MC_BUFFER_MODE`` (documented, softmotion.md 2.4)."""
+class SmcBufferMode(IntEnum):
+    """``MC_BUFFER_MODE`` (documented, docs/reference/softmotion.md 2.4)."""
 
     ABORTING = 0
     BUFFERED = 1
@@ -25,15 +25,15 @@ class BufferMode(IntEnum):
     @property
     def blends(self) -> bool:
         """Whether the corner before the movement may be rounded."""
-        return self >= BufferMode.BLENDING_LOW
+        return self >= SmcBufferMode.BLENDING_LOW
 
 
 @dataclass(frozen=True, slots=True)
-class Tool:
+class ToolInForce:
     """``ToolOffset`` and ``Name`` of SMC_GroupSetTool."""
 
     frame: Frame = ORIGIN
-    name: str = "Tool"
+    name: str = "ToolInForce"
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,10 +74,10 @@ class Movement:
         path: Path,
         pace: Pace | None,
         *,
-        tool: Tool,
-        mode: BufferMode,
+        tool: ToolInForce,
+        mode: SmcBufferMode,
         base: Frame,
-        execution: Execution,
+        execution: BlockExecution,
         watch: EdgeWatch | None = None,
     ) -> None:
         self.number = number
@@ -89,7 +89,7 @@ class Movement:
         self.armed = False
         self._base = base
         self._pace = pace
-        self._profile = Profile.fastest(0.0, pace)
+        self._profile = SpeedProfile.fastest(0.0, pace)
         self._start_ns: int | None = None
         self._braked = False
 
@@ -145,7 +145,7 @@ class Movement:
     def start(self, now_ns: int) -> None:
         """Begin, or go on after an interruption, from rest."""
         share = self._profile.end if self.begun else 0.0
-        self._profile = Profile.fastest(share, self._pace)
+        self._profile = SpeedProfile.fastest(share, self._pace)
         self._start_ns = now_ns
         self._braked = False
         self.execution.activate()
@@ -176,7 +176,7 @@ class Movement:
             return isinstance(before.path, JointPath)
         return isinstance(before.path, LinePath) and before.tool == self.tool
 
-    def _braked_profile(self, now_ns: int) -> Profile:
+    def _braked_profile(self, now_ns: int) -> SpeedProfile:
         if self._start_ns is None or self._pace is None:
             return self._profile
         elapsed_s = (now_ns - self._start_ns) / NS_PER_S

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
 
-from robolink_simulators.softmotion.group.smc_errors import ErrorKind, Refused
 from robolink_simulators.softmotion.kinematics.frames import (
     Frame,
     Matrix,
@@ -22,10 +21,11 @@ from robolink_simulators.softmotion.kinematics.frames import (
 from robolink_simulators.softmotion.kinematics.kinematics import (
     AxisValues,
     Configuration,
-    Kinematics,
+    KinematicsModel,
 )
 from robolink_simulators.softmotion.motion.axes import Axis
 from robolink_simulators.softmotion.motion.profile import Pace
+from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind
 
 _STILL = 1e-9
 _CHECK_EVERY_MM = 2.0
@@ -53,7 +53,7 @@ class Dynamics(NamedTuple):
         """
         for name, value in self._asdict().items():
             if not (math.isfinite(value) and 0 < value <= most):
-                raise Refused(ErrorKind.DYNAMICS, f"{name} cannot be {value}")
+                raise BlockRefused(ErrorKind.DYNAMICS, f"{name} cannot be {value}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +89,7 @@ class LinePath:
         end_tcp: TCP at its end.
     """
 
-    kinematics: Kinematics
+    kinematics: KinematicsModel
     tool: Frame
     configuration: Configuration
     start: AxisValues
@@ -136,7 +136,7 @@ Path = JointPath | LinePath
 
 
 def axes_for_tcp(
-    kinematics: Kinematics,
+    kinematics: KinematicsModel,
     tcp: Frame,
     tool: Frame,
     configuration: Configuration,
@@ -145,7 +145,8 @@ def axes_for_tcp(
 ) -> AxisValues:
     """Return the axes that bring the TCP somewhere, its orientation as close as it can be.
 
-    The orientation is projected first and the position kept (documented, softmotion.md 3.1).
+    The orientation is projected first and the position kept (documented,
+    docs/reference/softmotion.md 3.1).
 
     Raises:
         Refused: Out of reach.
@@ -157,7 +158,9 @@ def axes_for_tcp(
     return kinematics.axes_for(flange, configuration, near)
 
 
-def plan_line(kinematics: Kinematics, start: AxisValues, target: Frame, tool: Frame) -> LinePath:
+def plan_line(
+    kinematics: KinematicsModel, start: AxisValues, target: Frame, tool: Frame
+) -> LinePath:
     """Plan a straight movement of the TCP that keeps the configuration.
 
     Raises:

@@ -4,7 +4,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from robolink_simulators.softmotion.group.smc_errors import ErrorKind, Refused
 from robolink_simulators.softmotion.kinematics.coordinates import (
     CoordinateTransforms,
     CoordRef,
@@ -16,7 +15,7 @@ from robolink_simulators.softmotion.kinematics.kinematics import (
     AxisKind,
     AxisValues,
     Configuration,
-    Kinematics,
+    KinematicsModel,
 )
 from robolink_simulators.softmotion.motion.axes import Axis
 from robolink_simulators.softmotion.motion.paths import (
@@ -29,6 +28,7 @@ from robolink_simulators.softmotion.motion.paths import (
     plan_line,
 )
 from robolink_simulators.softmotion.motion.profile import Pace
+from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind
 
 Position = tuple[float, ...]
 """``SMC_POS_REF``: six numbers, axis values in ACS, else X, Y, Z, A, B, C."""
@@ -59,7 +59,7 @@ class Planner:
     """
 
     def __init__(
-        self, kinematics: Kinematics, axes: Sequence[Axis], transforms: CoordinateTransforms
+        self, kinematics: KinematicsModel, axes: Sequence[Axis], transforms: CoordinateTransforms
     ) -> None:
         self._kinematics = kinematics
         self._axes = axes
@@ -120,7 +120,9 @@ class Planner:
         if target.system is CoordSystem.ACS:
             wanted = self._kinematics.configuration(self._axis_target(target))
         if wanted.elbow_right not in (None, present.elbow_right):
-            raise Refused(ErrorKind.CONFIGURATION, "A straight movement keeps the elbow's side")
+            raise BlockRefused(
+                ErrorKind.CONFIGURATION, "A straight movement keeps the elbow's side"
+            )
 
 
 def _inside(value: float, axis: Axis) -> float:
@@ -134,4 +136,4 @@ def _inside(value: float, axis: Axis) -> float:
 
 def _require_finite(values: Sequence[float], count: int) -> None:
     if len(values) != count or not all(math.isfinite(value) for value in values):
-        raise Refused(ErrorKind.PARAMETER, f"Not {count} finite numbers: {tuple(values)}")
+        raise BlockRefused(ErrorKind.PARAMETER, f"Not {count} finite numbers: {tuple(values)}")

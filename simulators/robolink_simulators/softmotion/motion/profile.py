@@ -29,7 +29,7 @@ class Pace(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Profile:
+class SpeedProfile:
     """The share of a path, 0 to 1, as a function of time.
 
     Attributes:
@@ -93,7 +93,7 @@ class Profile:
         """Return this profile as far as ``time_s``, coming to rest after that.
 
         Slows down harder than asked where the path would end first, as MC_GroupStop may
-        (documented, softmotion.md 2.3).
+        (documented, docs/reference/softmotion.md 2.3).
         """
         if time_s >= self.duration_s:
             return self

@@ -5,8 +5,8 @@ from typing import Final
 
 from robolink.model import Hand, rotate_xy
 from robolink_simulators.epson.memory.points import AXES, HIGHEST_LOCAL, Point
-from robolink_simulators.epson.refusals import Refusal, RefusalKind
-from robolink_simulators.epson.remote.refused import Refused
+from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
+from robolink_simulators.epson.request_refusals import RequestRefused
 from robolink_simulators.epson.spel.expressions.functions import PLAIN_FUNCTIONS
 from robolink_simulators.epson.spel.expressions.machine_functions import (
     MACHINE_FUNCTIONS,
@@ -65,7 +65,7 @@ CONSTANTS: Final[dict[str, Value]] = {
     "lf": "\n",
     "crlf": "\r\n",
 }
-"""Predefined constants (spel.md 1.2)."""
+"""Predefined constants (docs/reference/spel.md 1.2)."""
 
 FARTHEST: Final = 1e9
 """Largest coordinate that a point may have (assumed), in mm or degrees."""
@@ -149,7 +149,7 @@ class Evaluator:
             return checked(state(self.session, [self.value(argument) for argument in given]))
         if arguments is None:
             return self._of_the_project(name)
-        raise Refusal(RefusalKind.NAME_UNDEFINED, f"Nothing is called {name}")
+        raise SpelRefusal(RefusalKind.NAME_UNDEFINED, f"Nothing is called {name}")
 
     def _of_the_project(self, name: str) -> Value:
         """Return a point by its label, or a variable.
@@ -163,12 +163,12 @@ class Evaluator:
         if self.session.variables.holds(name):
             try:
                 return self.session.variables.read(name)
-            except Refused as refused:
-                raise Refusal(RefusalKind.SUBSCRIPT, f"{name} is an array") from refused
-        raise Refusal(RefusalKind.NAME_UNDEFINED, f"Nothing is called {name}")
+            except RequestRefused as refused:
+                raise SpelRefusal(RefusalKind.SUBSCRIPT, f"{name} is an array") from refused
+        raise SpelRefusal(RefusalKind.NAME_UNDEFINED, f"Nothing is called {name}")
 
     def _point_number(self, argument: Expression) -> int:
-        # PDef(P1), PDef(P(n)) and PDef(1) all name point 1 (spel.md 5.1).
+        # PDef(P1), PDef(P(n)) and PDef(1) all name point 1 (docs/reference/spel.md 5.1).
         if isinstance(argument, PointExpression):
             return self.stored_number(argument)
         return self.integer(argument)
@@ -183,7 +183,7 @@ class Evaluator:
             case PointExpression(StoredPoint(number), 0, None, ()):
                 return self.integer(number)
             case _:
-                raise Refusal(RefusalKind.SYNTAX, "A stored point such as P1 is needed")
+                raise SpelRefusal(RefusalKind.SYNTAX, "A stored point such as P1 is needed")
 
     def _base(self, base: Base) -> Point:
         if isinstance(base, StoredPoint):
@@ -192,7 +192,7 @@ class Evaluator:
             return as_point(self._named(base.name, None))
         counts, function = POINT_FUNCTIONS[base.name]
         if base.name in OF_JOINTS and len(base.arguments) == SIX_JOINTS:
-            raise Refusal(RefusalKind.OTHER_ROBOT, "This robot has four joints")
+            raise SpelRefusal(RefusalKind.OTHER_ROBOT, "This robot has four joints")
         _check_count(base.name, base.arguments, counts)
         return function(self.session, [self.value(argument) for argument in base.arguments])
 
@@ -217,7 +217,7 @@ class Evaluator:
 
 def _check_count(name: str, arguments: tuple[Expression, ...], counts: range) -> None:
     if len(arguments) not in counts:
-        raise Refusal(RefusalKind.SYNTAX, f"{name} does not take {len(arguments)} arguments")
+        raise SpelRefusal(RefusalKind.SYNTAX, f"{name} does not take {len(arguments)} arguments")
 
 
 def _bounded(point: Point) -> Point:

@@ -8,7 +8,7 @@ from robolink.model import Hand, ToolOffset
 from robolink_simulators.epson.arm.kinematics import Joints, check_ranges, forward, tip_of
 from robolink_simulators.epson.memory.bits import BitBank
 from robolink_simulators.epson.memory.points import AXES, Point
-from robolink_simulators.epson.refusals import OutOfReach, Refusal, RefusalKind
+from robolink_simulators.epson.refusals import OutOfReach, RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.values import (
     Value,
     as_integer,
@@ -23,7 +23,7 @@ MachineFunction = Callable[[Session, Arguments], Value]
 PointFunction = Callable[[Session, Arguments], Point]
 
 SCARA: Final = 3
-"""RobotType (spel.md 9)."""
+"""RobotType (docs/reference/spel.md 9)."""
 
 OF_JOINTS: Final = frozenset({"ja", "pulse"})
 """Functions of one value for each joint."""
@@ -85,7 +85,7 @@ def _at_home(session: Session, _: Arguments) -> Value:
 def _home(session: Session, arguments: Arguments) -> Value:
     home = session.machine.settings.home_pulses
     if home is None:
-        raise Refusal(RefusalKind.HOME_UNDEFINED, "No home position is set")
+        raise SpelRefusal(RefusalKind.HOME_UNDEFINED, "No home position is set")
     return _item(home, arguments)
 
 
@@ -99,7 +99,10 @@ def _pulses(session: Session, arguments: Arguments) -> Value:
 
 
 def pulses_of(session: Session, joints: Joints) -> list[int]:
-    """Return encoder pulses, 0 where the joint value is 0 (epson.md 4: pulse ranges)."""
+    """Return encoder pulses, 0 where the joint value is 0.
+
+    Source: docs/reference/epson.md 4: pulse ranges.
+    """
     scales = session.machine.model.pulses_per_unit
     return [round(v * scale) for v, scale in zip(joints.values(), scales, strict=True)]
 
@@ -182,13 +185,13 @@ def coordinates_of(values: Sequence[float]) -> Point:
         Refusal: Another number of coordinates.
     """
     if len(values) not in (4, 6):
-        raise Refusal(RefusalKind.SYNTAX, f"{len(values)} coordinates: 4 or 6 are needed")
+        raise SpelRefusal(RefusalKind.SYNTAX, f"{len(values)} coordinates: 4 or 6 are needed")
     x, y, z, u, v, w = (*map(float, values), 0.0, 0.0)[:6]
     return Point((x, y, z, u, v, w), given=len(values))
 
 
 def offset_point(offset: ToolOffset) -> Point:
-    """Return a tool definition as a point (spel.md 6.1)."""
+    """Return a tool definition as a point (docs/reference/spel.md 6.1)."""
     return Point(offset.components())
 
 
@@ -245,7 +248,7 @@ def _real_position(session: Session, _: Arguments) -> Point:
 def _found_position(session: Session, _: Arguments) -> Point:
     if session.machine.found is None:
         # What FindPos gives before anything was found is not documented: an error here.
-        raise Refusal(RefusalKind.POINT_UNDEFINED, "No Find has met its condition")
+        raise SpelRefusal(RefusalKind.POINT_UNDEFINED, "No Find has met its condition")
     return session.machine.found
 
 
@@ -253,7 +256,7 @@ def _tool_point(session: Session, arguments: Arguments) -> Point:
     tool = as_integer(arguments[0])
     offset = session.machine.tools.get(tool)
     if offset is None and tool != 0 and session.options.tlset_of_undefined == "error":
-        raise Refusal(RefusalKind.TOOL_UNDEFINED, f"Tool {tool} is not defined")
+        raise SpelRefusal(RefusalKind.TOOL_UNDEFINED, f"Tool {tool} is not defined")
     return offset_point(offset or ToolOffset())
 
 

@@ -1,9 +1,9 @@
-"""Values of expressions and how one kind becomes another (spel.md 2.1)."""
+"""Values of expressions and how one kind becomes another (docs/reference/spel.md 2.1)."""
 
 import math
 
 from robolink_simulators.epson.memory.points import Point
-from robolink_simulators.epson.refusals import Refusal, RefusalKind
+from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 
 Number = int | float
 Value = bool | int | float | str | Point
@@ -14,17 +14,17 @@ _TRUE = -1
 _LARGEST_INT = 2**63 - 1
 
 
-def out_of_range(text: str) -> Refusal:
+def out_of_range(text: str) -> SpelRefusal:
     """Return the refusal of a value that is not allowed."""
-    return Refusal(RefusalKind.VALUE_OUT_OF_RANGE, text)
+    return SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, text)
 
 
-def _mismatch(wanted: str) -> Refusal:
-    return Refusal(RefusalKind.TYPE_MISMATCH, f"Type mismatch: {wanted} expected")
+def _mismatch(wanted: str) -> SpelRefusal:
+    return SpelRefusal(RefusalKind.TYPE_MISMATCH, f"Type mismatch: {wanted} expected")
 
 
 def as_number(value: Value) -> Number:
-    """Return a number; True counts as -1 (documented constant, spel.md 1.2).
+    """Return a number; True counts as -1 (documented constant, docs/reference/spel.md 1.2).
 
     Raises:
         Refusal: A string or a point.

@@ -1,14 +1,14 @@
-"""Jump and Jump3: up, across, down (spel.md 7.1)."""
+"""Jump and Jump3: up, across, down (docs/reference/spel.md 7.1)."""
 
 from dataclasses import replace
 
 from robolink.model import Pose
 from robolink_simulators.epson.arm.kinematics import Joints, flange_of, solve
-from robolink_simulators.epson.arm.motion_parameters import LIMZ_MARGIN_MM, Phase
+from robolink_simulators.epson.arm.motion_parameters import LIMZ_MARGIN_MM, MotionPhase
 from robolink_simulators.epson.arm.trajectory import Leg
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.points import Point
-from robolink_simulators.epson.refusals import Refusal, RefusalKind
+from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.statements.legs import go_leg, line_leg, pose_of
 
 DESCENT = 2
@@ -31,13 +31,13 @@ def jump(machine: Machine, point: Point, limz_mm: float | None) -> list[Leg]:
     start, end = machine.arm.joints, machine.joints_for(point)
     for joints, what in ((start, "The motion starts"), (end, "The target lies")):
         if joints.j3_mm > height_mm + LIMZ_MARGIN_MM:
-            raise Refusal(RefusalKind.ABOVE_LIMZ, f"{what} above LimZ")
+            raise SpelRefusal(RefusalKind.ABOVE_LIMZ, f"{what} above LimZ")
     up = replace(start, j3_mm=max(start.j3_mm, height_mm))
     across = replace(end, j3_mm=max(end.j3_mm, height_mm))
     return [
-        go_leg(machine, start, up, phase=Phase.DEPART),
+        go_leg(machine, start, up, phase=MotionPhase.DEPART),
         go_leg(machine, up, across),
-        go_leg(machine, across, end, phase=Phase.APPROACH),
+        go_leg(machine, across, end, phase=MotionPhase.APPROACH),
     ]
 
 

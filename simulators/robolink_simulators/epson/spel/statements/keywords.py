@@ -1,4 +1,7 @@
-"""Keyword statements about tools, the home position, switches and conditions (spel.md 6 to 8)."""
+"""Keyword statements about tools, the home position, switches and conditions.
+
+Source: docs/reference/spel.md 6, 8.
+"""
 
 from collections.abc import Callable, Sequence
 from typing import Final, NamedTuple
@@ -11,7 +14,7 @@ from robolink_simulators.epson.arm.trajectory import Leg
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.bits import BitBank
 from robolink_simulators.epson.memory.points import Point
-from robolink_simulators.epson.refusals import Refusal, RefusalKind
+from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
 from robolink_simulators.epson.spel.expressions.machine_functions import SIX_JOINTS, pulses_of
 from robolink_simulators.epson.spel.expressions.printing import CRLF, number_text
@@ -26,11 +29,11 @@ from robolink_simulators.epson.spel.statements.waiting import (
     seconds_of,
     shown_condition,
 )
-from robolink_simulators.epson.spel.tree import Command, Expression
+from robolink_simulators.epson.spel.tree import Expression, KeywordStatement
 
 SHORTEST_PULSE_S: Final = 0.01
 LONGEST_PULSE_S: Final = 10.0
-"""Times after which On and Off switch back (spel.md 8)."""
+"""Times after which On and Off switch back (docs/reference/spel.md 8)."""
 
 
 class TimedBit(NamedTuple):
@@ -42,7 +45,7 @@ class TimedBit(NamedTuple):
     after_ns: int
 
 
-class Outcome(NamedTuple):
+class StatementOutcome(NamedTuple):
     """What a statement printed, how long it takes, and what moves meanwhile."""
 
     output: str = ""
@@ -51,36 +54,36 @@ class Outcome(NamedTuple):
     timed: TimedBit | None = None
 
 
-def run_command(evaluator: Evaluator, command: Command) -> Outcome:
+def run_command(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
     """Carry out a keyword statement.
 
     Raises:
         Refusal: It cannot be carried out; nothing was changed.
     """
     if command.open_ended and command.name != "plist":
-        raise Refusal(RefusalKind.SYNTAX, f"{command.name} does not end with a comma")
+        raise SpelRefusal(RefusalKind.SYNTAX, f"{command.name} does not end with a comma")
     session = evaluator.session
     setting = SETTINGS.get(command.name) or ROBOT_SETTINGS.get(command.name)
     if setting is not None or command.name == "accel":
         numbers = [evaluator.number(argument) for argument in command.arguments]
         if setting is None:
-            return Outcome(accel(session.machine, numbers, session.options.accel_max))
-        return Outcome(setting(session.machine, numbers))
+            return StatementOutcome(accel(session.machine, numbers, session.options.accel_max))
+        return StatementOutcome(setting(session.machine, numbers))
     if command.name in POINT_STATEMENTS:
-        return Outcome(POINT_STATEMENTS[command.name](evaluator, command))
+        return StatementOutcome(POINT_STATEMENTS[command.name](evaluator, command))
     return _HANDLERS[command.name](evaluator, command)
 
 
-def _expect(command: Command, *counts: int) -> tuple[Expression, ...]:
+def _expect(command: KeywordStatement, *counts: int) -> tuple[Expression, ...]:
     if len(command.arguments) not in counts:
-        raise Refusal(
+        raise SpelRefusal(
             RefusalKind.SYNTAX,
             f"{command.name} does not take {len(command.arguments)} arguments here",
         )
     return command.arguments
 
 
-def _tlset(evaluator: Evaluator, command: Command) -> Outcome:
+def _tlset(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
     session, arguments = evaluator.session, _expect(command, 0, 1, 2, 5, 7)
     tools = session.machine.tools
     if len(arguments) <= 1:
@@ -90,57 +93,57 @@ def _tlset(evaluator: Evaluator, command: Command) -> Outcome:
             offset = tools.get(tool)
             shown = {} if offset is None else {tool: offset}
         listing = format_tool_listing(shown, layout=session.options.tool_listing)
-        return Outcome(listing + CRLF if listing else "")
-    # Flags and local of the point are ignored (documented, spel.md 6.1).
+        return StatementOutcome(listing + CRLF if listing else "")
+    # Flags and local of the point are ignored (documented, docs/reference/spel.md 6.1).
     x, y, z, *angles = point_argument(evaluator, arguments[1:]).coordinates
     if session.options.angle_wrap:
         angles = [angle if -180 <= angle <= 180 else _wrapped(angle) for angle in angles]
     tools.set(evaluator.integer(arguments[0]), ToolOffset(x, y, z, *angles))
-    return Outcome()
+    return StatementOutcome()
 
 
 def _wrapped(angle_deg: float) -> float:
     return (angle_deg + 180.0) % 360.0 - 180.0
 
 
-def _tlclr(evaluator: Evaluator, command: Command) -> Outcome:
+def _tlclr(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
     (tool,) = _expect(command, 1)
     session = evaluator.session
     in_force = session.options.clear_selected_tool
     session.machine.tools.clear(evaluator.integer(tool), in_force=in_force)
-    return Outcome()
+    return StatementOutcome()
 
 
-def _tool(evaluator: Evaluator, command: Command) -> Outcome:
+def _tool(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
     arguments, tools = _expect(command, 0, 1), evaluator.session.machine.tools
     if not arguments:
         # Bare Tool prints the number alone (seen: a client reads it as an integer).
-        return Outcome(number_text(tools.selected) + CRLF)
+        return StatementOutcome(number_text(tools.selected) + CRLF)
     tools.select(evaluator.integer(arguments[0]))
-    return Outcome()
+    return StatementOutcome()
 
 
-def _where(evaluator: Evaluator, command: Command) -> Outcome:
+def _where(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
     arguments, session = _expect(command, 0, 1), evaluator.session
     machine = session.machine
     local = evaluator.integer(arguments[0]) if arguments else 0
     here = machine.locals.convert(Point.at(machine.tip()), local)
     joints = machine.arm.joints
     printed = PrintedWhere(here.coordinates, joints.values(), tuple(pulses_of(session, joints)))
-    return Outcome(format_where(printed, width=session.options.where_width) + CRLF)
+    return StatementOutcome(format_where(printed, width=session.options.where_width) + CRLF)
 
 
-def _switch(command: Command, evaluator: Evaluator, *, on: bool) -> Outcome:
-    """Switch a bit, for a time if one stands there (documented, spel.md 8)."""
+def _switch(command: KeywordStatement, evaluator: Evaluator, *, on: bool) -> StatementOutcome:
+    """Switch a bit, for a time if one stands there (documented, docs/reference/spel.md 8)."""
     arguments, machine = _expect(command, 1, 2, 3), evaluator.session.machine
     bank = machine.memory if command.name.startswith("mem") else machine.outputs
     number = evaluator.integer(arguments[0])
     if len(arguments) == 1:
         bank.set(number, on)
         machine.timed_bits.forget(bank, number)
-        return Outcome()
+        return StatementOutcome()
     if bank is machine.memory:
-        raise Refusal(RefusalKind.SYNTAX, "A memory bit takes no time")
+        raise SpelRefusal(RefusalKind.SYNTAX, "A memory bit takes no time")
     seconds = float(evaluator.number(arguments[1]))
     if not SHORTEST_PULSE_S <= seconds <= LONGEST_PULSE_S:
         raise out_of_range(f"A time of {seconds} s")
@@ -148,74 +151,74 @@ def _switch(command: Command, evaluator: Evaluator, *, on: bool) -> Outcome:
     bank.set(number, on)
     duration_ns = round(seconds * NS_PER_S)
     pulse = TimedBit(bank, number, not on, duration_ns)
-    return Outcome(duration_ns=0 if goes_on else duration_ns, timed=pulse)
+    return StatementOutcome(duration_ns=0 if goes_on else duration_ns, timed=pulse)
 
 
-def _on(evaluator: Evaluator, command: Command) -> Outcome:
+def _on(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
     return _switch(command, evaluator, on=True)
 
 
-def _off(evaluator: Evaluator, command: Command) -> Outcome:
+def _off(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
     return _switch(command, evaluator, on=False)
 
 
-def _port(evaluator: Evaluator, command: Command) -> Outcome:
+def _port(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
     """Set a byte or a word of outputs or memory bits."""
     at, value = (evaluator.integer(argument) for argument in _expect(command, 2))
     machine = evaluator.session.machine
     bank = machine.memory if command.name.startswith("mem") else machine.outputs
     if not command.name.endswith("w"):
         bank.set_byte(at, value)
-        return Outcome()
+        return StatementOutcome()
     if not 0 <= value <= 0xFFFF:
         raise out_of_range(f"Not a word: {value}")
     bank.set_byte(2 * at, value & 0xFF)
     bank.set_byte(2 * at + 1, value >> 8)
-    return Outcome()
+    return StatementOutcome()
 
 
-def _wait_limit(evaluator: Evaluator, command: Command) -> Outcome:
+def _wait_limit(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
     memory = evaluator.session.memory
     arguments = _expect(command, 0, 1)
     if not arguments:
-        return Outcome(number_text(memory.wait_limit_s) + CRLF)
+        return StatementOutcome(number_text(memory.wait_limit_s) + CRLF)
     memory.wait_limit_s = int(seconds_of(evaluator, arguments[0]))
-    return Outcome()
+    return StatementOutcome()
 
 
-def _keep_condition(evaluator: Evaluator, command: Command) -> Outcome:
+def _keep_condition(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
     """Set the condition that a bare Till, Find or Sense stands for, or show it."""
     memory, arguments = evaluator.session.memory, _expect(command, 0, 1)
     if not arguments:
-        return Outcome(shown_condition(getattr(memory, command.name)) + CRLF)
+        return StatementOutcome(shown_condition(getattr(memory, command.name)) + CRLF)
     if not is_condition(arguments[0]):
-        raise Refusal(RefusalKind.SYNTAX, f"{command.name} needs a condition")
+        raise SpelRefusal(RefusalKind.SYNTAX, f"{command.name} needs a condition")
     setattr(memory, command.name, arguments[0])
-    return Outcome()
+    return StatementOutcome()
 
 
-def _pulse(evaluator: Evaluator, command: Command) -> Outcome:
+def _pulse(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
     """Show the pulses, or go point to point to pulses."""
     if len(command.arguments) == SIX_JOINTS:
-        raise Refusal(RefusalKind.OTHER_ROBOT, "This robot has four joints")
+        raise SpelRefusal(RefusalKind.OTHER_ROBOT, "This robot has four joints")
     arguments = _expect(command, 0, 4)
     if not arguments:
-        return Outcome(_line_of_where(evaluator, 2))
+        return StatementOutcome(_line_of_where(evaluator, 2))
     machine = evaluator.session.machine
     require_drives(machine)
     counts = [evaluator.integer(argument) for argument in arguments]
-    return Outcome(legs=[_leg_to_pulses(machine, counts)])
+    return StatementOutcome(legs=[_leg_to_pulses(machine, counts)])
 
 
-def _home(evaluator: Evaluator, command: Command) -> Outcome:
+def _home(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
     """Go to the home position, all joints at once (documented: in the order of Hordr)."""
     _expect(command, 0)
     machine = evaluator.session.machine
     home = machine.settings.home_pulses
     if home is None:
-        raise Refusal(RefusalKind.HOME_UNDEFINED, "No home position is set")
+        raise SpelRefusal(RefusalKind.HOME_UNDEFINED, "No home position is set")
     require_drives(machine)
-    return Outcome(legs=[_leg_to_pulses(machine, home)])
+    return StatementOutcome(legs=[_leg_to_pulses(machine, home)])
 
 
 def _leg_to_pulses(machine: Machine, counts: Sequence[int]) -> Leg:
@@ -223,37 +226,40 @@ def _leg_to_pulses(machine: Machine, counts: Sequence[int]) -> Leg:
     return go_leg(machine, machine.arm.joints, Joints(*(count / scale for count, scale in scales)))
 
 
-def _joint(evaluator: Evaluator, command: Command) -> Outcome:
+def _joint(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
     _expect(command, 0)
-    return Outcome(_line_of_where(evaluator, 1))
+    return StatementOutcome(_line_of_where(evaluator, 1))
 
 
 def _line_of_where(evaluator: Evaluator, line: int) -> str:
-    shown = _where(evaluator, Command("where", (), open_ended=False)).output
+    shown = _where(evaluator, KeywordStatement("where", (), open_ended=False)).output
     return shown.splitlines()[line] + CRLF
 
 
-def _base(evaluator: Evaluator, command: Command) -> Outcome:
+def _base(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
     """Show the base, or accept the one that there is."""
     if not command.arguments:
         values = ", ".join(["0.000"] * 6)
-        return Outcome(f"Base: {values}{CRLF}")
+        return StatementOutcome(f"Base: {values}{CRLF}")
     if any(point_argument(evaluator, command.arguments).coordinates):
-        raise Refusal(RefusalKind.NOT_SIMULATED, "The base cannot be moved here")
-    return Outcome()
+        raise SpelRefusal(RefusalKind.NOT_SIMULATED, "The base cannot be moved here")
+    return StatementOutcome()
 
 
-def _reset(evaluator: Evaluator, command: Command) -> Outcome:
-    """Reset parameters and outputs (spel.md 6.3); errors are the device's to clear."""
+def _reset(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
+    """Reset parameters and outputs; errors are the device's to clear.
+
+    Source: docs/reference/spel.md 6.3.
+    """
     _expect(command, 0)
     session = evaluator.session
     session.machine.reset_motion_parameters()
     if session.options.reset_outputs_off:
         session.machine.clear_outputs()
-    return Outcome()
+    return StatementOutcome()
 
 
-_HANDLERS: Final[dict[str, Callable[[Evaluator, Command], Outcome]]] = {
+_HANDLERS: Final[dict[str, Callable[[Evaluator, KeywordStatement], StatementOutcome]]] = {
     "tlset": _tlset,
     "tlclr": _tlclr,
     "tool": _tool,

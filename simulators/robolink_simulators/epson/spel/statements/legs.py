@@ -6,7 +6,7 @@ from dataclasses import replace
 from robolink.model import Pose
 from robolink_simulators.epson.arm.arc import ArcLeg, plan_arc
 from robolink_simulators.epson.arm.kinematics import Joints
-from robolink_simulators.epson.arm.motion_parameters import Phase
+from robolink_simulators.epson.arm.motion_parameters import MotionPhase
 from robolink_simulators.epson.arm.trajectory import JointLeg, LineLeg, LinePace, plan_go, plan_move
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.points import Point
@@ -26,7 +26,7 @@ def pose_of(machine: Machine, point: Point) -> Pose:
 
 
 def go_leg(
-    machine: Machine, start: Joints, end: Joints, *, phase: Phase = Phase.TRAVEL
+    machine: Machine, start: Joints, end: Joints, *, phase: MotionPhase = MotionPhase.TRAVEL
 ) -> JointLeg:
     """Plan a point-to-point leg.
 

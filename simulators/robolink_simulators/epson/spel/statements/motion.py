@@ -1,4 +1,4 @@
-"""Go, Move, Jump, Arc and their relatives (spel.md 7.1)."""
+"""Go, Move, Jump, Arc and their relatives (docs/reference/spel.md 7.1)."""
 
 import math
 from collections.abc import Callable
@@ -10,12 +10,12 @@ from robolink.model import rotate_xy
 from robolink_simulators.epson.arm.trajectory import Leg
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.points import Coordinates, Point
-from robolink_simulators.epson.refusals import Refusal, RefusalKind
+from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
 from robolink_simulators.epson.spel.expressions.values import out_of_range
 from robolink_simulators.epson.spel.statements.jump import jump, jump3
 from robolink_simulators.epson.spel.statements.legs import arc_leg, go_leg, line_leg, pose_of
-from robolink_simulators.epson.spel.tree import Motion
+from robolink_simulators.epson.spel.tree import MotionStatement
 
 _SAME_MM = 0.001
 _SAME_DEG = 0.001
@@ -41,7 +41,7 @@ _WORDS: Final = {
 _WAYPOINTS: Final = {"arc": 2, "jump3": 3, "jump3cp": 3}
 
 
-def plan(evaluator: Evaluator, motion: Motion) -> list[Leg]:
+def plan(evaluator: Evaluator, motion: MotionStatement) -> list[Leg]:
     """Return the legs of a motion; nothing moves yet.
 
     Targets are for the selected tool's tip.
@@ -52,12 +52,12 @@ def plan(evaluator: Evaluator, motion: Motion) -> list[Leg]:
     machine = evaluator.session.machine
     wrong = motion.options.words - _WORDS[motion.verb]
     if wrong:
-        raise Refusal(RefusalKind.SYNTAX, f"{motion.verb} knows no {', '.join(sorted(wrong))}")
+        raise SpelRefusal(RefusalKind.SYNTAX, f"{motion.verb} knows no {', '.join(sorted(wrong))}")
     if len(motion.options.words & {*_UNTIL_WORDS, "sense"}) > 1:
-        raise Refusal(RefusalKind.SYNTAX, "A motion takes one of Till, Find and Sense")
+        raise SpelRefusal(RefusalKind.SYNTAX, "A motion takes one of Till, Find and Sense")
     points = [evaluator.point(target) for target in motion.targets]
     if motion.verb != "pass" and len(points) != _WAYPOINTS.get(motion.verb, 1):
-        raise Refusal(RefusalKind.SYNTAX, f"{motion.verb} does not take {len(points)} points")
+        raise SpelRefusal(RefusalKind.SYNTAX, f"{motion.verb} does not take {len(points)} points")
     require_drives(machine)
     limz = motion.options.limz
     match motion.verb:
@@ -85,10 +85,10 @@ def require_drives(machine: Machine) -> None:
             number).
     """
     if not machine.motors_on:
-        raise Refusal(RefusalKind.MOTORS_OFF, "Motors are off")
+        raise SpelRefusal(RefusalKind.MOTORS_OFF, "Motors are off")
     if machine.settings.free_joints:
         free = ", ".join(map(str, sorted(machine.settings.free_joints)))
-        raise Refusal(RefusalKind.JOINT_FREE, f"Joint {free} is free")
+        raise SpelRefusal(RefusalKind.JOINT_FREE, f"Joint {free} is free")
 
 
 def _passing(machine: Machine, points: list[Point]) -> list[Leg]:
@@ -131,7 +131,8 @@ def _line(machine: Machine, target: Point, *, rot: bool) -> Leg:
 
     Raises:
         Refusal: Only the orientation changes and ROT is missing, or ROT stands and nothing
-            turns over a distance (both documented, spel.md 7.1; their numbers are not).
+            turns over a distance (both documented, docs/reference/spel.md 7.1; their numbers are
+            not).
     """
     end, tip = pose_of(machine, target), machine.tip()
     travels = math.dist(end.coordinates()[:3], tip.coordinates()[:3]) > _SAME_MM

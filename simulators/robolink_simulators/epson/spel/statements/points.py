@@ -1,20 +1,23 @@
-"""Keyword statements about points, locals and pallets (spel.md 5); each returns what it prints."""
+"""Keyword statements about points, locals and pallets; each returns what it prints.
+
+Source: docs/reference/spel.md 5.
+"""
 
 from collections.abc import Callable
 from typing import Final
 
 from robolink_simulators.epson.memory.points import HIGHEST_POINT, Local, Point
-from robolink_simulators.epson.refusals import Refusal, RefusalKind
+from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
 from robolink_simulators.epson.spel.expressions.machine_functions import coordinates_of
 from robolink_simulators.epson.spel.expressions.printing import CRLF, point_line
 from robolink_simulators.epson.spel.expressions.values import as_text, out_of_range
-from robolink_simulators.epson.spel.tree import Command, Expression
+from robolink_simulators.epson.spel.tree import Expression, KeywordStatement
 
 
-def _expect(command: Command, *counts: int) -> tuple[Expression, ...]:
+def _expect(command: KeywordStatement, *counts: int) -> tuple[Expression, ...]:
     if len(command.arguments) not in counts:
-        raise Refusal(
+        raise SpelRefusal(
             RefusalKind.SYNTAX,
             f"{command.name} does not take {len(command.arguments)} arguments here",
         )
@@ -22,7 +25,7 @@ def _expect(command: Command, *counts: int) -> tuple[Expression, ...]:
 
 
 def point_argument(evaluator: Evaluator, arguments: tuple[Expression, ...]) -> Point:
-    """Return a point, or the old list of bare numbers (spel.md 5.1).
+    """Return a point, or the old list of bare numbers (docs/reference/spel.md 5.1).
 
     Raises:
         Refusal: They are neither.
@@ -32,14 +35,14 @@ def point_argument(evaluator: Evaluator, arguments: tuple[Expression, ...]) -> P
     return coordinates_of([evaluator.number(argument) for argument in arguments])
 
 
-def _here(evaluator: Evaluator, command: Command) -> str:
+def _here(evaluator: Evaluator, command: KeywordStatement) -> str:
     (target,) = _expect(command, 1)
     machine = evaluator.session.machine
     machine.points.store(evaluator.stored_number(target), Point.at(machine.tip()))
     return ""
 
 
-def _plist(evaluator: Evaluator, command: Command) -> str:
+def _plist(evaluator: Evaluator, command: KeywordStatement) -> str:
     arguments = _expect(command, 1) if command.open_ended else _expect(command, 0, 1, 2)
     numbers = [evaluator.integer(argument) for argument in arguments]
     first = numbers[0] if numbers else 0
@@ -53,13 +56,13 @@ def _plist(evaluator: Evaluator, command: Command) -> str:
     return "".join(lines)
 
 
-def _pdel(evaluator: Evaluator, command: Command) -> str:
+def _pdel(evaluator: Evaluator, command: KeywordStatement) -> str:
     numbers = [evaluator.integer(argument) for argument in _expect(command, 1, 2)]
     evaluator.session.machine.points.delete(numbers[0], numbers[-1])
     return ""
 
 
-def _local(evaluator: Evaluator, command: Command) -> str:
+def _local(evaluator: Evaluator, command: KeywordStatement) -> str:
     arguments = _expect(command, 1, 2, 5, 7)
     number, locals_ = evaluator.integer(arguments[0]), evaluator.session.machine.locals
     if len(arguments) == 1:
@@ -74,14 +77,14 @@ def _local(evaluator: Evaluator, command: Command) -> str:
     return ""
 
 
-def _label(evaluator: Evaluator, command: Command) -> str:
+def _label(evaluator: Evaluator, command: KeywordStatement) -> str:
     number, name = _expect(command, 2)
     points = evaluator.session.machine.points
     points.label(evaluator.integer(number), as_text(evaluator.value(name)))
     return ""
 
 
-def _pallet(evaluator: Evaluator, command: Command) -> str:
+def _pallet(evaluator: Evaluator, command: KeywordStatement) -> str:
     """Define a pallet from three or four corners, columns and rows; Outside is not simulated."""
     number, *corners, columns, rows = _expect(command, 6, 7)
     points = [evaluator.point_of(corner) for corner in corners]
@@ -90,7 +93,7 @@ def _pallet(evaluator: Evaluator, command: Command) -> str:
     return ""
 
 
-POINT_STATEMENTS: Final[dict[str, Callable[[Evaluator, Command], str]]] = {
+POINT_STATEMENTS: Final[dict[str, Callable[[Evaluator, KeywordStatement], str]]] = {
     "here": _here,
     "plist": _plist,
     "pdel": _pdel,

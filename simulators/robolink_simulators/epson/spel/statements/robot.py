@@ -1,10 +1,13 @@
-"""Keyword statements about load, arm, free joints and the home position (spel.md 6.2, 7.2, 7.3)."""
+"""Keyword statements about load, arm, free joints and the home position.
+
+Source: docs/reference/spel.md 6.2, 7.2, 7.3.
+"""
 
 from collections.abc import Callable, Sequence
 from typing import Final
 
 from robolink_simulators.epson.machine import Machine
-from robolink_simulators.epson.refusals import Refusal, RefusalKind
+from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.printing import CRLF, number_text
 from robolink_simulators.epson.spel.expressions.values import Number, out_of_range
 
@@ -19,7 +22,7 @@ _HEAVIEST_KG: Final = 20.0
 
 def _expect(values: Numbers, *counts: int) -> None:
     if len(values) not in counts:
-        raise Refusal(RefusalKind.SYNTAX, f"{len(values)} values, not one of {counts}")
+        raise SpelRefusal(RefusalKind.SYNTAX, f"{len(values)} values, not one of {counts}")
 
 
 def _within(value: Number, low: float, high: float) -> float:
@@ -85,7 +88,7 @@ def _numbered(kind: RefusalKind) -> Setting:
         if not 0 <= values[0] <= 15:
             raise out_of_range(f"There is no number {values[0]}")
         if values[0]:
-            raise Refusal(kind, f"Number {values[0]} is not defined")
+            raise SpelRefusal(kind, f"Number {values[0]} is not defined")
         return ""
 
     return choose
@@ -97,7 +100,7 @@ def _joints(values: Numbers) -> set[int]:
 
 def _free(machine: Machine, values: Numbers) -> str:
     if not values:
-        raise Refusal(RefusalKind.SYNTAX, "SFree needs a joint")
+        raise SpelRefusal(RefusalKind.SYNTAX, "SFree needs a joint")
     machine.settings.free_joints |= _joints(values)
     machine.reset_motion_parameters()
     return ""
@@ -105,7 +108,7 @@ def _free(machine: Machine, values: Numbers) -> str:
 
 def _lock(machine: Machine, values: Numbers) -> str:
     if not machine.motors_on:
-        raise Refusal(RefusalKind.MOTORS_OFF, "Motors are off")
+        raise SpelRefusal(RefusalKind.MOTORS_OFF, "Motors are off")
     machine.settings.free_joints -= _joints(values) or set(range(1, _JOINTS + 1))
     machine.reset_motion_parameters()
     return ""
@@ -113,7 +116,7 @@ def _lock(machine: Machine, values: Numbers) -> str:
 
 def _home_set(machine: Machine, values: Numbers) -> str:
     if len(values) > _JOINTS:
-        raise Refusal(RefusalKind.OTHER_ROBOT, "This robot has four joints")
+        raise SpelRefusal(RefusalKind.OTHER_ROBOT, "This robot has four joints")
     _expect(values, 0, _JOINTS)
     home = machine.settings.home_pulses
     if values:
@@ -121,13 +124,13 @@ def _home_set(machine: Machine, values: Numbers) -> str:
         machine.settings.home_pulses = (a, b, c, d)
         return ""
     if home is None:
-        raise Refusal(RefusalKind.HOME_UNDEFINED, "No home position is set")
+        raise SpelRefusal(RefusalKind.HOME_UNDEFINED, "No home position is set")
     return f"{home[0]} {home[1]}{CRLF}{home[2]} {home[3]}{CRLF}"
 
 
 def _range(machine: Machine, values: Numbers) -> str:
     if values:
-        raise Refusal(RefusalKind.NOT_SIMULATED, "The range is the model's own here")
+        raise SpelRefusal(RefusalKind.NOT_SIMULATED, "The range is the model's own here")
     limits = zip(machine.model.ranges, machine.model.pulses_per_unit, strict=True)
     pulses = [round(end * scale) for travel, scale in limits for end in (travel.low, travel.high)]
     return ", ".join(map(str, pulses)) + CRLF

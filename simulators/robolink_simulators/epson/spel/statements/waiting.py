@@ -1,16 +1,19 @@
-"""``Wait`` for a condition; the conditions that Till, Find and Sense keep (spel.md 4.6, 7.1)."""
+"""``Wait`` for a condition; the conditions that Till, Find and Sense keep.
+
+Source: docs/reference/spel.md 4.6, 7.1.
+"""
 
 from typing import Final
 
 from robolink.timing import NS_PER_S
-from robolink_simulators.epson.refusals import Refusal, RefusalKind
+from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
 from robolink_simulators.epson.spel.expressions.printing import number_text
 from robolink_simulators.epson.spel.expressions.values import out_of_range, truth
 from robolink_simulators.epson.spel.tree import (
     Binary,
-    Command,
     Expression,
+    KeywordStatement,
     Literal,
     Name,
     PointExpression,
@@ -18,7 +21,7 @@ from robolink_simulators.epson.spel.tree import (
 )
 
 LONGEST_WAIT_S: Final = 2_147_483
-"""Longest Wait (spel.md 4.6)."""
+"""Longest Wait (docs/reference/spel.md 4.6)."""
 
 NEVER_NS: Final = 2**62
 
@@ -33,8 +36,8 @@ _EVENTS: Final = frozenset(_EVENT_WORDS.split())
 def is_condition(expression: Expression) -> bool:
     """Tell whether Wait waits for it to hold, and does not take it for a number of seconds.
 
-    A comparison, a logical operation and a bare event are conditions (documented, spel.md 4.6);
-    everything else is a time.
+    A comparison, a logical operation and a bare event are conditions (documented,
+    docs/reference/spel.md 4.6); everything else is a time.
     """
     match expression:
         case Binary(operator, left, right):
@@ -81,7 +84,7 @@ class Waiting:
         try:
             if self.holds():
                 return seen_ns + 1  # switched just now
-        except Refusal:
+        except SpelRefusal:
             return seen_ns + 1  # whoever looks then is told why
         coming_ns = self._evaluator.session.machine.timed_bits.next_change()
         return min(self._end_ns, NEVER_NS if coming_ns is None else coming_ns)
@@ -100,11 +103,11 @@ class Waiting:
             return False
         memory.timed_out = True
         if not self._own_limit:
-            raise Refusal(RefusalKind.WAIT_TIMED_OUT, "The time of TMOut ran out")
+            raise SpelRefusal(RefusalKind.WAIT_TIMED_OUT, "The time of TMOut ran out")
         return True
 
 
-def wait_limit(evaluator: Evaluator, command: Command) -> float | None:
+def wait_limit(evaluator: Evaluator, command: KeywordStatement) -> float | None:
     """Return the time that ``Wait condition, time`` names, ``None`` for none.
 
     Raises:
@@ -112,7 +115,7 @@ def wait_limit(evaluator: Evaluator, command: Command) -> float | None:
     """
     _, *rest = command.arguments
     if len(rest) > 1:
-        raise Refusal(RefusalKind.SYNTAX, "Wait takes a condition and a time")
+        raise SpelRefusal(RefusalKind.SYNTAX, "Wait takes a condition and a time")
     return seconds_of(evaluator, rest[0]) if rest else None
 
 

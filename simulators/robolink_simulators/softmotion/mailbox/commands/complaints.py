@@ -1,10 +1,13 @@
-"""What the mailbox program makes of the complaints of function blocks (softmotion.md 1.4)."""
+"""What the mailbox program makes of the complaints of function blocks.
+
+Source: docs/reference/softmotion.md 1.4.
+"""
 
 from typing import Final
 
 from robolink.protocols.mailbox import ErrorClass
-from robolink_simulators.softmotion.group.condition import GroupState
-from robolink_simulators.softmotion.group.smc_errors import ErrorKind
+from robolink_simulators.softmotion.group.condition import SmcGroupState
+from robolink_simulators.softmotion.smc_errors import ErrorKind
 
 _CLASSES: Final = {
     ErrorKind.NOTHING_TO_RESET: ErrorClass.NOTHING_TO_RESET,
@@ -25,12 +28,12 @@ _CLASSES: Final = {
 }
 
 _STATES: Final = {
-    GroupState.DISABLED: ErrorClass.DISABLED,
-    GroupState.STANDBY: ErrorClass.WRONG_STATE,
-    GroupState.MOVING: ErrorClass.MOVING,
-    GroupState.HOMING: ErrorClass.MOVING,
-    GroupState.STOPPING: ErrorClass.STOPPING,
-    GroupState.ERROR_STOP: ErrorClass.ERRORSTOP,
+    SmcGroupState.DISABLED: ErrorClass.DISABLED,
+    SmcGroupState.STANDBY: ErrorClass.WRONG_STATE,
+    SmcGroupState.MOVING: ErrorClass.MOVING,
+    SmcGroupState.HOMING: ErrorClass.MOVING,
+    SmcGroupState.STOPPING: ErrorClass.STOPPING,
+    SmcGroupState.ERROR_STOP: ErrorClass.ERRORSTOP,
 }
 
 
@@ -48,6 +51,6 @@ class Rejected(Exception):
         self.raw = raw
 
 
-def class_of(kind: ErrorKind, state: GroupState) -> ErrorClass:
+def class_of(kind: ErrorKind, state: SmcGroupState) -> ErrorClass:
     """Return the class of a complaint that a block made in this state of the group."""
     return _STATES[state] if kind is ErrorKind.WRONG_STATE else _CLASSES[kind]

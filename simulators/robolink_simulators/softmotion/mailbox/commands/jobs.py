@@ -4,11 +4,11 @@ from collections import deque
 from typing import Final
 
 from robolink.protocols.mailbox import Command, CommandState, ErrorClass, Finished, Opcode
+from robolink_simulators.softmotion.function_blocks import BlockExecution, BlockState
 from robolink_simulators.softmotion.group.axis_group import AxisGroup
-from robolink_simulators.softmotion.group.blocks import BlockState, Execution
-from robolink_simulators.softmotion.group.condition import GroupState
-from robolink_simulators.softmotion.group.smc_errors import SmcError
+from robolink_simulators.softmotion.group.condition import SmcGroupState
 from robolink_simulators.softmotion.mailbox.commands.complaints import class_of
+from robolink_simulators.softmotion.smc_errors import SmcError
 
 MOVEMENTS: Final = frozenset({Opcode.MOVE_DIRECT, Opcode.MOVE_LINEAR, Opcode.MOVE_UNTIL_INPUT})
 
@@ -36,7 +36,7 @@ class Job:
         cause: Why it will end aborted, when the program itself ends it.
     """
 
-    def __init__(self, command: Command, execution: Execution) -> None:
+    def __init__(self, command: Command, execution: BlockExecution) -> None:
         self.command = command
         self.execution = execution
         self.state = CommandState.BUFFERED
@@ -75,7 +75,7 @@ class Job:
         """Return its entry among the finished ones."""
         return Finished(self.command.sequence, self.state, self.error_class)
 
-    def _complain(self, error: SmcError, state: GroupState) -> None:
+    def _complain(self, error: SmcError, state: SmcGroupState) -> None:
         self.error_class, self.raw = class_of(error.kind, state), error.number
 
     def _explain_abort(self, group: AxisGroup) -> None:

@@ -1,4 +1,4 @@
-"""The opcodes that move the axis group, or change its state (design part 7)."""
+"""The opcodes that move the axis group, or change its state (docs/mailbox.md, "Movements")."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -6,10 +6,9 @@ from types import MappingProxyType
 from typing import Final
 
 from robolink.protocols.mailbox import Answer, Command, ErrorClass, Opcode
+from robolink_simulators.softmotion.function_blocks import BlockExecution
 from robolink_simulators.softmotion.group.axis_group import AxisGroup
-from robolink_simulators.softmotion.group.blocks import Execution
-from robolink_simulators.softmotion.group.condition import GroupState
-from robolink_simulators.softmotion.group.signals import SIGNALS
+from robolink_simulators.softmotion.group.condition import SmcGroupState
 from robolink_simulators.softmotion.kinematics.coordinates import CoordSystem
 from robolink_simulators.softmotion.mailbox.commands.complaints import Rejected
 from robolink_simulators.softmotion.mailbox.commands.jobs import Job, Jobs
@@ -17,9 +16,10 @@ from robolink_simulators.softmotion.mailbox.commands.operands import require_fin
 from robolink_simulators.softmotion.mailbox.commands.told import Handler, Told, done
 from robolink_simulators.softmotion.mailbox.words.units import UserUnits
 from robolink_simulators.softmotion.motion.jog import COORDINATES, JogCommand
-from robolink_simulators.softmotion.motion.movement import BufferMode, EdgeWatch
+from robolink_simulators.softmotion.motion.movement import EdgeWatch, SmcBufferMode
 from robolink_simulators.softmotion.motion.paths import Dynamics
 from robolink_simulators.softmotion.motion.planner import Target
+from robolink_simulators.softmotion.signals import SIGNALS
 
 MOST_MOVEMENTS: Final = 4
 _MASKS: Final = range(1 << COORDINATES)
@@ -41,7 +41,7 @@ class MotionDesk:
         self._group = group
         self._units = units
         self._jobs = jobs
-        self._releases: list[Execution] = []
+        self._releases: list[BlockExecution] = []
         self.opcodes: Mapping[int, Handler] = MappingProxyType(
             {
                 Opcode.ENABLE: lambda _: Told(group.enable()),
@@ -65,7 +65,7 @@ class MotionDesk:
 
     def follow(self) -> None:
         """A release is done when the group has left Stopping."""
-        if self._group.state is not GroupState.STOPPING:
+        if self._group.state is not SmcGroupState.STOPPING:
             for release in self._releases:
                 release.finish()
             self._releases.clear()
@@ -73,10 +73,10 @@ class MotionDesk:
     def _stop(self, command: Command) -> Told:
         if require_operand(command.operands[0], range(2)) == 0:
             return Told(self._group.stop())
-        if self._group.state is not GroupState.STOPPING:
+        if self._group.state is not SmcGroupState.STOPPING:
             return done()  # nothing is held (assumed)
         self._group.release_stop()
-        release = Execution()
+        release = BlockExecution()
         self._releases.append(release)
         return Told(release)
 
@@ -116,10 +116,10 @@ class MotionDesk:
         dynamics = self._units.dynamics(command.dynamics)
         return Told(self._group.move_linear_absolute(target, dynamics, mode=mode, watch=watch))
 
-    def _target(self, command: Command) -> tuple[Target, BufferMode]:
+    def _target(self, command: Command) -> tuple[Target, SmcBufferMode]:
         _, _, system, mode = command.operands
         require_operand(system, range(len(CoordSystem)))
-        require_operand(mode, range(len(BufferMode)))
+        require_operand(mode, range(len(SmcBufferMode)))
         require_finite(command.pose)
         if len(self._jobs.movements) >= MOST_MOVEMENTS:
             raise Rejected(ErrorClass.QUEUE_FULL)
@@ -127,4 +127,4 @@ class MotionDesk:
             position = self._units.axes(command.pose, self._group.kinematics.kinds)
         else:
             position = self._units.pose(command.pose)
-        return Target(position, CoordSystem(system)), BufferMode(mode)
+        return Target(position, CoordSystem(system)), SmcBufferMode(mode)

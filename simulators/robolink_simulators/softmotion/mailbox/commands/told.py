@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from robolink.protocols.mailbox import Answer, Command
-from robolink_simulators.softmotion.group.blocks import Execution
+from robolink_simulators.softmotion.function_blocks import BlockExecution
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,13 +16,13 @@ class Told:
         answer: What stands in the answer words; ``None`` for nothing.
     """
 
-    execution: Execution
+    execution: BlockExecution
     answer: Answer | None = None
 
 
 def done(answer: Answer | None = None) -> Told:
     """Return what a command is told that is done at once."""
-    execution = Execution()
+    execution = BlockExecution()
     execution.finish()
     return Told(execution, answer)
 

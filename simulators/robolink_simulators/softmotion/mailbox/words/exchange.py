@@ -22,7 +22,7 @@ _HEARTBEAT: Final = COMMAND["client_heartbeat"].word
 
 
 @dataclass(frozen=True, slots=True)
-class Served:
+class ServedAccess:
     """What a host does after an exchange.
 
     Attributes:
@@ -78,9 +78,9 @@ class WireFaults(CountedFaults[PlcFault]):
                 words = self._garbled(words, fault)
         return tuple(words)
 
-    def leaving(self, words: Words, faults: Iterable[PlcFault]) -> Served:
+    def leaving(self, words: Words, faults: Iterable[PlcFault]) -> ServedAccess:
         """Return what leaves instead of an answer."""
-        served = Served(words)
+        served = ServedAccess(words)
         for fault in faults:
             match fault.action:
                 case PlcFaultAction.DELAY:

@@ -30,7 +30,7 @@ class Bank(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class MailboxPlace:
     """Part of the mailbox in a bank of registers.
 
     Attributes:
@@ -55,14 +55,14 @@ class Place:
         return self.start + self.count
 
 
-def places_of(options: MailboxOptions) -> tuple[Place, ...]:
+def places_of(options: MailboxOptions) -> tuple[MailboxPlace, ...]:
     """Return where command, response, and the slots with the device block stand."""
     bank = Bank.HOLDING if options.registers == "holding" else Bank.INPUT
     slots = options.slots or options.response + RESPONSE_WORDS
     return (
-        Place("command", Bank.HOLDING, options.command, COMMAND_WORDS, written=True),
-        Place("response", bank, options.response, RESPONSE_WORDS),
-        Place("slots", bank, slots, OUTPUT_WORDS - RESPONSE_WORDS, RESPONSE_WORDS),
+        MailboxPlace("command", Bank.HOLDING, options.command, COMMAND_WORDS, written=True),
+        MailboxPlace("response", bank, options.response, RESPONSE_WORDS),
+        MailboxPlace("slots", bank, slots, OUTPUT_WORDS - RESPONSE_WORDS, RESPONSE_WORDS),
     )
 
 

@@ -1,0 +1,194 @@
+"""Two crossed light beams: where they are, from a pin, and what a crossing of one tells.
+
+A beam is a line in the base. The tip breaks it on entering and frees it on leaving; half way
+between, its middle is on the line, whatever its thickness and the beam's. Latency and
+backlash shift that middle along the travel, one way going and the other way coming back, so
+they are an unknown of their own that both directions show (docs/reference/calibration.md 2.6).
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from robolink.calibration.core.least_squares import linear_fit
+from robolink.calibration.core.pose_checks import check_poses
+from robolink.calibration.core.robust import Floats
+from robolink.errors import CalibrationError
+from robolink.messages import tr
+from robolink.model import Pose, angle_difference_deg, rotate_xy
+
+LEAST_ANGLE_DEG = 20.0
+"""Beams that cross at less than this leave one direction badly known."""
+
+
+LEAST_LENGTH_MM = 5.0
+
+
+_ALONG_THE_BEAM = 0.2
+
+
+_REFINEMENTS = 5
+
+
+@dataclass(frozen=True, slots=True)
+class Beam:
+    """A light beam: a point on it, mm, and its direction in the base."""
+
+    x_mm: float
+    y_mm: float
+    direction_deg: float
+
+    @property
+    def normal(self) -> tuple[float, float]:
+        """Unit vector across the beam."""
+        angle = math.radians(self.direction_deg)
+        return -math.sin(angle), math.cos(angle)
+
+    @property
+    def distance_mm(self) -> float:
+        """Distance of the beam from the base's origin, along :attr:`normal`."""
+        nx, ny = self.normal
+        return nx * self.x_mm + ny * self.y_mm
+
+
+@dataclass(frozen=True, slots=True)
+class Crossing:
+    """One straight travel of the tip through a beam, without turning.
+
+    Attributes:
+        beam: Which beam, 0 or 1.
+        entry: Flange pose (Tool 0) at which the beam was broken.
+        exit: Flange pose at which it was free again.
+    """
+
+    beam: int
+    entry: Pose
+    exit: Pose
+
+    @property
+    def middle_mm(self) -> tuple[float, float]:
+        """Flange position half way."""
+        return (self.entry.x_mm + self.exit.x_mm) / 2, (self.entry.y_mm + self.exit.y_mm) / 2
+
+    def direction_over(self, beam: Beam) -> float:
+        """Return 1 or -1: to which side of ``beam`` the travel led.
+
+        Raises:
+            CalibrationError: ``no_crossing`` when it ran along the beam.
+        """
+        nx, ny = beam.normal
+        dx, dy = self.exit.x_mm - self.entry.x_mm, self.exit.y_mm - self.entry.y_mm
+        across = nx * dx + ny * dy
+        if abs(across) <= _ALONG_THE_BEAM * math.hypot(dx, dy):
+            raise CalibrationError(
+                "no_crossing",
+                tr("A travel through beam {beam} ran along it.", beam=self.beam + 1),
+                remedy=tr("Drive the tip straight across each beam."),
+            )
+        return math.copysign(1.0, across)
+
+
+def find_beams(crossings: Sequence[Crossing], tip_mm: tuple[float, float]) -> tuple[Beam, Beam]:
+    """Return where both beams are, from a reference pin whose tip is known.
+
+    Args:
+        crossings: Travels of the pin through both beams at several places along each, four
+            or more, in both directions.
+        tip_mm: The pin's offset in the flange's axes.
+
+    Raises:
+        CalibrationError: ``too_few_poses``, ``short_beam``, ``parallel_beams``,
+            ``no_crossing``, or those of :func:`check_crossings`.
+    """
+    check_crossings(crossings, minimum=4)
+    first, second = (
+        _fit_beam([crossing for crossing in crossings if crossing.beam == beam], tip_mm)
+        for beam in (0, 1)
+    )
+    require_crossed((first, second))
+    return first, second
+
+
+def check_crossings(crossings: Sequence[Crossing], *, minimum: int) -> tuple[str, ...]:
+    """Refuse crossings that cannot be used; return the names of lesser doubts.
+
+    Raises:
+        CalibrationError: ``too_few_poses``, ``turned_in_crossing``, and those of
+            :func:`check_poses`.
+    """
+    for beam in (0, 1):
+        count = sum(crossing.beam == beam for crossing in crossings)
+        if count < minimum:
+            raise CalibrationError(
+                "too_few_poses",
+                tr("Beam {beam} was crossed {count} times.", beam=beam + 1, count=count),
+                remedy=tr("Cross each beam {minimum} times or more.", minimum=minimum),
+            )
+    poses = [pose for crossing in crossings for pose in (crossing.entry, crossing.exit)]
+    doubts = check_poses(poses, allow_mixed_hand=False)
+    for crossing in crossings:
+        if abs(angle_difference_deg(crossing.exit.u_deg, crossing.entry.u_deg)) > 0.01:
+            raise CalibrationError(
+                "turned_in_crossing",
+                tr("The tool turned while it crossed beam {beam}.", beam=crossing.beam + 1),
+                remedy=tr("Keep U while the tip crosses a beam."),
+            )
+    return doubts
+
+
+def require_crossed(beams: tuple[Beam, Beam]) -> None:
+    """Refuse beams that run nearly side by side.
+
+    Raises:
+        CalibrationError: ``parallel_beams``.
+    """
+    between = abs(angle_difference_deg(beams[0].direction_deg, beams[1].direction_deg))
+    angle = min(between, 180.0 - between)
+    if angle < LEAST_ANGLE_DEG:
+        raise CalibrationError(
+            "parallel_beams",
+            tr("The beams cross at {angle:.1f} degrees.", angle=angle),
+            remedy=tr("Mount them at a right angle, or nearly so."),
+        )
+
+
+def _fit_beam(crossings: Sequence[Crossing], tip_mm: tuple[float, float]) -> Beam:
+    points = np.array([_tip_at(crossing, tip_mm) for crossing in crossings])
+    middle = points.mean(axis=0)
+    beam = _first_line(points, middle)
+    for _ in range(_REFINEMENTS):
+        beam = _straightened(beam, points, [c.direction_over(beam) for c in crossings])
+    return beam
+
+
+def _first_line(points: Floats, middle: Floats) -> Beam:
+    _, spread, axes = np.linalg.svd(points - middle)
+    if 2 * spread[0] / math.sqrt(len(points)) < LEAST_LENGTH_MM:
+        raise CalibrationError(
+            "short_beam",
+            tr("The crossings lie too close together along the beam to tell its direction."),
+            remedy=tr("Spread them over {least:.0f} mm or more.", least=2 * LEAST_LENGTH_MM),
+        )
+    x, y = middle.tolist()
+    return Beam(x, y, math.degrees(math.atan2(axes[0, 1], axes[0, 0])))
+
+
+def _straightened(beam: Beam, points: Floats, directions: Sequence[float]) -> Beam:
+    """Return the beam after one fit of its tilt, its place and the shift by the travel."""
+    nx, ny = beam.normal
+    away = points - (beam.x_mm, beam.y_mm)
+    along, across = away @ (ny, -nx), away @ (nx, ny)
+    columns = [along, np.ones(len(points))]
+    if len(set(directions)) == 2:
+        columns.append(np.array(directions))
+    tilt, shift = linear_fit(np.column_stack(columns), across).x[:2].tolist()
+    direction = beam.direction_deg + math.degrees(math.atan(tilt))
+    return Beam(beam.x_mm + shift * nx, beam.y_mm + shift * ny, direction)
+
+
+def _tip_at(crossing: Crossing, tip_mm: tuple[float, float]) -> tuple[float, float]:
+    x, y = crossing.middle_mm
+    dx, dy = rotate_xy(tip_mm[0], tip_mm[1], crossing.entry.u_deg)
+    return x + dx, y + dy

@@ -1,0 +1,1 @@
+"""Solvers for marks that a camera sees."""

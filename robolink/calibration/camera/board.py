@@ -1,0 +1,109 @@
+"""A board held by the gripper: its place and direction as a tool, from fiducials.
+
+Two fiducials (EPSON's CalcBoardTool): the origin is the middle between them and the
+direction runs from the second to the first. A drawing that runs from 1 to 2 is off by
+180 degrees (docs/reference/calibration.md 1.3).
+"""
+
+import math
+
+from robolink.calibration.camera.up_camera import Sighting, check_sightings
+from robolink.calibration.core.dispersion import Dispersion
+from robolink.calibration.core.pose_checks import keep_unmeasured
+from robolink.calibration.core.result import CalibrationResult
+from robolink.errors import CalibrationError
+from robolink.messages import tr
+from robolink.model import ToolOffset
+
+LEAST_SPACING_MM = 5.0
+
+
+SPACING_TOLERANCE = 0.01
+"""Largest relative difference from the nominal spacing (docs/reference/calibration.md 3)."""
+
+
+def solve_board(
+    first: Sighting,
+    second: Sighting,
+    *,
+    stored: ToolOffset | None = None,
+    spacing_mm: float | None = None,
+    sigma_mm: float | None = None,
+    allow_mixed_hand: bool = False,
+) -> CalibrationResult:
+    """Return the tool of a board of which two fiducials were seen.
+
+    Args:
+        first: Fiducial 1, with the actual flange pose at its picture.
+        second: Fiducial 2, likewise; each may have a pose of its own.
+        stored: The offset stored now; Z, V and W are kept from it, or 0 without one.
+        spacing_mm: Nominal distance between the fiducials, checked when it is given.
+        sigma_mm: Standard deviation of one coordinate of one sighting.
+        allow_mixed_hand: Warn instead of refusing when the arm was configured differently.
+
+    Raises:
+        CalibrationError: ``coincident_fiducials``, ``spacing_mismatch``, ``non_finite``,
+            ``suspect_units``, ``mixed_hand``, ``mixed_local``, ``mixed_tool`` or
+            ``implausible_offset``.
+        ConfigError: ``sigma_mm`` is not positive.
+    """
+    warnings = check_sightings((first, second), allow_mixed_hand=allow_mixed_hand)
+    (x1, y1), (x2, y2) = first.in_flange_mm(), second.in_flange_mm()
+    spacing = math.hypot(x1 - x2, y1 - y2)
+    check_spacing(spacing, spacing_mm)
+    scatter = Dispersion.of(0.0, 0, sigma_mm)
+    covariance: tuple[tuple[float, ...], ...] = ()
+    if scatter:
+        half = scatter.sigma_mm**2 / 2
+        angle = 2 * (math.degrees(scatter.sigma_mm) / spacing) ** 2
+        covariance = ((half, 0.0, 0.0), (0.0, half, 0.0), (0.0, 0.0, angle))
+    return CalibrationResult(
+        method="board",
+        offset=keep_unmeasured(
+            stored,
+            x_mm=(x1 + x2) / 2,
+            y_mm=(y1 + y2) / 2,
+            u_deg=math.degrees(math.atan2(y1 - y2, x1 - x2)),
+        ),
+        measured=("x_mm", "y_mm", "u_deg"),
+        kept=("z_mm", "v_deg", "w_deg"),
+        reference_point_mm=(),
+        sigma_gain=1 / math.sqrt(2),
+        warnings=warnings,
+        inputs=(first.flange, second.flange),
+        covariance=covariance,
+        half_width95=scatter.half_widths(covariance) if scatter else (),
+        sigma_mm=sigma_mm,
+        sigma_stated=scatter is not None,
+        rank=3,
+        # The spacing is known as well, but only used as a check.
+        dof=0,
+        unobservable=("z_mm", "v_deg", "w_deg"),
+    )
+
+
+def check_spacing(spacing_mm: float, nominal_mm: float | None) -> None:
+    """Refuse fiducials that cannot be the ones that were meant.
+
+    Raises:
+        CalibrationError: ``coincident_fiducials`` or ``spacing_mismatch``.
+    """
+    if spacing_mm < LEAST_SPACING_MM:
+        raise CalibrationError(
+            "coincident_fiducials",
+            tr("The fiducials are {spacing:.3f} mm apart.", spacing=spacing_mm),
+            remedy=tr(
+                "Use fiducials far apart; at {least:.0f} mm or less no direction is found.",
+                least=LEAST_SPACING_MM,
+            ),
+        )
+    if nominal_mm is not None and abs(spacing_mm / nominal_mm - 1) > SPACING_TOLERANCE:
+        raise CalibrationError(
+            "spacing_mismatch",
+            tr(
+                "The fiducials are {spacing:.3f} mm apart; the drawing says {nominal:.3f} mm.",
+                spacing=spacing_mm,
+                nominal=nominal_mm,
+            ),
+            remedy=tr("Check which marks the camera found, and its scale."),
+        )

@@ -1,0 +1,130 @@
+"""A board with several fiducials: its drawing laid over them, turned and moved, not stretched.
+
+With d the drawing and f what was seen, both as x + iy and with their means taken off, the
+turn of the least squares is the direction of sum(conj(d) f).
+"""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from robolink.calibration.camera.board import SPACING_TOLERANCE, check_spacing
+from robolink.calibration.camera.up_camera import Sighting, check_sightings
+from robolink.calibration.core.planar_checks import require_poses
+from robolink.calibration.core.pose_checks import keep_unmeasured, require_finite
+from robolink.calibration.core.result import CalibrationResult
+from robolink.calibration.core.robust import Floats
+from robolink.calibration.pin.planar import Complexes
+from robolink.calibration.quality.fit_quality import judged
+from robolink.calibration.quality.tolerances import PLANAR_TOLERANCE, Tolerance
+from robolink.errors import CalibrationError
+from robolink.messages import tr
+from robolink.model import ToolOffset, rotate_xy
+
+UNKNOWNS = 3
+
+
+_KEPT = ("z_mm", "v_deg", "w_deg")
+
+
+def solve_board_fit(
+    sightings: Sequence[Sighting],
+    drawing_mm: Sequence[tuple[float, float]],
+    *,
+    stored: ToolOffset | None = None,
+    sigma_mm: float | None = None,
+    allow_mixed_hand: bool = False,
+    tolerance: Tolerance = PLANAR_TOLERANCE,
+) -> CalibrationResult:
+    """Return the tool whose axes are those of the drawing of a held board.
+
+    Args:
+        sightings: Fiducials as they were seen, with the flange pose of each picture.
+        drawing_mm: Where the same fiducials are in the drawing, in the same order.
+        stored: The offset stored now; Z, V and W are kept from it, or 0 without one.
+        sigma_mm: Standard deviation of one coordinate of one sighting, when it is known.
+        allow_mixed_hand: Warn instead of refusing when the arm was configured differently.
+        tolerance: Residuals above which the result carries a warning.
+
+    Raises:
+        CalibrationError: ``too_few_poses``, ``coincident_fiducials``, ``spacing_mismatch``,
+            and those of :func:`check_poses`.
+        ConfigError: ``sigma_mm`` is not positive.
+        ValueError: The lists differ in length.
+    """
+    if len(sightings) != len(drawing_mm):
+        raise ValueError(f"{len(sightings)} sightings for {len(drawing_mm)} places in the drawing")
+    require_poses(len(sightings), 2)
+    for number, (x, y) in enumerate(drawing_mm, start=1):
+        require_finite(**{f"x of drawing {number}": x, f"y of drawing {number}": y})
+    warnings = check_sightings(tuple(sightings), allow_mixed_hand=allow_mixed_hand)
+    seen = np.array([complex(*sighting.in_flange_mm()) for sighting in sightings])
+    drawing = np.array([complex(*place) for place in drawing_mm])
+    turn = _turn(seen, drawing)
+    origin = complex(seen.mean() - turn * drawing.mean())
+    residuals = seen - origin - turn * drawing
+    unit = _unit_covariance(turn, drawing)
+    result = CalibrationResult(
+        method="board_fit",
+        offset=keep_unmeasured(
+            stored,
+            x_mm=origin.real,
+            y_mm=origin.imag,
+            u_deg=math.degrees(math.atan2(turn.imag, turn.real)),
+        ),
+        measured=("x_mm", "y_mm", "u_deg"),
+        kept=_KEPT,
+        reference_point_mm=(),
+        sigma_gain=float(np.sqrt(max(unit[0, 0], unit[1, 1]))),
+        warnings=warnings,
+        inputs=tuple(sighting.flange for sighting in sightings),
+        residuals_mm=_in_base(residuals, sightings),
+        rank=UNKNOWNS,
+        unobservable=_KEPT,
+    )
+    return judged(
+        result,
+        residuals.view(float).reshape(-1, 2),
+        unit,
+        unknowns=UNKNOWNS,
+        sigma_mm=sigma_mm,
+        tolerance=tolerance,
+    )
+
+
+def _turn(seen: Complexes, drawing: Complexes) -> complex:
+    centred_f, centred_d = seen - seen.mean(), drawing - drawing.mean()
+    size = float((np.abs(centred_d) ** 2).sum())
+    overlap = complex((centred_d.conj() * centred_f).sum())
+    # Twice the rms distance from the middle is the spacing when there are two.
+    spread_mm = 2 * math.sqrt(float((np.abs(centred_f) ** 2).sum()) / len(seen))
+    check_spacing(min(spread_mm, 2 * math.sqrt(size / len(seen))), None)
+    scale = abs(overlap) / size
+    if abs(scale - 1) > SPACING_TOLERANCE:
+        raise CalibrationError(
+            "spacing_mismatch",
+            tr("The fiducials are {scale:.4f} times as far apart as in the drawing.", scale=scale),
+            remedy=tr("Check which marks the camera found, their order, and its scale."),
+        )
+    return overlap / abs(overlap)
+
+
+def _unit_covariance(turn: complex, drawing: Complexes) -> Floats:
+    """Return the covariance of x, y in mm^2 and u in deg^2 for sigma = 1 mm."""
+    centred = drawing - drawing.mean()
+    angle = 1 / float((np.abs(centred) ** 2).sum())
+    # The origin turns about the middle of the fiducials, to which alone the mean is tied.
+    lever = -1j * turn * complex(drawing.mean())
+    column = np.array([lever.real, lever.imag, math.degrees(1.0)])
+    unit: Floats = np.outer(column, column) * angle + np.diag([1, 1, 0]) / len(drawing)
+    return unit
+
+
+def _in_base(
+    residuals: Complexes, sightings: Sequence[Sighting]
+) -> tuple[tuple[float, float], ...]:
+    return tuple(
+        rotate_xy(residual.real, residual.imag, sighting.flange.u_deg)
+        for residual, sighting in zip(residuals.tolist(), sightings, strict=True)
+    )

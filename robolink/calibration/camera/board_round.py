@@ -1,0 +1,93 @@
+"""A held board seen at several angles: what the camera itself is off by is found with it.
+
+A fiducial at d in the drawing is seen from the flange at ``conj(z) (s - p) = o + turn d +
+conj(z) b``, with z = exp(iU), the board's origin o and direction turn, and the camera's error b.
+All but the direction is linear, and that is known well enough after the plain fit for one step.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from robolink.calibration.camera.board_fit import solve_board_fit
+from robolink.calibration.camera.camera_round import CameraRound, as_round
+from robolink.calibration.camera.up_camera import Sighting
+from robolink.calibration.core.least_squares import LinearFit, linear_fit
+from robolink.calibration.core.planar_checks import MIN_ROTATION_DEG, angle_spread_deg
+from robolink.calibration.core.pose_checks import keep_unmeasured
+from robolink.calibration.pin.n_angle import planar_arrays
+from robolink.calibration.pin.planar import Complexes
+from robolink.calibration.quality.fit_quality import judged
+from robolink.calibration.quality.tolerances import PLANAR_TOLERANCE, Tolerance
+from robolink.model import ToolOffset
+
+UNKNOWNS = 5
+
+
+def solve_board_round(
+    sightings: Sequence[Sighting],
+    drawing_mm: Sequence[tuple[float, float]],
+    *,
+    stored: ToolOffset | None = None,
+    sigma_mm: float | None = None,
+    tolerance: Tolerance = PLANAR_TOLERANCE,
+) -> CameraRound:
+    """Return the tool whose axes are those of the drawing of a held board, and the camera's error.
+
+    Args:
+        sightings: Fiducials as they were seen, with the flange pose of each look. Over less than
+            30 degrees of U the camera's error cannot be told and is taken for none.
+        drawing_mm: Where the same fiducials are in the drawing, in the same order.
+        stored: The offset stored now; Z, V and W are kept from it, or 0 without one.
+        sigma_mm: Standard deviation of one coordinate of one look, where it is known.
+        tolerance: Residuals above which the result carries a warning.
+
+    Raises:
+        CalibrationError: As :func:`solve_board_fit`.
+        ConfigError: ``sigma_mm`` is not positive.
+    """
+    plain = solve_board_fit(
+        sightings, drawing_mm, stored=stored, sigma_mm=sigma_mm, tolerance=tolerance
+    )
+    if angle_spread_deg([sighting.flange.u_deg for sighting in sightings]) < MIN_ROTATION_DEG:
+        return as_round(plain)
+    p, z = planar_arrays([sighting.flange for sighting in sightings])
+    seen = (np.array([complex(s.x_mm, s.y_mm) for s in sightings]) - p) / z
+    drawn = np.array([complex(*place) for place in drawing_mm])
+    turn_rad = math.radians(plain.offset.u_deg)
+    for _ in range(2):
+        fit = _step(seen, z, drawn * np.exp(1j * turn_rad))
+        turn_rad += float(fit.x[2])
+    x_mm, y_mm, _, error_x, error_y = fit.x.tolist()
+    residuals = (fit.residuals.reshape(2, -1).T @ (1, 1j)) * z
+    vectors = np.column_stack((residuals.real, residuals.imag))
+    in_degrees = np.diag((1.0, 1.0, math.degrees(1.0)))
+    unit = in_degrees @ fit.unit_covariance[:3, :3] @ in_degrees
+    u_deg = math.degrees(math.remainder(turn_rad, math.tau))
+    # What the plain fit said about itself is said anew.
+    fresh = replace(
+        plain,
+        offset=keep_unmeasured(stored, x_mm=x_mm, y_mm=y_mm, u_deg=u_deg),
+        residuals_mm=tuple(map(tuple, vectors.tolist())),
+        sigma_gain=math.sqrt(float(unit.diagonal()[:2].max())),
+        condition_number=fit.condition_number,
+        rank=fit.rank,
+        warnings=(),
+    )
+    result = judged(fresh, vectors, unit, unknowns=UNKNOWNS, sigma_mm=sigma_mm, tolerance=tolerance)
+    return as_round(result, camera_error_mm=(error_x, error_y))
+
+
+def _step(seen: Complexes, z: Complexes, turned: Complexes) -> LinearFit:
+    """Return the fit of origin, small turn in radians, and camera error."""
+    ones, zeros = np.ones(len(z)), np.zeros(len(z))
+    a = np.vstack(
+        (
+            np.column_stack((ones, zeros, -turned.imag, z.real, z.imag)),
+            np.column_stack((zeros, ones, turned.real, -z.imag, z.real)),
+        )
+    )
+    missing = seen - turned
+    return linear_fit(a, np.concatenate((missing.real, missing.imag)))

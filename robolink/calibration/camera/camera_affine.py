@@ -1,0 +1,178 @@
+"""Camera and tool offset together, from pixels, with a camera whose place is unknown.
+
+Every picture says ``M px + b = p + Rz(U) t``: linear in the matrix M, the origin b and the
+offset t, eight unknowns in all (docs/reference/calibration.md 2.5). Moving without turning shows M,
+turning shows t; without turning, t and b cannot be told apart.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from robolink.calibration.camera.camera_model import (
+    USUAL_CAMERA,
+    CameraLimits,
+    CameraModel,
+    require_same_camera,
+)
+from robolink.calibration.core.least_squares import LinearFit, linear_fit
+from robolink.calibration.core.planar_checks import require_poses
+from robolink.calibration.core.pose_checks import check_poses, keep_unmeasured, require_finite
+from robolink.calibration.core.result import CalibrationResult
+from robolink.calibration.core.robust import Floats
+from robolink.calibration.pin.n_angle import planar_arrays
+from robolink.calibration.quality.fit_quality import judged
+from robolink.calibration.quality.tolerances import PLANAR_TOLERANCE, Tolerance
+from robolink.errors import CalibrationError
+from robolink.messages import tr
+from robolink.model import Pose, ToolOffset
+
+UNKNOWNS = 8
+
+
+MAX_CONDITION = 100.0
+
+
+_KEPT = ("z_mm", "u_deg", "v_deg", "w_deg")
+
+
+@dataclass(frozen=True, slots=True)
+class PixelSighting:
+    """The tip in a picture: the flange pose (Tool 0) then, and the pixel."""
+
+    flange: Pose
+    px: float
+    py: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CameraCalibration(CalibrationResult):
+    """A tool offset and the camera that measured it.
+
+    Attributes:
+        camera: The map from pixels to the base.
+        rms_px: Root mean square of the residual distances in pixels, ``None`` without a
+            degree of freedom.
+    """
+
+    camera: CameraModel
+    rms_px: float | None = None
+
+    def details(self) -> dict[str, object]:
+        """Return the camera."""
+        return {
+            "camera": {
+                "mm_per_px": [list(row) for row in self.camera.mm_per_px],
+                "origin_mm": list(self.camera.origin_mm),
+                "scale_mm_per_px": list(self.camera.scale_mm_per_px),
+                "turn_deg": self.camera.turn_deg,
+                "shear_deg": self.camera.shear_deg,
+                "mirrored": self.camera.mirrored,
+                "rms_px": self.rms_px,
+            }
+        }
+
+
+def solve_camera_affine(
+    sightings: Sequence[PixelSighting],
+    *,
+    stored: ToolOffset | None = None,
+    sigma_mm: float | None = None,
+    before: CameraModel | None = None,
+    limits: CameraLimits = USUAL_CAMERA,
+    tolerance: Tolerance = PLANAR_TOLERANCE,
+) -> CameraCalibration:
+    """Return offset and camera from pictures of one tip in several flange poses.
+
+    Args:
+        sightings: At least four: three places that are not in line at one U, and other U.
+        stored: The offset stored now; Z, U, V and W are kept from it, or 0 without one.
+        sigma_mm: Standard deviation of one coordinate of one sighting, in mm, when known.
+        before: The camera at its last calibration; a changed one is refused.
+        limits: What is a good and what the same camera.
+        tolerance: Residuals above which the result carries a warning.
+
+    Raises:
+        CalibrationError: ``too_few_poses``, ``rank_deficient``, ``insufficient_rotation``,
+            ``camera_changed``, ``implausible_offset``, and those of :func:`check_poses`.
+        ConfigError: ``sigma_mm`` is not positive.
+    """
+    require_poses(len(sightings), UNKNOWNS // 2)
+    for number, sighting in enumerate(sightings, start=1):
+        require_finite(**{f"px of {number}": sighting.px, f"py of {number}": sighting.py})
+    poses = [sighting.flange for sighting in sightings]
+    warnings = check_poses(poses, allow_mixed_hand=False)
+    pixels = np.array([(sighting.px, sighting.py) for sighting in sightings], dtype=float)
+    fit = linear_fit(*_system(poses, pixels))
+    _require_observable(fit)
+    camera = _camera(fit.x, pixels.mean(axis=0))
+    if before is not None:
+        require_same_camera(camera, before, limits)
+    residuals = fit.residuals.reshape(-1, 2)
+    result = CameraCalibration(
+        method="camera_affine",
+        offset=keep_unmeasured(stored, x_mm=float(fit.x[6]), y_mm=float(fit.x[7])),
+        measured=("x_mm", "y_mm"),
+        kept=_KEPT,
+        reference_point_mm=camera.origin_mm,
+        sigma_gain=math.sqrt(float(fit.unit_covariance.diagonal()[6:].max())),
+        warnings=warnings,
+        inputs=tuple(poses),
+        residuals_mm=tuple(map(tuple, residuals.tolist())),
+        condition_number=fit.condition_number,
+        rank=fit.rank,
+        unobservable=_KEPT,
+        camera=camera,
+    )
+    result = judged(
+        result,
+        residuals,
+        fit.unit_covariance[6:, 6:],
+        unknowns=UNKNOWNS,
+        sigma_mm=sigma_mm,
+        tolerance=tolerance,
+    )
+    rms_px = _rms_px(camera, residuals) if result.dof else None
+    doubts = (*result.warnings, *limits.doubts(camera, rms_px))
+    return replace(result, rms_px=rms_px, warnings=doubts)
+
+
+def _system(poses: Sequence[Pose], pixels: Floats) -> tuple[Floats, Floats]:
+    """Return the 2N x 8 system in M (by rows), b at the mean pixel, and t."""
+    p, z = planar_arrays(poses)
+    a = np.zeros((len(poses), 2, UNKNOWNS))
+    # About the mean pixel, M and b hardly disturb each other.
+    centred = pixels - pixels.mean(axis=0)
+    a[:, 0, 0:2] = a[:, 1, 2:4] = centred
+    a[:, 0, 4] = a[:, 1, 5] = 1.0
+    a[:, 0, 6], a[:, 0, 7] = -z.real, z.imag
+    a[:, 1, 6], a[:, 1, 7] = -z.imag, -z.real
+    return a.reshape(-1, UNKNOWNS), np.column_stack((p.real, p.imag)).ravel()
+
+
+def _camera(x: Floats, mean_pixel: Floats) -> CameraModel:
+    m = x[:4].reshape(2, 2)
+    ox, oy = (x[4:6] - m @ mean_pixel).tolist()
+    (a, b), (c, d) = m.tolist()
+    return CameraModel(((a, b), (c, d)), (ox, oy))
+
+
+def _rms_px(camera: CameraModel, residuals_mm: Floats) -> float:
+    in_pixels = residuals_mm @ np.linalg.inv(np.array(camera.mm_per_px)).T
+    return math.sqrt(float((in_pixels**2).sum()) / len(in_pixels))
+
+
+def _require_observable(fit: LinearFit) -> None:
+    if fit.rank == UNKNOWNS and fit.condition_number <= MAX_CONDITION:
+        return
+    matrix_part, offset_part = np.abs(fit.weakest[:4]).max(), np.abs(fit.weakest[6:]).max()
+    if offset_part > matrix_part:
+        what = tr("The tool turned too little: its offset and the camera's place mix.")
+        remedy = tr("Add pictures at other angles of U, best all round.")
+    else:
+        what = tr("The tip moved too little over the image: its scale and turn are unknown.")
+        remedy = tr("Add pictures at three places or more that are not in line, at one U.")
+    code = "rank_deficient" if fit.rank < UNKNOWNS else "insufficient_rotation"
+    raise CalibrationError(code, what, remedy=remedy)

@@ -1,0 +1,1 @@
+"""Poses, rotations, least squares and statistics: what every solver stands on."""

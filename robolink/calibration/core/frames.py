@@ -1,0 +1,77 @@
+"""Where the flange is when a tip is somewhere, and a tip seen from another one."""
+
+from dataclasses import replace
+
+from robolink.model import Pose, ToolOffset, rotate_xy
+
+
+def flange_pose(tip: Pose, offset: ToolOffset) -> Pose:
+    """Return where the flange is when a four-axis robot's tool tip is at ``tip``.
+
+    ``tip = flange + Rz(U) t`` and the tip's U is the flange's U plus the tool's
+    (docs/reference/epson.md 3.1).
+    """
+    u_deg = tip.u_deg - offset.u_deg
+    dx, dy = rotate_xy(offset.x_mm, offset.y_mm, u_deg)
+    return replace(
+        tip,
+        x_mm=tip.x_mm - dx,
+        y_mm=tip.y_mm - dy,
+        z_mm=tip.z_mm - offset.z_mm,
+        u_deg=u_deg,
+        tool=0,
+    )
+
+
+def tilted_flange_pose(tip: Pose, offset: ToolOffset) -> Pose:
+    """Return where the flange is when a six-axis robot's tool is at ``tip``.
+
+    The tool's orientation is the flange's followed by the offset's own: ``R_tip = R R_tool``,
+    ``tip = flange + R t`` (docs/reference/epson.md 3.1).
+    """
+    from robolink.calibration.core.rotations import (  # numpy, which four axes do without
+        rotation_of,
+        uvw_deg,
+    )
+
+    own = rotation_of(Pose(0.0, 0.0, 0.0, offset.u_deg, offset.v_deg, offset.w_deg))
+    turned = rotation_of(tip) @ own.T
+    dx, dy, dz = (turned @ offset.components()[:3]).tolist()
+    u_deg, v_deg, w_deg = uvw_deg(turned)
+    return replace(
+        tip,
+        x_mm=tip.x_mm - dx,
+        y_mm=tip.y_mm - dy,
+        z_mm=tip.z_mm - dz,
+        u_deg=u_deg,
+        v_deg=v_deg,
+        w_deg=w_deg,
+        tool=0,
+    )
+
+
+def tilted_from(written: ToolOffset, tip: ToolOffset) -> ToolOffset:
+    """Return where a tip is, seen from the frame of a written offset of a six-axis robot."""
+    from robolink.calibration.core.rotations import rotation_of  # numpy, which four axes do without
+
+    own = rotation_of(Pose(0.0, 0.0, 0.0, written.u_deg, written.v_deg, written.w_deg))
+    aside = [b - a for a, b in zip(written.components(), tip.components(), strict=True)][:3]
+    x_mm, y_mm, z_mm = (own.T @ aside).tolist()
+    return ToolOffset(x_mm, y_mm, z_mm)
+
+
+def flange_of(tip: Pose, offset: ToolOffset) -> Pose:
+    """Return where the flange is, on four axes and on more."""
+    tilted = (tip.v_deg, tip.w_deg, offset.v_deg, offset.w_deg) != (0.0, 0.0, 0.0, 0.0)
+    return tilted_flange_pose(tip, offset) if tilted else flange_pose(tip, offset)
+
+
+def seen_from(written: ToolOffset, tip: ToolOffset) -> ToolOffset:
+    """Return where a tip is, seen from the frame of a written offset of a four-axis robot."""
+    dx, dy = rotate_xy(tip.x_mm - written.x_mm, tip.y_mm - written.y_mm, -written.u_deg)
+    return ToolOffset(dx, dy, tip.z_mm - written.z_mm)
+
+
+def toward_zero(u_deg: float, turn_deg: float) -> float:
+    """Return U after a turn that keeps it inside the joint's range: toward zero."""
+    return u_deg - turn_deg if u_deg > 0 else u_deg + turn_deg

@@ -1,0 +1,47 @@
+"""Linear least squares with what is needed to trust the answer."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from robolink.calibration.core.robust import Floats
+
+_RANK_BELOW = 1e-10
+
+
+@dataclass(frozen=True, slots=True)
+class LinearFit:
+    """Solution of A x = b.
+
+    Attributes:
+        x: The solution, shortest where the rank is short.
+        residuals: b - A x.
+        unit_covariance: (A'A)^-1, infinite where the rank is short.
+        condition_number: With every column brought to length 1, because they differ in unit.
+        rank: Of A.
+        weakest: Which mixture of the scaled columns is known worst.
+    """
+
+    x: Floats
+    residuals: Floats
+    unit_covariance: Floats
+    condition_number: float
+    rank: int
+    weakest: Floats
+
+
+def linear_fit(a: Floats, b: Floats) -> LinearFit:
+    """Return the least squares of ``a x = b``; ``a`` has at least as many rows as columns."""
+    lengths = np.linalg.norm(a, axis=0)
+    lengths[lengths == 0] = 1.0
+    u, s, v = np.linalg.svd(a / lengths, full_matrices=False)
+    known = s > _RANK_BELOW * s[0]
+    inverse = np.where(known, 1 / np.where(known, s, 1.0), 0.0)
+    x = (v.T * inverse) @ (u.T @ b) / lengths
+    if known.all():
+        root = (v.T * inverse) / lengths[:, None]
+        covariance = root @ root.T
+    else:
+        covariance = np.full((a.shape[1],) * 2, np.inf)
+    condition = float(s[0] / s[-1]) if known.all() else np.inf
+    return LinearFit(x, b - a @ x, covariance, condition, int(known.sum()), v[-1])

@@ -1,0 +1,133 @@
+"""What makes flange poses unfit for a planar calibration, by name.
+
+Source: docs/reference/calibration.md 3.
+"""
+
+import math
+from collections.abc import Sequence
+
+from robolink.calibration.core.pose_checks import check_poses
+from robolink.errors import CalibrationError
+from robolink.messages import tr
+from robolink.model import Pose
+
+MIN_ROTATION_DEG = 30.0
+
+
+WARN_ROTATION_DEG = 90.0
+
+
+_SAME_ANGLE_DEG = 1e-9
+
+
+_LIKE_A_NEEDLE_MM = 150.0
+
+
+def check_planar(
+    poses: Sequence[Pose], *, minimum: int, min_rotation_deg: float, allow_mixed_hand: bool
+) -> tuple[str, ...]:
+    """Refuse poses that a planar solver cannot use; return the names of lesser doubts.
+
+    Raises:
+        CalibrationError: ``too_few_poses``, ``tilted_pose``, ``degenerate_angles``,
+            ``insufficient_rotation``, and those of :func:`check_poses`.
+    """
+    require_poses(len(poses), minimum)
+    doubts = check_poses(poses, allow_mixed_hand=allow_mixed_hand)
+    _require_upright(poses)
+    spread_deg = angle_spread_deg([pose.u_deg for pose in poses])
+    if spread_deg < min_rotation_deg:
+        refuse_radians(poses, spread_deg)
+    _require_rotation(poses, spread_deg, min_rotation_deg)
+    if spread_deg < WARN_ROTATION_DEG:
+        doubts = (*doubts, "small_rotation")
+    return doubts
+
+
+def angle_spread_deg(angles_deg: Sequence[float]) -> float:
+    """Return the shortest arc that holds all angles, modulo 360."""
+    turned = sorted(angle % 360.0 for angle in angles_deg)
+    gaps = [b - a for a, b in zip(turned, [*turned[1:], turned[0] + 360.0], strict=True)]
+    return 360.0 - max(gaps)
+
+
+def planar_sigma_gain(poses: Sequence[Pose]) -> float:
+    """Return by how much a placement error counts in each offset axis; inf if for ever."""
+    cosines = [math.cos(math.radians(pose.u_deg)) for pose in poses]
+    sines = [math.sin(math.radians(pose.u_deg)) for pose in poses]
+    mean_c, mean_s = sum(cosines) / len(poses), sum(sines) / len(poses)
+    weight = sum((c - mean_c) ** 2 for c in cosines) + sum((s - mean_s) ** 2 for s in sines)
+    return 1 / math.sqrt(weight) if weight > 0 else math.inf
+
+
+def require_poses(count: int, minimum: int) -> None:
+    """Refuse fewer than ``minimum`` poses.
+
+    Raises:
+        CalibrationError: ``too_few_poses``.
+    """
+    if count < minimum:
+        raise CalibrationError(
+            "too_few_poses",
+            tr(
+                "{count} poses were given; the method needs at least {minimum}.",
+                count=count,
+                minimum=minimum,
+            ),
+            remedy=tr("Take more, at angles that differ as much as the robot allows."),
+        )
+
+
+def refuse_radians(poses: Sequence[Pose], spread_deg: float) -> None:
+    """Refuse angles that would need a giant tool, and a plausible one when read as radians.
+
+    Raises:
+        CalibrationError: ``suspect_units``.
+    """
+    angles = [angle for pose in poses for angle in pose.coordinates()[3:]]
+    if spread_deg < _SAME_ANGLE_DEG or any(abs(angle) > 2 * math.pi for angle in angles):
+        return
+    positions = [pose.coordinates()[:3] for pose in poses]
+    # Twice the way from one pose is never less than the way between any two.
+    travel_mm = max(math.dist(positions[0], position) for position in positions)
+    if travel_mm / (2 * math.sin(math.radians(spread_deg / 2))) > _LIKE_A_NEEDLE_MM:
+        raise CalibrationError(
+            "suspect_units",
+            tr("The poses move {travel:.1f} mm while they hardly turn.", travel=travel_mm),
+            remedy=tr("The angles look like radians; give them in degrees."),
+        )
+
+
+def _require_upright(poses: Sequence[Pose]) -> None:
+    for number, pose in enumerate(poses, start=1):
+        if pose.v_deg or pose.w_deg:
+            raise CalibrationError(
+                "tilted_pose",
+                tr(
+                    "Pose {number} has V = {v} and W = {w}; a planar method needs 0.",
+                    number=number,
+                    v=pose.v_deg,
+                    w=pose.w_deg,
+                ),
+                remedy=tr("Use the pivot method for poses of six axes."),
+            )
+
+
+def _require_rotation(poses: Sequence[Pose], spread_deg: float, minimum_deg: float) -> None:
+    if spread_deg < _SAME_ANGLE_DEG:
+        raise CalibrationError(
+            "degenerate_angles",
+            tr("All poses have the same U; the offset cannot be found from them."),
+            remedy=tr("Turn the tool between the poses, best over half a turn or more."),
+        )
+    if spread_deg < minimum_deg:
+        raise CalibrationError(
+            "insufficient_rotation",
+            tr(
+                "The poses spread over {spread:.2f} degrees in U only; every placement error "
+                "would count {gain:.1f} times.",
+                spread=spread_deg,
+                gain=planar_sigma_gain(poses),
+            ),
+            remedy=tr("Spread them over {minimum:.0f} degrees or more.", minimum=minimum_deg),
+        )

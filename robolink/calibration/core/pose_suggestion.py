@@ -1,0 +1,136 @@
+"""Which poses to take: the plan with the best condition that limits and workspace allow."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from robolink.calibration.core.dispersion import require_positive
+from robolink.calibration.core.pose_design import select_poses, sigma_gain
+from robolink.calibration.core.result import CalibrationResult
+from robolink.calibration.core.rotations import pose_arrays, rotations
+from robolink.errors import CalibrationError, ConfigError, LimitError
+from robolink.messages import tr
+from robolink.model import Pose, ToolOffset, WorkBox
+
+U_STEP_DEG = 15.0
+
+
+@dataclass(frozen=True, slots=True)
+class PoseLimits:
+    """Where the flange may go.
+
+    Attributes:
+        u_min_deg, u_max_deg: Range of U, inside the joint's limits.
+        tilt_deg: Largest V and W; 0 on four axes.
+        box: Box that no flange position may leave, ``None`` for none.
+    """
+
+    u_min_deg: float = -180.0
+    u_max_deg: float = 180.0
+    tilt_deg: float = 0.0
+    box: WorkBox | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class PosePlan:
+    """Poses to take, the most telling first.
+
+    Attributes:
+        poses: Flange poses (Tool 0) that bring the guessed tip onto the point.
+        sigma_gains: After each of them, the largest standard deviation of a measured length
+            as a multiple of one placement's; infinite while something is still unknown.
+    """
+
+    poses: tuple[Pose, ...]
+    sigma_gains: tuple[float, ...]
+
+
+def suggest_poses(
+    count: int,
+    *,
+    guess: ToolOffset,
+    point_mm: tuple[float, float, float],
+    limits: PoseLimits,
+    taken: Sequence[Pose] = (),
+) -> PosePlan:
+    """Return ``count`` further poses for a tip on a point.
+
+    Args:
+        count: How many poses to plan.
+        guess: About where the tip is; decides where the flange has to go.
+        point_mm: The reference point, base.
+        limits: Where the flange may go. Without tilt only X and Y are planned for.
+        taken: Poses that have been taken already; the plan adds to them.
+
+    Raises:
+        ConfigError: ``count`` or the limits make no sense.
+        CalibrationError: ``insufficient_rotation`` when the limits leave too few poses.
+    """
+    if count < 1:
+        raise ConfigError(
+            tr("{count} poses cannot be planned.", count=count), remedy=tr("Plan one or more.")
+        )
+    candidates = _candidates(guess, point_mm, limits)
+    if len(candidates) < 2:
+        raise CalibrationError(
+            "insufficient_rotation",
+            tr("The limits leave {count} orientations only.", count=len(candidates)),
+            remedy=tr("Widen the range of U or the box, or choose another reference point."),
+        )
+    size = 3 if limits.tilt_deg > 0 else 2
+    turned = pose_arrays(candidates)[1][:, :size, :size]
+    before = pose_arrays(taken)[1][:, :size, :size] if taken else np.zeros((0, size, size))
+    order = select_poses(turned, before, count)
+    gains = [
+        sigma_gain(np.concatenate((before, turned[order[: k + 1]]))) for k in range(len(order))
+    ]
+    return PosePlan(tuple(candidates[index] for index in order), tuple(gains))
+
+
+def precise_enough(result: CalibrationResult, tolerance_mm: float) -> bool:
+    """Tell whether a measurement may stop: every length is known inside the tolerance.
+
+    ``tolerance_mm`` is half of what the process can bear (docs/reference/calibration.md 3). A
+    result without an interval is never precise enough.
+
+    Raises:
+        ConfigError: ``tolerance_mm`` is not positive.
+    """
+    require_positive(tolerance_mm, "tolerance_mm")
+    if not result.half_width95:
+        return False
+    return all(
+        half <= tolerance_mm
+        for name, half in zip(result.measured, result.half_width95, strict=True)
+        if name.endswith("_mm")
+    )
+
+
+def _candidates(
+    guess: ToolOffset, point_mm: tuple[float, float, float], limits: PoseLimits
+) -> list[Pose]:
+    span = limits.u_max_deg - limits.u_min_deg
+    if span < 0 or limits.tilt_deg < 0:
+        raise ConfigError(
+            tr("The range of U or the tilt is negative."), remedy=tr("Give the smaller U first.")
+        )
+    turns = np.linspace(limits.u_min_deg, limits.u_max_deg, max(2, 1 + round(span / U_STEP_DEG)))
+    tilts = (-limits.tilt_deg, 0.0, limits.tilt_deg) if limits.tilt_deg > 0 else (0.0,)
+    angles = np.array([(u, v, w) for u in turns for v in tilts for w in tilts])
+    places = np.array(point_mm) - rotations(angles) @ np.array(guess.components()[:3])
+    poses = []
+    for (x, y, z), (u, v, w) in zip(places.tolist(), angles.tolist(), strict=True):
+        pose = Pose(x, y, z, u, v, w, tool=0)
+        if _allowed(pose, limits.box):
+            poses.append(pose)
+    return poses
+
+
+def _allowed(pose: Pose, box: WorkBox | None) -> bool:
+    try:
+        if box is not None:
+            box.check(pose)
+    except LimitError:
+        return False
+    return True

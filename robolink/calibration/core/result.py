@@ -1,0 +1,152 @@
+"""What a calibration proposes, and how much of it was measured."""
+
+import math
+from dataclasses import dataclass
+
+from robolink.calibration.core.statistics import NORMAL_95
+from robolink.model import (
+    Pose,
+    ToolOffset,
+)
+
+COMPONENTS = ("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
+
+
+@dataclass(frozen=True, slots=True)
+class CalibrationResult:
+    """A proposal for a tool offset. Nothing has been written.
+
+    Attributes:
+        method: How it was measured, for example ``two_pose``.
+        offset: The proposed offset: measured components, and the others as they were kept.
+        measured: Names of the components that the measurement determines.
+        kept: Names of the components that were not measured and are proposed unchanged.
+        reference_point_mm: Where the reference point lies in the base, (x, y) or (x, y, z);
+            empty where a method has none.
+        sigma_gain: Standard deviation of each measured length as a multiple of the standard
+            deviation of one placement (docs/reference/calibration.md 1.1); the largest when they
+            differ.
+        warnings: Named doubts that do not forbid the result.
+        inputs: The poses that went in.
+        covariance: Of the measured components, in their order: mm^2 between two lengths,
+            deg^2 between two angles, mm deg between both. Empty when neither a residual nor
+            a stated sigma tells how large the errors are.
+        half_width95: Half the 95 % interval of each measured component, in their order, mm or
+            degrees: Student's t where the scatter was estimated, the normal distribution where
+            it was stated. Empty when ``covariance`` is.
+        sigma_mm: Standard deviation of one coordinate of one placement, as it was stated or
+            estimated; ``None`` when it is unknown.
+        sigma_stated: Whether ``sigma_mm`` was stated by the caller.
+        rms_mm: Root mean square of the residual distances that were kept, ``None`` without a
+            degree of freedom.
+        max_residual_mm: The largest of them.
+        residuals_mm: Residual vector of every pose in base axes, rejected ones included.
+        rejected: Indices, from 0, of the poses that a robust fit left out.
+        condition_number: Of the whole design matrix, ``None`` for closed forms.
+        rank: Of the design matrix.
+        dof: Degrees of freedom that are left: equations less unknowns.
+        unobservable: Components that these data cannot tell, whatever their number.
+    """
+
+    method: str
+    offset: ToolOffset
+    measured: tuple[str, ...]
+    kept: tuple[str, ...]
+    reference_point_mm: tuple[float, ...]
+    sigma_gain: float
+    warnings: tuple[str, ...]
+    inputs: tuple[Pose, ...]
+    covariance: tuple[tuple[float, ...], ...] = ()
+    half_width95: tuple[float, ...] = ()
+    sigma_mm: float | None = None
+    sigma_stated: bool = False
+    rms_mm: float | None = None
+    max_residual_mm: float | None = None
+    residuals_mm: tuple[tuple[float, ...], ...] = ()
+    rejected: tuple[int, ...] = ()
+    condition_number: float | None = None
+    rank: int | None = None
+    dof: int | None = None
+    unobservable: tuple[str, ...] = ()
+
+    def details(self) -> dict[str, object]:
+        """Return what the method tells besides, plain JSON; nothing for most."""
+        return {}
+
+    @property
+    def interval95(self) -> dict[str, tuple[float, float]]:
+        """Lower and upper end of each measured component's 95 % interval, by name."""
+        if not self.half_width95:
+            return {}
+        return {
+            name: (getattr(self.offset, name) - half, getattr(self.offset, name) + half)
+            for name, half in zip(self.measured, self.half_width95, strict=True)
+        }
+
+    @property
+    def half95_mm(self) -> float | None:
+        """Half the 95 % interval of the length that is known worst; ``None`` without one."""
+        widths = zip(self.measured, self.half_width95, strict=False)
+        return max((half for name, half in widths if name.endswith("_mm")), default=None)
+
+    @property
+    def residual_distances_mm(self) -> tuple[float, ...]:
+        """Length of each pose's residual, in the order of the poses."""
+        return tuple(math.hypot(*residual) for residual in self.residuals_mm)
+
+
+@dataclass(frozen=True, slots=True)
+class Drift:
+    """How far the tip left the reference point when the tool stood at ``u_deg``.
+
+    ``dz_mm`` stays 0 where only the plane is judged.
+    """
+
+    u_deg: float
+    dx_mm: float
+    dy_mm: float
+    dz_mm: float = 0.0
+
+    @property
+    def distance_mm(self) -> float:
+        """Length of the drift."""
+        return math.hypot(self.dx_mm, self.dy_mm, self.dz_mm)
+
+
+@dataclass(frozen=True, slots=True)
+class VerifyResult:
+    """Drift of the tip about the reference point, one entry per angle.
+
+    ``warnings`` are named doubts about the test itself; ``heights_only`` tells that a surface was
+    touched, which shows Z and nothing else.
+    """
+
+    drifts: tuple[Drift, ...]
+    tolerance_mm: float
+    warnings: tuple[str, ...] = ()
+    heights_only: bool = False
+
+    @property
+    def max_drift_mm(self) -> float:
+        """The largest drift."""
+        return max(drift.distance_mm for drift in self.drifts)
+
+    @property
+    def passed(self) -> bool:
+        """Whether every drift is inside the tolerance."""
+        return self.max_drift_mm <= self.tolerance_mm
+
+
+def offset_sigma_mm(result: CalibrationResult) -> float | None:
+    """Return how uncertain a measured length is, as a standard deviation; the largest of them.
+
+    A scatter that was estimated from few poses is itself uncertain, and its 95 % interval is wider
+    for that. What is kept is the standard deviation of a normal distribution whose interval is as
+    wide, because whoever uses it later no longer knows from how many poses it came.
+
+    Returns:
+        ``None`` when nothing tells it.
+    """
+    widths = zip(result.measured, result.half_width95, strict=False)
+    lengths = [half for name, half in widths if name.endswith("_mm")]
+    return max(lengths) / NORMAL_95 if lengths else None

@@ -1,0 +1,81 @@
+"""Orientations as matrices, and the angles that two makers read off them.
+
+EPSON: R = Rz(U) Ry(V) Rx(W). CODESYS SoftMotion: R = Rz(A) Ry(B) Rz(C), intrinsic
+(docs/reference/calibration.md 1.4). Angles are never converted into each other but through the
+matrix.
+"""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from robolink.calibration.core.robust import Floats
+from robolink.model import Pose
+
+_SINGULAR = 1e-9
+
+
+def rotations(angles_deg: Floats) -> Floats:
+    """Return Rz(U) Ry(V) Rx(W) for each row (U, V, W), written out."""
+    angles = np.radians(angles_deg)
+    cu, cv, cw = np.cos(angles).T
+    su, sv, sw = np.sin(angles).T
+    svw, svc = sv * sw, sv * cw
+    out = np.empty((len(angles), 3, 3))
+    out[:, 0, 0], out[:, 1, 0], out[:, 2, 0] = cu * cv, su * cv, -sv
+    out[:, 0, 1], out[:, 1, 1], out[:, 2, 1] = cu * svw - su * cw, su * svw + cu * cw, cv * sw
+    out[:, 0, 2], out[:, 1, 2], out[:, 2, 2] = cu * svc + su * sw, su * svc - cu * sw, cv * cw
+    return out
+
+
+def pose_arrays(poses: Sequence[Pose]) -> tuple[Floats, Floats]:
+    """Return flange positions, N x 3 in mm, and rotations, N x 3 x 3."""
+    table = np.array([pose.coordinates() for pose in poses], dtype=float)
+    return table[:, :3], rotations(table[:, 3:])
+
+
+def rotation_of(pose: Pose) -> Floats:
+    """Return the rotation of one pose."""
+    matrix: Floats = rotations(np.array([pose.coordinates()[3:]]))[0]
+    return matrix
+
+
+def uvw_deg(rotation: Floats) -> tuple[float, float, float]:
+    """Return U, V, W of a rotation matrix, V in [-90, 90]; at +-90 W is 0."""
+    r = rotation
+    level = math.hypot(r[0, 0], r[1, 0])
+    v = math.degrees(math.atan2(-r[2, 0], level))
+    if level < _SINGULAR:
+        return math.degrees(math.atan2(-r[0, 1], r[1, 1])), v, 0.0
+    u = math.degrees(math.atan2(r[1, 0], r[0, 0]))
+    return u, v, math.degrees(math.atan2(r[2, 1], r[2, 2]))
+
+
+def zyz_deg(rotation: Floats) -> tuple[float, float, float]:
+    """Return A, B, C of a rotation matrix, B in [0, 180].
+
+    (A + 180, -B, C + 180) is the same rotation. Where B is 0 or 180 only one angle is
+    defined: it goes into A, and C is 0 (docs/reference/calibration.md 1.4).
+    """
+    r = rotation
+    sine = math.hypot(r[0, 2], r[1, 2])
+    b = math.degrees(math.atan2(sine, r[2, 2]))
+    if sine < _SINGULAR:
+        # At B = 180 the first column is (-cos, -sin): Ry turns x over.
+        sign = math.copysign(1.0, r[2, 2])
+        return math.degrees(math.atan2(sign * r[1, 0], sign * r[0, 0])), b, 0.0
+    a = math.degrees(math.atan2(r[1, 2], r[0, 2]))
+    return a, b, math.degrees(math.atan2(r[2, 1], -r[2, 0]))
+
+
+def quaternion_rotations(quaternions_xyzw: Floats) -> Floats:
+    """Return the rotations of unit quaternions, scalar last; they are normalised first."""
+    x, y, z, s = (quaternions_xyzw / np.linalg.norm(quaternions_xyzw, axis=1, keepdims=True)).T
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * s), 2 * (x * z + y * s)],
+            [2 * (x * y + z * s), 1 - 2 * (x * x + z * z), 2 * (y * z - x * s)],
+            [2 * (x * z - y * s), 2 * (y * z + x * s), 1 - 2 * (x * x + y * y)],
+        ]
+    ).transpose(2, 0, 1)

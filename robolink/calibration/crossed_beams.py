@@ -1,0 +1,185 @@
+"""Tool offset from travels through two crossed beams."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from robolink.calibration.beam_lines import Beam, Crossing, check_crossings, require_crossed
+from robolink.calibration.core.least_squares import LinearFit, linear_fit
+from robolink.calibration.core.planar_checks import MIN_ROTATION_DEG, angle_spread_deg
+from robolink.calibration.core.pose_checks import keep_unmeasured
+from robolink.calibration.core.result import CalibrationResult
+from robolink.calibration.core.robust import Floats
+from robolink.calibration.quality.fit_quality import judged
+from robolink.calibration.quality.tolerances import PLANAR_TOLERANCE, Tolerance
+from robolink.errors import CalibrationError
+from robolink.messages import tr
+from robolink.model import ToolOffset
+
+_KEPT = ("z_mm", "u_deg", "v_deg", "w_deg")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BeamsResult(CalibrationResult):
+    """A tool offset from beams.
+
+    Attributes:
+        lag_mm: For each beam, by how much latency and backlash shift a crossing along its
+            travel; ``None`` where only one direction was driven.
+    """
+
+    lag_mm: tuple[float | None, float | None]
+
+
+def solve_crossed_beams(
+    crossings: Sequence[Crossing],
+    beams: tuple[Beam, Beam],
+    *,
+    stored: ToolOffset | None = None,
+    sigma_mm: float | None = None,
+    beams_may_have_moved: bool = False,
+    tolerance: Tolerance = PLANAR_TOLERANCE,
+) -> BeamsResult:
+    """Return the offset of a tip that was driven through two crossed beams.
+
+    Args:
+        crossings: Travels through both beams, best in both directions.
+        beams: Where the beams are, from :func:`find_beams` with a reference pin.
+        stored: The offset stored now; Z, U, V and W are kept from it, or 0 without one.
+        sigma_mm: Standard deviation of one crossing's middle, across the beam.
+        beams_may_have_moved: Take only the directions of the beams as known. Needs crossings
+            at two angles of U, best half a turn apart; the offset is then absolute.
+        tolerance: Residuals above which the result carries a warning.
+
+    Raises:
+        CalibrationError: ``too_few_poses``, ``insufficient_rotation``, ``parallel_beams``,
+            ``no_crossing``, ``turned_in_crossing``, ``implausible_offset``, and those of
+            :func:`check_poses`.
+        ConfigError: ``sigma_mm`` is not positive.
+    """
+    warnings = check_crossings(crossings, minimum=1)
+    require_crossed(beams)
+    if beams_may_have_moved:
+        _require_turned(crossings)
+    two_ways = _two_ways(crossings, beams)
+    if not all(two_ways):
+        warnings = (*warnings, "one_direction")
+    a, b = _system(crossings, beams, two_ways, beams_may_have_moved)
+    fit = linear_fit(a, b) if len(a) >= a.shape[1] else None
+    if fit is None or fit.rank < a.shape[1]:
+        raise _too_few(len(a))
+    lags = fit.x[2 : 2 + sum(two_ways)].tolist()
+    result = BeamsResult(
+        method="crossed_beams",
+        offset=keep_unmeasured(stored, x_mm=float(fit.x[0]), y_mm=float(fit.x[1])),
+        measured=("x_mm", "y_mm"),
+        kept=_KEPT,
+        reference_point_mm=where_they_cross(beams),
+        sigma_gain=_gain(fit),
+        warnings=warnings,
+        inputs=tuple(crossing.entry for crossing in crossings),
+        residuals_mm=_vectors(fit.residuals, crossings, beams),
+        condition_number=fit.condition_number,
+        rank=fit.rank,
+        unobservable=_KEPT,
+        lag_mm=(
+            lags.pop(0) if two_ways[0] else None,
+            lags.pop(0) if two_ways[1] else None,
+        ),
+    )
+    return judged(
+        result,
+        fit.residuals[:, None],
+        fit.unit_covariance[:2, :2],
+        unknowns=a.shape[1],
+        sigma_mm=sigma_mm,
+        tolerance=tolerance,
+    )
+
+
+def crossing_sigma_gain(
+    crossings: Sequence[Crossing],
+    beams: tuple[Beam, Beam],
+    *,
+    beams_may_have_moved: bool = False,
+) -> float:
+    """Return the standard deviation of X or Y, the larger, as a multiple of one crossing's.
+
+    Only the directions and angles of the crossings count; see :func:`solve_crossed_beams`.
+    """
+    a, b = _system(crossings, beams, _two_ways(crossings, beams), beams_may_have_moved)
+    return _gain(linear_fit(a, b))
+
+
+def _gain(fit: LinearFit) -> float:
+    return math.sqrt(float(fit.unit_covariance.diagonal()[:2].max()))
+
+
+def _two_ways(crossings: Sequence[Crossing], beams: tuple[Beam, Beam]) -> tuple[bool, bool]:
+    driven = {(c.beam, c.direction_over(beams[c.beam])) for c in crossings}
+    return ({(0, 1.0), (0, -1.0)} <= driven, {(1, 1.0), (1, -1.0)} <= driven)
+
+
+def _system(
+    crossings: Sequence[Crossing],
+    beams: tuple[Beam, Beam],
+    two_ways: tuple[bool, bool],
+    moved: bool,
+) -> tuple[Floats, Floats]:
+    """Return one equation a crossing: n (middle + Rz(U) t) + direction lag = distance.
+
+    Columns: t (2), a lag for each beam driven both ways, and with ``moved`` by how far each
+    beam lies from where it was.
+    """
+    lag_column = {beam: 2 + sum(two_ways[:beam]) for beam in (0, 1) if two_ways[beam]}
+    width = 2 + sum(two_ways) + (2 if moved else 0)
+    a, b = np.zeros((len(crossings), width)), np.zeros(len(crossings))
+    for row, crossing in enumerate(crossings):
+        beam = beams[crossing.beam]
+        nx, ny = beam.normal
+        u = math.radians(crossing.entry.u_deg)
+        a[row, 0] = nx * math.cos(u) + ny * math.sin(u)
+        a[row, 1] = -nx * math.sin(u) + ny * math.cos(u)
+        if crossing.beam in lag_column:
+            a[row, lag_column[crossing.beam]] = -crossing.direction_over(beam)
+        if moved:
+            a[row, width - 2 + crossing.beam] = -1.0
+        x, y = crossing.middle_mm
+        b[row] = beam.distance_mm - nx * x - ny * y
+    return a, b
+
+
+def _vectors(
+    misses: Floats, crossings: Sequence[Crossing], beams: tuple[Beam, Beam]
+) -> tuple[tuple[float, ...], ...]:
+    normals = [beams[crossing.beam].normal for crossing in crossings]
+    return tuple(
+        (-miss * nx, -miss * ny) for miss, (nx, ny) in zip(misses.tolist(), normals, strict=True)
+    )
+
+
+def where_they_cross(beams: tuple[Beam, Beam]) -> tuple[float, float]:
+    """Return X and Y of the point where two beams cross, base, mm."""
+    normals = np.array([beam.normal for beam in beams])
+    x, y = np.linalg.solve(normals, [beam.distance_mm for beam in beams]).tolist()
+    return x, y
+
+
+def _too_few(count: int) -> CalibrationError:
+    return CalibrationError(
+        "too_few_poses",
+        tr("{count} crossings are too few.", count=count),
+        remedy=tr("Cross each beam in both directions, at each angle of U."),
+    )
+
+
+def _require_turned(crossings: Sequence[Crossing]) -> None:
+    spread_deg = angle_spread_deg([crossing.entry.u_deg for crossing in crossings])
+    if spread_deg < MIN_ROTATION_DEG:
+        raise CalibrationError(
+            "insufficient_rotation",
+            tr("All crossings have nearly the same U: a moved beam looks like a moved tip."),
+            remedy=tr("Cross the beams again with the tool turned by 180 degrees."),
+        )

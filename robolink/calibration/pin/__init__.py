@@ -1,0 +1,1 @@
+"""Solvers for a tip that touches a pin."""

@@ -1,0 +1,126 @@
+"""A new needle, from the difference between two looks at the same flange pose.
+
+``t_new = t_old + Rz(-U) d`` with d the shift of the tip in base axes. What the camera or pin
+gets wrong is in both looks and cancels; what every difference adds is counted in a chain,
+until a full calibration is due (docs/reference/calibration.md 2.9).
+"""
+
+import math
+from dataclasses import dataclass
+
+from robolink.calibration.core.dispersion import Dispersion, require_positive
+from robolink.calibration.core.pose_checks import check_poses, keep_unmeasured, require_finite
+from robolink.calibration.core.result import CalibrationResult
+from robolink.calibration.pin.needle_chain import NeedleChain, NeedleLimits
+from robolink.errors import CalibrationError
+from robolink.messages import tr
+from robolink.model import Pose, ToolOffset, rotate_xy
+
+Point = tuple[float, ...]
+"""(x, y) or (x, y, z) in the base, mm."""
+
+
+USUAL_LIMITS = NeedleLimits()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NeedleChangeResult(CalibrationResult):
+    """A calibration by difference.
+
+    Attributes:
+        shift_mm: By how much the tip moved, base axes.
+        chain: The chain with this change.
+        full_calibration_due: Whether the chain asks for a full calibration now.
+    """
+
+    shift_mm: Point
+    chain: NeedleChain
+    full_calibration_due: bool
+
+
+def solve_needle_change(
+    flange: Pose,
+    before_mm: Point,
+    after_mm: Point,
+    *,
+    stored: ToolOffset,
+    chain: NeedleChain,
+    sigma_mm: float,
+    limits: NeedleLimits = USUAL_LIMITS,
+) -> NeedleChangeResult:
+    """Return the offset of a new needle from where the old tip was and the new one is.
+
+    Args:
+        flange: The flange pose (Tool 0, upright) of both looks.
+        before_mm: Where the old tip was seen, (x, y) or (x, y, z) in the base.
+        after_mm: Where the new tip is seen.
+        stored: The offset of the old needle; what is not measured is kept from it.
+        chain: What has happened since the last full calibration.
+        sigma_mm: Standard deviation of one coordinate of one look.
+        limits: When a shift is not believed, and when a full calibration is due.
+
+    Raises:
+        CalibrationError: ``implausible_change``, ``non_finite``, ``suspect_units`` or
+            ``implausible_offset``.
+        ConfigError: A standard deviation or limit is not positive.
+        ValueError: The two places do not have two or three coordinates each.
+    """
+    _check_places(before_mm, after_mm)
+    require_positive(limits.tolerance_mm, "tolerance_mm")
+    check_poses((flange,), allow_mixed_hand=False)
+    shift = tuple(b - a for a, b in zip(before_mm, after_mm, strict=True))
+    _require_plausible(math.hypot(*shift), limits.max_change_mm)
+    dx, dy = rotate_xy(shift[0], shift[1], -flange.u_deg)
+    found = {"x_mm": stored.x_mm + dx, "y_mm": stored.y_mm + dy}
+    if len(shift) == 3:
+        found["z_mm"] = stored.z_mm + shift[2]
+    scatter = Dispersion.of(0.0, 0, sigma_mm)
+    assert scatter is not None  # noqa: S101 - a sigma was given
+    now = chain.after(math.sqrt(2) * sigma_mm)
+    covariance = tuple(
+        tuple(now.sigma_mm**2 if row == column else 0.0 for column in range(len(found)))
+        for row in range(len(found))
+    )
+    halves = scatter.half_widths(covariance)
+    due = now.changes >= limits.max_changes or halves[0] > limits.tolerance_mm
+    others = tuple(n for n in ("z_mm", "u_deg", "v_deg", "w_deg") if n not in found)
+    return NeedleChangeResult(
+        method="needle_change",
+        offset=keep_unmeasured(stored, **found),
+        measured=tuple(found),
+        kept=others,
+        reference_point_mm=tuple(after_mm),
+        sigma_gain=now.sigma_mm / sigma_mm,
+        warnings=("full_calibration_due",) if due else (),
+        inputs=(flange,),
+        covariance=covariance,
+        half_width95=halves,
+        sigma_mm=sigma_mm,
+        sigma_stated=True,
+        rank=len(found),
+        dof=0,
+        unobservable=others,
+        shift_mm=shift,
+        chain=now,
+        full_calibration_due=due,
+    )
+
+
+def _check_places(before_mm: Point, after_mm: Point) -> None:
+    if len(before_mm) != len(after_mm) or len(before_mm) not in (2, 3):
+        raise ValueError("both places need two coordinates, or both three")
+    for name, before, after in zip("xyz", before_mm, after_mm, strict=False):
+        require_finite(**{f"{name} before": before, f"{name} after": after})
+
+
+def _require_plausible(shift_mm: float, limit_mm: float) -> None:
+    if shift_mm > limit_mm:
+        raise CalibrationError(
+            "implausible_change",
+            tr(
+                "The tip moved by {shift:.3f} mm; {limit:.3f} mm is plausible for a new needle.",
+                shift=shift_mm,
+                limit=limit_mm,
+            ),
+            remedy=tr("Look at how it is seated, or make a full calibration."),
+        )

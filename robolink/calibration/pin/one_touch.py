@@ -1,0 +1,88 @@
+"""A new tip from a single touch of a pin whose place is known.
+
+A full calibration learns where the pin is: at the touch, p + R t. Any later tip on the same
+pin has ``t = R' (pin - p)``. With the pin as the last touch and the last offset place it,
+the difference between two tips is what is measured, and an error of the full calibration
+stays as it was (docs/reference/calibration.md 2.9).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from robolink.calibration.core.dispersion import Dispersion
+from robolink.calibration.core.pose_checks import check_poses, keep_unmeasured, require_finite
+from robolink.calibration.core.result import CalibrationResult
+from robolink.calibration.core.rotations import rotation_of
+from robolink.model import Pose, ToolOffset
+
+
+@dataclass(frozen=True, slots=True)
+class Pin:
+    """Where the end of a reference pin is, base, mm.
+
+    Attributes:
+        x_mm, y_mm, z_mm: The place.
+        sigma_mm: Standard deviation of each of them.
+    """
+
+    x_mm: float
+    y_mm: float
+    z_mm: float
+    sigma_mm: float = 0.0
+
+
+def pin_touched(flange: Pose, offset: ToolOffset, *, sigma_mm: float = 0.0) -> Pin:
+    """Return where the pin is when ``offset`` is right and touched it in this flange pose."""
+    x, y, z = (rotation_of(flange) @ offset.components()[:3]).tolist()
+    return Pin(flange.x_mm + x, flange.y_mm + y, flange.z_mm + z, sigma_mm)
+
+
+def solve_one_touch(
+    flange: Pose,
+    pin: Pin,
+    *,
+    stored: ToolOffset | None = None,
+    sigma_mm: float | None = None,
+) -> CalibrationResult:
+    """Return X, Y and Z of a tip that touches ``pin`` in one flange pose.
+
+    Args:
+        flange: Flange pose (Tool 0) at the touch.
+        pin: Where the pin is; :func:`pin_touched` makes it from the last touch.
+        stored: The offset stored now; U, V and W are kept from it, or 0 without one.
+        sigma_mm: Standard deviation of one coordinate of one touch. Without it the result has
+            no interval: one touch leaves no residual.
+
+    A pin that was moved puts all tools wrong by the same amount, and no touch can tell.
+
+    Raises:
+        CalibrationError: ``non_finite``, ``suspect_units`` or ``implausible_offset``.
+        ConfigError: ``sigma_mm`` is not positive.
+    """
+    check_poses((flange,), allow_mixed_hand=False)
+    require_finite(x_mm=pin.x_mm, y_mm=pin.y_mm, z_mm=pin.z_mm, sigma_mm=pin.sigma_mm)
+    away = np.array([pin.x_mm - flange.x_mm, pin.y_mm - flange.y_mm, pin.z_mm - flange.z_mm])
+    x, y, z = (rotation_of(flange).T @ away).tolist()
+    scatter = Dispersion.of(0.0, 0, sigma_mm)
+    covariance: tuple[tuple[float, ...], ...] = ()
+    if scatter:
+        variance = scatter.sigma_mm**2 + pin.sigma_mm**2
+        covariance = ((variance, 0.0, 0.0), (0.0, variance, 0.0), (0.0, 0.0, variance))
+    return CalibrationResult(
+        method="one_touch",
+        offset=keep_unmeasured(stored, x_mm=x, y_mm=y, z_mm=z),
+        measured=("x_mm", "y_mm", "z_mm"),
+        kept=("u_deg", "v_deg", "w_deg"),
+        reference_point_mm=(pin.x_mm, pin.y_mm, pin.z_mm),
+        sigma_gain=1.0,
+        warnings=(),
+        inputs=(flange,),
+        covariance=covariance,
+        half_width95=scatter.half_widths(covariance) if scatter else (),
+        sigma_mm=sigma_mm,
+        sigma_stated=scatter is not None,
+        rank=3,
+        dof=0,
+        unobservable=("u_deg", "v_deg", "w_deg"),
+    )

@@ -1,0 +1,177 @@
+"""The algebra of a pivot: one tip on one point in many orientations, on plain arrays.
+
+With the flange at p and its rotation R, the tip is at p + R t, always at c. The least squares
+over t and c, with the means Rm and pm taken off, is a 3 x 3 system
+(docs/reference/calibration.md 2.2):
+
+    (N I - N Rm' Rm) t = -(sum R_i' p_i - N Rm' pm),   c = Rm t + pm
+
+The eigenvalues of the whole 3N x 6 system are N (1 +- s) with s the singular values of Rm, so
+its condition number and rank are known before it is solved. Normal equations cost twice the
+digits that the condition costs; where it is bad, the system is solved by QR instead.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from robolink.calibration.core.robust import (
+    Floats,
+    Mask,
+    Robust,
+    draw_poses,
+    first_guess,
+    refit_until_settled,
+    threshold_rule,
+)
+
+UNKNOWNS = 6
+
+
+MINIMAL = 3
+
+
+QR_ABOVE_CONDITION = 50.0
+
+
+_ONE = np.eye(3)
+
+
+_RANK_BELOW = 1e-9
+"""1 - s below this is a direction that the rotations leave alone."""
+
+
+@dataclass(frozen=True, slots=True)
+class PivotDesign:
+    """What the orientations of the poses allow, before any position is looked at.
+
+    Attributes:
+        condition_number: Of the 3N x 6 system.
+        rank: Of the same.
+        smallest_singular_value: Of the same.
+        weakest_axis: Unit vector in flange axes along which the tip is known worst.
+        unit_covariance: Of the tip for sigma = 1, 3 x 3; infinite where the rank is short.
+    """
+
+    condition_number: float
+    rank: int
+    smallest_singular_value: float
+    weakest_axis: Floats
+    unit_covariance: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class PivotFit:
+    """Tip and pivot point, mm, with the residual vector of every pose in base axes."""
+
+    tip: Floats
+    point: Floats
+    residuals: Floats
+
+
+def pivot_design(rotations: Floats) -> PivotDesign:
+    """Return what N x 3 x 3 rotations can tell about a tip."""
+    count = len(rotations)
+    # Plain sums and floats: at a few poses, the calls cost more than the arithmetic.
+    _, s, axes = np.linalg.svd(rotations.sum(axis=0) / count)
+    largest, *_ = singular = s.tolist()
+    gaps = [max(1 - value, 0.0) for value in singular]
+    lost = sum(gap < _RANK_BELOW for gap in gaps)
+    if lost:
+        covariance = np.full((3, 3), np.inf)
+    else:
+        told = [count * gap * (1 + value) for gap, value in zip(gaps, singular, strict=True)]
+        covariance = (axes.T / told) @ axes
+    return PivotDesign(
+        condition_number=math.sqrt((1 + largest) / gaps[0]) if gaps[0] > 0 else math.inf,
+        rank=UNKNOWNS - lost,
+        smallest_singular_value=math.sqrt(count * gaps[0]),
+        weakest_axis=axes[0],
+        unit_covariance=covariance,
+    )
+
+
+def fit_pivot(
+    positions: Floats,
+    rotations: Floats,
+    *,
+    condition_number: float,
+    kept: Mask | None = None,
+) -> PivotFit:
+    """Return the least squares of the kept poses; residuals are those of all poses.
+
+    Args:
+        positions: N x 3, mm.
+        rotations: N x 3 x 3.
+        condition_number: As :func:`pivot_design` tells it; decides how it is solved.
+        kept: Which poses count.
+    """
+    p, r = (positions, rotations) if kept is None else (positions[kept], rotations[kept])
+    solve = _by_qr if condition_number > QR_ABOVE_CONDITION else _by_normal_equations
+    tip, point = solve(p, r)
+    return PivotFit(tip, point, positions + rotations @ tip - point)
+
+
+def fit_pivot_robust(
+    positions: Floats, rotations: Floats, robust: Robust, *, sigma_mm: float | None
+) -> tuple[PivotFit, Mask]:
+    """Return the fit of the poses that belong together, and which these are.
+
+    Raises:
+        CalibrationError: ``too_many_outliers``.
+    """
+    known, rule = threshold_rule(robust, sigma_mm=sigma_mm, dimensions=3, unknowns=UNKNOWNS)
+
+    def fit(kept: Mask) -> PivotFit:
+        condition = pivot_design(rotations[kept]).condition_number
+        return fit_pivot(positions, rotations, condition_number=condition, kept=kept)
+
+    return refit_until_settled(
+        _best_draw(positions, rotations, robust, known),
+        refit=lambda kept: fit(kept).residuals,
+        distances=_lengths,
+        threshold=rule,
+        finish=fit,
+    )
+
+
+def _by_normal_equations(p: Floats, r: Floats) -> tuple[Floats, Floats]:
+    rm, pm = r.sum(axis=0) / len(p), p.sum(axis=0) / len(p)
+    # Far from the origin p would swamp the differences that matter.
+    right = (r.reshape(-1, 3).T @ (p - pm).reshape(-1)) / len(p)
+    tip = np.linalg.solve(_ONE - rm.T @ rm, -right)
+    return tip, rm @ tip + pm
+
+
+def _by_qr(p: Floats, r: Floats) -> tuple[Floats, Floats]:
+    rm, pm = r.mean(axis=0), p.mean(axis=0)
+    q, upper = np.linalg.qr((r - rm).reshape(-1, 3))
+    tip = np.linalg.solve(upper, -q.T @ (p - pm).reshape(-1))
+    return tip, rm @ tip + pm
+
+
+def _best_draw(
+    positions: Floats, rotations: Floats, robust: Robust, threshold_mm: float | None
+) -> Floats:
+    """Return the residuals of all poses from the draw that explains them best."""
+    drawn = draw_poses(len(positions), MINIMAL, robust)
+    p, r = positions[drawn], rotations[drawn]
+    rm, pm = r.mean(axis=1), p.mean(axis=1)
+    left = np.eye(3) - rm.transpose(0, 2, 1) @ rm
+    right = np.einsum("bkji,bkj->bi", r, p - pm[:, None]) / MINIMAL
+    weak = np.linalg.eigvalsh(left)[:, 0] < _RANK_BELOW
+    left[weak] = np.eye(3)
+    tips = np.linalg.solve(left, -right[..., None])[..., 0]
+    points = np.einsum("bij,bj->bi", rm, tips) + pm
+    ends = (rotations.reshape(-1, 3) @ tips.T).reshape(*positions.shape, -1)
+    ends += positions[..., None] - points.T
+    distances = np.sqrt(np.einsum("nib,nib->bn", ends, ends))
+    distances[weak] = np.inf
+    best: Floats = ends[..., first_guess(distances, threshold_mm)]
+    return best
+
+
+def _lengths(residuals: Floats) -> Floats:
+    lengths: Floats = np.sqrt(np.einsum("ij,ij->i", residuals, residuals))
+    return lengths

@@ -1,0 +1,127 @@
+"""One tip on one point at known angles, in the plane, as complex numbers.
+
+With the flange at p and z = exp(iU), the tip is at p + z t. Taking means off leaves one
+unknown, and the least squares over all poses is a division (docs/reference/calibration.md 1.1,
+2.1):
+
+    t = -sum(conj(z - mean z) p) / sum |z - mean z|^2,   P = mean p + mean z t
+
+The angles are used as the controller knows them; nothing is fitted to an unlabelled circle.
+Leading axes are batches.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robolink.calibration.core.robust import (
+    Mask,
+    Robust,
+    draw_poses,
+    first_guess,
+    refit_until_settled,
+    threshold_rule,
+)
+
+Complexes = NDArray[np.complex128]
+
+
+UNKNOWNS = 4
+
+
+_NEARLY_PARALLEL = 0.2
+"""Draws of two poses that differ by less than about 11 degrees are not believed."""
+
+
+_ALL_PAIRS_UP_TO = 16
+
+
+@dataclass(frozen=True, slots=True)
+class PlanarFit:
+    """The tip and the point that it touched, mm, as x + iy.
+
+    Attributes:
+        tip: Offset in the flange's axes.
+        point: The touched point in the base.
+        residuals: Where each tip lies from that point.
+        weight: Sum of |z - mean z|^2: how much the angles tell.
+        imbalance: |mean z|: 0 for angles that balance, near 1 when they are all alike.
+    """
+
+    tip: complex
+    point: complex
+    residuals: Complexes
+    weight: float
+    imbalance: float
+
+    @property
+    def sigma_gain(self) -> float:
+        """Standard deviation of each offset axis, in those of one coordinate."""
+        return 1 / math.sqrt(self.weight)
+
+    @property
+    def condition_number(self) -> float:
+        """Of the 2N x 4 system in offset and point."""
+        return math.sqrt((1 + self.imbalance) / (1 - self.imbalance))
+
+
+def fit_planar(p: Complexes, z: Complexes, kept: Mask | None = None) -> PlanarFit:
+    """Return the least squares of the kept poses; residuals are those of all poses."""
+    chosen_p, chosen_z = (p, z) if kept is None else (p[kept], z[kept])
+    tip, point, weight = solve_planar(chosen_p, chosen_z)
+    residuals = p + z * tip - point
+    imbalance = min(float(abs(chosen_z.mean())), 1 - 1e-16)
+    return PlanarFit(complex(tip), complex(point), residuals, float(weight), imbalance)
+
+
+def solve_planar(
+    p: Complexes, z: Complexes
+) -> tuple[Complexes | complex, Complexes | complex, NDArray[np.float64] | float]:
+    """Return tip, point and weight; the last axis counts the poses."""
+    mean_p, mean_z = p.mean(axis=-1), z.mean(axis=-1)
+    turned = z - mean_z[..., None]
+    weight = (turned.real**2 + turned.imag**2).sum(axis=-1)
+    tip = -(turned.conj() * (p - mean_p[..., None])).sum(axis=-1) / weight
+    return tip, mean_p + mean_z * tip, weight
+
+
+def fit_planar_robust(
+    p: Complexes, z: Complexes, robust: Robust, *, sigma_mm: float | None
+) -> tuple[PlanarFit, Mask]:
+    """Return the fit of the poses that belong together, and which these are.
+
+    Raises:
+        CalibrationError: ``too_many_outliers``.
+    """
+    known, rule = threshold_rule(robust, sigma_mm=sigma_mm, dimensions=2, unknowns=UNKNOWNS)
+    start = _best_pair(p, z, _pairs(z.size, robust), known)
+    return refit_until_settled(
+        start,
+        refit=lambda kept: fit_planar(p, z, kept).residuals,
+        distances=np.abs,
+        threshold=rule,
+        finish=lambda kept: fit_planar(p, z, kept),
+    )
+
+
+def _best_pair(
+    p: Complexes, z: Complexes, pairs: NDArray[np.intp], threshold_mm: float | None
+) -> Complexes:
+    """Return the residuals of all poses from the pair that explains them best."""
+    first, second = pairs.T
+    turned = z[first] - z[second]
+    parallel = np.abs(turned) < _NEARLY_PARALLEL
+    tips = (p[second] - p[first]) / np.where(parallel, 1.0, turned)
+    points = p[first] + z[first] * tips
+    residuals = p + z * tips[:, None] - points[:, None]
+    residuals[parallel] = np.inf
+    best: Complexes = residuals[first_guess(np.abs(residuals), threshold_mm)]
+    return best
+
+
+def _pairs(count: int, robust: Robust) -> NDArray[np.intp]:
+    if count <= _ALL_PAIRS_UP_TO:
+        return np.column_stack(np.triu_indices(count, k=1))
+    return draw_poses(count, 2, robust)

@@ -1,0 +1,1 @@
+"""Whether a result can be believed, and what it means for the cell."""

@@ -1,0 +1,88 @@
+"""Poses that someone brings along: are there enough, are they flat, and which tool fits them.
+
+A stored point carries no tool number (docs/reference/epson.md 3.2), so a person says with which
+tool it was taught. The geometry can contradict. Let the poses be taken for tip poses of tool j; the
+flange poses that follow give the offset m_j. Taken for tip poses of another tool k, they give
+
+    m_k = t_k + Rz(u_k - u_j) (m_j - t_j)
+
+with t the stored offsets and u the stored tool angles. It follows from
+``(Rz(U1) - Rz(U2)) t = p2 - p1`` (docs/reference/calibration.md 1.1) with ``p_flange = p - Rz(U -
+u) t`` (docs/reference/epson.md 3.1). A changed nozzle sits a few tenths of a millimetre from where
+it was; so the right k is one whose m_k lies near the offset stored for the tool that is calibrated.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from robolink.calibration.core.result import CalibrationResult
+from robolink.model import ToolOffset, rotate_xy
+
+UNSUSPICIOUS_MM = 1.0
+"""A change up to this is an ordinary nozzle change and raises no doubt about the tool."""
+
+
+MUCH_NEARER = 4.0
+"""Another tool has to explain the poses this many times better before it is named."""
+
+
+@dataclass(frozen=True, slots=True)
+class ToolFit:
+    """How well poses fit to having been taught with ``tool``.
+
+    ``change_mm`` is by how much the calibrated tool would then have moved against its stored
+    value.
+    """
+
+    tool: int
+    change_mm: float
+
+
+def tool_fits(
+    result: CalibrationResult,
+    *,
+    taught: int,
+    stored: Mapping[int, ToolOffset],
+    calibrated: int,
+) -> tuple[ToolFit, ...]:
+    """Return every tool the poses may have been taught with, the likeliest first.
+
+    Args:
+        result: What the poses give when they are taken for tip poses of tool ``taught``.
+        taught: The tool that a person named; 0 for the flange.
+        stored: The defined tools with their offsets; Tool 0 is added.
+        calibrated: The tool that ``result`` is for; without a stored value of it nothing can
+            be judged and nothing is returned.
+    """
+    reference = stored.get(calibrated)
+    tools = {0: ToolOffset(), **stored}
+    if reference is None or taught not in tools:
+        return ()
+    own, measured = tools[taught], result.offset
+    shift = (measured.x_mm - own.x_mm, measured.y_mm - own.y_mm)
+    fits = []
+    for tool, offset in tools.items():
+        if offset.v_deg or offset.w_deg:
+            continue
+        dx_mm, dy_mm = rotate_xy(*shift, offset.u_deg - own.u_deg)
+        change_mm = math.hypot(
+            offset.x_mm + dx_mm - reference.x_mm, offset.y_mm + dy_mm - reference.y_mm
+        )
+        fits.append(ToolFit(tool, change_mm))
+    return tuple(sorted(fits, key=lambda fit: (fit.change_mm, fit.tool)))
+
+
+def better_fit(fits: Sequence[ToolFit], *, taught: int, plausible_mm: float) -> ToolFit | None:
+    """Return the tool that explains the poses much better than ``taught``, if one does.
+
+    It has to make the change plausible (at most ``plausible_mm``), and at least
+    :data:`MUCH_NEARER` times smaller than ``taught`` makes it; a change that is ordinary
+    with ``taught`` (:data:`UNSUSPICIOUS_MM`) is never doubted.
+    """
+    declared = next((fit for fit in fits if fit.tool == taught), None)
+    if declared is None or declared.change_mm <= UNSUSPICIOUS_MM:
+        return None
+    best = fits[0]
+    much_nearer = best.change_mm * MUCH_NEARER <= declared.change_mm
+    return best if much_nearer and best.change_mm <= plausible_mm else None

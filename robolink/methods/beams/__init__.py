@@ -1,0 +1,1 @@
+"""beams: two crossed light beams."""

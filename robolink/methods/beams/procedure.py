@@ -1,0 +1,133 @@
+"""The drive through two crossed beams, and what it says about the tip. No person takes part.
+
+Each beam is crossed both ways, entry and exit each time: half way between both edges the tip
+is in the beam whatever their thickness, and both ways together are free of latency, braking
+and backlash (docs/reference/calibration.md 2.6).
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
+
+from robolink.calibration import (
+    Beam,
+    BeamsResult,
+    Crossing,
+    Drift,
+    VerifyResult,
+    find_beams,
+    solve_crossed_beams,
+    toward_zero,
+)
+from robolink.methods.beams.crossings import CrossingSampler
+from robolink.methods.beams.drive import BeamDrive, BeamTravel
+from robolink.methods.beams.plan import CrossingPlan
+from robolink.model import Pose, ToolOffset, rotate_xy
+from robolink.procedures import NO_OFFSET, TAKE_ALL, SamplingPolicy, sample_sequentially
+from robolink.runner import Procedure
+from robolink.stations import BeamStation
+
+REFERENCE_ASIDES_MM: Final = (-12.0, -6.0, 6.0, 12.0)
+"""Places along a beam that tell its direction well enough, in a sensor of 30 mm."""
+
+
+def measure_beams(
+    station: BeamStation,
+    plan: CrossingPlan,
+    *,
+    here: Pose,
+    stored: ToolOffset | None,
+    turn_deg: float = 0.0,
+    sigma_mm: float | None = None,
+    sampling: SamplingPolicy = TAKE_ALL,
+) -> Procedure[BeamsResult]:
+    """Measure X and Y of a tip with two beams. Runs in Tool 0; see :func:`sample_sequentially`.
+
+    Args:
+        station: Where the beams are.
+        plan: How they are crossed.
+        here: Where the flange is; its U is that of the measurement.
+        stored: The offset stored now; the tip is expected there.
+        turn_deg: Measure again with U turned by this, toward zero. Only the directions of the
+            beams are relied on then, not their places, and the offset is absolute.
+        sigma_mm: Standard deviation of one crossing's middle, where it is known.
+        sampling: When it ends, and whether a crossing may be made again.
+
+    Raises:
+        CalibrationError: ``no_edge``, ``edge_passed``, ``bent_needle``, and those of
+            :func:`solve_crossed_beams`.
+    """
+    drive = BeamDrive(station, plan, here, stored or NO_OFFSET)
+    turned = None
+    if turn_deg:
+        turned = replace(drive, frame=replace(here, u_deg=toward_zero(here.u_deg, turn_deg)))
+    crossings = CrossingSampler(BeamTravel(here), drive, turned, stored, sigma_mm)
+    passages = crossings.passages
+    first = yield from crossings.take(passages[0])
+    return (yield from sample_sequentially(crossings, first, passages, sampling))
+
+
+def trace_beams(
+    guess: BeamStation,
+    plan: CrossingPlan,
+    *,
+    here: Pose,
+    tip: ToolOffset,
+    asides_mm: Sequence[float] = REFERENCE_ASIDES_MM,
+) -> Procedure[tuple[Beam, Beam]]:
+    """Find where both beams are, with a reference pin whose tip is known. Runs in Tool 0.
+
+    Args:
+        guess: Where they are to within ``search_mm`` of the plan, at every place of a crossing.
+        plan: How they are crossed.
+        here: Where the flange is.
+        tip: The pin's offset.
+        asides_mm: Where along each beam it is crossed, both ways, from where they meet; two
+            places or more, and none so near to it that the pin breaks both.
+
+    Raises:
+        CalibrationError: ``no_edge``, ``edge_passed``, and those of :func:`find_beams`.
+    """
+    travel, crossings = BeamTravel(here), list[Crossing]()
+    for aside_mm in asides_mm:
+        drive = BeamDrive(guess, replace(plan, aside_mm=aside_mm), here, tip)
+        crossings += yield from travel.through(drive.round())
+        yield from travel.lifted()
+    return find_beams(crossings, (tip.x_mm, tip.y_mm))
+
+
+def verify_by_crossing(
+    station: BeamStation,
+    plan: CrossingPlan,
+    *,
+    here: Pose,
+    angles_deg: Sequence[float],
+    tolerance_mm: float,
+    aside: ToolOffset = NO_OFFSET,
+) -> Procedure[VerifyResult]:
+    """Turn about the new tip and cross the beams there again. Runs in the new tool.
+
+    Args:
+        station: Where the beams are.
+        plan: How they are crossed.
+        here: Where the frame of the new tool is.
+        angles_deg: Its angles U at which the tip is measured.
+        tolerance_mm: Largest drift that passes.
+        aside: Where the tip is expected, seen from the frame in force; not 0 where a difference
+            to a reference was written.
+
+    The drift at an angle is how far from the place of the reference record the tip is found
+    there. It ends lifted.
+
+    Raises:
+        CalibrationError: As :func:`measure_beams`.
+    """
+    travel, drifts = BeamTravel(here), list[Drift]()
+    for angle_deg in angles_deg:
+        drive = BeamDrive(station, plan, replace(here, u_deg=angle_deg), aside)
+        crossings = yield from travel.through(drive.round())
+        yield from travel.lifted()
+        found = solve_crossed_beams(crossings, station.beams).offset
+        dx, dy = rotate_xy(aside.x_mm - found.x_mm, aside.y_mm - found.y_mm, angle_deg)
+        drifts.append(Drift(angle_deg, dx, dy))
+    return VerifyResult(tuple(drifts), tolerance_mm)

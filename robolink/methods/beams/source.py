@@ -1,0 +1,107 @@
+"""Two crossed light beams in the cell; nobody has to touch anything."""
+
+from dataclasses import dataclass, field
+
+from robolink.calibration import CalibrationResult, VerifyResult, seen_from
+from robolink.messages import tr
+from robolink.methods.beams.plan import CrossingPlan
+from robolink.model import Pose, ToolOffset
+from robolink.procedures import MeasurementContext, SamplingPolicy
+from robolink.runner import Procedure
+from robolink.stations import BeamStation
+
+_HALF_A_TURN_DEG = 180.0
+
+
+@dataclass(frozen=True, slots=True)
+class BeamsSource:
+    """Measures X and Y by driving the tip through two beams, from wherever the flange is.
+
+    Attributes:
+        station: Where the beams are, from the reference record.
+        plan: How they are crossed.
+        turn_deg: Measure at a second U too, so that beams that were moved do no harm; 0 for not.
+        sigma_mm: Standard deviation of one crossing's middle, where it is known.
+        sampling: When it ends, and whether a crossing is offered to be made again.
+    """
+
+    station: BeamStation
+    plan: CrossingPlan = field(default_factory=CrossingPlan)
+    turn_deg: float = 0.0
+    sigma_mm: float | None = None
+    sampling: SamplingPolicy = field(default_factory=SamplingPolicy)
+
+    @property
+    def sentence(self) -> str:
+        """What it does, for a report."""
+        if self.turn_deg:
+            return tr("measured on the robot: two crossed beams at two angles of U")
+        return tr("measured on the robot: two crossed beams")
+
+    @property
+    def remedy(self) -> str:
+        """What to do when a measurement makes the tip jump."""
+        return tr(
+            "Look whether the beams were moved since the reference record, and whether the "
+            "needle sits straight."
+        )
+
+    def measure(
+        self,
+        context: MeasurementContext,
+        tool: int,  # noqa: ARG002 - the flange is what moves
+        stored: ToolOffset | None,
+    ) -> CalibrationResult:
+        """Cross and solve; see :class:`~robolink.procedures.MovingSource`."""
+        return context.measure(lambda here: self._steps(stored, here, self.sampling))
+
+    def procedure(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:
+        """Return the steps of a measurement; see :class:`~robolink.procedures.MovingSource`.
+
+        All of them: when it ends early depends on crossings that nobody has made yet.
+        """
+        return self._steps(stored, here, SamplingPolicy())
+
+    def _steps(
+        self, stored: ToolOffset | None, here: Pose, sampling: SamplingPolicy
+    ) -> Procedure[CalibrationResult]:
+        from robolink.methods.beams.procedure import (
+            measure_beams,  # numpy, which a look does without
+        )
+
+        return measure_beams(
+            self.station,
+            self.plan,
+            here=here,
+            stored=stored,
+            turn_deg=self.turn_deg,
+            sigma_mm=self.sigma_mm,
+            sampling=sampling,
+        )
+
+    def verify(
+        self,
+        context: MeasurementContext,
+        tool: int,
+        result: CalibrationResult,
+        *,
+        tip: ToolOffset,
+        tolerance_mm: float,
+    ) -> VerifyResult:
+        """Cross again at another U; see :class:`~robolink.procedures.MovingSource`."""
+        from robolink.calibration import toward_zero
+        from robolink.methods.beams.procedure import verify_by_crossing  # numpy
+
+        context.controller.tools.select(tool)
+        # Half a turn on shows an error twofold; where that was measured already, half of it.
+        turn_deg = self.turn_deg / 2 if self.turn_deg else _HALF_A_TURN_DEG
+        measured_deg = result.inputs[-1].u_deg + result.offset.u_deg
+        procedure = verify_by_crossing(
+            self.station,
+            self.plan,
+            here=context.controller.groups[0].pose(),
+            angles_deg=(toward_zero(measured_deg, turn_deg),),
+            tolerance_mm=tolerance_mm,
+            aside=seen_from(result.offset, tip),
+        )
+        return context.run(procedure, tip=result.offset)

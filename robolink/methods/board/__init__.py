@@ -1,0 +1,1 @@
+"""board: a held board, by its fiducials before an up-looking camera."""

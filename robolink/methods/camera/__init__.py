@@ -1,0 +1,1 @@
+"""camera: a calibrated, up-looking camera sees the tip."""

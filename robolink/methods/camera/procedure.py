@@ -1,0 +1,52 @@
+"""A tip seen by an up-looking camera at several angles of U."""
+
+from collections.abc import Sequence
+
+from robolink.calibration import CameraRound, solve_camera_round, solve_up_camera
+from robolink.model import Pose, ToolOffset
+from robolink.procedures import NO_OFFSET, CameraDrive, CameraSamples, LookPlan, Place
+from robolink.runner import Procedure, SeenAt
+from robolink.stations import CameraStation
+
+
+def measure_camera(
+    station: CameraStation,
+    plan: LookPlan,
+    *,
+    here: Pose,
+    stored: ToolOffset | None,
+    sigma_mm: float | None = None,
+    retake: bool = False,
+) -> Procedure[CameraRound]:
+    """Measure X and Y of a tip with a calibrated camera. Runs in Tool 0.
+
+    Args:
+        station: Where the camera is, and what its pixels mean.
+        plan: At which angles it is looked at.
+        here: Where the flange is; its U is where the angles count from.
+        stored: The offset stored now; the tip is expected there.
+        sigma_mm: Standard deviation of one coordinate of one look, where it is known.
+        retake: Offer to take the look again that fits worst.
+
+    Raises:
+        CalibrationError: ``tip_not_seen``, ``several_tips_seen``, ``camera_not_calibrated``, and
+            those of :func:`solve_camera_round`.
+    """
+    tip, centred = stored or NO_OFFSET, False
+    drive, angles_deg = CameraDrive(station, plan, here), plan.angles_deg(here.u_deg)
+    if plan.centre_first:
+        found = Place(angles_deg[0], tip)
+
+        def expected(looks: Sequence[SeenAt]) -> ToolOffset:
+            return solve_up_camera(station.sighting(looks[0]), stored=stored).offset
+
+        tip = yield from drive.centred([found], here, expected)
+        here, centred = drive.pose(found), True
+    places = [Place(u_deg, tip) for u_deg in angles_deg]
+
+    def solve(looks: Sequence[SeenAt]) -> CameraRound:
+        sightings = [station.sighting(look) for look in looks]
+        return solve_camera_round(sightings, stored=stored, sigma_mm=sigma_mm)
+
+    looks = CameraSamples(drive, solve, here, before_camera=centred)
+    return (yield from looks.at(places, retake=retake))

@@ -1,0 +1,89 @@
+"""An up-looking camera in the cell whose pixels are known; nobody has to touch anything."""
+
+from dataclasses import dataclass, field
+
+from robolink.calibration import CalibrationResult, VerifyResult, seen_from
+from robolink.messages import tr
+from robolink.model import Pose, ToolOffset
+from robolink.procedures import (
+    CalibratedCameraSource,
+    LookPlan,
+    MeasurementContext,
+    angles_between,
+    calibrated_camera,
+    camera_error_of,
+)
+from robolink.runner import Procedure
+
+
+@dataclass(frozen=True, slots=True)
+class CameraSource(CalibratedCameraSource):
+    """Measures X and Y of a tip by looking at it at several angles of U.
+
+    Attributes:
+        plan: How the tip is brought before it.
+        sigma_mm: Standard deviation of one coordinate of one look, where it is known.
+        retake: Offer to take the look again that fits worst.
+    """
+
+    plan: LookPlan = field(default_factory=LookPlan)
+    sigma_mm: float | None = None
+    retake: bool = False
+
+    @property
+    def sentence(self) -> str:
+        """What it does, for a report."""
+        return tr(
+            "measured on the robot: seen by the camera {sensor} at {count} angles of U",
+            sensor=self.sensor,
+            count=len(self.plan.turns_deg),
+        )
+
+    @property
+    def remedy(self) -> str:
+        """What to do when a measurement makes the tip jump."""
+        return tr(
+            "Look at the picture: is it the tip that was found, and is it clean? Was the camera "
+            "moved?"
+        )
+
+    def procedure(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:
+        """Return the steps of a measurement; see :class:`~robolink.procedures.MovingSource`."""
+        from robolink.methods.camera.procedure import (
+            measure_camera,  # numpy, which a look does without
+        )
+
+        return measure_camera(
+            self.station,
+            self.plan,
+            here=here,
+            stored=stored,
+            sigma_mm=self.sigma_mm,
+            retake=self.retake,
+        )
+
+    def verify(
+        self,
+        context: MeasurementContext,
+        tool: int,
+        result: CalibrationResult,
+        *,
+        tip: ToolOffset,
+        tolerance_mm: float,
+    ) -> VerifyResult:
+        """Look again at other angles; see :class:`~robolink.procedures.MovingSource`."""
+        from robolink.procedures import verify_by_looking  # numpy
+
+        measured_deg = [pose.u_deg + result.offset.u_deg for pose in result.inputs]
+        with calibrated_camera(self.sensor, self.station) as camera:
+            context.controller.tools.select(tool)
+            procedure = verify_by_looking(
+                self.station,
+                self.plan,
+                here=context.controller.groups[0].pose(),
+                angles_deg=angles_between(measured_deg),
+                tolerance_mm=tolerance_mm,
+                camera_error_mm=camera_error_of(result),
+                aside=seen_from(result.offset, tip),
+            )
+            return context.run(procedure, tip=result.offset, camera=camera)

@@ -1,0 +1,130 @@
+"""An up-looking camera whose place and scale are unknown: found together with the tip."""
+
+from dataclasses import dataclass, field, replace
+
+from robolink.calibration import CalibrationResult, VerifyResult, offset_sigma_mm, seen_from
+from robolink.messages import tr
+from robolink.methods.camera_affine.plan import PatternPlan
+from robolink.model import Pose, ToolOffset
+from robolink.procedures import MeasurementContext, angles_between, pixel_camera
+from robolink.runner import Procedure
+from robolink.stations import CameraStation, Found, StationKind
+
+
+@dataclass(frozen=True, slots=True)
+class CameraAffineSource:
+    """Measures X and Y of a tip, and the camera that sees it, in one pattern of looks.
+
+    Attributes:
+        sensor: URL or name of the camera; it answers in pixels.
+        station: Where it is to within its field of view; with its model of before, a camera
+            that changed is refused.
+        plan: The pattern.
+        sigma_mm: Standard deviation of one coordinate of one look, where it is known.
+        retake: Offer to take the look again that fits worst.
+        name: Name of the station, under which the camera is kept on record; empty for not.
+    """
+
+    sensor: str
+    station: CameraStation
+    plan: PatternPlan = field(default_factory=PatternPlan)
+    sigma_mm: float | None = None
+    retake: bool = False
+    name: str = ""
+
+    @property
+    def sentence(self) -> str:
+        """What it does, for a report."""
+        return tr(
+            "measured on the robot: camera {sensor} and tip found together by {count} looks",
+            sensor=self.sensor,
+            count=len(self.plan.places),
+        )
+
+    @property
+    def remedy(self) -> str:
+        """What to do when a measurement makes the tip jump."""
+        return tr(
+            "Look at the pictures: is it the tip that was found in all of them, and is it clean?"
+        )
+
+    def found_station(self, result: CalibrationResult, tool: int) -> Found | None:
+        """Return what a kept measurement says about the camera, ``None`` without a name."""
+        from robolink.calibration import CameraCalibration  # numpy, which a look does without
+
+        if not self.name or not isinstance(result, CameraCalibration):
+            return None
+        model = result.camera
+        return Found(
+            id=self.name,
+            kind=StationKind.CAMERA,
+            x_mm=self.station.x_mm,
+            y_mm=self.station.y_mm,
+            z_mm=self.station.z_mm,
+            sigma_mm=offset_sigma_mm(result),
+            how=tr("{method} with tool {tool}", method=result.method, tool=tool),
+            tool=tool,
+            details={
+                "seen_by": self.sensor,
+                "mm_per_px": [list(row) for row in model.mm_per_px],
+                "origin_mm": list(model.origin_mm),
+            },
+        )
+
+    def require_ready(self) -> None:
+        """Find out whether the camera is there; see :class:`RequiresSensor`."""
+        with pixel_camera(self.sensor):
+            pass
+
+    def measure(
+        self,
+        context: MeasurementContext,
+        tool: int,  # noqa: ARG002 - the flange is what moves
+        stored: ToolOffset | None,
+    ) -> CalibrationResult:
+        """Look and solve; see :class:`~robolink.procedures.MovingSource`."""
+        with pixel_camera(self.sensor) as camera:
+            return context.measure(lambda here: self.procedure(stored, here), camera=camera)
+
+    def procedure(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:
+        """Return the steps of a measurement; see :class:`~robolink.procedures.MovingSource`."""
+        from robolink.methods.camera_affine.procedure import (
+            measure_camera_affine,  # numpy, which a look does without
+        )
+
+        return measure_camera_affine(
+            self.station,
+            self.plan,
+            here=here,
+            stored=stored,
+            sigma_mm=self.sigma_mm,
+            retake=self.retake,
+        )
+
+    def verify(
+        self,
+        context: MeasurementContext,
+        tool: int,
+        result: CalibrationResult,
+        *,
+        tip: ToolOffset,
+        tolerance_mm: float,
+    ) -> VerifyResult:
+        """Look again at other angles; see :class:`~robolink.procedures.MovingSource`."""
+        from robolink.calibration import CameraCalibration
+        from robolink.procedures import verify_by_looking  # numpy
+
+        if not isinstance(result, CameraCalibration):
+            raise TypeError(f"no camera was found by {result.method}")
+        measured_deg = [pose.u_deg + result.offset.u_deg for pose in result.inputs]
+        with pixel_camera(self.sensor) as camera:
+            context.controller.tools.select(tool)
+            procedure = verify_by_looking(
+                replace(self.station, model=result.camera),
+                self.plan.look,
+                here=context.controller.groups[0].pose(),
+                angles_deg=angles_between(measured_deg),
+                tolerance_mm=tolerance_mm,
+                aside=seen_from(result.offset, tip),
+            )
+            return context.run(procedure, tip=result.offset, camera=camera)

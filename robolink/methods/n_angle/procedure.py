@@ -1,0 +1,108 @@
+"""A tip touched onto a pin at several angles of U."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from robolink.calibration import CalibrationResult, planar_sigma_gain
+from robolink.messages import tr
+from robolink.model import Pose, ToolOffset, angle_difference_deg
+from robolink.procedures import (
+    TAKE_ALL,
+    SamplingPolicy,
+    TouchPlan,
+    lift_off,
+    sample_sequentially,
+    touch_again,
+)
+from robolink.runner import Ask, Procedure
+
+
+def measure_n_angle(
+    plan: TouchPlan,
+    *,
+    turns_deg: Sequence[float],
+    stored: ToolOffset | None,
+    sigma_mm: float | None = None,
+    sampling: SamplingPolicy = TAKE_ALL,
+) -> Procedure[CalibrationResult]:
+    """Measure a tip on a pin at several angles. Runs in Tool 0; see :func:`sample_sequentially`.
+
+    Args:
+        plan: Lift and clearance.
+        turns_deg: Angles of the further touches, counted from the first one.
+        stored: The offset stored now; the approaches use it.
+        sigma_mm: Standard deviation of one coordinate of one touch, where it is known.
+        sampling: When it ends, and whether a pose may be taken again.
+
+    Raises:
+        CalibrationError: As :func:`solve_n_angle`.
+    """
+    first: Pose = yield Ask(tr("Bring the tip onto the pin."))
+    yield lift_off(plan, first)
+    # Within half a turn of zero: adding up from touch to touch leaves the joint's range.
+    angles = [angle_difference_deg(first.u_deg + turn_deg, 0.0) for turn_deg in turns_deg]
+    turning = _NAngleSampler(plan, stored, sigma_mm, first)
+    return (yield from sample_sequentially(turning, first, [first.u_deg, *angles], sampling))
+
+
+def most_informative_order(turns_deg: Sequence[float]) -> tuple[float, ...]:
+    """Return the same angles, those first that tell the most together with the ones before.
+
+    The first touch is at 0. Whoever ends early then ends with angles that are spread well.
+    """
+    chosen, left = [0.0], list(turns_deg)
+    while left:
+        best = min(left, key=lambda turn: (round(_gain([*chosen, turn]), 9), left.index(turn)))
+        left.remove(best)
+        chosen.append(best)
+    return tuple(chosen[1:])
+
+
+@dataclass(slots=True)
+class _NAngleSampler:
+    """Touches at angles of U; implements :class:`SequentialSampler`. Each ends lifted off the pin.
+
+    Attributes:
+        plan, stored, sigma_mm: As for :func:`measure_n_angle`.
+        last: The touch from which the tip was lifted off.
+    """
+
+    plan: TouchPlan
+    stored: ToolOffset | None
+    sigma_mm: float | None
+    last: Pose
+
+    @property
+    def known(self) -> str:
+        return tr("X and Y are known")
+
+    def counted(self, count: int) -> str:
+        return tr("{count} touches", count=count)
+
+    def take(self, place: float) -> Procedure[Pose]:
+        self.last = yield from touch_again(self.plan, self.last, place, self.stored or ToolOffset())
+        return self.last
+
+    def away(self) -> Procedure[None]:
+        yield from ()
+
+    def foreseen(self, place: float) -> Pose:
+        return Pose(0.0, 0.0, 0.0, place)
+
+    def solve(self, touches: Sequence[Pose]) -> CalibrationResult:
+        from robolink.calibration import solve_n_angle  # numpy, not for --help
+
+        return solve_n_angle(touches, stored=self.stored, sigma_mm=self.sigma_mm)
+
+    def gain(self, poses: Sequence[Pose]) -> float:
+        return planar_sigma_gain(poses)
+
+    def named(self, pose: Pose) -> str:
+        return tr("U {u:.1f}", u=pose.u_deg)
+
+    def which(self, number: int, pose: Pose) -> str:
+        return tr("Pose {number}, at {where}", number=number, where=self.named(pose))
+
+
+def _gain(turns_deg: Sequence[float]) -> float:
+    return planar_sigma_gain([Pose(0.0, 0.0, 0.0, turn) for turn in turns_deg])

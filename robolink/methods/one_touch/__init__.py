@@ -1,0 +1,1 @@
+"""one-touch: a pin whose place is known, touched once."""

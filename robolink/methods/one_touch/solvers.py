@@ -1,0 +1,170 @@
+"""How the one touch of a known pin is solved: as a difference, or against the place of the pin."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, ClassVar
+
+from robolink.calibration import CalibrationResult, NeedleLimits
+from robolink.errors import CalibrationError, ConfigError
+from robolink.messages import tr
+from robolink.methods.one_touch.last_touch import LastTouch, find_last_touch
+from robolink.model import Controller, Pose, ToolOffset, rotate_xy
+from robolink.ways import Way, way
+
+if TYPE_CHECKING:
+    from robolink.calibration import NeedleChangeResult, Pin
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """Solves one touch as the difference from the last one of the same tool.
+
+    Attributes:
+        last: The last touch.
+        sigma_mm: Standard deviation of one coordinate of one touch.
+        limits: When a shift is not believed, and when a full calibration is due.
+    """
+
+    upright: ClassVar[bool] = True
+    needs: ClassVar[tuple[str, ...]] = ("z_mm",)
+
+    last: LastTouch
+    sigma_mm: float
+    limits: "NeedleLimits"
+
+    @property
+    def place_mm(self) -> tuple[float, float, float]:
+        """Where the pin is, base."""
+        return self.last.place_mm
+
+    @property
+    def u_deg(self) -> float | None:
+        """U at which the pin was touched before."""
+        return self.last.u_deg
+
+    @property
+    def sentence(self) -> str:
+        """How the touch is used, for a report."""
+        return tr("the difference from the last touch, of {at}", at=self.last.at)
+
+    def solve(self, flange: Sequence[Pose], stored: ToolOffset | None) -> CalibrationResult:
+        """Solve exactly one touch; see :class:`~robolink.procedures.PoseMethod`."""
+        from robolink.calibration import solve_needle_change  # numpy, which a look does without
+
+        touch = one_of(flange)
+        old = self.last.value if stored is None else stored
+        dx, dy = rotate_xy(old.x_mm, old.y_mm, touch.u_deg)
+        before_mm = (touch.x_mm + dx, touch.y_mm + dy, touch.z_mm + old.z_mm)
+        found = solve_needle_change(
+            touch,
+            before_mm,
+            self.place_mm,
+            stored=old,
+            chain=self.last.chain,
+            sigma_mm=self.sigma_mm,
+            limits=self.limits,
+        )
+        result = replace(found, method="one_touch")
+        if result.full_calibration_due or not self._one_more(result):
+            return result
+        return replace(result, warnings=("full_calibration_due",), full_calibration_due=True)
+
+    def _one_more(self, result: "NeedleChangeResult") -> bool:
+        """Tell whether the next difference would already be one too many."""
+        later = result.chain.after(math.sqrt(2) * self.sigma_mm)
+        half95_mm = result.half_width95[0] * later.sigma_mm / result.chain.sigma_mm
+        return half95_mm > self.limits.tolerance_mm
+
+
+@dataclass(frozen=True, slots=True)
+class Absolute:
+    """Solves one touch against a pin whose place is known.
+
+    Attributes:
+        pin: Where it is.
+        sigma_mm: Standard deviation of one coordinate of one touch, where it is known.
+    """
+
+    upright: ClassVar[bool] = False
+    needs: ClassVar[tuple[str, ...]] = ("z_mm",)
+
+    pin: "Pin"
+    sigma_mm: float | None = None
+
+    @property
+    def place_mm(self) -> tuple[float, float, float]:
+        """Where the pin is, base."""
+        return self.pin.x_mm, self.pin.y_mm, self.pin.z_mm
+
+    @property
+    def u_deg(self) -> float | None:
+        """No U is better than another."""
+        return None
+
+    @property
+    def sentence(self) -> str:
+        """How the touch is used, for a report."""
+        return tr("the place of the pin")
+
+    def solve(self, flange: Sequence[Pose], stored: ToolOffset | None) -> CalibrationResult:
+        """Solve exactly one touch; see :class:`~robolink.procedures.PoseMethod`."""
+        from robolink.calibration import solve_one_touch  # numpy, which a look does without
+
+        return solve_one_touch(one_of(flange), self.pin, stored=stored, sigma_mm=self.sigma_mm)
+
+
+def difference_from_last(
+    controller: Controller,
+    tool: int,
+    station: str,
+    *,
+    sigma_mm: float | None,
+    limits: NeedleLimits,
+) -> Difference:
+    """Return how one touch of a tool is solved against its last one on a pin.
+
+    Args:
+        controller: The controller, connected.
+        tool: Number of the tool.
+        station: Name of the pin.
+        sigma_mm: Standard deviation of one coordinate of one touch; ``None`` for what the last
+            calibration found.
+        limits: When a shift is not believed, and when a full calibration is due.
+
+    Raises:
+        CalibrationError: ``no_last_touch`` or ``reference_outdated``.
+        ConfigError: Nothing tells how well a touch repeats.
+    """
+    last = find_last_touch(controller, tool, station)
+    sigma = sigma_mm or last.touch_sigma_mm
+    if sigma is None:
+        raise ConfigError(
+            tr("Nothing tells how well a touch repeats: the last calibration left no residual."),
+            remedy=tr(
+                "Give {sigma} (in a recipe sigma_mm), or calibrate with n-angle once.",
+                sigma=way(Way.SIGMA),
+            ),
+        )
+    return Difference(last, sigma, limits)
+
+
+def one_of(poses: Sequence[Pose]) -> Pose:
+    """Return the pose that the method takes.
+
+    Raises:
+        CalibrationError: ``too_few_poses``.
+        ConfigError: There is more than one.
+    """
+    if not poses:
+        raise CalibrationError(
+            "too_few_poses",
+            tr("No pose was given; the method needs one."),
+            remedy=tr("Touch the pin once."),
+        )
+    if len(poses) > 1:
+        raise ConfigError(
+            tr("{count} poses were given; the method takes one.", count=len(poses)),
+            remedy=tr("Give one, or use the method n-angle."),
+        )
+    return poses[0]

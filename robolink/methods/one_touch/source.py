@@ -1,0 +1,87 @@
+"""A pin whose place is known, touched once by a person: X, Y and Z of the new tip."""
+
+from dataclasses import dataclass, field
+
+from robolink.calibration import CalibrationResult, VerifyResult
+from robolink.messages import tr
+from robolink.methods.one_touch.procedure import measure_one_touch
+from robolink.methods.one_touch.solvers import Absolute, Difference
+from robolink.model import Pose, ToolOffset
+from robolink.procedures import MeasurementContext, TouchPlan, contact_pose, verify_by_turning
+from robolink.runner import Procedure
+
+HALF_A_TURN_DEG = 180.0
+
+
+@dataclass(frozen=True, slots=True)
+class OneTouchSource:
+    """Measures X, Y and Z by one touch of a pin whose place is known.
+
+    Attributes:
+        solver: How the touch is used.
+        touch: Lift and clearance; the clearance has to be more than a new tip may be longer.
+    """
+
+    solver: Difference | Absolute
+    touch: TouchPlan = field(default_factory=lambda: TouchPlan(clearance_mm=5.0))
+
+    @property
+    def sentence(self) -> str:
+        """What it does, for a report."""
+        return tr(
+            "measured on the robot: one pin touched once, against {how}", how=self.solver.sentence
+        )
+
+    @property
+    def remedy(self) -> str:
+        """What to do when a measurement makes the tip jump."""
+        return tr(
+            "Look whether the pin was bumped and whether the nozzle sits firmly. A full "
+            "calibration tells."
+        )
+
+    def measure(
+        self,
+        context: MeasurementContext,
+        tool: int,  # noqa: ARG002 - the flange is what moves
+        stored: ToolOffset | None,
+    ) -> CalibrationResult:
+        """Touch and solve; see :class:`~robolink.procedures.MovingSource`."""
+        context.controller.tools.select(0)
+        return context.run(self.procedure(stored, context.controller.groups[0].pose()))
+
+    def procedure(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:
+        """Return the steps of a measurement; see :class:`~robolink.procedures.MovingSource`."""
+        u_deg = self.solver.u_deg
+        return measure_one_touch(
+            self.touch,
+            here=here,
+            pin_mm=self.solver.place_mm,
+            u_deg=here.u_deg if u_deg is None else u_deg,
+            stored=stored,
+            solve=lambda touch: self.solver.solve([touch], stored),
+        )
+
+    def verify(
+        self,
+        context: MeasurementContext,
+        tool: int,
+        result: CalibrationResult,
+        *,
+        tip: ToolOffset,
+        tolerance_mm: float,
+    ) -> VerifyResult:
+        """Turn half a turn about the new tip; see :class:`~robolink.procedures.MovingSource`."""
+        from robolink.calibration import toward_zero  # numpy, which a look does without
+
+        context.controller.tools.select(tool)
+        measured_deg = result.inputs[-1].u_deg + result.offset.u_deg
+        procedure = verify_by_turning(
+            self.touch,
+            contact=contact_pose(result, tool=tool),
+            angles_deg=(toward_zero(measured_deg, HALF_A_TURN_DEG),),
+            tolerance_mm=tolerance_mm,
+            written=result.offset,
+            tip=tip,
+        )
+        return context.run(procedure, tip=result.offset)

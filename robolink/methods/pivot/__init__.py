@@ -1,0 +1,1 @@
+"""pivot: one pin touched in tilted orientations, on five axes and six."""

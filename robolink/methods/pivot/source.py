@@ -1,0 +1,132 @@
+"""A pin in the cell, a person who brings the tip onto it, and a robot that can tilt its tool."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, ClassVar
+
+from robolink.calibration import CalibrationResult, VerifyResult, tilted_from
+from robolink.errors import ConfigError
+from robolink.messages import tr
+from robolink.model import Pose, ToolOffset
+from robolink.procedures import TAKE_ALL, MeasurementContext, PinSource, SamplingPolicy, TouchPlan
+from robolink.runner import Procedure
+
+if TYPE_CHECKING:
+    from robolink.methods.pivot.tilts import Tilt
+
+
+@dataclass(frozen=True, slots=True)
+class PivotSource(PinSource):
+    """Measures by touching one pin with the tool tilted and turned.
+
+    Attributes:
+        tilts: Orientations of the touches after the first; see
+            :func:`~robolink.methods.informative_tilts`.
+        touch: Lift and clearance.
+        sigma_mm: Standard deviation of one coordinate of one placement, where it is known.
+        sampling: When a measurement ends, and whether a pose is offered again.
+    """
+
+    tilts: "tuple[Tilt, ...]"
+    touch: TouchPlan = field(default_factory=TouchPlan)
+    sigma_mm: float | None = None
+    sampling: SamplingPolicy = TAKE_ALL
+
+    @property
+    def sentence(self) -> str:
+        """What it does, for a report."""
+        return self._touched
+
+    @property
+    def _touched(self) -> str:
+        return tr(
+            "measured on the robot: one pin touched in {count} orientations, tilted by {tilt:g} "
+            "degrees",
+            count=len(self.tilts) + 1,
+            tilt=self._tilt_deg,
+        )
+
+    def verify(
+        self,
+        context: MeasurementContext,
+        tool: int,
+        result: CalibrationResult,
+        *,
+        tip: ToolOffset,
+        tolerance_mm: float,
+    ) -> VerifyResult:
+        """Tilt about the new tip; see :class:`~robolink.procedures.MovingSource`."""
+        from robolink.methods.pivot.procedure import verify_by_tilting  # numpy
+        from robolink.methods.pivot.tilts import OverPin, proving_tilts
+
+        context.controller.tools.select(tool)
+        x_mm, y_mm, z_mm = result.reference_point_mm
+        over = OverPin(
+            context.controller.groups[0].pose(),
+            (x_mm, y_mm, z_mm),
+            tip=tilted_from(result.offset, tip),
+            frame=result.offset,
+        )
+        procedure = verify_by_tilting(
+            self.touch, over=over, tilts=proving_tilts(self._tilt_deg), tolerance_mm=tolerance_mm
+        )
+        return context.run(procedure, tip=result.offset)
+
+    @property
+    def _tilt_deg(self) -> float:
+        return max(abs(tilt.lean_deg) for tilt in self.tilts)
+
+    def _steps(self, stored: ToolOffset | None, *, live: bool) -> Procedure[CalibrationResult]:
+        """Return the steps.
+
+        Raises:
+            ConfigError: Nobody knows about where the tip is, so it cannot be kept off the pin.
+        """
+        from robolink.methods.pivot.procedure import (
+            measure_pivot,  # numpy, which a look does without
+        )
+
+        return measure_pivot(
+            self.touch,
+            tilts=self.tilts,
+            stored=require_known_tip(stored),
+            sigma_mm=self.sigma_mm,
+            sampling=self.sampling if live else TAKE_ALL,
+        )
+
+
+def require_known_tip(stored: ToolOffset | None) -> ToolOffset:
+    """Return the offset by which a tip is kept off the pin while the tool tilts.
+
+    Raises:
+        ConfigError: There is none.
+    """
+    if stored is None:
+        raise ConfigError(
+            tr("The tool is not defined, so a tilt would swing its tip nobody knows where to."),
+            remedy=tr(
+                "Write about where the tip is with 'tool set', to a millimetre or two, and "
+                "measure then."
+            ),
+        )
+    return stored
+
+
+@dataclass(frozen=True, slots=True)
+class PivotTouches:
+    """Touches of one pin with six axes, the tool tilted and turned.
+
+    Attributes:
+        sigma_mm: Standard deviation of one coordinate of one touch, where it is known.
+    """
+
+    upright: ClassVar[bool] = False
+    needs: ClassVar[tuple[str, ...]] = ("z_mm", "v_deg", "w_deg")
+
+    sigma_mm: float | None = None
+
+    def solve(self, flange: Sequence[Pose], stored: ToolOffset | None) -> CalibrationResult:
+        """Solve three poses and more; see :class:`PoseMethod`."""
+        from robolink.calibration import solve_pivot  # numpy, which a look does without
+
+        return solve_pivot(flange, stored=stored, sigma_mm=self.sigma_mm)

@@ -1,0 +1,170 @@
+"""Poses that exist already: taught on the pendant, typed, or kept in a file.
+
+With the guard open in Teach, where a person touches a tip to a pin, a PC commands nothing
+(docs/reference/rules.md 9). So the poses are taught on the pendant and read afterwards. Nothing
+moves here and no tool is selected; therefore nothing is proved by turning about the new tip either.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+from robolink.calibration import (
+    CalibrationResult,
+    ToolFit,
+    better_fit,
+    flange_pose,
+    tilted_flange_pose,
+    tool_fits,
+)
+from robolink.errors import CalibrationError, UndefinedToolError
+from robolink.messages import tr
+from robolink.methods.two_pose.source import TwoTouches
+from robolink.model import Controller, Pose, ToolOffset
+from robolink.procedures import MeasurementContext, PoseMethod
+from robolink.ways import Way, way
+
+
+class PointReader(Protocol):
+    """The taught points of a controller."""
+
+    def read_all(self, numbers: Sequence[int]) -> Mapping[int, Pose | None]:
+        """Read some of them; an undefined one is ``None``."""
+
+
+def taught_poses(points: PointReader, numbers: Sequence[int]) -> tuple[Pose, ...]:
+    """Read points that were taught on the pendant.
+
+    Raises:
+        CalibrationError: ``undefined_point``.
+    """
+    found = points.read_all(numbers)
+    missing = [f"P{number}" for number, pose in found.items() if pose is None]
+    if missing:
+        raise CalibrationError(
+            "undefined_point",
+            tr("Not taught on this controller: {points}.", points=", ".join(missing)),
+            remedy=tr("Teach them on the pendant, on the robot that is in force."),
+        )
+    return tuple(pose for pose in found.values() if pose is not None)
+
+
+@dataclass(frozen=True, slots=True)
+class PosesFound:
+    """What given poses say.
+
+    Attributes:
+        result: The offset.
+        fits: Which tools the poses may have been taught with, the likeliest first.
+        better: A tool that fits the poses much better than the one named, if there is one.
+    """
+
+    result: CalibrationResult
+    fits: tuple[ToolFit, ...]
+    better: ToolFit | None
+
+
+class PointsSource:
+    """Takes a measurement from poses that exist.
+
+    Attributes:
+        found: What the poses said, after :meth:`measure`.
+
+    Args:
+        poses: Brings the poses, mm and degrees.
+        method: How they are solved.
+        taught_tool: The tool whose tip they describe; 0 when they are flange poses.
+        plausible_mm: Largest change that needs no explanation by another tool.
+        sentence: Where they come from, for a report.
+    """
+
+    def __init__(
+        self,
+        poses: Callable[[], Sequence[Pose]],
+        method: PoseMethod | None = None,
+        *,
+        taught_tool: int = 0,
+        plausible_mm: float = 2.0,
+        sentence: str = "",
+    ) -> None:
+        self._poses = poses
+        self._method = TwoTouches() if method is None else method
+        self._taught_tool = taught_tool
+        self._plausible_mm = plausible_mm
+        self._sentence = sentence
+        self.found: PosesFound | None = None
+
+    @property
+    def sentence(self) -> str:
+        """Where the poses come from, for a report."""
+        return self._sentence
+
+    def measure(
+        self, context: MeasurementContext, tool: int, stored: ToolOffset | None
+    ) -> CalibrationResult:
+        """Solve the poses; see :class:`~robolink.procedures.TipSource`.
+
+        Raises:
+            CalibrationError: The poses give no trustworthy result; its code says why.
+            ConfigError: Too many poses for the method.
+            UndefinedToolError: The tool with which they were taught has no definition.
+        """
+        self.found = self.find(context.controller, tool, stored)
+        return self.found.result
+
+    def find(self, controller: Controller, tool: int, stored: ToolOffset | None) -> PosesFound:
+        """Solve the poses and ask which tool they fit. Moves and writes nothing."""
+        poses = self._poses()
+        taught = _require_defined(controller, self._taught_tool)
+        if not self._method.upright:
+            flange = [tilted_flange_pose(pose, taught) for pose in poses]
+            return PosesFound(self._method.solve(flange, stored), (), None)
+        _require_upright(self._taught_tool, taught)
+        result = self._method.solve([flange_pose(pose, taught) for pose in poses], stored)
+        # The listing may lack V and W; what is compared and written comes from single reads.
+        listed = {number: o for number, o in controller.tools.read_all().items() if o is not None}
+        fits = tool_fits(result, taught=self._taught_tool, stored=listed, calibrated=tool)
+        better = better_fit(fits, taught=self._taught_tool, plausible_mm=self._plausible_mm)
+        if better is not None:
+            result = replace(result, warnings=(*result.warnings, "other_tool_fits"))
+        return PosesFound(result, fits, better)
+
+    @property
+    def remedy(self) -> str:
+        """What to do when they make the tip jump."""
+        if self.found is not None and self.found.better is not None:
+            return tr(
+                "The poses fit tool {better} much better than tool {taught}: if they were taught "
+                "with it, give {taught_tool} {better}.",
+                taught_tool=way(Way.TAUGHT_TOOL),
+                better=self.found.better.tool,
+                taught=self._taught_tool,
+            )
+        return tr(
+            "Check that all poses touched the same point and with which tool they were taught "
+            "({taught_tool}).",
+            taught_tool=way(Way.TAUGHT_TOOL),
+        )
+
+
+def _require_defined(controller: Controller, tool: int) -> ToolOffset:
+    offset = controller.tools.read(tool)
+    if offset is None:
+        raise UndefinedToolError(
+            tr("Tool {tool} is not defined, so no pose was taught with it.", tool=tool),
+            remedy=tr(
+                "Name the tool that was selected on the pendant with {taught_tool}.",
+                taught_tool=way(Way.TAUGHT_TOOL),
+            ),
+            controller=controller.identity,
+        )
+    return offset
+
+
+def _require_upright(tool: int, offset: ToolOffset) -> None:
+    if offset.v_deg or offset.w_deg:
+        raise CalibrationError(
+            "tilted_pose",
+            tr("Tool {tool} is tilted (V or W is not 0).", tool=tool),
+            remedy=tr("Teach the poses with Tool 0."),
+        )

@@ -1,0 +1,122 @@
+"""Finding a station with a tip that is known: the reverse of finding a tip at a known station."""
+
+from collections.abc import Callable
+from dataclasses import asdict
+from typing import Final
+
+from robolink.calibration import offset_sigma_mm
+from robolink.errors import ConfigError
+from robolink.messages import tr
+from robolink.methods.beams.plan import CrossingPlan
+from robolink.methods.z_touch.plan import ZTouchPlan
+from robolink.model import Path, Pose, ToolOffset
+from robolink.procedures import offset_z
+from robolink.runner import Ask, Move, Procedure
+from robolink.stations import Found, Station, StationKind, beam_station, touch_station
+from robolink.ways import Way, way
+
+_LIFT_MM: Final = 10.0
+
+
+def learn_station(
+    station: Station,
+    *,
+    here: Pose,
+    tool: int,
+    tip: ToolOffset,
+    sigma_mm: float | None = None,
+) -> Procedure[Found]:
+    """Find where a station is. Runs in Tool 0, from above it.
+
+    Args:
+        station: What is known of it; beams and surfaces are sought about where it says.
+        here: Where the flange is.
+        tool: The tool whose tip is used.
+        tip: Its offset, which is taken for right: what is wrong with it shifts the station.
+        sigma_mm: Standard deviation of one coordinate of one touch, where it is known.
+
+    Raises:
+        CalibrationError: ``no_edge``, ``edge_passed``, and those of the solvers.
+        ConfigError: Nobody knows what the station switches, or about where it is; or it is a
+            camera.
+    """
+    if station.kind is StationKind.CAMERA:
+        raise ConfigError(
+            tr("A camera is found together with a tip."),
+            remedy=tr(
+                "Measure both at once: {calibrate}",
+                calibrate=way(Way.CALIBRATE_CAMERA_AT, tool=tool, station=station.id),
+            ),
+        )
+    courses: dict[StationKind, Callable[[], Procedure[Found]]] = {
+        StationKind.PIN: lambda: _pin(station, tool, tip, sigma_mm),
+        StationKind.BEAMS: lambda: _beams(station, here, tool, tip),
+        StationKind.TOUCH: lambda: _surface(station, here, tool, tip, sigma_mm),
+    }
+    return courses[station.kind]()
+
+
+def _pin(station: Station, tool: int, tip: ToolOffset, sigma_mm: float | None) -> Procedure[Found]:
+    from robolink.calibration import pin_touched  # numpy, which a look does without
+
+    touch: Pose = yield Ask(tr("Bring the tip onto the pin."))
+    yield Move(offset_z(touch, _LIFT_MM), Path.STRAIGHT, tr("lift off the pin"))
+    pin = pin_touched(touch, tip)
+    return Found(
+        id=station.id,
+        kind=StationKind.PIN,
+        x_mm=pin.x_mm,
+        y_mm=pin.y_mm,
+        z_mm=pin.z_mm,
+        sigma_mm=sigma_mm,
+        how=tr("touched with tool {tool}", tool=tool),
+        gauge=station.gauge,
+        tool=tool,
+    )
+
+
+def _beams(station: Station, here: Pose, tool: int, tip: ToolOffset) -> Procedure[Found]:
+    from robolink.methods.beams.procedure import trace_beams  # numpy, which a look does without
+
+    guess = beam_station(station)
+    beams = yield from trace_beams(guess, CrossingPlan(), here=here, tip=tip)
+    lines = [
+        {"input": number, **asdict(beam)} for number, beam in zip(guess.inputs, beams, strict=True)
+    ]
+    return Found(
+        id=station.id,
+        kind=StationKind.BEAMS,
+        x_mm=None,
+        y_mm=None,
+        z_mm=guess.z_mm,
+        how=tr("crossed with tool {tool}", tool=tool),
+        gauge=station.gauge,
+        tool=tool,
+        details={"beams": lines, "off_when_broken": guess.off_when_broken},
+    )
+
+
+def _surface(
+    station: Station, here: Pose, tool: int, tip: ToolOffset, sigma_mm: float | None
+) -> Procedure[Found]:
+    from robolink.methods.z_touch.procedure import (
+        measure_z_touch,  # numpy, which a look does without
+    )
+
+    guess = touch_station(station)
+    found = yield from measure_z_touch(
+        guess, ZTouchPlan(), here=here, stored=tip, sigma_mm=sigma_mm
+    )
+    return Found(
+        id=station.id,
+        kind=StationKind.TOUCH,
+        x_mm=guess.x_mm,
+        y_mm=guess.y_mm,
+        # A tip that seems too long touched a surface that is too high.
+        z_mm=guess.z_mm + tip.z_mm - found.offset.z_mm,
+        sigma_mm=offset_sigma_mm(found),
+        how=tr("touched with tool {tool}", tool=tool),
+        gauge=station.gauge,
+        tool=tool,
+        details={"input": guess.input, "off_when_touched": guess.off_when_touched},
+    )

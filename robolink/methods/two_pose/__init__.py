@@ -1,0 +1,1 @@
+"""two-pose: one pin touched at two angles of U."""

@@ -1,0 +1,51 @@
+"""A pin touched at two angles by a person, or two poses that exist already."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+from robolink.calibration import CalibrationResult, solve_two_pose, two_of
+from robolink.messages import tr
+from robolink.methods.two_pose.procedure import measure_two_pose
+from robolink.model import Pose, ToolOffset
+from robolink.procedures import ManualPinSource, TouchPlan
+from robolink.runner import Procedure
+
+
+@dataclass(frozen=True, slots=True)
+class TwoPoseSource(ManualPinSource):
+    """Measures by touching one pin at two angles of U.
+
+    Attributes:
+        touch: Lift, clearance and angle.
+        sigma_mm: Standard deviation of one coordinate of one placement, where it is known.
+    """
+
+    touch: TouchPlan = field(default_factory=TouchPlan)
+    sigma_mm: float | None = None
+
+    @property
+    def sentence(self) -> str:
+        """What it does, for a report."""
+        return tr("measured on the robot: one pin touched at two angles of U")
+
+    def _steps(self, stored: ToolOffset | None, *, live: bool) -> Procedure[CalibrationResult]:  # noqa: ARG002 - two are always taken
+        return measure_two_pose(self.touch, stored=stored, sigma_mm=self.sigma_mm)
+
+
+@dataclass(frozen=True, slots=True)
+class TwoTouches:
+    """Two touches of one pin.
+
+    Attributes:
+        sigma_mm: Standard deviation of one coordinate of one touch, where it is known.
+    """
+
+    upright: ClassVar[bool] = True
+    needs: ClassVar[tuple[str, ...]] = ()
+
+    sigma_mm: float | None = None
+
+    def solve(self, flange: Sequence[Pose], stored: ToolOffset | None) -> CalibrationResult:
+        """Solve exactly two poses; see :class:`PoseMethod`."""
+        return solve_two_pose(*two_of(flange), stored=stored, sigma_mm=self.sigma_mm)

@@ -1,0 +1,1 @@
+"""z-touch: a surface that switches an input."""

@@ -1,0 +1,168 @@
+"""Touch-off on a surface that switches an input. The tip stops at the touch, then retreats."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from robolink.calibration import (
+    Drift,
+    Touch,
+    VerifyResult,
+    ZTouchResult,
+    solve_z_touch,
+    touch_sigma_gain,
+)
+from robolink.messages import tr
+from robolink.methods.z_touch.plan import ZTouchPlan
+from robolink.model import Path, Pose, ToolOffset, rotate_xy
+from robolink.procedures import (
+    NO_OFFSET,
+    TAKE_ALL,
+    SamplingPolicy,
+    approach_path,
+    offset_z,
+    sample_sequentially,
+    seek_or_retract,
+)
+from robolink.runner import Move, Procedure, Seek
+from robolink.stations import TouchStation
+
+
+def measure_z_touch(
+    station: TouchStation,
+    plan: ZTouchPlan,
+    *,
+    here: Pose,
+    stored: ToolOffset | None,
+    sigma_mm: float | None = None,
+    sampling: SamplingPolicy = TAKE_ALL,
+) -> Procedure[ZTouchResult]:
+    """Measure Z of a tip by touching a surface. Runs in Tool 0; see :func:`sample_sequentially`.
+
+    Args:
+        station: Where the surface is.
+        plan: How it is touched.
+        here: Where the flange is.
+        stored: The offset stored now; the tip is expected there.
+        sigma_mm: Standard deviation of one touch, where it is known.
+        sampling: When it ends, and whether a touch may be made again.
+
+    Raises:
+        CalibrationError: ``no_edge``, ``edge_passed``, and those of :func:`solve_z_touch`.
+    """
+    probing = _ZTouchSampler(station, plan, here, stored or NO_OFFSET, here, stored, sigma_mm)
+    first = yield from probing.take(plan.speeds_mm_s[0])
+    return (yield from sample_sequentially(probing, first, plan.speeds_mm_s, sampling))
+
+
+def verify_by_touching(
+    station: TouchStation,
+    plan: ZTouchPlan,
+    *,
+    here: Pose,
+    angles_deg: Sequence[float],
+    tolerance_mm: float,
+    aside: ToolOffset = NO_OFFSET,
+) -> Procedure[VerifyResult]:
+    """Turn about the new tip and touch the surface there again. Runs in the new tool.
+
+    Args:
+        station: Where the surface is.
+        plan: How it is touched.
+        here: Where the frame of the new tool is.
+        angles_deg: Its angles U at which the surface is touched.
+        tolerance_mm: Largest drift that passes.
+        aside: Where the tip is expected, seen from the frame in force; not 0 where a difference
+            to a reference was written.
+
+    Raises:
+        CalibrationError: As :func:`measure_z_touch`.
+    """
+    drifts = []
+    for angle_deg in angles_deg:
+        probing = _ZTouchSampler(station, plan, replace(here, u_deg=angle_deg), aside, here)
+        touches = []
+        for speed_mm_s in plan.speeds_mm_s:
+            touches.append((yield from probing.take(speed_mm_s)))
+        yield from probing.away()
+        here, found = probing.here, probing.solve(touches).offset
+        drifts.append(Drift(angle_deg, 0.0, 0.0, aside.z_mm - found.z_mm))
+    return VerifyResult(tuple(drifts), tolerance_mm, heights_only=True)
+
+
+@dataclass(slots=True)
+class _ZTouchSampler:
+    """Touches of a surface, each at a speed; implements :class:`SequentialSampler`.
+
+    Attributes:
+        station, plan: Where and how.
+        frame: A pose of the frame: its angles, hand, local and tool.
+        tip: Where the tip is expected, seen from the frame.
+        here: Where the frame is.
+        stored, sigma_mm: As for :func:`measure_z_touch`.
+        near: Whether the frame is at the clearance or below, not above the surface.
+    """
+
+    station: TouchStation
+    plan: ZTouchPlan
+    frame: Pose
+    tip: ToolOffset
+    here: Pose
+    stored: ToolOffset | None = None
+    sigma_mm: float | None = None
+    near: bool = False
+
+    @property
+    def known(self) -> str:
+        return tr("Z is known")
+
+    def counted(self, count: int) -> str:
+        return tr("{count} touches", count=count)
+
+    def take(self, place: float) -> Procedure[Touch]:
+        if not self.near:
+            yield from approach_path(self._safe, here=self.here, purpose=tr("go above the surface"))
+            self.here = yield Move(self._above, Path.STRAIGHT, tr("come down to the clearance"))
+            self.near = True
+        end = offset_z(self._above, -self.plan.clearance_mm - self.plan.beyond_mm)
+        step = Seek(end, self.station.edge, place, tr("seek the surface"))
+        touch = yield from seek_or_retract(step, here=self.here, safe_z_mm=self._safe.z_mm)
+        self.here = yield Move(
+            offset_z(touch, self.plan.back_off_mm), Path.STRAIGHT, tr("back off")
+        )
+        return Touch(touch.z_mm, place)
+
+    def away(self) -> Procedure[None]:
+        if self.near:
+            self.here = yield Move(self._safe, Path.STRAIGHT, tr("lift off the surface"))
+            self.near = False
+
+    def solve(self, touches: Sequence[Touch]) -> ZTouchResult:
+        return solve_z_touch(touches, self.station.z_mm, stored=self.stored, sigma_mm=self.sigma_mm)
+
+    def foreseen(self, place: float) -> Touch:
+        return Touch(0.0, place)
+
+    def gain(self, touches: Sequence[Touch]) -> float:
+        return touch_sigma_gain(touches)
+
+    def named(self, touch: Touch) -> str:
+        return tr("{speed:g} mm/s", speed=touch.speed_mm_s)
+
+    def which(self, number: int, touch: Touch) -> str:
+        return tr("Touch {number}, at {where}", number=number, where=self.named(touch))
+
+    @property
+    def _above(self) -> Pose:
+        """The frame's pose with the tip where it begins to seek."""
+        dx, dy = rotate_xy(self.tip.x_mm, self.tip.y_mm, self.frame.u_deg)
+        return replace(
+            self.frame,
+            x_mm=self.station.x_mm - dx,
+            y_mm=self.station.y_mm - dy,
+            z_mm=self.station.z_mm + self.plan.clearance_mm - self.tip.z_mm,
+        )
+
+    @property
+    def _safe(self) -> Pose:
+        """The frame's pose with the tip above the surface, where it may turn."""
+        return replace(self._above, z_mm=self.station.z_mm + self.plan.lift_mm - self.tip.z_mm)

@@ -1,0 +1,98 @@
+"""A surface in the cell that switches an input when a tip touches it."""
+
+from dataclasses import dataclass, field
+
+from robolink.calibration import CalibrationResult, VerifyResult, seen_from
+from robolink.messages import tr
+from robolink.methods.z_touch.plan import ZTouchPlan
+from robolink.model import Pose, ToolOffset
+from robolink.procedures import MeasurementContext, SamplingPolicy
+from robolink.runner import Procedure
+from robolink.stations import TouchStation
+
+
+@dataclass(frozen=True, slots=True)
+class ZTouchSource:
+    """Measures Z by touching a surface at two speeds, from wherever the flange is.
+
+    Attributes:
+        station: Where the surface is.
+        plan: How it is touched.
+        sigma_mm: Standard deviation of one touch, where it is known.
+        proof_turn_deg: By how much U differs at the touch that proves the new value; 0 on a
+            machine that cannot turn.
+        sampling: When it ends, and whether a touch is offered to be made again.
+    """
+
+    station: TouchStation
+    plan: ZTouchPlan = field(default_factory=ZTouchPlan)
+    sigma_mm: float | None = None
+    proof_turn_deg: float = 180.0
+    sampling: SamplingPolicy = field(default_factory=SamplingPolicy)
+
+    @property
+    def sentence(self) -> str:
+        """What it does, for a report."""
+        return tr("measured on the robot: a surface touched at two speeds")
+
+    @property
+    def remedy(self) -> str:
+        """What to do when a measurement makes the tip jump."""
+        return tr("Clean the tip and the surface, and look whether the nozzle sits firmly.")
+
+    def measure(
+        self,
+        context: MeasurementContext,
+        tool: int,  # noqa: ARG002 - the flange is what moves
+        stored: ToolOffset | None,
+    ) -> CalibrationResult:
+        """Touch and solve; see :class:`~robolink.procedures.MovingSource`."""
+        return context.measure(lambda here: self._steps(stored, here, self.sampling))
+
+    def procedure(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:
+        """Return the steps of a measurement; see :class:`~robolink.procedures.MovingSource`.
+
+        All of them: when it ends early depends on touches that nobody has made yet.
+        """
+        return self._steps(stored, here, SamplingPolicy())
+
+    def _steps(
+        self, stored: ToolOffset | None, here: Pose, sampling: SamplingPolicy
+    ) -> Procedure[CalibrationResult]:
+        from robolink.methods.z_touch.procedure import (
+            measure_z_touch,  # numpy, which a look does without
+        )
+
+        return measure_z_touch(
+            self.station,
+            self.plan,
+            here=here,
+            stored=stored,
+            sigma_mm=self.sigma_mm,
+            sampling=sampling,
+        )
+
+    def verify(
+        self,
+        context: MeasurementContext,
+        tool: int,
+        result: CalibrationResult,
+        *,
+        tip: ToolOffset,
+        tolerance_mm: float,
+    ) -> VerifyResult:
+        """Touch again at another U; see :class:`~robolink.procedures.MovingSource`."""
+        from robolink.calibration import toward_zero
+        from robolink.methods.z_touch.procedure import verify_by_touching  # numpy
+
+        context.controller.tools.select(tool)
+        here = context.controller.groups[0].pose()
+        procedure = verify_by_touching(
+            self.station,
+            self.plan,
+            here=here,
+            angles_deg=(toward_zero(here.u_deg, self.proof_turn_deg),),
+            tolerance_mm=tolerance_mm,
+            aside=seen_from(result.offset, tip),
+        )
+        return context.run(procedure, tip=result.offset)

@@ -1,0 +1,134 @@
+"""What a measurement must be like to be believed, and the verdict in words."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from robolink.calibration import CalibrationResult, require_shrinking
+from robolink.errors import CalibrationError
+from robolink.messages import tr
+from robolink.nozzle_change._proposal import Proposal, Verdict
+
+
+@dataclass(frozen=True, slots=True)
+class AcceptanceCriteria:
+    """Limits of a measurement; what is ``None`` is not judged.
+
+    Attributes:
+        max_change_mm: Largest plausible change against the stored value, over the lengths measured.
+        rms_mm: Largest root mean square of the residuals.
+        max_residual_mm: Largest residual.
+        interval_mm: Largest half width of a component's 95 % interval.
+        drift_tolerance_mm: Largest drift that passes the verification.
+        accepted_change_mm: A larger change that an engineer accepts this time.
+        accepted_with: The option that sets it, for whoever is refused; empty where there is none.
+    """
+
+    max_change_mm: float = 2.0
+    rms_mm: float | None = None
+    max_residual_mm: float | None = None
+    interval_mm: float | None = None
+    drift_tolerance_mm: float = 0.2
+    accepted_change_mm: float | None = None
+    accepted_with: str = ""
+
+    @property
+    def limit_mm(self) -> float:
+        """The largest change that is believed this time."""
+        return max(self.max_change_mm, self.accepted_change_mm or 0.0)
+
+    def judge_fit(self, result: CalibrationResult) -> None:
+        """Refuse a measurement that does not agree with itself.
+
+        Raises:
+            CalibrationError: ``large_rms``, ``large_residual`` or ``large_interval``.
+        """
+        for verdict in self._of_fit(result):
+            if not verdict.passed:
+                raise CalibrationError(
+                    verdict.code,
+                    tr(
+                        "{name} is {found:.3f} mm; {limit:.3f} mm are allowed.",
+                        name=verdict.name,
+                        found=verdict.found_mm,
+                        limit=verdict.limit_mm,
+                    ),
+                    remedy=tr("Clean pin and tip, check that the nozzle sits firmly, and repeat."),
+                )
+
+    def judge_change(
+        self, proposal: Proposal, *, earlier_mm: Sequence[float] = (), remedy: str = ""
+    ) -> None:
+        """Refuse a change that no nozzle change explains.
+
+        Args:
+            proposal: What is to be written.
+            earlier_mm: Lengths in the plane of the corrections made since this nozzle was mounted,
+                oldest first.
+            remedy: What to do about an implausible change.
+
+        Raises:
+            CalibrationError: ``diverging`` or ``implausible_change``.
+        """
+        change, in_plane = proposal.change_mm, proposal.plane_change_mm
+        if change is None or in_plane is None:
+            return
+        # Z is often measured by another method, so only the plane has a history of its own.
+        require_shrinking(in_plane, earlier_mm)
+        if change > self.limit_mm:
+            raise CalibrationError(
+                "implausible_change",
+                tr(
+                    "The tip would move by {change:.3f} mm against the stored tool; {limit:.3f} "
+                    "mm are plausible.",
+                    change=change,
+                    limit=self.limit_mm,
+                ),
+                remedy=" ".join(filter(None, (remedy, self._way_past))),
+            )
+
+    def verdicts(self, proposal: Proposal) -> tuple[Verdict, ...]:
+        """Return what each limit says; nothing about what is not judged or not known."""
+        fit = self._of_fit(proposal.result)
+        if proposal.change_mm is None:
+            return tuple(fit)
+        change = Verdict("implausible_change", tr("The change"), proposal.change_mm, self.limit_mm)
+        return (*fit, change)
+
+    def jumps(self, proposal: Proposal) -> bool:
+        """Tell whether the change is larger than a nozzle change explains."""
+        change = proposal.change_mm
+        return change is not None and change > self.max_change_mm
+
+    @property
+    def _way_past(self) -> str:
+        if not self.accepted_with:
+            return ""
+        return tr("If the change is real, allow it with {option}.", option=self.accepted_with)
+
+    @property
+    def tolerance(self) -> str:
+        """The limits in words."""
+        return "; ".join(self._in_words())
+
+    def _in_words(self) -> Iterator[str]:
+        yield tr("change up to {limit:g} mm", limit=self.max_change_mm)
+        if self.rms_mm is not None:
+            yield tr("rms up to {limit:g} mm", limit=self.rms_mm)
+        if self.max_residual_mm is not None:
+            yield tr("residual up to {limit:g} mm", limit=self.max_residual_mm)
+        if self.interval_mm is not None:
+            yield tr("95 % interval up to +-{limit:g} mm", limit=self.interval_mm)
+
+    def _of_fit(self, result: CalibrationResult) -> Iterator[Verdict]:
+        for code, name, found_mm, limit_mm in (
+            ("large_rms", tr("The rms residual"), result.rms_mm, self.rms_mm),
+            (
+                "large_residual",
+                tr("The largest residual"),
+                result.max_residual_mm,
+                self.max_residual_mm,
+            ),
+            ("large_interval", tr("Half the 95 % interval"), result.half95_mm, self.interval_mm),
+        ):
+            if found_mm is not None and limit_mm is not None:
+                yield Verdict(code, name, found_mm, limit_mm)

@@ -1,0 +1,72 @@
+"""What calibration methods share: ways to a place, touches of a pin, looks of a camera, sampling.
+
+A procedure is a generator of steps (:mod:`robolink.runner`); a source runs procedures for one tool.
+"""
+
+from typing import TYPE_CHECKING
+
+from robolink.lazy_exports import lazy_exports
+
+if TYPE_CHECKING:
+    from robolink.procedures.approach import NO_OFFSET as NO_OFFSET
+    from robolink.procedures.approach import approach_path as approach_path
+    from robolink.procedures.approach import offset_z as offset_z
+    from robolink.procedures.approach import seek_or_retract as seek_or_retract
+    from robolink.procedures.camera_plan import HALF_ROUND_DEG as HALF_ROUND_DEG
+    from robolink.procedures.camera_plan import TWO_ANGLES_DEG as TWO_ANGLES_DEG
+    from robolink.procedures.camera_plan import LookPlan as LookPlan
+    from robolink.procedures.camera_samples import CameraDrive as CameraDrive
+    from robolink.procedures.camera_samples import CameraSamples as CameraSamples
+    from robolink.procedures.camera_samples import Place as Place
+    from robolink.procedures.camera_source import CalibratedCameraSource as CalibratedCameraSource
+    from robolink.procedures.camera_source import angles_between as angles_between
+    from robolink.procedures.camera_source import calibrated_camera as calibrated_camera
+    from robolink.procedures.camera_source import camera_error_of as camera_error_of
+    from robolink.procedures.camera_source import pixel_camera as pixel_camera
+    from robolink.procedures.camera_verify import NO_ERROR as NO_ERROR
+    from robolink.procedures.camera_verify import nearest_first as nearest_first
+    from robolink.procedures.camera_verify import seen_drift as seen_drift
+    from robolink.procedures.camera_verify import verify_by_looking as verify_by_looking
+    from robolink.procedures.lazy_source import LazySource as LazySource
+    from robolink.procedures.pin_source import ManualPinSource as ManualPinSource
+    from robolink.procedures.pin_source import PinSource as PinSource
+    from robolink.procedures.pin_touch import TouchPlan as TouchPlan
+    from robolink.procedures.pin_touch import contact_pose as contact_pose
+    from robolink.procedures.pin_touch import lift_off as lift_off
+    from robolink.procedures.pin_touch import touch_again as touch_again
+    from robolink.procedures.pin_touch import verify_by_turning as verify_by_turning
+    from robolink.procedures.pose_method import PoseMethod as PoseMethod
+    from robolink.procedures.sequential_sampling import TAKE_ALL as TAKE_ALL
+    from robolink.procedures.sequential_sampling import Sampler as Sampler
+    from robolink.procedures.sequential_sampling import SamplingPolicy as SamplingPolicy
+    from robolink.procedures.sequential_sampling import SequentialSampler as SequentialSampler
+    from robolink.procedures.sequential_sampling import finalize_samples as finalize_samples
+    from robolink.procedures.sequential_sampling import may_end_early as may_end_early
+    from robolink.procedures.sequential_sampling import sample_sequentially as sample_sequentially
+    from robolink.procedures.source import FindsStation as FindsStation
+    from robolink.procedures.source import MeasurementContext as MeasurementContext
+    from robolink.procedures.source import MovingSource as MovingSource
+    from robolink.procedures.source import RequiresSensor as RequiresSensor
+    from robolink.procedures.source import TipSource as TipSource
+
+__getattr__ = lazy_exports(
+    __name__,
+    {
+        "approach": "NO_OFFSET approach_path offset_z seek_or_retract",
+        "camera_plan": "HALF_ROUND_DEG LookPlan TWO_ANGLES_DEG",
+        "camera_samples": "CameraDrive CameraSamples Place",
+        "camera_source": (
+            "CalibratedCameraSource angles_between calibrated_camera camera_error_of pixel_camera"
+        ),
+        "camera_verify": "NO_ERROR nearest_first seen_drift verify_by_looking",
+        "lazy_source": "LazySource",
+        "pin_source": "ManualPinSource PinSource",
+        "pin_touch": "TouchPlan contact_pose lift_off touch_again verify_by_turning",
+        "pose_method": "PoseMethod",
+        "sequential_sampling": (
+            "Sampler SamplingPolicy SequentialSampler TAKE_ALL finalize_samples may_end_early "
+            "sample_sequentially"
+        ),
+        "source": "FindsStation MeasurementContext MovingSource RequiresSensor TipSource",
+    },
+)

@@ -1,0 +1,242 @@
+"""Marks brought before a camera and looked at: lifted, turned, down, then a look."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Generic
+
+from robolink.errors import CalibrationError
+from robolink.messages import tr
+from robolink.model import TIP, Path, Pose, SpotUnit, ToolOffset, rotate_xy
+from robolink.procedures.camera_plan import LookPlan
+from robolink.procedures.sequential_sampling import ResultT, finalize_samples
+from robolink.runner import Look, Move, Notify, Procedure, SeenAt
+from robolink.stations import CameraStation
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Something to be looked at.
+
+    Attributes:
+        u_deg: U of the frame meanwhile.
+        mark: The tip, or the number of a fiducial.
+        at: Where the mark is expected, seen from the frame.
+        aside_mm: How far from the middle of the image it is brought, base X and Y.
+    """
+
+    u_deg: float
+    at: ToolOffset
+    mark: int = TIP
+    aside_mm: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class CameraDrive:
+    """The way of one frame from place to place.
+
+    Attributes:
+        station, plan: Where and how.
+        frame: A pose of the frame: its hand, local and tool.
+    """
+
+    station: CameraStation
+    plan: LookPlan
+    frame: Pose
+
+    def looks(
+        self, places: Sequence[Place], here: Pose, *, before_camera: bool = False
+    ) -> Procedure[list[SeenAt]]:
+        """Look at every place in turn; ends before the camera, with the last one in the image.
+
+        Args:
+            places: What to look at.
+            here: Where the frame is.
+            before_camera: Whether it stands where an earlier call ended.
+
+        Raises:
+            CalibrationError: ``tip_not_seen``, ``several_tips_seen`` and their like, with the
+                frame lifted.
+        """
+        seen = list[SeenAt]()
+        for place in places:
+            if before_camera and place.u_deg == here.u_deg:
+                yield Move(self._beside(place), Path.STRAIGHT, tr("go on before the camera"))
+            else:
+                yield from self._turn_to(place, here)
+            here, before_camera = self.pose(place), True
+            yield Move(here, Path.STRAIGHT, tr("come before the camera from the same side"))
+            seen.append((yield from self._look(place)))
+        return seen
+
+    def centred(
+        self, places: Sequence[Place], here: Pose, found: Callable[[Sequence[SeenAt]], ToolOffset]
+    ) -> Procedure[ToolOffset]:
+        """Look where marks are, and return where they are to be expected from now on.
+
+        Args:
+            places: What to look at; ends before the camera, at the last of them.
+            here: Where the frame is.
+            found: Makes the expectation of the looks.
+
+        Raises:
+            CalibrationError: ``far_off``: a mark is farther from where it was expected than
+                anything explains; those of :meth:`looks`, and those of ``found``. The frame is
+                lifted then.
+        """
+        seen = yield from self.looks(places, here)
+        try:
+            for place, look in zip(places, seen, strict=True):
+                self._require_near(look, self._middle(place))
+            return found(seen)
+        except CalibrationError:
+            yield from self.lifted(places[-1])
+            raise
+
+    def _require_near(self, look: SeenAt, middle_mm: tuple[float, float]) -> None:
+        away_mm = math.dist(self.station.base_mm(look), middle_mm)
+        if away_mm > self.plan.search_mm:
+            raise CalibrationError(
+                "far_off",
+                tr(
+                    "What the camera found is {away:.2f} mm from where it is expected; up to "
+                    "{limit:g} mm are followed.",
+                    away=away_mm,
+                    limit=self.plan.search_mm,
+                ),
+                remedy=tr(
+                    "Look at the picture: is it the tip? Check the number of the tool, its stored "
+                    "offset, and what a pixel means."
+                ),
+            )
+
+    def lifted(self, place: Place) -> Procedure[None]:
+        """Lift off the camera from where :meth:`looks` ended."""
+        yield Move(self.above(place), Path.STRAIGHT, tr("lift off the camera"))
+
+    def above(self, place: Place) -> Pose:
+        """Return where :meth:`lifted` ends."""
+        return self._above(self.pose(place))
+
+    def pose(self, place: Place) -> Pose:
+        """Return where the frame is with a mark before the camera, as far as that is known."""
+        x_mm, y_mm = self._middle(place)
+        dx, dy = rotate_xy(place.at.x_mm, place.at.y_mm, place.u_deg)
+        return replace(
+            self.frame,
+            x_mm=x_mm - dx,
+            y_mm=y_mm - dy,
+            z_mm=self.station.z_mm - place.at.z_mm,
+            u_deg=place.u_deg,
+        )
+
+    def _turn_to(self, place: Place, here: Pose) -> Procedure[None]:
+        """Lift, go over and turn, come down beside the place."""
+        above = self._above(self._beside(place))
+        high_mm = max(here.z_mm, above.z_mm)
+        if here.z_mm < high_mm:
+            yield Move(replace(here, z_mm=high_mm), Path.STRAIGHT, tr("lift before the tool turns"))
+        yield Move(replace(above, z_mm=high_mm), Path.JOINT, tr("go above the camera"))
+        yield Move(self._beside(place), Path.STRAIGHT, tr("come down before the camera"))
+
+    def _beside(self, place: Place) -> Pose:
+        pose, by_mm = self.pose(place), self.plan.beside_mm
+        return replace(pose, x_mm=pose.x_mm - by_mm, y_mm=pose.y_mm - by_mm)
+
+    def _look(self, place: Place) -> Procedure[SeenAt]:
+        purpose = tr("look") if place.mark == TIP else tr("look at fiducial {n}", n=place.mark)
+        try:
+            seen: SeenAt = yield Look(purpose, self._middle(place), place.mark, self.plan.pictures)
+        except CalibrationError:
+            yield from self.lifted(place)
+            raise
+        yield Notify(self._told(seen, self._middle(place)))
+        return seen
+
+    def _told(self, seen: SeenAt, middle_mm: tuple[float, float]) -> str:
+        if seen.unit is SpotUnit.PIXEL and self.station.model is None:
+            return tr("seen at pixel {x:.1f}, {y:.1f}", x=seen.spot.x, y=seen.spot.y)
+        x_mm, y_mm = self.station.base_mm(seen)
+        return tr(
+            "seen X {dx:+.3f} Y {dy:+.3f} mm from where it is expected",
+            dx=x_mm - middle_mm[0],
+            dy=y_mm - middle_mm[1],
+        )
+
+    def _middle(self, place: Place) -> tuple[float, float]:
+        return self.station.x_mm + place.aside_mm[0], self.station.y_mm + place.aside_mm[1]
+
+    def _above(self, pose: Pose) -> Pose:
+        return replace(pose, z_mm=pose.z_mm + self.plan.lift_mm)
+
+
+class CameraSamples(Generic[ResultT]):
+    """Looks, and what they say; implements :class:`Sampler`.
+
+    Args:
+        drive: Brings marks before the camera.
+        solver: Makes the result of the looks.
+        here: Where the frame is.
+        before_camera: Whether that is before the camera, with a mark in the image.
+    """
+
+    def __init__(
+        self,
+        drive: CameraDrive,
+        solver: Callable[[Sequence[SeenAt]], ResultT],
+        here: Pose,
+        *,
+        before_camera: bool = False,
+    ) -> None:
+        self._drive = drive
+        self._solver = solver
+        self._here = here
+        self._before_camera = before_camera
+        self._last: Place | None = None
+
+    def at(self, places: Sequence[Place], *, retake: bool) -> Procedure[ResultT]:
+        """Look at every place, and return what that says. Ends lifted.
+
+        Args:
+            places: What to look at.
+            retake: Whether the look that fits worst is offered to be taken again.
+
+        Raises:
+            CalibrationError: Those of the solver, and of :meth:`CameraDrive.looks`.
+        """
+        seen = list[SeenAt]()
+        for place in places:
+            seen.append((yield from self.take(place)))
+        return (yield from finalize_samples(self, places, seen, retake=retake))
+
+    @property
+    def known(self) -> str:
+        """Which lengths become known."""
+        return tr("X and Y are known")
+
+    def counted(self, count: int) -> str:
+        """Say how many were taken."""
+        return tr("{count} looks", count=count)
+
+    def take(self, place: Place) -> Procedure[SeenAt]:
+        """Take one; see :class:`~robolink.procedures.Sampler`."""
+        (seen,) = yield from self._drive.looks(
+            [place], self._here, before_camera=self._before_camera
+        )
+        self._here, self._before_camera, self._last = self._drive.pose(place), True, place
+        return seen
+
+    def away(self) -> Procedure[None]:
+        """Lift the tip; see :class:`~robolink.procedures.Sampler`."""
+        if self._last is None:
+            return
+        yield from self._drive.lifted(self._last)
+        self._here, self._before_camera, self._last = self._drive.above(self._last), False, None
+
+    def solve(self, looks: Sequence[SeenAt]) -> ResultT:
+        """Solve what was taken."""
+        return self._solver(looks)
+
+    def which(self, number: int, look: SeenAt) -> str:
+        """Say which one it is."""
+        return tr("Look {number}, at U {u:.1f}", number=number, u=look.u_deg)

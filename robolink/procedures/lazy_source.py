@@ -1,0 +1,60 @@
+"""A source that is made when it is first needed, because making it reads from the controller."""
+
+from collections.abc import Callable
+
+from robolink.calibration import CalibrationResult, VerifyResult
+from robolink.model import Pose, ToolOffset
+from robolink.procedures.source import MeasurementContext, MovingSource
+from robolink.runner import Procedure
+
+
+class LazySource:
+    """Stands in for a source until it can be made.
+
+    Args:
+        make: Makes it; may read, and refuse.
+        sentence: What it does, for a report that is written before.
+    """
+
+    def __init__(self, make: Callable[[], MovingSource], *, sentence: str) -> None:
+        self._make = make
+        self._sentence = sentence
+        self._made: MovingSource | None = None
+
+    @property
+    def sentence(self) -> str:
+        """What it does, for a report."""
+        return self._made.sentence if self._made else self._sentence
+
+    @property
+    def remedy(self) -> str:
+        """What to do when a measurement makes the tip jump."""
+        return self._source.remedy
+
+    def measure(
+        self, context: MeasurementContext, tool: int, stored: ToolOffset | None
+    ) -> CalibrationResult:
+        """Measure; see :class:`~robolink.procedures.MovingSource`."""
+        return self._source.measure(context, tool, stored)
+
+    def procedure(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:
+        """Return the steps of a measurement; see :class:`~robolink.procedures.MovingSource`."""
+        return self._source.procedure(stored, here)
+
+    def verify(
+        self,
+        context: MeasurementContext,
+        tool: int,
+        result: CalibrationResult,
+        *,
+        tip: ToolOffset,
+        tolerance_mm: float,
+    ) -> VerifyResult:
+        """Prove the new tip; see :class:`~robolink.procedures.MovingSource`."""
+        return self._source.verify(context, tool, result, tip=tip, tolerance_mm=tolerance_mm)
+
+    @property
+    def _source(self) -> MovingSource:
+        if self._made is None:
+            self._made = self._make()
+        return self._made

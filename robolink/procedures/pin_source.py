@@ -1,0 +1,90 @@
+"""What every measurement has in common in which a person brings a tip onto one pin."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from itertools import pairwise
+
+from robolink.calibration import CalibrationResult, VerifyResult
+from robolink.messages import tr
+from robolink.model import Pose, ToolOffset
+from robolink.procedures.pin_touch import TouchPlan, contact_pose, verify_by_turning
+from robolink.procedures.source import MeasurementContext
+from robolink.runner import Procedure
+
+
+class PinSource(ABC):
+    """Measures by touching one pin."""
+
+    __slots__ = ()
+
+    @property
+    def remedy(self) -> str:
+        """What to do when a measurement makes the tip jump."""
+        return tr("Check that all poses touched the same point.")
+
+    def measure(
+        self,
+        context: MeasurementContext,
+        tool: int,  # noqa: ARG002 - the flange is what moves
+        stored: ToolOffset | None,
+    ) -> CalibrationResult:
+        """Touch and solve; see :class:`~robolink.procedures.MovingSource`."""
+        context.controller.tools.select(0)
+        return context.run(self._steps(stored, live=True))
+
+    def procedure(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:  # noqa: ARG002 - the person brings the tip to the pin
+        """Return the steps of a measurement; see :class:`~robolink.procedures.MovingSource`.
+
+        All of them: when it ends early depends on touches that nobody has made yet.
+        """
+        return self._steps(stored, live=False)
+
+    @abstractmethod
+    def _steps(self, stored: ToolOffset | None, *, live: bool) -> Procedure[CalibrationResult]:
+        """Return the steps.
+
+        Args:
+            stored: The offset stored now.
+            live: Whether they are taken, so that they may end early; else they are only shown.
+        """
+
+
+class ManualPinSource(PinSource):
+    """Measures by touching one pin at angles of U, and proves by turning about the new tip.
+
+    Attributes:
+        touch: Lift and clearance.
+    """
+
+    __slots__ = ()
+
+    touch: TouchPlan
+
+    def verify(
+        self,
+        context: MeasurementContext,
+        tool: int,
+        result: CalibrationResult,
+        *,
+        tip: ToolOffset,
+        tolerance_mm: float,
+    ) -> VerifyResult:
+        """Turn about the new tip; see :class:`~robolink.procedures.MovingSource`."""
+        angles = [pose.u_deg + result.offset.u_deg for pose in result.inputs]
+        context.controller.tools.select(tool)
+        procedure = verify_by_turning(
+            self.touch,
+            contact=contact_pose(result, tool=tool),
+            angles_deg=(_middle_of_largest_gap(angles), angles[0]),
+            tolerance_mm=tolerance_mm,
+            written=result.offset,
+            tip=tip,
+        )
+        return context.run(procedure, tip=result.offset)
+
+
+def _middle_of_largest_gap(angles_deg: Sequence[float]) -> float:
+    """Return an angle between those that were measured, as far from any of them as there is one."""
+    gaps = pairwise(sorted(angles_deg))
+    low, high = max(gaps, key=lambda gap: gap[1] - gap[0])
+    return (low + high) / 2

@@ -1,0 +1,242 @@
+"""Samples taken in sequence: live residuals, an early end, the worst one repeated."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final, Protocol, TypeVar
+
+from robolink.calibration import CalibrationResult
+from robolink.errors import CalibrationError
+from robolink.messages import tr
+from robolink.runner import Confirm, Notify, Procedure
+
+MOST_REPEATED: Final = 3
+"""How often one is offered to be taken again; after that the measurement stands as it is."""
+
+
+_DIGITS: Final = 6
+"""Residuals that are equal in so many decimals of a millimetre differ by rounding alone."""
+
+
+PlaceT = TypeVar("PlaceT")
+
+
+TakenT = TypeVar("TakenT")
+
+
+ResultT = TypeVar("ResultT", bound=CalibrationResult)
+
+
+PlaceT_contra = TypeVar("PlaceT_contra", contravariant=True)
+
+
+ResultT_co = TypeVar("ResultT_co", bound=CalibrationResult, covariant=True)
+
+
+class Sampler(Protocol[PlaceT_contra, TakenT, ResultT_co]):
+    """How one method takes a touch, a look or a crossing, and what it makes of all of them."""
+
+    @property
+    def known(self) -> str:
+        """Which lengths become known, for a person: "X and Y are known"."""
+
+    def counted(self, count: int) -> str:
+        """Return how many were taken, for a person: "6 touches"."""
+
+    def take(self, place: PlaceT_contra) -> Procedure[TakenT]:
+        """Go to a place from wherever the one before ended, and take one there.
+
+        Raises:
+            CalibrationError: The sensor says nothing of use; the tip is drawn back.
+        """
+
+    def away(self) -> Procedure[None]:
+        """Lift the tip to where a person may take their time; nothing where it is there."""
+
+    def solve(self, taken: Sequence[TakenT]) -> ResultT_co:
+        """Return what they say, with their residuals in their order.
+
+        Raises:
+            CalibrationError: They say nothing that can be trusted.
+        """
+
+    def which(self, number: int, taken: TakenT) -> str:
+        """Return which one it is, for a person: "Pose 3, at U 120.0"."""
+
+
+def finalize_samples(
+    method: Sampler[PlaceT, TakenT, ResultT],
+    places: Sequence[PlaceT],
+    taken: Sequence[TakenT],
+    *,
+    retake: bool,
+) -> Procedure[ResultT]:
+    """Return what was taken says, after the worst of it was taken again or not. Ends lifted.
+
+    Args:
+        method: How it is taken and solved.
+        places: Where it was taken.
+        taken: What was taken there.
+        retake: Whether the one that fits worst is offered to be taken again.
+
+    Raises:
+        CalibrationError: Those of ``method``.
+    """
+    yield from method.away()
+    held, times = list(taken), [0] * len(taken)
+    result = method.solve(held)
+    for _ in range(MOST_REPEATED if retake and result.dof else 0):
+        distances = result.residual_distances_mm
+        # Two that are checked by each other alone fit equally badly; then it is the other's turn.
+        worst = min(range(len(held)), key=lambda i: (-round(distances[i], _DIGITS), times[i]))
+        question = tr(
+            "{which}, fits worst: it is {distance:.3f} mm off. Take it again?",
+            which=method.which(worst + 1, held[worst]),
+            distance=distances[worst],
+        )
+        if not (yield Confirm(question)):
+            break
+        times[worst] += 1
+        held[worst] = yield from method.take(places[worst])
+        yield from method.away()
+        result = method.solve(held)
+        yield Notify(agreement(method, result, last=worst))
+    return result
+
+
+def agreement(
+    method: Sampler[PlaceT, TakenT, ResultT], fit: CalibrationResult, *, last: int
+) -> str:
+    """Return how well those agree that were taken so far, and how sure the tip is, as a sentence.
+
+    Args:
+        method: How they are named.
+        fit: What they say; it has a degree of freedom.
+        last: Index of the one that was taken last.
+    """
+    half_mm = fit.half95_mm
+    known = (
+        ""
+        if half_mm is None
+        else tr("; {known} to +-{half:.3f} mm", known=method.known, half=half_mm)
+    )
+    return tr(
+        "{counted} agree within {rms:.3f} mm rms, the last within {last:.3f} mm{known}.",
+        counted=method.counted(len(fit.residuals_mm)),
+        rms=fit.rms_mm,
+        last=fit.residual_distances_mm[last],
+        known=known,
+    )
+
+
+LEAST_DOF_TO_STOP: Final = 4
+"""Degrees of freedom before an estimated scatter may end a measurement, those of four touches of a
+pin at different U: from fewer it is a guess, and whoever stops as soon as a guess is good stops too
+often on a lucky one."""
+
+
+@dataclass(frozen=True, slots=True)
+class SamplingPolicy:
+    """How a measurement with many touches or crossings goes on.
+
+    Attributes:
+        until_mm: End early when half the 95 % interval of each measured length is at most this;
+            ``None`` for taking all.
+        retake: Offer to take the one again that fits worst.
+    """
+
+    until_mm: float | None = None
+    retake: bool = False
+
+
+TAKE_ALL: Final = SamplingPolicy()
+
+
+class SequentialSampler(
+    Sampler[PlaceT_contra, TakenT, ResultT_co], Protocol[PlaceT_contra, TakenT, ResultT_co]
+):
+    """What one method takes at each place, and what one more would bring."""
+
+    def foreseen(self, place: PlaceT_contra) -> TakenT:
+        """Return what would be taken at a place, as far as :meth:`gain` looks at it."""
+
+    def gain(self, taken: Sequence[TakenT]) -> float:
+        """Return the standard deviation of the tip as a multiple of a single one's."""
+
+    def named(self, taken: TakenT) -> str:
+        """Return where it was taken, for a person: "U 120.0"."""
+
+
+def sample_sequentially(
+    method: SequentialSampler[PlaceT, TakenT, ResultT],
+    first: TakenT,
+    places: Sequence[PlaceT],
+    sampling: SamplingPolicy,
+) -> Procedure[ResultT]:
+    """Take all after the first, and return what they say. Ends lifted.
+
+    As soon as they check each other it tells after each how well they agree, how sure the tip is,
+    and how sure one more would make it.
+
+    Args:
+        method: What is done at each place.
+        first: The first one taken.
+        places: Where all are taken, the first one too.
+        sampling: When it ends, and whether one may be taken again.
+
+    Raises:
+        CalibrationError: Those of ``method``.
+    """
+    taken = [first]
+    for number, place in enumerate(places[1:], start=2):
+        taken.append((yield from method.take(place)))
+        try:
+            fit = method.solve(taken)
+        except CalibrationError:
+            # What is too little now may be enough in the end.
+            continue
+        if not fit.dof:
+            continue
+        following = None if number == len(places) else method.foreseen(places[number])
+        yield Notify(_progress(method, fit, taken, following))
+        if following is not None and _enough(fit, sampling.until_mm):
+            counted = method.counted(len(taken))
+            yield Notify(tr("That is enough: {counted} were taken.", counted=counted))
+            break
+    return (yield from finalize_samples(method, places, taken, retake=sampling.retake))
+
+
+def may_end_early(count: int, *, unknowns: int, sigma_stated: bool) -> bool:
+    """Tell whether a measurement of ``count`` coordinates can be sure enough before the last one.
+
+    Args:
+        count: How many coordinates are measured.
+        unknowns: How many numbers the fit has to find.
+        sigma_stated: Whether somebody stated the standard deviation.
+    """
+    return count - 1 - unknowns >= (1 if sigma_stated else LEAST_DOF_TO_STOP)
+
+
+def _enough(fit: CalibrationResult, until_mm: float | None) -> bool:
+    half_mm, dof = fit.half95_mm, fit.dof or 0
+    if until_mm is None or half_mm is None:
+        return False
+    return (fit.sigma_stated or dof >= LEAST_DOF_TO_STOP) and half_mm <= until_mm
+
+
+def _progress(
+    method: SequentialSampler[PlaceT, TakenT, ResultT],
+    fit: CalibrationResult,
+    taken: Sequence[TakenT],
+    following: TakenT | None,
+) -> str:
+    """Return what those so far say."""
+    told = agreement(method, fit, last=len(taken) - 1)
+    if following is None or fit.half95_mm is None:
+        return told
+    better = method.gain([*taken, following]) / method.gain(taken)
+    gain = tr(
+        "One more, at {where}, leaves {share:.0f} % of that.",
+        where=method.named(following),
+        share=100 * better,
+    )
+    return f"{told} {gain}"

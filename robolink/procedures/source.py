@@ -1,0 +1,172 @@
+"""Where a measurement comes from: what every source of it offers to a nozzle change."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Protocol, TypeVar, runtime_checkable
+
+from robolink.calibration import CalibrationResult, VerifyResult
+from robolink.model import Controller, Pose, TipSensor, ToolOffset
+from robolink.runner import Operator, Procedure, Runner, RunSettings, StepDone
+from robolink.stations import Found
+
+T = TypeVar("T")
+
+
+class MeasurementContext:
+    """What a source works with.
+
+    Attributes:
+        controller: The controller, connected.
+        operator: The person at the cell.
+        start: Flange pose at the start of the change; limits lie about it.
+
+    Args:
+        settings: Limits and speeds for a tip at an offset from the flange.
+        offers: Whether the person is asked about what a procedure offers.
+    """
+
+    def __init__(
+        self,
+        controller: Controller,
+        operator: Operator,
+        *,
+        start: Pose | None,
+        settings: Callable[[Pose, ToolOffset | None], RunSettings],
+        offers: bool = True,
+    ) -> None:
+        self.controller = controller
+        self.operator = operator
+        self.start = start
+        self._settings = settings
+        self._offers = offers
+        self._on_step: Callable[[StepDone], None] | None = None
+
+    @contextmanager
+    def telling(self, on_step: Callable[[StepDone], None]) -> Iterator[None]:
+        """Tell ``on_step`` of every step taken inside the block."""
+        self._on_step = on_step
+        try:
+            yield
+        finally:
+            self._on_step = None
+
+    def run(
+        self,
+        procedure: Procedure[T],
+        *,
+        tip: ToolOffset | None = None,
+        camera: TipSensor | None = None,
+    ) -> T:
+        """Take the steps of a procedure; see :meth:`robolink.runner.Runner.run`.
+
+        Args:
+            procedure: What is to be done.
+            tip: Offset of the tip in whose frame it moves, ``None`` for the flange.
+            camera: What looks are taken with.
+        """
+        return self.runner(tip, camera).run(procedure)
+
+    def measure(
+        self, steps: Callable[[Pose], Procedure[T]], *, camera: TipSensor | None = None
+    ) -> T:
+        """Take the steps of a measurement, in Tool 0: it is the flange that moves.
+
+        Args:
+            steps: Returns them, given where the flange is.
+            camera: What looks are taken with.
+        """
+        self.controller.tools.select(0)
+        return self.run(steps(self.controller.groups[0].pose()), camera=camera)
+
+    def runner(self, tip: ToolOffset | None = None, camera: TipSensor | None = None) -> Runner:
+        """Return a runner for the flange, or for a tip at an offset from it."""
+        group = self.controller.groups[0]
+        # Where nothing moves there is nothing to limit, and perhaps no pose to be read.
+        start = Pose(0.0, 0.0, 0.0, 0.0) if self.start is None else self.start
+        return Runner(
+            self.controller,
+            group,
+            self.operator,
+            self._settings(start, tip),
+            on_step=self._on_step,
+            camera=camera,
+            offers=self._offers,
+            # About a new tip nothing is repeated: its value is written and not yet proved.
+            repeats=tip is None,
+        )
+
+
+class TipSource(Protocol):
+    """Measures one tip."""
+
+    @property
+    def sentence(self) -> str:
+        """What it does, for a report."""
+
+    @property
+    def remedy(self) -> str:
+        """What to do when a measurement makes the tip jump."""
+
+    def measure(
+        self, context: MeasurementContext, tool: int, stored: ToolOffset | None
+    ) -> CalibrationResult:
+        """Measure the tip of ``tool``, whose stored offset is given.
+
+        Raises:
+            CalibrationError: No trustworthy result; its code says why.
+            RobolinkError: Anything else that ended it.
+        """
+
+
+@runtime_checkable
+class MovingSource(TipSource, Protocol):
+    """Measures a tip by moving the robot, and so can turn about the new tip as well."""
+
+    def procedure(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:
+        """Return the steps of a measurement, for a look at them before anything moves.
+
+        Args:
+            stored: The offset stored now.
+            here: Where the flange is at its start.
+        """
+
+    def verify(
+        self,
+        context: MeasurementContext,
+        tool: int,
+        result: CalibrationResult,
+        *,
+        tip: ToolOffset,
+        tolerance_mm: float,
+    ) -> VerifyResult:
+        """Turn about the new tip and report the drift.
+
+        Args:
+            context: What to work with.
+            tool: The tool, written already.
+            result: What was measured, with the offset that was written.
+            tip: Where the tip was found, which differs from it where a difference was written.
+            tolerance_mm: Largest drift that passes.
+        """
+
+
+@runtime_checkable
+class FindsStation(Protocol):
+    """A source whose measurement tells where a station is, beside where the tip is."""
+
+    def found_station(self, result: CalibrationResult, tool: int) -> Found | None:
+        """Return what a kept measurement says about the station, ``None`` for nothing."""
+
+
+@runtime_checkable
+class RequiresSensor(Protocol):
+    """A source that needs equipment besides the robot."""
+
+    def require_ready(self) -> None:
+        """Find out whether the equipment is there and can be used, before anything moves.
+
+        Raises:
+            CalibrationError: ``sensor_not_found``, ``camera_not_calibrated``.
+            ConfigError: It cannot be used in this way.
+            ConnectError: It does not answer.
+        """

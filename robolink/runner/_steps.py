@@ -1,0 +1,149 @@
+"""The vocabulary in which a procedure asks for things to happen.
+
+A procedure is a generator. It yields steps and is sent what came of them; its return value
+is a proposal. It knows no controller, no clock and no person, so it can be tested by feeding
+it numbers, shown before anything moves, and replayed from a record.
+"""
+
+from collections.abc import Generator
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any, TypeVar
+
+from robolink.model import TIP, InputEdge, Path, Pose, Spot, SpotUnit
+
+
+@dataclass(frozen=True, slots=True)
+class Move:
+    """Drive the frame in force to ``target``; answered with the pose that was reached."""
+
+    target: Pose
+    path: Path
+    purpose: str
+
+
+class TeachPrompt(Enum):
+    """What a person shows with the pose to which they bring the tool."""
+
+    PIN = "pin"
+    """The tip is on the reference point."""
+
+    ROOM = "room"
+    """The tip is free in the air, with room to go along the axes of the tool."""
+
+    ALONG_X = "along_x"
+    """The tip has gone along the tool's own +X since."""
+
+    ALONG_Z = "along_z"
+    """The same along its +Z."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ask:
+    """Let a person bring the tool somewhere; answered with the pose then.
+
+    Attributes:
+        instruction: Where to, for a person.
+        shown: What the pose shows then.
+        foreseen: About where that is, for a look ahead; ``None`` for where the frame is already.
+    """
+
+    instruction: str
+    shown: TeachPrompt = TeachPrompt.PIN
+    foreseen: Pose | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Seek:
+    """Drive the frame in force straight on until an input switches; answered with the pose then.
+
+    When the input shows the edge already, or not on the way, whoever runs the procedure throws
+    CalibrationError ``edge_passed`` or ``no_edge`` into it. The frame is then where it was, or
+    at ``target``.
+    """
+
+    target: Pose
+    edge: InputEdge
+    speed_mm_s: float
+    purpose: str
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """Have the camera say where it sees a mark; answered with :class:`SeenAt`.
+
+    When it sees none, or two, whoever runs the procedure throws CalibrationError
+    ``tip_not_seen``, ``several_tips_seen`` and their like into it.
+
+    Attributes:
+        purpose: What for, for a person.
+        expected_mm: Where in the base, X and Y, the mark should be.
+        mark: The tip, or the number of a fiducial.
+        pictures: How many are taken; the median of them counts.
+    """
+
+    purpose: str
+    expected_mm: tuple[float, float]
+    mark: int = TIP
+    pictures: int = 3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SeenAt(Pose):
+    """The pose of the frame in force, and where the camera saw the mark meanwhile.
+
+    Attributes:
+        spot: Where, in the camera's unit.
+        unit: That unit.
+    """
+
+    spot: Spot
+    unit: SpotUnit
+
+    @classmethod
+    def of(cls, pose: Pose, spot: Spot, unit: SpotUnit) -> "SeenAt":
+        """Return what was seen from ``pose``."""
+        x_mm, y_mm, z_mm, u_deg, v_deg, w_deg = pose.coordinates()
+        return cls(
+            x_mm=x_mm,
+            y_mm=y_mm,
+            z_mm=z_mm,
+            u_deg=u_deg,
+            v_deg=v_deg,
+            w_deg=w_deg,
+            hand=pose.hand,
+            local=pose.local,
+            tool=pose.tool,
+            spot=spot,
+            unit=unit,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Notify:
+    """Let a person know how it goes; answered with ``None``."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Confirm:
+    """Offer something that a person may accept; answered with whether they did.
+
+    Where nobody is to be asked, the answer is ``False``: a measurement never depends on it.
+    """
+
+    question: str
+
+
+Step = Move | Ask | Seek | Look | Notify | Confirm
+
+
+T = TypeVar("T")
+
+
+Procedure = Generator[Step, Any, T]
+"""Yields steps, is sent what each step is answered with, returns a result.
+
+The type of an answer follows from the step, which a generator's type cannot say.
+"""

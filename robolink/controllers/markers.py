@@ -1,18 +1,6 @@
-"""Commands that change something: marked before they leave, cleared when proved.
+"""The durable markers of one controller: stored before a command leaves, cleared when it is proved.
 
-The command classes of docs/reference/rules.md 1:
-
-=====  ==========================================  =======================================
-class  on an EPSON controller                      when no answer comes
-=====  ==========================================  =======================================
-READ   GetStatus, Print ..., TLSet, Where          ask again on a new link
-SET    TLSet n, TLClr n, Tool n, SetIO ...         OutcomeUnknownError; read back, recover
-MOVE   Go, Move                                    OutcomeUnknownError; never sent again
-STOP   Abort, Stop                                 may be repeated
-=====  ==========================================  =======================================
-
-Speed, SpeedS, Power and the motors need no marker: they are set and read back before each
-move, and a lost answer leaves nothing that the next connection would not set again.
+What keeps two procedures of this process apart stands here too.
 """
 
 import threading
@@ -27,7 +15,6 @@ from robolink.errors import (
     JournalError,
     OutcomeUnknownError,
     RemoteProtocolError,
-    RobolinkError,
     StoppedError,
     TransportError,
 )
@@ -181,7 +168,7 @@ class MarkerStore:
         the selection itself says which other tool it may be.
         """
         marker = self._procedures.get(MarkerKind.SELECTION)
-        if marker is not None:
+        if marker is not None and marker.details.get("now") != tool:
             noted = replace(marker, details={**marker.details, "now": tool})
             self._procedures[MarkerKind.SELECTION] = noted
             self._recorded(lambda: self.outcomes.begin(noted))
@@ -258,25 +245,3 @@ class MarkerStore:
             )
             note_standing(doubt, self.ledger.standing())
             raise doubt from error
-
-
-def unrestored_tool(failure: RobolinkError, tool: int) -> str:
-    """Return the sentence about a tool of before that a procedure meant to leave selected.
-
-    Args:
-        failure: What kept the end of the procedure from being recorded, or from happening.
-        tool: Its number.
-    """
-    if isinstance(failure, JournalError):
-        return tr(
-            "Tool {tool} is selected again, which could not be recorded ({cause}) 'robolink "
-            "recover' settles it.",
-            tool=tool,
-            cause=failure.what,
-        )
-    return tr(
-        "The tool of before, tool {tool}, could not be selected again ({cause}) 'robolink "
-        "recover' selects it.",
-        tool=tool,
-        cause=failure.what,
-    )

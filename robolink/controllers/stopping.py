@@ -10,7 +10,6 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from robolink.errors import (
-    ConfigError,
     ConnectError,
     RejectedError,
     RemoteProtocolError,
@@ -24,7 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from robolink.controllers.softmotion.link.wire import MailboxWire
-    from robolink.model import ControllerStatus, Secret
+    from robolink.model import Controller, ControllerStatus, Secret
     from robolink.timing import Clock
     from robolink.transport import TraceSink
 
@@ -34,7 +33,7 @@ mailbox, is no reason to leave the robot moving."""
 
 
 def stop_now(
-    url: str,
+    url: "str | Controller",
     *,
     password: "str | Secret | None" = None,
     timeout_s: float = 3.0,
@@ -48,7 +47,7 @@ def stop_now(
     reset. Nothing is recorded.
 
     Args:
-        url: Which controller.
+        url: Which controller. One that is open already is stopped over the link that it has.
         password: An EPSON controller's remote password, if one is set.
         timeout_s: Longest wait for the connection, and for one answer.
         clock: Replaces the machine's clock; a simulator brings its own.
@@ -65,18 +64,17 @@ def stop_now(
         OutcomeUnknownError: It was told to stop and does not come to rest.
         TransportError, RemoteProtocolError: Whether it stops is not known.
     """
+    if not isinstance(url, str):
+        url.stop()
+        return url.status()
     link = parse_url(url)
     kinds = {"epson": _stop_epson, "softmotion": _stop_group, "plc": _stop_map}
-    if link.kind not in kinds:
-        raise ConfigError(
-            tr("robolink does not know controllers of the kind {kind!r}.", kind=link.kind),
-            remedy=tr("Write for example epson+tcp://192.168.0.1:5000."),
-        )
+    stop = kinds.get(link.kind, _stop_other)
     given = password if isinstance(password, str) else password.reveal() if password else ""
     means = _Means(given, timeout_s, clock, trace, met)
     for tries_left in reversed(range(_TRIES)):
         try:
-            return kinds[link.kind](link, means)
+            return stop(link, means)
         except (TransportError, RemoteProtocolError) as error:
             if isinstance(error, ConnectError) or not tries_left:
                 raise
@@ -101,14 +99,6 @@ def stop_requests(url: str) -> tuple[str, ...]:
 
         return (describe(Command(0, Opcode.STOP)),)
     return ()
-
-
-def advise_emergency_stop(error: RobolinkError) -> RobolinkError:
-    """Put in front of an error of a stop what a person has to do first."""
-    error.remedy = " ".join(
-        (tr("The stop is not confirmed: press the emergency stop."), error.remedy)
-    ).rstrip()
-    return error
 
 
 class _Means(NamedTuple):
@@ -177,6 +167,28 @@ def _tell_which(wire: "MailboxWire", met: "Callable[[str], None]") -> None:
         device_id = read_device_id(wire)
         if device_id is not None:
             met(identity_of(wire, device_id).name)
+
+
+def _stop_other(link: LinkUrl, means: _Means) -> "ControllerStatus":
+    """Stop a controller of a kind that another package brings, by what it offers for that."""
+    from robolink import __version__
+    from robolink.controllers.registry import ConnectionTerms, find_opener
+    from robolink.journal import GlancingLog, signature_here
+    from robolink.model import Secret
+
+    signature = signature_here(__version__)
+    terms = ConnectionTerms(
+        signature,
+        password=Secret(means.password) if means.password else None,
+        timeout_s=means.timeout_s,
+        clock=means.clock,
+        trace=means.trace,
+        # It opens no journal before something has to be recorded.
+        outcomes=GlancingLog(link.address, signature=signature),
+    )
+    with find_opener(link)(link, terms) as controller:
+        controller.stop()
+        return controller.status()
 
 
 def _stop_map(link: LinkUrl, means: _Means) -> "ControllerStatus":

@@ -8,250 +8,157 @@ and a read-back of all six components. What became of it goes on record together
 end of the intent.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import AbstractContextManager
-from dataclasses import dataclass
-from typing import TypeVar
+from abc import abstractmethod
+from collections.abc import Callable, Iterator, Mapping
 
-from robolink.controllers.markers import MarkerStore
-from robolink.errors import (
-    ControllerFaultError,
-    ReadBackError,
-    RejectedError,
-    ToolChangedError,
-    UnclearAnswerError,
-)
+from robolink.controllers.driver_link import DriverLink, MarkedCommand
+from robolink.errors import ReadBackError
 from robolink.messages import tr
 from robolink.model import (
     ANY,
     EntryKind,
     Expected,
     Marker,
-    MarkerKind,
     NewEntry,
     ToolOffset,
     ToolReceipt,
     describe_offset,
     plain_offset,
     require_engineer,
+    tool_changed,
 )
 
-T = TypeVar("T")
+Same = Callable[[ToolOffset | None, ToolOffset | None], bool]
 
 
-@dataclass(frozen=True, slots=True)
-class ToolWrite:
-    """One write as its controller carries it out.
+class ToolWrite(MarkedCommand[ToolOffset | None]):
+    """One write of a tool; each kind of controller says how it is read and sent.
 
     Attributes:
         tool: Number of the tool.
         requested: The new value as the controller can hold it; ``None`` clears the tool.
-        request: What is sent, as a person may read it.
-        send: Sends it; raises unless the controller accepted it.
-        read: Reads what is stored.
-        read_back: Reads it after the controller has accepted the write, where that is another
-            question.
-        read_doubted: Reads it when the answer told nothing, where that is another question.
-    """
-
-    tool: int
-    requested: ToolOffset | None
-    request: str
-    send: Callable[[], object]
-    read: Callable[[], ToolOffset | None]
-    read_back: Callable[[], ToolOffset | None] | None = None
-    read_doubted: Callable[[], ToolOffset | None] | None = None
-
-
-class ToolWriter:
-    """Carries out writes on one controller.
+        before: What it held, once :meth:`compare` has read it.
 
     Args:
-        markers: Keeps the intents.
+        link: The controller.
+        tool: See above.
+        requested: See above.
+        request: What is sent, as a person may read it.
         same: Whether the controller stores two values alike.
-        uninterrupted: Holds Ctrl-C back meanwhile.
-        not_executed: Whether a refusal proves that nothing was done.
     """
 
     def __init__(
-        self,
-        markers: MarkerStore,
-        *,
-        same: Callable[[ToolOffset | None, ToolOffset | None], bool],
-        uninterrupted: Callable[[], AbstractContextManager[None]],
-        not_executed: Callable[[RejectedError], bool],
+        self, link: DriverLink, tool: int, requested: ToolOffset | None, request: str, *, same: Same
     ) -> None:
-        self._markers = markers
-        self._same = markers.ledger.same = same
-        self._uninterrupted = uninterrupted
-        self._not_executed = not_executed
+        super().__init__(request)
+        self.tool = tool
+        self.requested = requested
+        self.before: ToolOffset | None = None
+        self._link = link
+        self._same = same
+        self._unconditional = False
 
-    def change(self, write: ToolWrite, expected: Expected) -> ToolReceipt:
+    @abstractmethod
+    def read_before(self, expected: Expected) -> ToolOffset | None:
+        """Read what the write replaces; ``expected`` is what the caller believes that is."""
+
+    @abstractmethod
+    def read_back(self) -> ToolOffset | None:
+        """Read what is stored after the controller has accepted the write."""
+
+    def read_doubted(self) -> ToolOffset | None:
+        """Read what is stored when the answer told nothing."""
+        return self.read_back()
+
+    def change(self, expected: Expected) -> ToolReceipt:
         """Write and read back; see :meth:`robolink.model.ToolTable.write`."""
-        tool, requested, unconditional = write.tool, write.requested, expected is ANY
-        if unconditional:
-            require_engineer(self._markers.outcomes, tr("write tool {tool} blindly", tool=tool))
-        self._markers.look()
-        before = write.read()
-        self._markers.ledger.saw_tool(tool, before)
-        if self._same(before, requested):
-            return ToolReceipt(
-                tool, before, requested, before, skipped=True, unconditional=unconditional
-            )
-        if expected is not ANY and not self._same(before, expected):
-            raise ToolChangedError(
-                tr(
-                    "Tool {tool} holds {found}, not the expected {expected}; nothing was written.",
-                    tool=tool,
-                    found=describe_offset(before),
-                    expected=describe_offset(expected),
-                ),
-                remedy=tr(
-                    "Someone changed it: a program that runs TLSet at its start, the pendant, or "
-                    "a restored project. Read it again and decide anew."
-                ),
-                request=write.request,
-            )
-        found = self._write(write, before, unconditional=unconditional)
-        if not self._same(found, requested):
-            raise ReadBackError(
-                tr(
-                    "Tool {tool} was written as {requested}, but reads back as {found}.",
-                    tool=tool,
-                    requested=describe_offset(requested),
-                    found=describe_offset(found),
-                ),
-                remedy=tr(
-                    "Do not run the cell with it. Before the write it held {before}.",
-                    before=describe_offset(before),
-                ),
-                request=write.request,
-            )
-        return ToolReceipt(tool, before, requested, found, unconditional=unconditional)
+        markers, self._unconditional = self._link.markers, expected is ANY
+        if self._unconditional:
+            purpose = tr("write tool {tool} blindly", tool=self.tool)
+            require_engineer(markers.outcomes, purpose)
+        markers.look()
+        self.before = self.read_before(expected)
+        markers.ledger.saw_tool(self.tool, self.before)
+        if self._same(self.before, self.requested):
+            return self._receipt(self.before, skipped=True)
+        if expected is not ANY and not self._same(self.before, expected):
+            raise tool_changed(self.tool, self.before, expected, request=self.request)
+        found = self._link.carry_out(self)
+        if not self._same(found, self.requested):
+            raise self._read_back_differs(found)
+        return self._receipt(found)
 
-    def carry_out(
-        self,
-        request: str,
-        details: Mapping[str, object],
-        *,
-        send: Callable[[], object],
-        read: Callable[[], T],
-        tell: Callable[[T], str] | None = None,
-        entries: Callable[[Marker, T], Iterable[NewEntry]] = lambda _marker, _found: (),
-    ) -> T:
-        """Send something that is marked, and return what ``read`` finds then.
-
-        Ctrl-C waits for that. A plain refusal settles the marker; a fault does not, because a
-        controller in error may refuse to show the value that would prove what happened. After
-        an answer that says neither yes nor no, reading settles it.
-
-        Args:
-            request: What is sent, as a person may read it.
-            details: What is needed to settle it later.
-            send: Sends it.
-            read: Reads what it changes.
-            tell: Says what the value that was read means, when the answer did not; only a
-                controller that may answer so needs it.
-            entries: What is put on record together with the end of the marker.
-
-        Raises:
-            UnclearAnswerError: The answer told nothing; the message says what was read.
-        """
-        ledger = self._markers.ledger
-        with self._uninterrupted(), ledger.block():
-            marker = self._markers.begin(MarkerKind.SET, request, details)
-            unclear: UnclearAnswerError | None = None
-            with self._markers.doubt(request):
-                try:
-                    with self._markers.unless_stopped(marker):
-                        send()
-                    ledger.answered(marker)
-                except (RejectedError, ControllerFaultError) as error:
-                    ledger.answered(marker)
-                    if isinstance(error, RejectedError) and self._not_executed(error):
-                        self._markers.clear(marker, _refusal(marker, error))
-                    raise
-                except UnclearAnswerError as error:
-                    ledger.answered(marker)
-                    unclear = error
-                found = read()
-            ledger.proved(marker, found)
-            self._markers.clear(marker, *entries(marker, found))
-        if unclear is not None:
-            # What such a link says is not relied on, so this ends as a failure in any case.
-            if tell is not None:
-                unclear.remedy = tell(found)
-            raise unclear
-        return found
-
-    def _write(
-        self, write: ToolWrite, before: ToolOffset | None, *, unconditional: bool
-    ) -> ToolOffset | None:
+    @property
+    def details(self) -> Mapping[str, object]:
+        """Plain JSON values needed to settle it later."""
+        markers = self._link.markers
         details: dict[str, object] = {
-            "tool": write.tool,
-            "before": plain_offset(before),
-            "requested": plain_offset(write.requested),
+            "tool": self.tool,
+            "before": plain_offset(self.before),
+            "requested": plain_offset(self.requested),
         }
-        if unconditional:
+        if self._unconditional:
             details["unconditional"] = True
-        if self._markers.outcomes.change:
-            details["change"] = self._markers.outcomes.change
-        if self._markers.changing:
+        if markers.outcomes.change:
+            details["change"] = markers.outcomes.change
+        if markers.changing:
             details["part"] = True
+        return details
 
-        acknowledged = False
+    def read(self) -> ToolOffset | None:
+        """Read what it changes."""
+        return self.read_back() if self.acknowledged else self.read_doubted()
 
-        def send() -> None:
-            nonlocal acknowledged
-            write.send()
-            acknowledged = True
+    def entries(self, marker: Marker, found: ToolOffset | None) -> Iterator[NewEntry]:
+        """Return what is put on record together with the end of the marker."""
+        now = {**marker.details, "value": plain_offset(found)}
+        for kind in self._ends(found):
+            said = {"request": self.request} if kind is EntryKind.WRITE else now
+            yield NewEntry(kind, operation=marker.operation, tool=self.tool, details=said)
 
-        def read() -> ToolOffset | None:
-            another = write.read_back if acknowledged else write.read_doubted
-            return (another or write.read)()
-
-        def ends(found: ToolOffset | None) -> Iterator[EntryKind]:
-            if not acknowledged and self._same(found, before):
-                yield EntryKind.NOT_APPLIED
-                return
-            yield EntryKind.WRITE
-            yield EntryKind.READ_BACK
-            if not self._same(found, write.requested):
-                yield EntryKind.CONFLICT
-            elif acknowledged and not self._markers.changing:
-                # A change of several steps says itself, at its end, whether it is done.
-                yield EntryKind.DONE
-
-        def entries(marker: Marker, found: ToolOffset | None) -> Iterator[NewEntry]:
-            now = {**details, "value": plain_offset(found)}
-            for kind in ends(found):
-                said = {"request": write.request} if kind is EntryKind.WRITE else now
-                yield NewEntry(kind, operation=marker.operation, tool=write.tool, details=said)
-
-        return self.carry_out(
-            write.request,
-            details,
-            send=send,
-            read=read,
-            tell=lambda found: self._told(write, before, found),
-            entries=entries,
+    def told_by(self, found: ToolOffset | None) -> str:
+        """Return what the value that was read says about an answer that told nothing."""
+        if self._same(found, self.requested):
+            return tr("Reading tool {tool} back shows that it did run.", tool=self.tool)
+        if self._same(found, self.before):
+            return tr("Reading tool {tool} back shows that it did not run.", tool=self.tool)
+        return tr(
+            "Tool {tool} reads back as {found}.", tool=self.tool, found=describe_offset(found)
         )
 
-    def _told(self, write: ToolWrite, before: ToolOffset | None, found: ToolOffset | None) -> str:
-        tool = write.tool
-        if self._same(found, write.requested):
-            return tr("Reading tool {tool} back shows that it did run.", tool=tool)
-        if self._same(found, before):
-            return tr("Reading tool {tool} back shows that it did not run.", tool=tool)
-        return tr("Tool {tool} reads back as {found}.", tool=tool, found=describe_offset(found))
+    def _ends(self, found: ToolOffset | None) -> Iterator[EntryKind]:
+        if not self.acknowledged and self._same(found, self.before):
+            yield EntryKind.NOT_APPLIED
+            return
+        yield EntryKind.WRITE
+        yield EntryKind.READ_BACK
+        if not self._same(found, self.requested):
+            yield EntryKind.CONFLICT
+        elif self.acknowledged and not self._link.markers.changing:
+            # A change of several steps says itself, at its end, whether it is done.
+            yield EntryKind.DONE
 
+    def _receipt(self, found: ToolOffset | None, *, skipped: bool = False) -> ToolReceipt:
+        return ToolReceipt(
+            self.tool,
+            self.before,
+            self.requested,
+            found,
+            skipped=skipped,
+            unconditional=self._unconditional,
+        )
 
-def _refusal(marker: Marker, error: RejectedError) -> NewEntry:
-    tool = marker.details.get("tool")
-    return NewEntry(
-        EntryKind.REFUSED,
-        operation=marker.operation,
-        tool=tool if isinstance(tool, int) else None,
-        verdict=error.what,
-        details={"request": marker.request, "code": error.code},
-    )
+    def _read_back_differs(self, found: ToolOffset | None) -> ReadBackError:
+        return ReadBackError(
+            tr(
+                "Tool {tool} was written as {requested}, but reads back as {found}.",
+                tool=self.tool,
+                requested=describe_offset(self.requested),
+                found=describe_offset(found),
+            ),
+            remedy=tr(
+                "Do not run the cell with it. Before the write it held {before}.",
+                before=describe_offset(self.before),
+            ),
+            request=self.request,
+        )

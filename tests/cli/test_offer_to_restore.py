@@ -36,7 +36,7 @@ def cell():
         died.__enter__()
         controller.tools.select(0)
         assert isinstance(controller, EpsonController)
-        controller._session.close()
+        controller._link.session.close()
     yield simulator, url
     unregister("offer-to-restore")
     memory_journal(url).close()

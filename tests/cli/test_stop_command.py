@@ -45,11 +45,11 @@ def moving(state_folder):
         here = controller.groups[0].pose()
         controller.groups[0].move_to(replace(here, z_mm=here.z_mm + 30), CREEPING, box=WorkBox())
         assert isinstance(controller, EpsonController)
-        controller._session.close()
+        controller._link.session.close()
         controller.outcomes.close()  # the lease of the one who died
         simulator.url = host.url
         yield simulator
-        controller._session.close()  # what it watches for Ctrl-C is given back
+        controller._link.session.close()  # what it watches for Ctrl-C is given back
         close_files()
 
 

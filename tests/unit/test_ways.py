@@ -8,7 +8,7 @@ import pytest
 from robolink_cli.console.ways import SHELL_WAYS
 
 import robolink
-from robolink.controllers.tool_clearing import require_replacement
+from robolink.controllers.tool_table import require_replacement
 from robolink.errors import SelectedToolError
 from robolink.ways import Way, speaking, way
 

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
 
-from robolink.controllers import advise_emergency_stop, stop_now
+from robolink.controllers import stop_now
 from robolink.errors import (
     ConfigError,
     ConnectError,
@@ -67,6 +67,9 @@ def stop_first(request: StopRequest) -> StopOutcome:
     try:
         _stop(request, outcome)
     except RobolinkError as error:
+        # Here, because a stop that is taken needs none of it.
+        from robolink.controllers import advise_emergency_stop
+
         outcome.error = advise_emergency_stop(error)
     except (Exception, KeyboardInterrupt) as error:
         outcome.error = error

@@ -5,8 +5,7 @@ from contextlib import suppress
 from typing import Final
 
 from robolink.controllers.epson.io.alarms import EpsonAlarms
-from robolink.controllers.epson.link.preferences import Preferences
-from robolink.controllers.epson.link.window import CommandWindow
+from robolink.controllers.epson.link.link import EpsonLink
 from robolink.controllers.epson.motion.group import EpsonGroup
 from robolink.controllers.epson.tools.published import PublishedTools
 from robolink.controllers.epson.tools.table import EpsonToolTable
@@ -27,16 +26,10 @@ class ConditionReader:
     """Reads the text of an error, the alarms, the tool in force, motors and power."""
 
     def __init__(
-        self,
-        window: CommandWindow,
-        *,
-        alarms: EpsonAlarms,
-        tools: EpsonToolTable,
-        group: EpsonGroup,
-        preferences: Preferences,
+        self, link: EpsonLink, alarms: EpsonAlarms, tools: EpsonToolTable, group: EpsonGroup
     ) -> None:
-        self._preferences = preferences
-        self._window = window
+        self._preferences = link.preferences
+        self._window = link.window
         self._alarms = alarms
         self._tools = tools
         self._group = group

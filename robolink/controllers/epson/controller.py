@@ -1,57 +1,34 @@
 """An EPSON controller on Remote Ethernet."""
 
-from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager
-from types import TracebackType
-from typing import Self
-
+from robolink.controllers.controller_core import ControllerCore
 from robolink.controllers.epson.condition import ConditionReader
 from robolink.controllers.epson.io.alarms import EpsonAlarms
 from robolink.controllers.epson.io.bits import EpsonIo
 from robolink.controllers.epson.io.pending_values import PendingValues
 from robolink.controllers.epson.io.raw_statements import RawStatements
-from robolink.controllers.epson.io.values import ValueSetter
 from robolink.controllers.epson.io.variables import EpsonVariables
-from robolink.controllers.epson.link.identity import FactReader, IdentityReader
-from robolink.controllers.epson.link.preferences import Preferences
+from robolink.controllers.epson.link.identity import FactReader
+from robolink.controllers.epson.link.link import EpsonLink
 from robolink.controllers.epson.link.session import EpsonSession
-from robolink.controllers.epson.link.stopping import REST_S
-from robolink.controllers.epson.link.window import CommandWindow
 from robolink.controllers.epson.motion.acts import EpsonActs
 from robolink.controllers.epson.motion.group import EpsonGroup
 from robolink.controllers.epson.motion.positions import EpsonPoints
-from robolink.controllers.epson.tools.preserve import Preserver
+from robolink.controllers.epson.tools.preserve import EpsonPreserver
 from robolink.controllers.epson.tools.published import PublishedReader, PublishedTools
 from robolink.controllers.epson.tools.resolve import EpsonResolver
 from robolink.controllers.epson.tools.table import EpsonToolTable
-from robolink.controllers.markers import MarkerStore, ProcedureLock
-from robolink.errors import (
-    RobolinkError,
-)
-from robolink.model import (
-    Act,
-    Capabilities,
-    ControllerFacts,
-    ControllerStatus,
-    Ledger,
-    Marker,
-    MarkerKind,
-    NewEntry,
-    OutcomeLog,
-    Secret,
-)
+from robolink.model import Act, Capabilities, ControllerFacts, ControllerStatus, OutcomeLog
 from robolink.protocols.epson_text import Preference
-from robolink.standing import note_standing
-from robolink.stop_latch import StopLatch
-from robolink.timing import Clock
-from robolink.transport import Transport
 
 
-class EpsonController:
+class EpsonController(ControllerCore):
     """A logged-in EPSON controller. Use it as a context manager.
 
     Attributes:
+        tools: Tools 1 to 15.
+        groups: The one robot that Execute acts on.
         io: Inputs, outputs and memory bits.
+        points: The taught points of the robot in force; read only.
         variables: The project's Global Preserve variables.
         alarms: The alarms that stand.
 
@@ -62,79 +39,47 @@ class EpsonController:
             0 (never) forbids motion.
     """
 
+    tools: EpsonToolTable
+    groups: tuple[EpsonGroup]
+    io: EpsonIo
+    points: EpsonPoints
+    variables: EpsonVariables
+    alarms: EpsonAlarms
+
     def __init__(
         self, session: EpsonSession, outcomes: OutcomeLog, *, remote_timeout_s: float
     ) -> None:
-        self._session = session
-        self._outcomes = outcomes
-        self._window = CommandWindow(session)
-        outcomes.ask(IdentityReader(session, self._window).read)
-        self._lock = ProcedureLock(session.identity, session.latch)
-        self._markers = MarkerStore(session.identity, outcomes, session.latch)
-        self._preferences = Preferences(session)
-        self._group = EpsonGroup(
-            session,
-            self._window,
-            self._markers,
-            self._lock,
-            preferences=self._preferences,
-            remote_timeout_s=remote_timeout_s,
-        )
-        self._tools = EpsonToolTable(
-            self._window, self._markers, self._lock, self._group.robot, self._preferences
-        )
-        self._preserver = Preserver(
-            session,
-            self._window,
-            self._markers,
-            self._lock,
-            self._preferences,
-            tools=self._tools,
-            group=self._group,
-        )
-        self._acts = EpsonActs(session, self._window, self._lock, self._group)
-        setter = ValueSetter(session, self._window, self._markers, self._lock)
-        self.io = EpsonIo(session, self._window, setter)
-        self.variables = EpsonVariables(session, setter)
-        self._raw = RawStatements(session, self._window, self._markers, self._lock)
-        self.alarms = EpsonAlarms(session, self._window, self._lock)
-        self._resolver = EpsonResolver(
-            self._markers,
-            tools=self._tools,
-            group=self._group,
-            preserver=self._preserver,
-            values=PendingValues(self.io, self.variables),
+        link = self._link = EpsonLink(session, outcomes)
+        group = EpsonGroup(link, remote_timeout_s=remote_timeout_s)
+        tools = EpsonToolTable(link)
+        preserver = EpsonPreserver(link, tools, group)
+        self.io = EpsonIo(link)
+        self.points = EpsonPoints(link.window)
+        self.variables = EpsonVariables(link)
+        self.alarms = EpsonAlarms(link)
+        values = PendingValues(self.io, self.variables)
+        self._acts = EpsonActs(link, group)
+        super().__init__(
+            link,
+            capabilities=Capabilities(
+                tool_write=True,
+                motion=True,
+                motors=True,
+                io=True,
+                points=True,
+                variables=True,
+                alarms=True,
+            ),
+            tools=tools,
+            groups=(group,),
+            preserver=preserver,
+            resolver=EpsonResolver(link, tools, preserver, group=group, values=values),
         )
 
     @property
-    def identity(self) -> str:
-        """The URL without its options; who answers there is ``outcomes.identity``."""
-        return self._session.identity
-
-    @property
-    def clock(self) -> Clock:
-        """The clock on which the controller's time passes."""
-        return self._session.clock
-
-    @property
-    def capabilities(self) -> Capabilities:
-        """Everything that this package can ask for."""
-        return Capabilities(tool_write=True, motion=True, motors=True)
-
-    @property
-    def tools(self) -> EpsonToolTable:
-        """Tools 1 to 15."""
-        return self._tools
-
-    @property
-    def groups(self) -> Sequence[EpsonGroup]:
-        """The one robot that Execute acts on."""
-        return (self._group,)
-
-    @property
-    def points(self) -> EpsonPoints:
-        """The taught points of the robot in force; read only."""
-        return EpsonPoints(self._window)
+    def exchanges(self) -> int:
+        """Requests sent so far."""
+        return self._link.session.exchanges
 
     def published_tools(self) -> PublishedTools | None:
         """Read the tools as the companion program published them; legal while production runs.
@@ -147,60 +92,13 @@ class EpsonController:
         """
         return PublishedReader(self.variables).read()
 
-    @property
-    def outcomes(self) -> OutcomeLog:
-        """Open markers of this controller."""
-        return self._outcomes
-
-    @property
-    def ledger(self) -> Ledger:
-        """What was done here since connecting, and how much of it is proved."""
-        return self._markers.ledger
-
-    @property
-    def resolver(self) -> EpsonResolver:
-        """Settles what was begun and not proved finished."""
-        return self._resolver
-
-    @property
-    def exchanges(self) -> int:
-        """Requests sent so far."""
-        return self._session.exchanges
-
-    def status(self) -> ControllerStatus:
-        """Read the state flags; others see by it that this process is alive."""
-        self._markers.beat()
-        return self._window.status()
-
     def facts(self) -> ControllerFacts:
         """Read which controller and robots these are; legal while production runs."""
-        return FactReader(self._session, self._window).read()
+        return FactReader(self._link.session, self._link.window).read()
 
     def error_text(self, code: int) -> str:
         """Return the controller's own text for an error number, empty where it has none."""
-        return self._window.error_text(code)
-
-    @property
-    def latch(self) -> StopLatch:
-        """What holds everything back from :meth:`stop` until :meth:`release_stop`."""
-        return self._session.latch
-
-    def stop(self) -> None:
-        """Bring everything to rest: Abort, Stop, and a status that shows it.
-
-        May be called from any thread, whatever another one is doing. From its first instant on
-        no movement, write or program start leaves this process until :meth:`release_stop`;
-        whoever is at work gets StoppedError.
-
-        Raises:
-            OutcomeUnknownError: Rest was not seen; the message says to use the emergency stop.
-            RobolinkError: It was not confirmed; the message says the same.
-        """
-        self._acts.stop()
-
-    def release_stop(self) -> None:
-        """Let this process act again after :meth:`stop`, because a person says so."""
-        self._session.latch.release()
+        return self._link.window.error_text(code)
 
     def reset_fault(self) -> None:
         """Send Reset because a person asked for it; it may switch outputs off.
@@ -249,7 +147,7 @@ class EpsonController:
             ControllerFaultError: It put the controller in error.
             OutcomeUnknownError: No answer came.
         """
-        return self._raw.execute(statement)
+        return RawStatements(self._link).execute(statement)
 
     def preferences(self) -> frozenset[Preference] | None:
         """Read the preferences that are on; asked once a connection.
@@ -257,102 +155,28 @@ class EpsonController:
         Returns:
             ``None`` where the firmware does not tell them.
         """
-        return self._preferences.read()
+        return self._link.preferences.read()
 
     def condition(self) -> dict[str, object]:
         """Read error text, alarms, preferences, the tool in force, motors and power."""
-        reader = ConditionReader(
-            self._window,
-            alarms=self.alarms,
-            tools=self._tools,
-            group=self._group,
-            preferences=self._preferences,
-        )
+        reader = ConditionReader(self._link, self.alarms, self.tools, self.groups[0])
         return reader.read(published=self.published_tools)
 
-    def require_settled(self, request: str) -> None:
-        """Refuse ``request`` while something earlier is unsettled.
+    def _read_status(self) -> ControllerStatus:
+        return self._link.window.status()
 
-        Raises:
-            OutcomeUnknownError: Names it.
-        """
-        self._markers.require_settled(request)
-
-    def begin(
-        self,
-        kind: MarkerKind,
-        request: str,
-        details: Mapping[str, object],
-        *,
-        operation: str = "",
-    ) -> Marker:
-        """Store the durable marker of a procedure; see the model."""
-        return self._markers.begin(kind, request, details, operation=operation)
-
-    def finish(self, marker: Marker, *entries: NewEntry) -> None:
-        """Forget the marker of a procedure, and journal how it ended."""
-        self._markers.clear(marker, *entries)
-
-    def uninterrupted(self) -> AbstractContextManager[None]:
-        """Hold Ctrl-C back for a block that must be seen through."""
-        return self._session.uninterrupted()
-
-    def preserved(self, reason: str) -> AbstractContextManager[None]:
-        """Put back the tool, power and speed in force; see the model."""
-        return self._preserver.preserved(reason)
-
-    def close(self) -> None:
-        """Abort what nobody waited on, log out where that does no harm, close. Idempotent.
+    def _take_leave(self) -> None:
+        """Abort what nobody waited on, and log out where that does no harm.
 
         Logging out while a task runs raises an error on the controller
         (docs/reference/epson.md 1.1), so the connection is just closed then. So it is when another
         device starts the cell: a task could begin between the look and the logout.
         """
-        self._session.latch.await_stops(REST_S)
-        try:
-            if self._session.alive:
-                self._group.abort_unfinished()
-                status = self.status()
-                if status.remote and not (status.running or status.paused):
-                    self._session.exchange("Logout")
-        except RobolinkError:
-            pass  # the link is going away in any case; markers keep what is in doubt
-        finally:
-            self._session.close()
-            self._outcomes.close()
+        if self._link.session.alive:
+            self.groups[0].abort_unfinished()
+            status = self.status()
+            if status.remote and not (status.running or status.paused):
+                self._link.session.exchange("Logout")
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
-        if error is not None:
-            note_standing(error, self.ledger.standing())
-
-
-def open_epson(
-    transport: Transport,
-    *,
-    outcomes: OutcomeLog,
-    password: Secret | None = None,
-    timeout_s: float = 3.0,
-    remote_timeout_s: float = 60.0,
-) -> EpsonController:
-    """Log in and return the controller; the transport is closed when that fails.
-
-    Raises:
-        LoginRefusedError: Wrong or missing password. One attempt is made.
-        LoginUnansweredError: Nobody answers; another client may be logged in.
-    """
-    session = EpsonSession(transport, timeout_s=timeout_s)
-    try:
-        session.login(password)
-    except BaseException:
-        session.close()
-        raise
-    return EpsonController(session, outcomes, remote_timeout_s=remote_timeout_s)
+    def _close_link(self) -> None:
+        self._link.session.close()

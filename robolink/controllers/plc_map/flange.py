@@ -1,14 +1,14 @@
 """Where the flange is, from a PLC that tells it; a person moves."""
 
-from collections.abc import Mapping
 from typing import Final, NoReturn
 
-from robolink.controllers.plc_map.registers import Registers
+from robolink.controllers.motion_group import MotionGroupCore
+from robolink.controllers.plc_map.link import MappedPlc
 from robolink.controllers.plc_map.values import OffsetValues
 from robolink.errors import RejectedError
 from robolink.messages import tr
 from robolink.model import Pose
-from robolink.register_maps import RegisterMap, span_of
+from robolink.register_maps import span_of
 from robolink.ways import Way, way
 
 _FAR_MM: Final = 100_000.0
@@ -16,14 +16,16 @@ _FAR_DEG: Final = 36_000.0
 """No head stands farther away or is turned more often."""
 
 
-class FlangeReader:
+class FlangeReader(MotionGroupCore):
     """The axis group of a PLC with a map: it may tell where it is, and is never moved."""
 
-    def __init__(self, registers: Registers, register_map: RegisterMap) -> None:
-        self._registers = registers
-        self._flange = register_map.flange
-        self._name = register_map.name
-        self._values = OffsetValues(register_map, registers.identity)
+    def __init__(self, plc: MappedPlc) -> None:
+        super().__init__(plc)
+        self._plc = plc
+        self._registers = plc.registers
+        self._flange = plc.register_map.flange
+        self._name = plc.register_map.name
+        self._values = OffsetValues(plc.register_map, plc.identity)
 
     @property
     def name(self) -> str:
@@ -52,29 +54,16 @@ class FlangeReader:
         pose = self._values.numbers(self._flange, words, largest_mm=_FAR_MM, largest_deg=_FAR_DEG)
         return Pose(*pose, tool=0)
 
-    def axes(self) -> Mapping[str, tuple[float, ...]]:
-        """Return nothing: a map has no axes."""
-        return {}
-
     def move_to(self, *_asked: object, **_how: object) -> NoReturn:
         """Refuse, and so does all that would move or stop the machine.
 
         Raises:
             RejectedError: Always.
         """
-        raise no_motion(self._registers.identity)
+        raise self._plc.no_motion()
 
     def require_able(self, purpose: str) -> NoReturn:
         """Refuse, as :meth:`move_to` does."""
         self.move_to(purpose)
 
     move_until_input = requests_until = requests_for = terms = stop = move_to
-
-
-def no_motion(identity: str) -> RejectedError:
-    """Return the error for anything that would move, stop or switch the machine."""
-    return RejectedError(
-        tr("A PLC with a register map is neither moved nor stopped by robolink."),
-        remedy=tr("Do it at the machine; in danger press the emergency stop."),
-        controller=identity,
-    )

@@ -1,64 +1,40 @@
 """The tool table of a PLC that keeps offsets in registers of its own."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from typing import ClassVar
 
-from robolink.controllers.markers import MarkerStore, ProcedureLock
 from robolink.controllers.plc_map.handshake import Handshake
-from robolink.controllers.plc_map.registers import Registers
+from robolink.controllers.plc_map.link import MappedPlc
 from robolink.controllers.plc_map.slots import Slots
-from robolink.controllers.tool_clearing import clear_after_selecting, preview_clearing
-from robolink.controllers.tool_writing import ToolWrite, ToolWriter
-from robolink.errors import (
-    RejectedError,
-    ReservedToolError,
-    ToolError,
-    ToolIndexError,
-)
+from robolink.controllers.tool_table import ToolTableCore
+from robolink.controllers.tool_writing import ToolWrite
+from robolink.errors import RejectedError, ToolError
 from robolink.messages import tr
 from robolink.model import Expected, ToolOffset, ToolReceipt
-from robolink.register_maps import MapSlot, RegisterMap
 
 
-class RegisterToolTable:
+class RegisterToolTable(ToolTableCore):
     """The tools that a map names.
 
     Every write is compare-and-set and read back. The values go out first, in one request where
-    they follow one another, and only then is the PLC asked to take them over.
+    they follow one another, and only then is the PLC asked to take them over. A refusal leaves the
+    registers as they were; where it does not, another error says so.
+
+    Where the map does not tell which tool is in force, nobody can keep it from losing its
+    definition but who works at the machine.
 
     Args:
-        registers: The PLC's tables.
-        register_map: Where everything stands.
-        markers: Keeps the markers.
-        lock: One procedure at a time.
-        require_confirmed: Refuses every change while nobody knows the map to be right; sends
-            nothing.
-        require_ready: Refuses a write that the machine or the map does not allow.
+        plc: The PLC and its map.
     """
 
-    def __init__(
-        self,
-        registers: Registers,
-        register_map: RegisterMap,
-        markers: MarkerStore,
-        lock: ProcedureLock,
-        *,
-        require_confirmed: Callable[[str], None],
-        require_ready: Callable[[str], None],
-    ) -> None:
-        self._registers = registers
-        self._map = register_map
-        self._markers = markers
-        self._lock = lock
-        self._require_confirmed = require_confirmed
-        self._require_ready = require_ready
-        self._slots = Slots(registers, register_map)
-        self._writer = ToolWriter(
-            markers,
-            same=self.same,
-            uninterrupted=lambda: registers.gate,
-            # A refusal leaves the registers as they were; where it does not, another error says so.
-            not_executed=lambda _error: True,
-        )
+    machine_selects: ClassVar[bool] = True
+
+    def __init__(self, plc: MappedPlc) -> None:
+        super().__init__(plc)
+        self._plc = plc
+        self._registers = plc.registers
+        self._map = plc.register_map
+        self._slots = Slots(plc.registers, plc.register_map)
 
     @property
     def handshake(self) -> Handshake:
@@ -81,87 +57,19 @@ class RegisterToolTable:
             ReservedToolError, ToolIndexError: As :meth:`write` would.
             ToolError: The PLC's offsets can only be read.
         """
-        self._require_confirmed(tr("tool {tool}", tool=tool))
-        if tool == 0:
-            raise ReservedToolError(
-                tr("Tool 0 is the flange itself and is never written."),
-                remedy=tr("Choose one of these: {tools}.", tools=self._known()),
-            )
-        slot = self._slot(tool)
-        if not slot.table.writable:
+        self._plc.require_confirmed(tr("tool {tool}", tool=tool))
+        super().require_writable(tool)
+        if not self._map.slots[tool].table.writable:
             raise ToolError(
                 tr("Tool {tool} stands in input registers, which nobody can write.", tool=tool),
                 remedy=tr("Change it at the HMI, or map holding registers."),
-                controller=self._registers.identity,
+                controller=self._plc.identity,
             )
-
-    def read_all(self) -> dict[int, ToolOffset | None]:
-        """Read every tool of the map."""
-        return {tool: self.read(tool) for tool in self.indices()}
-
-    def read(self, tool: int) -> ToolOffset | None:
-        """Read one tool, ``None`` when it is undefined; tool 0 reads as all zeros."""
-        if tool == 0 and not isinstance(tool, bool):
-            return ToolOffset()
-        found = self._slots.read(self._slot(tool))
-        self._markers.ledger.saw_tool(tool, found)
-        return found
-
-    def write(self, tool: int, offset: ToolOffset, *, expected: Expected) -> ToolReceipt:
-        """Write and read back; see :class:`robolink.model.ToolTable`.
-
-        Raises:
-            ToolError: A component is not 0 that the PLC does not have; nothing was sent.
-            LimitError: A component is too large for its registers; nothing was sent.
-            RejectedError: The PLC refused the value; the old one stands and is in force.
-        """
-        self.require_writable(tool)
-        return self._set(tool, self._slots.values.rounded(self._slot(tool), offset), expected)
-
-    def clear(
-        self, tool: int, *, expected: Expected, then_select: int | None = None
-    ) -> ToolReceipt:
-        """Make a tool undefined, where the map says how; see :meth:`write`.
-
-        Where the map does not tell which tool is in force, nobody can keep it from losing its
-        definition but who works at the machine.
-        """
-        self.require_writable(tool)
-        return clear_after_selecting(
-            self,
-            tool,
-            lambda: self._set(tool, None, expected),
-            expected=expected,
-            then_select=then_select,
-            uninterrupted=lambda: self._registers.gate,
-            stays_selected=True,
-        )
-
-    def preview_write(self, tool: int, offset: ToolOffset) -> tuple[str, ...]:
-        """Return what :meth:`write` would send, in words; reads only.
-
-        Empty when the value is stored already.
-        """
-        self.require_writable(tool)
-        return self._preview(tool, self._slots.values.rounded(self._slot(tool), offset))
-
-    def preview_clear(self, tool: int, *, then_select: int | None = None) -> tuple[str, ...]:
-        """Return what :meth:`clear` would send, in words."""
-        self.require_writable(tool)
-        return preview_clearing(self, tool, self._preview(tool, None), then_select)
 
     def preview_select(self, tool: int) -> tuple[str, ...]:
         """Refuse, as :meth:`select` does."""
         self.select(tool)
         return ()
-
-    def selected(self) -> int | None:
-        """Return the number of the tool in force; ``None`` where the map does not name it."""
-        if self._map.selected is None:
-            return None
-        found = self._registers.word(self._map.selected)
-        self._markers.ledger.saw_selected(found)
-        return found
 
     def select(self, tool: int) -> None:
         """Refuse: which tool is in force is the machine's affair.
@@ -169,14 +77,9 @@ class RegisterToolTable:
         Raises:
             RejectedError: Always, unless the tool is in force already.
         """
-        if tool != 0:
-            self._slot(tool)
+        self._require_known(tool)
         if self.selected() != tool:
-            raise RejectedError(
-                tr("robolink does not select tools on this PLC."),
-                remedy=tr("Select tool {tool} at the HMI.", tool=tool),
-                controller=self._registers.identity,
-            )
+            self._send_selection(tool)
 
     def take_over(self, tool: int, before: ToolOffset | None, request: str) -> None:
         """Ask the PLC once to take over what stands in the registers.
@@ -190,39 +93,89 @@ class RegisterToolTable:
             RejectedError: It refused; the registers show ``before`` again.
             RobolinkError: As :meth:`write`.
         """
-        with self._lock.held(request), self._registers.gate:
+        with self._plc.lock.held(request), self._plc.uninterrupted():
             self._slots.handshake.make_ready(request)
-            self._slots.take_over(self._slot(tool), before, request)
+            self._slots.take_over(self._map.slots[tool], before, request)
 
     def _set(self, tool: int, requested: ToolOffset | None, expected: Expected) -> ToolReceipt:
-        slot = self._slot(tool)
-        content = self._slots.content(slot, requested)
-        request = "; ".join(self._slots.requests(slot, content))
-        with self._lock.held(request):
-            self._require_ready(request)
+        request = self._request(tool, requested)
+        with self._plc.lock.held(request):
+            self._plc.require_ready(request)
             if not self.same(self.read(tool), requested):
                 self._slots.handshake.make_ready(request)
-            write = ToolWrite(
-                tool,
-                requested,
-                request,
-                send=lambda: self._slots.bring_into_force(slot, content, request),
-                read=lambda: self.read(tool),
-            )
-            return self._writer.change(write, expected)
+            return _RegisterWrite(self, self._plc, tool, requested, self._slots).change(expected)
 
-    def _preview(self, tool: int, requested: ToolOffset | None) -> tuple[str, ...]:
-        slot = self._slot(tool)
-        content = self._slots.content(slot, requested)
-        return () if self.same(self.read(tool), requested) else self._slots.requests(slot, content)
+    def _request(self, tool: int, requested: ToolOffset | None) -> str:
+        return "; ".join(self._requests(tool, requested))
 
-    def _slot(self, tool: int) -> MapSlot:
-        if isinstance(tool, bool) or tool not in self._map.slots:
-            raise ToolIndexError(
-                tr("There is no tool {tool}.", tool=tool),
-                remedy=tr("The map has these: {tools}.", tools=self._known()),
-            )
-        return self._map.slots[tool]
+    def _requests(self, tool: int, requested: ToolOffset | None) -> tuple[str, ...]:
+        slot = self._map.slots[tool]
+        return self._slots.requests(slot, self._slots.content(slot, requested))
 
-    def _known(self) -> str:
-        return ", ".join(map(str, self.indices()))
+    def _clear_request(self, tool: int) -> str:
+        return tr("tool {tool}", tool=tool)
+
+    def _storable(self, tool: int, offset: ToolOffset) -> ToolOffset:
+        return self._slots.values.rounded(self._map.slots[tool], offset)
+
+    def _stored(self, tool: int) -> ToolOffset | None:
+        return self._slots.read(self._map.slots[tool])
+
+    def _selected(self) -> int | None:
+        named = self._map.selected
+        return None if named is None else self._registers.word(named)
+
+    def _select_request(self, tool: int) -> str:
+        return tr("tool {tool}", tool=tool)
+
+    def _send_selection(self, tool: int) -> None:
+        raise RejectedError(
+            tr("robolink does not select tools on this PLC."),
+            remedy=tr("Select tool {tool} at the HMI.", tool=tool),
+            controller=self._plc.identity,
+        )
+
+    def _choices(self) -> str:
+        return tr("Choose one of these: {tools}.", tools=", ".join(map(str, self.indices())))
+
+    def _known(self, lowest: int) -> str:  # noqa: ARG002 - alike for both
+        return tr("The map has these: {tools}.", tools=", ".join(map(str, self.indices())))
+
+
+class _RegisterWrite(ToolWrite):
+    """The writing of one slot, and the request to take it over."""
+
+    def __init__(
+        self,
+        table: RegisterToolTable,
+        plc: MappedPlc,
+        tool: int,
+        requested: ToolOffset | None,
+        slots: Slots,
+    ) -> None:
+        slot = plc.register_map.slots[tool]
+        content = slots.content(slot, requested)
+        request = "; ".join(slots.requests(slot, content))
+        super().__init__(plc, tool, requested, request, same=table.same)
+        self._slot, self._content = slot, content
+        self._slots = slots
+
+    def read_before(self, expected: Expected) -> ToolOffset | None:  # noqa: ARG002 - one way only
+        """Read what the write replaces.
+
+        It was read before the PLC was made ready, too: that may have meant to wait for another
+        request of the machine, which may have stored another value.
+        """
+        return self._slots.read(self._slot)
+
+    def send(self) -> None:
+        """Write the registers and have the PLC take them over.
+
+        What stands there is read once more for that, register by register: should the PLC refuse,
+        it has to stand there again to the last bit.
+        """
+        self._slots.bring_into_force(self._slot, self._content, self.request)
+
+    def read_back(self) -> ToolOffset | None:
+        """Read what is stored."""
+        return self._slots.read(self._slot)

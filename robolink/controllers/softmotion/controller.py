@@ -1,33 +1,25 @@
 """An axis group of a CODESYS SoftMotion PLC behind its mailbox."""
 
-from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager
-from types import TracebackType
-from typing import TYPE_CHECKING, Final, Self
+from typing import TYPE_CHECKING, Final
 
+from robolink.controllers.controller_core import ControllerCore
+from robolink.controllers.preserving import Preserver
 from robolink.controllers.softmotion.facts import MailboxFacts, set_kinematics
 from robolink.controllers.softmotion.io import SoftMotionIo
 from robolink.controllers.softmotion.link.answers import describe
 from robolink.controllers.softmotion.link.condition import condition_of, status_of
 from robolink.controllers.softmotion.link.mailbox import Mailbox
 from robolink.controllers.softmotion.link.ownership import take_command
-from robolink.controllers.softmotion.link.stopping import REST_S
 from robolink.controllers.softmotion.motion.group import SoftMotionGroup
-from robolink.controllers.softmotion.tools.preserve import Preserver
 from robolink.controllers.softmotion.tools.resolve import SoftMotionResolver
 from robolink.controllers.softmotion.tools.table import SoftMotionToolTable
-from robolink.errors import ControllerFaultError, RobolinkError
+from robolink.errors import ControllerFaultError
 from robolink.messages import tr
 from robolink.model import (
     Act,
     Capabilities,
     ControllerFacts,
     ControllerStatus,
-    Ledger,
-    Marker,
-    MarkerKind,
-    NewEntry,
-    OutcomeLog,
 )
 from robolink.protocols.mailbox import (
     Capability,
@@ -37,18 +29,11 @@ from robolink.protocols.mailbox import (
     Opcode,
     Response,
 )
-from robolink.standing import note_standing
-from robolink.stop_latch import StopLatch
-from robolink.timing import Clock, Deadline
+from robolink.timing import Deadline
 
 if TYPE_CHECKING:
     from robolink.controllers.softmotion.verify import MailboxFinding
-import secrets
 
-from robolink.controllers.softmotion.link.device import read_device_id
-from robolink.controllers.softmotion.link.snapshots import Snapshots
-from robolink.controllers.softmotion.link.wire import MailboxWire
-from robolink.transport import MailboxLink
 
 _RESETS: Final = (
     (GroupState.ERRORSTOP, Command(0, Opcode.RESET)),
@@ -60,33 +45,44 @@ _LEAVING_S: Final = 1.0
 """Longest time from the end of a reset to the state that follows it."""
 
 
-class SoftMotionController:
+class SoftMotionController(ControllerCore):
     """A PLC mailbox that was met. Use it as a context manager.
 
     The mailbox is owned from the first command that needs it until :meth:`close`; reading the
-    state, the position and the tool slots needs no ownership.
+    state, the position and the tool slots needs no ownership. A stop holds the group on the PLC
+    until :meth:`reset_fault`. The profile ``tools`` of the mailbox program moves nothing.
 
     Attributes:
+        tools: Slots 1 to 15.
+        groups: The one axis group of this mailbox.
         io: Inputs and outputs.
 
     Args:
         mailbox: The mailbox.
     """
 
+    tools: SoftMotionToolTable
+    groups: tuple[SoftMotionGroup]
+    io: SoftMotionIo
+
     def __init__(self, mailbox: Mailbox) -> None:
         self._mailbox = mailbox
-        self._group = SoftMotionGroup(mailbox)
-        self._tools = SoftMotionToolTable(mailbox)
-        self._preserver = Preserver(mailbox, tools=self._tools, group=self._group)
-        self._resolver = SoftMotionResolver(
-            mailbox, tools=self._tools, group=self._group, preserver=self._preserver
-        )
+        group = self._group = SoftMotionGroup(mailbox)
+        tools = SoftMotionToolTable(mailbox)
+        preserver = Preserver(mailbox, tools, group)
         self.io = SoftMotionIo(mailbox)
-
-    @property
-    def identity(self) -> str:
-        """The URL, with those options only that tell mailboxes apart."""
-        return self._mailbox.identity
+        able = mailbox.snapshots.met.capabilities
+        moves = Capability.MOTION in able
+        super().__init__(
+            mailbox,
+            capabilities=Capabilities(
+                tool_write=Capability.TOOLS in able, motion=moves, motors=moves, io=True
+            ),
+            tools=tools,
+            groups=(group,),
+            preserver=preserver,
+            resolver=SoftMotionResolver(mailbox, tools, preserver),
+        )
 
     @property
     def device_id(self) -> int | None:
@@ -94,53 +90,12 @@ class SoftMotionController:
         return self._mailbox.device_id
 
     @property
-    def clock(self) -> Clock:
-        """The clock on which the PLC's time passes."""
-        return self._mailbox.wire.clock
-
-    @property
-    def capabilities(self) -> Capabilities:
-        """What the mailbox program can be told: the profile ``tools`` moves nothing."""
-        able = self._mailbox.snapshots.met.capabilities
-        moves = Capability.MOTION in able
-        return Capabilities(tool_write=Capability.TOOLS in able, motion=moves, motors=moves)
-
-    @property
-    def tools(self) -> SoftMotionToolTable:
-        """Slots 1 to 15."""
-        return self._tools
-
-    @property
-    def groups(self) -> Sequence[SoftMotionGroup]:
-        """The one axis group of this mailbox."""
-        return (self._group,)
-
-    @property
-    def outcomes(self) -> OutcomeLog:
-        """Open markers of this PLC."""
-        return self._mailbox.markers.outcomes
-
-    @property
-    def ledger(self) -> Ledger:
-        """What was done here since connecting, and how much of it is proved."""
-        return self._mailbox.markers.ledger
-
-    @property
-    def resolver(self) -> SoftMotionResolver:
-        """Settles what was begun and not proved finished."""
-        return self._resolver
-
-    @property
     def exchanges(self) -> int:
         """Requests sent so far."""
         return self._mailbox.wire.exchanges
 
-    def status(self) -> ControllerStatus:
-        """Read the state; others see by it that this process is alive.
-
-        It keeps nothing going: a movement or jog ends unless somebody waits on it.
-        """
-        self._mailbox.markers.beat()
+    def _read_status(self) -> ControllerStatus:
+        # It keeps nothing going: a movement or jog ends unless somebody waits on it.
         return status_of(self._mailbox.snapshots.take())
 
     def facts(self) -> ControllerFacts:
@@ -187,34 +142,6 @@ class SoftMotionController:
             LeaseHeldError: Another client owns it.
         """
         self._mailbox.commands.ownership.take(insist=insist)
-
-    @property
-    def latch(self) -> StopLatch:
-        """What holds everything back from :meth:`stop` until :meth:`release_stop`."""
-        return self._mailbox.wire.latch
-
-    def stop(self) -> None:
-        """Stop the group and hold it; on the PLC ``reset_fault`` releases it.
-
-        May be called from any thread, whatever another one is doing. From its first instant on
-        no movement, jog or write leaves this process until :meth:`release_stop`; whoever is at
-        work gets StoppedError.
-
-        Raises:
-            OutcomeUnknownError: Rest was not seen; the message says to use the emergency stop.
-            RobolinkError: It was not confirmed; the message says the same.
-        """
-        try:
-            self._group.stop()
-        except RobolinkError as error:
-            error.remedy = " ".join(
-                (tr("The stop is not confirmed: press the emergency stop."), error.remedy)
-            )
-            raise
-
-    def release_stop(self) -> None:
-        """Let this process act again after :meth:`stop`, because a person says so."""
-        self._mailbox.wire.latch.release()
 
     def reset_fault(self) -> None:
         """Clear the group's error and release a held stop, because a person asked for it.
@@ -266,62 +193,14 @@ class SoftMotionController:
         """
         set_kinematics(self._mailbox, position, orientation)
 
-    def require_settled(self, request: str) -> None:
-        """Refuse ``request`` while something earlier is unsettled.
+    def _take_leave(self) -> None:
+        """Halt what nobody waited on, and give the mailbox back."""
+        if self._mailbox.wire.alive:
+            self._group.abort_unfinished()
+            self._mailbox.commands.ownership.release()
 
-        Raises:
-            OutcomeUnknownError: Names it.
-        """
-        self._mailbox.markers.require_settled(request)
-
-    def begin(
-        self,
-        kind: MarkerKind,
-        request: str,
-        details: Mapping[str, object],
-        *,
-        operation: str = "",
-    ) -> Marker:
-        """Store the durable marker of a procedure; see the model."""
-        return self._mailbox.markers.begin(kind, request, details, operation=operation)
-
-    def finish(self, marker: Marker, *entries: NewEntry) -> None:
-        """Forget the marker of a procedure, and journal how it ended."""
-        self._mailbox.markers.clear(marker, *entries)
-
-    def uninterrupted(self) -> AbstractContextManager[None]:
-        """Hold Ctrl-C back for a block that must be seen through."""
-        return self._mailbox.uninterrupted()
-
-    def preserved(self, reason: str) -> AbstractContextManager[None]:
-        """Put back the selected tool; see the model."""
-        return self._preserver.preserved(reason)
-
-    def close(self) -> None:
-        """Halt what nobody waited on, give the mailbox back, close. Idempotent."""
-        self.latch.await_stops(REST_S)
-        try:
-            if self._mailbox.wire.alive:
-                self._group.abort_unfinished()
-                self._mailbox.commands.ownership.release()
-        except RobolinkError:
-            pass  # the link is going away in any case; markers keep what is in doubt
-        finally:
-            self._mailbox.wire.close()
-            self.outcomes.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
-        if error is not None:
-            note_standing(error, self.ledger.standing())
+    def _close_link(self) -> None:
+        self._mailbox.wire.close()
 
     def _left(self, state: GroupState, now: Response) -> Response:
         """Give the group the cycles that it needs to leave a state.
@@ -332,31 +211,3 @@ class SoftMotionController:
         while now.group_state == state and not deadline.expired:
             now = self._mailbox.snapshots.news(now)
         return now
-
-
-def open_softmotion(
-    link: MailboxLink, *, outcomes: OutcomeLog, timeout_s: float = 3.0, owner: int = 0
-) -> SoftMotionController:
-    """Meet the mailbox and return the controller; the link is closed when that fails.
-
-    Nothing is written: whoever only reads disturbs nobody.
-
-    Args:
-        link: An open link; the controller owns it from here on.
-        outcomes: Where doubtful outcomes of this PLC are kept.
-        timeout_s: Longest wait for the PLC to acknowledge a command.
-        owner: This client's token; by default one that nobody else has.
-
-    Raises:
-        ConnectError: The mailbox program does not run.
-        RemoteProtocolError: It is no mailbox of this version, or its words stand elsewhere.
-    """
-    wire = MailboxWire(link, owner=owner or 1 + secrets.randbelow(0xFFFF_FFFF), timeout_s=timeout_s)
-    try:
-        snapshots = Snapshots(wire)
-        snapshots.meet()
-        device_id = read_device_id(wire)
-        return SoftMotionController(Mailbox(wire, snapshots, outcomes, device_id=device_id))
-    except BaseException:
-        wire.close()
-        raise

@@ -1,7 +1,9 @@
 """What a mailbox says about the machine behind it."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
+from robolink.controllers.driver_link import MarkedCommand
 from robolink.controllers.softmotion.link.answers import describe
 from robolink.controllers.softmotion.link.condition import require_still
 from robolink.controllers.softmotion.link.mailbox import Mailbox
@@ -77,12 +79,7 @@ def set_kinematics(mailbox: Mailbox, position: Kinematics, orientation: Kinemati
         now = mailbox.prepare(draft, request)
         require_still(now, controller=mailbox.identity, request=request)
         mailbox.markers.note_selection(0)
-        after = mailbox.writer.carry_out(
-            request,
-            {"kinematics": wanted, "before": now.kinematics},
-            send=lambda: mailbox.commands.carry_out(draft),
-            read=mailbox.snapshots.take,
-        )
+        after = mailbox.carry_out(_Change(mailbox, draft, wanted, now.kinematics))
         mailbox.markers.ledger.saw_selected(after.tool_slot)
     if after.kinematics != wanted or after.tool_slot:
         raise ReadBackError(
@@ -96,6 +93,26 @@ def set_kinematics(mailbox: Mailbox, position: Kinematics, orientation: Kinemati
             controller=mailbox.identity,
             request=request,
         )
+
+
+class _Change(MarkedCommand[Response]):
+    """MC_SetKinTransform."""
+
+    def __init__(self, mailbox: Mailbox, draft: Command, wanted: int, before: int) -> None:
+        super().__init__(describe(draft))
+        self._mailbox = mailbox
+        self._draft = draft
+        self._details = {"kinematics": wanted, "before": before}
+
+    @property
+    def details(self) -> Mapping[str, object]:
+        return self._details
+
+    def send(self) -> None:
+        self._mailbox.commands.carry_out(self._draft)
+
+    def read(self) -> Response:
+        return self._mailbox.snapshots.take()
 
 
 def _block_name(code: int) -> str:

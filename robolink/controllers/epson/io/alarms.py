@@ -3,9 +3,7 @@
 Source: docs/reference/epson.md 1.2.
 """
 
-from robolink.controllers.epson.link.session import EpsonSession
-from robolink.controllers.epson.link.window import CommandWindow
-from robolink.controllers.markers import ProcedureLock
+from robolink.controllers.epson.link.link import EpsonLink
 from robolink.errors import ConfigError, ControllerFaultError, RemoteProtocolError
 from robolink.messages import tr
 from robolink.protocols import spel
@@ -16,10 +14,10 @@ _HIGHEST = 99_999
 class EpsonAlarms:
     """The alarms that stand. GetAlm exists from RC+ 7 on; older firmware refuses it (11)."""
 
-    def __init__(self, session: EpsonSession, window: CommandWindow, lock: ProcedureLock) -> None:
-        self._session = session
-        self._window = window
-        self._lock = lock
+    def __init__(self, link: EpsonLink) -> None:
+        self._session = link.session
+        self._window = link.window
+        self._lock = link.lock
 
     def list(self) -> tuple[int, ...]:
         """Read the numbers of the alarms.

@@ -4,11 +4,11 @@ import re
 from operator import eq
 from typing import Final
 
-from robolink.controllers.epson.io.values import Change, ValueReceipt, ValueSetter
-from robolink.controllers.epson.link.session import EpsonSession
-from robolink.controllers.epson.link.window import CommandWindow
+from robolink.controllers.epson.io.values import Change, ValueSetter
+from robolink.controllers.epson.link.link import EpsonLink
 from robolink.errors import ConfigError, RemoteProtocolError
 from robolink.messages import tr
+from robolink.model import ValueReceipt
 from robolink.protocols import spel
 from robolink.protocols.epson_text import Reply, Request
 
@@ -32,10 +32,10 @@ class EpsonIo:
     that this controller does not have.
     """
 
-    def __init__(self, session: EpsonSession, window: CommandWindow, setter: ValueSetter) -> None:
-        self._session = session
-        self._window = window
-        self._setter = setter
+    def __init__(self, link: EpsonLink) -> None:
+        self._session = link.session
+        self._window = link.window
+        self._setter = ValueSetter(link)
 
     def read_input(self, bit: int) -> bool:
         """Read one input."""

@@ -1,11 +1,10 @@
 """Judges the open marker of an output, a memory bit or a variable by reading it."""
 
 from robolink.controllers.epson.io.bits import EpsonIo
-from robolink.controllers.epson.io.values import Value
 from robolink.controllers.epson.io.variables import EpsonVariables, equal_values
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink.model import Finding, Marker, Verdict
+from robolink.model import Finding, Marker, Value, Verdict
 from robolink.ways import Way, way
 
 

@@ -4,9 +4,7 @@ Source: docs/reference/rules.md 8.
 """
 
 from robolink.controllers.epson.link.answers import NOT_EXECUTED
-from robolink.controllers.epson.link.session import EpsonSession
-from robolink.controllers.epson.link.window import CommandWindow
-from robolink.controllers.markers import MarkerStore, ProcedureLock
+from robolink.controllers.epson.link.link import EpsonLink
 from robolink.errors import ConfigError, ControllerFaultError, RejectedError
 from robolink.messages import tr
 from robolink.model import EntryKind, Marker, MarkerKind, NewEntry, require_engineer
@@ -17,36 +15,29 @@ from robolink.protocols.spel import Statement
 class RawStatements:
     """Runs statements as they were typed, each marked before and on record after."""
 
-    def __init__(
-        self,
-        session: EpsonSession,
-        window: CommandWindow,
-        markers: MarkerStore,
-        lock: ProcedureLock,
-    ) -> None:
-        self._session = session
-        self._window = window
-        self._markers = markers
-        self._lock = lock
+    def __init__(self, link: EpsonLink) -> None:
+        self._link = link
 
     def execute(self, text: str) -> str:
         """See :meth:`robolink.controllers.epson.EpsonController.execute_raw`."""
         statement = _checked(text)
-        with self._lock.held(statement):
-            self._markers.require_settled(statement)
-            self._window.require_ready(statement)
+        with self._link.lock.held(statement):
+            self._link.markers.require_settled(statement)
+            self._link.window.require_ready(statement)
             require_engineer(
-                self._markers.outcomes, tr("run {statement!r} as typed", statement=statement)
+                self._link.markers.outcomes, tr("run {statement!r} as typed", statement=statement)
             )
-            with self._window.uninterrupted(), self._markers.ledger.block():
-                marker = self._markers.begin(MarkerKind.SET, statement, {"raw": True})
-                with self._markers.doubt(statement):
-                    with self._markers.unless_stopped(marker):
-                        answer = self._session.execute(statement)
+            with self._link.uninterrupted(), self._link.markers.ledger.block():
+                marker = self._link.markers.begin(MarkerKind.SET, statement, {"raw": True})
+                with self._link.markers.doubt(statement):
+                    with self._link.markers.unless_stopped(marker):
+                        answer = self._link.session.execute(statement)
                     self._check(statement, answer, marker)
-                self._markers.ledger.proved(marker, None)
+                self._link.markers.ledger.proved(marker, None)
                 printed = answer.text or "" if isinstance(answer, Reply) else ""
-                self._markers.clear(marker, _entry(marker, verdict=tr("carried out"), said=printed))
+                self._link.markers.clear(
+                    marker, _entry(marker, verdict=tr("carried out"), said=printed)
+                )
         return printed
 
     def _check(self, statement: Statement, answer: Reply | Refusal, marker: Marker) -> None:
@@ -54,10 +45,10 @@ class RawStatements:
         if isinstance(answer, Reply) and (answer.text is not None or answer.fields == ("0",)):
             return
         try:
-            raise self._window.failure(statement, answer)
+            raise self._link.window.failure(statement, answer)
         except (RejectedError, ControllerFaultError) as error:
             if error.code in NOT_EXECUTED and isinstance(error, RejectedError):
-                self._markers.clear(marker, _entry(marker, verdict=error.what))
+                self._link.markers.clear(marker, _entry(marker, verdict=error.what))
             raise
 
 

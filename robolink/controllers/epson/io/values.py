@@ -5,41 +5,18 @@ marker stands before the request leaves; the request is sent once; the value is 
 waits for the end of that.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Generic, TypeVar
+from typing import Generic
 
-from robolink.controllers.epson.link.answers import NOT_EXECUTED
+from robolink.controllers.driver_link import MarkedCommand
+from robolink.controllers.epson.link.link import EpsonLink
 from robolink.controllers.epson.link.requests import as_sent
 from robolink.controllers.epson.link.session import EpsonSession
-from robolink.controllers.epson.link.window import CommandWindow
-from robolink.controllers.markers import MarkerStore, ProcedureLock
 from robolink.errors import ReadBackError, RejectedError
 from robolink.messages import tr
-from robolink.model import MarkerKind
+from robolink.model import Marker, NewEntry, ValueReceipt, ValueT
 from robolink.protocols.epson_text import Request
-
-Value = bool | int | float | str
-ValueT = TypeVar("ValueT", bound=Value)
-
-
-@dataclass(frozen=True, slots=True)
-class ValueReceipt(Generic[ValueT]):
-    """What setting a value did.
-
-    Attributes:
-        request: The request, as it stands on the wire.
-        before: What was there.
-        requested: What was asked for.
-        read_back: What is there now.
-        skipped: It was there already, so nothing was sent.
-    """
-
-    request: str
-    before: ValueT
-    requested: ValueT
-    read_back: ValueT
-    skipped: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,22 +41,13 @@ class Change(Generic[ValueT]):
 class ValueSetter:
     """Carries out a :class:`Change`."""
 
-    def __init__(
-        self,
-        session: EpsonSession,
-        window: CommandWindow,
-        markers: MarkerStore,
-        lock: ProcedureLock,
-    ) -> None:
-        self._session = session
-        self._window = window
-        self._markers = markers
-        self._lock = lock
+    def __init__(self, link: EpsonLink) -> None:
+        self._link = link
 
     def preview(self, change: Change[ValueT]) -> tuple[str, ...]:
         """Return the requests that :meth:`carry_out` would send besides its reads."""
         request = as_sent(change.request)
-        self._window.require_ready(request)
+        self._link.window.require_ready(request)
         return () if change.same(change.read(), change.requested) else (request,)
 
     def carry_out(self, change: Change[ValueT]) -> ValueReceipt[ValueT]:
@@ -92,12 +60,12 @@ class ValueSetter:
             OutcomeUnknownError: No answer came; motion is blocked until ``recover``.
         """
         request = as_sent(change.request)
-        with self._lock.held(request):
-            self._window.require_ready(request)
+        with self._link.lock.held(request):
+            self._link.window.require_ready(request)
             before = change.read()
             if change.same(before, change.requested):
                 return ValueReceipt(request, before, change.requested, before, skipped=True)
-            found = self._set(change, request, before)
+            found = self._link.carry_out(_Setting(change, request, before, self._link.session))
         if not change.same(found, change.requested):
             raise ReadBackError(
                 tr(
@@ -107,24 +75,34 @@ class ValueSetter:
                     requested=change.requested,
                 ),
                 remedy=tr("A program or the PLC may set it too. Nothing was repeated."),
-                controller=self._session.identity,
+                controller=self._link.identity,
                 request=request,
             )
         return ValueReceipt(request, before, change.requested, found, skipped=False)
 
-    def _set(self, change: Change[ValueT], request: str, before: ValueT) -> ValueT:
-        details = {"item": list(change.item), "before": before, "requested": change.requested}
-        with self._session.uninterrupted(), self._markers.ledger.block():
-            marker = self._markers.begin(MarkerKind.SET, request, details)
-            with self._markers.doubt(request):
-                try:
-                    with self._markers.unless_stopped(marker):
-                        self._session.exchange(change.request.name, *change.request.parameters)
-                except RejectedError as error:
-                    if error.code in NOT_EXECUTED:
-                        self._markers.clear(marker)
-                    raise
-                found = change.read()
-            self._markers.ledger.proved(marker, found)
-            self._markers.clear(marker)
-        return found
+
+class _Setting(MarkedCommand[ValueT]):
+    """The sending of one value."""
+
+    def __init__(
+        self, change: Change[ValueT], request: str, before: ValueT, session: EpsonSession
+    ) -> None:
+        super().__init__(request)
+        self._change = change
+        self._before = before
+        self._session = session
+
+    @property
+    def details(self) -> Mapping[str, object]:
+        change = self._change
+        item = list(change.item)
+        return {"item": item, "before": self._before, "requested": change.requested}
+
+    def send(self) -> None:
+        self._session.exchange(self._change.request.name, *self._change.request.parameters)
+
+    def read(self) -> ValueT:
+        return self._change.read()
+
+    def refusal(self, marker: Marker, error: RejectedError) -> Iterable[NewEntry]:  # noqa: ARG002 - none is kept
+        return ()

@@ -9,10 +9,11 @@ from collections.abc import Sequence
 from decimal import Decimal
 from typing import Final
 
-from robolink.controllers.epson.io.values import Change, Value, ValueReceipt, ValueSetter
-from robolink.controllers.epson.link.session import EpsonSession
+from robolink.controllers.epson.io.values import Change, ValueSetter
+from robolink.controllers.epson.link.link import EpsonLink
 from robolink.errors import ConfigError, RemoteProtocolError
 from robolink.messages import tr
+from robolink.model import Value, ValueReceipt
 from robolink.protocols import spel
 from robolink.protocols.epson_text import Request, VariableType
 
@@ -45,9 +46,9 @@ class EpsonVariables:
     RejectedError (15) for a variable that this controller does not have.
     """
 
-    def __init__(self, session: EpsonSession, setter: ValueSetter) -> None:
-        self._session = session
-        self._setter = setter
+    def __init__(self, link: EpsonLink) -> None:
+        self._session = link.session
+        self._setter = ValueSetter(link)
 
     def text(self, name: str) -> str:
         """Read a variable of any type, as the controller writes it."""

@@ -1,17 +1,14 @@
 """What a person asks of the whole controller: stop, reset, switch the motors."""
 
 from robolink.controllers.epson.link.answers import require_ready
+from robolink.controllers.epson.link.link import EpsonLink
 from robolink.controllers.epson.link.requests import as_sent
-from robolink.controllers.epson.link.session import EpsonSession
-from robolink.controllers.epson.link.window import CommandWindow
 from robolink.controllers.epson.motion.group import EpsonGroup
-from robolink.controllers.markers import ProcedureLock
 from robolink.errors import (
     ControllerFaultError,
     NotReadyError,
     NotReadyReason,
     ReadBackError,
-    RobolinkError,
 )
 from robolink.messages import tr
 from robolink.model import Act, ControllerStatus, MotionProfile
@@ -22,31 +19,15 @@ from robolink.protocols.epson_text import Request
 class EpsonActs:
     """Carries them out and proves them."""
 
-    def __init__(
-        self,
-        session: EpsonSession,
-        window: CommandWindow,
-        lock: ProcedureLock,
-        group: EpsonGroup,
-    ) -> None:
-        self._session = session
-        self._window = window
-        self._lock = lock
+    def __init__(self, link: EpsonLink, group: EpsonGroup) -> None:
+        self._link = link
+        self._session = link.session
+        self._window = link.window
         self._group = group
-
-    def stop(self) -> None:
-        """See :meth:`~robolink.controllers.epson.EpsonController.stop`."""
-        try:
-            self._group.stop()
-        except RobolinkError as error:
-            error.remedy = " ".join(
-                (tr("The stop is not confirmed: press the emergency stop."), error.remedy)
-            )
-            raise
 
     def reset(self) -> None:
         """See :meth:`~robolink.controllers.epson.EpsonController.reset_fault`."""
-        with self._lock.held("Reset", calming=True), self._session.latch.restoring():
+        with self._link.lock.held("Reset", calming=True), self._link.latch.restoring():
             self._require_resettable(self._window.status())
             self._session.exchange("Reset")
             status = self._window.status()
@@ -55,7 +36,7 @@ class EpsonActs:
                     tr("The emergency stop is still in force after the reset."),
                     code=status.code,
                     remedy=tr("Release the button, then reset again."),
-                    controller=self._session.identity,
+                    controller=self._link.identity,
                     request="Reset",
                 )
             if status.fault or status.serious_fault:
@@ -63,7 +44,7 @@ class EpsonActs:
                     tr("The reset did not clear error {code:04d}.", code=status.code),
                     code=status.code,
                     remedy=tr("Remove the cause; a serious error needs the power switched off."),
-                    controller=self._session.identity,
+                    controller=self._link.identity,
                     request="Reset",
                 )
             if status.remote and status.ready:
@@ -72,7 +53,7 @@ class EpsonActs:
     def motors(self, on: bool) -> None:
         """See :meth:`~robolink.controllers.epson.EpsonController.motors`."""
         name = "SetMotorsOn" if on else "SetMotorsOff"
-        with self._lock.held(name, calming=not on):
+        with self._link.lock.held(name, calming=not on):
             self._window.require_ready(name)
             self._session.exchange(name, str(self.robot_number()))
             if on:
@@ -81,7 +62,7 @@ class EpsonActs:
                 raise ReadBackError(
                     tr("The motors are not {wanted}.", wanted=tr("on") if on else tr("off")),
                     remedy=tr("Look at the controller; nothing was repeated."),
-                    controller=self._session.identity,
+                    controller=self._link.identity,
                     request=name,
                 )
 
@@ -103,12 +84,12 @@ class EpsonActs:
         # The flag of an emergency stop stays on after its release until the reset
         # (docs/reference/epson.md 1.7), so it cannot hold the reset back.
         if status.serious_fault or status.running or not status.remote:
-            require_ready(status, controller=self._session.identity, request="Reset")
+            require_ready(status, controller=self._link.identity, request="Reset")
         if status.guard_open:
             raise NotReadyError(
                 tr("The safety guard is open."),
                 reason=NotReadyReason.GUARD_OPEN,
                 remedy=tr("Close it before the reset."),
-                controller=self._session.identity,
+                controller=self._link.identity,
                 request="Reset",
             )

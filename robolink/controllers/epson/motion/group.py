@@ -2,13 +2,10 @@
 
 from collections.abc import Callable
 
-from robolink.controllers.epson.link.preferences import Preferences
+from robolink.controllers.epson.link.link import EpsonLink
 from robolink.controllers.epson.link.requests import executes
-from robolink.controllers.epson.link.robot import RobotFacts
-from robolink.controllers.epson.link.session import EpsonSession
 from robolink.controllers.epson.link.stopping import bring_to_rest
-from robolink.controllers.epson.link.window import CommandWindow
-from robolink.controllers.epson.motion.movement import EpsonMotion, MovementParts
+from robolink.controllers.epson.motion.movement import EpsonMotion
 from robolink.controllers.epson.motion.positions import read_position
 from robolink.controllers.epson.motion.power_and_speed import Settings
 from robolink.controllers.epson.motion.until_input import (
@@ -16,32 +13,29 @@ from robolink.controllers.epson.motion.until_input import (
     read_input,
     statement_until,
 )
-from robolink.controllers.markers import MarkerStore, ProcedureLock
+from robolink.controllers.motion_group import MotionGroupCore
 from robolink.errors import NotReadyError, NotReadyReason, StoppedError
 from robolink.messages import tr
-from robolink.model import InputEdge, MarkerKind, MotionProfile, MotionTerms, Path, Pose, WorkBox
+from robolink.model import InputEdge, MotionProfile, MotionTerms, Path, Pose, WorkBox
 from robolink.protocols import spel
 from robolink.ways import Way, way
 
 
-class EpsonGroup:
-    """The robot that the controller's Execute acts on."""
+class EpsonGroup(MotionGroupCore):
+    """The robot that the controller's Execute acts on.
 
-    def __init__(
-        self,
-        session: EpsonSession,
-        window: CommandWindow,
-        markers: MarkerStore,
-        lock: ProcedureLock,
-        *,
-        preferences: Preferences,
-        remote_timeout_s: float,
-    ) -> None:
-        self._preferences = preferences
-        self._parts = MovementParts(session, window, markers)
-        self._lock = lock
-        self._robot = RobotFacts(window)
-        self._settings = Settings(window, identity=session.identity)
+    Attributes:
+        settings: Power and speed of this robot.
+
+    Args:
+        link: The controller.
+        remote_timeout_s: The remote time-out set on it, as a person states it.
+    """
+
+    def __init__(self, link: EpsonLink, *, remote_timeout_s: float) -> None:
+        super().__init__(link)
+        self._link = link
+        self.settings = Settings(link.window, identity=link.identity)
         self._remote_timeout_s = remote_timeout_s
         self._current: EpsonMotion | None = None
 
@@ -50,30 +44,20 @@ class EpsonGroup:
         """``robot``: the one in force on the controller."""
         return "robot"
 
-    @property
-    def settings(self) -> Settings:
-        """Power and speed of this robot."""
-        return self._settings
-
-    @property
-    def robot(self) -> RobotFacts:
-        """Number and type of this robot."""
-        return self._robot
-
     def pose(self) -> Pose:
         """Read the measured position of the tool in force (RealPos)."""
-        window = self._parts.window
+        window = self._link.window
         window.require_ready("Print RealPos")
         return read_position(window, spel.print_real_position())
 
     def motors_on(self) -> bool:
         """Read whether the motors are on."""
-        return spel.parse_integer(self._parts.window.printed(spel.print_motor())) != 0
+        return spel.parse_integer(self._link.window.printed(spel.print_motor())) != 0
 
     def joints(self) -> spel.PrintedWhere:
         """Read the commanded position in all three notations (Where)."""
-        self._parts.window.require_ready("Where")
-        return spel.parse_where(self._parts.window.printed(spel.where()))
+        self._link.window.require_ready("Where")
+        return spel.parse_where(self._link.window.printed(spel.where()))
 
     def move_to(self, target: Pose, profile: MotionProfile, *, box: WorkBox) -> EpsonMotion:
         """Start one movement; see :class:`robolink.model.MotionGroup`."""
@@ -85,38 +69,38 @@ class EpsonGroup:
     ) -> EpsonMotionUntilInput:
         """Start a straight movement until an input switches; see the model."""
         box.check(target)
-        session, window = self._parts.session, self._parts.window
+        link, window = self._link, self._link.window
         statement = self._statement_until(target, edge)
 
         def look_at_input() -> None:
-            self._preferences.require_real_inputs(statement)
+            link.preferences.require_real_inputs(statement)
             on = read_input(window, edge.number)
-            edge.require_ahead(on, controller=session.identity, request=statement)
+            edge.require_ahead(on, controller=link.identity, request=statement)
 
         profile = MotionProfile(Path.STRAIGHT, speed_mm_s=speed_mm_s)
         motion = self._start(target, profile, statement, last_look=look_at_input)
-        return EpsonMotionUntilInput(motion, edge, window, identity=session.identity)
+        return EpsonMotionUntilInput(motion, edge, window, identity=link.identity)
 
     def requests_until(
         self, target: Pose, edge: InputEdge, *, speed_mm_s: float
     ) -> tuple[str, ...]:
         """Return what :meth:`move_until_input` would send besides its reads."""
         profile = MotionProfile(Path.STRAIGHT, speed_mm_s=speed_mm_s)
-        return executes((*self._settings.statements(profile), self._statement_until(target, edge)))
+        return executes((*self.settings.statements(profile), self._statement_until(target, edge)))
 
     def requests_for(self, target: Pose, profile: MotionProfile) -> tuple[str, ...]:
         """Return what :meth:`move_to` would send besides its reads, as it stands on the wire."""
-        return executes((*self._settings.statements(profile), self._statement_for(target, profile)))
+        return executes((*self.settings.statements(profile), self._statement_for(target, profile)))
 
     def require_able(self, purpose: str) -> None:
         """Refuse what no movement could begin in now; see :class:`robolink.model.MotionGroup`."""
         self._require_supervision(purpose)
-        self._parts.window.require_ready(purpose)
+        self._link.window.require_ready(purpose)
         self._require_motors(purpose)
 
     def terms(self) -> MotionTerms:
         """Read what a person must know before the robot moves."""
-        (number,) = self._parts.session.exchange("GetCurRobot").fields
+        (number,) = self._link.session.exchange("GetCurRobot").fields
         return MotionTerms(
             tr("Robot {number}, in Power Low,", number=spel.parse_integer(number)),
             tr(
@@ -137,9 +121,9 @@ class EpsonGroup:
             RejectedError: The controller takes no Stop from here.
             OutcomeUnknownError: It did not come to rest in time.
         """
-        with self._parts.session.latch.stopping():
-            session = self._parts.session
-            bring_to_rest(session.exchange, session.clock, controller=session.identity)
+        link = self._link
+        with link.latch.stopping():
+            bring_to_rest(link.session.exchange, link.clock, controller=link.identity)
 
     def abort_unfinished(self) -> None:
         """Abort the last movement if nobody has seen its end."""
@@ -154,18 +138,19 @@ class EpsonGroup:
         *,
         last_look: Callable[[], None] = lambda: None,
     ) -> EpsonMotion:
-        session, window, markers = self._parts.session, self._parts.window, self._parts.markers
+        link, window = self._link, self._link.window
         try:
-            with self._lock.held(statement):
-                markers.require_settled(statement)
+            with link.lock.held(statement):
+                link.markers.require_settled(statement)
                 self._require_supervision(statement)
                 window.require_ready(statement)
-                self._preferences.require_real_motion(statement)
+                link.preferences.require_real_motion(statement)
                 self._require_motors(statement)
-                self._require_tool(target, statement)
-                self._settings.slow_down(profile)
+                found = spel.parse_integer(window.printed(spel.print_selected_tool()))
+                self._require_tool(target, found, statement)
+                self.settings.slow_down(profile)
                 last_look()
-                with session.uninterrupted():
+                with link.uninterrupted():
                     self._current = self._started(target, statement)
                 return self._current
         except (KeyboardInterrupt, StoppedError):
@@ -174,23 +159,22 @@ class EpsonGroup:
             raise
 
     def _started(self, target: Pose, statement: spel.Statement) -> EpsonMotion:
-        session, markers = self._parts.session, self._parts.markers
-        details = {"target": list(target.coordinates())}
-        marker = markers.begin(MarkerKind.MOVE, statement, details)
+        session, markers = self._link.session, self._link.markers
+        marker = self._marked(target, statement)
         if session.interrupted:
             # Ctrl-C came while the marker was stored: nothing begins to move after it.
             markers.clear(marker)
             raise KeyboardInterrupt
         with markers.doubt(statement), markers.unless_stopped(marker):
             pending = session.start_execute(statement)
-        return EpsonMotion(target, pending, marker, parts=self._parts)
+        return EpsonMotion(target, pending, marker, link=self._link)
 
     def _statement_for(self, target: Pose, profile: MotionProfile) -> spel.Statement:
         build = spel.move if profile.path is Path.STRAIGHT else spel.go
-        return build(target, six_axes=self._robot.read().six_axes)
+        return build(target, six_axes=self._link.robot.read().six_axes)
 
     def _statement_until(self, target: Pose, edge: InputEdge) -> spel.Statement:
-        return statement_until(target, edge, six_axes=self._robot.read().six_axes)
+        return statement_until(target, edge, six_axes=self._link.robot.read().six_axes)
 
     def _require_supervision(self, statement: str) -> None:
         # With a remote time-out of 0 the robot may keep moving when this PC is gone
@@ -204,7 +188,7 @@ class EpsonGroup:
                     "{timeout}; without it a lost link leaves a moving robot unwatched.",
                     timeout=way(Way.REMOTE_TIMEOUT),
                 ),
-                controller=self._parts.session.identity,
+                controller=self._link.identity,
                 request=statement,
             )
 
@@ -214,22 +198,6 @@ class EpsonGroup:
                 tr("The motors are off."),
                 reason=NotReadyReason.MOTORS_OFF,
                 remedy=tr("Run 'robolink motors on' when the cell is clear."),
-                controller=self._parts.session.identity,
-                request=statement,
-            )
-
-    def _require_tool(self, target: Pose, statement: str) -> None:
-        window = self._parts.window
-        found = spel.parse_integer(window.printed(spel.print_selected_tool()))
-        if target.tool is None or found != target.tool:
-            raise NotReadyError(
-                tr(
-                    "The target is meant for tool {meant}, but tool {found} is in force.",
-                    meant=target.tool,
-                    found=found,
-                ),
-                reason=NotReadyReason.WRONG_TOOL,
-                remedy=tr("Nothing was moved. Select the right tool first."),
-                controller=self._parts.session.identity,
+                controller=self._link.identity,
                 request=statement,
             )

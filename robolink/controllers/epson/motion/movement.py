@@ -2,9 +2,8 @@
 
 from contextlib import suppress
 
-from robolink.controllers.epson.link.session import EpsonSession, PendingExecute
-from robolink.controllers.epson.link.window import CommandWindow
-from robolink.controllers.markers import MarkerStore
+from robolink.controllers.epson.link.link import EpsonLink
+from robolink.controllers.epson.link.session import PendingExecute
 from robolink.errors import (
     MotionTimeoutError,
     RejectedError,
@@ -20,17 +19,13 @@ POLL_S = 0.1
 """How often the status is read while the robot moves."""
 
 
-class MovementParts:
-    """What a motion needs of its controller."""
-
-    def __init__(self, session: EpsonSession, window: CommandWindow, markers: MarkerStore) -> None:
-        self.session = session
-        self.window = window
-        self.markers = markers
-
-
 class EpsonMotion:
-    """A movement under way. Wait on it."""
+    """A movement under way. Wait on it.
+
+    Attributes:
+        target: Where it goes.
+        statement: What was sent.
+    """
 
     def __init__(
         self,
@@ -38,27 +33,18 @@ class EpsonMotion:
         pending: PendingExecute,
         marker: Marker,
         *,
-        parts: MovementParts,
+        link: EpsonLink,
     ) -> None:
-        self._target = target
+        self.target = target
+        self.statement = pending.statement
         self._pending = pending
         self._marker = marker
-        self._parts = parts
-
-    @property
-    def target(self) -> Pose:
-        """Where it goes."""
-        return self._target
-
-    @property
-    def statement(self) -> str:
-        """What was sent."""
-        return self._pending.statement
+        self._link = link
 
     @property
     def settled(self) -> bool:
         """Whether its end was seen and taken."""
-        return self._parts.session.pending is not self._pending
+        return self._link.session.pending is not self._pending
 
     def wait(self, *, timeout_s: float) -> MotionOutcome:
         """Wait for the end; see :class:`robolink.model.Motion`.
@@ -66,13 +52,13 @@ class EpsonMotion:
         Raises:
             StoppedError: A stop came, whatever the movement did.
         """
-        with self._parts.session.latch.ending(self._pending.statement):
+        with self._link.latch.ending(self.statement):
             return self._awaited(timeout_s)
 
     def _awaited(self, timeout_s: float) -> MotionOutcome:
         try:
-            with self._parts.markers.doubt(self._pending.statement):
-                arrived = self._watch(Deadline.after(self._parts.session.clock, timeout_s))
+            with self._link.markers.doubt(self.statement):
+                arrived = self._watch(Deadline.after(self._link.clock, timeout_s))
         except KeyboardInterrupt:
             self.abort()
             raise
@@ -81,12 +67,12 @@ class EpsonMotion:
             raise MotionTimeoutError(
                 tr(
                     "{statement!r} did not end within {timeout_s:.0f} s and was aborted.",
-                    statement=self._pending.statement,
+                    statement=self.statement,
                     timeout_s=timeout_s,
                 ),
                 remedy=tr("Read where the robot is ('robolink where') before you go on."),
-                controller=self._parts.session.identity,
-                request=self._pending.statement,
+                controller=self._link.identity,
+                request=self.statement,
             )
         return self._settle()
 
@@ -96,9 +82,9 @@ class EpsonMotion:
         Raises:
             OutcomeUnknownError: No end was seen; the marker stays.
         """
-        session = self._parts.session
+        session = self._link.session
         with session.uninterrupted():
-            with self._parts.markers.doubt(self._pending.statement):
+            with self._link.markers.doubt(self.statement):
                 if self._pending.answer is None:
                     # A refusal may mean that it has just ended by itself; its end is awaited.
                     with suppress(RejectedError):
@@ -108,12 +94,12 @@ class EpsonMotion:
 
     def _watch(self, deadline: Deadline) -> bool:
         """Poll until the statement answers; False when the deadline passes first."""
-        session = self._parts.session
+        session = self._link.session
         while self._pending.answer is None:
             if deadline.expired:
                 return False
             try:
-                status = self._parts.window.status()
+                status = self._link.window.status()
             except TransportError:
                 if self._pending.answer is None:
                     raise
@@ -126,7 +112,7 @@ class EpsonMotion:
         return True
 
     def _end_within(self, timeout_s: float) -> None:
-        session = self._parts.session
+        session = self._link.session
         deadline = Deadline.after(session.clock, timeout_s)
         while self._pending.answer is None:
             if deadline.expired:
@@ -134,20 +120,20 @@ class EpsonMotion:
                 raise TransportTimeoutError(
                     tr("The controller did not announce the end of the statement."),
                     controller=session.identity,
-                    request=self._pending.statement,
+                    request=self.statement,
                 )
             session.await_pending(wait_s=min(POLL_S, deadline.remaining_s()))
 
     def _take_answer(self) -> None:
-        with self._parts.session.uninterrupted():
-            self._parts.session.finish(self._pending)
-            self._parts.markers.clear(self._marker)
+        with self._link.session.uninterrupted():
+            self._link.session.finish(self._pending)
+            self._link.markers.clear(self._marker)
 
     def _settle(self) -> MotionOutcome:
-        answer, statement = self._pending.answer, self._pending.statement
+        answer, statement = self._pending.answer, self.statement
         assert answer is not None  # noqa: S101 - _watch returned True
         self._take_answer()
-        window = self._parts.window
+        window = self._link.window
         try:
             window.check(statement, answer)
         except (RejectedError, UnclearAnswerError):

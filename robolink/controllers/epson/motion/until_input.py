@@ -6,8 +6,7 @@ Source: docs/reference/spel.md 7.1.
 from robolink.controllers.epson.link.window import CommandWindow
 from robolink.controllers.epson.motion.movement import EpsonMotion
 from robolink.controllers.epson.motion.positions import read_position
-from robolink.errors import StoppedError
-from robolink.messages import tr
+from robolink.controllers.motion_group import stopped_before_edge
 from robolink.model import InputEdge, MotionOutcome, Pose
 from robolink.protocols import spel
 
@@ -30,12 +29,7 @@ class EpsonMotionUntilInput:
     def wait(self, *, timeout_s: float) -> Pose | None:
         """Wait for the end; see :class:`robolink.model.MotionUntilInput`."""
         if self._motion.wait(timeout_s=timeout_s) is not MotionOutcome.ARRIVED:
-            raise StoppedError(
-                tr("The movement was stopped before the input switched."),
-                remedy=tr("Nothing goes on by itself; start again when the cell is clear."),
-                controller=self._identity,
-                request=self._motion.statement,
-            )
+            raise stopped_before_edge(self._identity, self._motion.statement)
         if self._edge.run_on:
             met, position = spel.print_position_found(), spel.print_found_position()
         else:

@@ -1,26 +1,16 @@
-"""Puts back what a procedure changed: the tool, the power mode and the speed.
+"""Puts back what a procedure changed: the tool, the power mode and the speed."""
 
-A calibration works in Tool 0, and the selection survives power-off (docs/reference/epson.md 3.1):
-left there, the next program would drive the flange where the nozzle tip belongs. So a durable
-marker names the cell's own tool before anything is changed, and goes only when that tool
-has been read back.
-"""
-
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass
 
-from robolink.controllers.epson.link.preferences import Preferences
-from robolink.controllers.epson.link.session import EpsonSession
-from robolink.controllers.epson.link.window import CommandWindow
+from robolink.controllers.epson.link.link import EpsonLink
 from robolink.controllers.epson.motion.group import EpsonGroup
 from robolink.controllers.epson.motion.power_and_speed import PowerAndSpeed
 from robolink.controllers.epson.tools.table import EpsonToolTable
-from robolink.controllers.markers import MarkerStore, ProcedureLock, unrestored_tool
-from robolink.errors import ConfigError, RemoteProtocolError, RobolinkError
+from robolink.controllers.preserving import Preserver, not_understood
+from robolink.errors import RemoteProtocolError
 from robolink.messages import tr
-from robolink.model import Marker, MarkerKind
-from robolink.ways import Way, way
+from robolink.model import Marker
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,58 +55,20 @@ class InForce:
             a, b, c = (int(value) for value in speed)
             d, e, f = (float(value) for value in speed_s)
         except (KeyError, TypeError, ValueError) as error:
-            raise ConfigError(
-                tr("The marker of {when} cannot be understood.", when=marker.begun_at),
-                remedy=tr(
-                    "Select the right tool by hand, then {forget}.", forget=way(Way.FORGET_MARKER)
-                ),
-            ) from error
+            raise not_understood(marker) from error
         return cls(tool, PowerAndSpeed(bool(high), (a, b, c), (d, e, f)))
 
 
-class Preserver:
-    """Remembers at the start of a procedure, restores at its end."""
+class EpsonPreserver(Preserver):
+    """Puts back the selected tool, and power and speed with it."""
 
-    def __init__(
-        self,
-        session: EpsonSession,
-        window: CommandWindow,
-        markers: MarkerStore,
-        lock: ProcedureLock,
-        preferences: Preferences,
-        *,
-        tools: EpsonToolTable,
-        group: EpsonGroup,
-    ) -> None:
-        self._session = session
-        self._window = window
-        self._markers = markers
-        self._lock = lock
-        self._preferences = preferences
-        self._tools = tools
-        self._group = group
+    def __init__(self, link: EpsonLink, tools: EpsonToolTable, group: EpsonGroup) -> None:
+        super().__init__(link, tools, group)
+        self._epson = link
+        self._table = tools
+        self._settings = group.settings
 
-    @contextmanager
-    def preserved(self, reason: str) -> Iterator[None]:
-        """See :meth:`robolink.model.Controller.preserved`."""
-        with self._lock.held(reason), self._markers.ledger.block():
-            self._markers.look()
-            self._markers.require_settled(reason)
-            self._window.require_ready(reason)
-            self._preferences.require_real(reason)
-            before = self._in_force(reason)
-            marker: Marker | None = None
-            try:
-                with self._session.uninterrupted():
-                    marker = self._markers.begin(MarkerKind.SELECTION, reason, before.to_details())
-                yield
-            except BaseException as error:
-                if marker is not None:
-                    self._restore_after(error, before, marker)
-                raise
-            self.restore(before, marker)
-
-    def _in_force(self, reason: str) -> InForce:
+    def _in_force(self, reason: str) -> Mapping[str, object]:
         """Read what is to be put back, twice.
 
         Every other value here is proved by what was sent; these have nothing to be compared
@@ -126,9 +78,9 @@ class Preserver:
         Raises:
             RemoteProtocolError: The two differ; nothing was changed.
         """
-        first, second = (
-            InForce(self._tools.selected(), self._group.settings.read()) for _ in range(2)
-        )
+        self._epson.window.require_ready(reason)
+        self._epson.preferences.require_real(reason)
+        first, second = (InForce(self._tool(), self._settings.read()) for _ in range(2))
         if first != second:
             raise RemoteProtocolError(
                 tr(
@@ -141,23 +93,24 @@ class Preserver:
                     "Nothing was changed. Check the cable and what stands between this PC and "
                     "the controller, and that no other program sets them."
                 ),
-                controller=self._session.identity,
+                controller=self._epson.identity,
                 request=reason,
             )
-        return first
+        return first.to_details()
 
-    def restore(self, before: InForce, marker: Marker) -> None:
-        """Put ``before`` back, read it back, and forget ``marker``; Ctrl-C waits for the end."""
-        with self._session.uninterrupted(), self._session.latch.restoring():
-            self._group.abort_unfinished()
-            self._tools.select(before.tool)
-            self._group.settings.restore(before.settings)
-            self._markers.clear(marker)
+    def _tool(self) -> int:
+        tool = self._table.selected()
+        assert tool is not None  # noqa: S101 - an EPSON controller always tells
+        return tool
 
-    def _restore_after(self, error: BaseException, before: InForce, marker: Marker) -> None:
-        """Restore while ``error`` is on its way; if impossible, let it say what is left."""
-        try:
-            self.restore(before, marker)
-        except RobolinkError as second:
-            if isinstance(error, RobolinkError):
-                error.remedy = f"{error.remedy} {unrestored_tool(second, before.tool)}".strip()
+    def _restore_more(self, marker: Marker) -> None:
+        self._settings.restore(InForce.from_marker(marker).settings)
+
+    def _restored_more(self, marker: Marker) -> bool:
+        return self._settings.read() == InForce.from_marker(marker).settings
+
+    def _action(self, marker: Marker, now: int | None) -> str:
+        tool = InForce.from_marker(marker).tool
+        if now == tool:
+            return tr("set power mode and speed as they were")
+        return tr("select tool {tool} again, with the power mode and speed of then", tool=tool)

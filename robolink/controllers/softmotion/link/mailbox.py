@@ -1,15 +1,13 @@
 """What every part of this driver works with: one mailbox, its commands and its markers."""
 
 import math
-from contextlib import AbstractContextManager
 
-from robolink.controllers.markers import MarkerStore, ProcedureLock
+from robolink.controllers.driver_link import DriverLink
 from robolink.controllers.softmotion.link.commands import CommandSender
 from robolink.controllers.softmotion.link.condition import require_permit
 from robolink.controllers.softmotion.link.device import identity_of
 from robolink.controllers.softmotion.link.snapshots import Snapshots
 from robolink.controllers.softmotion.link.wire import MailboxWire
-from robolink.controllers.tool_writing import ToolWriter
 from robolink.errors import RemoteProtocolError
 from robolink.messages import tr
 from robolink.model import OutcomeLog, ToolOffset
@@ -17,6 +15,7 @@ from robolink.protocols.mailbox import (
     Command,
     Response,
     Six,
+    Slot,
     frames_match,
     from_frame,
     to_frame,
@@ -27,16 +26,13 @@ TOLERANCE = 1e-9
 (docs/reference/rules.md 3)."""
 
 
-class Mailbox:
+class Mailbox(DriverLink):
     """One PLC mailbox that was met.
 
     Attributes:
         wire: The session.
         snapshots: Reads.
         commands: Commands.
-        markers: Markers.
-        lock: One procedure at a time.
-        writer: Changes that are marked, sent once and read back.
         device_id: The number of the PLC, the same on every link; ``None`` where it has none.
     """
 
@@ -53,30 +49,12 @@ class Mailbox:
         outcomes.ask(lambda: identity_of(wire, device_id))
         self.snapshots = snapshots
         self.commands = CommandSender(wire, snapshots)
-        self.markers = MarkerStore(wire.identity, outcomes, wire.latch)
-        self.lock = ProcedureLock(wire.identity, wire.latch)
-        # A refused command did nothing, whatever the reason (docs/mailbox.md, "When a command
-        # counts").
-        self.writer = ToolWriter(
-            self.markers,
-            same=self.same,
-            uninterrupted=self.uninterrupted,
-            not_executed=lambda _error: True,
-        )
-
-    @property
-    def identity(self) -> str:
-        """Which PLC this is."""
-        return self.wire.identity
+        super().__init__(wire.identity, wire.clock, wire.latch, outcomes, gate=wire.uninterrupted())
 
     @property
     def unit_um(self) -> float:
         """Micrometres in one of the PLC's units of length."""
         return self.snapshots.met.unit_um
-
-    def uninterrupted(self) -> AbstractContextManager[None]:
-        """Hold Ctrl-C back over exchanges that belong together."""
-        return self.wire.uninterrupted()
 
     def prepare(self, draft: Command, request: str, *, now: Response | None = None) -> Response:
         """Make sure that a command may be sent: the permit is there and the mailbox ours.
@@ -112,6 +90,10 @@ class Mailbox:
     def from_plc(self, frame: Six) -> ToolOffset:
         """Return a tool that came from the PLC."""
         return ToolOffset(*self.coordinates(frame))
+
+    def tool_in(self, slot: Slot) -> ToolOffset | None:
+        """Return what a slot holds, ``None`` when it is empty."""
+        return self.from_plc(slot.tool) if slot.defined else None
 
     def coordinates(self, frame: Six) -> Six:
         """Return x, y, z in mm and u, v, w in degrees of a frame from the PLC.

@@ -2,6 +2,7 @@
 
 import math
 
+from robolink.controllers.motion_group import MotionGroupCore
 from robolink.controllers.softmotion.io import SoftMotionIo
 from robolink.controllers.softmotion.link.answers import describe
 from robolink.controllers.softmotion.link.condition import (
@@ -19,8 +20,7 @@ from robolink.controllers.softmotion.motion.movement import (
     SoftMotionMotion,
     SoftMotionMotionUntilInput,
 )
-from robolink.controllers.softmotion.motion.starting import MovementStarter
-from robolink.errors import ConfigError, ReadBackError
+from robolink.errors import ConfigError, ControllerError, ReadBackError, StoppedError
 from robolink.messages import tr
 from robolink.model import InputEdge, MotionProfile, MotionTerms, Path, Pose, WorkBox
 from robolink.protocols.mailbox import (
@@ -29,17 +29,19 @@ from robolink.protocols.mailbox import (
     CoordinateSystem,
     GroupState,
     Opcode,
+    Response,
     Six,
     to_frame,
 )
 
 
-class SoftMotionGroup:
+class SoftMotionGroup(MotionGroupCore):
     """One axis group. Its poses are those of the selected tool in the machine frame (MCS)."""
 
     def __init__(self, mailbox: Mailbox) -> None:
+        super().__init__(mailbox)
         self._mailbox = mailbox
-        self._starter = MovementStarter(mailbox)
+        self._current: list[SoftMotionMotion] = []
 
     @property
     def name(self) -> str:
@@ -99,7 +101,7 @@ class SoftMotionGroup:
             BusyError: The ends of four movements are not taken yet.
         """
         box.check(target)
-        return self._starter.start(target, self._move_draft(target, profile))
+        return self._start(target, self._move_draft(target, profile))
 
     def requests_for(self, target: Pose, profile: MotionProfile) -> tuple[str, ...]:
         """Return what :meth:`move_to` would send besides its reads, in words."""
@@ -113,7 +115,7 @@ class SoftMotionGroup:
         draft = self._until_draft(target, edge, speed_mm_s)
         on = SoftMotionIo(self._mailbox).read_input(edge.number)
         edge.require_ahead(on, controller=self._mailbox.identity, request=describe(draft))
-        return SoftMotionMotionUntilInput(self._starter.start(target, draft), self._mailbox)
+        return SoftMotionMotionUntilInput(self._start(target, draft), self._mailbox)
 
     def requests_until(
         self, target: Pose, edge: InputEdge, *, speed_mm_s: float
@@ -130,7 +132,7 @@ class SoftMotionGroup:
         """
         watch = JogWatch(self._mailbox, jog, box)
         with self._mailbox.lock.held(watch.request):
-            self._starter.require_startable(watch.draft, watch.request)
+            self._require_startable(watch.draft, watch.request)
             return watch.run(duration_s)
 
     def stop(self) -> None:
@@ -142,9 +144,9 @@ class SoftMotionGroup:
             OutcomeUnknownError: The group did not come to rest in time.
         """
         mailbox = self._mailbox
-        with mailbox.wire.latch.stopping():
+        with mailbox.latch.stopping():
             bring_group_to_rest(
-                mailbox.commands, mailbox.snapshots, mailbox.wire.clock, controller=mailbox.identity
+                mailbox.commands, mailbox.snapshots, mailbox.clock, controller=mailbox.identity
             )
 
     def halt(self) -> None:
@@ -165,14 +167,70 @@ class SoftMotionGroup:
         request = describe(draft)
         mailbox = self._mailbox
         require_beats(mailbox.wire.whole_look_s, controller=mailbox.identity, request=request)
-        self._starter.require_settled(request)
+        self._require_settled(request)
         mailbox.prepare(draft, request)
         with mailbox.markers.doubt(request):
             mailbox.commands.carry_out(draft)
 
     def abort_unfinished(self) -> None:
         """Halt what was sent here and not seen to its end."""
-        self._starter.abort_unfinished()
+        for motion in self._current:
+            if not motion.settled:
+                motion.abort()
+
+    def _start(self, target: Pose, draft: Command) -> SoftMotionMotion:
+        """Start a movement that lies inside the limits; see the model."""
+        mailbox, request = self._mailbox, describe(draft)
+        try:
+            with mailbox.lock.held(request):
+                mailbox.wire.motions.require_room(request, controller=mailbox.identity)
+                now = self._require_startable(draft, request)
+                self._require_tool(target, now.tool_slot, request)
+                with mailbox.uninterrupted():
+                    motion = self._started(target, draft, request)
+                    self._current = [*(m for m in self._current if not m.settled), motion]
+                return motion
+        except (KeyboardInterrupt, StoppedError):
+            # Nobody will be given this motion to wait on.
+            self.abort_unfinished()
+            raise
+
+    def _started(self, target: Pose, draft: Command, request: str) -> SoftMotionMotion:
+        mailbox = self._mailbox
+        marker = self._marked(target, request)
+        with mailbox.markers.doubt(request):
+            try:
+                command = mailbox.commands.start(draft)
+            except (ControllerError, ConfigError, StoppedError, KeyboardInterrupt):
+                mailbox.markers.clear(marker)  # it was not sent, or refused
+                raise
+        return SoftMotionMotion(target, command, marker, mailbox)
+
+    def _require_startable(self, draft: Command, request: str) -> Response:
+        """Hold back what may not start now; see the room ``link``.
+
+        Raises:
+            ConfigError: The line is too slow for any movement.
+            NotReadyError: The group, its drives, the machine or another movement forbid it.
+            OutcomeUnknownError: Something earlier is unsettled.
+            LeaseHeldError, LeaseLostError: Another client owns the mailbox.
+        """
+        mailbox = self._mailbox
+        require_beats(mailbox.wire.whole_look_s, controller=mailbox.identity, request=request)
+        self._require_settled(request)
+        now = mailbox.prepare(draft, request)
+        require_enabled(now, controller=mailbox.identity, request=request)
+        require_power(now, controller=mailbox.identity, request=request)
+        if not mailbox.wire.motions.unfinished:
+            require_still(now, controller=mailbox.identity, request=request)
+        return now
+
+    def _require_settled(self, request: str) -> None:
+        """Hold ``request`` back while something earlier is unsettled."""
+        # The markers of our own movements under way do not count; what was open before the
+        # first of them would have held that one back.
+        if not self._mailbox.wire.motions.unread:
+            self._mailbox.markers.require_settled(request)
 
     def _move_draft(self, target: Pose, profile: MotionProfile) -> Command:
         joint = profile.path is Path.JOINT

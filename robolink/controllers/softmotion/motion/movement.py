@@ -2,6 +2,7 @@
 
 from contextlib import suppress
 
+from robolink.controllers.motion_group import stopped_before_edge
 from robolink.controllers.softmotion.link.answers import describe, motion_failure
 from robolink.controllers.softmotion.link.commands import is_own
 from robolink.controllers.softmotion.link.condition import is_moving
@@ -12,7 +13,6 @@ from robolink.errors import (
     MotionTimeoutError,
     RejectedError,
     RemoteProtocolError,
-    StoppedError,
     TransportTimeoutError,
 )
 from robolink.messages import tr
@@ -31,26 +31,21 @@ _HALT_S = 10.0
 
 
 class SoftMotionMotion:
-    """A movement under way. Wait on it: the PLC halts a movement on which nobody waits."""
+    """A movement under way. Wait on it: the PLC halts a movement on which nobody waits.
+
+    Attributes:
+        target: Where it goes.
+        command: What was sent, with its number.
+    """
 
     def __init__(self, target: Pose, command: Command, marker: Marker, mailbox: Mailbox) -> None:
-        self._target = target
-        self._command = command
+        self.target = target
+        self.command = command
         self._marker = marker
         self._mailbox = mailbox
         self._request = describe(command)
         self._halted = False
         self._end: Finished | None = None
-
-    @property
-    def target(self) -> Pose:
-        """Where it goes."""
-        return self._target
-
-    @property
-    def command(self) -> Command:
-        """What was sent, with its number."""
-        return self._command
 
     @property
     def settled(self) -> bool:
@@ -81,7 +76,7 @@ class SoftMotionMotion:
             mailbox.markers.doubt(self._request),
             mailbox.wire.attended(),
         ):
-            if self._end is None and mailbox.wire.motions.end_of(self._command.sequence) is None:
+            if self._end is None and mailbox.wire.motions.end_of(self.command.sequence) is None:
                 self._halted = True
                 # It may have just ended by itself, or by a stop; its end is awaited. A stop that is
                 # under way ends it too, and a halt after it would only hide the end of the stop.
@@ -138,7 +133,7 @@ class SoftMotionMotion:
 
     def _watch(self, deadline: Deadline) -> bool:
         """Beat and look until the end is known; False when the deadline passes first."""
-        mailbox, sequence = self._mailbox, self._command.sequence
+        mailbox, sequence = self._mailbox, self.command.sequence
         if self.settled:
             return True
         slow = mailbox.wire.whole_look_s > 0
@@ -165,10 +160,10 @@ class SoftMotionMotion:
 
     def _take_end(self) -> Finished:
         if self._end is None:
-            end = self._mailbox.wire.motions.end_of(self._command.sequence)
+            end = self._mailbox.wire.motions.end_of(self.command.sequence)
             assert end is not None  # noqa: S101 - _watch has seen it
             with self._mailbox.uninterrupted():
-                self._mailbox.wire.motions.forget(self._command.sequence)
+                self._mailbox.wire.motions.forget(self.command.sequence)
                 self._mailbox.markers.clear(self._marker)
                 self._end = end
         return self._end
@@ -216,12 +211,7 @@ class SoftMotionMotionUntilInput:
         if end.error_class == ErrorClass.NO_EDGE:
             return None
         if self._motion.wait(timeout_s=timeout_s) is not MotionOutcome.ARRIVED:
-            raise StoppedError(
-                tr("The movement was stopped before the input switched."),
-                remedy=tr("Nothing goes on by itself; start again when the cell is clear."),
-                controller=self._mailbox.identity,
-                request=describe(self._motion.command),
-            )
+            raise stopped_before_edge(self._mailbox.identity, describe(self._motion.command))
         return self._latched()
 
     def _latched(self) -> Pose:

@@ -5,12 +5,32 @@ from dataclasses import replace
 from pathlib import Path
 
 from robolink.controllers.plc_map.controller import PlcMapController
+from robolink.controllers.registry import ConnectionTerms
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink.model import OutcomeLog
+from robolink.model import Controller, OutcomeLog
 from robolink.register_maps import RegisterMap, load_map
 from robolink.timing import Clock
 from robolink.transport import LinkUrl, open_modbus
+from robolink.ways import Way, way
+
+
+def open_plc_map_url(url: LinkUrl, terms: ConnectionTerms, /) -> Controller:
+    """Connect to the PLC at a URL; see :class:`~robolink.controllers.ControllerOpener`.
+
+    Raises:
+        ConfigError: The dialogue was to be recorded; and as :func:`open_plc_map`.
+        RobolinkError: As :func:`open_plc_map`.
+    """
+    if terms.trace is not None:
+        raise ConfigError(
+            tr("The dialogue with a PLC's registers cannot be recorded."),
+            remedy=tr(
+                "Leave {record} out; a network capture shows the registers.",
+                record=way(Way.RECORD),
+            ),
+        )
+    return open_plc_map(url, outcomes=terms.record_at, timeout_s=terms.timeout_s, clock=terms.clock)
 
 
 def open_plc_map(

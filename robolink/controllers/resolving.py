@@ -1,10 +1,14 @@
-"""Judges the open markers of tools, written or selected, and of movements."""
+"""Settling what was begun and not proved finished: tools, written or selected, and movements."""
 
+from robolink.controllers.driver_link import DriverLink
+from robolink.controllers.preserving import Preserver
+from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import (
     EntryKind,
     Finding,
     Marker,
+    MarkerKind,
     NewEntry,
     ToolOffset,
     ToolTable,
@@ -13,6 +17,7 @@ from robolink.model import (
     plain_offset,
     read_offset,
 )
+from robolink.ways import Way, way
 
 _KINDS = {
     Verdict.DONE: EntryKind.DONE,
@@ -70,31 +75,6 @@ def examine_move(marker: Marker) -> Finding:
     return Finding(marker, Verdict.LOOK, sentence)
 
 
-def judge_selection(
-    marker: Marker, *, now: int, before: int, restored: bool, action: str
-) -> Finding:
-    """Return whether a procedure that ended early has put the cell's own tool back.
-
-    Args:
-        marker: Of the procedure.
-        now: The tool that is selected.
-        before: The tool that was selected when the procedure began.
-        restored: Whether all is as it was then.
-        action: What settling would do about it, without a full stop.
-    """
-    if restored:
-        sentence = tr("Tool {tool} is selected, as it was before.", tool=now)
-        return Finding(marker, Verdict.DONE, sentence)
-    if now == before:
-        sentence = tr("Tool {tool} is selected, as before; power mode or speed are not.", tool=now)
-    else:
-        sentence = tr(
-            "Tool {now} is selected; before it was tool {before}.", now=now, before=before
-        )
-    entry = NewEntry(EntryKind.SELECTION, tool=before, verdict=Verdict.NOT_RESTORED)
-    return Finding(marker, Verdict.NOT_RESTORED, sentence, action, (entry,))
-
-
 def _entry(marker: Marker, tool: int, verdict: Verdict, now: ToolOffset | None) -> NewEntry:
     details = {**marker.details, "value": plain_offset(now), "found_later": True}
     kind = _KINDS[verdict]
@@ -102,3 +82,55 @@ def _entry(marker: Marker, tool: int, verdict: Verdict, now: ToolOffset | None) 
         # Whether the change that it is part of is done, is settled after it.
         kind = EntryKind.READ_BACK
     return NewEntry(kind, operation=marker.operation, tool=tool, verdict=verdict, details=details)
+
+
+class MarkerResolver:
+    """Settles what an earlier process left open: by reading, and with a person's word.
+
+    Nothing is sent again. A value that was being written is read; a robot that was told to move is
+    looked at; the cell's own tool is selected again when a person says so. A kind of controller
+    adds what else it marks.
+
+    Args:
+        link: The controller.
+        tools: Its tools.
+        preserver: Puts back what procedures have changed.
+    """
+
+    def __init__(self, link: DriverLink, tools: ToolTable, preserver: Preserver) -> None:
+        self._link = link
+        self._tools = tools
+        self._preserver = preserver
+
+    def examine(self, marker: Marker) -> Finding:
+        """Read what is needed to judge ``marker``; see :class:`robolink.model.Resolver`."""
+        if marker.kind is MarkerKind.MOVE:
+            self._require_rest()
+            return examine_move(marker)
+        if marker.kind is MarkerKind.SELECTION:
+            return self._preserver.examine(marker)
+        if "select" in marker.details:
+            return examine_select(self._tools, marker)
+        finding = self._examine_more(marker)
+        if finding is not None:
+            return finding
+        if "tool" in marker.details:
+            return examine_write(self._tools, marker)
+        raise ConfigError(
+            tr("The marker of {when} cannot be understood.", when=marker.begun_at),
+            remedy=tr("Look at the controller, then {forget}.", forget=way(Way.FORGET_MARKER)),
+        )
+
+    def settle(self, finding: Finding) -> None:
+        """Do what ``finding.action`` says and forget the marker."""
+        if finding.verdict is Verdict.NOT_RESTORED:
+            self._preserver.restore(finding.marker)
+        else:
+            self._link.markers.clear(finding.marker, *finding.entries)
+
+    def _require_rest(self) -> None:
+        """Refuse to judge a movement while the machine moves."""
+
+    def _examine_more(self, marker: Marker) -> Finding | None:
+        """Judge what only this kind of controller marks; ``None`` for anything else."""
+        return None

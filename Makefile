@@ -60,6 +60,11 @@ $(PEER): $(VENV)/.installed-dev
 	$(BIN)/python -m pip install --quiet --no-deps --target $@ \
 		scikit-surgerycalibration==1.2.6 scikit-surgerycore==0.8.3 || true
 
+# Installed only here: nothing else needs Sphinx. docs/decisions/0021-pages-built-with-sphinx.md
+.PHONY: docs
+docs: $(VENV)/.installed-docs ## Build the pages and the API into build/docs/html, links checked.
+	$(BIN)/python docs/site/build.py
+
 .PHONY: messages
 messages: $(VENV)/.installed-dev ## Collect every sentence shown to a person.
 	$(BIN)/pybabel --quiet extract --keywords=tr --no-default-keywords --no-location \
@@ -91,6 +96,10 @@ clean: ## Remove everything that was made.
 $(VENV)/.installed-dev: pyproject.toml $(VENV)/.created
 	$(BIN)/python -m pip install --quiet --no-compile --editable '.[dev]'
 	touch $@ $(VENV)/.installed
+
+$(VENV)/.installed-docs: $(VENV)/.installed-dev
+	$(BIN)/python -m pip install --quiet --no-compile --editable '.[docs]'
+	touch $@
 
 $(VENV)/.installed: pyproject.toml $(VENV)/.created
 	$(BIN)/python -m pip install --quiet --editable .

@@ -3,6 +3,7 @@
 The far ends are simulators behind a listener that notes when each piece came in and how long
 the simulator took for its answer; that time is the peer's and is subtracted. The cell file names
 the controller, and the journal, the state folder and bytecode are there, as after a day of work.
+For ``status`` there are two cell files: one with the URL alone, and one with all that a shop says.
 """
 
 import os
@@ -28,6 +29,34 @@ from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 from benchmarks.table import Figure
 
 ROUNDS = 15
+_WHOLE = """
+robot = "T6-602S"
+tool = 1
+remote_timeout_s = 60.0
+remote_timeout_confirmed_by = "Anna, on the controller's page"
+box_mm = 30.0
+max_change_mm = 1.5
+people = { "4711" = "operator", "Anna" = "engineer" }
+[cells.%(name)s.stations.post]
+kind = "pin"
+x_mm = 300.0
+y_mm = 0.0
+z_mm = 100.0
+[cells.%(name)s.stations.gate]
+kind = "beams"
+z_mm = 120.0
+beams = [
+  { input = 1, x_mm = 300.0, y_mm = 50.0, direction_deg = 45.0 },
+  { input = 2, x_mm = 300.0, y_mm = 50.0, direction_deg = 135.0 },
+]
+[cells.%(name)s.stations.camera]
+kind = "camera"
+x_mm = 280.0
+y_mm = 40.0
+z_mm = 130.0
+"""
+"""Whatever a cell file may say beside the URL; the stations are at places of no importance."""
+
 _CAN_PORT = 43217
 
 
@@ -102,8 +131,7 @@ def measure_stopping() -> Iterator[Figure]:
             "tcp": f"epson+tcp://127.0.0.1:{aborts.port}",
             "modbus": f"softmotion+modbus-tcp://127.0.0.1:{stops.port}",
         }
-        cells = "".join(f'[cells.{name}]\nurl = "{url}"\n' for name, url in urls.items())
-        (folder / "robolink.toml").write_text(cells)
+        (folder / "robolink.toml").write_text(_cells(urls))
         for name in urls:
             _run([robolink, "-c", name, "status"])
         for name, tap, what in (
@@ -114,10 +142,27 @@ def measure_stopping() -> Iterator[Figure]:
             pairs = [(_run(floor), _to_frame(command, tap)) for _ in range(ROUNDS)]
             yield _figure(what, pairs, 2.50)
         yield from _over_canopen(robolink, floor)
-        for name, what in (("tcp", "EPSON over TCP"), ("modbus", "PLC over Modbus TCP")):
+        for name, what in (
+            ("tcp", "EPSON over TCP"),
+            ("modbus", "PLC over Modbus TCP"),
+            ("tcp-whole", "EPSON over TCP, cell file of a shop"),
+            ("modbus-whole", "PLC over Modbus TCP, cell file of a shop"),
+        ):
             command = [robolink, "-c", name, "status"]
+            _run(command)  # the cell file is checked once
             pairs = [(_run(floor), _run(command)) for _ in range(ROUNDS)]
             yield _figure(f"robolink status, {what}", pairs, 5.00)
+
+
+def _cells(urls: dict[str, str]) -> str:
+    """Return a cell file that names each far end twice: barely, and as a shop does."""
+    said = [f'[cells.{name}]\nurl = "{url}"\n' for name, url in urls.items()]
+    for name, url in urls.items():
+        whole = _WHOLE % {"name": f"{name}-whole"}
+        if name != "tcp":  # the PLC names its kinematics where a controller names its robot
+            whole = whole.replace("T6-602S", "Kin_Scara3_Z")
+        said.append(f'[cells.{name}-whole]\nurl = "{url}"{whole}')
+    return "".join(said)
 
 
 def _over_canopen(robolink: str, floor: list[str]) -> Iterator[Figure]:

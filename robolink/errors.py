@@ -109,8 +109,8 @@ class ConnectError(TransportError, ConnectionError):
 class LoginUnansweredError(ConnectError):
     """The port answers, the login does not.
 
-    EPSON controllers serve one remote client at a time (epson.md 1.1); what a second one
-    sees is not documented, so silence and a closed connection both end here.
+    EPSON controllers serve one remote client at a time (docs/reference/epson.md 1.1); what a second
+    one sees is not documented, so silence and a closed connection both end here.
     """
 
 

@@ -5,11 +5,12 @@ import os
 import stat
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Final
+from typing import Final, TextIO
 
 from robolink.durable_files import sync_folder, write_whole
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink.ways import Way, way
 
 MOST_BYTES: Final = 4_000_000
 """No cell file, recipe, map, backup or list of poses is nearly as long."""
@@ -17,7 +18,11 @@ MOST_BYTES: Final = 4_000_000
 _ANYONE: Final = 0o666
 
 
-def read_named(path: Path, *, most_bytes: int = MOST_BYTES) -> bytes:
+class OthersMayReadError(OSError):
+    """A file with a secret is open to others than its owner."""
+
+
+def read_named(path: Path, *, most_bytes: int = MOST_BYTES, secret: bool = False) -> bytes:
     """Return what is in a regular file; nothing is waited for and no memory filled by another.
 
     A pipe would be waited on for ever, and a device may never end: a mistake in a name must not
@@ -26,19 +31,46 @@ def read_named(path: Path, *, most_bytes: int = MOST_BYTES) -> bytes:
     Args:
         path: The file; a link is followed.
         most_bytes: Longest file that is read.
+        secret: Whether nobody but its owner may be able to read it; Windows keeps access in
+            lists, and is believed.
 
     Raises:
+        OthersMayReadError: It is secret, and others may read it.
         OSError: It cannot be read, is no regular file, or is too long; ``strerror`` says which in
             a person's language. The caller says which file, and what it is for.
     """
     descriptor = os.open(path, os.O_RDONLY | _AT_ONCE)
     with os.fdopen(descriptor, "rb") as file:
-        if not stat.S_ISREG(os.fstat(descriptor).st_mode):
-            raise OSError(errno.EINVAL, tr("it is no regular file"))
+        mode = _mode_of_regular(descriptor)
+        if secret and os.name == "posix" and mode & 0o077:
+            raise OthersMayReadError(errno.EPERM, tr("others than its owner may read it"))
         data = file.read(most_bytes + 1)
     if len(data) > most_bytes:
         raise OSError(errno.EFBIG, tr("it is longer than {most:g} MB", most=most_bytes / 1_000_000))
     return data
+
+
+def holds(path: Path, data: bytes) -> bool:
+    """Tell whether a regular file holds exactly ``data``."""
+    try:
+        return read_named(path, most_bytes=len(data)) == data
+    except OSError:
+        return False
+
+
+def append_to_named(path: Path) -> TextIO:
+    """Open a regular file for ASCII text at its end; it is made if it is not there.
+
+    Raises:
+        OSError: As of :func:`read_named`.
+    """
+    descriptor = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | _AT_ONCE, _ANYONE)
+    try:
+        _mode_of_regular(descriptor)
+        return os.fdopen(descriptor, "a", encoding="ascii", newline="\n")
+    except BaseException:
+        os.close(descriptor)
+        raise
 
 
 def require_free(path: Path, *, replace: bool = False) -> None:
@@ -78,10 +110,17 @@ _AT_ONCE: Final = (
 """Opening a pipe that nobody writes to does not wait, and a terminal does not become ours."""
 
 
+def _mode_of_regular(descriptor: int) -> int:
+    mode = os.fstat(descriptor).st_mode
+    if not stat.S_ISREG(mode):
+        raise OSError(errno.EINVAL, tr("it is no regular file"))
+    return mode
+
+
 def _taken(path: Path) -> ConfigError:
     return ConfigError(
         tr("{path} exists already; it was not written over.", path=path),
-        remedy=tr("Give another name, or --force to replace it."),
+        remedy=tr("Give another name, or {overwrite} to replace it.", overwrite=way(Way.OVERWRITE)),
     )
 
 

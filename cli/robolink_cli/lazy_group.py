@@ -2,7 +2,7 @@
 
 click asks for every command object to list their one-line helps, so a group that merely
 imports on demand still imports everything for ``--help`` and TAB. This one hands out
-stand-ins while it lists (ecosystem.md 2).
+stand-ins while it lists (docs/decisions/0005-libraries-chosen.md).
 """
 
 from collections.abc import Mapping

@@ -11,11 +11,13 @@ import click
 from robolink import __version__
 from robolink.interrupts import Interrupted, one_ending
 from robolink.messages import tr
+from robolink.ways import speaking
 from robolink_cli.console.exit_codes import exit_code, report
 from robolink_cli.console.output import watched_output
 from robolink_cli.console.render import dumps, note, print_document, say
 from robolink_cli.console.sink import hand_over
 from robolink_cli.console.tolerance import colour_wanted, help_width, tolerate_any_console
+from robolink_cli.console.ways import SHELL_WAYS
 from robolink_cli.lazy_group import LazyGroup
 from robolink_cli.options.shared import shared_options
 
@@ -194,7 +196,7 @@ def tell_stop(request: "StopRequest", outcome: "StopOutcome") -> int:
 
 
 def _guarded(speak: Callable[[], int], *, last: bool) -> int:
-    with one_ending(last=last), watched_output():
+    with one_ending(last=last), watched_output(), speaking(SHELL_WAYS):
         tolerate_any_console()
         try:
             code = speak()

@@ -6,6 +6,7 @@ from robolink.backup._values import COMPONENTS, TOOLS, ToolState
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import ToolOffset, angle_difference_deg
+from robolink.ways import Way, way
 
 _LENGTHS = 3
 
@@ -14,8 +15,8 @@ _LENGTHS = 3
 class ComparisonTolerance:
     """The largest difference that counts as none.
 
-    By default half the last digit that a controller prints (design part 4): values that it
-    prints alike are equal.
+    By default half the last digit that a controller prints (docs/reference/rules.md 3): values that
+    it prints alike are equal.
 
     Raises:
         ConfigError: One is negative or no number.
@@ -28,7 +29,7 @@ class ComparisonTolerance:
         if not (0 <= self.length_mm < float("inf") and 0 <= self.angle_deg < float("inf")):
             raise ConfigError(
                 tr("A tolerance must be a number from 0 up."),
-                remedy=tr("For example --tolerance 0.05."),
+                remedy=tr("For example {tolerance}.", tolerance=way(Way.LENGTH_TOLERANCE)),
             )
 
 

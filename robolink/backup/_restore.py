@@ -15,6 +15,7 @@ from robolink.errors import (
 )
 from robolink.messages import tr
 from robolink.model import ControllerFacts, ToolOffset, ToolReceipt, ToolTable
+from robolink.ways import Way, way
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,7 +192,9 @@ def _check_selection(plan: RestorePlan, now: ToolState) -> None:
                 "The backup has tool {tool} in force, but that would not be defined.",
                 tool=plan.select,
             ),
-            remedy=tr("Restore that tool too, or leave --selected out."),
+            remedy=tr(
+                "Restore that tool too, or leave {selected} out.", selected=way(Way.SELECTED_TOO)
+            ),
         )
     in_force = now.selected if plan.select is None else plan.select
     if any(change.tool == in_force for change in plan.clears):
@@ -201,8 +204,10 @@ def _check_selection(plan: RestorePlan, now: ToolState) -> None:
                 tool=in_force,
             ),
             remedy=tr(
-                "Select another tool first, add --selected, or name the other tools with --tool. "
-                "Nothing was written."
+                "Select another tool first, add {selected}, or name the other tools with {tools}. "
+                "Nothing was written.",
+                selected=way(Way.SELECTED_TOO),
+                tools=way(Way.TOOLS),
             ),
         )
 
@@ -211,8 +216,9 @@ def _another(cause: str) -> ConfigError:
     return ConfigError(
         tr("This backup is not of this controller: {cause}.", cause=cause),
         remedy=tr(
-            "Check the -c option and the file. If it is meant for this controller all the same, "
-            "give --other-controller."
+            "Check which controller is named, and the file. If it is meant for this controller "
+            "all the same, {other}.",
+            other=way(Way.OTHER_CONTROLLER),
         ),
     )
 

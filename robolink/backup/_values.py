@@ -9,7 +9,8 @@ from robolink.model import ControllerFacts, OutcomeLog, ToolOffset, ToolTable
 from robolink.timing import wall_label
 
 TOOLS: Final = range(1, 16)
-"""The tools that a controller can define (epson.md 3.1); a backup names every one."""
+"""The tools that a controller can define (docs/reference/epson.md 3.1); a backup names every
+one."""
 
 COMPONENTS: Final = ("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
 """The components of an offset, as files and documents name them."""

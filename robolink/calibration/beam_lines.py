@@ -3,7 +3,7 @@
 A beam is a line in the base. The tip breaks it on entering and frees it on leaving; half way
 between, its middle is on the line, whatever its thickness and the beam's. Latency and
 backlash shift that middle along the travel, one way going and the other way coming back, so
-they are an unknown of their own that both directions show (calibration.md 2).
+they are an unknown of their own that both directions show (docs/reference/calibration.md 2.6).
 """
 
 import math

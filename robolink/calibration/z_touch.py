@@ -1,7 +1,7 @@
 """Length of a tool from touching a surface, with the latency of the trigger taken out.
 
 The faster the tip comes down, the further it is when the trigger is read:
-``z = z_read + v latency`` (calibration.md 2). Two speeds tell z and latency.
+``z = z_read + v latency`` (docs/reference/calibration.md 2.7). Two speeds tell z and latency.
 """
 
 import math

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from robolink.config._files import ConfigFile as ConfigFile
     from robolink.config._files import Source as Source
     from robolink.config._files import config_files as config_files
+    from robolink.config._reach import Expected as Expected
     from robolink.config._reach import Reach as Reach
     from robolink.config._reach import glance_at_cell as glance_at_cell
     from robolink.config._reach import proof_of_files as proof_of_files
@@ -30,6 +31,6 @@ else:
         {
             "_cells": "Cell cell_names check_file find_cell load_cells",
             "_files": "ConfigFile Source config_files",
-            "_reach": "Reach glance_at_cell proof_of_files reach_cell remember_reach",
+            "_reach": "Expected Reach glance_at_cell proof_of_files reach_cell remember_reach",
         },
     )

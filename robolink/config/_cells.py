@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from robolink.config._files import config_files, read_document
-from robolink.config._problems import dotted, problems_of, refusal
+from robolink.config._files import CELL_FILE, config_files, read_document
+from robolink.config._problems import dotted, problems_of
+from robolink.config._reach import Expected
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.toml_files import Problem
@@ -36,6 +37,17 @@ class Cell:
     url: str
     settings: "CellSettings"
     origins: Mapping[str, Path]
+
+    @property
+    def expected(self) -> Expected:
+        """What even a look has to heed."""
+        return Expected(
+            self.name,
+            tool=self.settings.tool,
+            robot=self.settings.robot,
+            robot_file=str(self.origins.get("robot", "")),
+            people=self.settings.people,
+        )
 
 
 def find_cell(name: str) -> Cell:
@@ -137,7 +149,7 @@ def _checked(path: Path) -> dict[str, dict[str, object]]:
 
     problems = check_file(path)
     if problems:
-        raise refusal(path, problems)
+        raise CELL_FILE.refusal(path, problems)
     tables = {}
     for name, settings in CellFile.model_validate(read_document(path)).cells.items():
         values = settings.model_dump(exclude_unset=True)
@@ -163,8 +175,8 @@ def _cell(name: str, said: Mapping[str, tuple[Path, object]]) -> Cell:
         problems = [
             Problem(f"{cell}.{problem.where}", problem.what) for problem in problems_of(error, {})
         ]
-        raise refusal(next(iter(origins.values())), problems) from error
+        raise CELL_FILE.refusal(next(iter(origins.values())), problems) from error
     if settings.url is None:
         missing = Problem(dotted(["cells", name, "url"]), tr("is missing, in every file"))
-        raise refusal(next(iter(origins.values())), [missing])
+        raise CELL_FILE.refusal(next(iter(origins.values())), [missing])
     return Cell(name, settings.url, settings, origins)

@@ -4,11 +4,10 @@ import os
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
+from typing import Final
 
-from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink.named_files import read_named
-from robolink.toml_files import NotTomlError, parse_toml
+from robolink.toml_files import FileKind
 
 _NAME = "robolink.toml"
 
@@ -39,7 +38,7 @@ def config_files() -> tuple[ConfigFile, ...]:
     """Return the places looked at, the one that wins first.
 
     The file that ROBOLINK_CONFIG names, ``robolink.toml`` in the working folder, the user's,
-    the site's (ecosystem.md 5).
+    the site's (docs/cell-files.md, "Where they are").
     """
     from platformdirs import site_config_path, user_config_path
 
@@ -54,19 +53,17 @@ def config_files() -> tuple[ConfigFile, ...]:
     return tuple(files)
 
 
+CELL_FILE: Final = FileKind(
+    named=lambda path: tr("The cell file {path}", path=path),
+    unreadable_remedy=lambda: tr("'robolink config path' shows which files are looked at."),
+    wrong_remedy=lambda: tr("Correct it; 'robolink config check' looks again. Nothing was sent."),
+)
+
+
 def read_document(path: Path) -> dict[str, object]:
-    """Return what a TOML file says.
+    """Return what a cell file says.
 
     Raises:
         ConfigError: It cannot be read, or is no TOML.
     """
-    try:
-        return parse_toml(read_named(path))
-    except OSError as error:
-        cause = error.strerror or str(error)
-    except NotTomlError as error:
-        cause = str(error)
-    raise ConfigError(
-        tr("The cell file {path} cannot be read: {cause}.", path=path, cause=cause),
-        remedy=tr("'robolink config path' shows which files are looked at."),
-    )
+    return CELL_FILE.parse(path, CELL_FILE.read(path))

@@ -3,12 +3,10 @@
 import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from difflib import get_close_matches
-from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from robolink.errors import ConfigError
+from robolink.key_problems import is_not_known, sentence
 from robolink.messages import tr
 from robolink.toml_files import Problem
 
@@ -55,61 +53,19 @@ def problems_of(
     return problems
 
 
-def refusal(path: Path, problems: Sequence[Problem]) -> ConfigError:
-    """Return the error that tells all problems of one file at once."""
-    lines = "\n".join(f"    {problem}" for problem in problems)
-    return ConfigError(
-        tr(
-            "The cell file {path} is wrong in {count} places:\n{lines}",
-            path=path,
-            count=len(problems),
-            lines=lines,
-        )
-        if len(problems) > 1
-        else tr("The cell file {path} is wrong:\n{lines}", path=path, lines=lines),
-        remedy=tr("Correct it; 'robolink config check' looks again. Nothing was sent."),
-    )
-
-
 def _sentence(
     detail: Any,  # noqa: ANN401 - pydantic's own form
     known: Sequence[str],
     kinds: Iterable[str],
 ) -> str:
-    limits = detail.get("ctx", {})
     match detail["type"]:
         case "extra_forbidden":
             return _unknown(str(detail["loc"][-1]), known)
-        case "float_type" | "int_type":
-            return tr("must be a number")
-        case "string_type":
-            return tr("must be a text in quotes")
-        case "model_type" | "dict_type":
-            return tr("must be a table")
-        case "missing":
-            return tr("is missing")
         case "union_tag_invalid" | "union_tag_not_found":
             return tr("needs a kind: {kinds}", kinds=", ".join(kinds))
-        case "bool_type":
-            return tr("must be true or false")
-        case "too_short" | "too_long":
-            return tr("must hold {count}", count=limits.get("min_length") or limits["max_length"])
-        case "greater_than":
-            return tr("must be more than {limit:g}", limit=limits["gt"])
-        case "greater_than_equal":
-            return tr("must be at least {limit:g}", limit=limits["ge"])
-        case "less_than_equal":
-            return tr("must be at most {limit:g}", limit=limits["le"])
-        case "finite_number":
-            return tr("must be a finite number")
-        case "string_too_short":
-            return tr("must not be empty")
         case "string_pattern_mismatch":
             return tr("must be the name of a variable that begins with ROBOLINK_PASSWORD")
-        case "value_error":
-            return str(limits["error"])
-        case _:
-            return str(detail["msg"])
+    return sentence(detail)
 
 
 def _unknown(key: str, known: Sequence[str]) -> str:
@@ -118,7 +74,4 @@ def _unknown(key: str, known: Sequence[str]) -> str:
             "looks like a password, which never stands in a cell file; name a password_file that "
             "only you can read, or a password_env"
         )
-    close = get_close_matches(key, known, n=1)
-    if close:
-        return tr("is not known; is {name} meant?", name=close[0])
-    return tr("is not known; these are: {names}", names=", ".join(known))
+    return is_not_known(key, known)

@@ -6,8 +6,9 @@ copy counts that the last successful connection left in the state folder.
 """
 
 import json
+from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from hashlib import sha256
 from pathlib import Path
 
@@ -15,9 +16,29 @@ from robolink.config._files import config_files, read_document
 from robolink.durable_files import file_name, make_folder, state_folder, write_whole
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink.model import Role
 from robolink.named_files import read_named
 
 _KIND = "cells"
+
+
+@dataclass(frozen=True, slots=True)
+class Expected:
+    """What the cell files say that even a look has to heed.
+
+    Attributes:
+        cell: The cell's name.
+        tool: The tool that works there, ``None`` where nothing is said.
+        robot: Model of its robot, ``None`` where nothing is said.
+        robot_file: The file that names the robot; empty where none does.
+        people: Who works there, with their roles; ``None`` where nobody is named.
+    """
+
+    cell: str
+    tool: int | None = None
+    robot: str | None = None
+    robot_file: str = ""
+    people: Mapping[str, Role] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,8 +50,8 @@ class Reach:
         password_file: File whose first line is the password; empty for none.
         password_env: Environment variable that holds the password; empty for none.
         timeout_s: Longest wait for one answer; 0 where nothing is said.
-        proof: Of the cell files that were right as a whole when this was kept, and say nothing
-            else that a look needs; empty where they do.
+        proof: Of the cell files that were right as a whole when this was kept; empty for none.
+        expected: What they say that a look has to heed; ``None`` where they were not right.
         doubt: What is wrong with the cell files, or with this; empty for nothing.
     """
 
@@ -39,6 +60,7 @@ class Reach:
     password_env: str = ""
     timeout_s: float = 0.0
     proof: str = ""
+    expected: Expected | None = None
     doubt: str = ""
 
 
@@ -92,7 +114,7 @@ def glance_at_cell(name: str) -> Reach | None:
     proof = proof_of_files()
     for file in config_files():
         copy = _recall(name, file.path) if file.present else None
-        if copy is not None and copy.proof == proof:
+        if copy is not None and proof and copy.proof == proof and copy.expected is not None:
             return copy
     return None
 
@@ -138,7 +160,20 @@ def _recall(name: str, origin: Path) -> Reach | None:
         password_env=_text(kept, "password_env"),
         timeout_s=timeout_s if isinstance(timeout_s, float) else 0.0,
         proof=_text(kept, "proof"),
+        expected=_recalled_expected(kept.get("expected")),
     )
+
+
+def _recalled_expected(kept: object) -> Expected | None:
+    """Return what was kept of the cell file; ``None`` where an earlier version kept nothing."""
+    try:
+        found = Expected(**kept)  # type: ignore[arg-type]
+        people = found.people
+        if people is None:
+            return found
+        return replace(found, people={name: Role(role) for name, role in people.items()})
+    except (TypeError, ValueError, AttributeError):
+        return None
 
 
 def _copy_of(name: str, origin: Path) -> Path:

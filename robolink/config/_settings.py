@@ -26,7 +26,7 @@ class CellSettings(BaseModel):
         password_env: Environment variable that holds the password.
         timeout_s: Longest wait for one answer.
         remote_timeout_s: The remote time-out set in the controller, which cannot be read over
-            the wire (epson.md 1.1).
+            the wire (docs/reference/epson.md 1.1).
         remote_timeout_confirmed_by: Who looked at the controller's setting, and when.
         speed_mm_s: Speed of moves, in low power.
         box_mm: How far, sideways, the flange may go in a calibration.

@@ -1,7 +1,8 @@
 """The journal: what was done to each tool, by whom, and what is not settled yet.
 
-Append-only, on SQLAlchemy Core: an SQLite file by default, PostgreSQL by URL (design parts 2
-and 8). Importing this package loads no database code; opening a journal does.
+Append-only, on SQLAlchemy Core: an SQLite file by default, PostgreSQL by URL
+(docs/decisions/0011-journal-on-sqlalchemy.md, docs/reference/rules.md 6). Importing this package
+loads no database code; opening a journal does.
 """
 
 from typing import TYPE_CHECKING
@@ -13,34 +14,34 @@ from robolink.model import Recorded as Recorded
 from robolink.model import Signature as Signature
 
 if TYPE_CHECKING:
+    from robolink.journal._glancing import GlancingLog as GlancingLog
+    from robolink.journal._glancing import nothing_is_open as nothing_is_open
     from robolink.journal._journal import Journal as Journal
+    from robolink.journal._looking import LookingLog as LookingLog
     from robolink.journal._opening import close_files as close_files
     from robolink.journal._opening import memory_journal as memory_journal
     from robolink.journal._opening import open_journal as open_journal
     from robolink.journal._opening import open_log as open_log
+    from robolink.journal._outcome_log import JournalOutcomeLog as JournalOutcomeLog
     from robolink.journal._places import default_location as default_location
     from robolink.journal._places import may_exist as may_exist
+    from robolink.journal._processes import LeaseHolder as LeaseHolder
+    from robolink.journal._processes import signature_here as signature_here
+    from robolink.journal._processes import this_process as this_process
     from robolink.journal._records import ChainVerification as ChainVerification
-    from robolink.journal.leases.processes import LeaseHolder as LeaseHolder
-    from robolink.journal.leases.processes import signature_here as signature_here
-    from robolink.journal.leases.processes import this_process as this_process
-    from robolink.journal.leases.sightings import LEASE_S as LEASE_S
-    from robolink.journal.logs.glancing import GlancingLog as GlancingLog
-    from robolink.journal.logs.glancing import nothing_is_open as nothing_is_open
-    from robolink.journal.logs.looking import LookingLog as LookingLog
-    from robolink.journal.logs.outcome_log import JournalOutcomeLog as JournalOutcomeLog
+    from robolink.journal._sightings import LEASE_S as LEASE_S
 else:
     __getattr__ = lazy_exports(
         __name__,
         {
-            "logs.glancing": "GlancingLog nothing_is_open",
+            "_glancing": "GlancingLog nothing_is_open",
             "_journal": "Journal",
-            "logs.outcome_log": "JournalOutcomeLog",
-            "logs.looking": "LookingLog",
+            "_outcome_log": "JournalOutcomeLog",
+            "_looking": "LookingLog",
             "_opening": "close_files memory_journal open_journal open_log",
             "_places": "default_location may_exist",
-            "leases.processes": "LeaseHolder signature_here this_process",
+            "_processes": "LeaseHolder signature_here this_process",
             "_records": "ChainVerification",
-            "leases.sightings": "LEASE_S",
+            "_sightings": "LEASE_S",
         },
     )

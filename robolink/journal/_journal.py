@@ -6,10 +6,10 @@ from dataclasses import fields
 from typing import TYPE_CHECKING, Any, Final, cast
 
 from robolink.errors import JournalError
-from robolink.journal._chain import ChainCheck
+from robolink.journal._outcome_log import JournalOutcomeLog
+from robolink.journal._processes import LeaseHolder
 from robolink.journal._records import ChainVerification, Filter
-from robolink.journal.leases.processes import LeaseHolder
-from robolink.journal.logs.outcome_log import JournalOutcomeLog
+from robolink.journal.store.chain import ChainCheck
 from robolink.messages import tr
 from robolink.model import EntryKind, Marker, Recorded, Signature
 from robolink.timing import Clock

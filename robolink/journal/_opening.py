@@ -4,8 +4,8 @@ import threading
 from typing import TYPE_CHECKING, Final
 
 from robolink.errors import JournalError
+from robolink.journal._looking import LookingLog
 from robolink.journal._places import JournalPlace, default_location, memory_place, place_of
-from robolink.journal.logs.looking import LookingLog
 from robolink.model import OutcomeLog, Signature
 
 if TYPE_CHECKING:

@@ -58,12 +58,14 @@ def place_of(location: str) -> JournalPlace:
     A PostgreSQL URL without a driver means psycopg. Nothing is opened.
 
     Raises:
-        JournalError: It is neither a file nor a PostgreSQL database.
+        JournalError: It is neither a file nor a PostgreSQL database; a pipe, for which SQLite
+            would wait for ever, is no file.
     """
     if "://" not in location:
         location = _file_location(Path(location))
     if location.startswith(_SQLITE) and location != _SQLITE:
         path = Path(location.removeprefix(_SQLITE)).absolute()
+        _require_regular(path)
         return JournalPlace(_file_location(path), str(path), path=path)
     scheme, _, rest = location.partition("://")
     if scheme in ("postgresql", "postgresql+psycopg") and rest:
@@ -83,6 +85,18 @@ def memory_place(identity: str) -> JournalPlace:
     """Return the place of a journal that ends with this process."""
     name = tr("in memory, of {identity}", identity=identity)
     return JournalPlace("sqlite://", name)
+
+
+def _require_regular(path: Path) -> None:
+    try:
+        special = path.exists() and not path.is_file()
+    except OSError:
+        return  # opening it says why
+    if special:
+        raise JournalError(
+            tr("The journal {path} is no regular file.", path=path),
+            remedy=tr("Name a file, or a PostgreSQL database, in ROBOLINK_JOURNAL."),
+        )
 
 
 def _file_location(path: Path) -> str:

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 
 from annotated_types import Ge, Gt, Le, Len, MaxLen, MinLen
 
-from robolink.messages import tr
+from robolink.key_problems import at_least, at_most, holds_at_least, holds_at_most, more_than
 from robolink.methods.declaration import Help, Option, Unit
 
 _NOTES = "__annotations__"
@@ -123,7 +123,7 @@ def _of_size(value: float, metadata: tuple[object, ...]) -> Iterator[str]:
             case Ge(ge) if not value >= ge:  # type: ignore[operator]
                 yield at_least(ge)
             case Gt(gt) if not value > gt:  # type: ignore[operator]
-                yield tr("must be more than {limit:g}", limit=gt)
+                yield more_than(gt)
             case Le(le) if not value <= le:  # type: ignore[operator]
                 yield at_most(le)
 
@@ -135,23 +135,3 @@ def _of_length(count: int, metadata: tuple[object, ...]) -> Iterator[str]:
                 yield holds_at_least(least)
             case MaxLen(most) | Len(max_length=most) if most is not None and count > most:
                 yield holds_at_most(most)
-
-
-def at_least(limit: object) -> str:
-    """Return what to say about a number that is too small."""
-    return tr("must be at least {limit:g}", limit=limit)
-
-
-def at_most(limit: object) -> str:
-    """Return what to say about a number that is too large."""
-    return tr("must be at most {limit:g}", limit=limit)
-
-
-def holds_at_least(count: object) -> str:
-    """Return what to say about a list that is too short."""
-    return tr("must hold at least {count}", count=count)
-
-
-def holds_at_most(count: object) -> str:
-    """Return what to say about a list that is too long."""
-    return tr("must hold at most {count}", count=count)

@@ -25,6 +25,7 @@ from robolink.methods.site import Site
 from robolink.procedures import HALF_ROUND_DEG, LookPlan
 from robolink.stations import CameraStation, camera_station, sensor_of
 from robolink.toml_files import Problem
+from robolink.ways import Way, way
 
 Turns = Annotated[
     tuple[Angle, ...],
@@ -150,7 +151,10 @@ def camera_at(parameters: LookParameters, site: Site) -> tuple[str, CameraStatio
     if not sensor:
         raise ConfigError(
             tr("Nobody knows through which sensor station {id} sees.", id=site.station.id),
-            remedy=tr("Give --sensor, write source.sensor, or state it in the cell file."),
+            remedy=tr(
+                "Give {sensor}, write source.sensor, or state it in the cell file.",
+                sensor=way(Way.SENSOR),
+            ),
         )
     stated = parameters.model is not None
     station = site.stating(

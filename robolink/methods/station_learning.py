@@ -13,6 +13,7 @@ from robolink.model import Path, Pose, ToolOffset
 from robolink.procedures import offset_z
 from robolink.runner import Ask, Move, Procedure
 from robolink.stations import Found, Station, StationKind, beam_station, touch_station
+from robolink.ways import Way, way
 
 _LIFT_MM: Final = 10.0
 
@@ -43,9 +44,8 @@ def learn_station(
         raise ConfigError(
             tr("A camera is found together with a tip."),
             remedy=tr(
-                "robolink calibrate camera-affine --tool {tool} --station {id}",
-                tool=tool,
-                id=station.id,
+                "Measure both at once: {calibrate}",
+                calibrate=way(Way.CALIBRATE_CAMERA_AT, tool=tool, station=station.id),
             ),
         )
     courses: dict[StationKind, Callable[[], Procedure[Found]]] = {

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from robolink.model._geometry import rotate_xy as rotate_xy
     from robolink.model._identity import Identity as Identity
     from robolink.model._identity import Who as Who
-    from robolink.model._io import DigitalIo as DigitalIo
+    from robolink.model._identity import is_own_name as is_own_name
     from robolink.model._journal_entries import EntryKind as EntryKind
     from robolink.model._journal_entries import NewEntry as NewEntry
     from robolink.model._journal_entries import Recorded as Recorded
@@ -34,6 +34,13 @@ if TYPE_CHECKING:
     from robolink.model._motion import MotionTerms as MotionTerms
     from robolink.model._motion import Path as Path
     from robolink.model._motion import WorkBox as WorkBox
+    from robolink.model._optional_parts import AlarmList as AlarmList
+    from robolink.model._optional_parts import DigitalIo as DigitalIo
+    from robolink.model._optional_parts import PointReader as PointReader
+    from robolink.model._optional_parts import Value as Value
+    from robolink.model._optional_parts import ValueReceipt as ValueReceipt
+    from robolink.model._optional_parts import ValueT as ValueT
+    from robolink.model._optional_parts import VariableTable as VariableTable
     from robolink.model._outcomes import Marker as Marker
     from robolink.model._outcomes import MarkerKind as MarkerKind
     from robolink.model._outcomes import OutcomeLog as OutcomeLog
@@ -55,6 +62,7 @@ if TYPE_CHECKING:
     from robolink.model._tools import describe_offset as describe_offset
     from robolink.model._tools import plain_offset as plain_offset
     from robolink.model._tools import read_offset as read_offset
+    from robolink.model._tools import tool_changed as tool_changed
     from robolink.model._until_input import InputEdge as InputEdge
     from robolink.model._until_input import MotionUntilInput as MotionUntilInput
 else:
@@ -65,11 +73,13 @@ else:
             "_facts": "ControllerFacts",
             "_findings": "Finding Resolver Verdict",
             "_geometry": "Hand Pose angle_difference_deg rotate_xy",
-            "_identity": "Identity Who",
-            "_io": "DigitalIo",
+            "_identity": "Identity Who is_own_name",
             "_journal_entries": "EntryKind NewEntry Recorded Signature",
             "_ledger": "Account Ledger",
             "_motion": "Motion MotionGroup MotionOutcome MotionProfile MotionTerms Path WorkBox",
+            "_optional_parts": (
+                "AlarmList DigitalIo PointReader Value ValueReceipt ValueT VariableTable"
+            ),
             "_outcomes": "Marker MarkerKind OutcomeLog new_operation",
             "_people": "Role require_engineer",
             "_secret": "Secret",
@@ -77,7 +87,7 @@ else:
             "_tip_sensor": "Spot SpotUnit TIP TipSensor",
             "_tools": (
                 "ANY Expect Expected ToolOffset ToolReceipt ToolTable describe_offset "
-                "plain_offset read_offset"
+                "plain_offset read_offset tool_changed"
             ),
             "_until_input": "InputEdge MotionUntilInput",
         },

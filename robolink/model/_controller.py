@@ -12,6 +12,7 @@ from robolink.model._findings import Resolver
 from robolink.model._journal_entries import NewEntry
 from robolink.model._ledger import Ledger
 from robolink.model._motion import MotionGroup
+from robolink.model._optional_parts import AlarmList, DigitalIo, PointReader, VariableTable
 from robolink.model._outcomes import Marker, MarkerKind, OutcomeLog
 from robolink.model._tools import ToolTable
 from robolink.stop_latch import StopLatch
@@ -90,11 +91,18 @@ class Act(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Capabilities:
-    """What this kind of controller can be asked for."""
+    """What this kind of controller can be asked for.
+
+    The last four say that the controller's attribute of that name is there.
+    """
 
     tool_write: bool = False
     motion: bool = False
     motors: bool = False
+    io: bool = False
+    points: bool = False
+    variables: bool = False
+    alarms: bool = False
 
 
 class Controller(Protocol):
@@ -126,6 +134,22 @@ class Controller(Protocol):
     @property
     def groups(self) -> Sequence[MotionGroup]:
         """What moves."""
+
+    @property
+    def io(self) -> DigitalIo | None:
+        """Inputs and outputs; ``None`` for a kind that has none."""
+
+    @property
+    def points(self) -> PointReader | None:
+        """Points that a person taught; ``None`` for a kind that has none."""
+
+    @property
+    def variables(self) -> VariableTable | None:
+        """Variables of the machine's program; ``None`` for a kind that has none."""
+
+    @property
+    def alarms(self) -> AlarmList | None:
+        """Alarms beside the error state; ``None`` for a kind that has none."""
 
     @property
     def exchanges(self) -> int:

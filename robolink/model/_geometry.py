@@ -1,7 +1,8 @@
 """Poses in a robot's base frame.
 
 Lengths are millimetres, angles degrees. Orientation follows EPSON: U turns about Z, V about
-Y, W about X, and ``R = Rz(U) Ry(V) Rx(W)`` (epson.md 3.1; design part 4).
+Y, W about X, and ``R = Rz(U) Ry(V) Rx(W)`` (docs/reference/epson.md 3.1;
+docs/reference/calibration.md 1.4).
 """
 
 import math

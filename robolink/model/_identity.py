@@ -32,5 +32,14 @@ class Identity:
         return self.name != self.place
 
 
+def is_own_name(name: str) -> bool:
+    """Tell a name that rests on what a controller said of itself from an address.
+
+    ``softmotion:0A1B2C3D`` is one; ``softmotion@192.168.0.2:502`` and URLs are not.
+    """
+    kind, _, number = name.partition(":")
+    return bool(number) and kind.isalpha()
+
+
 Who: TypeAlias = Callable[[], Identity]
 """Asks a controller who it is; raises what any exchange with it may raise."""

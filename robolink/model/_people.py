@@ -6,6 +6,7 @@ from robolink.errors import NotAllowedError
 from robolink.messages import tr
 from robolink.model._journal_entries import EntryKind, NewEntry
 from robolink.model._outcomes import OutcomeLog
+from robolink.ways import Way, way
 
 
 class Role(StrEnum):
@@ -39,7 +40,8 @@ def require_engineer(outcomes: OutcomeLog, act: str, **details: object) -> None:
         raise NotAllowedError(
             tr("{person} may not {act}: it takes an engineer.", person=person, act=act),
             remedy=tr(
-                "Nothing was sent. One whom the cell file calls an engineer may, with --operator."
+                "Nothing was sent. One whom the cell file calls an engineer may, with {operator}.",
+                operator=way(Way.OPERATOR),
             ),
         )
     said = {**details, "engineer": True}

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Final, Literal, Protocol
 
-from robolink.errors import ConfigError
+from robolink.errors import ConfigError, ToolChangedError
 from robolink.messages import tr
 from robolink.model._geometry import angle_difference_deg
 
@@ -105,6 +105,31 @@ ANY: Final = Expect.ANY
 
 Expected = ToolOffset | None | Literal[Expect.ANY]
 """What the caller believes is stored: an offset, ``None`` for undefined, or :data:`ANY`."""
+
+
+def tool_changed(
+    tool: int,
+    found: ToolOffset | None,
+    expected: ToolOffset | None,
+    *,
+    controller: str = "",
+    request: str = "",
+) -> ToolChangedError:
+    """Return the error for a tool that holds something else than its writer believes."""
+    return ToolChangedError(
+        tr(
+            "Tool {tool} holds {found}, not the expected {expected}; nothing was written.",
+            tool=tool,
+            found=describe_offset(found),
+            expected=describe_offset(expected),
+        ),
+        remedy=tr(
+            "Someone changed it: a program that runs TLSet at its start, the pendant, or "
+            "a restored project. Read it again and decide anew."
+        ),
+        controller=controller,
+        request=request,
+    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from typing import Protocol
 
+from robolink.errors import NotReadyError, NotReadyReason
+from robolink.messages import tr
 from robolink.model._geometry import Pose
 
 
@@ -24,6 +26,36 @@ class InputEdge:
     def awaited(self, on: bool) -> bool:
         """Tell whether an input that is ``on`` shows what the movement waits for."""
         return on is not self.falling
+
+    def require_ahead(self, on: bool, *, controller: str, request: str) -> None:
+        """Refuse an input that shows already what the movement waits for.
+
+        An EPSON controller would take such a movement for finished at once, and a PLC would drive
+        on to the target, the tip perhaps in contact (docs/reference/spel.md 7.1, docs/mailbox.md).
+
+        Args:
+            on: Whether the input is on before the movement begins.
+            controller: Who is asked, for the error.
+            request: What is asked, for the error.
+
+        Raises:
+            NotReadyError: Names the input.
+        """
+        if self.awaited(on):
+            raise NotReadyError(
+                tr(
+                    "Input {number} is {state} before the movement begins.",
+                    number=self.number,
+                    state=tr("on") if on else tr("off"),
+                ),
+                reason=NotReadyReason.EDGE_PASSED,
+                remedy=tr(
+                    "Nothing was moved. Check the number of the input, clean the sensor, and bring "
+                    "the tip clear of it."
+                ),
+                controller=controller,
+                request=request,
+            )
 
 
 class MotionUntilInput(Protocol):

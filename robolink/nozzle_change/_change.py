@@ -1,6 +1,6 @@
 """The nozzle change: measure the new tips, write their offsets, prove them, or take all back.
 
-Order (design parts 4 and 8): read the old values; measure, in Tool 0 where the robot moves;
+Order (docs/reference/rules.md 4, 6): read the old values; measure, in Tool 0 where the robot moves;
 judge; propose; on a yes write with compare-and-set and read back; turn about the new tips;
 keep, or write the old values back once. Several tools are all measured before the first is
 written. Whatever happens, the tool, power mode and speed of before are put back at the end.

@@ -14,6 +14,7 @@ from robolink.nozzle_change._plan import ToolPlan
 from robolink.nozzle_change._proposal import Proposal
 from robolink.procedures import FindsStation
 from robolink.stations import Station, find_stations, station_entry
+from robolink.ways import Way, way
 
 Proposals = Sequence[tuple[ToolPlan, Proposal]]
 
@@ -126,9 +127,9 @@ def _refusal(station: str, shift: StationShift) -> CalibrationError:
         "station_moved",
         _sentence(station, shift),
         remedy=tr(
-            "Nothing was written. Fasten the pin, find it again with a full calibration ('robolink "
-            "calibrate n-angle --station {station}'), then touch it with each tool.",
-            station=station,
+            "Nothing was written. Fasten the pin, find it again with a full calibration "
+            "({calibrate}), then touch it with each tool.",
+            calibrate=way(Way.CALIBRATE_AT, station=station),
         ),
     )
 

@@ -17,7 +17,7 @@ point::
 ``nUndefined`` counts in bits. Deleted points show 262143, all eighteen; points whose X to W
 are in use show 0 or 448, which is R, S and T when the bits follow the order of the fields.
 That order is inferred. ``nHand`` is 1 for right and 2 for left, as the function Hand
-(spel.md 5.1).
+(docs/reference/spel.md 5.1).
 """
 
 import re

@@ -9,6 +9,7 @@ from robolink.procedures import MeasurementContext
 from robolink.recipe._recipe import Recipe
 from robolink.recipe._tables import Prompt
 from robolink.runner import MOST_REFUSED, parse_decimal
+from robolink.ways import Way, way
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,23 +41,23 @@ class Answers:
         return self.texts.get(number)
 
     def missing(self, recipe: Recipe) -> Iterator[str]:
-        """Yield what nobody answered beforehand, as the options that would."""
+        """Yield what nobody answered beforehand, as what would."""
         for number, prompt in enumerate(recipe.prompts, start=1):
             if self.prepared(number, prompt) is None:
                 yield _option(number, prompt)
         if recipe.z == "kept" and not self.yes:
-            yield "--yes"
+            yield way(Way.YES)
         if recipe.z == "typed":
             for tool in recipe.tools:
                 if tool.number not in self.z_mm:
-                    yield f"--z {tool.number}=MM"
+                    yield way(Way.HEIGHT, tool=tool.number)
 
 
 def require_answers(answers: Answers, recipe: Recipe) -> None:
     """Refuse, before anything is sent, to run where a question would find nobody.
 
     Raises:
-        ConfigError: Names the options that are missing.
+        ConfigError: Names what is missing.
     """
     options = ", ".join(dict.fromkeys(answers.missing(recipe)))
     if options:
@@ -128,7 +129,9 @@ def confirm_height(context: MeasurementContext, tool: int, name: str) -> None:
 
 def _option(number: int, prompt: Prompt) -> str:
     if prompt.answer == "yes":
-        return "--yes"
-    if prompt.answer in ("nozzle", "lot"):
-        return f"--{prompt.answer} ID"
-    return f"--answer {number}=TEXT"
+        return way(Way.YES)
+    if prompt.answer == "nozzle":
+        return way(Way.NOZZLE)
+    if prompt.answer == "lot":
+        return way(Way.LOT)
+    return way(Way.ANSWER, number=number)

@@ -3,15 +3,22 @@
 import hashlib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
-from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink.named_files import read_named
-from robolink.toml_files import NotTomlError, Problem, parse_toml
+from robolink.toml_files import FileKind, Problem
 
 if TYPE_CHECKING:
     from robolink.recipe._recipe import Recipe
+
+
+RECIPE_FILE: Final = FileKind(
+    named=lambda path: tr("The recipe {path}", path=path),
+    unreadable_remedy=lambda: tr(
+        "docs/recipes.md shows what a recipe looks like. Nothing was sent."
+    ),
+    wrong_remedy=lambda: tr("Correct it; docs/recipes.md explains every key. Nothing was sent."),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,13 +52,12 @@ def load_recipe(path: Path) -> LoadedRecipe:
             its path.
     """
     from robolink.recipe._former_names import with_names_of_now
-    from robolink.recipe._problems import refusal
 
-    content = _content(path)
-    document, notes = with_names_of_now(_document(path, content))
+    content = RECIPE_FILE.read(path)
+    document, notes = with_names_of_now(RECIPE_FILE.parse(path, content))
     recipe, problems = _checked(document)
     if recipe is None or problems:
-        raise refusal(path, problems)
+        raise RECIPE_FILE.refusal(path, problems)
     return LoadedRecipe(recipe, path, hashlib.sha256(content).hexdigest(), notes)
 
 
@@ -61,7 +67,7 @@ def check_recipe(path: Path) -> tuple[Problem, ...]:
     Raises:
         ConfigError: It cannot be read, or is no TOML.
     """
-    return _checked(_document(path, _content(path)))[1]
+    return _checked(RECIPE_FILE.parse(path, RECIPE_FILE.read(path)))[1]
 
 
 def _checked(document: dict[str, object]) -> tuple["Recipe | None", tuple[Problem, ...]]:
@@ -82,24 +88,3 @@ def _checked(document: dict[str, object]) -> tuple["Recipe | None", tuple[Proble
         problems = problems_of(error)
     draft = Draft.of(sound, given=document)
     return recipe, (*problems, *problems_together(draft))
-
-
-def _content(path: Path) -> bytes:
-    try:
-        return read_named(path)
-    except OSError as error:
-        raise _unreadable(path, error.strerror or str(error)) from error
-
-
-def _document(path: Path, content: bytes) -> dict[str, object]:
-    try:
-        return parse_toml(content)
-    except NotTomlError as error:
-        raise _unreadable(path, str(error)) from error
-
-
-def _unreadable(path: Path, cause: str) -> ConfigError:
-    return ConfigError(
-        tr("The recipe {path} cannot be read: {cause}.", path=path, cause=cause),
-        remedy=tr("docs/recipes.md shows what a recipe looks like. Nothing was sent."),
-    )

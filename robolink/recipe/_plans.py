@@ -9,6 +9,7 @@ from robolink.procedures import TipSource
 from robolink.recipe._recipe import Recipe
 from robolink.recipe._tables import Tool
 from robolink.stations import Station, StationKind
+from robolink.ways import Way, way
 
 
 def plan_of(
@@ -42,7 +43,7 @@ def plan_of(
         interval_mm=tolerances.interval_mm,
         drift_tolerance_mm=tolerances.drift_mm,
         accepted_change_mm=accepted_change_mm,
-        accepted_with="--accept-jump",
+        accepted_with=way(Way.ACCEPT_JUMP),
     )
     safe = recipe.poses.safe
     return ChangePlan(

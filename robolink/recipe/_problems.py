@@ -5,14 +5,12 @@ Tables and numbers of a list are counted from 1, as people do, hence the sign.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from robolink.config import Problem
-from robolink.errors import ConfigError
+from robolink.key_problems import is_not_known, one_of, sentence
 from robolink.messages import tr
 from robolink.recipe._schema import json_schema
-from robolink.recipe._sentences import missing, one_of, sentence, unknown
+from robolink.toml_files import Problem
 
 if TYPE_CHECKING:
     from pydantic import ValidationError
@@ -23,22 +21,6 @@ def problems_of(error: "ValidationError") -> list[Problem]:
     schema = json_schema()
     details = error.errors(include_url=False, include_input=False)
     return [_problem(detail, schema) for detail in details if not _follows(detail, details)]
-
-
-def refusal(path: Path, problems: Sequence[Problem]) -> ConfigError:
-    """Return the error that tells all problems of one recipe at once."""
-    lines = "\n".join(f"    {problem}" for problem in problems)
-    return ConfigError(
-        tr(
-            "The recipe {path} is wrong in {count} places:\n{lines}",
-            path=path,
-            count=len(problems),
-            lines=lines,
-        )
-        if len(problems) > 1
-        else tr("The recipe {path} is wrong:\n{lines}", path=path, lines=lines),
-        remedy=tr("Correct it; docs/recipes.md explains every key. Nothing was sent."),
-    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,10 +74,49 @@ def _problem(detail: Any, schema: dict[str, Any]) -> Problem:  # noqa: ANN401 - 
     place = _Place.of(detail["loc"], schema)
     match detail["type"]:
         case "extra_forbidden":
-            return Problem(place.path, unknown(place.key, place.table, tuple(schema["properties"])))
+            return Problem(place.path, _unknown(place, tuple(schema["properties"])))
         case "missing":
-            return Problem(place.path, missing(place.key))
+            return Problem(place.path, _missing(place.key))
         case "union_tag_invalid" | "union_tag_not_found":
             kinds = schema["properties"][place.key]["discriminator"]["mapping"]
             return Problem(f"{place.path}.kind", one_of(kinds))
+        case "string_pattern_mismatch":
+            said = tr("must not hold control characters or, except in notes, line breaks")
+            return Problem(place.path, said)
     return Problem(place.path, sentence(detail))
+
+
+def _unknown(place: _Place, top: Sequence[str]) -> str:
+    """Return what to say about a key that does not exist where it stands.
+
+    Args:
+        place: Where it stands.
+        top: The keys that are known at the top of the file.
+    """
+    if place.key in top:
+        return tr("belongs at the top of the file, above the first line with a [table]")
+    return is_not_known(place.key, place.table)
+
+
+def _missing(key: str) -> str:
+    """Return what to say about a key that is required."""
+    match key:
+        case "basis":
+            return tr(
+                "is missing, and it has to be decided, because taught points agree only with the "
+                'tool value that they were taught with. Write "difference" to move the stored '
+                "value by how much the tip moved against the reference of the same tool at the "
+                "same station (the first run only records that reference, with the nozzle still "
+                'on with which the points were taught), or "absolute" to write what was measured.'
+            )
+        case "z":
+            return tr(
+                'is missing: write "kept" when the new nozzle is as long as the old one (the '
+                'person confirms it each time), "typed" when the person enters Z each time, or '
+                '"measured" when the touch of the pin gives it'
+            )
+        case "tools":
+            return tr("is missing: write one [[tools]] table for each tool")
+        case "schema":
+            return tr('is missing: begin the file with schema = "robolink/recipe/1"')
+    return tr("is missing")

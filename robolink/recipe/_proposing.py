@@ -10,6 +10,7 @@ from robolink.model import ToolOffset, angle_difference_deg, rotate_xy
 from robolink.nozzle_change import Proposal
 from robolink.recipe._recipe import Recipe
 from robolink.recipe._reference import Reference, reference_details
+from robolink.ways import Way, way
 
 
 def contact_z_mm(proposal: Proposal) -> float:
@@ -133,7 +134,7 @@ def _height(
         raise CalibrationError(
             "reference_outdated",
             tr("The reference of {at} has no height of the contact.", at=reference.at),
-            remedy=tr("Take a new reference with --reference."),
+            remedy=tr("Take a new reference with {reference}.", reference=way(Way.REFERENCE)),
         )
     return offset.z_mm - (height - reference.contact_z_mm)
 

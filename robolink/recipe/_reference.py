@@ -20,6 +20,7 @@ from robolink.model import (
     plain_offset,
     read_offset,
 )
+from robolink.ways import Way, way
 
 _KINDS = (EntryKind.CALIBRATION, EntryKind.DONE, EntryKind.DECISION)
 
@@ -86,7 +87,8 @@ def find_reference(controller: Controller, tool: int, station: str) -> Reference
         ),
         remedy=tr(
             "Somebody changed the tool since. Put the value of the reference back, or take a new "
-            "reference with --reference and the nozzle for which the stored value is right."
+            "reference with {reference} and the nozzle for which the stored value is right.",
+            reference=way(Way.REFERENCE),
         ),
     )
 

@@ -26,6 +26,7 @@ from robolink.recipe._reference import Reference, find_reference
 from robolink.runner import Operator
 from robolink.stations import Station, find_stations
 from robolink.transaction import ChangedSince, changed_since, earlier_corrections
+from robolink.ways import Way, way
 
 
 class RecipeRun:
@@ -171,9 +172,9 @@ class RecipeRun:
     def _outputs_left(self, listener: RecipeListener) -> str:
         """Say how the outputs were left.
 
-        An emergency stop may switch them off by itself (spel.md 8): what the recipe had switched
-        is not how they are then. Where the controller cannot be asked any more, only what the
-        recipe did is known.
+        An emergency stop may switch them off by itself (docs/reference/spel.md 8): what the recipe
+        had switched is not how they are then. Where the controller cannot be asked any more, only
+        what the recipe did is known.
         """
         stopped = False
         with suppress(RobolinkError):
@@ -187,7 +188,11 @@ class RecipeRun:
         if signature.role == Role.OPERATOR:
             raise NotAllowedError(
                 tr("Letting a tool jump takes an engineer."),
-                remedy=tr("Nothing was moved. Give --operator, or leave --accept-jump out."),
+                remedy=tr(
+                    "Nothing was moved. Give {operator}, or leave {accept_jump} out.",
+                    operator=way(Way.OPERATOR),
+                    accept_jump=way(Way.ACCEPT_JUMP),
+                ),
             )
 
 

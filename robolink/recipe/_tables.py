@@ -16,7 +16,8 @@ Note = Annotated[str, Field(max_length=5000, pattern=r"^[^\x00-\x08\x0b-\x1f\x7f
 """Lines for people."""
 
 Length = Annotated[float, Field(ge=0.001)]
-"""No limit is finer than the last digit that a controller prints, mm (design part 4)."""
+"""No limit is finer than the last digit that a controller prints, mm
+(docs/reference/rules.md 3)."""
 
 Angle = Annotated[float, Field(ge=-360, le=360)]
 ToolNumber = Annotated[int, Field(ge=1, le=15)]

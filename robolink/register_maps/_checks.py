@@ -13,7 +13,7 @@ from robolink.register_maps._tables import CommitBitKeys, LevelKeys, MapFile
 from robolink.toml_files import Problem
 
 _MOST_READ: Final = 125
-"""Registers that one request reads (softmotion.md 4.3)."""
+"""Registers that one request reads (docs/reference/softmotion.md 4.3)."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,9 @@
 """That a person compared a map's values with what the HMI shows: kept for one map at one PLC.
 
 Without a probe in the PLC nothing else tells a right map from a shifted one, or one word
-order from the other. A file that was changed is another map.
+order from the other. A file that was changed is another map. A PLC is the one that its own
+number names, where the map has that, else the one at its resolved address: by another spelling of
+its host it is the same, and with a number another one in its place is not.
 """
 
 import json
@@ -37,6 +39,10 @@ def confirmation_of(identity: str, register_map: RegisterMap) -> Confirmation | 
     """Return who confirmed this very map at this PLC, ``None`` when nobody did.
 
     A record that cannot be read confirms nothing.
+
+    Args:
+        identity: The PLC's name, never a URL: see :class:`robolink.model.Identity`.
+        register_map: The map.
     """
     try:
         document = json.loads(_path(identity, register_map).read_bytes())

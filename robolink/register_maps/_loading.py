@@ -2,13 +2,18 @@
 
 import hashlib
 from pathlib import Path
+from typing import Final
 
-from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink.named_files import read_named
 from robolink.register_maps._map import RegisterMap
-from robolink.register_maps._problems import problems_of, refusal
-from robolink.toml_files import NotTomlError, Problem, parse_toml
+from robolink.register_maps._problems import problems_of
+from robolink.toml_files import FileKind, Problem
+
+MAP_FILE: Final = FileKind(
+    named=lambda path: tr("The PLC map {path}", path=path),
+    unreadable_remedy=lambda: tr("docs/plc-maps.md shows what a map looks like. Nothing was sent."),
+    wrong_remedy=lambda: tr("Correct it; docs/plc-maps.md explains every key. Nothing was sent."),
+)
 
 
 def load_map(path: Path) -> RegisterMap:
@@ -20,7 +25,7 @@ def load_map(path: Path) -> RegisterMap:
     """
     register_map, problems = _checked(path)
     if register_map is None or problems:
-        raise refusal(path, problems)
+        raise MAP_FILE.refusal(path, problems)
     return register_map
 
 
@@ -40,9 +45,9 @@ def _checked(path: Path) -> tuple[RegisterMap | None, list[Problem]]:
     from robolink.register_maps._resolving import Resolving
     from robolink.register_maps._tables import MapFile
 
-    content = _content(path)
+    content = MAP_FILE.read(path)
     try:
-        file = MapFile.model_validate(_document(path, content))
+        file = MapFile.model_validate(MAP_FILE.parse(path, content))
     except ValidationError as error:
         return None, problems_of(error)
     resolving = Resolving(file)
@@ -50,24 +55,3 @@ def _checked(path: Path) -> tuple[RegisterMap | None, list[Problem]]:
     if register_map is None:
         return None, resolving.problems
     return register_map, problems_together(file, register_map)
-
-
-def _content(path: Path) -> bytes:
-    try:
-        return read_named(path)
-    except OSError as error:
-        raise _unreadable(path, error.strerror or str(error)) from error
-
-
-def _document(path: Path, content: bytes) -> dict[str, object]:
-    try:
-        return parse_toml(content)
-    except NotTomlError as error:
-        raise _unreadable(path, str(error)) from error
-
-
-def _unreadable(path: Path, cause: str) -> ConfigError:
-    return ConfigError(
-        tr("The PLC map {path} cannot be read: {cause}.", path=path, cause=cause),
-        remedy=tr("docs/plc-maps.md shows what a map looks like. Nothing was sent."),
-    )

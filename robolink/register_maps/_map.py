@@ -18,8 +18,9 @@ ANGLES: Final = frozenset("uvw")
 class AllZero(StrEnum):
     """What a slot means whose registers are all zero.
 
-    A CODESYS PLC zeroes what clients may write when its watchdog expires (softmotion.md 0.6),
-    so that all zeros may be a lost link and no tool (faults_and_speed.md F30).
+    A CODESYS PLC zeroes what clients may write when its watchdog expires
+    (docs/reference/softmotion.md 4.1), so that all zeros may be a lost link and no tool
+    (docs/reference/faults.md F30).
     """
 
     REFUSE = "refuse"

@@ -2,7 +2,7 @@
 
 Inside a register the high byte comes first on the wire. A 32 or 64 bit number of a CODESYS
 PLC has its low word first; other makers have the high word first, and some gateways swap
-bytes (softmotion.md 4.4). Nothing here is guessed: a map says it.
+bytes (docs/reference/softmotion.md 4.4). Nothing here is guessed: a map says it.
 """
 
 import math
@@ -14,7 +14,7 @@ from typing import Final
 from robolink.register_maps._places import RegisterTable, describe_place
 
 LREAL_TOLERANCE: Final = 1e-9
-"""Two LREALs this near are equal (design part 4)."""
+"""Two LREALs this near are equal (docs/reference/rules.md 3)."""
 
 _TINY: Final = 1e-20
 """What is smaller and not 0 is no length and no angle, but words in the wrong order."""

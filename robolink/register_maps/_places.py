@@ -2,7 +2,7 @@
 
 Addresses count from 0, as on the wire. What a manual prints as 40001 is holding register 0;
 whoever reads a place is shown both, because tools disagree about which one they mean
-(softmotion.md 4.4, ecosystem.md 3.1).
+(docs/reference/softmotion.md 4.4).
 """
 
 from dataclasses import dataclass

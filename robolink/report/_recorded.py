@@ -7,6 +7,7 @@ from robolink.messages import tr
 from robolink.model import EntryKind, Recorded
 from robolink.report._recorded_tool import report_of_tool
 from robolink.report._values import Judgement, Record, Report
+from robolink.ways import Way, way
 
 _NOT_ABOUT_A_CHANGE = (
     EntryKind.SELECTION,
@@ -42,7 +43,7 @@ def reports_of(
     if not tools:
         raise ConfigError(
             tr("These entries are not about a change of a tool's offset."),
-            remedy=tr("'robolink journal list --kind done' shows entries that are."),
+            remedy=tr("{changes} shows entries that are.", changes=way(Way.LIST_CHANGES)),
         )
     record = Record(
         change=entries[-1].change or entries[-1].operation,

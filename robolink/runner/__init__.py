@@ -2,8 +2,8 @@
 
 The runner owns what a procedure must not know: limits, deadlines, the clock, and the watch
 over the controller while a person is asked. Remote control cuts an idle client off after the
-remote time-out (60 s by default, epson.md 1.1), and a person may take half an hour; so the
-prompt is polled, and the status is read between polls. That also shows an emergency stop or
+remote time-out (60 s by default, docs/reference/epson.md 1.1), and a person may take half an hour;
+so the prompt is polled, and the status is read between polls. That also shows an emergency stop or
 an open guard at once.
 """
 

@@ -52,7 +52,7 @@ def jog_target(here: Pose, steps: str, settings: RunSettings) -> tuple[Pose, Pat
         z_mm=here.z_mm + deltas.get("z", 0.0),
         u_deg=here.u_deg + deltas.get("u", 0.0),
     )
-    # A straight move that only turns is an error in SPEL+ without ROT (spel.md 7.1).
+    # A straight move that only turns is an error in SPEL+ without ROT (docs/reference/spel.md 7.1).
     return target, Path.JOINT if "u" in deltas else Path.STRAIGHT
 
 

@@ -46,6 +46,7 @@ from robolink.runner._steps import (
 )
 from robolink.runner._yes_no import ask_yes_no
 from robolink.sensing import seen_once
+from robolink.ways import Way, way
 
 POLL_S = 1.0
 """Longest time between two status reads while a person is asked (design: at most 5 s)."""
@@ -209,7 +210,10 @@ class Runner:
         if camera is None:
             raise ConfigError(
                 tr("A camera is needed, and none was named."),
-                remedy=tr("Name it with --sensor, in the recipe, or in the cell file."),
+                remedy=tr(
+                    "Name it with {sensor}, in the recipe, or in the cell file.",
+                    sensor=way(Way.SENSOR),
+                ),
             )
         self._controller.clock.sleep(camera.settle_s)
         pose = self._group.pose()

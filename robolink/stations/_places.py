@@ -8,6 +8,7 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.stations._sensors import BeamStation, CameraStation, TouchStation
 from robolink.stations._station import Station
+from robolink.ways import Way, way
 
 if TYPE_CHECKING:
     from robolink.calibration import Pin
@@ -96,8 +97,9 @@ def _unknown(station: Station, what: str) -> ConfigError:
     return ConfigError(
         tr("Nobody knows {what} of station {id}.", what=what, id=station.id),
         remedy=tr(
-            "Make a full calibration there ('robolink calibrate n-angle --station {id}'), learn "
-            "it with 'robolink station learn {id}', or state it in the cell file.",
+            "Make a full calibration there ({calibrate}), learn it with 'robolink station learn "
+            "{id}', or state it in the cell file.",
+            calibrate=way(Way.CALIBRATE_AT, station=station.id),
             id=station.id,
         ),
     )

@@ -33,6 +33,7 @@ class ControllerHolder:
         token: What opens it.
         pid: Its number.
         who: Who it is, and what it does, as a person is told.
+        controller: Which controller that is, as it said of itself; empty where it did not.
         card: The file that says so.
     """
 
@@ -40,6 +41,7 @@ class ControllerHolder:
     token: str
     pid: int
     who: str
+    controller: str
     card: Path
 
     def ask_to_stop(self, who: str) -> str:
@@ -122,7 +124,10 @@ class HolderGoneError(Exception):
 
 
 def holders_of(keys: Set[str]) -> Iterator[ControllerHolder]:
-    """Yield the processes on this computer that hold a far end, the latest first.
+    """Yield the processes on this computer that hold a controller, the latest first.
+
+    Args:
+        keys: Its far end (:func:`.far_end_of`), and its own name where that is known.
 
     What a process that is gone has left is taken away.
     """
@@ -148,7 +153,8 @@ def _read(card: Path, keys: Set[str]) -> ControllerHolder | None:
             card.with_suffix(".sock").unlink(missing_ok=True)
             return None
         where = place if isinstance(place, str) else (str(place[0]), int(place[1]))
-        return ControllerHolder(where, str(said["token"]), pid, str(said["who"]), card)
+        controller = str(said.get("controller", ""))
+        return ControllerHolder(where, str(said["token"]), pid, str(said["who"]), controller, card)
     except (OSError, ValueError, TypeError, KeyError, IndexError):
         return None
 

@@ -1,10 +1,10 @@
 """A process that holds a controller listens for the stop from a second terminal.
 
-EPSON serves one client (epson.md 1.1), a serial line is opened once, and a CANopen node answers
-one at a time. So whoever has the controller is the one who can stop it: it listens on a local
-socket, for its own user only, and stops on request. Where the system has no such sockets, or the
-path is too long for one, it listens on the loopback address, and a token in a file that only this
-user can read opens it.
+EPSON serves one client (docs/reference/epson.md 1.1), a serial line is opened once, and a CANopen
+node answers one at a time. So whoever has the controller is the one who can stop it: it listens on
+a local socket, for its own user only, and stops on request. Where the system has no such sockets,
+or the path is too long for one, it listens on the loopback address, and a token in a file that only
+this user can read opens it.
 
 The thread that listens is the only one that robolink starts on its own; it does nothing but
 ``controller.stop()``, which any thread may call.
@@ -18,13 +18,13 @@ import threading
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from types import TracebackType
-from typing import Final, Protocol, Self
+from typing import Final, Protocol
 
+from robolink.closing import ClosedAtExit
 from robolink.durable_files import make_folder, state_folder
 from robolink.errors import RobolinkError
 from robolink.messages import tr
-from robolink.model import ControllerStatus
+from robolink.model import ControllerStatus, is_own_name
 from robolink.stopping._far_end import far_end_of
 
 KIND: Final = "holders"
@@ -49,7 +49,7 @@ class Stoppable(Protocol):
         """Read its state."""
 
 
-class StopListener:
+class StopListener(ClosedAtExit):
     """Listens while a controller is held; a context manager.
 
     Leave it before the controller is closed: it then waits for a stop that is under way.
@@ -58,6 +58,8 @@ class StopListener:
         controller: What is stopped.
         url: How it was reached.
         who: Who holds it, and for what, as a person is told.
+        name: Under which name the controller is on record (``controller.outcomes.identity``), so
+            that a stop finds it by another address, too; empty where that is not known.
         heard: Called with who stopped it, in the listener's thread, before the stop.
 
     Raises:
@@ -70,6 +72,7 @@ class StopListener:
         url: str,
         *,
         who: str = "",
+        name: str = "",
         heard: Callable[[str], None] | None = None,
     ) -> None:
         self._controller = controller
@@ -77,12 +80,14 @@ class StopListener:
         self._token = os.urandom(16).hex()
         folder = state_folder(KIND)
         make_folder(folder)
-        name = f"{os.getpid()}-{self._token[:8]}"
-        self._card = folder / f"{name}.json"
-        self._socket, self._path = _listening(folder / f"{name}.sock")
+        file = f"{os.getpid()}-{self._token[:8]}"
+        own = name if is_own_name(name) else ""
+        self._card = folder / f"{file}.json"
+        self._socket, self._path = _listening(folder / f"{file}.sock")
         self._wake, self._awake = socket.socketpair()
         card: dict[str, object] = {
-            "keys": sorted(far_end_of(url)),
+            "keys": sorted(far_end_of(url) | ({own} if own else set())),
+            "controller": own,
             "place": self._path or list(self._socket.getsockname()),
             "token": self._token,
             "pid": os.getpid(),
@@ -105,17 +110,6 @@ class StopListener:
     def _close_sockets(self) -> None:
         for one in (self._socket, self._wake, self._awake):
             one.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def _publish(self, card: dict[str, object]) -> None:
         """Write where to knock; not synced to the disk, because it dies with the process."""

@@ -2,12 +2,15 @@
 
 It stands in the state folder, is written after the frame of the stop and never before, and is
 taken away by ``reset``, by ``release``, or by the person who is shown it and goes on.
+
+It hangs on the controller: on its own name where it said that, so that it is found by whatever
+address the next one comes, and on the far end of the URL besides. A note of another controller
+that answered at the same address before is none of this one.
 """
 
 import json
-from collections.abc import Set
-from contextlib import suppress
-from dataclasses import dataclass
+from collections.abc import Iterable, Set
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from robolink.durable_files import (
@@ -32,12 +35,17 @@ class StopNote:
         who: Who did it, as a person is told; empty where the note cannot be read.
         when: Wall time as a label; empty where the note cannot be read.
         confirmed: Whether the controller was seen at rest.
+        controller: Which one it is, as it said itself after it was stopped; empty where nobody
+            could ask.
+        keys: Under which keys the note was left.
     """
 
     url: str
     who: str
     when: str
     confirmed: bool
+    controller: str = ""
+    keys: tuple[str, ...] = ()
 
     @property
     def sentence(self) -> str:
@@ -53,8 +61,20 @@ class StopNote:
             )
         return tr("{who} stopped {url} on {when}.", who=self.who, url=self.url, when=self.when)
 
+    def is_about(self, name: str) -> bool:
+        """Tell whether it may be about the controller ``name``; in doubt it is."""
+        return not (name and self.controller) or name == self.controller
 
-def leave_note(keys: Set[str], url: str, who: str, *, confirmed: bool) -> None:
+
+def leave_note(
+    keys: Set[str],
+    url: str,
+    who: str,
+    *,
+    confirmed: bool,
+    controller: str = "",
+    last_known: str = "",
+) -> None:
     """Note that a controller was stopped.
 
     Args:
@@ -62,56 +82,85 @@ def leave_note(keys: Set[str], url: str, who: str, *, confirmed: bool) -> None:
         url: How it was named; without password or options.
         who: Who did it.
         confirmed: Whether it was seen at rest.
+        controller: Its own name, if it said that after it was stopped.
+        last_known: The name of who was met there last, where it could not be asked.
 
     Raises:
         OSError: It cannot be kept.
     """
-    data = json.dumps({"url": url, "who": who, "when": wall_label(), "confirmed": confirmed})
+    all_keys = sorted({*keys, *filter(None, (controller, last_known))})
+    note = StopNote(url, who, wall_label(), confirmed, controller, tuple(all_keys))
+    data = json.dumps(asdict(note)).encode()
     folder = state_folder(_KIND)
     make_folder(folder)
-    for path in _paths(keys):
-        write_whole(path, data.encode())
+    for path in _paths(all_keys):
+        write_whole(path, data)
     sync_folder(folder)
 
 
-def find_note(keys: Set[str]) -> StopNote | None:
-    """Return the note about a far end; one that cannot be read is a note all the same."""
-    for path in _paths(keys):
-        try:
-            data = path.read_bytes()
-        except FileNotFoundError:
-            continue
-        except OSError:
-            return _unreadable()
-        return _note(data)
+def find_note(keys: Set[str], name: str = "") -> StopNote | None:
+    """Return the note about a controller; one that cannot be read is a note all the same.
+
+    Args:
+        keys: Its far end.
+        name: Its own name, where that is known.
+    """
+    for path in _paths(_with_name(keys, name)):
+        data = _content(path)
+        if data is not None and (found := _note(data)).is_about(name):
+            return found
     return None
 
 
-def clear_note(keys: Set[str]) -> None:
-    """Take the note about a far end away.
+def clear_note(keys: Set[str], name: str = "") -> None:
+    """Take the notes about a controller away, under whatever keys they were left.
+
+    Args:
+        keys: Its far end.
+        name: Its own name, where that is known.
 
     Raises:
-        OSError: It stays.
+        OSError: One stays.
     """
-    for path in _paths(keys):
-        with suppress(FileNotFoundError):
-            path.unlink()
+    for path in _paths(_with_name(keys, name)):
+        data = _content(path)
+        if data is None or not (found := _note(data)).is_about(name):
+            continue
+        for other in (*_paths(found.keys), path):
+            # Under another key there may be the note of a later stop, of another controller.
+            if other == path or _content(other) == data:
+                other.unlink(missing_ok=True)
 
 
-def _paths(keys: Set[str]) -> list[Path]:
+def _with_name(keys: Set[str], name: str) -> list[str]:
+    return sorted({*keys, *([name] if name else [])})
+
+
+def _paths(keys: Iterable[str]) -> list[Path]:
     folder = state_folder(_KIND)
-    return [folder / file_name(key) for key in sorted(keys)]
+    return [folder / file_name(key) for key in keys]
+
+
+def _content(path: Path) -> bytes | None:
+    """Return what is in a note, nothing for one that cannot be read, ``None`` without one."""
+    try:
+        return path.read_bytes()
+    except FileNotFoundError:
+        return None
+    except OSError:
+        return b""
 
 
 def _note(data: bytes) -> StopNote:
     try:
         kept = json.loads(data)
         return StopNote(
-            str(kept["url"]), str(kept["who"]), str(kept["when"]), kept["confirmed"] is True
+            str(kept["url"]),
+            str(kept["who"]),
+            str(kept["when"]),
+            kept["confirmed"] is True,
+            str(kept.get("controller", "")),
+            tuple(map(str, kept.get("keys", ()))),
         )
-    except (ValueError, TypeError, KeyError):
-        return _unreadable()
-
-
-def _unreadable() -> StopNote:
-    return StopNote("", "", "", confirmed=False)
+    except (ValueError, TypeError, KeyError, AttributeError):
+        return StopNote("", "", "", confirmed=False)

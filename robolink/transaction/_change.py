@@ -1,7 +1,7 @@
 """One tool change: written as a whole, kept as a whole, or taken back as a whole.
 
-The order is that of design part 8: look at the lease, read the old values, compare them with
-what is expected, store the intent durably (which takes the lease), write, read back. A change
+The order is that of docs/reference/rules.md 6: look at the lease, read the old values, compare them
+with what is expected, store the intent durably (which takes the lease), write, read back. A change
 of one tool that nothing is to verify is done then. Any other is open, in the journal too,
 until :meth:`ToolChange.keep`; whatever ends it earlier puts the old values back, once.
 """

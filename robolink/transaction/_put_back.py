@@ -59,7 +59,7 @@ def put_back(
 ) -> list[PutBack]:
     """Give each tool its old value back, the last one first, with one write each at most.
 
-    A stop does not hinder it, once for each tool (design part 4).
+    A stop does not hinder it, once for each tool (docs/reference/rules.md 5).
 
     Args:
         controller: Whose tools they are.

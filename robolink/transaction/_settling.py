@@ -16,6 +16,7 @@ from robolink.model import (
     read_offset,
 )
 from robolink.transaction._put_back import Step, put_back
+from robolink.ways import Way, way
 
 
 class Settler:
@@ -198,5 +199,7 @@ def _steps(marker: Marker) -> list[Step]:
     except (KeyError, TypeError, ValueError) as error:
         raise ConfigError(
             tr("The marker of {when} cannot be understood.", when=marker.begun_at),
-            remedy=tr("Compare the tools with a backup, then 'robolink recover --forget'."),
+            remedy=tr(
+                "Compare the tools with a backup, then {forget}.", forget=way(Way.FORGET_MARKER)
+            ),
         ) from error

@@ -1,7 +1,7 @@
 """Undoing a change: what the tools held before it, or any value proved earlier, is written back.
 
-An undo is a change like any other (design part 8): it expects what the journal proved last,
-writes all of its tools or none, and can itself be undone.
+An undo is a change like any other (docs/reference/rules.md 6): it expects what the journal proved
+last, writes all of its tools or none, and can itself be undone.
 """
 
 from collections.abc import Callable, Collection, Iterator, Mapping
@@ -29,6 +29,7 @@ from robolink.transaction._undo_history import (
     proof_numbered,
     tool_of,
 )
+from robolink.ways import Way, way
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,13 +145,13 @@ def _plan_to(controller: Controller, number: int, tool: int | None) -> UndoPlan:
                 "Entry {number} does not say what was read from a tool of this controller.",
                 number=number,
             ),
-            remedy=tr("'robolink journal list --kind done' shows entries that do."),
+            remedy=tr("{changes} shows entries that do.", changes=way(Way.LIST_CHANGES)),
         )
     proved = tool_of(entry)
     if tool not in (None, proved):
         raise ConfigError(
             tr("Entry {number} is about tool {tool}.", number=number, tool=proved),
-            remedy=tr("Name that tool, or leave --tool out."),
+            remedy=tr("Name that tool, or leave {tool} out.", tool=way(Way.TOOL)),
         )
     sentence = tr(
         "bring tool {tool} back to what entry {number} of {at} proved",

@@ -4,6 +4,7 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import EntryKind, OutcomeLog, Recorded, ToolOffset, read_offset
 from robolink.transaction._history import PROOFS
+from robolink.ways import Way, way
 
 _ENDS = (EntryKind.DONE, EntryKind.ROLLED_BACK)
 
@@ -36,7 +37,7 @@ def of_change(outcomes: OutcomeLog, change: str, tool: int | None) -> list[Recor
     if not done or taken_back:
         raise ConfigError(
             _nothing_to_undo(chosen, taken_back=taken_back),
-            remedy=tr("'robolink journal list --kind done' shows what can be undone."),
+            remedy=tr("{changes} shows what can be undone.", changes=way(Way.LIST_CHANGES)),
         )
     return done
 
@@ -85,5 +86,8 @@ def offset_of(entry: Recorded, name: str) -> ToolOffset | None:
 def _unreadable(entry: Recorded) -> ConfigError:
     return ConfigError(
         tr("Entry {number} of the journal cannot be understood.", number=entry.number),
-        remedy=tr("'robolink journal verify' checks it; name an earlier value with --to."),
+        remedy=tr(
+            "'robolink journal verify' checks it; name an earlier value with {to}.",
+            to=way(Way.EARLIER_VALUE),
+        ),
     )

@@ -1,4 +1,4 @@
-"""The contract of a link to a PLC mailbox (design parts 4 and 7)."""
+"""The contract of a link to a PLC mailbox (docs/reference/rules.md 11; docs/mailbox.md)."""
 
 from collections.abc import Sequence
 from typing import Final, NamedTuple, Protocol
@@ -62,6 +62,13 @@ class MailboxLink(Protocol):
     @property
     def clock(self) -> Clock:
         """The clock on which deadlines are kept."""
+
+    @property
+    def whole_look_s(self) -> float:
+        """How long the response block and a beat take on the line alone, without the PLC's time.
+
+        0 where the line is too fast to count: on a network, and inside this process.
+        """
 
     def write_command(self, words: Sequence[int]) -> None:
         """Write the 64 words of the command block in one piece."""

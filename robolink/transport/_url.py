@@ -7,6 +7,7 @@ from urllib.parse import parse_qsl, urlsplit
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink.ways import Way, way
 
 _MODBUS_PORT: Final = 502
 _USUAL_UNITS: Final = {"modbus-tcp": "255", "modbus-rtu": "1"}
@@ -89,7 +90,7 @@ def parse_url(text: str) -> LinkUrl:
     if parts.username is not None or parts.password is not None:
         raise ConfigError(
             tr("A controller URL must not carry a user name or password."),
-            remedy=tr("Remove it and set ROBOLINK_PASSWORD or give --password-file."),
+            remedy=tr("Remove it and give it so: {password}.", password=way(Way.PASSWORD)),
         )
     kind, plus, medium = parts.scheme.partition("+")
     if not (kind and plus and medium):
@@ -111,6 +112,6 @@ def parse_url(text: str) -> LinkUrl:
         if forbidden in options:
             raise ConfigError(
                 tr("A controller URL must not carry a password."),
-                remedy=tr("Remove it and set ROBOLINK_PASSWORD or give --password-file."),
+                remedy=tr("Remove it and give it so: {password}.", password=way(Way.PASSWORD)),
             )
     return LinkUrl(kind, medium, parts.hostname or "", port, parts.path, options)

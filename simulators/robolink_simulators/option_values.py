@@ -1,6 +1,6 @@
 """Values of simulator options as text, as URLs and command lines carry them."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields
 from typing import Any, Final, Literal, get_args, get_origin, get_type_hints
 
@@ -8,6 +8,25 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 
 _TRUTH: Final = {"1": True, "true": True, "yes": True, "0": False, "false": False, "no": False}
+
+
+def require_known(given: Iterable[str], known: Sequence[str], *, kind: str) -> None:
+    """Refuse an option that a simulator does not have.
+
+    Args:
+        given: The names that were given.
+        known: Those that there are.
+        kind: What is simulated, as a sentence names it: "EPSON" or "PLC".
+
+    Raises:
+        ConfigError: Names the first one that is unknown.
+    """
+    unknown = sorted(set(given) - set(known))
+    if unknown:
+        raise ConfigError(
+            tr("The {kind} simulator has no option {name!r}.", kind=kind, name=unknown[0]),
+            remedy=tr("Known are: {names}.", names=", ".join(known)),
+        )
 
 
 def values_from_text(

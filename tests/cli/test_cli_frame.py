@@ -8,8 +8,8 @@ from typing import Any
 import click
 import pytest
 from robolink_cli import main
-from robolink_cli.session.context import open_controller
-from robolink_cli.session.warnings import marker_notice, note_unsettled
+from robolink_cli.access.warnings import marker_notice, note_unsettled
+from robolink_cli.session.opening import open_controller
 
 import robolink
 from robolink.errors import NotReadyError, NotReadyReason
@@ -152,7 +152,7 @@ class UnfinishedController:
         self.closed = False
         self.more = more
         self.latch, self.ledger = StopLatch(URL), Ledger()
-        self.trouble, self.remarks = None, ()
+        self.trouble, self.remarks, self.identity = None, (), URL
 
     def at_work(self):
         return ""

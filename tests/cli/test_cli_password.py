@@ -3,7 +3,7 @@
 import sys
 
 import pytest
-from robolink_cli.session import password as _password
+from robolink_cli.access import password as _password
 
 from robolink import errors
 
@@ -58,6 +58,19 @@ def test_a_password_file_that_cannot_be_read_is_named_and_its_bytes_are_not(tmp_
     with pytest.raises(errors.ConfigError, match="not UTF-8") as caught:
         _password.find_password(URL, password_file=path)
     assert caught.value.__cause__ is None
+    path.write_bytes(b"x" * 200_000)
+    with pytest.raises(errors.ConfigError, match=r"longer than 0\.1 MB"):
+        _password.find_password(URL, password_file=path)
+
+
+@pytest.mark.parametrize("content", [b"hunter2", b"hunter2\r\nmore", b"\xef\xbb\xbfhunter2\n\xff"])
+def test_the_first_line_of_a_password_file_counts(tmp_path, content):
+    path = tmp_path / "secret"
+    path.write_bytes(content)
+    path.chmod(0o600)
+    found = _password.find_password(URL, password_file=path)
+    assert found is not None
+    assert found.reveal() == "hunter2"
 
 
 class Ring:

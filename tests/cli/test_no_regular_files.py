@@ -7,9 +7,11 @@ import time
 from pathlib import Path
 
 import pytest
-from robolink_cli import main
+from robolink_cli import entry, main
+from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 
-from robolink.named_files import MOST_BYTES, read_named
+from robolink.named_files import MOST_BYTES, append_to_named, holds, read_named
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="POSIX pipes and devices")
 
@@ -26,6 +28,8 @@ COMMANDS = {
     "register list": ["plc", "check-map", "--from-csv", "{file}"],
     "case": ["solve", "{file}"],
     "table": ["solve", "{file}", "--method", "pivot"],
+    "password": ["-c", "epson+tcp://127.0.0.1:1", "--password-file", "{file}", "status"],
+    "dialogue": ["-c", URL, "--record", "{file}", "status"],
     "recording": ["sim", "epson", "--tcp", "127.0.0.1:0", "--replay", "{file}"],
     "profile": ["sim", "epson", "--tcp", "127.0.0.1:0", "--profile", "{file}"],
     "state": ["sim", "epson", "--tcp", "127.0.0.1:0", "--state", "{file}"],
@@ -77,6 +81,45 @@ def test_a_cell_file_is_no_exception(no_file, capsys, monkeypatch):
     code, what = run(["-c", "a", "status"], capsys)
     assert code == 2
     assert str(no_file) in what
+
+
+def test_a_journal_is_no_exception(no_file, capsys, monkeypatch):
+    monkeypatch.setenv("ROBOLINK_JOURNAL", str(no_file))
+    code, what = run(["journal", "list"], capsys)
+    assert code == 2
+    assert f"{no_file} is no regular file" in what
+
+
+@pytest.mark.parametrize("where", ["environment", "cell file"])
+def test_a_password_file_that_nobody_typed_is_no_exception(where, no_file, capsys, monkeypatch):
+    cell = '[cells.a]\nurl = "epson+tcp://127.0.0.1:1"\n'
+    if where == "environment":
+        monkeypatch.setenv("ROBOLINK_PASSWORD_FILE", str(no_file))
+    else:
+        cell += f'password_file = "{no_file}"\n'
+    Path("robolink.toml").write_text(cell)
+    code, what = run(["-c", "a", "status"], capsys)
+    assert code == 2
+    assert str(no_file) in what
+
+
+def test_a_stop_does_not_wait_for_a_password_file(no_file, capsys):
+    with serve_tcp(EpsonSimulator(seed=4)) as host:
+        began_s = time.monotonic()
+        assert entry.run(["-c", host.url, "--password-file", str(no_file), "stop"]) == 0
+        assert time.monotonic() - began_s < 10.0
+    assert f"The password file {no_file} cannot be read" in capsys.readouterr().err
+
+
+def test_a_recording_goes_on_where_it_ended(tmp_path):
+    path = tmp_path / "morning"
+    for line in ("first", "second"):
+        with append_to_named(path) as file:
+            file.write(line + "\n")
+    assert path.read_bytes() == b"first\nsecond\n"
+    assert holds(path, b"first\nsecond\n")
+    assert not holds(path, b"first\n")
+    assert not holds(tmp_path, b"")
 
 
 def test_a_file_that_is_too_long_is_refused_and_a_link_is_followed(tmp_path):

@@ -2,7 +2,9 @@
 
 import pytest
 from robolink_cli import main
-from robolink_cli.prompts import consent, operator, restore_offer
+from robolink_cli.prompts import operator
+from robolink_cli.prompts import questions as consent
+from robolink_cli.session import restore_offer
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.in_process.epson import register, unregister
 
@@ -34,7 +36,7 @@ def cell():
         died.__enter__()
         controller.tools.select(0)
         assert isinstance(controller, EpsonController)
-        controller._session.close()
+        controller._link.session.close()
     yield simulator, url
     unregister("offer-to-restore")
     memory_journal(url).close()

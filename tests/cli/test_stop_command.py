@@ -13,8 +13,8 @@ from types import SimpleNamespace
 import click
 import pytest
 from robolink_cli import entry, main
-from robolink_cli.prompts import consent
 from robolink_cli.prompts import operator as _operator
+from robolink_cli.prompts import questions as consent
 from robolink_cli.stopping.request import FLAGS, VALUES, StopRequest, read_stop
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
@@ -45,11 +45,11 @@ def moving(state_folder):
         here = controller.groups[0].pose()
         controller.groups[0].move_to(replace(here, z_mm=here.z_mm + 30), CREEPING, box=WorkBox())
         assert isinstance(controller, EpsonController)
-        controller._session.close()
+        controller._link.session.close()
         controller.outcomes.close()  # the lease of the one who died
         simulator.url = host.url
         yield simulator
-        controller._session.close()  # what it watches for Ctrl-C is given back
+        controller._link.session.close()  # what it watches for Ctrl-C is given back
         close_files()
 
 
@@ -285,11 +285,13 @@ def test_a_reset_takes_the_note_away_too(moving, stop):
 
 def test_a_note_that_cannot_be_read_is_a_note(moving, stop, state_folder, capsys):
     assert stop()[0] == 0
-    (note,) = (state_folder / "stops").iterdir()
-    note.write_bytes(b"{")
+    for note in (state_folder / "stops").iterdir():
+        note.write_bytes(b"{")
     assert main.run(["-c", moving.url, "recover", "--yes"]) == 0
     assert main.run(["jog", "x+1", "--yes", "-c", moving.url]) == 10
     assert "cannot be read" in capsys.readouterr().err
+    assert main.run(["-c", moving.url, "release", "--yes"]) == 0
+    assert main.run(["jog", "x+1", "--yes", "-c", moving.url]) == 0
 
 
 def test_what_is_read_by_hand_is_what_click_knows():
@@ -337,8 +339,8 @@ def test_the_environment_names_the_controller(monkeypatch):
 
 HEAVY = """
 can canopen click jinja2 keyring lark numpy pydantic pymodbus rich sqlalchemy sqlite3 logging
-asyncio robolink.journal robolink.calibration robolink.controllers.epson._controller
-robolink.controllers.softmotion._controller
+asyncio robolink.journal robolink.calibration robolink.controllers.epson.controller
+robolink.controllers.softmotion.controller
 """
 
 PROBE = """
@@ -370,7 +372,20 @@ def test_nothing_heavy_is_loaded_before_the_robot_stands(state_folder, kind):
     assert (done.stdout, done.stderr) == ("\n", "")
 
 
-@pytest.mark.parametrize("more", ["", "robot = 'T6-602S'", "timeout_s = 2.5"])
+WHOLE = """
+robot = "T6-602S"
+tool = 2
+people = { "4711" = "operator", "Anna" = "engineer" }
+remote_timeout_s = 60.0
+remote_timeout_confirmed_by = "Anna"
+max_change_mm = 1.5
+box_mm = 30.0
+[cells.a.stations.post]
+kind = "pin"
+"""
+
+
+@pytest.mark.parametrize("more", ["", "robot = 'T6-602S'", "timeout_s = 2.5", WHOLE])
 def test_a_cell_file_is_checked_anew_for_a_look_when_it_changed(moving, stop, capsys, more):
     assert stop()[0] == 0
     cell = Path("robolink.toml")
@@ -378,8 +393,8 @@ def test_a_cell_file_is_checked_anew_for_a_look_when_it_changed(moving, stop, ca
     assert glance_at_cell("a") is None
     for _ in range(2):
         assert main.run(["-c", "a", "status"]) == 0
-        assert (glance_at_cell("a") is None) is ("robot" in more)
-    cell.write_text(CELL.format(url=moving.url, more=more + "\nno_such_key = 1"))
+        assert glance_at_cell("a") is not None
+    cell.write_text(CELL.format(url=moving.url, more="no_such_key = 1\n" + more))
     assert glance_at_cell("a") is None
     capsys.readouterr()
     assert main.run(["-c", "a", "status"]) == 0
@@ -387,3 +402,42 @@ def test_a_cell_file_is_checked_anew_for_a_look_when_it_changed(moving, stop, ca
     cell.write_text(CELL.format(url=moving.url, more="robot = 'LS10-B'"))
     assert main.run(["-c", "a", "status"]) == 0
     assert "has a robot LS10-B" in capsys.readouterr().err
+
+
+def test_a_look_that_does_not_check_the_cell_file_heeds_what_it_says(moving, stop, capsys):
+    assert stop()[0] == 0
+    more = WHOLE.replace("T6-602S", "LS10-B")
+    Path("robolink.toml").write_text(CELL.format(url=moving.url, more=more))
+    for known in (False, True):
+        assert (glance_at_cell("a") is not None) is known
+        capsys.readouterr()
+        assert main.run(["-c", "a", "status"]) == 0
+        told = capsys.readouterr().err
+        assert "The cell a has a robot LS10-B" in told
+        assert "the cell a works with tool 2" in told
+        assert main.run(["-c", "a", "--operator", "Anna", "status"]) == 0
+        assert main.run(["-c", "a", "--operator", "nobody", "status"]) == 2
+        assert "not among the people of this cell" in capsys.readouterr().err
+
+
+LOOK = """
+import sys
+from robolink_cli import entry
+assert entry.run(["-c", "a", "status"]) == 0
+print("loaded:", *sorted(set(sys.argv[1:]) & set(sys.modules)))
+"""
+
+
+def test_the_cell_file_of_a_shop_makes_no_look_load_what_checks_it(moving, stop):
+    assert stop()[0] == 0
+    Path("robolink.toml").write_text(CELL.format(url=moving.url, more=WHOLE))
+    assert main.run(["-c", "a", "status"]) == 0
+    done = subprocess.run(
+        [sys.executable, "-c", LOOK, "pydantic", "numpy", "rich"],
+        check=False,
+        capture_output=True,
+        text=True,
+        timeout=30,
+        env=dict(os.environ),
+    )
+    assert done.stdout.endswith("loaded:\n"), done

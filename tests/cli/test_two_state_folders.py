@@ -64,7 +64,7 @@ def epson(folder):
 
 def test_a_jog_from_the_other_folder_asks_before_it_moves_the_flange(epson, folder, run):
     simulator, url = epson
-    kill_a_calibration(url, lambda controller: controller._session.close())
+    kill_a_calibration(url, lambda controller: controller._link.session.close())
     folder("second")
     code, said = run("-c", "a", "status")
     assert code == 0
@@ -87,7 +87,7 @@ def test_without_a_cell_file_the_record_of_the_last_procedure_tells(epson, folde
     close_files()
     here = Path.cwd() / "first"
     folder("second")
-    kill_a_calibration(url, lambda controller: controller._session.close())
+    kill_a_calibration(url, lambda controller: controller._link.session.close())
     folder(here.name)
     code, said = run("-c", url, "jog", "x+1", "--yes")
     assert code == 9

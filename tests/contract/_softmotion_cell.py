@@ -22,7 +22,7 @@ from robolink.timing import NS_PER_S, SystemClock
 
 BACKENDS: Final = ("sim", "modbus-tcp", "modbus-rtu", "can-virtual", "can-multicast")
 OWNER_SILENCE_S: Final = 10.1
-"""After this long without a sign of its owner a mailbox is free (design part 7)."""
+"""After this long without a sign of its owner a mailbox is free (docs/mailbox.md, "Owners")."""
 
 QUICK: Final = MotionProfile(Path.STRAIGHT, speed_mm_s=1000.0)
 SLOW: Final = MotionProfile(Path.STRAIGHT, speed_mm_s=2.0)

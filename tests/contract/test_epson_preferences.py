@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.epson.option_text import options_from_text
+from robolink_simulators.epson.options import options_from_text
 
 from robolink import ToolOffset
 from robolink.errors import NotReadyError, NotReadyReason

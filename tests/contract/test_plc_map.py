@@ -56,7 +56,7 @@ class Served:
         self.host = self.serve(self.plc, self.path, clock=ScaledClock(10.0))
         self.url = self.host.url
         with self.connect() as controller:
-            confirm(controller.identity, self.map, by="test", compared="1.x")
+            confirm(controller.who().name, self.map, by="test", compared="1.x")
         return self
 
     def __exit__(self, *_details):

@@ -61,7 +61,7 @@ def served(simulator=None, *, factor=1.0):
         yield host
 
 
-# ---- the vectors of epson.md part 7, against the simulator ----------------------------------
+# ---- the exchanges of docs/reference/epson.md 6, against the simulator
 
 
 def test_a_login_with_and_without_a_password():

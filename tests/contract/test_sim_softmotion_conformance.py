@@ -1,4 +1,4 @@
-"""The conformance behaviours of softmotion.md part 7, seen through the wire.
+"""The behaviours of docs/reference/softmotion.md 5, seen through the wire.
 
 Numbers 6 and 9 need kinematics that are not simulated.
 """

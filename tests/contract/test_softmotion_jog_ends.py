@@ -7,7 +7,7 @@ import pytest
 from robolink_simulators.softmotion.mailbox import PlcFault, PlcFaultAction
 
 from robolink.controllers.softmotion import Jog
-from robolink.controllers.softmotion._wire import MailboxWire
+from robolink.controllers.softmotion.link.wire import MailboxWire
 from robolink.errors import ControllerFaultError, LimitError, RejectedError, StoppedError
 from robolink.model import WorkBox
 from robolink.protocols.mailbox import ErrorClass

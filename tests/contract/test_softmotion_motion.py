@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from robolink.controllers.softmotion import Jog
-from robolink.controllers.softmotion._wire import MailboxWire
+from robolink.controllers.softmotion.link.wire import MailboxWire
 from robolink.errors import (
     BusyError,
     ControllerFaultError,

@@ -42,7 +42,7 @@ def left_moving(cell, **options):
     group = controller.groups[0]
     here = group.pose()
     group.move_to(replace(here, z_mm=here.z_mm + 30), CREEPING, box=ANYWHERE)
-    controller._session.close()
+    controller._link.session.close()
 
 
 @pytest.mark.parametrize("habits", HABITS, ids=str)

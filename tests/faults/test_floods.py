@@ -5,10 +5,14 @@ kernel buffered: the far end offers up to 64 MB and would go on.
 """
 
 import contextlib
+import os
+import select
 import socket
+import termios
 import threading
 import time
 import tracemalloc
+import tty
 from collections.abc import Iterator
 
 import can
@@ -19,12 +23,12 @@ from robolink.errors import (
     ConnectError,
     RemoteProtocolError,
     RobolinkError,
-    TransportTimeoutError,
 )
 from robolink.transport import open_modbus, parse_url
 from robolink.transport.can.bus import CanLine
 from robolink.transport.can.mailbox import CanopenMailboxLink
 from tests.unit._scripted_can import IDENTITY, NODE, SDO_ANSWER, FakeClock, ScriptedBus, node_with
+from tests.unit._scripted_modbus import rtu, words
 
 OFFERED = 64_000_000
 HELD = 2_000_000
@@ -97,14 +101,79 @@ def test_an_epson_controller_that_floods_is_named_and_left(flood):
     assert len(str(caught.value)) < 1000
 
 
-def test_a_modbus_server_that_floods_costs_one_time_out():
-    """Frames of no request of ours are dropped until the deadline, and nothing is kept."""
-    stray = bytes.fromhex("ffff 0000 0005 ff 04 02 0001") * 300
-    with flooding(b"", stray) as port, little_is_held():
+STRAYS = {
+    "frames of other requests": bytes.fromhex("ffff 0000 0005 ff 04 02 0001") * 300,
+    "the beginning of a frame": bytes.fromhex("ffff 0000 00fe ff 04") * 300,
+    "no Modbus": bytes(4096),
+}
+
+
+@pytest.mark.parametrize("stray", STRAYS)
+def test_a_modbus_server_that_floods_is_named_at_once(stray):
+    """No time-out: it is told what it is, long before the deadline, after some 16 kB."""
+    with flooding(b"", STRAYS[stray]) as port, little_is_held():
         url = parse_url(f"softmotion+modbus-tcp://127.0.0.1:{port}")
-        client = open_modbus(url, timeout_s=0.3)
-        with pytest.raises(TransportTimeoutError):
+        client = open_modbus(url, timeout_s=60.0)
+        with pytest.raises(RemoteProtocolError) as caught:
             client.read_input(0, 1)
+    assert caught.value.remedy
+    assert len(str(caught.value)) < 1000
+    if stray == "frames of other requests":
+        assert "sends without an end" in caught.value.what
+
+
+@contextlib.contextmanager
+def flooded_line(flood: bytes, *, answers: bool) -> Iterator[str]:
+    """A pseudo terminal whose far end sends without an end, at once or after one request."""
+    far, near = os.openpty()
+    tty.setraw(near)
+    over = threading.Event()
+
+    def serve() -> None:
+        with contextlib.suppress(OSError):
+            if answers:
+                # Unit 1 is in step after the answer to its opening question: three registers.
+                os.read(far, 256)
+                os.write(far, rtu(words(1, 2, 3, function=3)))
+                os.read(far, 256)
+            while not over.is_set():
+                if select.select([], [far], [], 0.1)[1]:
+                    os.write(far, flood)
+
+    os.set_blocking(far, True)
+    thread = threading.Thread(target=serve, daemon=True)
+    thread.start()
+    try:
+        yield os.ttyname(near)
+    finally:
+        over.set()
+        termios.tcflush(near, termios.TCIOFLUSH)
+        thread.join(timeout=SOON_S)
+        os.close(far)
+        os.close(near)
+
+
+LINE_FLOODS = {
+    "frames of another unit": rtu(words(*range(100)), unit=9),
+    "nothing but zeros": bytes(256),
+}
+
+
+@pytest.mark.parametrize("answers", [False, True], ids=["from the beginning", "later"])
+@pytest.mark.parametrize("flood", LINE_FLOODS)
+def test_a_serial_line_that_floods_is_named_at_once(flood, answers):
+    with flooded_line(LINE_FLOODS[flood], answers=answers) as device, little_is_held():
+        url = parse_url(f"softmotion+modbus-rtu://{device}?baud=19200&parity=none&stopbits=1")
+        with pytest.raises(RemoteProtocolError) as caught:
+            client = open_modbus(url, timeout_s=60.0)
+            with contextlib.closing(client):
+                client.read_input(0, 1)
+    what = caught.value.what
+    assert caught.value.remedy
+    if not answers:
+        assert "does not fall silent" in what
+    elif flood == "frames of another unit":
+        assert "sends without an end" in what
 
 
 def test_a_can_node_that_floods_is_named_before_anything_is_sent(monkeypatch):

@@ -1,7 +1,7 @@
 """Two operators on one PLC: the lease of a shared journal, the ownership, and the comparison.
 
-Two PCs that share no journal are kept apart by the PLC alone (faults_and_speed.md F46, F47). Of
-all orders in which two take their steps a sample is followed; ``ROBOLINK_ALL_KILL_POINTS=1``
+Two PCs that share no journal are kept apart by the PLC alone (docs/reference/faults.md F46, F47).
+Of all orders in which two take their steps a sample is followed; ``ROBOLINK_ALL_KILL_POINTS=1``
 follows all. ``pytest -s`` shows how many there are.
 """
 
@@ -88,7 +88,7 @@ def test_a_frozen_owner_whose_mailbox_was_taken_writes_nothing_when_it_comes_bac
     ann.thaw()
     refused = ann.end()
     # Her block went out, and the PLC refused it. If her first look shows his acknowledgement
-    # still, the write is unknown to her (design part 7).
+    # still, the write is unknown to her (docs/mailbox.md).
     assert refused.how in {"RejectedError", "OutcomeUnknownError"}
     assert "another client" in refused.said
     assert cell.values_written() == [BOBS]

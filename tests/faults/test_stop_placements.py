@@ -3,7 +3,7 @@
 A point is a kind of checkpoint (a lock, an exchange, a commit, a question, a step), what goes on
 there, and the step of the procedure. After the acknowledgement there is no movement, no output,
 no write and no success, except that tool, power and speed are put back and each tool of an open
-change once (design part 4).
+change once (docs/reference/rules.md 5).
 
 By default a sample is taken. ``ROBOLINK_ALL_KILL_POINTS=1`` takes all; ``pytest -s`` counts them.
 """
@@ -67,7 +67,7 @@ def check_nothing_went_on(cell: RecipeCell, ended: Ended, rest: AtRest) -> None:
     assert all(count == 1 for count in after.values()), after
     for tool in after:
         assert cell.tools()[tool] == cell.before[tool], "a write that is no roll-back"
-    # A value that could not be put back outranks the stop (design part 5).
+    # A value that could not be put back outranks the stop (docs/exit-codes.md).
     unproved = {marker.kind for marker in cell.open_markers()} - {MarkerKind.SELECTION}
     assert ended.code == (6 if unproved else 10), (ended.code, ended.err)
     if not cell.changed():

@@ -16,6 +16,9 @@ ROOT = Path(__file__).parents[2]
 
 IMPORT = re.compile(r"^ *(?:from (\w+)[\w.]* import |import (\w+)[\w.]*(?: as \w+)?$)", re.M)
 
+NEVER = ("dev", "docs")
+"""Extras for people who work on robolink; nothing of them is needed to use it."""
+
 CHOSEN = (
     "tests/contract/journal/test_journal_files.py",
     "tests/contract/journal/test_journal_databases.py",
@@ -41,7 +44,7 @@ def run_time_dependencies():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     extras = project["optional-dependencies"]
     lines = [*project["dependencies"]]
-    lines += [line for extra, wanted in extras.items() if extra != "dev" for line in wanted]
+    lines += [line for extra, wanted in extras.items() if extra not in NEVER for line in wanted]
     return [Requirement(line) for line in lines]
 
 

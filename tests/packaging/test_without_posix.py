@@ -1,4 +1,6 @@
-"""A chosen part of the suite in a Python that lacks what Windows lacks (design part 2).
+"""A chosen part of the suite in a Python that lacks what Windows lacks.
+
+Source: docs/reference/rules.md 10.
 
 What the library, the simulators and the command line use where it exists is taken away before
 anything of theirs is imported: modules cannot be imported, names are gone. pyserial chooses

@@ -85,7 +85,8 @@ class Bench:
         self.plc = PlcSimulator(self.map, seed=3)
         self.program = self.plc.program
         if confirmed:
-            confirm(identity, self.map, by="test", compared="1.x")
+            with self.connect() as controller:
+                confirm(controller.who().name, self.map, by="test", compared="1.x")
 
     def connect(self):
         """Return a driver; ``client`` of the bench is what it speaks through."""

@@ -91,6 +91,10 @@ class PlcLink:
         self.sent.append(tuple(words))
         self._exchange("write_command", lambda: self.plc.receive(changed))
 
+    @property
+    def whole_look_s(self) -> float:
+        return 0.0
+
     def read_head(self) -> MailboxHead:
         """Read the head."""
         words = self._exchange("read_head", self.plc.response)

@@ -1,6 +1,6 @@
 """A PLC mailbox in its documented DEVICE role.
 
-It plays design part 7 with the codec and nothing else: no kinematics, no path. A movement takes
+It plays docs/mailbox.md with the codec and nothing else: no kinematics, no path. A movement takes
 half a second and arrives where it was sent.
 """
 

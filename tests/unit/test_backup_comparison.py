@@ -150,7 +150,7 @@ OTHERS = {
 def test_another_controller_is_refused_by_what_it_says(what):
     with pytest.raises(ConfigError, match=what) as caught:
         require_same_controller(backup_of(state()), URL, OTHERS[what])
-    assert "--other-controller" in caught.value.remedy
+    assert "require_same_controller" in caught.value.remedy
 
 
 def test_the_same_robot_at_another_address_is_the_same():

@@ -92,7 +92,7 @@ def test_a_station_that_only_the_journal_knows_has_the_sensor_of_then():
     [
         ("mm_per_px = [[0.02, 0.0], [0.0, 0.02]]", "origin_mm", "goes with mm_per_px"),
         ("origin_mm = [1, 2]", "origin_mm", "goes with mm_per_px"),
-        ("mm_per_px = [[0.02, 0.0]]\norigin_mm = [1, 2]", "mm_per_px", "must hold 2"),
+        ("mm_per_px = [[0.02, 0.0]]\norigin_mm = [1, 2]", "mm_per_px", "must hold at least 2"),
         ("sensors = 'x'", "sensors", "is not known"),
     ],
 )
@@ -109,4 +109,4 @@ def test_a_camera_is_not_learnt_by_a_tip_but_with_one():
     here = Pose(0.0, 0.0, 0.0, 0.0)
     with pytest.raises(ConfigError) as refusal:
         learn_station(camera, here=here, tool=2, tip=ToolOffset())
-    assert "camera-affine --tool 2 --station CAM" in refusal.value.remedy
+    assert "camera-affine, with tool 2 at 'CAM'" in refusal.value.remedy

@@ -180,7 +180,7 @@ def test_names_and_arrays_keep_within_the_language_s_bounds():
         if form in ("global", "local"):
             for name, bound in DECLARED.findall(parts[1]):
                 assert len(name) <= 32
-                # One GetVariable gives at most 100 elements (epson.md 1.2 note 4).
+                # One GetVariable gives at most 100 elements (docs/reference/epson.md 1.2 note 4).
                 assert int(bound or 0) < 100
 
 

@@ -1,4 +1,4 @@
-"""The vectors of epson.md part 7, replayed through both roles."""
+"""The exchanges of docs/reference/epson.md 6, replayed through both roles."""
 
 import tomllib
 from pathlib import Path

@@ -3,8 +3,8 @@
 import pytest
 
 from robolink.errors import JournalError, LeaseHeldError, LeaseLostError
-from robolink.journal.leases.lease import BEAT_S
-from robolink.journal.leases.sightings import LEASE_S
+from robolink.journal._lease import BEAT_S
+from robolink.journal._sightings import LEASE_S
 from tests.unit._lease_logs import ANNA, BERT, HERE, IDENTITY, leases_in_memory, marker
 
 

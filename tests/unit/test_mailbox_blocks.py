@@ -96,7 +96,7 @@ def test_a_command_word_by_word():
 
 
 def test_the_probe_lies_low_word_first():
-    # softmotion.md 4.4
+    # docs/reference/softmotion.md 4.4
     assert encode_response(SNAPSHOT)[84:88] == (0xFEC5, 0x7BB2, 0xB0F2, 0x4028)
 
 

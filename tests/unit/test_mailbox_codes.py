@@ -26,7 +26,7 @@ from robolink.protocols.mailbox import (
     opcodes_of,
 )
 
-# softmotion.md 4.4
+# docs/reference/softmotion.md 4.4
 LOW_FIRST = (0xFEC5, 0x7BB2, 0xB0F2, 0x4028)
 
 

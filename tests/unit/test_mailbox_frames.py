@@ -74,13 +74,13 @@ def test_lengths_are_in_user_units(unit_um, expected):
 
 
 def test_the_numbers_worked_by_hand():
-    # softmotion.md 1.3: R(30, 40, 50) of the PLC, its tool axis
+    # docs/reference/softmotion.md 1.3: R(30, 40, 50) of the PLC, its tool axis
     u, v, w = from_frame((0, 0, 0, 30.0, 40.0, 50.0), unit_um=1000.0)[3:]
     assert uvw_matrix((u, v, w))[:, 2] == pytest.approx((0.556670, 0.321394, 0.766044), abs=1e-6)
 
 
 def test_angles_that_mean_the_same_are_the_same_frame():
-    # softmotion.md 1.3
+    # docs/reference/softmotion.md 1.3
     one = (1.0, 2.0, 3.0, 30.0, 0.0, 50.0)
     assert frames_match(one, (1.0, 2.0, 3.0, 80.0, 0.0, 0.0), tolerance=1e-9)
     assert frames_match(one, (1.0, 2.0, 3.0, 0.0, 0.0, 80.0), tolerance=1e-9)

@@ -26,7 +26,12 @@ def over_rtu(*steps, echo=False):
 
     line = ScriptedLine(first, *steps)
     settings = RtuLine(
-        silence_s=0.002, quiet_s=0.02, echo=echo, probe_area=Area.INPUT, probe_address=0
+        character_s=0.0005,
+        silence_s=0.002,
+        quiet_s=0.02,
+        echo=echo,
+        probe_area=Area.INPUT,
+        probe_address=0,
     )
     exchange = RtuExchange(line, IDENTITY, settings, RtuFraming())
     return line, ModbusClient(line, exchange, identity=IDENTITY, unit=1, timeout_s=1.0)
@@ -125,9 +130,24 @@ def test_frames_on_a_serial_line_keep_their_distance():
 def test_a_line_that_never_falls_silent_is_named():
     line, client = over_rtu()
     line.coming = [(step * 5_000_000, b"\xff") for step in range(1000)]
-    with pytest.raises(TransportTimeoutError, match="does not fall silent"):
+    with pytest.raises(RemoteProtocolError, match="does not fall silent"):
         client.read_input(0, 1)
     assert not line.sent
+    assert 0.98e9 < line.clock.time_ns < 1.1e9  # at the deadline: it is slow enough for that
+
+
+def test_frames_of_others_that_never_stop_are_named_after_few_of_them():
+    others = [(step / 1000, rtu(words(*range(100)), unit=9)) for step in range(500)]
+    line, client = over_rtu(lambda frame: others)
+    with pytest.raises(RemoteProtocolError, match="without an end"):
+        client.read_input(0, 1)
+    assert len(others) - len(line.coming) < 30
+
+
+def test_what_gathered_on_a_line_before_a_question_is_no_flood():
+    line, client = over_rtu(lambda frame: [rtu(words(42))])
+    line.coming.append((0, bytes(4095)))
+    assert client.read_input(0, 1) == (42,)
 
 
 def test_damage_on_a_serial_line_is_an_error_and_the_line_finds_its_place_again():

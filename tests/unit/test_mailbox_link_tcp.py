@@ -63,6 +63,16 @@ def test_frames_that_never_stop_do_not_move_the_deadline():
     assert line.clock.time_ns == 1_000_000_000
 
 
+def test_frames_that_come_in_a_flood_are_named_before_the_deadline():
+    stream = [(after / 1000, tcp(words(*range(100)), 99)) for after in range(500)]
+    line, client = over_tcp(lambda frame: stream)
+    with pytest.raises(RemoteProtocolError, match="without an end") as caught:
+        client.read_input(0, 1)
+    assert len(caught.value.raw) <= 256
+    assert line.closed
+    assert len(stream) - len(line.coming) < 100
+
+
 @pytest.mark.parametrize(
     "answer",
     [tcp(words(1, 2), 1), tcp(words(1, function=3), 1), tcp(words(1), 1, unit=1)],

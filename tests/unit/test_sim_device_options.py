@@ -4,7 +4,7 @@ from dataclasses import fields
 
 import pytest
 from robolink_simulators.epson import EpsonOptions
-from robolink_simulators.epson.option_text import option_names, options_from_text
+from robolink_simulators.epson.options import option_names, options_from_text
 
 from robolink.errors import ConfigError
 

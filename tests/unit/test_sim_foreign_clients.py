@@ -1,6 +1,6 @@
 """What clients written by others send, and what real controllers answered them.
 
-The requests are those of public clients and transcripts (epson_corrections.md 1 to 5).
+The requests are those of public clients and transcripts (docs/reference/epson.md 1.10, 5).
 """
 
 import pytest

@@ -126,7 +126,8 @@ def test_every_row_says_where_it_comes_from():
 
 
 def test_the_pulse_ranges_of_the_t_series_are_those_of_the_data_sheet():
-    # epson.md 4: T3-B J1 -95574..505174, J2 +-320854; T6-B J1 -152918..808278, J2 +-341334.
+    # docs/reference/epson.md 4: T3-B J1 -95574..505174, J2 +-320854; T6-B J1 -152918..808278, J2
+    # +-341334.
     for name, j1, j2 in (
         ("T3-401S", (-95574, 505174), 320854),
         ("T6-602S", (-152918, 808278), 341334),

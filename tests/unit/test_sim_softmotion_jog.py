@@ -1,4 +1,4 @@
-"""Jogging of a simulated axis group; numbers are those of softmotion.md 7."""
+"""Jogging of a simulated axis group; numbers are those of docs/reference/softmotion.md 5."""
 
 from dataclasses import dataclass
 from itertools import pairwise

@@ -2,7 +2,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from robolink_simulators.softmotion import BlockRefused, CoordRef, ErrorKind, machine_named
-from robolink_simulators.softmotion.kinematics.catalogue import NAMES, parameter_names
+from robolink_simulators.softmotion.catalogue import NAMES, parameter_names
 from robolink_simulators.softmotion.kinematics.coupled import CAxis, Coupled, scara3_z
 from robolink_simulators.softmotion.kinematics.five_axes import FiveAxes
 from robolink_simulators.softmotion.kinematics.frames import (

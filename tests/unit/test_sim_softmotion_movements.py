@@ -15,7 +15,7 @@ from robolink_simulators.softmotion import (
     Target,
     machine_named,
 )
-from robolink_simulators.softmotion.kinematics.catalogue import NAMES
+from robolink_simulators.softmotion.catalogue import NAMES
 from robolink_simulators.softmotion.kinematics.frames import Z_AXIS, turned
 from robolink_simulators.softmotion.kinematics.kinematics import Configuration
 

@@ -45,7 +45,7 @@ def test_buffered_movements_run_one_after_another():
 @pytest.mark.parametrize("mode", BLENDING)
 @pytest.mark.parametrize("line", [True, False])
 def test_a_blended_corner_is_smooth_and_the_second_movement_counts_as_active(mode, line):
-    """The second is active from the start of the blend (softmotion.md 2.1)."""
+    """The second is active from the start of the blend (docs/reference/softmotion.md 2.1)."""
     group = standing()
     corner = shifted(group, x_mm=-40) if line else in_axes(50, 30, 0, 0)
     end = shifted(group, x_mm=-40, z_mm=30) if line else in_axes(50, 60, 0, 40)

@@ -1,4 +1,4 @@
-"""Stop and halt of a simulated axis group; numbers are those of softmotion.md 7."""
+"""Stop and halt of a simulated axis group; numbers are those of docs/reference/softmotion.md 5."""
 
 import pytest
 from robolink_simulators.softmotion import (

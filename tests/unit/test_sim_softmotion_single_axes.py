@@ -1,4 +1,4 @@
-"""Axes of a group that move alone; numbers are those of softmotion.md 7."""
+"""Axes of a group that move alone; numbers are those of docs/reference/softmotion.md 5."""
 
 import pytest
 from robolink_simulators.softmotion import (

@@ -1,4 +1,4 @@
-"""Tools of a simulated axis group; numbers are those of softmotion.md 7."""
+"""Tools of a simulated axis group; numbers are those of docs/reference/softmotion.md 5."""
 
 from dataclasses import dataclass
 
@@ -15,7 +15,7 @@ from robolink_simulators.softmotion import (
     ToolInForce,
     machine_named,
 )
-from robolink_simulators.softmotion.kinematics.catalogue import NAMES
+from robolink_simulators.softmotion.catalogue import NAMES
 from robolink_simulators.softmotion.kinematics.frames import zyz
 from robolink_simulators.softmotion.kinematics.positions import Gantry3
 
@@ -99,7 +99,10 @@ def test_a_polar_kinematics_takes_shifts_along_z_only():
 
 @pytest.mark.parametrize("name", [n for n in NAMES if n not in ("Kin_Scara2_Z", "Kin_Polar_Z")])
 def test_a_kinematics_whose_orientation_is_known_takes_any_tool(name):
-    """Behaviour 7, and a C axis behind an arm lifts its restriction (softmotion.md 0.3)."""
+    """Behaviour 7, and a C axis behind an arm lifts its restriction.
+
+    Source: docs/reference/softmotion.md 3.1.
+    """
     group = standing(name)
     assert set_to(group, 1, 2, 3, 4, 5, 6).outputs.done
     assert shift_of(group) == (1, 2, 3)

@@ -1,4 +1,4 @@
-"""Expressions and Print; the checks of the language reference, part 15, by number."""
+"""Expressions and Print; the checks of docs/reference/spel.md 15, by number."""
 
 import os
 import random

@@ -1,4 +1,4 @@
-"""Motion statements and settings; the checks of the language reference, part 15."""
+"""Motion statements and settings; the checks of docs/reference/spel.md 15."""
 
 import random
 

@@ -1,4 +1,4 @@
-"""Points, locals, tools and switches; the checks of the language reference, part 15."""
+"""Points, locals, tools and switches; the checks of docs/reference/spel.md 15."""
 
 import random
 
@@ -126,7 +126,7 @@ def test_a_turned_local_turns_points(window):
 
 
 def test_here_is_printed_as_a_real_controller_prints_it(window):
-    # The layout of the captured "print realpos" (epson.md 7, vector 10).
+    # The layout of the captured "print realpos" (docs/reference/epson.md 6, vector 10).
     assert window("Print Here") == (
         " X:  158.634 Y:  495.439 Z:    0.000 U:    0.000 V:    0.000 W:    0.000 /R /0\r\n"
     )

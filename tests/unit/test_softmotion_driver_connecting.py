@@ -1,4 +1,4 @@
-"""Meeting a PLC mailbox: version, probe, heartbeat, whole snapshots (design part 7)."""
+"""Meeting a PLC mailbox: version, probe, heartbeat, whole snapshots (docs/mailbox.md)."""
 
 import re
 from collections.abc import Iterator

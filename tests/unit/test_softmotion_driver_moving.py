@@ -1,4 +1,7 @@
-"""Movements of an axis group: marked, sent once, kept alive by whoever waits (design part 7)."""
+"""Movements of an axis group: marked, sent once, kept alive by whoever waits.
+
+Source: docs/mailbox.md, "Movements".
+"""
 
 import signal
 import threading

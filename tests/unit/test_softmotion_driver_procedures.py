@@ -4,8 +4,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from robolink.controllers import _connect, connect
-from robolink.controllers.softmotion import SoftMotionController
+from robolink.controllers import connect
+from robolink.controllers.softmotion import SoftMotionController, opening
 from robolink.errors import (
     ConfigError,
     ConnectError,
@@ -103,7 +103,7 @@ def test_a_runner_moves_and_jogs_the_group(controller):
 
 
 def test_a_softmotion_url_leads_to_a_mailbox(cell, monkeypatch):
-    monkeypatch.setattr(_connect, "open_mailbox_link", lambda *_args, **_options: cell.link)
+    monkeypatch.setattr(opening, "open_mailbox_link", lambda *_args, **_options: cell.link)
     with connect("softmotion+modbus-tcp://192.0.2.1") as controller:
         assert isinstance(controller, SoftMotionController)
         assert controller.identity == cell.link.identity
@@ -111,7 +111,7 @@ def test_a_softmotion_url_leads_to_a_mailbox(cell, monkeypatch):
 
 
 def test_a_mailbox_that_does_not_run_is_not_reached(cell, monkeypatch):
-    monkeypatch.setattr(_connect, "open_mailbox_link", lambda *_args, **_options: cell.link)
+    monkeypatch.setattr(opening, "open_mailbox_link", lambda *_args, **_options: cell.link)
     cell.plc.frozen = True
     with pytest.raises(ConnectError):
         connect("softmotion+modbus-tcp://192.0.2.1")

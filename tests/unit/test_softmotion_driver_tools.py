@@ -1,4 +1,7 @@
-"""The tool slots of a PLC: compare-and-set, read back from slot and axis group (design part 4)."""
+"""The tool slots of a PLC: compare-and-set, read back from slot and axis group.
+
+Source: docs/reference/rules.md 2.
+"""
 
 from collections.abc import Iterator
 from contextlib import suppress

@@ -190,7 +190,11 @@ def test_a_nearer_file_adds_stations_and_takes_none_away(tmp_path, monkeypatch):
             "cells.a.stations.S.input",
             "is missing",
         ),
-        ('kind = "beams"\nz_mm = 1.0\nbeams = []', "cells.a.stations.S.beams", "must hold 2"),
+        (
+            'kind = "beams"\nz_mm = 1.0\nbeams = []',
+            "cells.a.stations.S.beams",
+            "must hold at least 2",
+        ),
     ],
 )
 def test_what_is_wrong_with_a_station_is_told_by_its_key(file, text, where, what):

@@ -135,7 +135,7 @@ def test_a_change_that_was_taken_back_is_not_undone_again(cell, controller):
 def test_without_a_finished_change_there_is_nothing_to_undo(controller):
     with pytest.raises(ConfigError, match="No finished change") as caught:
         plan_undo(controller)
-    assert "journal list" in caught.value.remedy
+    assert "EntryKind.DONE" in caught.value.remedy
 
 
 @pytest.mark.parametrize("number", [1, 10**9])

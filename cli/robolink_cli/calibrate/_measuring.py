@@ -3,13 +3,18 @@
 from dataclasses import replace
 from math import isfinite
 
+import click
+
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.methods import AnyMethod, MethodParameters, Site
 from robolink.model import Controller, EntryKind
 from robolink.stations import Station, StationKind, find_stations
 from robolink_cli.calibrate._frame import Frame
+from robolink_cli.calibrate._given import calibrate_from_poses
+from robolink_cli.calibrate._live import calibrate_live
 from robolink_cli.calibrate._stations import station_at
+from robolink_cli.options.motion import refuse_motion_options
 from robolink_cli.options.pose_source import PoseSource
 
 
@@ -56,9 +61,13 @@ def calibrate_with(
 
     from_poses = method.from_poses
     if poses is not None and from_poses is not None:
-        frame.solve(poses, lambda controller: from_poses(parameters, site(controller)))
+        refuse_motion_options(click.get_current_context())
+        calibrate_from_poses(
+            frame, poses, lambda controller: from_poses(parameters, site(controller))
+        )
         return
-    frame.measure(lambda controller: method.source(parameters, site(controller)))
+    frame.require_something_to_show()
+    calibrate_live(frame, lambda controller: method.source(parameters, site(controller)))
 
 
 def _station(

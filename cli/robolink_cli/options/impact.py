@@ -9,9 +9,9 @@ import click
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink_cli.access.capabilities import points_of
 from robolink_cli.console.render import say, table
 from robolink_cli.options.pose_source import point_numbers
-from robolink_cli.session.capabilities import points_of
 
 if TYPE_CHECKING:
     from robolink.calibration import Impact
@@ -74,7 +74,7 @@ def judge(
     """Return what the change does at ``points``.
 
     ``None`` when no points were asked for, or when the tool was undefined: a program cannot
-    have driven to them with it (epson.md 1.5).
+    have driven to them with it (docs/reference/epson.md 1.5).
     """
     from robolink.calibration import impact_on
 

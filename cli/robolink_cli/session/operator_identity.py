@@ -12,7 +12,7 @@ from robolink_cli.console.render import json_is_on
 from robolink_cli.options.line import LINE
 
 if TYPE_CHECKING:
-    from robolink.config import Cell
+    from robolink.config import Expected
     from robolink.model import Signature
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -34,7 +34,7 @@ def nozzle_options(function: F) -> F:
     return function
 
 
-def signature_of(operator: str | None, cell: "Cell | None", *, changes: bool) -> "Signature":
+def signature_of(operator: str | None, cell: "Expected | None", *, changes: bool) -> "Signature":
     """Return who works here, with the role that the cell file gives.
 
     Where the cell names people, a change asks for a badge on a terminal; who is not known
@@ -42,7 +42,7 @@ def signature_of(operator: str | None, cell: "Cell | None", *, changes: bool) ->
 
     Args:
         operator: The badge or name that was given.
-        cell: The cell, if ``-c`` named one.
+        cell: What the cell file says, if ``-c`` named a cell.
         changes: Whether the command may change something.
 
     Raises:
@@ -53,7 +53,7 @@ def signature_of(operator: str | None, cell: "Cell | None", *, changes: bool) ->
     from robolink.journal import signature_here
     from robolink.model import Role
 
-    people = cell.settings.people if cell else None
+    people = cell.people if cell else None
     here = signature_here(__version__)
     if people is None:
         return replace(here, operator=operator or "")
@@ -70,7 +70,7 @@ def signature_of(operator: str | None, cell: "Cell | None", *, changes: bool) ->
 
 
 def _asked_for_badge() -> str:
-    from robolink_cli.prompts.consent import asked_for_text, on_terminal
+    from robolink_cli.prompts.questions import asked_for_text, on_terminal
 
     if json_is_on() or not on_terminal():
         return ""

@@ -3,7 +3,7 @@
 What a program on another computer, or one with another state folder, left behind is in no
 journal here; the controller shows it. A calibration that was killed leaves Tool 0 selected: the
 next movement would be that of the flange, and the next program would drive the flange where the
-nozzle tip belongs (epson.md 3.1).
+nozzle tip belongs (docs/reference/epson.md 3.1).
 """
 
 from contextlib import suppress
@@ -16,28 +16,28 @@ from robolink.model import EntryKind
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from robolink.config import Cell
+    from robolink.config import Expected
     from robolink.model import Controller
 
 
-def doubt_about(selected: int | None, controller: "Controller", cell: "Cell | None") -> str:
+def doubt_about(selected: int | None, controller: "Controller", cell: "Expected | None") -> str:
     """Return why the selected tool may be a wrong one, one sentence; empty for no doubt.
 
     Args:
         selected: The selected tool, ``None`` where the controller does not tell.
         controller: The controller, connected.
-        cell: The cell, if one was named.
+        cell: What the cell file says, if a cell was named.
     """
     if selected is None:
         return ""
-    if cell is not None and cell.settings.tool is not None:
-        if cell.settings.tool == selected:
+    if cell is not None and cell.tool is not None:
+        if cell.tool == selected:
             return ""
         return tr(
             "Tool {selected} is selected, but the cell {cell} works with tool {tool}.",
             selected=selected,
-            cell=cell.name,
-            tool=cell.settings.tool,
+            cell=cell.cell,
+            tool=cell.tool,
         )
     before = _of_the_last_procedure(controller) if selected == 0 else 0
     if not before:
@@ -49,7 +49,7 @@ def doubt_about(selected: int | None, controller: "Controller", cell: "Cell | No
     )
 
 
-def heed_selection(controller: "Controller", cell: "Cell | None", *, yes: bool) -> None:
+def heed_selection(controller: "Controller", cell: "Expected | None", *, yes: bool) -> None:
     """Ask before something moves in a tool that may be a wrong one.
 
     ``--yes`` was given before anybody could know of it, so it is no answer.
@@ -58,7 +58,7 @@ def heed_selection(controller: "Controller", cell: "Cell | None", *, yes: bool) 
         DeclinedError: The answer was no, or nobody could be asked.
     """
     from robolink_cli.console.render import json_is_on
-    from robolink_cli.prompts.consent import asked, on_terminal
+    from robolink_cli.prompts.questions import asked, on_terminal
 
     if controller.outcomes.open_markers():
         return  # which block it, and say more
@@ -77,14 +77,14 @@ def heed_selection(controller: "Controller", cell: "Cell | None", *, yes: bool) 
 
 
 def note_doubts(
-    payload: "Mapping[str, object]", controller: "Controller", cell: "Cell | None"
+    payload: "Mapping[str, object]", controller: "Controller", cell: "Expected | None"
 ) -> None:
     """Say, beside the state of a controller, what other programs seem to have left on it.
 
     Args:
         payload: The state, as ``status`` shows it.
         controller: The controller, connected; nothing was sent but questions.
-        cell: The cell, if one was named.
+        cell: What the cell file says, if a cell was named.
     """
     from robolink_cli.console.render import note
 

@@ -2,28 +2,34 @@
 
 from typing import TYPE_CHECKING
 
-from robolink.errors import ConfigError, DeclinedError, StoppedError
+from robolink.errors import ConfigError, DeclinedError, RobolinkError, StoppedError
 from robolink.messages import tr
+from robolink.model import is_own_name
 from robolink.stopping import StopNote, clear_note, far_end_of, find_note
 from robolink_cli.console.render import note
 
 if TYPE_CHECKING:
-    from robolink_cli.session.context import CliContext
+    from robolink.model import Controller
     from robolink_cli.stopping.request import StopRequest
 
 
-def heed_stop(url: str, *, yes: bool) -> None:
+def heed_stop(url: str, controller: "Controller", *, yes: bool) -> None:
     """Show who stopped this controller, before anything moves; ask, and take the note away.
+
+    Args:
+        url: How it was reached.
+        controller: The controller, connected; it is asked who it is.
+        yes: Whether the answer was given beforehand.
 
     Raises:
         StoppedError: There is a note, and nobody is asked: ``--yes`` was given for a cell that
             nobody had stopped, or there is no terminal.
         DeclinedError: The answer was no.
     """
-    from robolink_cli.prompts.consent import asked, on_terminal
+    from robolink_cli.prompts.questions import asked, on_terminal
 
-    keys = far_end_of(url)
-    found = find_note(keys)
+    keys, name = far_end_of(url), own_name_of(controller)
+    found = find_note(keys, name)
     if found is None:
         return
     if yes or not on_terminal():
@@ -38,12 +44,40 @@ def heed_stop(url: str, *, yes: bool) -> None:
     note(found.sentence)
     if not asked(tr("Has that been looked into, and may the robot move again?")):
         raise DeclinedError(tr("You said no."), remedy=tr("Nothing was sent."))
-    _clear(keys)
+    _clear(keys, name)
 
 
-def forget_stop(context: "CliContext") -> None:
-    """Take the note away after a reset, which a person asked for."""
-    _clear(far_end_of(context.require_url()))
+def forget_stop(url: str, name: str) -> None:
+    """Take the note away after a reset, which a person asked for.
+
+    Args:
+        url: How the controller was reached.
+        name: Its own name (:func:`own_name_of`).
+    """
+    _clear(far_end_of(url), name)
+
+
+def own_name_of(controller: "Controller") -> str:
+    """Return what a controller calls itself; empty where it does not, or nobody can tell."""
+    try:
+        name = controller.outcomes.identity
+    except RobolinkError:
+        return ""  # a broken journal, or a link that the next exchange will tell of
+    return name if is_own_name(name) else ""
+
+
+def last_known(url: str) -> str:
+    """Return who was met last at the address of a URL, as far as the journal says."""
+    from robolink.journal import default_location, may_exist, open_journal
+    from robolink.transport import parse_url
+
+    try:
+        if not may_exist(default_location()):
+            return ""
+        name = open_journal(read_only=True).log(parse_url(url).address).identity
+    except RobolinkError:
+        return ""
+    return name if is_own_name(name) else ""
 
 
 def release_stop(request: "StopRequest", *, yes: bool) -> dict[str, object]:
@@ -53,14 +87,15 @@ def release_stop(request: "StopRequest", *, yes: bool) -> dict[str, object]:
         ConfigError: No controller is named, or the note cannot be taken away.
         DeclinedError: The answer was no.
     """
-    from robolink_cli.prompts.consent import agree
+    from robolink_cli.prompts.questions import agree
 
-    keys = far_end_of(url_of(request))
-    found = find_note(keys)
+    url = url_of(request)
+    keys, name = far_end_of(url), last_known(url)
+    found = find_note(keys, name)
     if found is not None:
         note(found.sentence)
         agree(tr("Has that been looked into, and may the robot move again?"), yes=yes)
-        _clear(keys)
+        _clear(keys, name)
     return {"released": found is not None, "note": _plain(found)}
 
 
@@ -70,7 +105,7 @@ def url_of(request: "StopRequest") -> str:
     Raises:
         ConfigError: No controller is named, or no cell file has it.
     """
-    from robolink_cli.session.cell import is_cell_name
+    from robolink_cli.access.cell import is_cell_name
 
     if not request.named:
         raise ConfigError(
@@ -84,9 +119,9 @@ def url_of(request: "StopRequest") -> str:
     return reach_cell(request.named).url
 
 
-def _clear(keys: frozenset[str]) -> None:
+def _clear(keys: frozenset[str], name: str) -> None:
     try:
-        clear_note(keys)
+        clear_note(keys, name)
     except OSError as error:
         raise ConfigError(
             tr("The note of the stop stays: {cause}.", cause=error.strerror or error),

@@ -88,6 +88,8 @@ class Telling:
 
     def _noted(self) -> list[str]:
         outcome = self._outcome
+        from robolink_cli.stopping.notes import last_known
+
         if "+sim://" in outcome.url:
             return []  # it ends with this process, and nobody else moves it
         try:
@@ -96,6 +98,8 @@ class Telling:
                 _shown(outcome.url),
                 who_asks(self._request),
                 confirmed=outcome.error is None,
+                controller=outcome.controller,
+                last_known="" if outcome.controller else last_known(outcome.url),
             )
         except OSError as error:
             return [
@@ -110,7 +114,7 @@ class Telling:
     def _recorded(self) -> list[str]:
         if not self._request.record:
             return []
-        from robolink_cli.session.recording import recording
+        from robolink_cli.access.recording import recording
 
         try:
             with recording(self._request.record, _shown(self._outcome.url)) as trace:
@@ -134,7 +138,7 @@ class Telling:
             open_now = log.open_markers()
         except JournalError as error:
             return [error.what]
-        from robolink_cli.session.warnings import marker_notice, note_at_work
+        from robolink_cli.access.warnings import marker_notice, note_at_work
 
         if open_now and note_at_work(log, self._request.named):
             return []

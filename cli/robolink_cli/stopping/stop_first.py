@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
 
-from robolink.controllers import press_the_button, stop_now
+from robolink.controllers import stop_now
 from robolink.errors import (
     ConfigError,
     ConnectError,
@@ -39,6 +39,8 @@ class StopOutcome:
         holder: Who stopped it for us; empty when this process did.
         error: Why it is not confirmed.
         keys: The far end.
+        controller: Which controller it is, as it said itself once it stood; empty where it
+            did not.
         doubts: What was wrong on the way, and did not keep the stop back.
         heard: What went over the connection: time, direction, bytes; without the login.
     """
@@ -48,6 +50,7 @@ class StopOutcome:
     holder: str = ""
     error: BaseException | None = None
     keys: frozenset[str] = frozenset()
+    controller: str = ""
     doubts: list[str] = field(default_factory=list)
     heard: "list[tuple[int, Direction, bytes]]" = field(default_factory=list)
 
@@ -64,7 +67,10 @@ def stop_first(request: StopRequest) -> StopOutcome:
     try:
         _stop(request, outcome)
     except RobolinkError as error:
-        outcome.error = press_the_button(error)
+        # Here, because a stop that is taken needs none of it.
+        from robolink.controllers import advise_emergency_stop
+
+        outcome.error = advise_emergency_stop(error)
     except (Exception, KeyboardInterrupt) as error:
         outcome.error = error
     return outcome
@@ -106,7 +112,7 @@ def _stop(request: StopRequest, outcome: StopOutcome) -> None:
         try:
             _directly(request, outcome, password_file, password_env)
         except RobolinkError:
-            if not _through_holder(request, outcome):
+            if not _through_holder(request, outcome, also=_last_known(outcome.url)):
                 raise
         else:
             _through_holder(request, outcome)
@@ -117,14 +123,40 @@ def _stop(request: StopRequest, outcome: StopOutcome) -> None:
     try:
         _directly(request, outcome, password_file, password_env)
     except ConnectError as error:
-        raise (refusals or [error])[0] from error
+        if not _through_holder(request, outcome, also=_last_known(outcome.url)):
+            raise (refusals or [error])[0] from error
+    else:
+        # Whoever has it by another address, a PLC over the network, hears of it now.
+        _through_holder(request, outcome)
+
+
+def _last_known(url: str) -> str:
+    """Return who was met last at an address that does not answer; the journal is read for that.
+
+    Nothing is kept back by it: the stop was tried at the address itself before.
+    """
+    from robolink_cli.stopping.notes import last_known
+
+    return last_known(url)
 
 
 def _through_holder(
-    request: StopRequest, outcome: StopOutcome, refusals: list[RobolinkError] | None = None
+    request: StopRequest,
+    outcome: StopOutcome,
+    refusals: list[RobolinkError] | None = None,
+    *,
+    also: str = "",
 ) -> bool:
-    """Let whoever has the controller on this computer stop it; False when nobody did."""
-    for holder in holders_of(outcome.keys):
+    """Let whoever has the controller on this computer stop it; False when nobody did.
+
+    Args:
+        request: What was asked for.
+        outcome: Tells the far end and the controller, and takes what becomes of it.
+        refusals: Takes why one could not stop it.
+        also: The controller's own name, where it is not known from itself.
+    """
+    names = {name for name in (outcome.controller, also) if name}
+    for holder in holders_of(outcome.keys | names):
         try:
             state = holder.ask_to_stop(who_asks(request))
         except HolderGoneError:
@@ -135,11 +167,15 @@ def _through_holder(
             continue
         outcome.state = outcome.state or state
         outcome.holder = holder.who or tr("process {pid}", pid=holder.pid)
+        outcome.controller = outcome.controller or holder.controller
         return True
     return False
 
 
 def _directly(request: StopRequest, outcome: StopOutcome, file: str, variable: str) -> None:
+    def met(name: str) -> None:
+        outcome.controller = name
+
     refused: LoginRefusedError | None = None
     for password in _passwords(outcome, file, variable):
         try:
@@ -148,6 +184,7 @@ def _directly(request: StopRequest, outcome: StopOutcome, file: str, variable: s
                 password=password,
                 timeout_s=request.timeout_s,
                 trace=(lambda *passage: outcome.heard.append(passage)) if request.record else None,
+                met=met,
             )
         except LoginRefusedError as error:
             refused = refused or error
@@ -163,7 +200,7 @@ def _passwords(outcome: StopOutcome, file: str, variable: str) -> Iterator[str]:
     if not outcome.url.startswith("epson+"):
         yield ""
         return
-    from robolink_cli.session.password import from_keyring, from_places
+    from robolink_cli.access.password import from_keyring, from_places
 
     try:
         near = from_places(file or None, variable or None)

@@ -2,7 +2,7 @@
 
 Two fiducials (EPSON's CalcBoardTool): the origin is the middle between them and the
 direction runs from the second to the first. A drawing that runs from 1 to 2 is off by
-180 degrees (calibration.md 1.3).
+180 degrees (docs/reference/calibration.md 1.3).
 """
 
 import math
@@ -18,7 +18,7 @@ from robolink.model import ToolOffset
 LEAST_SPACING_MM = 5.0
 
 SPACING_TOLERANCE = 0.01
-"""Largest relative difference from the nominal spacing (calibration.md 6)."""
+"""Largest relative difference from the nominal spacing (docs/reference/calibration.md 3)."""
 
 
 def solve_board(

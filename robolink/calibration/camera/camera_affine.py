@@ -1,8 +1,8 @@
 """Camera and tool offset together, from pixels, with a camera whose place is unknown.
 
 Every picture says ``M px + b = p + Rz(U) t``: linear in the matrix M, the origin b and the
-offset t, eight unknowns in all (calibration.md 2). Moving without turning shows M, turning
-shows t; without turning, t and b cannot be told apart.
+offset t, eight unknowns in all (docs/reference/calibration.md 2.5). Moving without turning shows M,
+turning shows t; without turning, t and b cannot be told apart.
 """
 
 import math

@@ -2,7 +2,8 @@
 
 What the camera is off by is the same in all looks, while the offset turns with the tool: so
 both are told apart. With the tip seen at s, flange p and R = Rz(U), ``p - s + R t`` is one
-point, and the least squares are those of a pin touched at several angles (calibration.md 2).
+point, and the least squares are those of a pin touched at several angles
+(docs/reference/calibration.md 2.1).
 """
 
 from collections.abc import Sequence

@@ -7,7 +7,7 @@ With z = exp(iU), what a camera sees of the tip about the flange is
 c is where the camera believes the axis to be off; t is the constant offset that a tool holds,
 and for a tip on the axis its runout; e makes the circle an ellipse (camera scale, or a tilted
 view), and s comes from a bearing or a bent shaft. Only t belongs into a tool
-(calibration.md 2).
+(docs/reference/calibration.md 2.8).
 """
 
 import math

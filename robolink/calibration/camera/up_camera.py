@@ -2,7 +2,7 @@
 
 The camera tells where the tip is in the base, the controller where the flange is:
 ``t = Rz(-U) (tip - flange)``. In this form there is no Atan2(0, 0) and no order of its
-arguments to get wrong (calibration.md 1.2).
+arguments to get wrong (docs/reference/calibration.md 1.2).
 """
 
 from dataclasses import dataclass

@@ -9,7 +9,7 @@ def flange_pose(tip: Pose, offset: ToolOffset) -> Pose:
     """Return where the flange is when a four-axis robot's tool tip is at ``tip``.
 
     ``tip = flange + Rz(U) t`` and the tip's U is the flange's U plus the tool's
-    (epson.md 3.1).
+    (docs/reference/epson.md 3.1).
     """
     u_deg = tip.u_deg - offset.u_deg
     dx, dy = rotate_xy(offset.x_mm, offset.y_mm, u_deg)
@@ -27,7 +27,7 @@ def tilted_flange_pose(tip: Pose, offset: ToolOffset) -> Pose:
     """Return where the flange is when a six-axis robot's tool is at ``tip``.
 
     The tool's orientation is the flange's followed by the offset's own: ``R_tip = R R_tool``,
-    ``tip = flange + R t`` (epson.md 3.1).
+    ``tip = flange + R t`` (docs/reference/epson.md 3.1).
     """
     from robolink.calibration.core.rotations import (  # numpy, which four axes do without
         rotation_of,

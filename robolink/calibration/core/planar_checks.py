@@ -1,4 +1,7 @@
-"""What makes flange poses unfit for a planar calibration, by name (calibration.md 6)."""
+"""What makes flange poses unfit for a planar calibration, by name.
+
+Source: docs/reference/calibration.md 3.
+"""
 
 import math
 from collections.abc import Sequence

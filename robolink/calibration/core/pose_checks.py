@@ -1,4 +1,4 @@
-"""What makes poses and other numbers unfit, by name (calibration.md 6)."""
+"""What makes poses and other numbers unfit, by name (docs/reference/calibration.md 3)."""
 
 import math
 from collections.abc import Sequence
@@ -9,7 +9,7 @@ from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
 
 MAX_OFFSET_MM = 1000.0
-"""A tool longer than this is taken for a mistake (calibration.md 6)."""
+"""A tool longer than this is taken for a mistake (docs/reference/calibration.md 3)."""
 
 _METRES_BELOW = 2.0
 
@@ -88,7 +88,7 @@ def _check_finite(poses: Sequence[Pose]) -> None:
 
 def _check_units(poses: Sequence[Pose]) -> None:
     # A flange of a robot that reaches over 100 mm never stays within 2 mm of its own base
-    # axis; the size of the offset says nothing (design part 5).
+    # axis; the size of the offset says nothing (docs/reference/calibration.md 3).
     if all(abs(p.x_mm) < _METRES_BELOW and abs(p.y_mm) < _METRES_BELOW for p in poses):
         raise CalibrationError(
             "suspect_units",

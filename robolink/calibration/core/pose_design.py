@@ -1,7 +1,8 @@
 """Which orientations tell most about a tip that is held on one point.
 
 How well the tip will be known depends on them alone. With Rm their mean, the tip's covariance is
-sigma^2 (N I - N Rm' Rm)^-1; the choice makes its trace as small as it can (calibration.md 2).
+sigma^2 (N I - N Rm' Rm)^-1; the choice makes its trace as small as it can
+(docs/reference/calibration.md 2.3).
 """
 
 import math

@@ -91,8 +91,8 @@ def suggest_poses(
 def precise_enough(result: CalibrationResult, tolerance_mm: float) -> bool:
     """Tell whether a measurement may stop: every length is known inside the tolerance.
 
-    ``tolerance_mm`` is half of what the process can bear (calibration.md 6). A result without
-    an interval is never precise enough.
+    ``tolerance_mm`` is half of what the process can bear (docs/reference/calibration.md 3). A
+    result without an interval is never precise enough.
 
     Raises:
         ConfigError: ``tolerance_mm`` is not positive.

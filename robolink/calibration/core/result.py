@@ -24,7 +24,8 @@ class CalibrationResult:
         reference_point_mm: Where the reference point lies in the base, (x, y) or (x, y, z);
             empty where a method has none.
         sigma_gain: Standard deviation of each measured length as a multiple of the standard
-            deviation of one placement (calibration.md 1.1); the largest when they differ.
+            deviation of one placement (docs/reference/calibration.md 1.1); the largest when they
+            differ.
         warnings: Named doubts that do not forbid the result.
         inputs: The poses that went in.
         covariance: Of the measured components, in their order: mm^2 between two lengths,

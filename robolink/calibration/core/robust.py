@@ -1,7 +1,8 @@
 """Which poses belong together: many small draws, the best of them, then refits.
 
 Whole poses are rejected, never single coordinates. A known measurement scale decides best;
-without one it is estimated from the median residual of the best draw (calibration.md 2).
+without one it is estimated from the median residual of the best draw
+(docs/reference/calibration.md 2.10).
 """
 
 from collections.abc import Callable

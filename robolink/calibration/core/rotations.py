@@ -1,7 +1,8 @@
 """Orientations as matrices, and the angles that two makers read off them.
 
 EPSON: R = Rz(U) Ry(V) Rx(W). CODESYS SoftMotion: R = Rz(A) Ry(B) Rz(C), intrinsic
-(calibration.md 1.4). Angles are never converted into each other but through the matrix.
+(docs/reference/calibration.md 1.4). Angles are never converted into each other but through the
+matrix.
 """
 
 import math
@@ -55,7 +56,7 @@ def zyz_deg(rotation: Floats) -> tuple[float, float, float]:
     """Return A, B, C of a rotation matrix, B in [0, 180].
 
     (A + 180, -B, C + 180) is the same rotation. Where B is 0 or 180 only one angle is
-    defined: it goes into A, and C is 0 (design part 4).
+    defined: it goes into A, and C is 0 (docs/reference/calibration.md 1.4).
     """
     r = rotation
     sine = math.hypot(r[0, 2], r[1, 2])

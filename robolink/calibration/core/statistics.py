@@ -1,7 +1,7 @@
 """Quantiles for 95 % intervals, without a statistics package.
 
 With n degrees of freedom the estimated scatter is itself uncertain; 1.96 then holds the truth
-in 81 % of the cases for three poses instead of 95 % (calibration.md 2).
+in 81 % of the cases for three poses instead of 95 % (docs/reference/calibration.md 2.11).
 """
 
 import math

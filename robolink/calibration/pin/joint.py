@@ -2,7 +2,8 @@
 
 Every touch says ``p + R t = P`` with the offset t of its tool and the place P of its pin.
 Tools that share a pin share its error, so the differences between them are known better than
-each alone; a tool may even have a single touch, if others find the pin (calibration.md 2).
+each alone; a tool may even have a single touch, if others find the pin
+(docs/reference/calibration.md 2.1).
 """
 
 import math

@@ -35,7 +35,7 @@ def solve_n_angle(
     """Return the offset of a tip that was on one point in all flange poses.
 
     The angles are taken as known, so the fit is linear and exact on any arc
-    (calibration.md 2). X and Y are measured, the rest is kept.
+    (docs/reference/calibration.md 2.1). X and Y are measured, the rest is kept.
 
     Args:
         poses: Flange poses (Tool 0), mm and degrees, at least two.

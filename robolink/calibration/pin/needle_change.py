@@ -2,7 +2,7 @@
 
 ``t_new = t_old + Rz(-U) d`` with d the shift of the tip in base axes. What the camera or pin
 gets wrong is in both looks and cancels; what every difference adds is counted in a chain,
-until a full calibration is due (calibration.md 2).
+until a full calibration is due (docs/reference/calibration.md 2.9).
 """
 
 import math

@@ -3,7 +3,7 @@
 A full calibration learns where the pin is: at the touch, p + R t. Any later tip on the same
 pin has ``t = R' (pin - p)``. With the pin as the last touch and the last offset place it,
 the difference between two tips is what is measured, and an error of the full calibration
-stays as it was (calibration.md 2).
+stays as it was (docs/reference/calibration.md 2.9).
 """
 
 from dataclasses import dataclass

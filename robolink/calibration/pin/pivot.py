@@ -1,6 +1,7 @@
 """Tool offset from one point touched in many orientations, on six axes.
 
-Tilt shows Z, turning about the tool shows X and Y; a plan needs both (calibration.md 2).
+Tilt shows Z, turning about the tool shows X and Y; a plan needs both
+(docs/reference/calibration.md 2.2).
 """
 
 import math

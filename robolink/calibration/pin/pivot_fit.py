@@ -1,7 +1,8 @@
 """The algebra of a pivot: one tip on one point in many orientations, on plain arrays.
 
 With the flange at p and its rotation R, the tip is at p + R t, always at c. The least squares
-over t and c, with the means Rm and pm taken off, is a 3 x 3 system (calibration.md 2):
+over t and c, with the means Rm and pm taken off, is a 3 x 3 system
+(docs/reference/calibration.md 2.2):
 
     (N I - N Rm' Rm) t = -(sum R_i' p_i - N Rm' pm),   c = Rm t + pm
 

@@ -1,7 +1,8 @@
 """One tip on one point at known angles, in the plane, as complex numbers.
 
 With the flange at p and z = exp(iU), the tip is at p + z t. Taking means off leaves one
-unknown, and the least squares over all poses is a division (calibration.md 1.1 and 2):
+unknown, and the least squares over all poses is a division (docs/reference/calibration.md 1.1,
+2.1):
 
     t = -sum(conj(z - mean z) p) / sum |z - mean z|^2,   P = mean p + mean z t
 

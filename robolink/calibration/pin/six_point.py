@@ -2,7 +2,7 @@
 
 After the pivot the tool is moved, without turning, along its own X and then along its own Z
 (or anywhere in its XZ plane). The ways of the flange, seen from the flange, are the axes
-(calibration.md 2).
+(docs/reference/calibration.md 2.4).
 """
 
 import math
@@ -28,7 +28,7 @@ from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
 
 MOST_OFF_SQUARE_DEG = 2.0
-"""Raw axes that are further from a right angle are refused (calibration.md 2)."""
+"""Raw axes that are further from a right angle are refused (docs/reference/calibration.md 2.4)."""
 
 FAR_DEG = 45.0
 """A way that leads further from where its axis is stored is nearer to another axis."""

@@ -5,8 +5,8 @@ With the tip on the same point in both poses, ``p1 + Rz(U1) t = p2 + Rz(U2) t``,
     (Rz(U1) - Rz(U2)) t = p2 - p1
 
 EPSON's formula ``t = (p2 - p1) / 2`` is the case U1 = 0, U2 = 180. The closed form below
-holds for any two angles (calibration.md 1.1): with d = p2 - p1, h = (U2 - U1) / 2 and
-m = Rz(-(U1 + U2) / 2) d,
+holds for any two angles (docs/reference/calibration.md 1.1): with d = p2 - p1, h = (U2 - U1) / 2
+and m = Rz(-(U1 + U2) / 2) d,
 
     t = (-m_y, m_x) / (2 sin h)
 

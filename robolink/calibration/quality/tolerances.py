@@ -1,4 +1,4 @@
-"""Residuals above which a result is given with a warning (calibration.md 6)."""
+"""Residuals above which a result is given with a warning (docs/reference/calibration.md 3)."""
 
 from dataclasses import dataclass
 

@@ -1,15 +1,15 @@
 """Poses that someone brings along: are there enough, are they flat, and which tool fits them.
 
-A stored point carries no tool number (epson.md 3.2), so a person says with which tool it was
-taught. The geometry can contradict. Let the poses be taken for tip poses of tool j; the
+A stored point carries no tool number (docs/reference/epson.md 3.2), so a person says with which
+tool it was taught. The geometry can contradict. Let the poses be taken for tip poses of tool j; the
 flange poses that follow give the offset m_j. Taken for tip poses of another tool k, they give
 
     m_k = t_k + Rz(u_k - u_j) (m_j - t_j)
 
 with t the stored offsets and u the stored tool angles. It follows from
-``(Rz(U1) - Rz(U2)) t = p2 - p1`` (calibration.md 1.1) with ``p_flange = p - Rz(U - u) t``
-(epson.md 3.1). A changed nozzle sits a few tenths of a millimetre from where it was; so the
-right k is one whose m_k lies near the offset stored for the tool that is calibrated.
+``(Rz(U1) - Rz(U2)) t = p2 - p1`` (docs/reference/calibration.md 1.1) with ``p_flange = p - Rz(U -
+u) t`` (docs/reference/epson.md 3.1). A changed nozzle sits a few tenths of a millimetre from where
+it was; so the right k is one whose m_k lies near the offset stored for the tool that is calibrated.
 """
 
 import math

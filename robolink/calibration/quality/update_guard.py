@@ -1,8 +1,9 @@
 """Whether a new offset may replace the stored one.
 
 A correction with the wrong sign makes the next one about twice as large, and the one after
-that twice again; the classic bug of every home-made calibration (calibration.md 2). It is
-caught here by comparing corrections, not by trusting the sign.
+that twice again; the classic bug of every home-made calibration
+(docs/reference/calibration.md 2.9). It is caught here by comparing corrections, not by trusting the
+sign.
 """
 
 import math
@@ -14,7 +15,8 @@ from robolink.messages import tr
 from robolink.model import ToolOffset
 
 NEEDLE_LIMIT_MM = 2.0
-"""Largest plausible change by a new needle; 0.5 mm is usual for a nozzle (calibration.md 2)."""
+"""Largest plausible change by a new needle; 0.5 mm is usual for a nozzle
+(docs/reference/calibration.md 2.9)."""
 
 NOISE_MM = 0.05
 

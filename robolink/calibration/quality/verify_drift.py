@@ -17,7 +17,7 @@ from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
 
 PLACING_TOLERANCE_MM = 0.1
-"""Drift allowed for placing; dispensing is content with 0.2 (calibration.md 6)."""
+"""Drift allowed for placing; dispensing is content with 0.2 (docs/reference/calibration.md 3)."""
 
 RECOMMENDED_ANGLES = 4
 
@@ -32,8 +32,8 @@ def verify_drift(
     """Return how far ``offset`` puts the tip from one point in flange poses that touch it.
 
     Drift counts from the first pose: an error e of the offset then shows as 2 |e| half a turn
-    later, which makes the test twice as sensitive (calibration.md 2). The poses must not be
-    those that the offset was calculated from; they would prove nothing.
+    later, which makes the test twice as sensitive (docs/reference/calibration.md 2.12). The poses
+    must not be those that the offset was calculated from; they would prove nothing.
 
     Args:
         poses: Flange poses (Tool 0), mm and degrees, all with the tip on the same point.

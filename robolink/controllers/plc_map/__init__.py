@@ -1,5 +1,5 @@
 """PLCs that keep tool offsets in registers of the machine builder's own."""
 
-from robolink.controllers.plc_map._controller import PlcMapController as PlcMapController
-from robolink.controllers.plc_map._flange import FlangeReader as FlangeReader
-from robolink.controllers.plc_map._open import open_plc_map as open_plc_map
+from robolink.controllers.plc_map.controller import PlcMapController as PlcMapController
+from robolink.controllers.plc_map.flange import FlangeReader as FlangeReader
+from robolink.controllers.plc_map.opening import open_plc_map as open_plc_map

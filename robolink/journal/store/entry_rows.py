@@ -8,8 +8,8 @@ from typing import Any, Final, TypeAlias, TypeVar
 
 from sqlalchemy import Connection, Select, bindparam, func, insert, select, update
 
-from robolink.journal._chain import canonical, digest, storable
 from robolink.journal._records import Filter
+from robolink.journal.store.chain import canonical, digest, storable
 from robolink.journal.store.prepared import Prepared, StatementRunner
 from robolink.journal.store.tables import ENTRIES, HEAD, IN_A_CHANGE
 from robolink.model import EntryKind, NewEntry, Signature

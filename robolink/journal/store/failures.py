@@ -6,6 +6,7 @@ from sqlalchemy.exc import DBAPIError
 
 from robolink.errors import JournalError
 from robolink.messages import tr
+from robolink.ways import Way, way
 
 # Result codes of SQLite (https://www.sqlite.org/rescode.html), the low byte.
 _SQLITE: Final = {
@@ -112,7 +113,8 @@ def _sentences(reason: str, text: str) -> tuple[str, str]:
 
 def _move_it_away() -> str:
     return tr(
-        "Save what can be read with 'robolink journal export --read-only' and move the file "
-        "away; a new one is made then. It also held what was left unfinished: check the robot's "
-        "selected tool and its tool offsets by hand."
+        "Save what can be read with {export} and move the file away; a new one is made then. It "
+        "also held what was left unfinished: check the robot's selected tool and its tool "
+        "offsets by hand.",
+        export=way(Way.EXPORT_JOURNAL),
     )

@@ -6,8 +6,8 @@ from typing import Final
 
 from sqlalchemy import BindParameter, bindparam, insert, select, update
 
-from robolink.journal._chain import storable
-from robolink.journal.leases.sightings import FREE, LeaseSighting
+from robolink.journal._sightings import FREE, LeaseSighting
+from robolink.journal.store.chain import storable
 from robolink.journal.store.prepared import UNLESS_THERE, Prepared, StatementRunner
 from robolink.journal.store.tables import LEASES
 

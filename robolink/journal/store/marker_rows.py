@@ -6,7 +6,7 @@ from typing import Final, NamedTuple
 from sqlalchemy import BindParameter, bindparam, delete, func, insert, select, update
 
 from robolink.errors import JournalError
-from robolink.journal._chain import canonical, storable
+from robolink.journal.store.chain import canonical, storable
 from robolink.journal.store.prepared import UNLESS_THERE, Prepared, StatementRunner
 from robolink.journal.store.tables import MARKERS
 from robolink.messages import tr

@@ -25,9 +25,10 @@ from sqlalchemy.schema import CreateIndex, CreateTable
 from sqlalchemy.sql.ddl import DDLElement
 
 from robolink.errors import JournalError
-from robolink.journal._chain import FIRST
+from robolink.journal.store.chain import FIRST
 from robolink.journal.store.tables import HEAD, IN_A_CHANGE, SCHEMA_VERSION
 from robolink.messages import tr
+from robolink.ways import Way, way
 
 # SQLite keeps a table in the order of its key only if the key is called INTEGER.
 _NUMBER: Final = BigInteger().with_variant(Integer, "sqlite")
@@ -185,8 +186,9 @@ def newer_error(name: str, found: int) -> JournalError:
             own=len(MIGRATIONS),
         ),
         remedy=tr(
-            "Nothing was written to it. Install the newer robolink that made it; 'robolink "
-            "journal export --read-only' reads what this one understands."
+            "Nothing was written to it. Install the newer robolink that made it; {export} reads "
+            "what this one understands.",
+            export=way(Way.EXPORT_JOURNAL),
         ),
     )
 

@@ -9,7 +9,7 @@ from typing import Final
 
 from sqlalchemy import BindParameter, bindparam, func, insert, select, update
 
-from robolink.journal._chain import storable
+from robolink.journal.store.chain import storable
 from robolink.journal.store.prepared import UNLESS_THERE, Prepared, StatementRunner
 from robolink.journal.store.tables import ADDRESSES, ENTRIES, FORMER_NAMES, LEASES, MARKERS
 

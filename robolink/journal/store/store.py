@@ -10,44 +10,12 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from robolink.checkpoints import Checkpoint, checkpoint
 from robolink.errors import JournalError
-from robolink.journal._damage import damage
 from robolink.journal._places import JournalPlace
 from robolink.journal.store import migrations
 from robolink.journal.store.engines import Backend, backend_of
-from robolink.journal.store.entry_rows import EntryRows
 from robolink.journal.store.failures import damaged_error, journal_error
-from robolink.journal.store.lease_rows import LeaseRows
-from robolink.journal.store.marker_rows import MarkerRows
-from robolink.journal.store.name_rows import NameRows
-from robolink.journal.store.prepared import Prepared, StatementRunner
+from robolink.journal.store.statements import Tables
 from robolink.messages import tr
-
-
-class Tables:
-    """What can be asked and changed over one connection.
-
-    Attributes:
-        connection: The connection.
-        runner: Runs prepared statements over it.
-        entries: The append-only record.
-        markers: What is not settled.
-        leases: Who may change which controller.
-        names: Who is meant by a name or an address.
-        newer: Whether a newer robolink made the tables.
-        self_checks: Statements by which the database looks for damage.
-    """
-
-    def __init__(
-        self, connection: Connection, version: int, self_checks: tuple[Prepared, ...]
-    ) -> None:
-        self.connection = connection
-        self.runner = StatementRunner(connection)
-        self.entries = EntryRows(connection, self.runner)
-        self.markers = MarkerRows(self.runner)
-        self.leases = LeaseRows(self.runner)
-        self.names = NameRows(self.runner, known=version >= migrations.NAMED)
-        self.newer = version > len(migrations.MIGRATIONS)
-        self.self_checks = self_checks
 
 
 class Store:
@@ -108,7 +76,7 @@ class Store:
         """
         consequence = tr("The command was not sent.")
         with self.read(consequence) as tables:
-            found = next(damage(tables, names), "")
+            found = next(tables.damage(names), "")
         if found:
             raise damaged_error(found, self._place.name, consequence)
 

@@ -2,7 +2,7 @@
 
 Each beam is crossed both ways, entry and exit each time: half way between both edges the tip
 is in the beam whatever their thickness, and both ways together are free of latency, braking
-and backlash (calibration.md 2).
+and backlash (docs/reference/calibration.md 2.6).
 """
 
 from collections.abc import Sequence

@@ -26,8 +26,8 @@ METHOD = Method(
     description=tr(
         "See the fiducials of a held board with an up-looking camera: X, Y and U of the board.\n\n"
         "The tool that is stored says where the board is expected: the fiducials must then lie in "
-        "the image one at a time. Say where they are with --spacing, or with --fiducial for each "
-        "of them."
+        "the image one at a time. Say where they are: how far two are apart, or where each of "
+        "them is."
     ),
     parameters=BoardParameters,
     measures=("x_mm", "y_mm", "u_deg"),

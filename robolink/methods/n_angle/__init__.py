@@ -32,7 +32,7 @@ METHOD = Method(
         "Touch one pin at several angles of U; the touches check each other.\n\n"
         "After each touch from the third on it says how well they agree and how sure the tip is. "
         "At the end the pose that fits worst is named and may be taken again.\n\n"
-        "With --points, --pose or --poses the touches exist already: nothing moves."
+        "With poses that exist already nothing moves."
     ),
     parameters=NAngleParameters,
     measures=("x_mm", "y_mm"),

@@ -55,8 +55,8 @@ METHOD = Method(
     summary=tr("Touch a known pin once: X, Y and Z, for a change of the needle."),
     description=tr(
         "Touch a pin once: X, Y and Z of the new tip, for a change of the needle.\n\n"
-        "The tool must have been calibrated on that pin before, for example with n-angle --station "
-        "ID. What is written is the stored offset moved by how much the tip differs from the old "
+        "The tool must have been calibrated on that pin before, for example with n-angle. What is "
+        "written is the stored offset moved by how much the tip differs from the old "
         "one. The uncertainty adds up over such changes, until a full calibration is due."
     ),
     parameters=OneTouchParameters,

@@ -2,7 +2,7 @@
 
 The offset that is written and the touches that it came from say together where the pin is,
 ``P = p + R t``. As long as that offset stays stored and the pin stays where it is, a new tip that
-touches the pin shows by how much it differs from the old one (calibration.md 2).
+touches the pin shows by how much it differs from the old one (docs/reference/calibration.md 2.9).
 """
 
 from collections.abc import Mapping
@@ -19,6 +19,7 @@ from robolink.model import (
     describe_offset,
     read_offset,
 )
+from robolink.ways import Way, way
 
 KEPT = (EntryKind.DONE, EntryKind.DECISION)
 """Entries that say that a value stays, and what it rests on."""
@@ -68,10 +69,8 @@ def find_last_touch(controller: Controller, tool: int, station: str) -> LastTouc
                 "Tool {tool} was never calibrated on station {station}.", tool=tool, station=station
             ),
             remedy=tr(
-                "Make a full calibration there first: robolink calibrate n-angle --tool {tool} "
-                "--station {station}",
-                tool=tool,
-                station=station,
+                "Make a full calibration there first: {calibrate}",
+                calibrate=way(Way.CALIBRATE_TOOL_AT, tool=tool, station=station),
             ),
         )
     stored = controller.tools.read(tool)

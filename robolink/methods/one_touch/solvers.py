@@ -10,6 +10,7 @@ from robolink.errors import CalibrationError, ConfigError
 from robolink.messages import tr
 from robolink.methods.one_touch.last_touch import LastTouch, find_last_touch
 from robolink.model import Controller, Pose, ToolOffset, rotate_xy
+from robolink.ways import Way, way
 
 if TYPE_CHECKING:
     from robolink.calibration import NeedleChangeResult, Pin
@@ -140,7 +141,10 @@ def difference_from_last(
     if sigma is None:
         raise ConfigError(
             tr("Nothing tells how well a touch repeats: the last calibration left no residual."),
-            remedy=tr("Give --sigma MM (in a recipe sigma_mm), or calibrate with n-angle once."),
+            remedy=tr(
+                "Give {sigma} (in a recipe sigma_mm), or calibrate with n-angle once.",
+                sigma=way(Way.SIGMA),
+            ),
         )
     return Difference(last, sigma, limits)
 

@@ -37,7 +37,7 @@ METHOD = Method(
         "production. After the first touch the robot lifts it, tilts and turns it in the air, and "
         "comes down to a clearance; you do the rest. The tool must be defined already, to a "
         "millimetre or two. A robot whose tool only turns about Z cannot do this.\n\n"
-        "With --points, --pose or --poses the touches exist already: nothing moves."
+        "With poses that exist already nothing moves."
     ),
     parameters=PivotParameters,
     measures=("x_mm", "y_mm", "z_mm"),

@@ -22,6 +22,7 @@ from robolink.methods.pivot.tilts import UPRIGHT, OverPin, Tilt, apart_deg, tilt
 from robolink.model import Path, Pose, ToolOffset
 from robolink.procedures import TAKE_ALL, SamplingPolicy, TouchPlan, lift_off, sample_sequentially
 from robolink.runner import Ask, Move, Procedure
+from robolink.ways import Way, way
 
 MOST_DEVIATION_DEG: Final = 1.0
 """A robot that stands further from the orientation it was sent to cannot take it up."""
@@ -136,7 +137,9 @@ class _Swing:
                     ),
                     remedy=tr(
                         "This robot cannot take it up. It stands with the tip lifted. Tilt less "
-                        "with --tilt, or teach the poses and give --points."
+                        "with {tilt}, or teach the poses and give {points}.",
+                        tilt=way(Way.TILT),
+                        points=way(Way.TAUGHT_POINTS),
                     ),
                 )
         self._stands = goal

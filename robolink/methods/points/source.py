@@ -1,8 +1,8 @@
 """Poses that exist already: taught on the pendant, typed, or kept in a file.
 
 With the guard open in Teach, where a person touches a tip to a pin, a PC commands nothing
-(design part 1a). So the poses are taught on the pendant and read afterwards. Nothing moves
-here and no tool is selected; therefore nothing is proved by turning about the new tip either.
+(docs/reference/rules.md 9). So the poses are taught on the pendant and read afterwards. Nothing
+moves here and no tool is selected; therefore nothing is proved by turning about the new tip either.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -22,6 +22,7 @@ from robolink.messages import tr
 from robolink.methods.two_pose.source import TwoTouches
 from robolink.model import Controller, Pose, ToolOffset
 from robolink.procedures import MeasurementContext, PoseMethod
+from robolink.ways import Way, way
 
 
 class PointReader(Protocol):
@@ -134,13 +135,15 @@ class PointsSource:
         if self.found is not None and self.found.better is not None:
             return tr(
                 "The poses fit tool {better} much better than tool {taught}: if they were taught "
-                "with it, give --taught-tool {better}.",
+                "with it, give {taught_tool} {better}.",
+                taught_tool=way(Way.TAUGHT_TOOL),
                 better=self.found.better.tool,
                 taught=self._taught_tool,
             )
         return tr(
             "Check that all poses touched the same point and with which tool they were taught "
-            "(--taught-tool)."
+            "({taught_tool}).",
+            taught_tool=way(Way.TAUGHT_TOOL),
         )
 
 
@@ -149,7 +152,10 @@ def _require_defined(controller: Controller, tool: int) -> ToolOffset:
     if offset is None:
         raise UndefinedToolError(
             tr("Tool {tool} is not defined, so no pose was taught with it.", tool=tool),
-            remedy=tr("Name the tool that was selected on the pendant with --taught-tool."),
+            remedy=tr(
+                "Name the tool that was selected on the pendant with {taught_tool}.",
+                taught_tool=way(Way.TAUGHT_TOOL),
+            ),
             controller=controller.identity,
         )
     return offset

@@ -39,9 +39,9 @@ METHOD = Method(
         "the tip to where it has room, and jog it along the tool's own +X; the robot goes straight "
         "back; and along its own +Z. A way that is too short or has turned is said at once. The "
         "work box reaches higher by the length of a way.\n\n"
-        "With --points, --pose or --poses the poses exist already: three or more on one pin, "
-        "tilted and turned; the last two, in this order, after a way along +X and one along +Z, "
-        "both from the last pose on the pin. Nothing moves."
+        "With poses that exist already nothing moves: three or more on one pin, tilted and turned; "
+        "the last two, in this order, after a way along +X and one along +Z, both from the last "
+        "pose on the pin."
     ),
     parameters=SixPointParameters,
     measures=("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg"),

@@ -28,8 +28,8 @@ METHOD = Method(
         "Put the tip some millimetres above a fixed pin first. The robot moves in Power Low only: "
         "it lifts before it turns and comes down to a clearance; you do the rest by typing "
         "steps.\n\n"
-        "With --points, --pose or --poses the two poses exist already: nothing moves, no tool is "
-        "selected, and nothing is proved by turning about the new tip."
+        "With two poses that exist already nothing moves, no tool is selected, and nothing is "
+        "proved by turning about the new tip."
     ),
     parameters=TwoPoseParameters,
     measures=("x_mm", "y_mm"),

@@ -46,18 +46,18 @@ class EpsonTextCodec:
     line is a request without ``$``.
 
     A quoted text is handed out without one line end at its end, whether or not the
-    controller prints one before the closing quote (epson.md 1.5). A quote directly followed
-    by a line end ends the text, even if the controller meant it as part of it.
+    controller prints one before the closing quote (docs/reference/epson.md 1.5). A quote directly
+    followed by a line end ends the text, even if the controller meant it as part of it.
 
     Args:
         role: HOST sends requests, DEVICE answers them.
         terminator: What ends the messages sent: CR, LF or CRLF.
         max_line: Most bytes of one received message.
         encoding: Of names and texts. Controllers print in the code page of their language
-            (cp1252, Shift-JIS, GB18030, Big5; epson.md 1.1); the default, latin-1, loses no
-            byte. A byte outside the encoding is shown as ``\xNN``.
+            (cp1252, Shift-JIS, GB18030, Big5; docs/reference/epson.md 1.1); the default, latin-1,
+            loses no byte. A byte outside the encoding is shown as ``\xNN``.
         unterminated: DEVICE only: a request may lack its terminator, as one controller was
-            seen to accept (epson.md 1.1). It ends where the next one begins, or with
+            seen to accept (docs/reference/epson.md 1.1). It ends where the next one begins, or with
             :meth:`end_of_request`.
 
     Raises:

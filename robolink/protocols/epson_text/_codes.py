@@ -1,4 +1,4 @@
-"""The error codes of Remote Ethernet (epson.md 1.6)."""
+"""The error codes of Remote Ethernet (docs/reference/epson.md 1.6)."""
 
 from enum import IntEnum
 

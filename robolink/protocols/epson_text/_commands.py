@@ -1,4 +1,4 @@
-"""Every Remote Ethernet command, once (epson.md 1.2, 1.3, 1.8).
+"""Every Remote Ethernet command, once (docs/reference/epson.md 1.2, 1.3, 1.8).
 
 Flag names are the field names of ``StatusFlags``. A precondition is judged by the state in
 which the request finds the controller; for the commands that are legal during an Execute,
@@ -51,11 +51,12 @@ class RemoteCommand:
         forbids: Status flags that must be off.
         form: How its parameters are written.
         reply: What a successful reply carries.
-        in_monitoring: Served to a client that may only monitor (epson.md 1.3).
+        in_monitoring: Served to a client that may only monitor (docs/reference/epson.md 1.3).
         during_execute: RC+ version from which it is served while an Execute runs.
         since: RC+ version that introduced it.
-        extended: Not in the public command table; older firmware answers 11 (epson.md 1.8).
-        bare: Clients send it without its parameter too (epson_corrections.md 1.2); a device
+        extended: Not in the public command table; older firmware answers 11
+            (docs/reference/epson.md 1.8).
+        bare: Clients send it without its parameter too (docs/reference/epson.md 1.10); a device
             decides what that means.
     """
 
@@ -79,9 +80,11 @@ class RemoteCommand:
 
 _AUTO: Final = frozenset({"auto"})
 _READY: Final = frozenset({"auto", "ready"})
-_READY_ONLY: Final = frozenset({"ready"})  # epson.md 1.2 note 2: Auto is missing there
+# Auto is missing there (docs/reference/epson.md 1.2, note 2).
+_READY_ONLY: Final = frozenset({"ready"})
 _UNSAFE: Final = frozenset({"emergency_stop", "safeguard"})
-# One manual prints "Safeguard on" for Start; the guard must be closed (epson.md 1.2 note 1).
+# One manual prints "Safeguard on" for Start; the guard must be closed (docs/reference/epson.md 1.2
+# note 1).
 _UNFIT: Final = _UNSAFE | {"error"}
 
 
@@ -172,7 +175,7 @@ COMMANDS: Final[tuple[RemoteCommand, ...]] = (
     _extended("GetHealthRB", 3),
     _extended("GetPartWarning", 1),
 )
-"""The table, in the order of epson.md 1.2, then 1.8."""
+"""The table, in the order of docs/reference/epson.md 1.2, then 1.8."""
 
 _BY_NAME: Final[Mapping[str, RemoteCommand]] = MappingProxyType(
     {command.name.lower(): command for command in COMMANDS}

@@ -1,4 +1,4 @@
-"""The messages of EPSON Remote Ethernet (epson.md 1.1, 1.2, 1.6)."""
+"""The messages of EPSON Remote Ethernet (docs/reference/epson.md 1.1, 1.2, 1.6)."""
 
 from dataclasses import dataclass
 
@@ -25,7 +25,7 @@ class BadRequest:
     """A line that a device cannot take for a request, with the refusal it deserves.
 
     ``name`` is what to echo: the name if one could be read, else the received text
-    (assumed; epson.md 1.6 marks it unverified).
+    (assumed; docs/reference/epson.md 1.6 marks it unverified).
     """
 
     name: str

@@ -1,13 +1,13 @@
 """Cutting a stream into messages at CR, LF or CRLF.
 
-The terminator is chosen in the controller's setup (epson.md 1.1), and a technician may have
-chosen any; so all three end a message here, whichever we send ourselves. A message is
+The terminator is chosen in the controller's setup (docs/reference/epson.md 1.1), and a technician
+may have chosen any; so all three end a message here, whichever we send ourselves. A message is
 handed out at its CR, without waiting for an LF that may never come; an LF that follows is
 dropped when it arrives. What a message is therefore never depends on how the stream was cut
 into chunks.
 
 A reply whose payload starts with a quote may hold line ends of its own. It lasts until a
-quote is directly followed by a line end (epson.md 1.5).
+quote is directly followed by a line end (docs/reference/epson.md 1.5).
 """
 
 from collections.abc import Callable

@@ -5,7 +5,7 @@ from typing import Final
 from robolink.protocols.epson_text._commands import ParameterForm, RemoteCommand, ReplyShape
 
 MAX_TEXT: Final = 4060
-"""Most bytes of a statement, and of what it prints (epson.md 1.5)."""
+"""Most bytes of a statement, and of what it prints (docs/reference/epson.md 1.5)."""
 
 QUOTE: Final = '"'
 
@@ -16,7 +16,7 @@ def read_parameters(command: RemoteCommand, payload: str) -> tuple[str, ...] | N
     Clients in use send more than a command takes (``$Login,,terminator``, ``$GetStatus,``,
     ``$Reset,0``, ``$SetMotorsOn, 1``) and controllers were seen to answer; so blanks around a
     number are trimmed and surplus parameters are dropped unread, but for SetVariable
-    (epson_corrections.md 1.1).
+    (docs/reference/epson.md 1.10).
     """
     parameters = _read(command, payload)
     if parameters is None:
@@ -29,7 +29,7 @@ def write_parameters(command: RemoteCommand, parameters: tuple[str, ...]) -> str
     """Return ``parameters`` as one text, ``None`` when a device could read anything else."""
     payload = ",".join(parameters)
     if command.form is ParameterForm.STATEMENT:
-        if QUOTE in payload:  # there is no escape for it (spel.md 1)
+        if QUOTE in payload:  # there is no escape for it (docs/reference/spel.md 1)
             return None
         payload = f"{QUOTE}{payload}{QUOTE}"
     missing = len(parameters) < command.min_parameters
@@ -57,7 +57,7 @@ def _read(command: RemoteCommand, payload: str) -> tuple[str, ...] | None:
 def _read_statement(payload: str) -> tuple[str, ...] | None:
     """Return what stands between the first quote, at the start, and the last.
 
-    Quotes between are part of the statement; nothing is escaped (epson_corrections.md 3).
+    Quotes between are part of the statement; nothing is escaped (docs/reference/epson.md 1.5).
     """
     last = payload.rfind(QUOTE)
     if not payload.startswith(QUOTE) or last == 0:

@@ -1,4 +1,4 @@
-"""The controller's preferences, as GetContSettings tells them (epson_corrections.md 5.1).
+"""The controller's preferences, as GetContSettings tells them (docs/reference/epson.md 1.11).
 
 One field of the characters 0 and 1, read as a binary number: the right-most is bit 0. At least
 23 of them come, for the highest known bit is 22. EPSON's own client is the only source.

@@ -43,7 +43,7 @@ def read_answer(line: bytes, encoding: str) -> Reply | Refusal:
             fields = [field.decode(encoding, _UNDECODABLE) for field in payload.split(b",")]
             return Reply(name.decode("ascii"), tuple(fields))
     elif mark == b"!":
-        # The name may be an echo of anything, commas included (epson.md 1.6).
+        # The name may be an echo of anything, commas included (docs/reference/epson.md 1.6).
         name, comma, code = line[1:].rpartition(b",")
         if comma and code.isdigit() and len(code) <= _MAX_CODE_DIGITS:
             return Refusal(name.decode(encoding, _UNDECODABLE), int(code))

@@ -1,4 +1,4 @@
-"""The status flags of GetStatus (epson.md 1.4)."""
+"""The status flags of GetStatus (docs/reference/epson.md 1.4)."""
 
 from dataclasses import dataclass, fields
 from functools import lru_cache

@@ -1,4 +1,4 @@
-"""The types of Global Preserve variables (epson.md 1.2 note 4)."""
+"""The types of Global Preserve variables (docs/reference/epson.md 1.2 note 4)."""
 
 from enum import StrEnum
 

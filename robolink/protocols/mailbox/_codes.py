@@ -1,7 +1,7 @@
 """Numbers that stand in single words. Append-only: a number is never given a new meaning.
 
-States follow SRCI where it has one (softmotion.md 4.6). A number that this version does not
-know is handed out as a plain ``int``.
+States follow SRCI where it has one (docs/reference/softmotion.md 4.6). A number that this version
+does not know is handed out as a plain ``int``.
 """
 
 from enum import IntEnum, IntFlag, StrEnum
@@ -102,7 +102,7 @@ class BufferMode(IntEnum):
 
 
 class ReadMode(IntEnum):
-    """Operand i0 of READ_TOOL (softmotion.md 1.2)."""
+    """Operand i0 of READ_TOOL (docs/reference/softmotion.md 1.2)."""
 
     SET = 0
     ACTIVE = 1

@@ -1,8 +1,8 @@
-"""Between robolink's coordinates and the PLC's (design part 4).
+"""Between robolink's coordinates and the PLC's (docs/reference/calibration.md 1.4).
 
 robolink: mm and degrees, R = Rz(U) Ry(V) Rx(W), as EPSON defines it. SoftMotion: the axis
-group's user units and degrees, R = Rz(A) Ry(B) Rz(C), intrinsic (softmotion.md 1.3). The
-angles are never converted into each other but through the matrix, and the unit factor is
+group's user units and degrees, R = Rz(A) Ry(B) Rz(C), intrinsic (docs/reference/softmotion.md 1.3).
+The angles are never converted into each other but through the matrix, and the unit factor is
 applied nowhere else.
 
 Reading an angle off a matrix is done in an order that leaves no doubt near a singular

@@ -1,4 +1,7 @@
-"""Code numbers of the kinematics blocks of SM3_Transformation (softmotion.md 3.2, 3.3)."""
+"""Code numbers of the kinematics blocks of SM3_Transformation.
+
+Source: docs/reference/softmotion.md 3.2, 3.3.
+"""
 
 from collections.abc import Mapping
 from enum import IntEnum

@@ -1,6 +1,6 @@
 """What the mailbox can be told to do; numbers follow SRCI where it has one.
 
-SRCI's numbers are those of softmotion.md 4.6; 30001 and up are the mailbox's own.
+SRCI's numbers are those of docs/reference/softmotion.md 4.6; 30001 and up are the mailbox's own.
 """
 
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""The listing of ``TLSet`` (epson.md 3.1, spel.md 6.1).
+"""The listing of ``TLSet`` (docs/reference/epson.md 3.1, docs/reference/spel.md 6.1).
 
 Its columns are not documented. What Epson's own sample relies on: a line per defined tool,
 ``Tool``, the number, a colon, and numbers between commas with any blanks.
@@ -50,9 +50,9 @@ def format_tool_listing(tools: Mapping[int, ToolOffset], *, layout: Layout = "pl
 
     Args:
         tools: The defined tools by number.
-        layout: ``plain`` as ``Tool 1: 12.000, -3.250, ...`` (the likeliest, spel.md 6.1),
-            ``padded`` with values nine columns wide, ``four`` without V and W, which such a
-            controller cannot show.
+        layout: ``plain`` as ``Tool 1: 12.000, -3.250, ...`` (the likeliest,
+            docs/reference/spel.md 6.1), ``padded`` with values nine columns wide, ``four`` without
+            V and W, which such a controller cannot show.
     """
     return "\r\n".join(_line(tool, tools[tool], layout) for tool in sorted(tools))
 

@@ -1,4 +1,4 @@
-"""Numbers as SPEL+ writes them (spel.md 2.1, 3.2): strict, ASCII, no locale."""
+"""Numbers as SPEL+ writes them (docs/reference/spel.md 2.1, 3.2): strict, ASCII, no locale."""
 
 import math
 import re
@@ -20,7 +20,7 @@ _FALSE: Final = frozenset({"0", "false"})
 def decimal(value: float, places: int = 3) -> str:
     """Return ``value`` with ``places`` decimals, as a statement may carry it.
 
-    Three places is what controllers print (epson.md 3.3). Zero never carries a sign.
+    Three places is what controllers print (docs/reference/epson.md 3.3). Zero never carries a sign.
 
     Raises:
         ConfigError: ``value`` is not finite.
@@ -61,7 +61,9 @@ def parse_integer(text: str) -> int:
 
 
 def parse_boolean(text: str) -> bool:
-    """Read a printed Boolean: -1 or 1, 0, or a word; the references disagree (spel.md 2.1).
+    """Read a printed Boolean: -1 or 1, 0, or a word; the references disagree.
+
+    Source: docs/reference/spel.md 2.1.
 
     Raises:
         RemoteProtocolError: It is anything else.

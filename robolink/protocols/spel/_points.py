@@ -1,4 +1,4 @@
-"""Points as ``Print`` shows them (epson.md 3.3, spel.md 5.6).
+"""Points as ``Print`` shows them (docs/reference/epson.md 3.3, docs/reference/spel.md 5.6).
 
 A real capture::
 
@@ -83,7 +83,8 @@ def format_point(
         point: What to print.
         coordinates: ``six`` shows V and W, as zeros where the point has none; ``four`` leaves
             them out.
-        width: Columns of a value: 9 in the real capture, 8 in one sample (spel.md 5.6).
+        width: Columns of a value: 9 in the real capture, 8 in one sample
+            (docs/reference/spel.md 5.6).
     """
     shown = (*point.coordinates, 0.0, 0.0)[: 6 if coordinates == "six" else 4]
     values = zip(_AXES, shown, strict=False)

@@ -1,4 +1,6 @@
-"""Statements that only print (epson.md 3.1, 3.3; spel.md 5.3, 6.1, 7.2, 9).
+"""Statements that only print.
+
+Source: docs/reference/epson.md 3.1, 3.3; docs/reference/spel.md 5.3, 6.1, 7.2, 9.
 
 Those that take a number raise LocalProtocolError when it is out of range.
 """
@@ -7,7 +9,8 @@ from robolink.messages import tr
 from robolink.protocols.spel._statements import LAST_TOOL, Statement, check_range
 
 _LAST_OUTPUT = 0xFFFF
-"""Two bytes carry a bit number (epson.md 2.2); which exist depends on the hardware."""
+"""Two bytes carry a bit number (docs/reference/epson.md 2.2); which exist depends on the
+hardware."""
 
 _LAST_SPEED = 3
 _LAST_JOINT = 6
@@ -45,12 +48,15 @@ def print_here() -> Statement:
 
 
 def print_point_defined(number: int) -> Statement:
-    """Whether point P0 to P999 is taught, a Boolean (spel.md 5.1)."""
+    """Whether point P0 to P999 is taught, a Boolean (docs/reference/spel.md 5.1)."""
     return Statement(f"Print PDef(P{_point(number)})")
 
 
 def print_point(number: int) -> Statement:
-    """A taught point, P0 to P999; one that is not taught is error 7007 (spel.md 5.1)."""
+    """A taught point, P0 to P999; one that is not taught is error 7007.
+
+    Source: docs/reference/spel.md 5.1.
+    """
     return Statement(f"Print P{_point(number)}")
 
 
@@ -60,22 +66,24 @@ def print_robot() -> Statement:
 
 
 def print_robot_type() -> Statement:
-    """The kind of the robot in force: 3 SCARA, 5 six axes, 6 RS, 7 N (spel.md 9)."""
+    """The kind of the robot in force: 3 SCARA, 5 six axes, 6 RS, 7 N (docs/reference/spel.md 9)."""
     return Statement("Print RobotType")
 
 
 def print_robot_model() -> Statement:
-    """The model of the robot in force, a text (spel.md 9)."""
+    """The model of the robot in force, a text (docs/reference/spel.md 9)."""
     return Statement("Print RobotModel$")
 
 
 def print_robot_serial() -> Statement:
-    """The serial number of the robot in force, a text (spel.md 9)."""
+    """The serial number of the robot in force, a text (docs/reference/spel.md 9)."""
     return Statement("Print RobotSerial$")
 
 
 def print_output(bit: int) -> Statement:
-    """1 when an output is on, else 0 (spel.md 8). Remote Ethernet has no request for it.
+    """1 when an output is on, else 0. Remote Ethernet has no request for it.
+
+    Source: docs/reference/spel.md 8.
 
     Raises:
         LocalProtocolError: ``bit`` is not 0 to 65535.

@@ -16,7 +16,7 @@ Statement = NewType("Statement", str)
 """One SPEL+ statement, fit for Execute."""
 
 MAX_STATEMENT: Final = 4060
-"""Most bytes of a statement (epson.md 1.5)."""
+"""Most bytes of a statement (docs/reference/epson.md 1.5)."""
 
 _HANDS: Final = {Hand.RIGHT: " /R", Hand.LEFT: " /L"}
 LAST_TOOL: Final = 15
@@ -27,7 +27,9 @@ _Speed = TypeVar("_Speed", int, float)
 
 
 def set_tool(tool: int, offset: ToolOffset, *, six_axes: bool) -> Statement:
-    """``TLSet 1, XY(...)``: define a tool, mm and degrees (epson.md 3.1). Wears the flash.
+    """``TLSet 1, XY(...)``: define a tool, mm and degrees. Wears the flash.
+
+    Source: docs/reference/epson.md 3.1.
 
     Raises:
         LocalProtocolError: No such tool, or V or W on a robot of four axes.
@@ -37,7 +39,7 @@ def set_tool(tool: int, offset: ToolOffset, *, six_axes: bool) -> Statement:
 
 
 def clear_tool(tool: int) -> Statement:
-    """``TLClr 1``: remove a tool's definition (epson.md 3.1). Wears the flash.
+    """``TLClr 1``: remove a tool's definition (docs/reference/epson.md 3.1). Wears the flash.
 
     Raises:
         LocalProtocolError: No such tool.
@@ -47,7 +49,7 @@ def clear_tool(tool: int) -> Statement:
 
 
 def select_tool(tool: int) -> Statement:
-    """``Tool 1``: put a tool in force; 0 is the flange (epson.md 3.1).
+    """``Tool 1``: put a tool in force; 0 is the flange (docs/reference/epson.md 3.1).
 
     Raises:
         LocalProtocolError: No such tool.
@@ -57,7 +59,7 @@ def select_tool(tool: int) -> Statement:
 
 
 def go(target: Pose, *, six_axes: bool) -> Statement:
-    """``Go XY(...)``: move point to point (spel.md 7.1).
+    """``Go XY(...)``: move point to point (docs/reference/spel.md 7.1).
 
     Raises:
         LocalProtocolError: V or W on a robot of four axes, or a local other than 0.
@@ -66,7 +68,7 @@ def go(target: Pose, *, six_axes: bool) -> Statement:
 
 
 def move(target: Pose, *, six_axes: bool) -> Statement:
-    """``Move XY(...)``: move along a straight line (spel.md 7.1).
+    """``Move XY(...)``: move along a straight line (docs/reference/spel.md 7.1).
 
     Raises:
         LocalProtocolError: V or W on a robot of four axes, or a local other than 0.
@@ -75,12 +77,12 @@ def move(target: Pose, *, six_axes: bool) -> Statement:
 
 
 def power_low() -> Statement:
-    """``Power Low``: the tip stays below 250 mm/s (epson.md 3.4)."""
+    """``Power Low``: the tip stays below 250 mm/s (docs/reference/epson.md 3.4)."""
     return Statement("Power Low")
 
 
 def power_high() -> Statement:
-    """``Power High``: the speeds that were set take effect (spel.md 7.2)."""
+    """``Power High``: the speeds that were set take effect (docs/reference/spel.md 7.2)."""
     return Statement("Power High")
 
 
@@ -88,7 +90,7 @@ def speed(percent: int, depart: int | None = None, approach: int | None = None) 
     """``Speed 5``: joint speed in percent; Jump's departure and approach follow it if left out.
 
     Raises:
-        LocalProtocolError: Not 1 to 100 (spel.md 7.2), or only one of the two given.
+        LocalProtocolError: Not 1 to 100 (docs/reference/spel.md 7.2), or only one of the two given.
     """
     values = _three(percent, depart, approach)
     for value in values:
@@ -100,7 +102,8 @@ def speed_s(mm_s: float, depart: float | None = None, approach: float | None = N
     """``SpeedS 20.000``: straight-line speed in mm/s; the other two follow it if left out.
 
     Raises:
-        LocalProtocolError: Not 0.1 to 2000 mm/s (spel.md 7.2), or only one of the two given.
+        LocalProtocolError: Not 0.1 to 2000 mm/s (docs/reference/spel.md 7.2), or only one of the
+            two given.
     """
     values = _three(mm_s, depart, approach)
     written = ", ".join(decimal(value) for value in values)

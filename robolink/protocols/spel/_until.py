@@ -1,4 +1,6 @@
-"""Straight moves that an input ends or marks, and what they leave to be read (spel.md 7.1).
+"""Straight moves that an input ends or marks, and what they leave to be read.
+
+Source: docs/reference/spel.md 7.1.
 
 ``Till`` brings the robot to rest at the edge; ``TillOn`` tells whether it did. ``Find`` lets it
 go on and keeps the position at the edge in ``FindPos``; ``PosFound`` tells whether there is
@@ -10,7 +12,8 @@ from robolink.model import Pose
 from robolink.protocols.spel._statements import Statement, check_range, move
 
 _LAST_INPUT = 0xFFFF
-"""Two bytes carry a bit number (epson.md 2.2); which exist depends on the hardware."""
+"""Two bytes carry a bit number (docs/reference/epson.md 2.2); which exist depends on the
+hardware."""
 
 
 def move_till(target: Pose, bit: int, *, on: bool, six_axes: bool) -> Statement:
@@ -32,7 +35,7 @@ def move_find(target: Pose, bit: int, *, on: bool, six_axes: bool) -> Statement:
 
 
 def print_input(bit: int) -> Statement:
-    """1 when an input is on, else 0 (spel.md 8).
+    """1 when an input is on, else 0 (docs/reference/spel.md 8).
 
     Raises:
         LocalProtocolError: ``bit`` is not 0 to 65535.
@@ -41,17 +44,23 @@ def print_input(bit: int) -> Statement:
 
 
 def print_till_on() -> Statement:
-    """Whether the last move was stopped by its ``Till``, a Boolean (spel.md 7.1, p. 831)."""
+    """Whether the last move was stopped by its ``Till``, a Boolean.
+
+    Source: docs/reference/spel.md 7.1, p. 831.
+    """
     return Statement("Print TillOn")
 
 
 def print_position_found() -> Statement:
-    """Whether the last ``Find`` met its condition, a Boolean (spel.md 7.1)."""
+    """Whether the last ``Find`` met its condition, a Boolean (docs/reference/spel.md 7.1)."""
     return Statement("Print PosFound")
 
 
 def print_found_position() -> Statement:
-    """Where the last ``Find`` met its condition, as a point (spel.md 5.3, p. 328)."""
+    """Where the last ``Find`` met its condition, as a point.
+
+    Source: docs/reference/spel.md 5.3, p. 328.
+    """
     return Statement("Print FindPos")
 
 

@@ -1,4 +1,4 @@
-"""The three lines of ``Where`` (epson.md 3.3, spel.md 5.6).
+"""The three lines of ``Where`` (docs/reference/epson.md 3.3, docs/reference/spel.md 5.6).
 
 The layout below is what a client in the field reads by columns: a label of two characters,
 the value, a unit, sixteen columns in all::
@@ -74,7 +74,8 @@ def format_where(
 
     Args:
         where: What to print.
-        width: Columns of a value: 9 as read in the field, 8 in one sample (spel.md 5.6).
+        width: Columns of a value: 9 as read in the field, 8 in one sample
+            (docs/reference/spel.md 5.6).
         linear_joints: Numbers of the joints in mm: the third on a SCARA, none on six axes.
     """
     world = zip(_AXES, map(decimal, where.world), ("mm",) * 3 + ("deg",) * 3, strict=True)

@@ -1,7 +1,7 @@
 """Opens a CAN bus, and reads it in the caller's own thread.
 
 python-can's Notifier reads in a thread that ends without a word at the first bus error
-(faults_and_speed.md A1, F50). Here whoever waits for an answer reads the bus itself, so an
+(docs/reference/faults.md F50). Here whoever waits for an answer reads the bus itself, so an
 error reaches the one who waits, and there is no thread to stop.
 """
 

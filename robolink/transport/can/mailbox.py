@@ -1,4 +1,4 @@
-"""A PLC mailbox in the object dictionary of a CANopen node (design part 7)."""
+"""A PLC mailbox in the object dictionary of a CANopen node (docs/mailbox.md, "CANopen")."""
 
 import struct
 import threading
@@ -153,6 +153,11 @@ class CanopenMailboxLink:
                 ),
                 controller=self._identity,
             ) from error
+
+    @property
+    def whole_look_s(self) -> float:
+        """0: a bus at 125 kbit/s carries the block in some 60 ms, one at 1 Mbit/s in 8."""
+        return 0.0
 
     def write_command(self, words: Sequence[int]) -> None:
         """See :meth:`robolink.transport.MailboxLink.write_command`; one DOMAIN download."""

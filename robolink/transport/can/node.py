@@ -25,7 +25,7 @@ _BOOT_UP: Final = 0
 """What a node's first heartbeat says."""
 
 _HEAD: Final = struct.Struct("<HBBHH")
-"""TPDO1: ack, state, group_state, error_class, heartbeat (softmotion.md 4.8)."""
+"""TPDO1: ack, state, group_state, error_class, heartbeat (docs/reference/softmotion.md 4.7)."""
 _MISSED: Final = 3
 _SHORTEST_LOSS_S: Final = 0.5
 

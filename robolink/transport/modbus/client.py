@@ -1,7 +1,7 @@
 """A Modbus client for a PLC's registers and coils, over TCP or a serial line.
 
-Nothing is sent twice and no connection is renewed by itself (design part 2). Addresses count
-from 0, as on the wire.
+Nothing is sent twice and no connection is renewed by itself
+(docs/decisions/0004-no-silent-retry.md). Addresses count from 0, as on the wire.
 """
 
 import threading
@@ -40,6 +40,12 @@ class Exchange(Protocol):
     @property
     def units(self) -> range:
         """The units that can be asked."""
+
+    def takes_s(self, sent_bytes: int, answered_bytes: int) -> float:
+        """Return how long frames of so many bytes take on the line; 0 on a network.
+
+        Counted are the bytes behind the unit and before the checksum, as in a PDU.
+        """
 
     def ask(self, request: ModbusRequest, deadline: Deadline) -> ModbusReply:
         """Send ``request`` once and return its own answer, which may be a refusal.
@@ -99,6 +105,14 @@ class ModbusClient:
     def clock(self) -> Clock:
         """The clock on which deadlines are kept."""
         return self._transport.clock
+
+    def read_takes_s(self, count: int) -> float:
+        """Return how long a read of so many registers takes on the line alone; 0 on a network."""
+        return self._exchange.takes_s(5, 2 + 2 * count)
+
+    def write_takes_s(self, count: int) -> float:
+        """Return how long a write of so many registers takes on the line alone; 0 on a network."""
+        return self._exchange.takes_s(6 + 2 * count, 5)
 
     def read_holding(self, address: int, count: int, *, unit: int | None = None) -> tuple[int, ...]:
         """Return holding registers (function 3), at most 125."""

@@ -1,7 +1,7 @@
 """Puts what goes wrong between this computer and a Modbus server into words.
 
 Addresses are always given both ways, as the number that manuals print and as the one on the
-wire, because tools disagree about which one they mean (ecosystem.md 3.1). Exception codes:
+wire, because tools disagree about which one they mean. Exception codes:
 Modbus application protocol 1.1b3, chapter 7.
 """
 
@@ -18,6 +18,7 @@ from robolink.errors import (
 from robolink.messages import tr
 from robolink.transport.modbus.messages import ModbusRequest
 
+_SHOWN_BYTES: Final = 256
 _GATEWAY_NO_PATH: Final = 0x0A
 _GATEWAY_NO_ANSWER: Final = 0x0B
 _NOT_DONE: Final = frozenset({1, 2, 3, 6})
@@ -59,6 +60,39 @@ def unanswered(identity: str, request: ModbusRequest, held: bytes) -> TransportT
         controller=identity,
         request=describe(request),
         raw=held,
+    )
+
+
+def flooding(identity: str, request: ModbusRequest, count: int, raw: bytes) -> RemoteProtocolError:
+    """Return the error for a far end that goes on sending what was not asked for."""
+    return RemoteProtocolError(
+        tr(
+            "{identity} sends without an end: {count} bytes, and no answer to: {request}.",
+            identity=identity,
+            count=count,
+            request=describe(request),
+        ),
+        remedy=tr(
+            "Check that this is the PLC's Modbus port; on a serial line look for a second client, "
+            "or a device that never stops."
+        ),
+        controller=identity,
+        request=describe(request),
+        raw=raw[-_SHOWN_BYTES:],
+    )
+
+
+def restless(identity: str, count: int, raw: bytes) -> RemoteProtocolError:
+    """Return the error for a serial line on which no pause comes."""
+    return RemoteProtocolError(
+        tr(
+            "The line of {identity} does not fall silent: {count} bytes without a pause.",
+            identity=identity,
+            count=count,
+        ),
+        remedy=tr("Look for a second client on it, or a device that never stops."),
+        controller=identity,
+        raw=raw[-_SHOWN_BYTES:],
     )
 
 

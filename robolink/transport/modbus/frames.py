@@ -1,9 +1,9 @@
 """Modbus requests and answers as bytes, both framings. No I/O.
 
 The only module of the library that imports pymodbus, which renames what it offers in minor
-releases (ecosystem.md 1.2). It is used as a codec alone: its clients reconnect before each
-request, repeat writes, take an answer of another function or length for the one asked for,
-and on a serial line throw away what follows a frame.
+releases (docs/decisions/0012-modbus-and-canopen-libraries.md). It is used as a codec alone: its
+clients reconnect before each request, repeat writes, take an answer of another function or length
+for the one asked for, and on a serial line throw away what follows a frame.
 """
 
 import logging

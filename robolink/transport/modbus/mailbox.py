@@ -1,4 +1,4 @@
-"""A PLC mailbox in the registers of a Modbus server (design part 7)."""
+"""A PLC mailbox in the registers of a Modbus server (docs/mailbox.md, "Registers")."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -111,6 +111,11 @@ class ModbusMailboxLink:
     def clock(self) -> Clock:
         """The client's clock."""
         return self._client.clock
+
+    @property
+    def whole_look_s(self) -> float:
+        """See :meth:`robolink.transport.MailboxLink.whole_look_s`."""
+        return self._client.read_takes_s(RESPONSE_WORDS) + self._client.write_takes_s(1)
 
     def write_command(self, words: Sequence[int]) -> None:
         """See :meth:`robolink.transport.MailboxLink.write_command`; one function 16."""

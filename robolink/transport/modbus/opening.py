@@ -135,6 +135,7 @@ def _open_rtu(
     options.finish()
     timed = settings.baud <= _FASTEST_TIMED_BAUD
     line = RtuLine(
+        character_s=settings.character_s,
         silence_s=3.5 * settings.character_s if timed else 0.00175,
         quiet_s=max(_QUIET_CHARACTERS * settings.character_s, _QUIET_S),
         echo=echo,

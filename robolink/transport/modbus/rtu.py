@@ -1,7 +1,7 @@
 """How one Modbus request and its answer pass on a serial line.
 
 A serial frame carries no number: an answer of the same function and length that comes late
-would pass for the next one (faults_and_speed.md finding 3, F02). So after anything doubtful,
+would pass for the next one (docs/reference/faults.md F02). So after anything doubtful,
 and when it is opened, a line falls silent, throws away what it holds and asks a question whose
 answer no earlier question can have. A server answers in order, so whatever was late has passed
 when that answer comes.
@@ -12,12 +12,14 @@ from dataclasses import dataclass
 from typing import Final
 
 from robolink.errors import RemoteProtocolError, TransportTimeoutError
-from robolink.messages import tr
 from robolink.timing import NS_PER_S, Deadline
 from robolink.transport.modbus import errors as errors
 from robolink.transport.modbus.framing import FrameError, Framing
 from robolink.transport.modbus.messages import WRITE_COIL, Area, ModbusReply, ModbusRequest
 from robolink.transport.stream.contract import Transport
+
+_AROUND: Final = 3
+"""The unit in front of a frame and its checksum behind."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +27,7 @@ class RtuLine:
     """What is special about one serial line.
 
     Attributes:
+        character_s: How long one character takes.
         silence_s: Pause between frames: 3.5 characters, 1.75 ms above 19 200 baud
             (Modbus over serial line 1.02, 2.5.1.1).
         quiet_s: After something doubtful, this long without a byte counts as silent.
@@ -33,6 +36,7 @@ class RtuLine:
         probe_address: First address of it.
     """
 
+    character_s: float
     silence_s: float
     quiet_s: float
     echo: bool
@@ -55,6 +59,11 @@ class RtuExchange:
     # Lengths that nothing else on a mailbox reads, so that each names its own question.
     _UNUSUAL: Final = range(3, 3 + 2 * (_REMEMBERED + 1), 2)
 
+    # Sixteen of the longest frames: more late answers than that are not expected either.
+    _MOST_UNASKED_BYTES: Final = 256 * _REMEMBERED
+    # Four of the longest frames in a row without the pause that has to follow each.
+    _MOST_WITHOUT_PAUSE: Final = 1024
+
     def __init__(
         self, transport: Transport, identity: str, line: RtuLine, framing: Framing
     ) -> None:
@@ -66,11 +75,18 @@ class RtuExchange:
         self._doubts: deque[ModbusRequest] = deque(maxlen=self._REMEMBERED)
         self._in_step: set[int] = set()
         self._quiet_since_ns = transport.clock.now_ns()
+        self._unasked = 0
+
+    def takes_s(self, sent_bytes: int, answered_bytes: int) -> float:
+        """See :meth:`robolink.transport.modbus.client.Exchange.takes_s`."""
+        framed = sent_bytes + answered_bytes + 2 * _AROUND
+        return framed * self._line.character_s + 2 * self._line.silence_s
 
     def ask(self, request: ModbusRequest, deadline: Deadline) -> ModbusReply:
         """See :meth:`robolink.transport.modbus.client.Exchange.ask`."""
+        self._unasked = 0
         if request.unit not in self._in_step:
-            self.get_in_step(request.unit, deadline)
+            self._get_in_step(request.unit, deadline)
         reply = self._ask_once(request, deadline)
         while not request.is_answered_by(reply):
             reply = self._next(request, b"", deadline)
@@ -81,9 +97,13 @@ class RtuExchange:
         """Let the line fall silent, then ask ``unit`` a question like no other.
 
         Raises:
-            TransportTimeoutError: It never fell silent, or the question was not answered.
-            RemoteProtocolError: What came is no Modbus.
+            TransportTimeoutError: The question was not answered.
+            RemoteProtocolError: It never fell silent, or what came is no Modbus, or has no end.
         """
+        self._unasked = 0
+        self._get_in_step(unit, deadline)
+
+    def _get_in_step(self, unit: int, deadline: Deadline) -> None:
         self._fall_silent(deadline)
         probe = self._unlike_all_doubts(unit)
         # A refusal says no length: it proves something when only this question can have it.
@@ -110,16 +130,22 @@ class RtuExchange:
         return ModbusRequest(unit, function, area, self._line.probe_address, count)
 
     def _fall_silent(self, deadline: Deadline) -> None:
+        self._transport.receive_waiting()  # it may have gathered for minutes, pauses and all
+        passed = 0
         while True:
             self._transport.clock.sleep(self._line.quiet_s)
-            if self._transport.receive_waiting() is None:
+            heard = self._transport.receive_waiting()
+            if heard is None:
                 return
-            if deadline.expired:
-                raise TransportTimeoutError(
-                    tr("The line of {identity} does not fall silent.", identity=self._identity),
-                    remedy=tr("Look for a second client on it, or a device that never stops."),
-                    controller=self._identity,
-                )
+            passed += len(heard)
+            if passed > self._MOST_WITHOUT_PAUSE or deadline.expired:
+                raise errors.restless(self._identity, passed, heard)
+
+    def _count(self, data: bytes, request: ModbusRequest) -> None:
+        """Raise RemoteProtocolError when more comes for one question than any device sends."""
+        self._unasked += len(data)
+        if self._unasked > self._MOST_UNASKED_BYTES:
+            raise errors.flooding(self._identity, request, self._unasked, data)
 
     def _ask_once(self, request: ModbusRequest, deadline: Deadline) -> ModbusReply:
         self._buffer.clear()
@@ -175,7 +201,9 @@ class RtuExchange:
         if deadline.expired:  # also when frames of no request of ours keep coming
             raise errors.unanswered(self._identity, request, bytes(self._buffer))
         try:
-            self._buffer += self._transport.receive(deadline=deadline)
+            came = self._transport.receive(deadline=deadline)
+            self._count(came, request)
+            self._buffer += came
         except TransportTimeoutError as error:
             held = bytes(self._buffer)
             raise errors.unanswered(self._identity, request, held) from error

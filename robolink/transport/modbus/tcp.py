@@ -9,6 +9,10 @@ from robolink.transport.modbus.framing import FrameError, Framing
 from robolink.transport.modbus.messages import ModbusReply, ModbusRequest
 from robolink.transport.stream.contract import Transport
 
+_MOST_UNASKED_BYTES: Final = 16_384
+"""Sixty of the longest frames. Late answers are fewer: after a time-out the link is closed. Who
+sends more between a question and its answer does not stop."""
+
 
 class TcpExchange:
     """Takes the answer that carries the number of the request; what comes late is dropped."""
@@ -22,13 +26,19 @@ class TcpExchange:
         self._framing = framing
         self._buffer = bytearray()
         self._transaction = 0
+        self._unasked = 0
+
+    def takes_s(self, sent_bytes: int, answered_bytes: int) -> float:  # noqa: ARG002 - the form of all exchanges
+        """See :meth:`robolink.transport.modbus.client.Exchange.takes_s`."""
+        return 0.0
 
     def ask(self, request: ModbusRequest, deadline: Deadline) -> ModbusReply:
         """See :meth:`robolink.transport.modbus.client.Exchange.ask`."""
         # A server that hung up while nothing was asked is noticed before anything is sent.
+        self._unasked = 0
         waiting = self._transport.receive_waiting()
         if waiting is not None:
-            self._keep(waiting)
+            self._keep(waiting, request)
         self._transaction = self._transaction % 0xFFFF + 1
         frame = self._framing.pack(request, self._transaction)
         self._transport.send(frame, deadline=deadline)
@@ -51,12 +61,21 @@ class TcpExchange:
             if deadline.expired:  # also when frames of no request of ours keep coming
                 raise errors.unanswered(self._identity, request, bytes(self._buffer))
             try:
-                self._keep(self._transport.receive(deadline=deadline))
+                self._keep(self._transport.receive(deadline=deadline), request)
             except TransportTimeoutError as error:
                 held = bytes(self._buffer)
                 raise errors.unanswered(self._identity, request, held) from error
 
-    def _keep(self, data: bytes) -> None:
+    def _keep(self, data: bytes, request: ModbusRequest) -> None:
+        """Take what came; the longest answer is far shorter than what is taken for one request.
+
+        Raises:
+            TransportBrokenError: It was the end of the stream.
+            RemoteProtocolError: It has no end.
+        """
         if not data:
             raise errors.hung_up(self._identity)
+        self._unasked += len(data)
+        if self._unasked > _MOST_UNASKED_BYTES:
+            raise errors.flooding(self._identity, request, self._unasked, data)
         self._buffer += data

@@ -11,7 +11,7 @@ from robolink.transport._url import LinkUrl
 _UNREACHABLE = (errno.EHOSTUNREACH, errno.ENETUNREACH, errno.ENETDOWN)
 
 # A peer that lost its power answers nothing, and bytes sent to it "succeed" for minutes
-# unless the kernel is told otherwise (faults_and_speed.md finding 8, F11). Probing after 1 s
+# unless the kernel is told otherwise (docs/reference/faults.md F11). Probing after 1 s
 # of silence, twice, 1 s apart, ends an idle link after 3 s; unacknowledged data end it
 # after 2.5 s. Each constant is missing on some platform.
 _OPTIONS = (

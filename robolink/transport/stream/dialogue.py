@@ -22,6 +22,7 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.timing import NS_PER_S
 from robolink.transport.stream.trace import SECRET_PLACEHOLDER, Direction
+from robolink.ways import Way, way
 
 SCHEMA: Final = "robolink/dialogue/1"
 
@@ -180,5 +181,5 @@ def _passage(line: dict[str, object]) -> Passage:
 def _unreadable(source: str, number: int) -> ConfigError:
     return ConfigError(
         tr("Line {number} of {source} is not part of a dialogue.", number=number, source=source),
-        remedy=tr("Give a file that --record or --transcript has written."),
+        remedy=tr("Give a file that {record} has written.", record=way(Way.DIALOGUE_FILE)),
     )

@@ -9,10 +9,10 @@ import json
 import socket
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from types import TracebackType
-from typing import Any, Final, Self
+from typing import Any, Final
 from urllib.parse import urlsplit
 
+from robolink.closing import ClosedAtExit
 from robolink.errors import ConfigError, ConnectError, RobolinkError, TransportBrokenError
 from robolink.messages import tr
 from robolink_simulators.assist.acts import Assisted, perform
@@ -23,7 +23,7 @@ from robolink_simulators.epson.refusals import SpelRefusal
 from robolink_simulators.hosting.in_process import epson as in_process
 from robolink_simulators.hosting.in_process import softmotion as plc_in_process
 from robolink_simulators.hosting.streams.tcp_host import TcpHost
-from robolink_simulators.softmotion.group.smc_errors import BlockRefused
+from robolink_simulators.softmotion.smc_errors import BlockRefused
 
 _MAX_LINE: Final = 65536
 _SCHEME: Final = "assist+tcp"
@@ -106,7 +106,7 @@ class _AssistLink:
         return json.dumps(answer).encode() + b"\n"
 
 
-class AssistClient:
+class AssistClient(ClosedAtExit):
     """Talks to an assist port.
 
     Args:
@@ -181,17 +181,6 @@ class AssistClient:
         """Close the connection."""
         self._lines.close()
         self._socket.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def _broken(self) -> TransportBrokenError:
         return TransportBrokenError(

@@ -5,7 +5,9 @@ from dataclasses import dataclass, field
 
 @dataclass(slots=True)
 class ControllerCard:
-    """Texts of the extended queries (epson.md 1.8); the values are the simulator's own.
+    """Texts of the extended queries; the values are the simulator's own.
+
+    Source: docs/reference/epson.md 1.8.
 
     Attributes:
         name: Its name, ``0`` if none was given.

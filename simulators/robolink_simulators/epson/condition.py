@@ -22,11 +22,11 @@ class Task(Enum):
 
 
 class Condition:
-    """The state that decides what a controller serves (epson.md 1.4).
+    """The state that decides what a controller serves (docs/reference/epson.md 1.4).
 
-    An emergency stop stays in force until it is released and then Reset (epson.md 1.7).
-    Ready means that start-up is over and no task executes; it stays on in an error, since
-    Reset needs it (inferred from the table of epson.md 1.2).
+    An emergency stop stays in force until it is released and then Reset
+    (docs/reference/epson.md 1.7). Ready means that start-up is over and no task executes; it stays
+    on in an error, since Reset needs it (inferred from the table of docs/reference/epson.md 1.2).
 
     Attributes:
         mode: Position of the mode selector.

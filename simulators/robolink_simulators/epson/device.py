@@ -21,8 +21,8 @@ from robolink_simulators.epson.arm.robots import find_robot
 from robolink_simulators.epson.card import ControllerCard
 from robolink_simulators.epson.companion import Companion
 from robolink_simulators.epson.condition import Condition, Mode, Task
+from robolink_simulators.epson.flash import Flash, forget_volatile
 from robolink_simulators.epson.machine import Machine
-from robolink_simulators.epson.memory.flash import Flash, forget_volatile
 from robolink_simulators.epson.memory.variables import project_variables
 from robolink_simulators.epson.mishaps import EpsonMishaps
 from robolink_simulators.epson.options import EpsonOptions
@@ -47,7 +47,7 @@ RequestHook = Callable[[int, str], None]
 
 
 class EpsonSimulator:
-    """Implements :class:`~robolink_simulators.hosting.seam.WireDevice`.
+    """Implements ``hosting.seam.WireDevice``.
 
     Args:
         robot: Name of a SCARA model.
@@ -296,7 +296,7 @@ class EpsonSimulator:
             self._stepping = False
 
     def _supervise(self, now_ns: int) -> None:
-        """Keep the time-outs of epson.md 1.1."""
+        """Keep the time-outs of docs/reference/epson.md 1.1."""
         unfinished = self._service.unfinished
         self._slot.settle(unfinished=unfinished)
         deadline = self._slot.deadline(unfinished=unfinished)

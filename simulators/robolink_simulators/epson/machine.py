@@ -16,7 +16,7 @@ from robolink_simulators.epson.memory.timed_bits import TimedBits
 from robolink_simulators.epson.memory.tools import ToolMemory
 
 REMOTE_ETHERNET = 26
-"""CtrlDev of a controller run over Remote Ethernet (spel.md 9)."""
+"""CtrlDev of a controller run over Remote Ethernet (docs/reference/spel.md 9)."""
 
 
 class Machine:
@@ -113,7 +113,7 @@ class Machine:
         return inverse(self.model, flange, base.hand)
 
     def switch_motors(self, on: bool) -> None:
-        """Switch the motors; on also resets the motion parameters (spel.md 6.3)."""
+        """Switch the motors; on also resets the motion parameters (docs/reference/spel.md 6.3)."""
         self.motors_on = on
         if on:
             self.reset_motion_parameters()
@@ -124,7 +124,10 @@ class Machine:
         self.timed_bits.clear()
 
     def reset_motion_parameters(self) -> None:
-        """Set the defaults and low power: start-up, Motor On, Reset ... (spel.md 6.3)."""
+        """Set the defaults and low power: start-up, Motor On, Reset and the like.
+
+        Source: docs/reference/spel.md 6.3.
+        """
         self.parameters = MotionParameters()
         self.power_high = False
         self.settings.reset()

@@ -5,8 +5,11 @@ tests run with each). Evidence marks: [D] document, [R] transcript of a real con
 [I] inferred, [U] unverified, [open] the references contradict each other.
 """
 
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from typing import Final, Literal
+
+from robolink_simulators.option_values import require_known, values_from_text
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,8 +23,8 @@ class SpelNumbers:
     function_only: int = 2120
     name_undefined: int = 2121
     not_simulated: int = 2199
-    wait_timed_out: int = 2280  # spel.md 4.6
-    value_out_of_range: int = 4002  # spel.md 10, for AvoidSingularity
+    wait_timed_out: int = 2280  # docs/reference/spel.md 4.6
+    value_out_of_range: int = 4002  # docs/reference/spel.md 10, for AvoidSingularity
     out_of_reach: int = 4001
     motors_off: int = 4023
     emergency_stop: int = 4025
@@ -35,13 +38,13 @@ class SpelNumbers:
     tool_zero_fixed: int = 4016
     tool_in_force: int = 4017
     local_undefined: int = 4010
-    point_undefined: int = 7007  # spel.md 10, sample handler
-    above_limz: int = 4005  # spel.md 10
+    point_undefined: int = 7007  # docs/reference/spel.md 10, sample handler
+    above_limz: int = 4005  # docs/reference/spel.md 10
     subscript: int = 2231
     type_mismatch: int = 2130
     aborted: int = 2997
     logged_out_in_task: int = 2996
-    home_undefined: int = 2228  # spel.md 10
+    home_undefined: int = 2228  # docs/reference/spel.md 10
     serious: int = 9001
 
 
@@ -103,7 +106,7 @@ class EpsonOptions:
         real_pos_noise_mm: Standard deviation of RealPos against the commanded position [R:
             2 um seen].
         till_already_met: What a motion does whose Till holds from the start: it stays, or
-            starts and stops at once [open, spel.md 15].
+            starts and stops at once [open, docs/reference/spel.md 15].
         angle_wrap: Whether a stored tool angle is brought into -180..180 [U].
         numbers: Error numbers in use.
     """
@@ -151,3 +154,24 @@ class EpsonOptions:
     till_already_met: Literal["stays", "starts"] = "stays"
     angle_wrap: bool = False
     numbers: SpelNumbers = SpelNumbers()
+
+
+_NUMBERS: Final = "numbers."
+
+
+def option_names() -> tuple[str, ...]:
+    """Return every option; error numbers are written ``numbers.NAME``."""
+    own = [field.name for field in fields(EpsonOptions) if field.name != "numbers"]
+    return (*own, *(_NUMBERS + field.name for field in fields(SpelNumbers)))
+
+
+def options_from_text(pairs: Mapping[str, str]) -> EpsonOptions:
+    """Return the defaults with ``pairs`` applied.
+
+    Raises:
+        ConfigError: An option is unknown, or a value does not fit it.
+    """
+    require_known(pairs, option_names(), kind="EPSON")
+    numbers = values_from_text(SpelNumbers, pairs, prefix=_NUMBERS)
+    own = values_from_text(EpsonOptions, pairs)
+    return replace(EpsonOptions(), **own, numbers=replace(SpelNumbers(), **numbers))

@@ -63,7 +63,7 @@ class Memory:
         self._values[place] = self._values.get(place, 0) & ~mask | bit << signal.bit
 
     def zero(self, table: RegisterTable) -> None:
-        """Zero a whole table, as a watchdog does (softmotion.md 4.1)."""
+        """Zero a whole table, as a watchdog does (docs/reference/softmotion.md 4.1)."""
         self._values = {place: v for place, v in self._values.items() if place[0] is not table}
 
     def _require(self, table: RegisterTable, addresses: range) -> None:

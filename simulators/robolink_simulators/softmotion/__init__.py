@@ -1,23 +1,18 @@
 """A simulated CODESYS SoftMotion axis group: SIMULATED, no runtime system is involved.
 
 What is simulated and on what evidence stands in docs/simulated-softmotion.md; the facts are
-those of softmotion.md.
+those of docs/reference/softmotion.md.
 """
 
+from robolink_simulators.softmotion.catalogue import MachineModel as MachineModel
+from robolink_simulators.softmotion.catalogue import machine_named as machine_named
+from robolink_simulators.softmotion.function_blocks import BlockExecution as BlockExecution
+from robolink_simulators.softmotion.function_blocks import BlockOutputs as BlockOutputs
+from robolink_simulators.softmotion.function_blocks import BlockState as BlockState
 from robolink_simulators.softmotion.group.axis_group import AxisGroup as AxisGroup
-from robolink_simulators.softmotion.group.blocks import BlockExecution as BlockExecution
-from robolink_simulators.softmotion.group.blocks import BlockOutputs as BlockOutputs
-from robolink_simulators.softmotion.group.blocks import BlockState as BlockState
 from robolink_simulators.softmotion.group.condition import GroupStatus as GroupStatus
 from robolink_simulators.softmotion.group.condition import ReadToolMode as ReadToolMode
 from robolink_simulators.softmotion.group.condition import SmcGroupState as SmcGroupState
-from robolink_simulators.softmotion.group.options import GroupOptions as GroupOptions
-from robolink_simulators.softmotion.group.options import SmcNumbers as SmcNumbers
-from robolink_simulators.softmotion.group.smc_errors import BlockRefused as BlockRefused
-from robolink_simulators.softmotion.group.smc_errors import ErrorKind as ErrorKind
-from robolink_simulators.softmotion.group.smc_errors import SmcError as SmcError
-from robolink_simulators.softmotion.kinematics.catalogue import MachineModel as MachineModel
-from robolink_simulators.softmotion.kinematics.catalogue import machine_named as machine_named
 from robolink_simulators.softmotion.kinematics.coordinates import CoordRef as CoordRef
 from robolink_simulators.softmotion.kinematics.coordinates import CoordSystem as CoordSystem
 from robolink_simulators.softmotion.motion.axes import AxisLimits as AxisLimits
@@ -28,4 +23,9 @@ from robolink_simulators.softmotion.motion.movement import SmcBufferMode as SmcB
 from robolink_simulators.softmotion.motion.movement import ToolInForce as ToolInForce
 from robolink_simulators.softmotion.motion.paths import Dynamics as Dynamics
 from robolink_simulators.softmotion.motion.planner import Target as Target
+from robolink_simulators.softmotion.options import GroupOptions as GroupOptions
+from robolink_simulators.softmotion.options import SmcNumbers as SmcNumbers
+from robolink_simulators.softmotion.smc_errors import BlockRefused as BlockRefused
+from robolink_simulators.softmotion.smc_errors import ErrorKind as ErrorKind
+from robolink_simulators.softmotion.smc_errors import SmcError as SmcError
 from robolink_simulators.softmotion.world import SoftMotionWorld as SoftMotionWorld

@@ -20,7 +20,6 @@ from robolink_simulators.cell.workplace import (
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.softmotion.group.axis_group import AxisGroup
 from robolink_simulators.softmotion.group.condition import SmcGroupState
-from robolink_simulators.softmotion.group.smc_errors import BlockRefused, ErrorKind
 from robolink_simulators.softmotion.kinematics.frames import (
     NO_TURN,
     ORIGIN,
@@ -32,6 +31,7 @@ from robolink_simulators.softmotion.kinematics.frames import (
     zyx_angles,
 )
 from robolink_simulators.softmotion.kinematics.kinematics import AxisKind, AxisValues
+from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind
 
 STORED: Final = ToolOffset(12.0, -3.5, -20.0)
 """The nozzle that was there before, on a kinematics that carries any tool."""

@@ -142,7 +142,7 @@ def test_a_damaged_page_is_told_and_what_can_be_read_is_read(filled, open_anew):
         journal.log("cell").open_markers()
         journal.log("other").begin(marker())
 
-    refused(everything, filled, "it is damaged", "journal export --read-only", "by hand")
+    refused(everything, filled, "it is damaged", "read_only=True", "by hand")
     assert open_anew(str(filled), read_only=True).entry(1).verdict == "x" * 50
     assert filled.read_bytes()[page : page + 200] == b"\xff" * 200
 

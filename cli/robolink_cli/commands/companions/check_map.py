@@ -100,12 +100,13 @@ def _check_values(context: CliContext, shows: tuple[str, ...]) -> None:
         if not context.json:
             values.show()
         controller.require_probe()
-        confirmed = confirmation_of(controller.identity, register_map)
+        name = controller.who().name
+        confirmed = confirmation_of(name, register_map)
         if shows or (register_map.probe is None and confirmed is None):
             compared = _compared(controller, values, shows)
-            person = signature_of(context.operator, context.cell, changes=True)
+            person = signature_of(context.operator, context.expected, changes=True)
             by = person.operator or person.os_user
-            confirmed = confirm(controller.identity, register_map, by=by, compared=compared)
+            confirmed = confirm(name, register_map, by=by, compared=compared)
     payload = values.payload()
     payload["probe"] = None if register_map.probe is None else "fits"
     payload["confirmed_by"] = confirmed.by if confirmed else None
@@ -136,7 +137,7 @@ def _compared(controller: "PlcMapController", values: "MapValues", shows: tuple[
     try:
         return values.compared(answers)
     except MapDiffersError as error:
-        held = revoke(controller.identity, controller.register_map)
+        held = revoke(controller.who().name, controller.register_map)
         if held is not None:
             error.remedy = " ".join(
                 (
@@ -174,8 +175,8 @@ def _asked(controller: "PlcMapController", values: "MapValues") -> list[str]:
         DeclinedError: Nobody can be asked, or the person does not answer.
     """
     from robolink.runner import POLL_S, Question
-    from robolink_cli.prompts.consent import on_terminal
     from robolink_cli.prompts.operator import terminal
+    from robolink_cli.prompts.questions import on_terminal
 
     wanted = values.to_compare()
     if not on_terminal():

@@ -8,6 +8,7 @@ from typing import Final
 from robolink.durable_files import sync_folder, write_whole
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink.named_files import holds
 
 _EPSON: Final = ("epson/robolink_tools.prg", "LICENSE")
 
@@ -52,7 +53,7 @@ def export_companions(folder: Path, *, replace: bool = False) -> list[Path]:
 def _require_own(folder: Path, texts: Mapping[str, bytes]) -> None:
     for name, data in texts.items():
         path = folder / name
-        if path.exists() and not (path.is_file() and path.read_bytes() == data):
+        if path.exists() and not holds(path, data):
             raise ConfigError(
                 tr("{path} is there already and differs; it was not written over.", path=path),
                 remedy=tr("Name another folder, or give --force."),

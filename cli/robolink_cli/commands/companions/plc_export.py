@@ -5,7 +5,7 @@ from pathlib import Path
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink.named_files import require_free, save_named
+from robolink.named_files import holds, require_free, save_named
 from robolink.protocols.mailbox import (
     ExportProfile,
     electronic_data_sheet,
@@ -35,7 +35,7 @@ def export_texts(folder: Path, texts: Mapping[str, str], *, replace: bool = Fals
     """
     _make(folder)
     files = {folder / name: text.encode() for name, text in texts.items()}
-    stale = {path: data for path, data in files.items() if not _holds(path, data)}
+    stale = {path: data for path, data in files.items() if not holds(path, data)}
     for path in stale:
         require_free(path, replace=replace)
     for path, data in stale.items():
@@ -55,7 +55,3 @@ def _make(folder: Path) -> None:
             ),
             remedy=tr("Name a folder that can be written."),
         ) from error
-
-
-def _holds(path: Path, data: bytes) -> bool:
-    return path.is_file() and path.read_bytes() == data

@@ -7,14 +7,11 @@ import click
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink_cli.prompts.consent import (
-    agree_to_motion,
-    dry_run_option,
-    motion_question,
-    yes_option,
-)
-from robolink_cli.session.cell import with_cell_limits
-from robolink_cli.session.context import CliContext, controller_options, open_controller
+from robolink_cli.access.cell import with_cell_limits
+from robolink_cli.options.consent import dry_run_option, yes_option
+from robolink_cli.session.context import CliContext, controller_options
+from robolink_cli.session.motion_consent import agree_to_motion, motion_question
+from robolink_cli.session.opening import open_controller
 
 if TYPE_CHECKING:
     from robolink_cli.prompts.keyboard import Keyboard
@@ -84,7 +81,7 @@ def jog(
         if board is None:
             agree_to_motion(question, yes=yes)
         else:
-            heed_selection(controller, context.cell, yes=yes)
+            heed_selection(controller, context.expected, yes=yes)
         if board is not None and not yes:
             agree_by_key(question, board, watch=controller.status)
         with controller.preserved(tr("jog")):

@@ -1,4 +1,4 @@
-"""The command block: from a client to the PLC (design part 7)."""
+"""The command block: from a client to the PLC (docs/mailbox.md)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

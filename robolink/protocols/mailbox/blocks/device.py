@@ -1,4 +1,6 @@
-"""Which PLC this is: a number that it draws once and retains (design part 7).
+"""Which PLC this is: a number that it draws once and retains.
+
+Source: docs/mailbox.md, "Which PLC this is".
 
 The number stands behind the last slot, and in CANopen object 1018h:4, so that a PLC is known
 again over TCP, RTU and CAN, and under whatever name or address it is reached.

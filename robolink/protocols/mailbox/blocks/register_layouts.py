@@ -1,4 +1,4 @@
-"""The register map of mailbox version 1, once (design part 7).
+"""The register map of mailbox version 1, once (docs/mailbox.md, "Words and bytes").
 
 The codec, the register-map tables, the EDS and the Structured Text types all come from here.
 """

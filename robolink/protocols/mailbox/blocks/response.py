@@ -1,4 +1,4 @@
-"""The response block: from the PLC to every client (design part 7)."""
+"""The response block: from the PLC to every client (docs/mailbox.md)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields

@@ -1,4 +1,4 @@
-"""One slot of the tool table (design part 7)."""
+"""One slot of the tool table (docs/mailbox.md, "Tools")."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,7 @@
 """Finding out from the probe how a PLC, or a gateway before it, orders its words.
 
-It is the fault that users of Modbus report most (softmotion.md 4.4), and one that makes
-plausible numbers: so the probe is compared before anything is believed or written.
+It is the fault that users of Modbus report most (docs/reference/softmotion.md 4.4), and one that
+makes plausible numbers: so the probe is compared before anything is believed or written.
 """
 
 import struct

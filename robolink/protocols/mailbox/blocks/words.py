@@ -1,4 +1,4 @@
-"""Checksums and counters of the mailbox (design part 7)."""
+"""Checksums and counters of the mailbox (docs/mailbox.md, "Words and bytes")."""
 
 from collections.abc import Sequence
 from typing import Final

@@ -1,4 +1,7 @@
-"""The CANopen objects of the mailbox (design part 7; softmotion.md 4.8)."""
+"""The CANopen objects of the mailbox.
+
+Source: docs/mailbox.md, "CANopen"; docs/reference/softmotion.md 4.7.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -107,7 +110,7 @@ MAILBOX_OBJECTS: Final = (
     _record(0x2110, "command_fields", *COMMAND_FIELDS),
     _array(0x2200, "tool_slot", *(Entry(f"slot_{n}", DOMAIN) for n in SLOTS)),
 )
-"""As design part 7 says, and 0x2103, because a PDO can only carry what stands somewhere."""
+"""As docs/mailbox.md says, and 0x2103, because a PDO can only carry what stands somewhere."""
 
 
 def _mapping(index: int, entries: tuple[Entry, ...]) -> Iterator[Entry]:

@@ -1,4 +1,4 @@
-"""A circular motion of the tip: ``Arc mid, end`` (spel.md 7.1)."""
+"""A circular motion of the tip: ``Arc mid, end`` (docs/reference/spel.md 7.1)."""
 
 import cmath
 import math
@@ -76,7 +76,7 @@ def plan_arc(
 
     Raises:
         Refusal: The three stand in a line, or the hand would have to change (documented,
-            spel.md 7.1; the numbers are not).
+            docs/reference/spel.md 7.1; the numbers are not).
         OutOfReach: The arc leaves the envelope.
     """
     start, mid, end = points

@@ -138,7 +138,8 @@ class Arm:
         """Return the flange pose as RealPos measures it.
 
         Encoders sit before the play, so backlash does not show; X, Y and Z scatter with the
-        standard deviation ``noise_mm`` (seen in a transcript: 2 um, epson.md 7, 11).
+        standard deviation ``noise_mm`` (seen in a transcript: 2 um, docs/reference/epson.md 6,
+        vector 11).
         """
         pose = self.flange()
         return replace(

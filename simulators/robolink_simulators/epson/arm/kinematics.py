@@ -1,10 +1,10 @@
 """Forward and inverse kinematics of a SCARA, and where a tool's tip is.
 
 Conventions: joint 1 at 0 has the arm along the robot's +X, counter-clockwise is positive
-(documented, epson.md 4). With all joints at 0 the flange axes are parallel to the robot axes
-and turn with joint 4 (documented, epson.md 3.1), hence ``U = J1 + J2 + J4``; that U is
-printed and taken literally, not brought into -180..180, is assumed (a SCARA has no flag that
-could tell 270 from -90). Z is joint 3's travel, 0 at the top, negative downwards
+(documented, docs/reference/epson.md 4). With all joints at 0 the flange axes are parallel to the
+robot axes and turn with joint 4 (documented, docs/reference/epson.md 3.1), hence ``U = J1 + J2 +
+J4``; that U is printed and taken literally, not brought into -180..180, is assumed (a SCARA has no
+flag that could tell 270 from -90). Z is joint 3's travel, 0 at the top, negative downwards
 (documented). Righty is the solution whose joint 2 is not negative (assumed: the elbow lies to
 the right of the line from base to flange, as a person's right elbow does).
 """
@@ -108,8 +108,8 @@ def inverse(model: ScaraModel, flange: Pose, hand: Hand) -> Joints:
 def tip_of(flange: Pose, offset: ToolOffset | None, *, tool: int = 0) -> Pose:
     """Return the pose of a tool's tip: flange + Rz(U) (tx, ty), reported U = U + tu.
 
-    Seen in a client that computes the flange back the same way (epson.md 3.1). V and W of
-    the offset cannot be reached by a SCARA and are not part of its pose (assumed).
+    Seen in a client that computes the flange back the same way (docs/reference/epson.md 3.1). V and
+    W of the offset cannot be reached by a SCARA and are not part of its pose (assumed).
     """
     if offset is None:
         return replace(flange, tool=tool)

@@ -7,10 +7,11 @@ from typing import Final
 from robolink_simulators.epson.arm.trajectory import JointPace, LinePace
 
 LOW_POWER_TIP_MM_S: Final = 250.0
-"""In low power the tip stays below this (spel.md 7.2, epson.md 3.4)."""
+"""In low power the tip stays below this (docs/reference/spel.md 7.2,
+docs/reference/epson.md 3.4)."""
 
 LIMZ_MARGIN_MM: Final = 0.02
-"""Default of LimZMargin (spel.md 6.3)."""
+"""Default of LimZMargin (docs/reference/spel.md 6.3)."""
 
 
 class MotionPhase(IntEnum):
@@ -25,8 +26,9 @@ class MotionPhase(IntEnum):
 class MotionParameters:
     """What Speed, Accel, SpeedS, AccelS, SpeedR, AccelR and LimZ set.
 
-    The defaults are "per model (low)" in the reference, 5 % in its samples (spel.md 6.3); the
-    other numbers are assumed. Triples and pairs run travel, depart, approach.
+    The defaults are "per model (low)" in the reference, 5 % in its samples
+    (docs/reference/spel.md 6.3); the other numbers are assumed. Triples and pairs run travel,
+    depart, approach.
 
     Attributes:
         speed: Speed in percent.
@@ -50,7 +52,7 @@ class MotionParameters:
         """Return the pace of a joint-space leg.
 
         In low power the values may be set but are held to the defaults (documented,
-        spel.md 7.2), and the tip to 250 mm/s.
+        docs/reference/spel.md 7.2), and the tip to 250 mm/s.
         """
         used = self if power_high else self._held_to_defaults()
         accel, decel = used.accel[2 * phase : 2 * phase + 2]

@@ -1,10 +1,13 @@
-"""What a robot is told about its load, its arm and its joints (spel.md 6.2, 6.3, 7.2)."""
+"""What a robot is told about its load, its arm and its joints.
+
+Source: docs/reference/spel.md 6.2, 6.3, 7.2.
+"""
 
 from dataclasses import dataclass, field
 from typing import Final
 
 FINE_PULSES: Final = (10, 10, 10, 10)
-"""Default of Fine; per model in the reference, 10 in its sample (spel.md 7.3)."""
+"""Default of Fine; per model in the reference, 10 in its sample (docs/reference/spel.md 7.3)."""
 
 
 @dataclass(slots=True)
@@ -12,7 +15,7 @@ class RobotSettings:
     """Settings without a bearing on where the robot goes, but for the last four.
 
     The defaults of Weight and Inertia are per model; these are assumed. Which statement resets
-    which of them is documented (spel.md 6.3).
+    which of them is documented (docs/reference/spel.md 6.3).
 
     Attributes:
         weight_kg: Weight: hand and part.

@@ -28,7 +28,7 @@ class Range(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class ScaraModel:
-    """Geometry and drives of one robot (epson.md 4).
+    """Geometry and drives of one robot (docs/reference/epson.md 4).
 
     Joints 1, 2 and 4 count degrees, joint 3 mm downwards from 0.
 
@@ -60,7 +60,7 @@ class ScaraModel:
 
 _TURN = 360.0
 
-# epson.md 4: measured on a G3, the only SCARA whose joint 3 and 4 scales are known.
+# docs/reference/epson.md 4: measured on a G3, the only SCARA whose joint 3 and 4 scales are known.
 _J3_PULSES_PER_MM = 1706667 / 150.0
 _J4_PULSES_PER_DEG = 1494221 / _TURN
 
@@ -82,7 +82,7 @@ def _t_series(
             _J4_PULSES_PER_DEG,
         ),
         top_speed=_TOP_SPEED,
-        source="epson.md 4 (TB): reach, joint ranges, pulses of joints 1 and 2",
+        source="docs/reference/epson.md 4 (TB): reach, joint ranges, pulses of joints 1 and 2",
         assumed="link split, stroke of T6, pulses of joints 3 and 4 (G3's), joint speeds",
     )
 
@@ -106,7 +106,7 @@ def _gx_series(
             _J4_PULSES_PER_DEG,
         ),
         top_speed=_TOP_SPEED,
-        source="epson.md 4 (ROS2, GX): links, joint ranges; pulses of GX4 joint 1",
+        source="docs/reference/epson.md 4 (ROS2, GX): links, joint ranges; pulses of GX4 joint 1",
         assumed="pulses of joint 1 of GX8, of joint 2, of joints 3 and 4 (G3's), joint speeds",
     )
 

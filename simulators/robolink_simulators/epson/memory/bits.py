@@ -5,10 +5,11 @@ from typing import Final
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 
 IO_BITS: Final = 512
-"""Inputs and outputs (spel.md 8: bit numbers 0 to 511)."""
+"""Inputs and outputs (docs/reference/spel.md 8: bit numbers 0 to 511)."""
 
 MEMORY_BITS: Final = 1024
-"""Memory bits (spel.md 8: the reference gives 256, 512 and 1024; the largest is used)."""
+"""Memory bits (docs/reference/spel.md 8: the reference gives 256, 512 and 1024; the largest is
+used)."""
 
 
 class BitBank:

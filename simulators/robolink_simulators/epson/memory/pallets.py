@@ -1,4 +1,4 @@
-"""Pallets: points in rows and columns between corners (spel.md 5.4)."""
+"""Pallets: points in rows and columns between corners (docs/reference/spel.md 5.4)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""SPEL+ point values, planar locals and the point memory P0 to P999 (spel.md 5)."""
+"""SPEL+ point values, planar locals and the point memory P0 to P999 (docs/reference/spel.md 5)."""
 
 from dataclasses import dataclass, replace
 from typing import Final
@@ -111,7 +111,7 @@ class LocalTable:
         return replace(point, coordinates=coordinates, local=0)
 
     def convert(self, point: Point, number: int) -> Point:
-        """Express a point in another local (the modifier ``@n``, spel.md 5.2)."""
+        """Express a point in another local (the modifier ``@n``, docs/reference/spel.md 5.2)."""
         if number == point.local:
             return point
         base = self.to_base(point)
@@ -164,7 +164,7 @@ class PointTable:
         self._points[number] = point
 
     def delete(self, first: int, last: int) -> None:
-        """Forget a range of points; undefined ones are fine (spel.md 5.1)."""
+        """Forget a range of points; undefined ones are fine (docs/reference/spel.md 5.1)."""
         for number in self.numbers(first, last):
             del self._points[number]
 

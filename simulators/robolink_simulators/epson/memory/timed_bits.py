@@ -1,4 +1,4 @@
-"""Bits that switch back by themselves: ``On 11, 0.5`` (spel.md 8)."""
+"""Bits that switch back by themselves: ``On 11, 0.5`` (docs/reference/spel.md 8)."""
 
 from robolink_simulators.epson.memory.bits import BitBank
 

@@ -13,10 +13,10 @@ ClearInForce: TypeAlias = Literal["selects_zero", "keeps", "error"]
 
 
 class ToolMemory:
-    """Tools 1 to 15 and the selected tool; both survive power-off (spel.md 6.1).
+    """Tools 1 to 15 and the selected tool; both survive power-off (docs/reference/spel.md 6.1).
 
     Attributes:
-        flash_writes: TLSet and TLClr executed; each writes the flash (epson.md 3.1).
+        flash_writes: TLSet and TLClr executed; each writes the flash (docs/reference/epson.md 3.1).
     """
 
     def __init__(self) -> None:
@@ -59,8 +59,8 @@ class ToolMemory:
         Args:
             tool: Number of the tool.
             in_force: What happens when it is the tool in force. Neither the language reference
-                nor a transcript says (spel.md 6.1): Tool 0 is selected; or the number stays
-                selected, and targets are the flange's; or nothing is cleared.
+                nor a transcript says (docs/reference/spel.md 6.1): Tool 0 is selected; or the
+                number stays selected, and targets are the flange's; or nothing is cleared.
 
         Raises:
             Refusal: Tool 0, no such tool number, or the tool in force where that is an error.
@@ -78,8 +78,8 @@ class ToolMemory:
         """Put a tool in force.
 
         Raises:
-            Refusal: It is not defined (seen in a client: it needs a reset, epson.md 1.5), or
-                there is no such number.
+            Refusal: It is not defined (seen in a client: it needs a reset,
+                docs/reference/epson.md 1.5), or there is no such number.
         """
         if self.get(tool) is None and tool != 0:
             raise SpelRefusal(RefusalKind.TOOL_UNDEFINED, f"Tool {tool} is not defined")

@@ -1,4 +1,7 @@
-"""Global Preserve variables, as GetVariable and SetVariable reach them (epson.md 1.2 note 4)."""
+"""Global Preserve variables, as GetVariable and SetVariable reach them.
+
+Source: docs/reference/epson.md 1.2 note 4.
+"""
 
 import math
 import re
@@ -8,7 +11,7 @@ from typing import Final
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.protocols.epson_text import ErrorCode, VariableType
-from robolink_simulators.epson.remote.refused import RequestRefused, malformed
+from robolink_simulators.epson.request_refusals import RequestRefused, malformed
 
 Value = bool | int | float | str
 
@@ -145,7 +148,7 @@ class Variables:
         return variable, subscripts
 
     def _check_type(self, variable: _Variable, stated: Sequence[str]) -> None:
-        # Numbers asked as text, or text as numbers, are 14 (epson_corrections.md 6); that one
+        # Numbers asked as text, or text as numbers, are 14 (docs/reference/epson.md 1.2); that one
         # kind of number asked as another is so too is assumed.
         if stated and stated[0].strip().lower() != variable.kind.lower():
             raise RequestRefused(ErrorCode.BAD_COUNT)

@@ -1,4 +1,4 @@
-"""Who is logged in, and for how long silence is tolerated (epson.md 1.1)."""
+"""Who is logged in, and for how long silence is tolerated (docs/reference/epson.md 1.1)."""
 
 from typing import Protocol
 
@@ -16,7 +16,7 @@ class ClientSlot:
     """The one place for a logged-in client, watched by the remote time-out.
 
     When a client vanishes without a logout while something runs, its silence goes on being
-    counted: that a finite time-out also ends what runs is inferred (epson.md 1.7).
+    counted: that a finite time-out also ends what runs is inferred (docs/reference/epson.md 1.7).
 
     Args:
         remote_timeout_s: Longest silence; 0 for any.

@@ -1,4 +1,4 @@
-"""The command window: the one statement that Execute runs (epson.md 1.5)."""
+"""The command window: the one statement that Execute runs (docs/reference/epson.md 1.5)."""
 
 from robolink_simulators.epson.condition import Condition
 from robolink_simulators.epson.options import EpsonOptions
@@ -11,7 +11,7 @@ class SpelWindow:
     """Runs one statement at a time and answers the Execute that brought it.
 
     A failed statement puts the controller into its error state (seen: clients must Reset
-    after one, epson.md 1.5); an aborted one does not (assumed).
+    after one, docs/reference/epson.md 1.5); an aborted one does not (assumed).
     """
 
     def __init__(

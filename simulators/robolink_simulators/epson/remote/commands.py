@@ -1,4 +1,4 @@
-"""Which request is served now, and what it does (epson.md 1.2)."""
+"""Which request is served now, and what it does (docs/reference/epson.md 1.2)."""
 
 from functools import lru_cache
 
@@ -17,7 +17,7 @@ from robolink_simulators.epson.options import EpsonOptions
 from robolink_simulators.epson.refusals import SpelRefusal
 from robolink_simulators.epson.remote.io_commands import Fields, Served, io_commands
 from robolink_simulators.epson.remote.queries import Alarms, check_robot, query_commands
-from robolink_simulators.epson.remote.refused import RequestRefused, malformed, number
+from robolink_simulators.epson.request_refusals import RequestRefused, malformed, number
 
 _HIGHEST_FUNCTION = {5: 7, 7: 63, 8: 63}
 

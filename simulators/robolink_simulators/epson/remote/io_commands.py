@@ -1,14 +1,14 @@
-"""Remote Ethernet's input, output and memory commands (epson.md 1.2).
+"""Remote Ethernet's input, output and memory commands (docs/reference/epson.md 1.2).
 
 Numbers count from 0. Bytes and words are read as hex digits and set as decimal numbers, as
-clients do it (epson.md 1.2 note 5). GetIO reads inputs, SetIO sets outputs.
+clients do it (docs/reference/epson.md 1.2 note 5). GetIO reads inputs, SetIO sets outputs.
 """
 
 from collections.abc import Callable
 
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.bits import BitBank
-from robolink_simulators.epson.remote.refused import number
+from robolink_simulators.epson.request_refusals import number
 
 Fields = tuple[str, ...]
 """What a served command answers; nothing stands for a lone ``0``."""

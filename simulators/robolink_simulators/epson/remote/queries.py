@@ -1,4 +1,4 @@
-"""The extended queries of newer firmware (epson.md 1.8, epson_corrections.md 5), and the alarms.
+"""The extended queries of newer firmware (docs/reference/epson.md 1.8), and the alarms.
 
 The order of fields is that of Epson's own client; the values are the simulator's.
 """
@@ -13,18 +13,19 @@ from robolink_simulators.epson.condition import Condition
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.options import EpsonOptions
 from robolink_simulators.epson.remote.io_commands import Fields, Served
-from robolink_simulators.epson.remote.refused import malformed, number
+from robolink_simulators.epson.request_refusals import malformed, number
 
 _SCARA: Final = "3"
 _NOT_APPLICABLE: Final = "-1"
 _AXES: Final = 6
-_HIGHEST_LANGUAGE: Final = 6  # Spanish, which only ErrMsg$ documents (spel.md 4.4)
+_HIGHEST_LANGUAGE: Final = 6  # Spanish, which only ErrMsg$ documents (docs/reference/spel.md 4.4)
 _WARNED_PARTS: Final = 6  # battery, belt, grease, motor, gear, ball screw
 _FIRMWARE: Final = {5: "5. 4. 0. 0", 7: "7. 5. 4. 0", 8: "8. 1. 0. 0"}
 """With the blanks after the dots that Epson's own client takes out."""
 
 _OTHER_DEVICE: Final = "21"
-"""The control device where Remote Ethernet may only monitor: the PC (spel.md 9), assumed."""
+"""The control device where Remote Ethernet may only monitor: the PC (docs/reference/spel.md 9),
+assumed."""
 
 _WIDTH_OF_A_FUNCTION: Final = 64
 _INSTALLED: Final = "2020/01/01 00:00:00"
@@ -92,7 +93,7 @@ def check_robot(text: str) -> None:
 
 
 class Alarms:
-    """Numbers of the alarms that stand (epson.md 1.2)."""
+    """Numbers of the alarms that stand (docs/reference/epson.md 1.2)."""
 
     def __init__(self) -> None:
         self._numbers: list[int] = []

@@ -1,4 +1,7 @@
-"""Where a request goes: login, logout, the command window, or the desk (epson.md 1.1, 1.2)."""
+"""Where a request goes: login, logout, the command window, or the desk.
+
+Source: docs/reference/epson.md 1.1, 1.2.
+"""
 
 from robolink.protocols.epson_text import (
     BadRequest,
@@ -14,7 +17,7 @@ from robolink_simulators.epson.remote.command_window import SpelWindow
 from robolink_simulators.epson.remote.commands import CommandDesk
 from robolink_simulators.epson.remote.exchange import PendingRequest
 from robolink_simulators.epson.remote.link import EpsonLink
-from robolink_simulators.epson.remote.refused import RequestRefused
+from robolink_simulators.epson.request_refusals import RequestRefused
 
 
 class Service:
@@ -111,8 +114,8 @@ class Service:
 
     def _logout(self, link: EpsonLink, now_ns: int) -> None:
         if self.unfinished:
-            # Logging out while a task runs raises an error (documented, epson.md 1.1); that
-            # the error ends what runs, as errors do, is assumed.
+            # Logging out while a task runs raises an error (documented,
+            # docs/reference/epson.md 1.1); that the error ends what runs, as errors do, is assumed.
             self._window.interrupt(now_ns)
             self._condition.raise_error(self._options.numbers.logged_out_in_task)
             if self._options.logout_while_running == "refused":

@@ -41,7 +41,7 @@ def number_value(text: str) -> int | float:
     """Return the value of a numeric literal.
 
     Decimal integers that no Long holds are reals (inferred from Str$(99999999999999), which
-    prints with an exponent, spel.md 3.2).
+    prints with an exponent, docs/reference/spel.md 3.2).
     """
     lower = text.lower()
     if lower[:2] in _RADIX:
@@ -141,7 +141,7 @@ class TreeBuilder(Transformer[Token, tuple[Statement, ...]]):
     def coordinates(self, *values: Expression) -> Coordinates:
         """Build a coordinate list; flags were read as divisions, and are tried first.
 
-        ``0 /R /1`` arrives as ``(0 / R) / 1`` (spel.md 14.1, item 2).
+        ``0 /R /1`` arrives as ``(0 / R) / 1`` (docs/reference/spel.md 14.1, item 2).
         """
         last, flags = values[-1], list[Modifier]()
         while isinstance(last, Binary) and last.operator == "/":

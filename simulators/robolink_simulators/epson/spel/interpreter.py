@@ -10,7 +10,7 @@ from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.variables import Variables
 from robolink_simulators.epson.options import EpsonOptions
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
-from robolink_simulators.epson.remote.refused import RequestRefused
+from robolink_simulators.epson.request_refusals import RequestRefused
 from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
 from robolink_simulators.epson.spel.expressions.printing import CRLF, joined, number_text
 from robolink_simulators.epson.spel.expressions.values import Value, as_number, truth
@@ -210,7 +210,7 @@ class StatementExecution:
     def _assign(self, name: str, value: Value) -> StatementOutcome:
         session = self._evaluator.session
         if session.options.variable_assignment == "refused":
-            # Whether the command window takes variables is left open (spel.md 13).
+            # Whether the command window takes variables is left open (docs/reference/spel.md 13).
             raise SpelRefusal(RefusalKind.NOT_ALLOWED_HERE, f"{name} needs a program")
         if not session.variables.holds(name):
             raise SpelRefusal(RefusalKind.NAME_UNDEFINED, f"Nothing is called {name}")

@@ -22,7 +22,7 @@ _PROGRAM_WORDS = """
 """
 
 PROGRAM_ONLY: Final = frozenset(_PROGRAM_WORDS.split())
-"""Statements that exist in programs only (spel.md 13, class E)."""
+"""Statements that exist in programs only (docs/reference/spel.md 13, class E)."""
 
 _WORDS_OF_OTHER_ROBOTS = """
     brake jumptlz avoidsingularity singularityangle singularityspeed singularitydist
@@ -48,7 +48,8 @@ _WORDS_NOT_SIMULATED = """
 """
 
 NOT_SIMULATED: Final = frozenset(_WORDS_NOT_SIMULATED.split())
-"""Statements that the reference allows in the command window (spel.md 13, classes A to D)."""
+"""Statements that the reference allows in the command window (docs/reference/spel.md 13, classes A
+to D)."""
 
 _FUNCTION_WORDS = """
     abs accelmax acos agl agltopls align armdef asc asin atan atan2 athome bclr bset btst chr$ cos
@@ -63,7 +64,7 @@ _FUNCTION_WORDS = """
 """
 
 FUNCTION_ONLY: Final = frozenset(_FUNCTION_WORDS.split())
-"""Words that are functions and never statements (spel.md 13, class F)."""
+"""Words that are functions and never statements (docs/reference/spel.md 13, class F)."""
 
 _REFUSED_WORDS: Final = (
     (PROGRAM_ONLY, RefusalKind.NOT_ALLOWED_HERE, "is allowed in programs only"),

@@ -12,7 +12,10 @@ from robolink_simulators.epson.spel.tree import Binary, Expression, Literal, Nam
 
 
 def _at_power_on() -> Expression:
-    """Return the condition of a bare Till, Find or Sense (spel.md 6.3): ``Sw(0) = On``."""
+    """Return the condition of a bare Till, Find or Sense: ``Sw(0) = On``.
+
+    Source: docs/reference/spel.md 6.3.
+    """
     return Binary("=", Name("sw", (Literal(0),)), Name("on"))
 
 

@@ -59,7 +59,7 @@ class PointFunction:
 
 
 class ModifierKind(Enum):
-    """What a modifier behind a point does (spel.md 5.2)."""
+    """What a modifier behind a point does (docs/reference/spel.md 5.2)."""
 
     FLAG = "/"
     CONVERT = "@"

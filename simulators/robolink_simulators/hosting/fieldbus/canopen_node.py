@@ -4,12 +4,12 @@ import logging
 import struct
 import threading
 from dataclasses import dataclass
-from types import TracebackType
-from typing import Any, Final, Self
+from typing import Any, Final
 
 import can
 import canopen
 
+from robolink.closing import ClosedAtExit
 from robolink.errors import ConfigError, ConnectError
 from robolink.messages import tr
 from robolink.protocols.mailbox import COMMAND
@@ -71,7 +71,7 @@ class CanPlace:
         return settings
 
 
-class CanopenHost:
+class CanopenHost(ClosedAtExit):
     """A node in front of a simulated PLC; a context manager.
 
     Args:
@@ -119,17 +119,6 @@ class CanopenHost:
             self._network.disconnect()
             if self._simulator.url == self.url:
                 self._simulator.url = ""
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def _real_seconds(self, simulated: float) -> float:
         return self._clock.real_seconds(self._clock.now_ns() + round(simulated * NS_PER_S))

@@ -1,9 +1,9 @@
 """Serves a simulated PLC as a Modbus server, over TCP or a serial cable."""
 
-from types import TracebackType
-from typing import Final, Self
+from typing import Final
 from urllib.parse import urlencode
 
+from robolink.closing import ClosedAtExit
 from robolink.errors import ConnectError
 from robolink.messages import tr
 from robolink_simulators.cell.clock import ScaledClock
@@ -21,7 +21,7 @@ from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 _DEFAULT_UNIT: Final = 1
 
 
-class ModbusHost:
+class ModbusHost(ClosedAtExit):
     """A Modbus server in front of a simulated PLC; a context manager.
 
     Args:
@@ -54,17 +54,6 @@ class ModbusHost:
             self._server.close()
             if self._cable is not None:
                 self._cable.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def _look(self) -> None:
         """Cut the connections when the PLC was started anew; a serial line has none."""

@@ -1,7 +1,8 @@
 """A Modbus server in a thread of its own. The only simulator module that imports pymodbus.
 
 pymodbus renames what it offers in minor releases, and its action hook fires for read-backs
-too (ecosystem.md 1.2); all of that is dealt with here. Nothing is kept in its own registers.
+too (docs/decisions/0012-modbus-and-canopen-libraries.md); all of that is dealt with here. Nothing
+is kept in its own registers.
 """
 
 import asyncio

@@ -20,8 +20,8 @@ _WORD_BITS: Final = 16
 class PlcRegisters:
     """Holding and input registers; coils overlay the first, discrete inputs the second.
 
-    As CODESYS does it (documented, softmotion.md 4.1). Registers beside the mailbox only keep
-    what is written.
+    As CODESYS does it (documented, docs/reference/softmotion.md 4.1). Registers beside the mailbox
+    only keep what is written.
 
     Args:
         simulator: The PLC.

@@ -9,12 +9,12 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.timing import Clock
 from robolink.transport import LinkUrl
-from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.cell.world_parameters import from_options, plain
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.epson.option_text import option_names, options_from_text
+from robolink_simulators.epson.options import option_names, options_from_text
 from robolink_simulators.hosting.in_process.named import NamedSimulators, seed_from_text
 from robolink_simulators.hosting.in_process.transport import InProcessTransport
+from robolink_simulators.option_values import require_known
 from robolink_simulators.serial_numbers import drawn_serial
 
 _OWN_OPTIONS: Final = ("robot", "seed", "state", "split")
@@ -61,47 +61,16 @@ def open_epson(
     )
 
 
-def simulator_named(name: str) -> EpsonSimulator:
-    """Return the simulator behind ``epson+sim://NAME``.
-
-    Raises:
-        ConfigError: Nothing was opened or registered under that name.
-    """
-    return _named.find(name).simulator
-
-
-def register(name: str, simulator: EpsonSimulator, *, clock: ManualClock | None = None) -> str:
-    """Serve a simulator under ``epson+sim://NAME`` and return that URL.
-
-    Raises:
-        ConfigError: The name is taken.
-    """
-    return _named.register(name, simulator, clock)
-
-
-def unregister(name: str) -> None:
-    """Forget a simulator; open connections go on. An unknown name is fine."""
-    _named.unregister(name)
-
-
-def clock_of(name: str) -> ManualClock:
-    """Return the clock of the simulator of that name.
-
-    Raises:
-        ConfigError: There is none.
-    """
-    return _named.find(name).clock
+simulator_named = _named.simulator
+register = _named.register
+unregister = _named.unregister
+clock_of = _named.clock
 
 
 def _made(name: str, options: Mapping[str, str]) -> EpsonSimulator:
     known = {key: options[key] for key in _OWN_OPTIONS if key in options}
     habits = {key: value for key, value in plain(options).items() if key not in _OWN_OPTIONS}
-    unknown = sorted(set(habits) - set(option_names()))
-    if unknown:
-        raise ConfigError(
-            tr("The EPSON simulator has no option {name!r}.", name=unknown[0]),
-            remedy=tr("Known are: {names}.", names=", ".join((*_OWN_OPTIONS, *option_names()))),
-        )
+    require_known(habits, (*_OWN_OPTIONS, *option_names()), kind="EPSON")
     state = known.get("state")
     seed = seed_from_text(known.get("seed", "1"))
     return EpsonSimulator(

@@ -72,6 +72,11 @@ class InProcessMailboxLink:
         """The simulator's clock."""
         return self._clock
 
+    @property
+    def whole_look_s(self) -> float:
+        """0: nothing is carried anywhere."""
+        return 0.0
+
     def write_command(self, words: Sequence[int]) -> None:
         """See :meth:`robolink.transport.MailboxLink.write_command`."""
         self._exchange(lambda now_ns: self._simulator.write(0, words, now_ns))

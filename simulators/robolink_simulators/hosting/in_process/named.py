@@ -72,12 +72,23 @@ class NamedSimulators(Generic[Simulator]):
                 )
             return named
 
-    def find(self, name: str) -> Named[Simulator]:
+    def simulator(self, name: str) -> Simulator:
         """Return the simulator of that name.
 
         Raises:
             ConfigError: Nothing was opened or registered under it.
         """
+        return self._find(name).simulator
+
+    def clock(self, name: str) -> ManualClock:
+        """Return the clock of the simulator of that name.
+
+        Raises:
+            ConfigError: Nothing was opened or registered under it.
+        """
+        return self._find(name).clock
+
+    def _find(self, name: str) -> Named[Simulator]:
         with self._lock:
             named = self._named.get(name.lower())
         if named is None:
@@ -89,8 +100,8 @@ class NamedSimulators(Generic[Simulator]):
             )
         return named
 
-    def register(self, name: str, simulator: Simulator, clock: ManualClock | None) -> str:
-        """Serve a simulator under a name and return its URL.
+    def register(self, name: str, simulator: Simulator, *, clock: ManualClock | None = None) -> str:
+        """Serve a simulator under a name and return its URL, such as ``epson+sim://NAME``.
 
         Raises:
             ConfigError: The name is taken.

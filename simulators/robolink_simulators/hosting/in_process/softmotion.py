@@ -4,15 +4,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 
-from robolink.errors import ConfigError
-from robolink.messages import tr
 from robolink.timing import Clock
 from robolink.transport import LinkUrl
-from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.cell.world_parameters import from_options, plain
 from robolink_simulators.hosting.in_process.mailbox_link import InProcessMailboxLink
 from robolink_simulators.hosting.in_process.named import NamedSimulators, seed_from_text
-from robolink_simulators.softmotion.kinematics.catalogue import NAMES, parameter_names
+from robolink_simulators.option_values import require_known
+from robolink_simulators.softmotion.catalogue import NAMES, parameter_names
 from robolink_simulators.softmotion.mailbox.option_text import option_names, options_from_text
 from robolink_simulators.softmotion.mailbox.parameters import parameters_from_text
 from robolink_simulators.softmotion.mailbox.simulator import (
@@ -47,36 +45,10 @@ def open_softmotion(
     return InProcessMailboxLink(link_url.identity, named.simulator, named.clock, timeout_s)
 
 
-def simulator_named(name: str) -> SoftMotionSimulator:
-    """Return the simulator behind ``softmotion+sim://NAME``.
-
-    Raises:
-        ConfigError: Nothing was opened or registered under that name.
-    """
-    return _named.find(name).simulator
-
-
-def register(name: str, simulator: SoftMotionSimulator, *, clock: ManualClock | None = None) -> str:
-    """Serve a simulator under ``softmotion+sim://NAME`` and return that URL.
-
-    Raises:
-        ConfigError: The name is taken.
-    """
-    return _named.register(name, simulator, clock)
-
-
-def unregister(name: str) -> None:
-    """Forget a simulator; open links go on. An unknown name is fine."""
-    _named.unregister(name)
-
-
-def clock_of(name: str) -> ManualClock:
-    """Return the clock of the simulator of that name.
-
-    Raises:
-        ConfigError: There is none.
-    """
-    return _named.find(name).clock
+simulator_named = _named.simulator
+register = _named.register
+unregister = _named.unregister
+clock_of = _named.clock
 
 
 def _made(options: Mapping[str, str]) -> SoftMotionSimulator:
@@ -84,12 +56,7 @@ def _made(options: Mapping[str, str]) -> SoftMotionSimulator:
     kinematics = options.get("kinematics", DEFAULT_KINEMATICS).replace(" ", "+")
     of_machine = parameter_names(kinematics) if kinematics in NAMES else ()
     names = (*_OWN_OPTIONS, *of_machine, *option_names())
-    unknown = sorted(set(plain(options)) - set(names))
-    if unknown:
-        raise ConfigError(
-            tr("The PLC simulator has no option {name!r}.", name=unknown[0]),
-            remedy=tr("Known are: {names}.", names=", ".join(names)),
-        )
+    require_known(plain(options), names, kind="PLC")
     state = options.get("state")
     habits = {name: value for name, value in options.items() if name in option_names()}
     parameters = {name: value for name, value in options.items() if name in of_machine}

@@ -4,18 +4,18 @@ import contextlib
 import selectors
 import socket
 import threading
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from contextlib import AbstractContextManager
-from types import TracebackType
-from typing import Final, Self
+from typing import Final
 
+from robolink.closing import ClosedAtExit
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.hosting.seam import WireDevice
 
 _LONGEST_SLEEP_S: Final = 3600.0
 
 
-class WireHost(ABC):
+class WireHost(ClosedAtExit):
     """The thread that serves a device. What it watches, a subclass adds, and then starts it.
 
     Args:
@@ -57,17 +57,6 @@ class WireHost(ABC):
         self.wake()
         if self._thread is not threading.current_thread():
             self._thread.join()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     @abstractmethod
     def flush(self) -> None:

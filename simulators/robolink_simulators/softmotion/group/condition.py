@@ -3,12 +3,15 @@
 from dataclasses import dataclass
 from enum import IntEnum
 
-from robolink_simulators.softmotion.group.smc_errors import SmcError
 from robolink_simulators.softmotion.kinematics.kinematics import AxisValues, Configuration
+from robolink_simulators.softmotion.smc_errors import SmcError
 
 
 class SmcGroupState(IntEnum):
-    """``SMC_AXIS_GROUP_STATE``; the numbers are a field report (softmotion.md 2.1)."""
+    """``SMC_AXIS_GROUP_STATE``; the numbers are a field report.
+
+    Source: docs/reference/softmotion.md 2.1.
+    """
 
     DISABLED = 0
     STANDBY = 1
@@ -19,7 +22,7 @@ class SmcGroupState(IntEnum):
 
 
 class ReadToolMode(IntEnum):
-    """Which tool SMC_GroupReadTool gives; numbers of design part 7, opcode 30002."""
+    """Which tool SMC_GroupReadTool gives; numbers of opcode 30002 (docs/mailbox.md)."""
 
     SET = 0
     ACTIVE_MOVEMENT = 1

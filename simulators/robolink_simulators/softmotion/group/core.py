@@ -4,11 +4,8 @@ from collections.abc import Callable, Sequence
 from functools import wraps
 from typing import Concatenate, ParamSpec, TypeVar
 
-from robolink_simulators.softmotion.group.blocks import BlockExecution
+from robolink_simulators.softmotion.function_blocks import BlockExecution
 from robolink_simulators.softmotion.group.condition import GroupStatus, SmcGroupState
-from robolink_simulators.softmotion.group.options import GroupOptions
-from robolink_simulators.softmotion.group.signals import DigitalInputs, DigitalOutputs
-from robolink_simulators.softmotion.group.smc_errors import BlockRefused, Overruled
 from robolink_simulators.softmotion.group.state_machine import StateMachine
 from robolink_simulators.softmotion.kinematics.coordinates import CoordinateTransforms
 from robolink_simulators.softmotion.kinematics.frames import Frame
@@ -17,6 +14,9 @@ from robolink_simulators.softmotion.motion.axes import ASSUMED_LIMITS, Axis, Axi
 from robolink_simulators.softmotion.motion.motion import GroupMotion
 from robolink_simulators.softmotion.motion.movement import ToolInForce
 from robolink_simulators.softmotion.motion.paths import require_inside
+from robolink_simulators.softmotion.options import GroupOptions
+from robolink_simulators.softmotion.signals import DigitalInputs, DigitalOutputs
+from robolink_simulators.softmotion.smc_errors import BlockRefused, Overruled
 
 Inputs = ParamSpec("Inputs")
 Core = TypeVar("Core", bound="GroupCore")

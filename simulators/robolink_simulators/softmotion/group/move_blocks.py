@@ -1,9 +1,8 @@
-"""The blocks that move an axis group (softmotion.md 2.3, 2.4)."""
+"""The blocks that move an axis group (docs/reference/softmotion.md 2.3, 2.4)."""
 
-from robolink_simulators.softmotion.group.blocks import BlockExecution
+from robolink_simulators.softmotion.function_blocks import BlockExecution
 from robolink_simulators.softmotion.group.condition import SmcGroupState
 from robolink_simulators.softmotion.group.core import GroupCore, block
-from robolink_simulators.softmotion.group.smc_errors import BlockRefused, ErrorKind
 from robolink_simulators.softmotion.kinematics.frames import ORIGIN, Frame
 from robolink_simulators.softmotion.kinematics.kinematics import AxisValues
 from robolink_simulators.softmotion.motion.jog import JogCommand, JogMotion
@@ -11,6 +10,7 @@ from robolink_simulators.softmotion.motion.movement import EdgeWatch, Movement, 
 from robolink_simulators.softmotion.motion.paths import Dynamics, Path
 from robolink_simulators.softmotion.motion.planner import Planner, Target
 from robolink_simulators.softmotion.motion.profile import Pace
+from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind
 
 
 class MoveBlocks(GroupCore):
@@ -28,7 +28,7 @@ class MoveBlocks(GroupCore):
     ) -> None:
         """``MC_MoveLinearAbsolute``: the TCP on a straight line, the elbow on its side.
 
-        With ``watch``, as the companion program's movement until an input (design part 7,
+        With ``watch``, as the companion program's movement until an input (docs/mailbox.md,
         opcode 30008): ``execution.latched`` is the TCP at the edge, in the coordinate system
         of the target; without an edge the block ends in error.
         """

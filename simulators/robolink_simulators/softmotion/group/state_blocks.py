@@ -1,13 +1,13 @@
-"""The blocks that change the state of an axis group (softmotion.md 2.2, 2.3)."""
+"""The blocks that change the state of an axis group (docs/reference/softmotion.md 2.2, 2.3)."""
 
-from robolink_simulators.softmotion.group.blocks import BlockExecution
+from robolink_simulators.softmotion.function_blocks import BlockExecution
 from robolink_simulators.softmotion.group.condition import SmcGroupState
 from robolink_simulators.softmotion.group.core import GroupCore, block
-from robolink_simulators.softmotion.group.signals import DigitalOutputs
-from robolink_simulators.softmotion.group.smc_errors import BlockRefused, ErrorKind, Overruled
 from robolink_simulators.softmotion.kinematics.coordinates import CoordinateTransforms
 from robolink_simulators.softmotion.kinematics.kinematics import KinematicsModel
 from robolink_simulators.softmotion.motion.movement import ToolInForce
+from robolink_simulators.softmotion.signals import DigitalOutputs
+from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind, Overruled
 
 _SAME_PLACE = 1e-6
 

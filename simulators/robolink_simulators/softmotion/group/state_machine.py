@@ -1,18 +1,18 @@
-"""The states of an axis group in simulated time (softmotion.md 2.2)."""
+"""The states of an axis group in simulated time (docs/reference/softmotion.md 2.2)."""
 
 from collections.abc import Callable
 
-from robolink_simulators.softmotion.group.blocks import BlockExecution
+from robolink_simulators.softmotion.function_blocks import BlockExecution
 from robolink_simulators.softmotion.group.condition import SmcGroupState
-from robolink_simulators.softmotion.group.options import GroupOptions
-from robolink_simulators.softmotion.group.smc_errors import (
+from robolink_simulators.softmotion.motion.axes import Axis
+from robolink_simulators.softmotion.motion.motion import GroupMotion
+from robolink_simulators.softmotion.options import GroupOptions
+from robolink_simulators.softmotion.smc_errors import (
     BlockRefused,
     ErrorKind,
     Overruled,
     SmcError,
 )
-from robolink_simulators.softmotion.motion.axes import Axis
-from robolink_simulators.softmotion.motion.motion import GroupMotion
 
 
 class StateMachine:

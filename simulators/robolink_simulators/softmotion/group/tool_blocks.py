@@ -1,17 +1,17 @@
-"""The blocks about tool, kinematics and position (softmotion.md 1, 2.3)."""
+"""The blocks about tool, kinematics and position (docs/reference/softmotion.md 1, 2.3)."""
 
-from robolink_simulators.softmotion.group.blocks import BlockExecution
+from robolink_simulators.softmotion.function_blocks import BlockExecution
 from robolink_simulators.softmotion.group.condition import (
     ActualPosition,
     ReadToolMode,
     SmcGroupState,
 )
 from robolink_simulators.softmotion.group.core import GroupCore, block
-from robolink_simulators.softmotion.group.smc_errors import BlockRefused, ErrorKind
 from robolink_simulators.softmotion.kinematics.coordinates import CoordRef, CoordSystem
 from robolink_simulators.softmotion.kinematics.frames import NO_TURN, Frame
 from robolink_simulators.softmotion.kinematics.kinematics import KinematicsModel
 from robolink_simulators.softmotion.motion.movement import ToolInForce
+from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind
 
 
 class ToolBlocks(GroupCore):
@@ -80,7 +80,7 @@ class ToolBlocks(GroupCore):
     def read_actual_position(self, system: CoordSystem = CoordSystem.MCS) -> ActualPosition:
         """``MC_GroupReadActualPosition`` of the TCP of the tool that is set.
 
-        It therefore jumps when a tool is set (inferred, softmotion.md 1.1).
+        It therefore jumps when a tool is set (inferred, docs/reference/softmotion.md 1.1).
         """
         if system is CoordSystem.ACS:
             return ActualPosition(self.values, None)

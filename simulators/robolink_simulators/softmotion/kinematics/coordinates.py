@@ -4,12 +4,15 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import Self
 
-from robolink_simulators.softmotion.group.smc_errors import BlockRefused, ErrorKind
 from robolink_simulators.softmotion.kinematics.frames import ORIGIN, Frame, zyz, zyz_angles
+from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind
 
 
 class CoordSystem(IntEnum):
-    """``SMC_COORD_SYSTEM``: members documented (softmotion.md 2.6), numbers those of design 7."""
+    """``SMC_COORD_SYSTEM``: members documented, numbers those of docs/mailbox.md.
+
+    Source: docs/reference/softmotion.md 2.6.
+    """
 
     ACS = 0
     MCS = 1
@@ -21,7 +24,9 @@ class CoordSystem(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class CoordRef:
-    """``MC_COORD_REF``: shift in mm, A, B, C in degrees (documented, softmotion.md 1.3).
+    """``MC_COORD_REF``: shift in mm, A, B, C in degrees.
+
+    Source: docs/reference/softmotion.md 1.3 (documented).
 
     The user unit of a simulated group is the millimetre.
     """

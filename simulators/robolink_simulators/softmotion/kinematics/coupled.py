@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass, field
 
-from robolink_simulators.softmotion.group.smc_errors import BlockRefused, ErrorKind
 from robolink_simulators.softmotion.kinematics.frames import Frame, Matrix, subtract, turned
 from robolink_simulators.softmotion.kinematics.kinematics import (
     AxisKind,
@@ -13,6 +12,7 @@ from robolink_simulators.softmotion.kinematics.kinematics import (
 )
 from robolink_simulators.softmotion.kinematics.orientation import OrientationSpace, about_z, yaw_deg
 from robolink_simulators.softmotion.kinematics.positions import Scara2Z
+from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +34,9 @@ class CAxis:
 
 @dataclass(frozen=True, slots=True)
 class Coupled:
-    """``Kin_Coupled`` of a position kinematics and a C axis (documented, softmotion.md 3.1).
+    """``Kin_Coupled`` of a position kinematics and a C axis.
+
+    Source: docs/reference/softmotion.md 3.1 (documented).
 
     The position part may turn the C axis's base about Z, as a SCARA's arms do. A shift of any
     direction fits, because the C axis decides the orientation.

@@ -3,7 +3,6 @@
 import math
 from dataclasses import dataclass
 
-from robolink_simulators.softmotion.group.smc_errors import BlockRefused, ErrorKind
 from robolink_simulators.softmotion.kinematics.frames import Y_AXIS, Frame, Matrix, about, product
 from robolink_simulators.softmotion.kinematics.kinematics import (
     ANY_CONFIGURATION,
@@ -13,6 +12,7 @@ from robolink_simulators.softmotion.kinematics.kinematics import (
     near_turn,
 )
 from robolink_simulators.softmotion.kinematics.orientation import OrientationSpace, about_z
+from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind
 
 _UNDECIDED = 1e-9
 

@@ -1,7 +1,7 @@
 """Frames and rotations as plain values: exact to compare, safe to share.
 
 A rotation is a tuple of rows. SoftMotion's angles are A, B, C in degrees with
-``R = Rz(A) Ry(B) Rz(C)`` (documented, softmotion.md 1.3).
+``R = Rz(A) Ry(B) Rz(C)`` (documented, docs/reference/softmotion.md 1.3).
 """
 
 import math
@@ -101,7 +101,7 @@ def zyz_angles(rotation: Matrix) -> Vector:
     """Return A, B, C in degrees with B in 0..180.
 
     Where B is 0 or 180 only A + C, or A - C, is defined; A carries it and C is 0 (which of
-    the two SoftMotion fills is unverified, softmotion.md 1.3).
+    the two SoftMotion fills is unverified, docs/reference/softmotion.md 1.3).
     """
     tilt = math.hypot(rotation[0][2], rotation[1][2])
     b = math.atan2(tilt, rotation[2][2])

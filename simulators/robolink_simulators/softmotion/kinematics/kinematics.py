@@ -66,8 +66,8 @@ class KinematicsModel(Protocol):
     def orientation_image(self, wanted: Matrix) -> OrientationSpace | None:
         """Return what becomes of a programmed flange orientation.
 
-        ``GetFlangeOrientationImage`` (documented, softmotion.md 3.1); ``None`` when the
-        kinematics does not implement the interface.
+        ``GetFlangeOrientationImage`` (documented, docs/reference/softmotion.md 3.1); ``None`` when
+        the kinematics does not implement the interface.
 
         Raises:
             Refused: No orientation is closest to this one.

@@ -1,8 +1,8 @@
 """Which flange orientations a kinematics can take up, and which tools fit it.
 
-One rule settles every row of the vendor's table (softmotion.md 3.1, 3.2): a tool's shift must
-look the same whatever the part of the orientation is that nobody knows. Its rotation never
-matters.
+One rule settles every row of the vendor's table (docs/reference/softmotion.md 3.1, 3.2): a tool's
+shift must look the same whatever the part of the orientation is that nobody knows. Its rotation
+never matters.
 """
 
 import math
@@ -68,7 +68,7 @@ def yaw_deg(rotation: Matrix) -> float | None:
     """Return the turn about Z that comes closest to a rotation.
 
     ``None`` where the rotated Z points the other way, so that every turn is equally far
-    (documented for Kin_CAxis, softmotion.md 3.3).
+    (documented for Kin_CAxis, docs/reference/softmotion.md 3.3).
     """
     sine = rotation[1][0] - rotation[0][1]
     cosine = rotation[0][0] + rotation[1][1]

@@ -1,12 +1,11 @@
 """The position kinematics: three axes that carry a flange.
 
-Geometry as in softmotion.md 3.3; the evidence of each stands at its class.
+Geometry as in docs/reference/softmotion.md 3.3; the evidence of each stands at its class.
 """
 
 import math
 from dataclasses import dataclass
 
-from robolink_simulators.softmotion.group.smc_errors import BlockRefused, ErrorKind
 from robolink_simulators.softmotion.kinematics.frames import NO_TURN, Frame, Matrix
 from robolink_simulators.softmotion.kinematics.kinematics import (
     ANY_CONFIGURATION,
@@ -16,6 +15,7 @@ from robolink_simulators.softmotion.kinematics.kinematics import (
     near_turn,
 )
 from robolink_simulators.softmotion.kinematics.orientation import Freedom, OrientationSpace, about_z
+from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind
 
 _ROUNDING = 1e-9
 

@@ -1,4 +1,4 @@
-"""The mailbox program of a simulated SoftMotion PLC (design part 7). SIMULATED."""
+"""The mailbox program of a simulated SoftMotion PLC (docs/mailbox.md). SIMULATED."""
 
 from robolink_simulators.softmotion.mailbox.faults import PlcFault as PlcFault
 from robolink_simulators.softmotion.mailbox.faults import PlcFaultAction as PlcFaultAction

@@ -1,6 +1,6 @@
 """Planned faults of a simulated PLC and its fieldbus. Counted, never rolled.
 
-The vocabulary follows the fault catalogue of faults_and_speed.md A2.
+The vocabulary, and the numbers, are those of docs/reference/faults.md.
 """
 
 from dataclasses import dataclass

@@ -6,10 +6,10 @@ from typing import Final
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink_simulators.option_values import values_from_text
-from robolink_simulators.softmotion.group.options import GroupOptions, SmcNumbers
+from robolink_simulators.option_values import require_known, values_from_text
 from robolink_simulators.softmotion.mailbox.options import MailboxOptions
 from robolink_simulators.softmotion.mailbox.words.places import require_places
+from robolink_simulators.softmotion.options import GroupOptions, SmcNumbers
 
 _NUMBERS: Final = "numbers."
 _LONGEST_CYCLE_US: Final = 1_000_000
@@ -42,12 +42,7 @@ def options_from_text(pairs: Mapping[str, str]) -> PlcOptions:
     Raises:
         ConfigError: An option is unknown, or a value does not fit it.
     """
-    for name in pairs:
-        if name not in option_names():
-            raise ConfigError(
-                tr("The PLC simulator has no option {name!r}.", name=name),
-                remedy=tr("Known are: {names}.", names=", ".join(option_names())),
-            )
+    require_known(pairs, option_names(), kind="PLC")
     numbers = replace(SmcNumbers(), **values_from_text(SmcNumbers, pairs, prefix=_NUMBERS))
     group = replace(GroupOptions(), **values_from_text(GroupOptions, pairs), numbers=numbers)
     mailbox = replace(MailboxOptions(), **values_from_text(MailboxOptions, pairs))

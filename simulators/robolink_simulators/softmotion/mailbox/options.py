@@ -1,7 +1,7 @@
 """How a PLC's mailbox program and its fieldbus are set up, as named options.
 
-Evidence marks as in ``softmotion.md``: [D] vendor documentation, [U] unverified; [project]
-what each PLC project chooses for itself.
+Evidence marks as in docs/reference/softmotion.md: [D] vendor documentation, [U] unverified;
+[project] what each PLC project chooses for itself.
 """
 
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ class MailboxOptions:
         profile: Which opcodes the program holds [project]; ``tools`` has no motion.
         unit_um: Micrometres per user unit of the axis group [project].
         word_order: How the program lays values of several words; anything but ``low_first``
-            is a mistake that a client must notice (softmotion.md 4.4).
+            is a mistake that a client must notice (docs/reference/softmotion.md 4.4).
         program_cycle_us: Period of the task that the mailbox program runs in [project].
         exchange_us: What one exchange takes over a ``sim`` URL [ours].
         watchdog_ms: Silence after which the fieldbus zeroes what clients write; 0 never

@@ -1,4 +1,4 @@
-"""Who may command the mailbox (design part 7)."""
+"""Who may command the mailbox (docs/mailbox.md)."""
 
 from typing import Final
 

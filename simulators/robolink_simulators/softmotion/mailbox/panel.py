@@ -5,12 +5,12 @@ from contextlib import AbstractContextManager
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink_simulators.softmotion.group.smc_errors import BlockRefused
 from robolink_simulators.softmotion.kinematics.coordinates import CoordRef
 from robolink_simulators.softmotion.mailbox.plc import Plc
+from robolink_simulators.softmotion.smc_errors import BlockRefused
 
 _LAG_ERROR = 16
-"""SMC_ERROR: lag error (softmotion.md 1.4)."""
+"""SMC_ERROR: lag error (docs/reference/softmotion.md 1.4)."""
 
 
 class PlcPanel:

@@ -12,15 +12,15 @@ from robolink.protocols.mailbox import (
     Words,
     next_number,
 )
+from robolink_simulators.softmotion.catalogue import MachineModel
 from robolink_simulators.softmotion.group.axis_group import AxisGroup
 from robolink_simulators.softmotion.group.condition import SmcGroupState
-from robolink_simulators.softmotion.kinematics.catalogue import MachineModel
 from robolink_simulators.softmotion.kinematics.coordinates import CoordRef
 from robolink_simulators.softmotion.mailbox.commands.tools import ToolDesk
 from robolink_simulators.softmotion.mailbox.option_text import PlcOptions
+from robolink_simulators.softmotion.mailbox.outbox import Outbox
 from robolink_simulators.softmotion.mailbox.program import MailboxProgram
 from robolink_simulators.softmotion.mailbox.retained import RetainedMemory
-from robolink_simulators.softmotion.mailbox.words.outbox import Outbox
 from robolink_simulators.softmotion.mailbox.words.units import UserUnits
 
 _PRESET_SLOT: Final = 1

@@ -1,4 +1,4 @@
-"""The mailbox program of a PLC: what it does with a command, and meanwhile (design part 7).
+"""The mailbox program of a PLC: what it does with a command, and meanwhile (docs/mailbox.md).
 
 Theory of operation. Clients write words. In the next cycle of its task the program looks at
 them: a whole new command is accepted, once, and handed to one of the desks, which call the
@@ -20,8 +20,8 @@ from robolink.protocols.mailbox import (
     WordOrder,
     opcodes_of,
 )
+from robolink_simulators.softmotion.function_blocks import BlockExecution
 from robolink_simulators.softmotion.group.axis_group import AxisGroup
-from robolink_simulators.softmotion.group.blocks import BlockExecution
 from robolink_simulators.softmotion.mailbox.commands.complaints import Rejected
 from robolink_simulators.softmotion.mailbox.commands.jobs import Job, Jobs
 from robolink_simulators.softmotion.mailbox.commands.motion import MotionDesk

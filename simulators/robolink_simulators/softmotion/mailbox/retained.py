@@ -7,7 +7,6 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
 
-from robolink.durable_files import sync_folder, write_whole
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.named_files import read_named
@@ -19,12 +18,13 @@ from robolink.protocols.mailbox import (
     encode_slot,
     next_number,
 )
+from robolink_simulators.state_files import save_state
 
 SCHEMA: Final = "robolink/plc-state/1"
 
 
 class RetainedMemory:
-    """The retained variables of the mailbox program (design part 7).
+    """The retained variables of the mailbox program (docs/mailbox.md).
 
     Attributes:
         boot_id: Counts PLC starts; 0 before the first.
@@ -152,15 +152,4 @@ class RetainedFile:
             return
         self._written = state
         document = {"schema": SCHEMA, "machine": self._machine, "memory": state}
-        try:
-            write_whole(self._path, json.dumps(document).encode())
-            sync_folder(self._path.parent)
-        except OSError as error:
-            raise ConfigError(
-                tr(
-                    "The simulator cannot save its state in {path}: {cause}.",
-                    path=self._path,
-                    cause=error.strerror or error,
-                ),
-                remedy=tr("Name a file in a folder that can be written."),
-            ) from error
+        save_state(self._path, document)

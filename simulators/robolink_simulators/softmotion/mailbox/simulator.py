@@ -15,7 +15,7 @@ from typing import Any, Final
 
 from robolink.protocols.mailbox import COMMAND, Opcode, Words
 from robolink_simulators.cell.world_parameters import WorldParameters
-from robolink_simulators.softmotion.kinematics.catalogue import machine_named
+from robolink_simulators.softmotion.catalogue import machine_named
 from robolink_simulators.softmotion.kinematics.coordinates import CoordRef
 from robolink_simulators.softmotion.mailbox.faults import PlcFault, PlcFaultAction
 from robolink_simulators.softmotion.mailbox.mishaps import PlcMishaps

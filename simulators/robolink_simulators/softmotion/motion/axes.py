@@ -6,16 +6,16 @@ from enum import IntEnum
 from typing import Final
 
 from robolink.timing import NS_PER_S
-from robolink_simulators.softmotion.group.smc_errors import BlockRefused, ErrorKind
 from robolink_simulators.softmotion.kinematics.kinematics import AxisKind
 from robolink_simulators.softmotion.motion.profile import Pace, SpeedProfile
+from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind
 
 _ROUNDING = 1e-9
 _STILL = 1e-9
 
 
 class AxisState(IntEnum):
-    """``SMC_AXIS_STATE`` (documented, softmotion.md 2.1)."""
+    """``SMC_AXIS_STATE`` (documented, docs/reference/softmotion.md 2.1)."""
 
     POWER_OFF = 0
     ERRORSTOP = 1

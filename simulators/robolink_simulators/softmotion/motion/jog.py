@@ -4,8 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from robolink.timing import NS_PER_S
-from robolink_simulators.softmotion.group.blocks import BlockExecution
-from robolink_simulators.softmotion.group.smc_errors import BlockRefused, ErrorKind
+from robolink_simulators.softmotion.function_blocks import BlockExecution
 from robolink_simulators.softmotion.kinematics.coordinates import CoordinateTransforms, CoordSystem
 from robolink_simulators.softmotion.kinematics.frames import (
     Frame,
@@ -25,6 +24,7 @@ from robolink_simulators.softmotion.kinematics.kinematics import (
 )
 from robolink_simulators.softmotion.motion.axes import Axis
 from robolink_simulators.softmotion.motion.paths import Dynamics, axes_for_tcp, require_inside
+from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind
 
 COORDINATES = 6
 
@@ -184,7 +184,7 @@ def jogged(tcp: Frame, base: Matrix, way_mm: Vector, turn_deg: Vector) -> Frame:
     """Return a TCP moved along, and turned about, the axes of a coordinate system.
 
     A, B and C turn about X, Y and Z through the TCP: they are no Euler angles here
-    (documented, softmotion.md 0.4).
+    (documented, docs/reference/softmotion.md 2.3).
 
     Args:
         tcp: The TCP in MCS.

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 from robolink.timing import NS_PER_S
-from robolink_simulators.softmotion.group.blocks import BlockExecution
+from robolink_simulators.softmotion.function_blocks import BlockExecution
 from robolink_simulators.softmotion.kinematics.coordinates import CoordRef
 from robolink_simulators.softmotion.kinematics.frames import ORIGIN, Frame
 from robolink_simulators.softmotion.kinematics.kinematics import AxisValues
@@ -13,7 +13,7 @@ from robolink_simulators.softmotion.motion.profile import Pace, SpeedProfile
 
 
 class SmcBufferMode(IntEnum):
-    """``MC_BUFFER_MODE`` (documented, softmotion.md 2.4)."""
+    """``MC_BUFFER_MODE`` (documented, docs/reference/softmotion.md 2.4)."""
 
     ABORTING = 0
     BUFFERED = 1

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
 
-from robolink_simulators.softmotion.group.smc_errors import BlockRefused, ErrorKind
 from robolink_simulators.softmotion.kinematics.frames import (
     Frame,
     Matrix,
@@ -26,6 +25,7 @@ from robolink_simulators.softmotion.kinematics.kinematics import (
 )
 from robolink_simulators.softmotion.motion.axes import Axis
 from robolink_simulators.softmotion.motion.profile import Pace
+from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind
 
 _STILL = 1e-9
 _CHECK_EVERY_MM = 2.0
@@ -145,7 +145,8 @@ def axes_for_tcp(
 ) -> AxisValues:
     """Return the axes that bring the TCP somewhere, its orientation as close as it can be.
 
-    The orientation is projected first and the position kept (documented, softmotion.md 3.1).
+    The orientation is projected first and the position kept (documented,
+    docs/reference/softmotion.md 3.1).
 
     Raises:
         Refused: Out of reach.

@@ -4,7 +4,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from robolink_simulators.softmotion.group.smc_errors import BlockRefused, ErrorKind
 from robolink_simulators.softmotion.kinematics.coordinates import (
     CoordinateTransforms,
     CoordRef,
@@ -29,6 +28,7 @@ from robolink_simulators.softmotion.motion.paths import (
     plan_line,
 )
 from robolink_simulators.softmotion.motion.profile import Pace
+from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind
 
 Position = tuple[float, ...]
 """``SMC_POS_REF``: six numbers, axis values in ACS, else X, Y, Z, A, B, C."""

@@ -93,7 +93,7 @@ class SpeedProfile:
         """Return this profile as far as ``time_s``, coming to rest after that.
 
         Slows down harder than asked where the path would end first, as MC_GroupStop may
-        (documented, softmotion.md 2.3).
+        (documented, docs/reference/softmotion.md 2.3).
         """
         if time_s >= self.duration_s:
             return self

@@ -51,7 +51,10 @@ class MovementQueue:
 
     @property
     def active(self) -> Movement | None:
-        """The active movement; in a blended corner the second (documented, softmotion.md 2.1)."""
+        """The active movement; in a blended corner the second.
+
+        Source: docs/reference/softmotion.md 2.1 (documented).
+        """
         active = [movement for movement in self if movement.execution.outputs.active]
         return active[-1] if active else None
 

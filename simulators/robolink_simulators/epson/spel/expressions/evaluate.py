@@ -6,7 +6,7 @@ from typing import Final
 from robolink.model import Hand, rotate_xy
 from robolink_simulators.epson.memory.points import AXES, HIGHEST_LOCAL, Point
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
-from robolink_simulators.epson.remote.refused import RequestRefused
+from robolink_simulators.epson.request_refusals import RequestRefused
 from robolink_simulators.epson.spel.expressions.functions import PLAIN_FUNCTIONS
 from robolink_simulators.epson.spel.expressions.machine_functions import (
     MACHINE_FUNCTIONS,
@@ -65,7 +65,7 @@ CONSTANTS: Final[dict[str, Value]] = {
     "lf": "\n",
     "crlf": "\r\n",
 }
-"""Predefined constants (spel.md 1.2)."""
+"""Predefined constants (docs/reference/spel.md 1.2)."""
 
 FARTHEST: Final = 1e9
 """Largest coordinate that a point may have (assumed), in mm or degrees."""
@@ -168,7 +168,7 @@ class Evaluator:
         raise SpelRefusal(RefusalKind.NAME_UNDEFINED, f"Nothing is called {name}")
 
     def _point_number(self, argument: Expression) -> int:
-        # PDef(P1), PDef(P(n)) and PDef(1) all name point 1 (spel.md 5.1).
+        # PDef(P1), PDef(P(n)) and PDef(1) all name point 1 (docs/reference/spel.md 5.1).
         if isinstance(argument, PointExpression):
             return self.stored_number(argument)
         return self.integer(argument)

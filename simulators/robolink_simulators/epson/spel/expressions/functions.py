@@ -1,4 +1,4 @@
-"""Functions of numbers and strings (spel.md 11)."""
+"""Functions of numbers and strings (docs/reference/spel.md 11)."""
 
 import math
 import re
@@ -53,7 +53,7 @@ def _cut(arguments: Arguments) -> Value:
 
 
 def _atan2(arguments: Arguments) -> Value:
-    # X first, unlike nearly everywhere else (spel.md 11, p. 144).
+    # X first, unlike nearly everywhere else (docs/reference/spel.md 11, p. 144).
     x, y = (float(as_number(argument)) for argument in arguments)
     return math.atan2(y, x)
 

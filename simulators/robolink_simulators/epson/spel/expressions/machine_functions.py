@@ -23,7 +23,7 @@ MachineFunction = Callable[[Session, Arguments], Value]
 PointFunction = Callable[[Session, Arguments], Point]
 
 SCARA: Final = 3
-"""RobotType (spel.md 9)."""
+"""RobotType (docs/reference/spel.md 9)."""
 
 OF_JOINTS: Final = frozenset({"ja", "pulse"})
 """Functions of one value for each joint."""
@@ -99,7 +99,10 @@ def _pulses(session: Session, arguments: Arguments) -> Value:
 
 
 def pulses_of(session: Session, joints: Joints) -> list[int]:
-    """Return encoder pulses, 0 where the joint value is 0 (epson.md 4: pulse ranges)."""
+    """Return encoder pulses, 0 where the joint value is 0.
+
+    Source: docs/reference/epson.md 4: pulse ranges.
+    """
     scales = session.machine.model.pulses_per_unit
     return [round(v * scale) for v, scale in zip(joints.values(), scales, strict=True)]
 
@@ -188,7 +191,7 @@ def coordinates_of(values: Sequence[float]) -> Point:
 
 
 def offset_point(offset: ToolOffset) -> Point:
-    """Return a tool definition as a point (spel.md 6.1)."""
+    """Return a tool definition as a point (docs/reference/spel.md 6.1)."""
     return Point(offset.components())
 
 

@@ -1,4 +1,4 @@
-"""Operators of expressions (spel.md 3.1)."""
+"""Operators of expressions (docs/reference/spel.md 3.1)."""
 
 import math
 import operator
@@ -71,7 +71,7 @@ def _strings(sign: str, left: str, right: str) -> Value:
 
 
 def _compare(sign: str, left: Value, right: Value) -> bool:
-    # Beside a Boolean the other side counts as zero or not zero (spel.md 2.1).
+    # Beside a Boolean the other side counts as zero or not zero (docs/reference/spel.md 2.1).
     if isinstance(left, bool) or isinstance(right, bool):
         return _COMPARE[sign](truth(left), truth(right))
     return _COMPARE[sign](as_number(left), as_number(right))
@@ -87,7 +87,7 @@ def _arithmetic(sign: str, left: Number, right: Number) -> Number:
             case "*":
                 return left * right
             case "/":
-                # Always a real; how integers divide is left open (spel.md 2.1).
+                # Always a real; how integers divide is left open (docs/reference/spel.md 2.1).
                 return left / right
             case "mod":
                 # A whole number with the sign of the dividend (sign left open).

@@ -1,4 +1,7 @@
-"""How values print (spel.md 3.2, 3.3, 5.6; epson.md 3.3). Points and Where come from twins."""
+"""How values print. Points and Where come from twins.
+
+Source: docs/reference/spel.md 3.2, 3.3, 5.6; docs/reference/epson.md 3.3.
+"""
 
 import re
 from collections.abc import Sequence
@@ -12,7 +15,8 @@ from robolink_simulators.epson.spel.expressions.values import Number, Value, out
 
 CRLF: Final = "\r\n"
 LONGEST_PRINT: Final = 256
-"""Bytes that one Print may show (spel.md 3.2); what more does is assumed to be an error."""
+"""Bytes that one Print may show (docs/reference/spel.md 3.2); what more does is assumed to be an
+error."""
 
 _EXPONENT_FROM = 1e14
 _EXPONENT_BELOW = 1e-4
@@ -23,7 +27,8 @@ def number_text(value: Number) -> str:
     """Return a number as Print and Str$ show it.
 
     Integers plain, reals with 14 digits and no trailing zeros, ``1.000000E+014`` for large
-    and very small ones: the rule that fits most samples of the reference (spel.md 3.2).
+    and very small ones: the rule that fits most samples of the reference
+    (docs/reference/spel.md 3.2).
     """
     if isinstance(value, int):
         return str(value)
@@ -49,7 +54,10 @@ def point_text(point: Point, options: EpsonOptions) -> str:
 
 
 def point_line(number: int, point: Point) -> str:
-    """Return a line of PList on a SCARA: ``P1   = XY(  200.000, ... ) /R /0`` (epson.md 3.3)."""
+    """Return a line of PList on a SCARA: ``P1   = XY(  200.000, ... ) /R /0``.
+
+    Source: docs/reference/epson.md 3.3.
+    """
     values = ",".join(decimal(value).rjust(9) for value in point.coordinates[:4])
     printed = PrintedPoint.of(point.coordinates, hand=point.hand, local=point.local)
     flags = " ".join(f"/{flag}" for flag in printed.flags)
@@ -89,7 +97,7 @@ def value_text(value: Value, options: EpsonOptions) -> str:
 
 
 def formatted(value: Number, layout: str) -> str:
-    """Return a number laid out by the marks of FmtStr$: ``0 # . ,`` (spel.md 3.3).
+    """Return a number laid out by the marks of FmtStr$: ``0 # . ,`` (docs/reference/spel.md 3.3).
 
     Raises:
         Refusal: The layout holds other marks; dates are not simulated.

@@ -1,7 +1,9 @@
-"""Functions that tell the state of the controller, its errors and its waits (spel.md 4.4, 9).
+"""Functions that tell the state of the controller, its errors and its waits.
+
+Source: docs/reference/spel.md 4.4, 9.
 
 That the command window may call those which programs may call from special tasks only is left
-open; they are answered (the default of spel.md 4.4).
+open; they are answered (the default of docs/reference/spel.md 4.4).
 """
 
 from collections.abc import Callable, Sequence

@@ -1,4 +1,4 @@
-"""Values of expressions and how one kind becomes another (spel.md 2.1)."""
+"""Values of expressions and how one kind becomes another (docs/reference/spel.md 2.1)."""
 
 import math
 
@@ -24,7 +24,7 @@ def _mismatch(wanted: str) -> SpelRefusal:
 
 
 def as_number(value: Value) -> Number:
-    """Return a number; True counts as -1 (documented constant, spel.md 1.2).
+    """Return a number; True counts as -1 (documented constant, docs/reference/spel.md 1.2).
 
     Raises:
         Refusal: A string or a point.

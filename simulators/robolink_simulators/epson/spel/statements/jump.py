@@ -1,4 +1,4 @@
-"""Jump and Jump3: up, across, down (spel.md 7.1)."""
+"""Jump and Jump3: up, across, down (docs/reference/spel.md 7.1)."""
 
 from dataclasses import replace
 

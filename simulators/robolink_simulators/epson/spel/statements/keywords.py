@@ -1,4 +1,7 @@
-"""Keyword statements about tools, the home position, switches and conditions (spel.md 6 to 8)."""
+"""Keyword statements about tools, the home position, switches and conditions.
+
+Source: docs/reference/spel.md 6, 8.
+"""
 
 from collections.abc import Callable, Sequence
 from typing import Final, NamedTuple
@@ -30,7 +33,7 @@ from robolink_simulators.epson.spel.tree import Expression, KeywordStatement
 
 SHORTEST_PULSE_S: Final = 0.01
 LONGEST_PULSE_S: Final = 10.0
-"""Times after which On and Off switch back (spel.md 8)."""
+"""Times after which On and Off switch back (docs/reference/spel.md 8)."""
 
 
 class TimedBit(NamedTuple):
@@ -91,7 +94,7 @@ def _tlset(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
             shown = {} if offset is None else {tool: offset}
         listing = format_tool_listing(shown, layout=session.options.tool_listing)
         return StatementOutcome(listing + CRLF if listing else "")
-    # Flags and local of the point are ignored (documented, spel.md 6.1).
+    # Flags and local of the point are ignored (documented, docs/reference/spel.md 6.1).
     x, y, z, *angles = point_argument(evaluator, arguments[1:]).coordinates
     if session.options.angle_wrap:
         angles = [angle if -180 <= angle <= 180 else _wrapped(angle) for angle in angles]
@@ -131,7 +134,7 @@ def _where(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
 
 
 def _switch(command: KeywordStatement, evaluator: Evaluator, *, on: bool) -> StatementOutcome:
-    """Switch a bit, for a time if one stands there (documented, spel.md 8)."""
+    """Switch a bit, for a time if one stands there (documented, docs/reference/spel.md 8)."""
     arguments, machine = _expect(command, 1, 2, 3), evaluator.session.machine
     bank = machine.memory if command.name.startswith("mem") else machine.outputs
     number = evaluator.integer(arguments[0])
@@ -244,7 +247,10 @@ def _base(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
 
 
 def _reset(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
-    """Reset parameters and outputs (spel.md 6.3); errors are the device's to clear."""
+    """Reset parameters and outputs; errors are the device's to clear.
+
+    Source: docs/reference/spel.md 6.3.
+    """
     _expect(command, 0)
     session = evaluator.session
     session.machine.reset_motion_parameters()

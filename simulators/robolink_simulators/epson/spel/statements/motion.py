@@ -1,4 +1,4 @@
-"""Go, Move, Jump, Arc and their relatives (spel.md 7.1)."""
+"""Go, Move, Jump, Arc and their relatives (docs/reference/spel.md 7.1)."""
 
 import math
 from collections.abc import Callable
@@ -131,7 +131,8 @@ def _line(machine: Machine, target: Point, *, rot: bool) -> Leg:
 
     Raises:
         Refusal: Only the orientation changes and ROT is missing, or ROT stands and nothing
-            turns over a distance (both documented, spel.md 7.1; their numbers are not).
+            turns over a distance (both documented, docs/reference/spel.md 7.1; their numbers are
+            not).
     """
     end, tip = pose_of(machine, target), machine.tip()
     travels = math.dist(end.coordinates()[:3], tip.coordinates()[:3]) > _SAME_MM

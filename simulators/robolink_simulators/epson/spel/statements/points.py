@@ -1,4 +1,7 @@
-"""Keyword statements about points, locals and pallets (spel.md 5); each returns what it prints."""
+"""Keyword statements about points, locals and pallets; each returns what it prints.
+
+Source: docs/reference/spel.md 5.
+"""
 
 from collections.abc import Callable
 from typing import Final
@@ -22,7 +25,7 @@ def _expect(command: KeywordStatement, *counts: int) -> tuple[Expression, ...]:
 
 
 def point_argument(evaluator: Evaluator, arguments: tuple[Expression, ...]) -> Point:
-    """Return a point, or the old list of bare numbers (spel.md 5.1).
+    """Return a point, or the old list of bare numbers (docs/reference/spel.md 5.1).
 
     Raises:
         Refusal: They are neither.

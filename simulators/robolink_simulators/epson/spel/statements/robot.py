@@ -1,4 +1,7 @@
-"""Keyword statements about load, arm, free joints and the home position (spel.md 6.2, 7.2, 7.3)."""
+"""Keyword statements about load, arm, free joints and the home position.
+
+Source: docs/reference/spel.md 6.2, 7.2, 7.3.
+"""
 
 from collections.abc import Callable, Sequence
 from typing import Final

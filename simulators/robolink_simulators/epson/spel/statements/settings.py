@@ -1,4 +1,4 @@
-"""Statements that set or show a motion setting (spel.md 7.2, 7.3).
+"""Statements that set or show a motion setting (docs/reference/spel.md 7.2, 7.3).
 
 Without values a statement shows what is set. Only Speed's and Accel's listings are described,
 and their columns were lost: rows here are assumed, values and the first line are documented.
@@ -17,16 +17,16 @@ Numbers = Sequence[Number]
 Setting = Callable[[Machine, Numbers], str]
 
 HIGHEST_ACCEL_S: Final = 25_000.0
-"""AccelS in mm/s2 of most SCARA robots (spel.md 7.2)."""
+"""AccelS in mm/s2 of most SCARA robots (docs/reference/spel.md 7.2)."""
 
 HIGHEST_SPEED_S: Final = 2000.0
-"""SpeedS in mm/s (spel.md 7.2)."""
+"""SpeedS in mm/s (docs/reference/spel.md 7.2)."""
 
 HIGHEST_SPEED_R: Final = 1000.0
-"""SpeedR in degrees/s (spel.md 7.2)."""
+"""SpeedR in degrees/s (docs/reference/spel.md 7.2)."""
 
 HIGHEST_ACCEL_R: Final = 5000.0
-"""AccelR in degrees/s2 (spel.md 7.2)."""
+"""AccelR in degrees/s2 (docs/reference/spel.md 7.2)."""
 
 
 def _expect(values: Numbers, *counts: int) -> None:

@@ -1,4 +1,6 @@
-"""``Till``, ``Find`` and ``Sense``: motions that a condition ends or marks (spel.md 7.1).
+"""``Till``, ``Find`` and ``Sense``: motions that a condition ends or marks.
+
+Source: docs/reference/spel.md 7.1.
 
 The instant at which an input that follows the robot meets the condition is known when the
 motion starts, because the motion is; an input that is switched by hand is seen at once. Till

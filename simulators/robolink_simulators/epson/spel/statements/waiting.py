@@ -1,4 +1,7 @@
-"""``Wait`` for a condition; the conditions that Till, Find and Sense keep (spel.md 4.6, 7.1)."""
+"""``Wait`` for a condition; the conditions that Till, Find and Sense keep.
+
+Source: docs/reference/spel.md 4.6, 7.1.
+"""
 
 from typing import Final
 
@@ -18,7 +21,7 @@ from robolink_simulators.epson.spel.tree import (
 )
 
 LONGEST_WAIT_S: Final = 2_147_483
-"""Longest Wait (spel.md 4.6)."""
+"""Longest Wait (docs/reference/spel.md 4.6)."""
 
 NEVER_NS: Final = 2**62
 
@@ -33,8 +36,8 @@ _EVENTS: Final = frozenset(_EVENT_WORDS.split())
 def is_condition(expression: Expression) -> bool:
     """Tell whether Wait waits for it to hold, and does not take it for a number of seconds.
 
-    A comparison, a logical operation and a bare event are conditions (documented, spel.md 4.6);
-    everything else is a time.
+    A comparison, a logical operation and a bare event are conditions (documented,
+    docs/reference/spel.md 4.6); everything else is a time.
     """
     match expression:
         case Binary(operator, left, right):

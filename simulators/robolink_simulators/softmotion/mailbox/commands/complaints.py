@@ -1,10 +1,13 @@
-"""What the mailbox program makes of the complaints of function blocks (softmotion.md 1.4)."""
+"""What the mailbox program makes of the complaints of function blocks.
+
+Source: docs/reference/softmotion.md 1.4.
+"""
 
 from typing import Final
 
 from robolink.protocols.mailbox import ErrorClass
 from robolink_simulators.softmotion.group.condition import SmcGroupState
-from robolink_simulators.softmotion.group.smc_errors import ErrorKind
+from robolink_simulators.softmotion.smc_errors import ErrorKind
 
 _CLASSES: Final = {
     ErrorKind.NOTHING_TO_RESET: ErrorClass.NOTHING_TO_RESET,

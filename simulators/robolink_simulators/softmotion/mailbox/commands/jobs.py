@@ -4,11 +4,11 @@ from collections import deque
 from typing import Final
 
 from robolink.protocols.mailbox import Command, CommandState, ErrorClass, Finished, Opcode
+from robolink_simulators.softmotion.function_blocks import BlockExecution, BlockState
 from robolink_simulators.softmotion.group.axis_group import AxisGroup
-from robolink_simulators.softmotion.group.blocks import BlockExecution, BlockState
 from robolink_simulators.softmotion.group.condition import SmcGroupState
-from robolink_simulators.softmotion.group.smc_errors import SmcError
 from robolink_simulators.softmotion.mailbox.commands.complaints import class_of
+from robolink_simulators.softmotion.smc_errors import SmcError
 
 MOVEMENTS: Final = frozenset({Opcode.MOVE_DIRECT, Opcode.MOVE_LINEAR, Opcode.MOVE_UNTIL_INPUT})
 

@@ -1,4 +1,4 @@
-"""The opcodes that move the axis group, or change its state (design part 7)."""
+"""The opcodes that move the axis group, or change its state (docs/mailbox.md, "Movements")."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -6,10 +6,9 @@ from types import MappingProxyType
 from typing import Final
 
 from robolink.protocols.mailbox import Answer, Command, ErrorClass, Opcode
+from robolink_simulators.softmotion.function_blocks import BlockExecution
 from robolink_simulators.softmotion.group.axis_group import AxisGroup
-from robolink_simulators.softmotion.group.blocks import BlockExecution
 from robolink_simulators.softmotion.group.condition import SmcGroupState
-from robolink_simulators.softmotion.group.signals import SIGNALS
 from robolink_simulators.softmotion.kinematics.coordinates import CoordSystem
 from robolink_simulators.softmotion.mailbox.commands.complaints import Rejected
 from robolink_simulators.softmotion.mailbox.commands.jobs import Job, Jobs
@@ -20,6 +19,7 @@ from robolink_simulators.softmotion.motion.jog import COORDINATES, JogCommand
 from robolink_simulators.softmotion.motion.movement import EdgeWatch, SmcBufferMode
 from robolink_simulators.softmotion.motion.paths import Dynamics
 from robolink_simulators.softmotion.motion.planner import Target
+from robolink_simulators.softmotion.signals import SIGNALS
 
 MOST_MOVEMENTS: Final = 4
 _MASKS: Final = range(1 << COORDINATES)

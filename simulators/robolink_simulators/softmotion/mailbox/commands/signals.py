@@ -1,13 +1,13 @@
-"""The opcodes about inputs and outputs (design part 7)."""
+"""The opcodes about inputs and outputs (docs/mailbox.md)."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
 
 from robolink.protocols.mailbox import Answer, Command, Opcode
 from robolink_simulators.softmotion.group.axis_group import AxisGroup
-from robolink_simulators.softmotion.group.signals import SIGNALS
 from robolink_simulators.softmotion.mailbox.commands.operands import require_operand
 from robolink_simulators.softmotion.mailbox.commands.told import Handler, Told, done
+from robolink_simulators.softmotion.signals import SIGNALS
 
 
 class SignalDesk:

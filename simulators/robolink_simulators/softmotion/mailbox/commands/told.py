@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from robolink.protocols.mailbox import Answer, Command
-from robolink_simulators.softmotion.group.blocks import BlockExecution
+from robolink_simulators.softmotion.function_blocks import BlockExecution
 
 
 @dataclass(frozen=True, slots=True)

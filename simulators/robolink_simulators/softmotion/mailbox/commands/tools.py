@@ -1,4 +1,4 @@
-"""The opcodes about tools and kinematics (design part 7)."""
+"""The opcodes about tools and kinematics (docs/mailbox.md, "Tools")."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -14,14 +14,13 @@ from robolink.protocols.mailbox import (
     find_kinematics,
     kinematics_word,
 )
-from robolink_simulators.softmotion.group.axis_group import AxisGroup
-from robolink_simulators.softmotion.group.condition import ReadToolMode
-from robolink_simulators.softmotion.group.smc_errors import BlockRefused
-from robolink_simulators.softmotion.kinematics.catalogue import (
+from robolink_simulators.softmotion.catalogue import (
     NAMES,
     machine_named,
     parameter_names,
 )
+from robolink_simulators.softmotion.group.axis_group import AxisGroup
+from robolink_simulators.softmotion.group.condition import ReadToolMode
 from robolink_simulators.softmotion.kinematics.coordinates import CoordRef
 from robolink_simulators.softmotion.mailbox.commands.complaints import Rejected, class_of
 from robolink_simulators.softmotion.mailbox.commands.operands import (
@@ -33,6 +32,7 @@ from robolink_simulators.softmotion.mailbox.commands.told import Handler, Told, 
 from robolink_simulators.softmotion.mailbox.retained import RetainedMemory
 from robolink_simulators.softmotion.mailbox.words.units import UserUnits
 from robolink_simulators.softmotion.motion.movement import ToolInForce
+from robolink_simulators.softmotion.smc_errors import BlockRefused
 
 _NO_TOOL: Final[Six] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 _COUPLING: Final = "+"

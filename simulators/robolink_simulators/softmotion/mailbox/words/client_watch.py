@@ -5,7 +5,8 @@ from typing import Final
 from robolink.protocols.mailbox import beats_for
 
 PATIENCE_NS: Final = 500_000_000
-"""Without a new beat for this long, what moves is halted (design part 7)."""
+"""Without a new beat for this long, what moves is halted (docs/mailbox.md, "What ends by
+itself")."""
 
 
 class ClientWatch:

@@ -6,7 +6,7 @@ _NS_PER_MS: Final = 1_000_000
 
 
 class FieldbusWatchdog:
-    """Knows when a fieldbus gives its clients up (documented, softmotion.md 4.1).
+    """Knows when a fieldbus gives its clients up (documented, docs/reference/softmotion.md 4.1).
 
     It runs by the clock: nobody has to ask for anything for it to expire.
 

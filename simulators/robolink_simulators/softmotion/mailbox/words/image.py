@@ -1,4 +1,7 @@
-"""Blocks as a PLC lays them whose program orders words in its own way (softmotion.md 4.4)."""
+"""Blocks as a PLC lays them whose program orders words in its own way.
+
+Source: docs/reference/softmotion.md 4.4.
+"""
 
 from collections.abc import Iterator, Sequence
 

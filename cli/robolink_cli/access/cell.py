@@ -1,0 +1,85 @@
+"""What ``-c NAME`` stands for, and what the cell says where the command line says nothing."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import click
+from click.core import ParameterSource
+
+from robolink.errors import ConfigError
+from robolink.messages import tr
+
+if TYPE_CHECKING:
+    from robolink.config import Cell, Expected
+    from robolink.model import Controller
+
+
+def is_cell_name(given: str) -> bool:
+    """Tell a cell's name from a URL."""
+    return "+" not in given and "://" not in given
+
+
+def link_options(cell: "Cell") -> dict[str, Any]:
+    """Return what a cell says about reaching its controller, by the names of the options.
+
+    A cell whose file states no remote time-out has none: it cannot be read over the wire
+    (docs/reference/epson.md 1.1), so nothing moves until a person states it.
+    """
+    settings = cell.settings
+    said: dict[str, Any] = {"remote_timeout_s": settings.remote_timeout_s or 0.0}
+    if settings.timeout_s is not None:
+        said["timeout_s"] = settings.timeout_s
+    return said
+
+
+def with_cell_limits(
+    cell: "Cell | None", options: Mapping[str, Any], keys: Mapping[str, str]
+) -> dict[str, Any]:
+    """Return a command's options; those that nobody typed are taken from the cell.
+
+    Args:
+        cell: The cell, if ``-c`` named one.
+        options: The options by the names that click gives them.
+        keys: For each option that a cell may say, its key in the cell file.
+    """
+    chosen = dict(options)
+    if cell is not None:
+        source = click.get_current_context().get_parameter_source
+        for option, key in keys.items():
+            value = getattr(cell.settings, key)
+            if value is not None and source(option) is ParameterSource.DEFAULT:
+                chosen[option] = value
+    return chosen
+
+
+def require_expected_robot(controller: "Controller", cell: "Expected") -> None:
+    """Refuse to work on another robot than the cell file names.
+
+    Raises:
+        ConfigError: The controller has another robot, or does not say which.
+    """
+    if cell.robot is None:
+        return
+    found = controller.facts().robot_models
+    if cell.robot.casefold() not in (model.casefold() for model in found):
+        raise ConfigError(
+            tr(
+                "The cell {cell} has a robot {expected}, but at {url} there is: {found}.",
+                cell=cell.cell,
+                expected=cell.robot,
+                url=controller.identity,
+                found=", ".join(found) or tr("a robot that does not say its model"),
+            ),
+            remedy=tr(
+                "Check the address first. If the cell file is wrong, correct 'robot' in {path} or "
+                "take it out.",
+                path=cell.robot_file,
+            ),
+        )
+
+
+def complete_cell(context: click.Context, parameter: click.Parameter, start: str) -> list[str]:  # noqa: ARG001 - click's form
+    """Return the cells whose names begin so, for TAB; reads nothing but the cell files."""
+    from robolink.config import cell_names
+
+    return [name for name in cell_names() if name.startswith(start)]

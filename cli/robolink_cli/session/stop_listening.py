@@ -1,0 +1,91 @@
+"""A command that has a controller lets a second terminal stop it, and leaves its address."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+import click
+
+from robolink.messages import tr
+from robolink_cli.console.render import note
+
+if TYPE_CHECKING:
+    from robolink.model import Controller
+    from robolink_cli.session.context import CliContext
+
+
+@contextmanager
+def listening_for_stop(
+    controller: "Controller", context: "CliContext", *, looks: bool
+) -> Iterator[None]:
+    """Listen for the ``stop`` of another terminal while the block has the controller.
+
+    A simulator inside this process is nobody else's to stop. A command that looks or calms is
+    found by its address alone: it does not wait for the journal, which knows the name.
+    """
+    from robolink.stopping import StopListener
+
+    url = context.require_url()
+    if "+sim://" in url:
+        yield
+        return
+    name = ""
+    if not looks:
+        from robolink_cli.stopping.notes import own_name_of
+
+        name = own_name_of(controller)
+    try:
+        listener = StopListener(controller, url, who=_who(context), name=name, heard=_say_who)
+    except OSError as error:
+        note(
+            tr(
+                "'robolink stop' in another terminal cannot reach this one: {cause}.",
+                cause=error.strerror or error,
+            )
+        )
+        yield
+        return
+    with listener:
+        yield
+
+
+def remember_address(context: "CliContext") -> None:
+    """Keep how the cell was reached, for a stop on the day when its file cannot be read."""
+    if context.cell is None or "+sim://" in context.cell.url:
+        return
+    from robolink.config import Reach, proof_of_files, remember_reach
+
+    settings = context.cell.settings
+    remember_reach(
+        context.cell.name,
+        context.cell.origins["url"],
+        Reach(
+            context.cell.url,
+            password_file=settings.password_file or "",
+            password_env=settings.password_env or "",
+            timeout_s=settings.timeout_s or 0.0,
+            proof=proof_of_files(),
+            expected=context.cell.expected,
+        ),
+    )
+
+
+def _who(context: "CliContext") -> str:
+    import getpass
+    import os
+
+    try:
+        user = getpass.getuser()
+    except (OSError, KeyError, ImportError):
+        user = "?"
+    command = click.get_current_context().command_path
+    return tr(
+        "{who} ('{command}', process {pid})",
+        who=context.operator or user,
+        command=command,
+        pid=os.getpid(),
+    )
+
+
+def _say_who(who: str) -> None:
+    note(tr("Stopped from another terminal by {who}.", who=who))

@@ -1,0 +1,179 @@
+"""Builds the pages of docs/ and API pages from the docstrings into build/docs/html.
+
+Everything that pages link to is laid out first in build/docs/pages as it lies in the repository,
+so that a relative link means the same on GitHub and here. Sphinx fails on a link to a page or a
+heading that is not there; what it wrote is then looked through once more, link by link.
+"""
+
+import ast
+import importlib
+import inspect
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from html.parser import HTMLParser
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
+
+ROOT = Path(__file__).parents[2]
+PAGES = ROOT / "build" / "docs" / "pages"
+HTML = ROOT / "build" / "docs" / "html"
+LINKED = ("docs", "simulators", "companions", "examples", "tests", "benchmarks")
+PACKAGES = {
+    "robolink": ROOT / "robolink",
+    "robolink_simulators": ROOT / "simulators/robolink_simulators",
+}
+MODULES = ("robolink.checkpoints", "robolink.errors", "robolink.timing")
+
+
+def exported(source: str) -> list[str]:
+    """Return the names that a package hands out: imported as themselves, or in ``__all__``."""
+    names = []
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.ImportFrom):
+            names += [alias.name for alias in node.names if alias.asname == alias.name]
+    return names
+
+
+def described(path: str, value: object) -> list[str]:
+    """Return what makes Sphinx describe a thing, in reStructuredText."""
+    if hasattr(value, "__origin__"):  # an alias of a type brings the words of that type
+        return [f".. py:data:: {path}", "", f"   Stands for ``{value}``."]
+    if inspect.isclass(value):
+        kind = "autoexception" if issubclass(value, BaseException) else "autoclass"
+    else:
+        kind = "autofunction" if inspect.isroutine(value) else "autodata"
+    return [f".. {kind}:: {path}"]
+
+
+def packages() -> dict[str, dict[str, object]]:
+    """Return what each package hands out, by name; and the modules that are public as they are."""
+    found = {name: public(name) for name in MODULES}
+    for top, folder in PACKAGES.items():
+        for init in sorted(folder.rglob("__init__.py")):
+            package = ".".join((top, *init.parent.relative_to(folder).parts))
+            module = importlib.import_module(package)
+            if names := exported(init.read_text(encoding="utf-8")):
+                found[package] = {name: getattr(module, name) for name in names}
+    return dict(sorted(found.items()))
+
+
+def public(module: str) -> dict[str, object]:
+    """Return the classes and functions that a module defines."""
+    members = vars(importlib.import_module(module)).items()
+    return {
+        name: value
+        for name, value in members
+        if not name.startswith("_") and getattr(value, "__module__", "") == module
+    }
+
+
+def home(value: object, name: str, places: list[str]) -> str:
+    """Return the package that describes a thing which several hand out: the nearest to it."""
+    module = getattr(value, "__module__", "")
+    return max(places, key=lambda place: (module.startswith(place), len(place)))
+
+
+def api_page(package: str, names: dict[str, str], things: dict[str, object]) -> str:
+    """Return the page of one package, in reStructuredText; ``names`` leads to their homes."""
+    lines = [package, "=" * len(package), "", f".. automodule:: {package}", "   :no-members:", ""]
+    if away := [f":py:obj:`{at}.{name}`" for name, at in names.items() if at != package]:
+        lines += ["Also here: " + ", ".join(away) + ".", ""]
+    for name, at in names.items():
+        if at == package:
+            lines += [*described(f"{package}.{name}", things[name]), ""]
+    return "\n".join(lines)
+
+
+def lay_out() -> None:
+    shutil.rmtree(PAGES.parent, ignore_errors=True)
+    PAGES.mkdir(parents=True)
+    for name in LINKED:
+        shutil.copytree(ROOT / name, PAGES / name, ignore=shutil.ignore_patterns("__pycache__"))
+    for file in (*ROOT.glob("*.md"), *(ROOT / name for name in ("LICENSE", "NOTICE", "Makefile"))):
+        shutil.copy(file, PAGES)
+    api = PAGES / "api"
+    api.mkdir()
+    listed = ["API", "===", "", "What each package hands out.", "", ".. toctree::"]
+    listed += ["   :maxdepth: 1", ""]
+    found = packages()
+    for package, things in found.items():
+        names = {
+            name: home(thing, name, [p for p, named in found.items() if named.get(name) is thing])
+            for name, thing in things.items()
+        }
+        (api / f"{package}.rst").write_text(api_page(package, names, things), encoding="utf-8")
+        listed.append(f"   {package}")
+    (api / "index.rst").write_text("\n".join([*listed, ""]), encoding="utf-8")
+
+
+def toctree(caption: str, pages: list[str]) -> str:
+    """Return a table of contents that shows in the sidebar only."""
+    return "\n".join(["```{toctree}", ":hidden:", f":caption: {caption}", "", *pages, "```"])
+
+
+def add_contents() -> None:
+    """Give the sidebar what the index lists, under the index's own headings."""
+    index = PAGES / "docs" / "README.md"
+    text = index.read_text(encoding="utf-8")
+    blocks = []
+    for section in re.split(r"^##+ ", text, flags=re.M)[1:]:
+        heading, _, body = section.partition("\n")
+        pages = re.findall(r"\]\(([\w./-]+\.md)\)", body)
+        blocks.append(
+            "\n".join(["```{toctree}", ":hidden:", f":caption: {heading}", "", *pages, "```"])
+        )
+    blocks.append("```{toctree}\n:hidden:\n:caption: API\n\n../api/index\n```")
+    index.write_text("\n\n".join([text, *blocks, ""]), encoding="utf-8")
+
+
+class _Links(HTMLParser):
+    """The anchors of one page and where its links lead."""
+
+    def __init__(self, page: Path) -> None:
+        super().__init__()
+        self.anchors: set[str] = set()
+        self.links: set[str] = set()
+        self.feed(page.read_text(encoding="utf-8"))
+
+    def handle_starttag(self, _tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        for key, value in attrs:
+            if key == "id" and value:
+                self.anchors.add(value)
+            elif key in ("href", "src") and value:
+                self.links.add(value)
+
+
+def dead_links() -> Iterator[str]:
+    """Tell every link inside the built pages that leads nowhere."""
+    pages = {page.resolve(): _Links(page) for page in HTML.rglob("*.html")}
+    for page, content in pages.items():
+        for link in content.links:
+            parts = urlsplit(link)
+            if parts.scheme or parts.netloc:
+                continue
+            target = (page.parent / unquote(parts.path)).resolve() if parts.path else page
+            anchor = unquote(parts.fragment)
+            if not target.exists():
+                yield f"{page.relative_to(HTML)}: {link}: no such file"
+            elif anchor and target in pages and anchor not in pages[target].anchors:
+                yield f"{page.relative_to(HTML)}: {link}: no such heading"
+
+
+def main() -> int:
+    lay_out()
+    add_contents()
+    options = ["-q", "-W", "--keep-going", "-j", "2", "-c", str(ROOT / "docs/site")]
+    command = [sys.executable, "-m", "sphinx", *options, str(PAGES), str(HTML)]
+    built = subprocess.run(command, check=False).returncode
+    dead = sorted(dead_links())
+    for line in dead:
+        print(line, file=sys.stderr)
+    print(f"{len(list(HTML.rglob('*.html')))} pages: {HTML / 'docs/README.html'}")
+    return built or bool(dead)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,220 @@
+"""A controller, but for what its kind says: the same for whatever is driven.
+
+A kind brings a :class:`~.driver_link.DriverLink`, a tool table, what moves, and how its state is
+read. Markers, latch, ledger, recovery, and what happens at the end of a connection are here.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
+from types import TracebackType
+from typing import Final, Self
+
+from robolink.controllers.driver_link import DriverLink, advise_emergency_stop
+from robolink.controllers.preserving import Preserver
+from robolink.controllers.resolving import MarkerResolver
+from robolink.errors import RobolinkError
+from robolink.model import (
+    Act,
+    AlarmList,
+    Capabilities,
+    ControllerFacts,
+    ControllerStatus,
+    DigitalIo,
+    Marker,
+    MarkerKind,
+    MotionGroup,
+    NewEntry,
+    PointReader,
+    Resolver,
+    ToolTable,
+    VariableTable,
+)
+from robolink.standing import note_standing
+
+_STOPS_S: Final = 5.0
+"""Longest wait, at the end, for stops that are under way in other threads."""
+
+
+class ControllerCore(ABC):
+    """Implements :class:`robolink.model.Controller` with what a kind of controller says.
+
+    Attributes:
+        identity: How it is reached: the URL, with those options only that tell far ends apart.
+        clock: The clock on which its time passes.
+        latch: What holds everything back from :meth:`stop` until :meth:`release_stop`.
+        outcomes: The doubtful outcomes and the unfinished procedures of this controller.
+        ledger: What was done to it since connecting, and how much of that is proved.
+        capabilities: What can be asked for.
+        tools: The tool offsets.
+        groups: What moves.
+        resolver: Settles what was begun here and not proved finished.
+        io: Inputs and outputs, where this kind has them.
+        points: Taught points, likewise.
+        variables: Variables of the machine's program, likewise.
+        alarms: Alarms beside the error state, likewise.
+
+    Args:
+        link: The controller, connected.
+        capabilities: See above.
+        tools: See above.
+        groups: See above.
+        preserver: Puts back what procedures change.
+        resolver: See above; by default what settles tools and movements.
+    """
+
+    tools: ToolTable
+    groups: Sequence[MotionGroup]
+    resolver: Resolver
+    io: DigitalIo | None = None
+    points: PointReader | None = None
+    variables: VariableTable | None = None
+    alarms: AlarmList | None = None
+
+    def __init__(
+        self,
+        link: DriverLink,
+        *,
+        capabilities: Capabilities,
+        tools: ToolTable,
+        groups: Sequence[MotionGroup],
+        preserver: Preserver,
+        resolver: Resolver | None = None,
+    ) -> None:
+        self._driver = link
+        self._preserver = preserver
+        self.identity = link.identity
+        self.clock = link.clock
+        self.latch = link.latch
+        self.outcomes = link.markers.outcomes
+        self.ledger = link.markers.ledger
+        self.capabilities = capabilities
+        self.tools = tools
+        self.groups = groups
+        self.resolver = resolver or MarkerResolver(link, tools, preserver)
+
+    # What a kind says.
+
+    @property
+    @abstractmethod
+    def exchanges(self) -> int:
+        """Requests sent so far."""
+
+    @abstractmethod
+    def _read_status(self) -> ControllerStatus:
+        """Read the state flags."""
+
+    @abstractmethod
+    def _close_link(self) -> None:
+        """Close the link. Idempotent."""
+
+    def _take_leave(self) -> None:
+        """Do what is proper before the link is closed; whatever it raises is passed over."""
+
+    # What a kind may have.
+
+    def condition(self) -> Mapping[str, object]:
+        """Read more about the state than the flags say, plain JSON."""
+        return {}
+
+    def facts(self) -> ControllerFacts:
+        """Read which controller and robots these are."""
+        return ControllerFacts()
+
+    def preview(self, act: Act) -> tuple[str, ...]:
+        """Return the requests of an act, as they stand on the wire. Reads at most."""
+        raise self._driver.lacks(str(act))
+
+    def reset_fault(self) -> None:
+        """Clear an error because a person asked for it."""
+        raise self._driver.lacks(str(Act.RESET))
+
+    def motors(self, on: bool) -> None:
+        """Switch the motors."""
+        raise self._driver.lacks(str(Act.MOTORS_ON if on else Act.MOTORS_OFF))
+
+    # What is the same for all.
+
+    def status(self) -> ControllerStatus:
+        """Read the state flags; others see by it that this process is alive."""
+        self._driver.markers.beat()
+        return self._read_status()
+
+    def stop(self) -> None:
+        """Bring everything to rest; from any thread, at any time, more than once.
+
+        From its first instant on no movement, jog, write or program start leaves this process until
+        :meth:`release_stop`; whoever is at work gets StoppedError.
+
+        Raises:
+            OutcomeUnknownError: Rest was not seen; the message says to use the emergency stop.
+            RobolinkError: It was not confirmed; the message says the same.
+        """
+        self.latch.close()
+        try:
+            if not self.groups:
+                raise self._driver.lacks(str(Act.STOP))
+            for group in self.groups:
+                group.stop()
+        except RobolinkError as error:
+            advise_emergency_stop(error)
+            raise
+
+    def release_stop(self) -> None:
+        """Let this process act again after :meth:`stop`, because a person says so."""
+        self.latch.release()
+
+    def require_settled(self, request: str) -> None:
+        """Refuse ``request`` while something earlier is unsettled.
+
+        Raises:
+            OutcomeUnknownError: Names it.
+        """
+        self._driver.markers.require_settled(request)
+
+    def begin(
+        self,
+        kind: MarkerKind,
+        request: str,
+        details: Mapping[str, object],
+        *,
+        operation: str = "",
+    ) -> Marker:
+        """Store the durable marker of a procedure; see the model."""
+        return self._driver.markers.begin(kind, request, details, operation=operation)
+
+    def finish(self, marker: Marker, *entries: NewEntry) -> None:
+        """Forget the marker of a procedure, and journal how it ended."""
+        self._driver.markers.clear(marker, *entries)
+
+    def uninterrupted(self) -> AbstractContextManager[None]:
+        """Hold Ctrl-C back for a block that must be seen through."""
+        return self._driver.uninterrupted()
+
+    def preserved(self, reason: str) -> AbstractContextManager[None]:
+        """Put back, at the end of the block, the tool and what goes with it; see the model."""
+        return self._preserver.preserved(reason)
+
+    def close(self) -> None:
+        """End what nobody waited on, take leave, close. Idempotent."""
+        self.latch.await_stops(_STOPS_S)
+        try:
+            self._take_leave()
+        except RobolinkError:
+            pass  # the link is going away in any case; markers keep what is in doubt
+        finally:
+            self._close_link()
+            self.outcomes.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+        if error is not None:
+            note_standing(error, self.ledger.standing())

@@ -1,0 +1,188 @@
+"""What every part of a driver works with, and the one way in which it changes something.
+
+The command classes of docs/reference/rules.md 1:
+
+=====  ==========================================  =======================================
+class  on an EPSON controller                      when no answer comes
+=====  ==========================================  =======================================
+READ   GetStatus, Print ..., TLSet, Where          ask again on a new link
+SET    TLSet n, TLClr n, Tool n, SetIO ...         OutcomeUnknownError; read back, recover
+MOVE   Go, Move                                    OutcomeUnknownError; never sent again
+STOP   Abort, Stop                                 may be repeated
+=====  ==========================================  =======================================
+
+Speed, SpeedS, Power and the motors need no marker: they are set and read back before each
+move, and a lost answer leaves nothing that the next connection would not set again.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Mapping
+from contextlib import AbstractContextManager
+from typing import Generic, TypeVar
+
+from robolink.controllers.markers import MarkerStore, ProcedureLock
+from robolink.errors import (
+    ConfigError,
+    ControllerFaultError,
+    RejectedError,
+    RobolinkError,
+    UnclearAnswerError,
+)
+from robolink.messages import tr
+from robolink.model import EntryKind, Marker, MarkerKind, NewEntry, OutcomeLog
+from robolink.stop_latch import StopLatch
+from robolink.timing import Clock
+
+T = TypeVar("T")
+
+
+class MarkedCommand(ABC, Generic[T]):
+    """Something that is sent once, is marked meanwhile, and is proved by what is read then.
+
+    Attributes:
+        request: What is sent, as a person may read it.
+        acknowledged: Whether the controller has said that it did it.
+
+    Args:
+        request: See above.
+    """
+
+    def __init__(self, request: str) -> None:
+        self.request = request
+        self.acknowledged = False
+
+    @property
+    @abstractmethod
+    def details(self) -> Mapping[str, object]:
+        """Plain JSON values needed to settle it later."""
+
+    @abstractmethod
+    def send(self) -> None:
+        """Send it; raises unless the controller accepted it."""
+
+    @abstractmethod
+    def read(self) -> T:
+        """Read what it changes."""
+
+    def told_by(self, found: T) -> str:
+        """Return what the value that was read says about an answer that told nothing.
+
+        Empty where only a person can tell.
+        """
+        return ""
+
+    def entries(self, marker: Marker, found: T) -> Iterable[NewEntry]:
+        """Return what is put on record together with the end of the marker."""
+        return ()
+
+    def refusal(self, marker: Marker, error: RejectedError) -> Iterable[NewEntry]:
+        """Return what is put on record when the controller did not do it."""
+        tool = marker.details.get("tool")
+        yield NewEntry(
+            EntryKind.REFUSED,
+            operation=marker.operation,
+            tool=tool if isinstance(tool, int) else None,
+            verdict=error.what,
+            details={"request": marker.request, "code": error.code},
+        )
+
+
+class DriverLink:
+    """A controller that is connected, as the parts of its driver see it.
+
+    Attributes:
+        identity: Which controller.
+        clock: The clock on which its time passes.
+        latch: What holds requests back while a stop is in force.
+        markers: The durable markers of what was begun.
+        lock: One procedure at a time.
+
+    Args:
+        identity: See above.
+        clock: See above.
+        latch: See above.
+        outcomes: Where the markers are kept.
+        gate: Holds Ctrl-C back inside.
+    """
+
+    def __init__(
+        self,
+        identity: str,
+        clock: Clock,
+        latch: StopLatch,
+        outcomes: OutcomeLog,
+        *,
+        gate: AbstractContextManager[None],
+    ) -> None:
+        self.identity = identity
+        self.clock = clock
+        self.latch = latch
+        self.markers = MarkerStore(identity, outcomes, latch)
+        self.lock = ProcedureLock(identity, latch)
+        self._gate = gate
+
+    def uninterrupted(self) -> AbstractContextManager[None]:
+        """Hold Ctrl-C back over exchanges that belong together; it is raised at their end."""
+        return self._gate
+
+    def was_not_executed(self, refusal: RejectedError) -> bool:
+        """Whether a refusal proves that nothing was done."""
+        return True
+
+    def lacks(self, what: str) -> ConfigError:
+        """Return the error for something that this kind of controller does not have.
+
+        Args:
+            what: The thing, for a person.
+        """
+        return ConfigError(
+            tr("{controller} has no {what}.", controller=self.identity, what=what),
+            remedy=tr("This is for other kinds of controllers."),
+            controller=self.identity,
+        )
+
+    def carry_out(self, command: MarkedCommand[T]) -> T:
+        """Send something that is marked, and return what is read then.
+
+        Ctrl-C waits for that. A plain refusal settles the marker; a fault does not, because a
+        controller in error may refuse to show the value that would prove what happened. After
+        an answer that says neither yes nor no, reading settles it.
+
+        Raises:
+            UnclearAnswerError: The answer told nothing; the message says what was read.
+            OutcomeUnknownError: No answer came.
+        """
+        markers, ledger = self.markers, self.markers.ledger
+        with self.uninterrupted(), ledger.block():
+            marker = markers.begin(MarkerKind.SET, command.request, command.details)
+            unclear: UnclearAnswerError | None = None
+            with markers.doubt(command.request):
+                try:
+                    with markers.unless_stopped(marker):
+                        command.send()
+                    command.acknowledged = True
+                    ledger.answered(marker)
+                except (RejectedError, ControllerFaultError) as error:
+                    ledger.answered(marker)
+                    if isinstance(error, RejectedError) and self.was_not_executed(error):
+                        markers.clear(marker, *command.refusal(marker, error))
+                    raise
+                except UnclearAnswerError as error:
+                    ledger.answered(marker)
+                    unclear = error
+                found = command.read()
+            ledger.proved(marker, found)
+            markers.clear(marker, *command.entries(marker, found))
+        if unclear is not None:
+            # What such a link says is not relied on, so this ends as a failure in any case.
+            unclear.remedy = command.told_by(found) or unclear.remedy
+            raise unclear
+        return found
+
+
+def advise_emergency_stop(error: RobolinkError) -> RobolinkError:
+    """Put in front of an error of a stop what a person has to do first."""
+    error.remedy = " ".join(
+        (tr("The stop is not confirmed: press the emergency stop."), error.remedy)
+    ).rstrip()
+    return error

@@ -1,0 +1,182 @@
+"""An EPSON controller on Remote Ethernet."""
+
+from robolink.controllers.controller_core import ControllerCore
+from robolink.controllers.epson.condition import ConditionReader
+from robolink.controllers.epson.io.alarms import EpsonAlarms
+from robolink.controllers.epson.io.bits import EpsonIo
+from robolink.controllers.epson.io.pending_values import PendingValues
+from robolink.controllers.epson.io.raw_statements import RawStatements
+from robolink.controllers.epson.io.variables import EpsonVariables
+from robolink.controllers.epson.link.identity import FactReader
+from robolink.controllers.epson.link.link import EpsonLink
+from robolink.controllers.epson.link.session import EpsonSession
+from robolink.controllers.epson.motion.acts import EpsonActs
+from robolink.controllers.epson.motion.group import EpsonGroup
+from robolink.controllers.epson.motion.positions import EpsonPoints
+from robolink.controllers.epson.tools.preserve import EpsonPreserver
+from robolink.controllers.epson.tools.published import PublishedReader, PublishedTools
+from robolink.controllers.epson.tools.resolve import EpsonResolver
+from robolink.controllers.epson.tools.table import EpsonToolTable
+from robolink.model import Act, Capabilities, ControllerFacts, ControllerStatus, OutcomeLog
+from robolink.protocols.epson_text import Preference
+
+
+class EpsonController(ControllerCore):
+    """A logged-in EPSON controller. Use it as a context manager.
+
+    Attributes:
+        tools: Tools 1 to 15.
+        groups: The one robot that Execute acts on.
+        io: Inputs, outputs and memory bits.
+        points: The taught points of the robot in force; read only.
+        variables: The project's Global Preserve variables.
+        alarms: The alarms that stand.
+
+    Args:
+        session: A session that has logged in.
+        outcomes: Where doubtful outcomes of this controller are kept.
+        remote_timeout_s: The remote time-out set on the controller, as a person states it;
+            0 (never) forbids motion.
+    """
+
+    tools: EpsonToolTable
+    groups: tuple[EpsonGroup]
+    io: EpsonIo
+    points: EpsonPoints
+    variables: EpsonVariables
+    alarms: EpsonAlarms
+
+    def __init__(
+        self, session: EpsonSession, outcomes: OutcomeLog, *, remote_timeout_s: float
+    ) -> None:
+        link = self._link = EpsonLink(session, outcomes)
+        group = EpsonGroup(link, remote_timeout_s=remote_timeout_s)
+        tools = EpsonToolTable(link)
+        preserver = EpsonPreserver(link, tools, group)
+        self.io = EpsonIo(link)
+        self.points = EpsonPoints(link.window)
+        self.variables = EpsonVariables(link)
+        self.alarms = EpsonAlarms(link)
+        values = PendingValues(self.io, self.variables)
+        self._acts = EpsonActs(link, group)
+        super().__init__(
+            link,
+            capabilities=Capabilities(
+                tool_write=True,
+                motion=True,
+                motors=True,
+                io=True,
+                points=True,
+                variables=True,
+                alarms=True,
+            ),
+            tools=tools,
+            groups=(group,),
+            preserver=preserver,
+            resolver=EpsonResolver(link, tools, preserver, group=group, values=values),
+        )
+
+    @property
+    def exchanges(self) -> int:
+        """Requests sent so far."""
+        return self._link.session.exchanges
+
+    def published_tools(self) -> PublishedTools | None:
+        """Read the tools as the companion program published them; legal while production runs.
+
+        Returns:
+            ``None`` where the project publishes none.
+
+        Raises:
+            ToolError: The table was being changed, or is of another version.
+        """
+        return PublishedReader(self.variables).read()
+
+    def facts(self) -> ControllerFacts:
+        """Read which controller and robots these are; legal while production runs."""
+        return FactReader(self._link.session, self._link.window).read()
+
+    def error_text(self, code: int) -> str:
+        """Return the controller's own text for an error number, empty where it has none."""
+        return self._link.window.error_text(code)
+
+    def reset_fault(self) -> None:
+        """Send Reset because a person asked for it; it may switch outputs off.
+
+        Raises:
+            NotReadyError: A reset cannot help now (serious error, guard open, a program is
+                running, no remote control).
+            ControllerFaultError: The error or the emergency stop is still there afterwards.
+        """
+        self._acts.reset()
+
+    def motors(self, on: bool) -> None:
+        """Switch the motors of the robot in force, and prove it.
+
+        Raises:
+            NotReadyError: The state forbids it.
+            ReadBackError: The motors are not as asked.
+        """
+        self._acts.motors(on)
+
+    def robot_number(self) -> int:
+        """Read which robot motors and statements act on."""
+        return self._acts.robot_number()
+
+    def preview(self, act: Act) -> tuple[str, ...]:
+        """Return the requests of an act, as they stand on the wire."""
+        return self._acts.preview(act)
+
+    def execute_raw(self, statement: str) -> str:
+        """Run a SPEL+ statement as it was typed, and put it on record.
+
+        Only here does text that a person typed reach the controller (docs/reference/rules.md 8). It
+        has to be answered within the time-out, so it is not for movements.
+
+        Args:
+            statement: One line of SPEL+ as the command window takes it.
+
+        Returns:
+            What it printed, empty for nothing.
+
+        Raises:
+            NotAllowedError: The person is an operator.
+            ConfigError: It is not one line of printable ASCII.
+            NotReadyError: The state forbids it.
+            RejectedError: The controller refused it.
+            ControllerFaultError: It put the controller in error.
+            OutcomeUnknownError: No answer came.
+        """
+        return RawStatements(self._link).execute(statement)
+
+    def preferences(self) -> frozenset[Preference] | None:
+        """Read the preferences that are on; asked once a connection.
+
+        Returns:
+            ``None`` where the firmware does not tell them.
+        """
+        return self._link.preferences.read()
+
+    def condition(self) -> dict[str, object]:
+        """Read error text, alarms, preferences, the tool in force, motors and power."""
+        reader = ConditionReader(self._link, self.alarms, self.tools, self.groups[0])
+        return reader.read(published=self.published_tools)
+
+    def _read_status(self) -> ControllerStatus:
+        return self._link.window.status()
+
+    def _take_leave(self) -> None:
+        """Abort what nobody waited on, and log out where that does no harm.
+
+        Logging out while a task runs raises an error on the controller
+        (docs/reference/epson.md 1.1), so the connection is just closed then. So it is when another
+        device starts the cell: a task could begin between the look and the logout.
+        """
+        if self._link.session.alive:
+            self.groups[0].abort_unfinished()
+            status = self.status()
+            if status.remote and not (status.running or status.paused):
+                self._link.session.exchange("Logout")
+
+    def _close_link(self) -> None:
+        self._link.session.close()

@@ -1,0 +1,1 @@
+"""Bits, variables, alarms and typed statements of an EPSON controller."""

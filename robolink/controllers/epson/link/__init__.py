@@ -1,0 +1,1 @@
+"""One login on an EPSON controller, and what is said over it."""

@@ -1,0 +1,334 @@
+"""One login on an EPSON controller: a transport, a codec and a lock.
+
+Theory of operation. Remote Ethernet has no transaction numbers; an answer is known by its
+name and by its place in line (docs/reference/epson.md 1.1). So at most two requests are
+outstanding: one Execute, which answers when its statement has ended, and one of the few requests
+that are legal meanwhile. Whoever holds the lock reads; an Execute answer that turns up is put into
+the pending motion's slot. The lock is held for one exchange, never for a motion, so that a
+stop always gets in.
+
+A time-out, a broken link or an answer that nobody asked for ends the session for good: late
+bytes die with the connection and can never be taken for the answer to a later question
+(docs/reference/faults.md F01, F06, F09).
+"""
+
+import threading
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
+
+from robolink.checkpoints import Checkpoint, checkpoint
+from robolink.controllers.epson.link.answers import rejected
+from robolink.controllers.epson.link.login import PASSWORD_REFUSALS, refused, unanswered
+from robolink.controllers.epson.link.requests import command_class_of
+from robolink.errors import (
+    BusyError,
+    RemoteProtocolError,
+    RobolinkError,
+    TransportBrokenError,
+    TransportClosedError,
+    TransportError,
+    TransportTimeoutError,
+)
+from robolink.interrupts import InterruptGate
+from robolink.messages import tr
+from robolink.model import Secret
+from robolink.protocols.epson_text import (
+    NEED_DATA,
+    EndOfStream,
+    EpsonTextCodec,
+    Refusal,
+    Reply,
+    Request,
+    Role,
+    find_command,
+)
+from robolink.protocols.spel import Statement
+from robolink.stop_latch import StopLatch
+from robolink.timing import Clock, Deadline
+from robolink.transport import Transport
+
+
+@dataclass(slots=True)
+class PendingExecute:
+    """An Execute that was sent; ``answer`` is set by whoever reads it."""
+
+    statement: Statement
+    answer: Reply | Refusal | None = None
+    abort_requested: bool = False
+
+
+_SHOWN = 120
+"""Characters of an unexpected answer in a sentence; a text may be thousands long."""
+
+
+class EpsonSession:
+    """Requests and answers on one connection.
+
+    Attributes:
+        latch: What holds requests back while a stop is in force.
+
+    Args:
+        transport: An open transport; the session owns it from here on.
+        timeout_s: Longest wait for the answer to one request that moves nothing.
+    """
+
+    def __init__(self, transport: Transport, *, timeout_s: float = 3.0) -> None:
+        self._transport = transport
+        self._codec = EpsonTextCodec(Role.HOST)
+        self._wire = threading.Lock()
+        self._gate = InterruptGate()
+        self._gate.open()
+        self._pending: PendingExecute | None = None
+        self._ended_by: RobolinkError | None = None
+        self.latch = StopLatch(transport.identity)
+        self.timeout_s = timeout_s
+        self.exchanges = 0
+
+    @property
+    def identity(self) -> str:
+        """Which controller this is."""
+        return self._transport.identity
+
+    @property
+    def place(self) -> str:
+        """Where it was reached, the same for each spelling of the URL."""
+        return self._transport.place
+
+    @property
+    def clock(self) -> Clock:
+        """The clock on which the controller's time passes."""
+        return self._transport.clock
+
+    @property
+    def alive(self) -> bool:
+        """Whether the session can still be used."""
+        return self._ended_by is None
+
+    @property
+    def pending(self) -> PendingExecute | None:
+        """The Execute that has not been taken as finished, if any."""
+        return self._pending
+
+    def login(self, password: Secret | None) -> None:
+        """Log in. One attempt.
+
+        Raises:
+            LoginRefusedError: The password is wrong (13) or one is demanded (98).
+            LoginUnansweredError: No answer; most likely another client is logged in.
+        """
+        request = Request("Login", (password.reveal() if password else "",))
+        try:
+            answer = self._ask(request, secret=True)
+        except (TransportTimeoutError, TransportBrokenError) as error:
+            raise unanswered(self.identity) from error
+        if isinstance(answer, Refusal):
+            self.close()
+            if answer.code in PASSWORD_REFUSALS:
+                raise refused(answer.code, self.identity)
+            raise rejected(answer, controller=self.identity)
+
+    def exchange(self, name: str, *parameters: str) -> Reply:
+        """Send one request and return its answer.
+
+        Raises:
+            RejectedError: The controller refused; it did not act.
+            BusyError: An Execute is running and this request is not legal meanwhile.
+            TransportError, RemoteProtocolError: The session is over.
+        """
+        answer = self._ask(Request(name, parameters))
+        if isinstance(answer, Refusal):
+            raise rejected(answer, controller=self.identity)
+        return answer
+
+    def execute(self, statement: Statement) -> Reply | Refusal:
+        """Run a statement that moves nothing and return whatever was answered."""
+        return self._ask(Request("Execute", (statement,)))
+
+    def start_execute(self, statement: Statement) -> PendingExecute:
+        """Send a statement that takes its time; its answer is collected by name later."""
+        request = Request("Execute", (statement,))
+        with self._exchanging(request):
+            pending = PendingExecute(statement)
+            try:
+                self._expect_silence()
+                self._pending = pending
+                self._send(request, secret=False)
+            except RobolinkError as error:
+                self._end(error)
+                raise
+        return pending
+
+    def uninterrupted(self) -> AbstractContextManager[None]:
+        """Hold Ctrl-C back over exchanges that belong together; it is raised at their end."""
+        return self._gate
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether Ctrl-C is held back just now."""
+        return self._gate.interrupted
+
+    def finish(self, pending: PendingExecute) -> None:
+        """Forget an Execute whose answer was taken."""
+        if self._pending is pending:
+            self._pending = None
+
+    def await_pending(self, *, wait_s: float) -> None:
+        """Wait up to ``wait_s`` for bytes, without the lock, then read what is there."""
+        # The answer may have come in one piece with that of the last request.
+        self._collect()
+        if self._pending is None or self._pending.answer is None:
+            self._transport.wait_readable(deadline=Deadline.after(self.clock, wait_s))
+            self._collect()
+
+    def close(self) -> None:
+        """Close the connection. Idempotent."""
+        if self._ended_by is None:
+            self._ended_by = TransportClosedError(
+                tr("The connection to {identity} is closed.", identity=self.identity),
+                remedy=tr("Connect again."),
+                controller=self.identity,
+            )
+        self._transport.close()
+        self._gate.close()
+
+    def _collect(self) -> None:
+        with self._gate, self._wire:
+            if self._ended_by is None:
+                try:
+                    self._expect_silence()
+                except RobolinkError as error:
+                    self._end(error)
+                    raise
+
+    @contextmanager
+    def _exchanging(self, request: Request) -> Iterator[None]:
+        """Hold the exchange lock for ``request``, once it is legal and no stop forbids it."""
+        what = _shown(request)
+        checkpoint(Checkpoint.LOCK, what)
+        try:
+            with self._gate, self._wire:
+                checkpoint(Checkpoint.HELD, what)
+                self._check_usable(request)
+                self.latch.admit(command_class_of(request), what)
+                if self._pending is not None and request.name == "Abort":
+                    # Whatever ends it from here on was asked for.
+                    self._pending.abort_requested = True
+                yield
+        finally:
+            checkpoint(Checkpoint.EXCHANGE, what)
+
+    def _ask(self, request: Request, *, secret: bool = False) -> Reply | Refusal:
+        with self._exchanging(request):
+            try:
+                self._expect_silence()
+                return self._receive(request, self._send(request, secret=secret))
+            except RobolinkError as error:
+                self._end(error)
+                raise
+
+    def _check_usable(self, request: Request) -> None:
+        if self._ended_by is not None:
+            raise TransportClosedError(
+                tr("The connection to {identity} has ended.", identity=self.identity),
+                remedy=tr("Connect again; the controller's state is read anew then."),
+                controller=self.identity,
+                request=request.name,
+            ) from self._ended_by
+        if self._pending is not None and self._pending.answer is None:
+            command = find_command(request.name)
+            if command is None or not command.during_execute:
+                raise BusyError(
+                    tr(
+                        "{name} has to wait: a statement is still running on the controller.",
+                        name=request.name,
+                    ),
+                    remedy=tr("Wait for the motion, or stop it."),
+                    controller=self.identity,
+                    request=request.name,
+                )
+
+    def _send(self, request: Request, *, secret: bool) -> Deadline:
+        deadline = Deadline.after(self.clock, self.timeout_s)
+        self._transport.send(self._codec.send(request), deadline=deadline, secret=secret)
+        self.exchanges += 1
+        return deadline
+
+    def _receive(self, request: Request, deadline: Deadline) -> Reply | Refusal:
+        wanted = request.name.lower()
+        while True:
+            event = self._codec.next_event()
+            if event is NEED_DATA:
+                self._codec.receive_data(self._transport.receive(deadline=deadline))
+            elif isinstance(event, (Reply, Refusal)) and self._answers(event, wanted):
+                return event
+            else:
+                self._take_aside(event)
+
+    def _answers(self, event: Reply | Refusal, wanted: str) -> bool:
+        name = event.name.lower()
+        if name == wanted:
+            return True
+        # A refusal may come without a readable name (docs/reference/epson.md 1.6, unverified); it
+        # can be ours only when nothing else is outstanding.
+        return isinstance(event, Refusal) and not name and self._pending is None
+
+    def _expect_silence(self) -> None:
+        """Read what has arrived unasked; only the pending Execute may answer by itself.
+
+        Each piece is judged before the next is read. So a far end that never stops sending is
+        noticed at its first whole message, or at the codec's limit for one, and not when
+        memory is full.
+        """
+        self._judge_unasked()
+        while (data := self._transport.receive_waiting()) is not None:
+            self._codec.receive_data(data)
+            self._judge_unasked()
+
+    def _judge_unasked(self) -> None:
+        while (event := self._codec.next_event()) is not NEED_DATA:
+            self._take_aside(event)
+
+    def _take_aside(self, event: object) -> None:
+        if isinstance(event, EndOfStream):
+            raise TransportBrokenError(
+                tr("{identity} closed the connection.", identity=self.identity),
+                remedy=tr(
+                    "Check the cable, the controller's power and its remote time-out, then "
+                    "connect again."
+                ),
+                controller=self.identity,
+            )
+        pending = self._pending
+        if (
+            isinstance(event, (Reply, Refusal))
+            and event.name.lower() == "execute"
+            and pending is not None
+            and pending.answer is None
+        ):
+            pending.answer = event
+            return
+        raise RemoteProtocolError(
+            tr(
+                "The controller sent an answer to a question nobody asked: {event}.",
+                event=repr(event)[:_SHOWN],
+            ),
+            remedy=tr(
+                "The connection is closed, because later answers could be mistaken. Connect "
+                "again; if it happens twice, look for a second program on this controller."
+            ),
+            controller=self.identity,
+        )
+
+    def _end(self, error: RobolinkError) -> None:
+        if isinstance(error, (TransportError, RemoteProtocolError)):
+            if not error.controller:
+                error.controller = self.identity
+            if self._ended_by is None:
+                self._ended_by = error
+            self._transport.close()
+
+
+def _shown(request: Request) -> str:
+    """Return a request as a person may read it; a login, with its password, is never held back."""
+    return request.parameters[0] if request.name == "Execute" else request.name

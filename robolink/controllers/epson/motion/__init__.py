@@ -1,0 +1,1 @@
+"""Moving the robot of an EPSON controller, and switching it."""

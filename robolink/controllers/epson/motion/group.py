@@ -1,0 +1,203 @@
+"""The robot arm of an EPSON controller: where it is, and how it is told to go elsewhere."""
+
+from collections.abc import Callable
+
+from robolink.controllers.epson.link.link import EpsonLink
+from robolink.controllers.epson.link.requests import executes
+from robolink.controllers.epson.link.stopping import bring_to_rest
+from robolink.controllers.epson.motion.movement import EpsonMotion
+from robolink.controllers.epson.motion.positions import read_position
+from robolink.controllers.epson.motion.power_and_speed import Settings
+from robolink.controllers.epson.motion.until_input import (
+    EpsonMotionUntilInput,
+    read_input,
+    statement_until,
+)
+from robolink.controllers.motion_group import MotionGroupCore
+from robolink.errors import NotReadyError, NotReadyReason, StoppedError
+from robolink.messages import tr
+from robolink.model import InputEdge, MotionProfile, MotionTerms, Path, Pose, WorkBox
+from robolink.protocols import spel
+from robolink.ways import Way, way
+
+
+class EpsonGroup(MotionGroupCore):
+    """The robot that the controller's Execute acts on.
+
+    Attributes:
+        settings: Power and speed of this robot.
+
+    Args:
+        link: The controller.
+        remote_timeout_s: The remote time-out set on it, as a person states it.
+    """
+
+    def __init__(self, link: EpsonLink, *, remote_timeout_s: float) -> None:
+        super().__init__(link)
+        self._link = link
+        self.settings = Settings(link.window, identity=link.identity)
+        self._remote_timeout_s = remote_timeout_s
+        self._current: EpsonMotion | None = None
+
+    @property
+    def name(self) -> str:
+        """``robot``: the one in force on the controller."""
+        return "robot"
+
+    def pose(self) -> Pose:
+        """Read the measured position of the tool in force (RealPos)."""
+        window = self._link.window
+        window.require_ready("Print RealPos")
+        return read_position(window, spel.print_real_position())
+
+    def motors_on(self) -> bool:
+        """Read whether the motors are on."""
+        return spel.parse_integer(self._link.window.printed(spel.print_motor())) != 0
+
+    def joints(self) -> spel.PrintedWhere:
+        """Read the commanded position in all three notations (Where)."""
+        self._link.window.require_ready("Where")
+        return spel.parse_where(self._link.window.printed(spel.where()))
+
+    def move_to(self, target: Pose, profile: MotionProfile, *, box: WorkBox) -> EpsonMotion:
+        """Start one movement; see :class:`robolink.model.MotionGroup`."""
+        box.check(target)
+        return self._start(target, profile, self._statement_for(target, profile))
+
+    def move_until_input(
+        self, target: Pose, edge: InputEdge, *, speed_mm_s: float, box: WorkBox
+    ) -> EpsonMotionUntilInput:
+        """Start a straight movement until an input switches; see the model."""
+        box.check(target)
+        link, window = self._link, self._link.window
+        statement = self._statement_until(target, edge)
+
+        def look_at_input() -> None:
+            link.preferences.require_real_inputs(statement)
+            on = read_input(window, edge.number)
+            edge.require_ahead(on, controller=link.identity, request=statement)
+
+        profile = MotionProfile(Path.STRAIGHT, speed_mm_s=speed_mm_s)
+        motion = self._start(target, profile, statement, last_look=look_at_input)
+        return EpsonMotionUntilInput(motion, edge, window, identity=link.identity)
+
+    def requests_until(
+        self, target: Pose, edge: InputEdge, *, speed_mm_s: float
+    ) -> tuple[str, ...]:
+        """Return what :meth:`move_until_input` would send besides its reads."""
+        profile = MotionProfile(Path.STRAIGHT, speed_mm_s=speed_mm_s)
+        return executes((*self.settings.statements(profile), self._statement_until(target, edge)))
+
+    def requests_for(self, target: Pose, profile: MotionProfile) -> tuple[str, ...]:
+        """Return what :meth:`move_to` would send besides its reads, as it stands on the wire."""
+        return executes((*self.settings.statements(profile), self._statement_for(target, profile)))
+
+    def require_able(self, purpose: str) -> None:
+        """Refuse what no movement could begin in now; see :class:`robolink.model.MotionGroup`."""
+        self._require_supervision(purpose)
+        self._link.window.require_ready(purpose)
+        self._require_motors(purpose)
+
+    def terms(self) -> MotionTerms:
+        """Read what a person must know before the robot moves."""
+        (number,) = self._link.session.exchange("GetCurRobot").fields
+        return MotionTerms(
+            tr("Robot {number}, in Power Low,", number=spel.parse_integer(number)),
+            tr(
+                "The remote time-out set in the controller is taken to be {timeout:g} s.",
+                timeout=self._remote_timeout_s,
+            ),
+        )
+
+    def axes(self) -> dict[str, tuple[float, ...]]:
+        """Read the commanded joints and pulses."""
+        printed = self.joints()
+        return {"joints": tuple(printed.joints), "pulses": tuple(printed.pulses)}
+
+    def stop(self) -> None:
+        """Bring everything to rest; from here on nothing acts before ``release_stop``.
+
+        Raises:
+            RejectedError: The controller takes no Stop from here.
+            OutcomeUnknownError: It did not come to rest in time.
+        """
+        link = self._link
+        with link.latch.stopping():
+            bring_to_rest(link.session.exchange, link.clock, controller=link.identity)
+
+    def abort_unfinished(self) -> None:
+        """Abort the last movement if nobody has seen its end."""
+        if self._current is not None and not self._current.settled:
+            self._current.abort()
+
+    def _start(
+        self,
+        target: Pose,
+        profile: MotionProfile,
+        statement: spel.Statement,
+        *,
+        last_look: Callable[[], None] = lambda: None,
+    ) -> EpsonMotion:
+        link, window = self._link, self._link.window
+        try:
+            with link.lock.held(statement):
+                link.markers.require_settled(statement)
+                self._require_supervision(statement)
+                window.require_ready(statement)
+                link.preferences.require_real_motion(statement)
+                self._require_motors(statement)
+                found = spel.parse_integer(window.printed(spel.print_selected_tool()))
+                self._require_tool(target, found, statement)
+                self.settings.slow_down(profile)
+                last_look()
+                with link.uninterrupted():
+                    self._current = self._started(target, statement)
+                return self._current
+        except (KeyboardInterrupt, StoppedError):
+            # Nobody will be given this motion to wait on.
+            self.abort_unfinished()
+            raise
+
+    def _started(self, target: Pose, statement: spel.Statement) -> EpsonMotion:
+        session, markers = self._link.session, self._link.markers
+        marker = self._marked(target, statement)
+        if session.interrupted:
+            # Ctrl-C came while the marker was stored: nothing begins to move after it.
+            markers.clear(marker)
+            raise KeyboardInterrupt
+        with markers.doubt(statement), markers.unless_stopped(marker):
+            pending = session.start_execute(statement)
+        return EpsonMotion(target, pending, marker, link=self._link)
+
+    def _statement_for(self, target: Pose, profile: MotionProfile) -> spel.Statement:
+        build = spel.move if profile.path is Path.STRAIGHT else spel.go
+        return build(target, six_axes=self._link.robot.read().six_axes)
+
+    def _statement_until(self, target: Pose, edge: InputEdge) -> spel.Statement:
+        return statement_until(target, edge, six_axes=self._link.robot.read().six_axes)
+
+    def _require_supervision(self, statement: str) -> None:
+        # With a remote time-out of 0 the robot may keep moving when this PC is gone
+        # (docs/reference/epson.md 1.1). The value cannot be read over the wire; a person states it.
+        if self._remote_timeout_s <= 0:
+            raise NotReadyError(
+                tr("The remote time-out of this controller is stated as 0 (never)."),
+                reason=NotReadyReason.NO_REMOTE_TIMEOUT,
+                remedy=tr(
+                    "Set a time-out on the controller's Remote Ethernet page and state it with "
+                    "{timeout}; without it a lost link leaves a moving robot unwatched.",
+                    timeout=way(Way.REMOTE_TIMEOUT),
+                ),
+                controller=self._link.identity,
+                request=statement,
+            )
+
+    def _require_motors(self, statement: str) -> None:
+        if not self.motors_on():
+            raise NotReadyError(
+                tr("The motors are off."),
+                reason=NotReadyReason.MOTORS_OFF,
+                remedy=tr("Run 'robolink motors on' when the cell is clear."),
+                controller=self._link.identity,
+                request=statement,
+            )

@@ -1,0 +1,1 @@
+"""The tools of an EPSON controller: read, written, preserved, settled."""

@@ -1,0 +1,175 @@
+"""The tool table of an EPSON controller: TLSet, TLClr, Tool (docs/reference/epson.md 3.1)."""
+
+from collections.abc import Sequence
+from contextlib import suppress
+from typing import Final
+
+from robolink.controllers.epson.link.link import EpsonLink
+from robolink.controllers.epson.link.requests import as_sent
+from robolink.controllers.tool_table import ToolTableCore
+from robolink.controllers.tool_writing import ToolWrite
+from robolink.errors import RemoteProtocolError, ToolError
+from robolink.messages import tr
+from robolink.model import Expected, ToolOffset, ToolReceipt
+from robolink.protocols import spel
+from robolink.protocols.epson_text import Request
+
+DECIMALS: Final = 3
+"""Places that a printed point shows (docs/reference/epson.md 3.3, from a real capture)."""
+
+TOLERANCE: Final = 0.5 * 10**-DECIMALS
+"""Two values that this controller prints alike are equal."""
+
+_TOOLS: Final = range(1, 16)
+
+
+class EpsonToolTable(ToolTableCore):
+    """Tools 1 to 15 in the controller's flash, and the selected one.
+
+    Every write is compare-and-set and read back. A value that is stored already is not
+    written again: TLSet wears the flash (docs/reference/epson.md 3.1).
+    """
+
+    def __init__(self, link: EpsonLink) -> None:
+        super().__init__(link)
+        self._link = link
+        self._window = link.window
+
+    def indices(self) -> Sequence[int]:
+        """Return 1 to 15; Tool 0 is the flange."""
+        return _TOOLS
+
+    def same(self, a: ToolOffset | None, b: ToolOffset | None) -> bool:
+        """Tell whether this controller prints both alike; undefined equals undefined only."""
+        if a is None or b is None:
+            return a is b
+        return a.matches(b, TOLERANCE)
+
+    def read_all(self) -> dict[int, ToolOffset | None]:
+        """Read all fifteen from one TLSet listing; it is empty when none is defined."""
+        self._window.require_ready("TLSet")
+        listed = spel.parse_tool_listing(self._listing())
+        return {tool: listed.get(tool) for tool in self.indices()}
+
+    def selected(self) -> int | None:
+        """Read which tool is in force; the selection survives power-off.
+
+        Source: docs/reference/epson.md 3.1.
+        """
+        self._window.require_ready("Print Tool")
+        return super().selected()
+
+    def _set(self, tool: int, requested: ToolOffset | None, expected: Expected) -> ToolReceipt:
+        name = f"TLClr {tool}" if requested is None else f"TLSet {tool}"
+        with self._link.lock.held(name):
+            if requested is not None:
+                self._link.robot.read(name)
+                self._link.preferences.require_real(name)
+            statement = self._statement(tool, requested)
+            return _FlashWrite(self, self._link, tool, requested, statement).change(expected)
+
+    def _statement(self, tool: int, requested: ToolOffset | None) -> spel.Statement:
+        if requested is None:
+            return spel.clear_tool(tool)
+        six_axes = self._link.robot.read().six_axes
+        if not six_axes and (requested.v_deg or requested.w_deg):
+            raise ToolError(
+                tr("This robot has four axes: a tool's V and W must be 0."),
+                remedy=tr("Leave V and W out."),
+            )
+        return spel.set_tool(tool, requested, six_axes=six_axes)
+
+    def _request(self, tool: int, requested: ToolOffset | None) -> str:
+        return self._statement(tool, requested)
+
+    def _as_sent(self, request: str) -> str:
+        return as_sent(Request("Execute", (request,)))
+
+    def _storable(self, tool: int, offset: ToolOffset) -> ToolOffset:  # noqa: ARG002 - alike for all
+        return offset.rounded(DECIMALS)
+
+    def _require_readable(self, tool: int) -> None:
+        self._window.require_ready(f"TLSet {tool}")
+
+    def _require_clearable(self, tool: int) -> None:
+        self._link.preferences.require_real(f"TLClr {tool}")
+
+    def _require_selectable(self, request: str) -> None:
+        self._window.require_ready(request)
+
+    def _stored(self, tool: int) -> ToolOffset | None:
+        # What TLSet(n) gives for an undefined tool is not documented, so that is asked first.
+        defined = self._window.printed(spel.print_tool_defined(tool))
+        return self.printed(tool) if spel.parse_boolean(defined) else None
+
+    def stored(self, tool: int) -> ToolOffset | None:
+        """Read a tool for the proof of its write."""
+        return self._stored(tool)
+
+    def printed(self, tool: int) -> ToolOffset:
+        """Read a tool that is known to be defined."""
+        point = spel.parse_point(self._window.printed(spel.print_tool(tool)))
+        return ToolOffset(*point.coordinates)
+
+    def before(
+        self, tool: int, requested: ToolOffset | None, expected: Expected
+    ) -> ToolOffset | None:
+        """Read what a write replaces.
+
+        The list of all tools takes one question, and whatever is in it is defined. How it looks
+        is not documented, so it is believed only where it confirms what was expected to the last
+        digit; and not on six axes, where it may leave V and W out.
+        """
+        with self._window.proving_ready(f"TLSet {tool}"):
+            if isinstance(expected, ToolOffset) and not self._link.robot.read().six_axes:
+                listing = self._listing()
+                with suppress(RemoteProtocolError):
+                    listed = spel.parse_tool_listing(listing).get(tool)
+                    if self.same(listed, expected) and not self.same(listed, requested):
+                        return listed
+            return self._stored(tool)
+
+    def _listing(self) -> str:
+        return self._window.printed(spel.list_tools(), may_be_nothing=True)
+
+    def _select_request(self, tool: int) -> str:
+        return spel.select_tool(tool)
+
+    def _send_selection(self, tool: int) -> None:
+        self._window.command(spel.select_tool(tool))
+
+    def _selected(self) -> int:
+        return spel.parse_integer(self._window.printed(spel.print_selected_tool()))
+
+    def _known(self, lowest: int) -> str:
+        return tr("EPSON controllers have tools {lowest} to 15.", lowest=lowest)
+
+
+class _FlashWrite(ToolWrite):
+    """TLSet or TLClr of one tool."""
+
+    def __init__(
+        self,
+        table: EpsonToolTable,
+        link: EpsonLink,
+        tool: int,
+        requested: ToolOffset | None,
+        statement: spel.Statement,
+    ) -> None:
+        super().__init__(link, tool, requested, statement, same=table.same)
+        self._table = table
+        self._window = link.window
+        self._statement = statement
+
+    def read_before(self, expected: Expected) -> ToolOffset | None:
+        return self._table.before(self.tool, self.requested, expected)
+
+    def send(self) -> None:
+        self._window.command(self._statement)
+
+    def read_back(self) -> ToolOffset | None:
+        # A tool that was set just now is defined.
+        return self.read_doubted() if self.requested is None else self._table.printed(self.tool)
+
+    def read_doubted(self) -> ToolOffset | None:
+        return self._table.stored(self.tool)

@@ -1,0 +1,102 @@
+"""One verification, from login to logout."""
+
+from robolink.controllers.epson.controller import EpsonController
+from robolink.controllers.epson.link.session import EpsonSession
+from robolink.controllers.epson.verify import text_facts as text
+from robolink.controllers.epson.verify import wire_facts as wire
+from robolink.controllers.epson.verify.interview import Interview
+from robolink.controllers.epson.verify.not_tried import not_tried
+from robolink.controllers.epson.verify.verification import Fact, Verification
+from robolink.journal import memory_journal
+from robolink.messages import tr
+from robolink.model import ControllerFacts, Secret
+from robolink.protocols import spel
+from robolink.timing import wall_label
+from robolink.transport import DialogueLog, TraceSink, TracingTransport, open_transport
+
+
+def verify_epson(
+    url: str,
+    *,
+    password: Secret | None = None,
+    timeout_s: float = 3.0,
+    trace: TraceSink | None = None,
+) -> Verification:
+    """Find out what a controller does where documents leave it open (docs/reference/epson.md 7).
+
+    Reads only: no value is written, nothing moves, no statement is run that could leave an
+    error. While production runs only queries are sent, and less is found out.
+
+    Args:
+        url: The controller.
+        password: Its remote password.
+        timeout_s: Longest wait for one answer.
+        trace: Told about all traffic but the login.
+
+    Raises:
+        ConfigError: The URL is wrong.
+        ConnectError: Nobody is reached.
+        LoginRefusedError: Wrong or missing password.
+    """
+    transport = open_transport(url, timeout_s=timeout_s)
+    log = DialogueLog(transport.identity, wall_label())
+    traced = TracingTransport(transport, log)
+    if trace is not None:
+        traced = TracingTransport(traced, trace)
+    session = EpsonSession(traced, timeout_s=timeout_s)
+    try:
+        session.login(password)
+        # It only reads, and the login sees to it that nobody else is there.
+        outcomes = memory_journal(session.identity).log(session.identity)
+        controller = EpsonController(session, outcomes, remote_timeout_s=0.0)
+        try:
+            about, facts = _found_out(Interview(controller, session, traced, log))
+        finally:
+            controller.close()
+    finally:
+        session.close()
+    return Verification(session.identity, about, facts, log.dialogue)
+
+
+def _found_out(interview: Interview) -> tuple[ControllerFacts, tuple[Fact, ...]]:
+    about = interview.controller.facts()
+    facts = [
+        wire.status_flags(interview),
+        wire.case_echo(interview),
+        wire.extended_queries(interview),
+        wire.command_set(interview),
+        *wire.preferences(interview),
+        _served(interview),
+        text.closing_quote(interview),
+        text.number_lead_blank(interview),
+        text.point_coordinates(interview),
+        text.point_flags(interview),
+        text.where_width(interview),
+        text.comma_blank(interview),
+        *text.tool_facts(interview),
+        _while_executing(interview),
+        wire.terminator(interview),
+        wire.unfinished_request(interview.leave()),
+    ]
+    return about, (*facts, *not_tried())
+
+
+def _served(interview: Interview) -> Fact:
+    name = tr("only monitoring")
+    query = spel.print_selected_tool()
+    answer = interview.printed(query)
+    if answer is None:
+        return Fact(name, interview.why_no_statement(), "monitoring_only")
+    evidence = f"{query} -> {answer}"
+    return Fact(name, tr("no: statements are run"), "monitoring_only", False, evidence)
+
+
+def _while_executing(interview: Interview) -> Fact:
+    name, option = tr("flags while a statement runs"), "flags_during_execute"
+    flags = interview.flags_while_waiting()
+    if flags is None:
+        why = interview.why_no_statement() or tr("the statement had ended already")
+        return Fact(name, why, option)
+    ready = flags.endswith("1")
+    finding = tr("Ready stays on") if ready else tr("Running is on, Ready off")
+    return Fact(name, finding, option, "ready" if ready else "running", flags)

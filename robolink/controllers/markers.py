@@ -1,0 +1,247 @@
+"""The durable markers of one controller: stored before a command leaves, cleared when it is proved.
+
+What keeps two procedures of this process apart stands here too.
+"""
+
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, nullcontext
+from dataclasses import replace
+from typing import Final
+
+from robolink.checkpoints import Checkpoint, checkpoint
+from robolink.errors import (
+    BusyError,
+    JournalError,
+    OutcomeUnknownError,
+    RemoteProtocolError,
+    StoppedError,
+    TransportError,
+)
+from robolink.messages import tr
+from robolink.model import Ledger, Marker, MarkerKind, NewEntry, OutcomeLog, new_operation
+from robolink.standing import note_standing
+from robolink.stop_latch import StopLatch
+from robolink.timing import wall_label
+
+_PROCEDURES: Final = frozenset({MarkerKind.SELECTION, MarkerKind.CHANGE})
+
+
+class ProcedureLock:
+    """Lets one thread at a time run a procedure on a controller; others are told at once.
+
+    Args:
+        identity: Which controller.
+        latch: Under which no procedure begins, and none ends well.
+    """
+
+    def __init__(self, identity: str, latch: StopLatch) -> None:
+        self._lock = threading.RLock()
+        self._identity = identity
+        self._latch = latch
+
+    @contextmanager
+    def held(self, request: str, *, calming: bool = False) -> Iterator[None]:
+        """Hold the procedure lock.
+
+        Args:
+            request: What it is held for.
+            calming: Whether that may go on while a stop is in force, as a reset may.
+
+        Raises:
+            BusyError: Another thread holds it.
+            StoppedError: A stop is in force, or came meanwhile.
+        """
+        checkpoint(Checkpoint.PROCEDURE, request)
+        if not self._lock.acquire(blocking=False):
+            raise BusyError(
+                tr("{request} has to wait: another operation is under way.", request=request),
+                remedy=tr("Wait for it to end; stopping is possible at any time."),
+                controller=self._identity,
+                request=request,
+            )
+        try:
+            with nullcontext() if calming else self._latch.watching(request):
+                yield
+        finally:
+            self._lock.release()
+
+
+class MarkerStore:
+    """Writes and clears the durable markers of one controller.
+
+    Attributes:
+        outcomes: Where they are kept.
+        ledger: What became of what was begun here; it is told before they are.
+
+    Args:
+        identity: Which controller.
+        outcomes: Where the markers are kept.
+        latch: Knows whether a thread puts back what was in force before. That goes on when the
+            journal fails in the middle: the marker of the procedure, which names what is to be
+            put back, is stored, and nothing but the old state comes of it.
+    """
+
+    def __init__(self, identity: str, outcomes: OutcomeLog, latch: StopLatch) -> None:
+        self._identity = identity
+        self._latch = latch
+        self._unstored: set[str] = set()
+        self.outcomes = outcomes
+        self.ledger = Ledger()
+        self._procedures: dict[MarkerKind, Marker] = {}
+
+    def look(self) -> None:
+        """Note the state of the lease before a value is read that a write will rely on.
+
+        Raises:
+            LeaseHeldError: Somebody else is changing this controller.
+        """
+        self._recorded(self.outcomes.look)
+
+    def beat(self) -> None:
+        """Let others see that this process is alive."""
+        self.outcomes.beat()
+
+    def begin(
+        self,
+        kind: MarkerKind,
+        request: str,
+        details: Mapping[str, object],
+        *,
+        operation: str = "",
+    ) -> Marker:
+        """Store a marker durably: a new one, or one of before whose work is taken up again.
+
+        Args:
+            kind: What it stands for.
+            request: What is begun, as a person may read it.
+            details: Plain JSON values needed to settle it.
+            operation: Id of the marker of before; empty for a new one.
+
+        Raises:
+            ConfigError: That is impossible.
+            BusyError: Another process has the controller.
+        """
+        name = operation or new_operation()
+        marker = Marker(name, kind, request, wall_label(), dict(details))
+        if not self._recorded(lambda: self.outcomes.begin(marker)):
+            self._unstored.add(name)
+        self.ledger.begin(marker)
+        if kind in _PROCEDURES:
+            self._procedures[kind] = marker
+        return marker
+
+    def clear(self, marker: Marker, *entries: NewEntry) -> None:
+        """Forget a marker whose outcome is known, and journal how it ended."""
+        self.ledger.ended(marker)
+        cleared = True
+        if marker.kind in _PROCEDURES:
+            self.outcomes.clear(marker.operation, *entries)
+        else:
+            cleared = self._recorded(lambda: self.outcomes.clear(marker.operation, *entries))
+        if cleared or marker.operation in self._unstored:
+            self.ledger.recorded(marker)
+        known = self._procedures.get(marker.kind)
+        if known is not None and known.operation == marker.operation:
+            del self._procedures[marker.kind]
+
+    @contextmanager
+    def unless_stopped(self, marker: Marker) -> Iterator[None]:
+        """Surround the sending of what ``marker`` stands for; a stop that forbids it settles it."""
+        try:
+            yield
+        except StoppedError:
+            self.clear(marker)  # it was never sent
+            raise
+
+    @property
+    def changing(self) -> bool:
+        """Whether a tool change of several steps is under way here."""
+        marker = self._procedures.get(MarkerKind.CHANGE)
+        # One that could not be taken back stays open when its change is over.
+        return marker is not None and marker.details.get("change") == self.outcomes.change
+
+    def note_selection(self, tool: int) -> None:
+        """Record, in the marker of the procedure under way, which tool is in force now.
+
+        Called when the controller has accepted the selection: until then the open marker of
+        the selection itself says which other tool it may be.
+        """
+        marker = self._procedures.get(MarkerKind.SELECTION)
+        if marker is not None and marker.details.get("now") != tool:
+            noted = replace(marker, details={**marker.details, "now": tool})
+            self._procedures[MarkerKind.SELECTION] = noted
+            self._recorded(lambda: self.outcomes.begin(noted))
+
+    def require_settled(self, request: str) -> None:
+        """Refuse to go on while something earlier is unsettled.
+
+        The markers of the procedures that run here do not count.
+
+        Raises:
+            OutcomeUnknownError: Names what is unsettled.
+            LeaseHeldError: Somebody else is at it.
+        """
+        unsettled = self._unsettled()
+        if unsettled:
+            # Whoever began it may still be at it, or have finished just now.
+            self.outcomes.look()
+            still = {marker.operation for marker in self._unsettled()}
+            unsettled = [marker for marker in unsettled if marker.operation in still]
+        for marker in unsettled:
+            raise OutcomeUnknownError(
+                tr(
+                    "{request!r} was not sent: {earlier!r} of {when} is not settled.",
+                    request=request,
+                    earlier=marker.request,
+                    when=marker.begun_at,
+                ),
+                remedy=tr("Run 'robolink recover'; motion is blocked until then."),
+                controller=self._identity,
+                request=request,
+            )
+
+    def _recorded(self, keep: Callable[[], object]) -> bool:
+        """Keep something on record; return whether that was possible.
+
+        Raises:
+            JournalError: It was not, and nothing is being put back for which that is no matter.
+        """
+        try:
+            keep()
+        except JournalError:
+            if not (self._latch.restores and self._procedures):
+                raise
+            return False
+        return True
+
+    def _unsettled(self) -> list[Marker]:
+        own = {
+            marker.operation
+            for kind, marker in self._procedures.items()
+            if kind is not MarkerKind.CHANGE or self.changing
+        }
+        return [m for m in self.outcomes.open_markers() if m.operation not in own]
+
+    @contextmanager
+    def doubt(self, request: str) -> Iterator[None]:
+        """Turn a lost answer inside the block into OutcomeUnknownError."""
+        try:
+            yield
+        except (TransportError, RemoteProtocolError) as error:
+            doubt = OutcomeUnknownError(
+                tr(
+                    "No clear answer came to {request!r}: it may or may not have run ({cause})",
+                    request=request,
+                    cause=error.what,
+                ),
+                remedy=tr(
+                    "It was not sent again. Look at the robot, connect again and run "
+                    "'robolink recover'; motion is blocked until then."
+                ),
+                controller=self._identity,
+                request=request,
+                raw=error.raw,
+            )
+            note_standing(doubt, self.ledger.standing())
+            raise doubt from error

@@ -1,0 +1,120 @@
+"""Axes that move together, as far as every kind of controller treats them alike."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+
+from robolink.controllers.driver_link import DriverLink
+from robolink.errors import NotReadyError, NotReadyReason, StoppedError
+from robolink.messages import tr
+from robolink.model import (
+    InputEdge,
+    Marker,
+    MarkerKind,
+    Motion,
+    MotionProfile,
+    MotionTerms,
+    MotionUntilInput,
+    Pose,
+    WorkBox,
+)
+
+
+class MotionGroupCore(ABC):
+    """Implements :class:`robolink.model.MotionGroup`, but for what a kind of controller says.
+
+    What only some kinds can do, a movement until an input switches, is refused here by name.
+
+    Args:
+        link: The controller.
+    """
+
+    def __init__(self, link: DriverLink) -> None:
+        self._driver = link
+
+    @property
+    @abstractmethod
+    def name(self) -> str:
+        """What a person calls it."""
+
+    @abstractmethod
+    def pose(self) -> Pose:
+        """Read where the frame in force is now (measured, not commanded)."""
+
+    @abstractmethod
+    def move_to(self, target: Pose, profile: MotionProfile, *, box: WorkBox) -> Motion:
+        """Start one movement; see the model."""
+
+    @abstractmethod
+    def requests_for(self, target: Pose, profile: MotionProfile) -> tuple[str, ...]:
+        """Return what :meth:`move_to` would send besides its reads, as it stands on the wire."""
+
+    @abstractmethod
+    def stop(self) -> None:
+        """Bring everything to rest; from here on nothing acts before ``release_stop``."""
+
+    def terms(self) -> MotionTerms:
+        """Return what a person must know before it moves."""
+        return MotionTerms(
+            tr("{group} of {identity}", group=self.name, identity=self._driver.identity),
+            tr("Nothing stops it when this computer falls silent."),
+        )
+
+    def require_able(self, purpose: str) -> None:
+        """Refuse what no movement could begin in now; see the model."""
+
+    def axes(self) -> Mapping[str, tuple[float, ...]]:
+        """Read the positions of the axes; none where this kind does not tell them."""
+        return {}
+
+    def move_until_input(
+        self, target: Pose, edge: InputEdge, *, speed_mm_s: float, box: WorkBox
+    ) -> MotionUntilInput:
+        """Start a straight movement until an input switches; see the model.
+
+        Raises:
+            ConfigError: This kind of controller has none.
+        """
+        raise self._driver.lacks(tr("movement until an input switches"))
+
+    def requests_until(
+        self, target: Pose, edge: InputEdge, *, speed_mm_s: float
+    ) -> tuple[str, ...]:
+        """Return what :meth:`move_until_input` would send besides its reads; raises as it."""
+        raise self._driver.lacks(tr("movement until an input switches"))
+
+    def abort_unfinished(self) -> None:
+        """End the movements that were begun here and not seen to their end."""
+
+    def _marked(self, target: Pose, request: str) -> Marker:
+        """Store the marker of a movement that is about to be sent."""
+        details = {"target": list(target.coordinates())}
+        return self._driver.markers.begin(MarkerKind.MOVE, request, details)
+
+    def _require_tool(self, target: Pose, found: int | None, request: str) -> None:
+        """Refuse a target that is meant for another tool than the one in force.
+
+        Raises:
+            NotReadyError: Names both.
+        """
+        if target.tool is None or target.tool != found:
+            raise NotReadyError(
+                tr(
+                    "The target is meant for tool {meant}, but tool {found} is in force.",
+                    meant=target.tool,
+                    found=found,
+                ),
+                reason=NotReadyReason.WRONG_TOOL,
+                remedy=tr("Nothing was moved. Select the right tool first."),
+                controller=self._driver.identity,
+                request=request,
+            )
+
+
+def stopped_before_edge(controller: str, request: str) -> StoppedError:
+    """Return the error for a movement that ended before its input switched, nor arrived."""
+    return StoppedError(
+        tr("The movement was stopped before the input switched."),
+        remedy=tr("Nothing goes on by itself; start again when the cell is clear."),
+        controller=controller,
+        request=request,
+    )

@@ -1,0 +1,146 @@
+"""A PLC that keeps its tool offsets in registers of the machine builder's own."""
+
+from robolink.controllers.controller_core import ControllerCore
+from robolink.controllers.plc_map.flange import FlangeReader
+from robolink.controllers.plc_map.inputs import MappedInputs
+from robolink.controllers.plc_map.link import MappedPlc
+from robolink.controllers.plc_map.registers import RegisterClient
+from robolink.controllers.plc_map.resolve import RegisterResolver
+from robolink.controllers.plc_map.tools import RegisterToolTable
+from robolink.controllers.preserving import Preserver
+from robolink.model import (
+    Act,
+    Capabilities,
+    ControllerFacts,
+    ControllerStatus,
+    Identity,
+    OutcomeLog,
+)
+from robolink.register_maps import RegisterMap
+
+
+class PlcMapController(ControllerCore):
+    """A PLC that is reached by a map. Use it as a context manager.
+
+    It moves nothing: a calibration takes its poses from a person.
+
+    Attributes:
+        register_map: Where everything stands.
+        tools: The tools of the map.
+        groups: One, which tells where the flange is, if the map has that, and refuses to move.
+        io: The inputs that the map names.
+
+    Args:
+        client: An open Modbus client; the controller owns it from here on.
+        register_map: The map.
+        outcomes: Where doubtful outcomes of this PLC are kept.
+    """
+
+    tools: RegisterToolTable
+    groups: tuple[FlangeReader]
+    io: MappedInputs
+
+    def __init__(
+        self, client: RegisterClient, register_map: RegisterMap, outcomes: OutcomeLog
+    ) -> None:
+        plc = self._plc = MappedPlc(client, register_map, outcomes)
+        self.register_map = register_map
+        self.io = MappedInputs(plc.registers, register_map)
+        tools = RegisterToolTable(plc)
+        preserver = _KeepsOthersOut(plc, tools)
+        super().__init__(
+            plc,
+            capabilities=Capabilities(tool_write=register_map.writable, io=True),
+            tools=tools,
+            groups=(FlangeReader(plc),),
+            preserver=preserver,
+            resolver=RegisterResolver(plc, tools, preserver),
+        )
+
+    @property
+    def exchanges(self) -> int:
+        """Requests sent so far."""
+        return self._plc.registers.exchanges
+
+    def who(self) -> Identity:
+        """Return which PLC this is: what a person confirms about a map holds for that one.
+
+        Raises:
+            TransportError, RemoteProtocolError: The link failed, or its number does not stand
+                still.
+            NotReadyError: The map knows where the PLC's number stands, and there is none now.
+        """
+        return self._plc.who()
+
+    def require_probe(self) -> None:
+        """Compare the PLC's constant with the map's, if there is one.
+
+        Raises:
+            RemoteProtocolError: It differs; says what the map should say.
+        """
+        self._plc.require_probe()
+
+    def facts(self) -> ControllerFacts:
+        """Return what the map says about the machine; its PLC says nothing."""
+        return ControllerFacts(controller_name=self.register_map.name)
+
+    def error_text(self, code: int) -> str:
+        """Return what the map says about an error number, empty where it says nothing."""
+        return self.tools.handshake.error_text(code)
+
+    def condition(self) -> dict[str, object]:
+        """Read the tool in force, and the text of an error, as far as the map has them."""
+        fault = self.tools.handshake.fault()
+        return {
+            "text": self.error_text(fault) if fault else "",
+            "selected_tool": self.tools.selected() if self.register_map.selected else None,
+            "map": self.register_map.name,
+            "permitted": self._plc.permitted,
+        }
+
+    def preview(self, act: Act) -> tuple[str, ...]:  # noqa: ARG002 - the model's form
+        """Refuse; see :meth:`stop`."""
+        raise self._plc.no_motion()
+
+    def stop(self) -> None:
+        """Write nothing from here on; the machine itself nothing here can stop.
+
+        Raises:
+            RejectedError: Always; the message says to use the emergency stop.
+        """
+        self.latch.close()
+        raise self._plc.no_motion()
+
+    def reset_fault(self) -> None:
+        """Refuse; see :meth:`stop`."""
+        raise self._plc.no_motion()
+
+    def motors(self, on: bool) -> None:  # noqa: ARG002 - the model's form
+        """Refuse; see :meth:`stop`."""
+        raise self._plc.no_motion()
+
+    def _read_status(self) -> ControllerStatus:
+        """Read permit, busy and error; one that the map lacks never hinders.
+
+        An answer shows that the PLC is alive.
+        """
+        slot = next(iter(self.register_map.slots.values()))
+        self._plc.registers.read(slot.table, slot.span)
+        fault, busy = self.tools.handshake.fault(), self.tools.handshake.busy
+        return ControllerStatus(
+            remote=self._plc.permitted,
+            ready=fault is None and not busy,
+            running=busy,
+            fault=fault is not None,
+            code=fault or 0,
+        )
+
+    def _close_link(self) -> None:
+        self._plc.registers.close()
+
+
+class _KeepsOthersOut(Preserver):
+    """Nothing is selected or moved here, so that nothing has to be put back."""
+
+    def _in_force(self, reason: str) -> None:  # noqa: ARG002 - alike for all
+        return None

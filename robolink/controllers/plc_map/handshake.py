@@ -1,0 +1,194 @@
+"""How a PLC is told to take new values over, and how it answers.
+
+Commit bit: request on, the answer comes, request off, the answer goes. Level: the request
+stays on until the answer comes. None: what is written counts. Each wait has its deadline.
+"""
+
+from contextlib import suppress
+from typing import Final
+
+from robolink.controllers.plc_map.registers import Registers
+from robolink.errors import (
+    BusyError,
+    NotReadyError,
+    NotReadyReason,
+    OutcomeUnknownError,
+    RejectedError,
+    RobolinkError,
+)
+from robolink.messages import tr
+from robolink.register_maps import Commit, CommitKind, Signal
+from robolink.stop_latch import CommandClass
+from robolink.timing import Deadline
+
+_POLL_S: Final = 0.02
+
+
+class Handshake:
+    """The commit of one map."""
+
+    def __init__(self, registers: Registers, commit: Commit) -> None:
+        self._registers = registers
+        self._commit = commit
+
+    @property
+    def answers(self) -> bool:
+        """Whether the PLC says that it has taken values over."""
+        return self._commit.kind is not CommitKind.NONE
+
+    def make_ready(self, request: str) -> None:
+        """Take an old request back, and refuse while the PLC cannot be asked.
+
+        A request that stands was left by a client that died; nothing follows from ending it.
+
+        Raises:
+            BusyError: The PLC is busy, or its answer stands although nothing is asked.
+            NotReadyError: It is in error already.
+        """
+        asked = self._commit.request
+        if asked is not None and self._registers.is_on(asked):
+            self._registers.switch(asked, on=False, kind=CommandClass.CALM)
+        deadline = Deadline.after(self._registers.clock, self._commit.timeout_s)
+        while (hindrance := self._hindrance(request)) is not None:
+            if deadline.expired:
+                raise hindrance
+            self._registers.clock.sleep(_POLL_S)
+
+    def carry_out(self, tool: int, request: str) -> None:
+        """Have the PLC take over what stands in the registers.
+
+        Raises:
+            RejectedError: It refused; the request is taken back.
+            OutcomeUnknownError: It did not answer in time; the request is taken back.
+        """
+        commit, registers = self._commit, self._registers
+        if commit.request is None:
+            registers.clock.sleep(commit.settle_s)
+            return
+        if commit.tool_number is not None:
+            registers.write(commit.tool_number.address, [tool])
+        registers.switch(commit.request, on=True)
+        try:
+            code = self._answered(commit.request, request)
+        except RejectedError as error:  # of a look or of taking back: the PLC may have acted
+            raise self._unknown(error.what, request) from error
+        if code is not None:
+            raise RejectedError(
+                tr("The PLC refused the new value: {error}.", error=self._error_text(code)),
+                code=code,
+                remedy=tr("The old value stays in force. Remove the cause, then try again."),
+                controller=registers.identity,
+                request=request,
+            )
+
+    def requests(self, tool: int) -> tuple[str, ...]:
+        """Return what :meth:`carry_out` writes, in words."""
+        commit = self._commit
+        if commit.request is None:
+            return ()
+        number = commit.tool_number
+        named = (tr("write {place}: {value}", place=number.place, value=tool),) if number else ()
+        return (
+            *named,
+            tr("switch {place} on", place=commit.request.place),
+            tr("switch {place} off", place=commit.request.place),
+        )
+
+    def error_text(self, code: int) -> str:
+        """Return what the map says about an error number, empty where it says nothing."""
+        return self._commit.error_texts.get(code, "")
+
+    def fault(self) -> int | None:
+        """Return the number of the error that stands now, 0 for one without a number."""
+        commit = self._commit
+        if commit.error is not None and not self._registers.is_on(commit.error):
+            return None
+        if commit.error_code is None:
+            return None if commit.error is None else 0
+        code = self._registers.word(commit.error_code)
+        return code if code or commit.error is not None else None
+
+    @property
+    def busy(self) -> bool:
+        """Whether the PLC says that it is busy."""
+        return self._registers.is_on(self._commit.busy)
+
+    def _answered(self, asked: Signal, request: str) -> int | None:
+        """Wait for the answer and take the request back.
+
+        Returns:
+            The number of an error that came instead of the answer, ``None`` for none.
+        """
+        code = self._answer(asked, request)
+        self._registers.switch(asked, on=False, kind=CommandClass.CALM)
+        if code is None and self._commit.kind is CommitKind.COMMIT_BIT:
+            self._let_go(request)
+        return code
+
+    def _answer(self, asked: Signal, request: str) -> int | None:
+        timeout_s = self._commit.timeout_s
+        deadline = Deadline.after(self._registers.clock, timeout_s)
+        while True:
+            code = self.fault()
+            if code is not None or self._registers.is_on(self._commit.answer):
+                return code
+            if deadline.expired:
+                with suppress(RobolinkError):  # what is said below holds in any case
+                    self._registers.switch(asked, on=False, kind=CommandClass.CALM)
+                raise self._unknown(
+                    tr("It did not answer the request within {timeout:g} s.", timeout=timeout_s),
+                    request,
+                )
+            self._registers.clock.sleep(_POLL_S)
+
+    def _let_go(self, request: str) -> None:
+        """Wait until the answer has gone with the request."""
+        timeout_s = self._commit.timeout_s
+        deadline = Deadline.after(self._registers.clock, timeout_s)
+        while self._registers.is_on(self._commit.answer):
+            if deadline.expired:
+                raise self._unknown(
+                    tr("Its done signal stays on, {timeout:g} s after.", timeout=timeout_s),
+                    request,
+                )
+            self._registers.clock.sleep(_POLL_S)
+
+    def _hindrance(self, request: str) -> RobolinkError | None:
+        """Return why the PLC cannot be asked now."""
+        registers = self._registers
+        code = self.fault()
+        if code is not None:
+            return NotReadyError(
+                tr("The PLC is in error: {error}.", error=self._error_text(code)),
+                reason=NotReadyReason.FAULT,
+                code=code,
+                remedy=tr("Clear it at the HMI; nothing was written."),
+                controller=registers.identity,
+                request=request,
+            )
+        if self.busy or registers.is_on(self._commit.answer):
+            return BusyError(
+                tr("The PLC is busy with another request."),
+                remedy=tr("Wait until it has finished, then try again; nothing was written."),
+                controller=registers.identity,
+                request=request,
+            )
+        return None
+
+    def _error_text(self, code: int) -> str:
+        if not code:
+            return tr("error without a number")
+        text = self.error_text(code)
+        return (
+            tr("error {code}, {text}", code=code, text=text)
+            if text
+            else tr("error {code}, of which the map says nothing", code=code)
+        )
+
+    def _unknown(self, why: str, request: str) -> OutcomeUnknownError:
+        return OutcomeUnknownError(
+            tr("Whether the PLC took the value over is not known. {why}", why=why),
+            remedy=tr("The request was not repeated. Look at the HMI, then 'robolink recover'."),
+            controller=self._registers.identity,
+            request=request,
+        )

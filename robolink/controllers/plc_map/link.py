@@ -1,0 +1,107 @@
+"""What every part of this driver works with: registers, the map of them, and when both count."""
+
+from robolink.controllers.driver_link import DriverLink
+from robolink.controllers.plc_map.probe import IdentityReader, require_probe
+from robolink.controllers.plc_map.registers import RegisterClient, Registers
+from robolink.errors import ConfigError, NotReadyError, NotReadyReason, RejectedError
+from robolink.messages import tr
+from robolink.model import Identity, OutcomeLog
+from robolink.register_maps import RegisterMap, confirmation_of
+
+
+class MappedPlc(DriverLink):
+    """One PLC that is reached by a map.
+
+    Attributes:
+        registers: The PLC's tables.
+        register_map: Where everything stands.
+
+    Args:
+        client: An open Modbus client.
+        register_map: See above.
+        outcomes: Where doubtful outcomes of this PLC are kept.
+    """
+
+    def __init__(
+        self, client: RegisterClient, register_map: RegisterMap, outcomes: OutcomeLog
+    ) -> None:
+        registers = self.registers = Registers(client)
+        self.register_map = register_map
+        self._identity = IdentityReader(registers, register_map)
+        outcomes.ask(self._identity.read)
+        super().__init__(
+            client.identity, registers.clock, registers.latch, outcomes, gate=registers.gate
+        )
+
+    @property
+    def permitted(self) -> bool:
+        """Whether the machine permits changes now; one without a permit always does."""
+        permit = self.register_map.permit
+        return permit is None or self.registers.is_on(permit)
+
+    def no_motion(self) -> RejectedError:
+        """Return the error for anything that would move, stop or switch the machine."""
+        return RejectedError(
+            tr("A PLC with a register map is neither moved nor stopped by robolink."),
+            remedy=tr("Do it at the machine; in danger press the emergency stop."),
+            controller=self.identity,
+        )
+
+    def who(self) -> Identity:
+        """Return which PLC this is: what a person confirms about a map holds for that one.
+
+        Raises:
+            TransportError, RemoteProtocolError: The link failed, or its number does not stand
+                still.
+            NotReadyError: The map knows where the PLC's number stands, and there is none now.
+        """
+        found = self._identity.read()
+        if found.certain:
+            return found
+        raise NotReadyError(
+            tr("The number by which the map knows {identity} reads zero.", identity=self.identity),
+            reason=NotReadyReason.NOT_REMOTE,
+            remedy=tr("Look whether the PLC's program runs, then try again; nothing was written."),
+            controller=self.identity,
+        )
+
+    def require_probe(self) -> None:
+        """Compare the PLC's constant with the map's, if there is one.
+
+        Raises:
+            RemoteProtocolError: It differs; says what the map should say.
+        """
+        require_probe(self.registers, self.register_map.probe)
+
+    def require_ready(self, request: str) -> None:
+        """Refuse a write where the map is not known to be right, or the machine says no."""
+        self.require_confirmed(request)
+        self.require_probe()
+        permit = self.register_map.permit
+        if permit is not None and not self.registers.is_on(permit):
+            raise NotReadyError(
+                tr("The machine does not permit changes now ({place}).", place=permit.place),
+                reason=NotReadyReason.NOT_REMOTE,
+                remedy=tr("Permit it at the machine, then try again; nothing was written."),
+                controller=self.identity,
+                request=request,
+            )
+
+    def require_confirmed(self, request: str) -> None:
+        """Refuse a change by a map without a probe that nobody has compared; writes nothing."""
+        if self.register_map.probe is None and not confirmation_of(
+            self.who().name, self.register_map
+        ):
+            raise ConfigError(
+                tr(
+                    "The map {name!r} has no probe, and nobody has confirmed it at {identity} yet.",
+                    name=self.register_map.name,
+                    identity=self.identity,
+                ),
+                remedy=tr(
+                    "Run 'robolink plc check-map' with the same -c and compare with the HMI. A map "
+                    "that was changed is confirmed anew. Nothing was written."
+                ),
+                controller=self.identity,
+                request=request,
+            )

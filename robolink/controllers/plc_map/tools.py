@@ -1,0 +1,181 @@
+"""The tool table of a PLC that keeps offsets in registers of its own."""
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+from robolink.controllers.plc_map.handshake import Handshake
+from robolink.controllers.plc_map.link import MappedPlc
+from robolink.controllers.plc_map.slots import Slots
+from robolink.controllers.tool_table import ToolTableCore
+from robolink.controllers.tool_writing import ToolWrite
+from robolink.errors import RejectedError, ToolError
+from robolink.messages import tr
+from robolink.model import Expected, ToolOffset, ToolReceipt
+
+
+class RegisterToolTable(ToolTableCore):
+    """The tools that a map names.
+
+    Every write is compare-and-set and read back. The values go out first, in one request where
+    they follow one another, and only then is the PLC asked to take them over. A refusal leaves the
+    registers as they were; where it does not, another error says so.
+
+    Where the map does not tell which tool is in force, nobody can keep it from losing its
+    definition but who works at the machine.
+
+    Args:
+        plc: The PLC and its map.
+    """
+
+    machine_selects: ClassVar[bool] = True
+
+    def __init__(self, plc: MappedPlc) -> None:
+        super().__init__(plc)
+        self._plc = plc
+        self._registers = plc.registers
+        self._map = plc.register_map
+        self._slots = Slots(plc.registers, plc.register_map)
+
+    @property
+    def handshake(self) -> Handshake:
+        """How the PLC is told to take values over."""
+        return self._slots.handshake
+
+    def indices(self) -> Sequence[int]:
+        """Return the numbers of the tools in the map."""
+        return tuple(sorted(self._map.slots))
+
+    def same(self, a: ToolOffset | None, b: ToolOffset | None) -> bool:
+        """Tell whether the registers hold both alike; undefined equals undefined only."""
+        return self._slots.values.same(a, b)
+
+    def require_writable(self, tool: int) -> None:
+        """Refuse a tool number that cannot be written; sends nothing.
+
+        Raises:
+            ConfigError: The map has no probe, and nobody has confirmed it.
+            ReservedToolError, ToolIndexError: As :meth:`write` would.
+            ToolError: The PLC's offsets can only be read.
+        """
+        self._plc.require_confirmed(tr("tool {tool}", tool=tool))
+        super().require_writable(tool)
+        if not self._map.slots[tool].table.writable:
+            raise ToolError(
+                tr("Tool {tool} stands in input registers, which nobody can write.", tool=tool),
+                remedy=tr("Change it at the HMI, or map holding registers."),
+                controller=self._plc.identity,
+            )
+
+    def preview_select(self, tool: int) -> tuple[str, ...]:
+        """Refuse, as :meth:`select` does."""
+        self.select(tool)
+        return ()
+
+    def select(self, tool: int) -> None:
+        """Refuse: which tool is in force is the machine's affair.
+
+        Raises:
+            RejectedError: Always, unless the tool is in force already.
+        """
+        self._require_known(tool)
+        if self.selected() != tool:
+            self._send_selection(tool)
+
+    def take_over(self, tool: int, before: ToolOffset | None, request: str) -> None:
+        """Ask the PLC once to take over what stands in the registers.
+
+        Args:
+            tool: Number of the tool.
+            before: What is in force, if the PLC refuses.
+            request: What this is about, for a person.
+
+        Raises:
+            RejectedError: It refused; the registers show ``before`` again.
+            RobolinkError: As :meth:`write`.
+        """
+        with self._plc.lock.held(request), self._plc.uninterrupted():
+            self._slots.handshake.make_ready(request)
+            self._slots.take_over(self._map.slots[tool], before, request)
+
+    def _set(self, tool: int, requested: ToolOffset | None, expected: Expected) -> ToolReceipt:
+        request = self._request(tool, requested)
+        with self._plc.lock.held(request):
+            self._plc.require_ready(request)
+            if not self.same(self.read(tool), requested):
+                self._slots.handshake.make_ready(request)
+            return _RegisterWrite(self, self._plc, tool, requested, self._slots).change(expected)
+
+    def _request(self, tool: int, requested: ToolOffset | None) -> str:
+        return "; ".join(self._requests(tool, requested))
+
+    def _requests(self, tool: int, requested: ToolOffset | None) -> tuple[str, ...]:
+        slot = self._map.slots[tool]
+        return self._slots.requests(slot, self._slots.content(slot, requested))
+
+    def _clear_request(self, tool: int) -> str:
+        return tr("tool {tool}", tool=tool)
+
+    def _storable(self, tool: int, offset: ToolOffset) -> ToolOffset:
+        return self._slots.values.rounded(self._map.slots[tool], offset)
+
+    def _stored(self, tool: int) -> ToolOffset | None:
+        return self._slots.read(self._map.slots[tool])
+
+    def _selected(self) -> int | None:
+        named = self._map.selected
+        return None if named is None else self._registers.word(named)
+
+    def _select_request(self, tool: int) -> str:
+        return tr("tool {tool}", tool=tool)
+
+    def _send_selection(self, tool: int) -> None:
+        raise RejectedError(
+            tr("robolink does not select tools on this PLC."),
+            remedy=tr("Select tool {tool} at the HMI.", tool=tool),
+            controller=self._plc.identity,
+        )
+
+    def _choices(self) -> str:
+        return tr("Choose one of these: {tools}.", tools=", ".join(map(str, self.indices())))
+
+    def _known(self, lowest: int) -> str:  # noqa: ARG002 - alike for both
+        return tr("The map has these: {tools}.", tools=", ".join(map(str, self.indices())))
+
+
+class _RegisterWrite(ToolWrite):
+    """The writing of one slot, and the request to take it over."""
+
+    def __init__(
+        self,
+        table: RegisterToolTable,
+        plc: MappedPlc,
+        tool: int,
+        requested: ToolOffset | None,
+        slots: Slots,
+    ) -> None:
+        slot = plc.register_map.slots[tool]
+        content = slots.content(slot, requested)
+        request = "; ".join(slots.requests(slot, content))
+        super().__init__(plc, tool, requested, request, same=table.same)
+        self._slot, self._content = slot, content
+        self._slots = slots
+
+    def read_before(self, expected: Expected) -> ToolOffset | None:  # noqa: ARG002 - one way only
+        """Read what the write replaces.
+
+        It was read before the PLC was made ready, too: that may have meant to wait for another
+        request of the machine, which may have stored another value.
+        """
+        return self._slots.read(self._slot)
+
+    def send(self) -> None:
+        """Write the registers and have the PLC take them over.
+
+        What stands there is read once more for that, register by register: should the PLC refuse,
+        it has to stand there again to the last bit.
+        """
+        self._slots.bring_into_force(self._slot, self._content, self.request)
+
+    def read_back(self) -> ToolOffset | None:
+        """Read what is stored."""
+        return self._slots.read(self._slot)

@@ -1,0 +1,176 @@
+"""What was in force before a procedure is put back at its end, whatever that end is.
+
+A calibration works in Tool 0, and the selection of an EPSON controller survives power-off
+(docs/reference/epson.md 3.1): left there, the next program would drive the flange where the nozzle
+tip belongs. So a durable marker names the cell's own tool before anything is changed, and goes only
+when that tool has been read back (docs/reference/rules.md 4).
+"""
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+
+from robolink.controllers.driver_link import DriverLink
+from robolink.controllers.motion_group import MotionGroupCore
+from robolink.errors import ConfigError, JournalError, RobolinkError
+from robolink.messages import tr
+from robolink.model import EntryKind, Finding, Marker, MarkerKind, NewEntry, ToolTable, Verdict
+from robolink.ways import Way, way
+
+
+class Preserver:
+    """Remembers at the start of a procedure, restores at its end: the selected tool.
+
+    A kind of controller on which more has to be put back adds that.
+
+    Args:
+        link: The controller.
+        tools: Its tools.
+        group: What moves, ``None`` where nothing does.
+    """
+
+    def __init__(
+        self, link: DriverLink, tools: ToolTable, group: MotionGroupCore | None = None
+    ) -> None:
+        self._link = link
+        self._tools = tools
+        self._group = group
+
+    @contextmanager
+    def preserved(self, reason: str) -> Iterator[None]:
+        """See :meth:`robolink.model.Controller.preserved`."""
+        markers = self._link.markers
+        with self._link.lock.held(reason), markers.ledger.block():
+            markers.look()
+            markers.require_settled(reason)
+            details = self._in_force(reason)
+            if details is None:
+                yield
+                return
+            marker: Marker | None = None
+            try:
+                with self._link.uninterrupted():
+                    marker = markers.begin(MarkerKind.SELECTION, reason, details)
+                yield
+            except BaseException as error:
+                if marker is not None:
+                    self._restore_after(error, marker)
+                raise
+            self.restore(marker)
+
+    def restore(self, marker: Marker) -> None:
+        """Put back what ``marker`` names, and forget it; Ctrl-C waits for the end.
+
+        Raises:
+            ConfigError: The marker was written by something else.
+            RobolinkError: It is not back; the marker stays.
+        """
+        tool = tool_before(marker)
+        with self._link.uninterrupted(), self._link.latch.restoring():
+            if self._group is not None:
+                self._group.abort_unfinished()
+            self._tools.select(tool)
+            self._restore_more(marker)
+            self._link.markers.clear(marker)
+
+    def examine(self, marker: Marker) -> Finding:
+        """Return whether a procedure that ended early has put everything back; only reads."""
+        before, now = tool_before(marker), self._tools.selected()
+        return _judged(
+            marker,
+            now=now,
+            before=before,
+            restored=now == before and self._restored_more(marker),
+            action=self._action(marker, now),
+        )
+
+    def _in_force(self, reason: str) -> Mapping[str, object] | None:
+        """Read what is to be put back, as plain JSON; ``None`` where nothing is ever changed."""
+        tool = self._tools.selected()
+        return {"tool": tool, "now": tool}
+
+    def _restore_more(self, marker: Marker) -> None:
+        """Put back what this kind of controller has besides the tool."""
+
+    def _restored_more(self, marker: Marker) -> bool:
+        """Whether that is back."""
+        return True
+
+    def _action(self, marker: Marker, now: int | None) -> str:
+        """Return what :meth:`restore` would do, without a full stop."""
+        return tr("select tool {tool} again", tool=tool_before(marker))
+
+    def _restore_after(self, error: BaseException, marker: Marker) -> None:
+        """Restore while ``error`` is on its way; if impossible, let it say what is left."""
+        try:
+            self.restore(marker)
+        except RobolinkError as second:
+            if isinstance(error, RobolinkError):
+                left = _unrestored(second, tool_before(marker))
+                error.remedy = f"{error.remedy} {left}".strip()
+
+
+def tool_before(marker: Marker) -> int:
+    """Return the tool that was in force when a procedure began.
+
+    Raises:
+        ConfigError: The marker was written by something else.
+    """
+    tool = marker.details.get("tool")
+    if not isinstance(tool, int):
+        raise not_understood(marker)
+    return tool
+
+
+def not_understood(marker: Marker) -> ConfigError:
+    """Return the error for the marker of a procedure that something else has written."""
+    return ConfigError(
+        tr("The marker of {when} cannot be understood.", when=marker.begun_at),
+        remedy=tr("Select the right tool by hand, then {forget}.", forget=way(Way.FORGET_MARKER)),
+    )
+
+
+def _unrestored(failure: RobolinkError, tool: int) -> str:
+    """Return the sentence about a tool of before that a procedure meant to leave selected.
+
+    Args:
+        failure: What kept the end of the procedure from being recorded, or from happening.
+        tool: Its number.
+    """
+    if isinstance(failure, JournalError):
+        return tr(
+            "Tool {tool} is selected again, which could not be recorded ({cause}) 'robolink "
+            "recover' settles it.",
+            tool=tool,
+            cause=failure.what,
+        )
+    return tr(
+        "The tool of before, tool {tool}, could not be selected again ({cause}) 'robolink "
+        "recover' selects it.",
+        tool=tool,
+        cause=failure.what,
+    )
+
+
+def _judged(
+    marker: Marker, *, now: int | None, before: int, restored: bool, action: str
+) -> Finding:
+    """Return whether a procedure that ended early has put the cell's own tool back.
+
+    Args:
+        marker: Of the procedure.
+        now: The tool that is selected.
+        before: The tool that was selected when the procedure began.
+        restored: Whether all is as it was then.
+        action: What settling would do about it, without a full stop.
+    """
+    if restored:
+        sentence = tr("Tool {tool} is selected, as it was before.", tool=now)
+        return Finding(marker, Verdict.DONE, sentence)
+    if now == before:
+        sentence = tr("Tool {tool} is selected, as before; power mode or speed are not.", tool=now)
+    else:
+        sentence = tr(
+            "Tool {now} is selected; before it was tool {before}.", now=now, before=before
+        )
+    entry = NewEntry(EntryKind.SELECTION, tool=before, verdict=Verdict.NOT_RESTORED)
+    return Finding(marker, Verdict.NOT_RESTORED, sentence, action, (entry,))

@@ -1,0 +1,213 @@
+"""An axis group of a CODESYS SoftMotion PLC behind its mailbox."""
+
+from typing import TYPE_CHECKING, Final
+
+from robolink.controllers.controller_core import ControllerCore
+from robolink.controllers.preserving import Preserver
+from robolink.controllers.softmotion.facts import MailboxFacts, set_kinematics
+from robolink.controllers.softmotion.io import SoftMotionIo
+from robolink.controllers.softmotion.link.answers import describe
+from robolink.controllers.softmotion.link.condition import condition_of, status_of
+from robolink.controllers.softmotion.link.mailbox import Mailbox
+from robolink.controllers.softmotion.link.ownership import take_command
+from robolink.controllers.softmotion.motion.group import SoftMotionGroup
+from robolink.controllers.softmotion.tools.resolve import SoftMotionResolver
+from robolink.controllers.softmotion.tools.table import SoftMotionToolTable
+from robolink.errors import ControllerFaultError
+from robolink.messages import tr
+from robolink.model import (
+    Act,
+    Capabilities,
+    ControllerFacts,
+    ControllerStatus,
+)
+from robolink.protocols.mailbox import (
+    Capability,
+    Command,
+    GroupState,
+    Kinematics,
+    Opcode,
+    Response,
+)
+from robolink.timing import Deadline
+
+if TYPE_CHECKING:
+    from robolink.controllers.softmotion.verify import MailboxFinding
+
+
+_RESETS: Final = (
+    (GroupState.ERRORSTOP, Command(0, Opcode.RESET)),
+    (GroupState.STOPPING, Command(0, Opcode.STOP, operands=(1, 0, 0, 0))),
+)
+"""What brings a group out of a state; after an error a stop may still be held."""
+
+_LEAVING_S: Final = 1.0
+"""Longest time from the end of a reset to the state that follows it."""
+
+
+class SoftMotionController(ControllerCore):
+    """A PLC mailbox that was met. Use it as a context manager.
+
+    The mailbox is owned from the first command that needs it until :meth:`close`; reading the
+    state, the position and the tool slots needs no ownership. A stop holds the group on the PLC
+    until :meth:`reset_fault`. The profile ``tools`` of the mailbox program moves nothing.
+
+    Attributes:
+        tools: Slots 1 to 15.
+        groups: The one axis group of this mailbox.
+        io: Inputs and outputs.
+
+    Args:
+        mailbox: The mailbox.
+    """
+
+    tools: SoftMotionToolTable
+    groups: tuple[SoftMotionGroup]
+    io: SoftMotionIo
+
+    def __init__(self, mailbox: Mailbox) -> None:
+        self._mailbox = mailbox
+        group = self._group = SoftMotionGroup(mailbox)
+        tools = SoftMotionToolTable(mailbox)
+        preserver = Preserver(mailbox, tools, group)
+        self.io = SoftMotionIo(mailbox)
+        able = mailbox.snapshots.met.capabilities
+        moves = Capability.MOTION in able
+        super().__init__(
+            mailbox,
+            capabilities=Capabilities(
+                tool_write=Capability.TOOLS in able, motion=moves, motors=moves, io=True
+            ),
+            tools=tools,
+            groups=(group,),
+            preserver=preserver,
+            resolver=SoftMotionResolver(mailbox, tools, preserver),
+        )
+
+    @property
+    def device_id(self) -> int | None:
+        """The number that the PLC drew once, the same on every link; ``None`` where it has none."""
+        return self._mailbox.device_id
+
+    @property
+    def exchanges(self) -> int:
+        """Requests sent so far."""
+        return self._mailbox.wire.exchanges
+
+    def _read_status(self) -> ControllerStatus:
+        # It keeps nothing going: a movement or jog ends unless somebody waits on it.
+        return status_of(self._mailbox.snapshots.take())
+
+    def facts(self) -> ControllerFacts:
+        """Read which machine this is, in the words that all kinds of controllers share."""
+        return self.mailbox_facts().shared()
+
+    def mailbox_facts(self) -> MailboxFacts:
+        """Read which machine and which mailbox program this is."""
+        return MailboxFacts.of(self._mailbox.snapshots.take(), device_id=self.device_id)
+
+    def verify(self) -> "tuple[MailboxFinding, ...]":
+        """Look at everything that can be seen without a command; nothing is written."""
+        from robolink.controllers.softmotion.verify import verify_mailbox
+
+        return verify_mailbox(self._mailbox)
+
+    def condition(self) -> dict[str, object]:
+        """Read the meaning of an error, the tool in force, and what the mailbox shows beside."""
+        return condition_of(self._mailbox.snapshots.take())
+
+    def preview(self, act: Act) -> tuple[str, ...]:
+        """Return the commands of an act, in words; those of a reset depend on the state."""
+        if act is Act.RESET:
+            state = self._mailbox.snapshots.take().group_state
+            return tuple(describe(draft) for wrong, draft in _RESETS if wrong == state)
+        opcodes = {
+            Act.STOP: Opcode.STOP,
+            Act.MOTORS_ON: Opcode.ENABLE,
+            Act.MOTORS_OFF: Opcode.DISABLE,
+        }
+        return (describe(Command(0, opcodes[act])),)
+
+    def preview_take(self, *, insist: bool = False) -> str:
+        """Return what :meth:`take` would send, in words."""
+        return describe(take_command(insist=insist))
+
+    def take(self, *, insist: bool = False) -> None:
+        """Take the mailbox now, before the first command that needs it.
+
+        Args:
+            insist: A person who sees the cell wants it, whoever owns it now.
+
+        Raises:
+            LeaseHeldError: Another client owns it.
+        """
+        self._mailbox.commands.ownership.take(insist=insist)
+
+    def reset_fault(self) -> None:
+        """Clear the group's error and release a held stop, because a person asked for it.
+
+        Nothing is sent where there is nothing to reset: SoftMotion calls that an error
+        (docs/reference/softmotion.md 2.2).
+
+        Raises:
+            NotReadyError: The machine does not permit it.
+            ControllerFaultError: The error is still there afterwards.
+        """
+        mailbox = self._mailbox
+        request = tr("reset")
+        with mailbox.lock.held(request, calming=True):
+            now = mailbox.snapshots.take()
+            for state, draft in _RESETS:
+                if now.group_state == state:
+                    mailbox.prepare(draft, describe(draft))
+                    mailbox.commands.ownership.require(describe(draft))
+                    now = self._left(state, mailbox.commands.carry_out(draft))
+            if any(now.group_state == state for state, _draft in _RESETS):
+                raise ControllerFaultError(
+                    tr("The reset did not bring the axis group out of its state."),
+                    code=now.error_class,
+                    remedy=tr("Remove the cause at the drives or the machine, then reset again."),
+                    controller=self.identity,
+                    request=request,
+                )
+
+    def motors(self, on: bool) -> None:
+        """Enable or disable the group, and prove it; the PLC's program switches the drives."""
+        if on:
+            self._group.enable()
+        else:
+            self._group.disable()
+
+    def set_kinematics(
+        self, position: Kinematics, orientation: Kinematics = Kinematics.NONE
+    ) -> None:
+        """Put another kinematics in force (MC_SetKinTransform), and prove it.
+
+        The tool is identity and no slot is selected afterwards (docs/reference/softmotion.md 1.1).
+
+        Raises:
+            NotReadyError: The group moves, or the machine does not permit it.
+            RejectedError: The PLC refused it.
+            ReadBackError: Another kinematics is in force.
+            OutcomeUnknownError: Something earlier is unsettled, or no answer came.
+        """
+        set_kinematics(self._mailbox, position, orientation)
+
+    def _take_leave(self) -> None:
+        """Halt what nobody waited on, and give the mailbox back."""
+        if self._mailbox.wire.alive:
+            self._group.abort_unfinished()
+            self._mailbox.commands.ownership.release()
+
+    def _close_link(self) -> None:
+        self._mailbox.wire.close()
+
+    def _left(self, state: GroupState, now: Response) -> Response:
+        """Give the group the cycles that it needs to leave a state.
+
+        Source: docs/reference/softmotion.md 2.2.
+        """
+        deadline = Deadline.after(self.clock, _LEAVING_S)
+        while now.group_state == state and not deadline.expired:
+            now = self._mailbox.snapshots.news(now)
+        return now

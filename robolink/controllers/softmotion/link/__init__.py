@@ -1,0 +1,1 @@
+"""One session on a PLC mailbox: snapshots read, commands sent, rest seen."""

@@ -1,0 +1,137 @@
+"""What a PLC's refusals and ends mean, in words, with what to do about them."""
+
+from typing import Final, NamedTuple
+
+from robolink.errors import (
+    ControllerError,
+    ControllerFaultError,
+    HeartbeatLostError,
+    RejectedError,
+)
+from robolink.messages import tr
+from robolink.protocols.mailbox import (
+    Command,
+    ErrorClass,
+    GroupState,
+    Opcode,
+    Response,
+    error_meaning,
+)
+
+_FAULTS: Final = frozenset({6, 7, 9})
+"""Hundreds of error classes that say that something broke, not that something was refused."""
+
+_POSED: Final = frozenset(
+    {Opcode.MOVE_DIRECT, Opcode.MOVE_LINEAR, Opcode.MOVE_UNTIL_INPUT, Opcode.WRITE_TOOL}
+)
+
+
+class Ended(NamedTuple):
+    """How a command ended, and the snapshot that says so."""
+
+    command: Command
+    state: int
+    error_class: int
+    now: Response
+
+
+def describe(command: Command) -> str:
+    """Return a command as a person may read it: its number, its name, and what it carries."""
+    name = getattr(command.opcode, "name", "")
+    operands = list(command.operands)
+    while operands and not operands[-1]:
+        operands.pop()
+    words = [str(int(command.opcode)), name, *(str(operand) for operand in operands)]
+    if command.opcode in _POSED:
+        words.append("(" + " ".join(f"{value + 0.0:.6g}" for value in command.pose) + ")")
+    return " ".join(word for word in words if word)
+
+
+def refused(command: Command, now: Response, error_class: int) -> RejectedError:
+    """Return the error for a command that ended in ERROR: the PLC did not do it.
+
+    A refused tool write leaves the slot and the tool as they were (docs/mailbox.md, "Tools").
+    """
+    return RejectedError(
+        tr(
+            "The PLC refused {request!r}: {meaning}.",
+            request=describe(command),
+            meaning=_meaning(error_class, now),
+        ),
+        code=error_class,
+        remedy=_remedy(error_class),
+        request=describe(command),
+    )
+
+
+def command_ended_early(command: Command) -> ControllerFaultError:
+    """Return the error for a command, not a movement, that a stop or a fault ended."""
+    return ControllerFaultError(
+        tr("{request!r} was ended before it was done.", request=describe(command)),
+        remedy=tr("Someone stopped the group, or it went into error. Read the status."),
+        request=describe(command),
+    )
+
+
+def motion_failure(request: str, now: Response, error_class: int) -> ControllerError:
+    """Return the error for a movement that did not end as it should."""
+    kind: type[ControllerError]
+    fault = error_class // 100 in _FAULTS or now.group_state == GroupState.ERRORSTOP
+    kind = ControllerFaultError if fault else RejectedError
+    if error_class == ErrorClass.HEARTBEAT_LOST and now.group_state != GroupState.ERRORSTOP:
+        kind = HeartbeatLostError
+    return kind(
+        tr(
+            "The PLC ended {request!r}: {meaning}.",
+            request=request,
+            meaning=_meaning(error_class, now),
+        ),
+        code=error_class,
+        remedy=tr("Nothing was repeated. {remedy}", remedy=_remedy(error_class)),
+        request=request,
+    )
+
+
+def _meaning(error_class: int, now: Response) -> str:
+    meaning = error_meaning(error_class)
+    # The PLC's own number belongs to the command that stands in the response now.
+    if now.error_class == error_class and now.raw_error:
+        return tr(
+            "{meaning} ({number}; the PLC's ErrorID is {raw})",
+            meaning=meaning,
+            number=error_class,
+            raw=now.raw_error,
+        )
+    return tr("{meaning} ({number})", meaning=meaning, number=error_class)
+
+
+def _remedy(error_class: int) -> str:
+    remedies: dict[int, str] = {
+        ErrorClass.VERSION: tr("Export the PLC program of this robolink and load it."),
+        ErrorClass.UNKNOWN_OPCODE: tr("Load the profile 'full' of the PLC program."),
+        ErrorClass.NOT_OWNER: tr("Connect again when the other client has ended."),
+        ErrorClass.STALE_EPOCH: tr("Connect again when the other client has ended."),
+        ErrorClass.OTHER_BOOT: tr("Connect again; no tool slot is selected after a start."),
+        ErrorClass.NOT_PERMITTED: tr(
+            "The machine's program gives the permit (xPermit); bring it to its service state."
+        ),
+        ErrorClass.DISABLED: tr("Run 'robolink enable' when the cell is clear."),
+        ErrorClass.ERRORSTOP: tr("Find the cause, then run 'robolink reset'."),
+        ErrorClass.STOPPING: tr("Run 'robolink reset' to release the stop when the cell is clear."),
+        ErrorClass.MOVING: tr("Wait for the end of the movement."),
+        ErrorClass.BUSY: tr("Wait for the command in work, or stop it."),
+        ErrorClass.QUEUE_FULL: tr("Wait for the first movement to end."),
+        ErrorClass.SLOT_EMPTY: tr("Write the slot first, with a calibration or 'tool set'."),
+        ErrorClass.TOOL_INCOMPATIBLE: tr(
+            "This kinematics fixes no full orientation of the flange: only a shift along its own "
+            "axis can be a tool. Couple an orientation kinematics in the PLC, or leave X and Y 0."
+        ),
+        ErrorClass.NO_ORIENTATION_IMAGE: tr(
+            "The PLC's own kinematics must implement ISMKinematicsWithOrientationImage."
+        ),
+        ErrorClass.HEARTBEAT_LOST: tr(
+            "A movement goes on only while someone waits on it. This computer, or the network, "
+            "was too slow for half a second: close other programs, then start again."
+        ),
+    }
+    return remedies.get(error_class) or tr("Read the status before you go on.")

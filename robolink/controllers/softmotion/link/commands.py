@@ -1,0 +1,362 @@
+"""Telling the PLC something, once, and knowing what became of it.
+
+Source: docs/mailbox.md, "When a command counts".
+
+A command goes out with a number that is new, the owner's token, the epoch and the PLC start
+that was met. Its answer counts as ours only when owner, number and opcode are ours; an answer
+to somebody else in its place leaves it unknown. A block is written again in one case only: the
+PLC counts one more damaged block and has acknowledged nothing since. Never after a time-out.
+"""
+
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Final
+
+from robolink.checkpoints import Checkpoint, checkpoint
+from robolink.controllers.softmotion.link.answers import (
+    Ended,
+    command_ended_early,
+    describe,
+    refused,
+)
+from robolink.controllers.softmotion.link.motion_tracking import has_ended
+from robolink.controllers.softmotion.link.ownership import Ownership
+from robolink.controllers.softmotion.link.snapshots import Snapshots
+from robolink.controllers.softmotion.link.wire import MailboxWire
+from robolink.errors import (
+    ConfigError,
+    RejectedError,
+    RemoteProtocolError,
+    StoppedError,
+    TransportTimeoutError,
+    UnclearAnswerError,
+)
+from robolink.messages import tr
+from robolink.protocols.mailbox import (
+    OPCODES,
+    BlockError,
+    Command,
+    CommandState,
+    ErrorClass,
+    Finished,
+    Opcode,
+    Response,
+    Words,
+    encode_command,
+    next_number,
+)
+from robolink.stop_latch import CommandClass
+from robolink.timing import Deadline
+
+_CLASSES: Final = {
+    Opcode.OWNERSHIP: CommandClass.LOOK,
+    Opcode.READ_TOOL: CommandClass.LOOK,
+    Opcode.READ_INPUT: CommandClass.LOOK,
+    Opcode.STOP: CommandClass.CALM,
+    Opcode.HALT: CommandClass.CALM,
+    Opcode.INTERRUPT: CommandClass.CALM,
+    Opcode.RESET: CommandClass.CALM,
+    Opcode.DISABLE: CommandClass.CALM,
+    Opcode.SELECT_TOOL: CommandClass.RESTORE,
+    Opcode.WRITE_TOOL: CommandClass.WRITE,
+    Opcode.CLEAR_TOOL: CommandClass.WRITE,
+}
+"""Every other opcode acts. To release a held stop (2003 with i0 = 1) moves nothing by itself."""
+
+
+def command_class_of(command: Command) -> CommandClass:
+    """Return what ``command`` does; an end of a jog, both masks 0, calms."""
+    if command.opcode == Opcode.JOG and not any(command.operands[:2]):
+        return CommandClass.CALM
+    return _CLASSES.get(Opcode(command.opcode), CommandClass.ACT)
+
+
+COMPLETION_S: Final = 10.0
+"""Longest time between the acknowledgement and the end of what is not a movement."""
+
+_WRITES: Final = 3
+_OVERTAKEN: Final = frozenset({Opcode.STOP, Opcode.HALT})
+"""Commands whose end another stop or halt may hide: it does the same, and rest is looked for."""
+
+_DISPOSSESSED: Final = frozenset({ErrorClass.NOT_OWNER, ErrorClass.STALE_EPOCH})
+
+
+class CommandSender:
+    """Sends commands. Drafts carry no sequence, owner, epoch or boot_id; they are added here.
+
+    Attributes:
+        ownership: Of the mailbox; taken by the first command that needs it.
+    """
+
+    def __init__(self, wire: MailboxWire, snapshots: Snapshots) -> None:
+        self._wire = wire
+        self._snapshots = snapshots
+        self._lock = threading.RLock()
+        self._last = 0
+        self.ownership = Ownership(wire, self._to_end)
+
+    def carry_out(self, draft: Command) -> Response:
+        """Send a command that is no movement and return the snapshot that shows its end.
+
+        Raises:
+            RejectedError: The PLC refused it; it did nothing.
+            ControllerFaultError: It was ended before it was done.
+            LeaseHeldError, LeaseLostError: Another client owns the mailbox; nothing was sent.
+            ConfigError: A value does not fit; nothing was sent.
+            TransportError, RemoteProtocolError: The session is over; it may have been done.
+        """
+        with self._wire.uninterrupted():
+            self._possess(draft)
+            end = self._to_end(draft)
+            return self._taken(end)
+
+    def stop(self) -> Callable[[Response], bool]:
+        """Send 2003, and return what tells by a later snapshot whether it is done.
+
+        What it returns raises like :meth:`carry_out`.
+        """
+        with self._wire.uninterrupted():
+            command, now = self._send(Command(0, Opcode.STOP))
+
+        def done(now: Response) -> bool:
+            end = self._end_of(command, now)
+            return end is not None and self._taken(end) is not None
+
+        done(now)
+        return done
+
+    def _taken(self, end: Ended) -> Response:
+        """Return the snapshot of a command that is done; raise for one that is not."""
+        if end.state == CommandState.ERROR:
+            raise self._refusal(end.command, end.now, end.error_class)
+        if end.state == CommandState.ABORTED:
+            raise command_ended_early(end.command)
+        return end.now
+
+    def start(self, draft: Command) -> Command:
+        """Send a movement or a jog and return it as it was accepted; raises like the other.
+
+        Raises:
+            KeyboardInterrupt: Ctrl-C came before a movement was sent; it was not.
+        """
+        # Who begins a movement is there; at most four begin before one has to be waited on.
+        with self._wire.uninterrupted(), self._wire.attended():
+            self._possess(draft)
+            command, now = self._send(draft, ride=draft.opcode != Opcode.JOG)
+            if now.state == CommandState.ERROR:
+                self._wire.motions.forget(command.sequence)
+                raise self._refusal(command, now, now.error_class)
+            # On a slow line the answer took its time; who waits now begins with a whole patience.
+            self._wire.beat()
+            return command
+
+    def _possess(self, draft: Command) -> None:
+        if draft.needs_owner:
+            self.ownership.require(describe(draft))
+
+    def _refusal(self, command: Command, now: Response, error_class: int) -> RejectedError:
+        if error_class in _DISPOSSESSED and command.needs_owner:
+            self.ownership.lose()
+        return refused(command, now, error_class)
+
+    def _to_end(self, draft: Command) -> Ended:
+        if draft.only_ends:
+            with self._wire.ahead():
+                return self._seen_to_end(draft)
+        return self._seen_to_end(draft)
+
+    def _seen_to_end(self, draft: Command) -> Ended:
+        command, now = self._send(draft)
+        deadline = Deadline.after(self._wire.clock, COMPLETION_S)
+        while (end := self._end_of(command, now)) is None:
+            if deadline.expired:
+                raise self._wire.ended(self._silence(command, tr("began, and has not ended")))
+            now = self._snapshots.news(now)
+        return end
+
+    def _end_of(self, command: Command, now: Response) -> Ended | None:
+        if is_own(command, now):
+            if not has_ended(now.state):
+                return None
+            return Ended(command, now.state, now.error_class, now)
+        if _has_taken(command, now):
+            return Ended(command, CommandState.DONE, ErrorClass.NONE, now)
+        if now.ack_owner != command.owner:
+            raise self._wire.ended(self._overtaken(command, now))
+        # Our own stop or halt was accepted after it, from another thread.
+        ends = (end for end in now.finished if end.sequence == command.sequence)
+        end = next((Ended(command, end.state, end.error_class, now) for end in ends), None)
+        if end is None and command.opcode not in _OVERTAKEN:
+            raise self._unseen(command)
+        return end or Ended(command, CommandState.DONE, ErrorClass.NONE, now)
+
+    def _send(self, draft: Command, *, ride: bool = False) -> tuple[Command, Response]:
+        """Write a command and return it with the snapshot that acknowledges it."""
+        request = describe(draft)
+        with self._exchanging(request):
+            before = self._before(draft)
+            self._require_able(draft, before)
+            command = self._addressed(draft, before)
+            words = self._encode(command)
+            if ride and self._wire.interrupted:
+                raise KeyboardInterrupt  # held back until here: nothing begins to move after it
+            if ride:
+                self._wire.motions.begin(command.sequence)
+            for _ in range(_WRITES):
+                try:
+                    self._wire.latch.admit(command_class_of(command), request)
+                    self._wire.write(words)
+                except (RejectedError, StoppedError):
+                    self._wire.motions.forget(command.sequence)
+                    raise
+                try:
+                    before, accepted = self._await_acknowledgement(command, before)
+                except RejectedError:
+                    self._wire.motions.forget(command.sequence)
+                    raise
+                if accepted:
+                    return command, before
+            raise self._wire.ended(
+                RemoteProtocolError(
+                    tr("{request!r} arrived damaged each time.", request=describe(command)),
+                    remedy=tr("Look for a gateway that changes registers, or a bad line."),
+                )
+            )
+
+    def _before(self, draft: Command) -> Response:
+        """Return a snapshot of before a command.
+
+        What ends a movement of ours on a slow line does not wait for one: whoever waited on the
+        movement has read the last one, and beats no more.
+        """
+        if draft.only_ends and self._wire.motions.unfinished and self._wire.whole_look_s > 0:
+            return self._snapshots.latest
+        return self._snapshots.take()
+
+    @contextmanager
+    def _exchanging(self, request: str) -> Iterator[None]:
+        """Hold the lock from the look at the latch to the acknowledgement."""
+        checkpoint(Checkpoint.LOCK, request)
+        try:
+            with self._lock:
+                checkpoint(Checkpoint.HELD, request)
+                yield
+        finally:
+            checkpoint(Checkpoint.EXCHANGE, request)
+
+    def _await_acknowledgement(self, command: Command, before: Response) -> tuple[Response, bool]:
+        """Return the snapshot that shows the acknowledgement, or the damage, of a block."""
+        deadline = Deadline.after(self._wire.clock, self._wire.timeout_s)
+        now = before
+        while True:
+            now = self._snapshots.news(now)
+            if is_own(command, now) or _has_taken(command, now):
+                return now, True
+            if _came_too_early(command, before, now):
+                raise refused(command, now, ErrorClass.BUSY)
+            if (now.ack_head, now.ack_owner) != (before.ack_head, before.ack_owner):
+                raise self._wire.ended(self._overtaken(command, now))
+            if now.rejected != before.rejected:
+                return now, False
+            if deadline.expired:
+                silence = self._silence(command, tr("was not acknowledged"))
+                # Something stronger must be able to follow what should have ended a movement.
+                raise silence if command.only_ends else self._wire.ended(silence)
+
+    def _addressed(self, draft: Command, before: Response) -> Command:
+        taken = {before.ack_head, before.active_movement}
+        taken |= {end.sequence for end in before.finished}
+        number = next_number(self._last or before.ack_head)
+        while number in taken or self._wire.motions.holds(number):
+            number = next_number(number)
+        self._last = number
+        return replace(
+            draft,
+            sequence=number,
+            owner=self._wire.owner,
+            epoch=self._wire.epoch,
+            boot_id=before.boot_id,
+        )
+
+    def _encode(self, command: Command) -> Words:
+        try:
+            return encode_command(command, heartbeat=self._wire.next_beat())
+        except BlockError as error:
+            raise ConfigError(
+                tr("{request!r} cannot be sent: {cause}.", request=describe(command), cause=error),
+                remedy=tr("Correct the value; nothing was sent."),
+                controller=self._wire.identity,
+            ) from error
+
+    def _require_able(self, draft: Command, before: Response) -> None:
+        opcode = Opcode(draft.opcode)
+        if OPCODES[opcode].capability not in before.capabilities:
+            raise refused(draft, before, ErrorClass.UNKNOWN_OPCODE)
+
+    def _silence(self, command: Command, how: str) -> TransportTimeoutError:
+        return TransportTimeoutError(
+            tr("{request!r} {how}.", request=describe(command), how=how),
+            remedy=tr("Look at the PLC; the command may still be carried out."),
+            request=describe(command),
+        )
+
+    def _unseen(self, command: Command) -> UnclearAnswerError:
+        # Only what a stop ends is kept among the last ends; what had ended before it, well or
+        # not, is not shown any more (docs/mailbox.md, "When a command counts").
+        return UnclearAnswerError(
+            tr("A stop came before the end of {request!r} was read.", request=describe(command)),
+            remedy=tr("Read again what it was to change."),
+            controller=self._wire.identity,
+            request=describe(command),
+        )
+
+    def _overtaken(self, command: Command, now: Response) -> RemoteProtocolError:
+        return RemoteProtocolError(
+            tr(
+                "The PLC acknowledged command {number} of another client ({owner:08X}) in place of "
+                "{request!r}.",
+                number=now.ack_head,
+                owner=now.ack_owner,
+                request=describe(command),
+            ),
+            remedy=tr("Find the other client; one at a time may command this mailbox."),
+            request=describe(command),
+        )
+
+
+def is_own(command: Command, now: Response) -> bool:
+    """Whether a snapshot acknowledges this very command: owner, number and opcode."""
+    return (now.ack_owner, now.ack_head, now.opcode_echo) == (
+        command.owner,
+        command.sequence,
+        command.opcode,
+    )
+
+
+def _came_too_early(command: Command, before: Response, now: Response) -> bool:
+    """Whether the PLC held a command back, which it then never carries out.
+
+    Source: docs/mailbox.md, "When a command counts".
+
+    Its number was in none of the ends when it was sent, so an end of that number is its own.
+    """
+    early = Finished(command.sequence, CommandState.ERROR, ErrorClass.BUSY)
+    return early in now.finished and early not in before.finished
+
+
+def _has_taken(command: Command, now: Response) -> bool:
+    """Whether a take succeeded although the answer to it is gone already.
+
+    Another client that asked for the mailbox just after it was refused, and the answer to him
+    names the holder and the epoch.
+    """
+    take_command = command.opcode == Opcode.OWNERSHIP and command.operands[0] == 1
+    return (
+        take_command
+        and now.opcode_echo == Opcode.OWNERSHIP
+        and now.ack_owner != command.owner
+        and now.answer.holder == command.owner
+        and now.answer.epoch != 0
+    )

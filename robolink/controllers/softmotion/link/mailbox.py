@@ -1,0 +1,111 @@
+"""What every part of this driver works with: one mailbox, its commands and its markers."""
+
+import math
+
+from robolink.controllers.driver_link import DriverLink
+from robolink.controllers.softmotion.link.commands import CommandSender
+from robolink.controllers.softmotion.link.condition import require_permit
+from robolink.controllers.softmotion.link.device import identity_of
+from robolink.controllers.softmotion.link.snapshots import Snapshots
+from robolink.controllers.softmotion.link.wire import MailboxWire
+from robolink.errors import RemoteProtocolError
+from robolink.messages import tr
+from robolink.model import OutcomeLog, ToolOffset
+from robolink.protocols.mailbox import (
+    Command,
+    Response,
+    Six,
+    Slot,
+    frames_match,
+    from_frame,
+    to_frame,
+)
+
+TOLERANCE = 1e-9
+"""Two LREALs this near are equal: user units, and elements of a rotation matrix
+(docs/reference/rules.md 3)."""
+
+
+class Mailbox(DriverLink):
+    """One PLC mailbox that was met.
+
+    Attributes:
+        wire: The session.
+        snapshots: Reads.
+        commands: Commands.
+        device_id: The number of the PLC, the same on every link; ``None`` where it has none.
+    """
+
+    def __init__(
+        self,
+        wire: MailboxWire,
+        snapshots: Snapshots,
+        outcomes: OutcomeLog,
+        *,
+        device_id: int | None,
+    ) -> None:
+        self.wire = wire
+        self.device_id = device_id
+        outcomes.ask(lambda: identity_of(wire, device_id))
+        self.snapshots = snapshots
+        self.commands = CommandSender(wire, snapshots)
+        super().__init__(wire.identity, wire.clock, wire.latch, outcomes, gate=wire.uninterrupted())
+
+    @property
+    def unit_um(self) -> float:
+        """Micrometres in one of the PLC's units of length."""
+        return self.snapshots.met.unit_um
+
+    def prepare(self, draft: Command, request: str, *, now: Response | None = None) -> Response:
+        """Make sure that a command may be sent: the permit is there and the mailbox ours.
+
+        It is done before a marker is begun: what fails here was never sent.
+
+        Args:
+            draft: The command.
+            request: The same in words.
+            now: A snapshot that was taken just now; by default another one is taken.
+
+        Raises:
+            NotReadyError: The machine does not permit it.
+            LeaseHeldError, LeaseLostError: Another client owns the mailbox.
+        """
+        now = now or self.snapshots.take()
+        if draft.needs_permit:
+            require_permit(now, controller=self.identity, request=request)
+        if draft.needs_owner:
+            self.commands.ownership.require(request)
+        return now
+
+    def same(self, a: ToolOffset | None, b: ToolOffset | None) -> bool:
+        """Tell whether this PLC holds both alike; rotations are compared as matrices."""
+        if a is None or b is None:
+            return a is b
+        return frames_match(self.to_plc(a), self.to_plc(b), tolerance=TOLERANCE)
+
+    def to_plc(self, offset: ToolOffset) -> Six:
+        """Return a tool in the PLC's units and angles."""
+        return to_frame(offset.components(), unit_um=self.unit_um)
+
+    def from_plc(self, frame: Six) -> ToolOffset:
+        """Return a tool that came from the PLC."""
+        return ToolOffset(*self.coordinates(frame))
+
+    def tool_in(self, slot: Slot) -> ToolOffset | None:
+        """Return what a slot holds, ``None`` when it is empty."""
+        return self.from_plc(slot.tool) if slot.defined else None
+
+    def coordinates(self, frame: Six) -> Six:
+        """Return x, y, z in mm and u, v, w in degrees of a frame from the PLC.
+
+        Raises:
+            RemoteProtocolError: A number in it is not finite.
+        """
+        if not all(map(math.isfinite, frame)):
+            raise self.wire.ended(
+                RemoteProtocolError(
+                    tr("{identity} sent a position with no number.", identity=self.identity),
+                    remedy=tr("Look at the PLC's axes and kinematics, then connect again."),
+                )
+            )
+        return from_frame(frame, unit_um=self.unit_um)

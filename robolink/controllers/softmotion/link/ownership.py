@@ -1,0 +1,116 @@
+"""Who may command the mailbox: one client at a time, known by a token and an epoch.
+
+The PLC gives the mailbox to whoever asks when nobody owns it, when its owner has been silent
+for 10 s with nothing moving, or when a person insists; each time under a new epoch, so that a
+client that slept through it is refused (docs/mailbox.md, "Owners"; docs/reference/faults.md F46,
+F47).
+"""
+
+from collections.abc import Callable
+from typing import Final
+
+from robolink.controllers.softmotion.link.answers import Ended
+from robolink.controllers.softmotion.link.wire import MailboxWire
+from robolink.errors import LeaseHeldError, LeaseLostError, RejectedError
+from robolink.messages import tr
+from robolink.protocols.mailbox import Command, CommandState, ErrorClass, Opcode
+from robolink.timing import Deadline
+
+_LONGEST_STOP_S: Final = 1.0
+_AGAIN_S: Final = 0.05
+
+
+def take_command(*, insist: bool) -> Command:
+    """Return the command that takes the mailbox.
+
+    Args:
+        insist: A person who sees the cell wants it, whoever owns it now.
+    """
+    return Command(0, Opcode.OWNERSHIP, operands=(1, int(insist), 0, 0))
+
+
+class Ownership:
+    """Takes the mailbox, once, and gives it back.
+
+    Args:
+        wire: The session; its ``epoch`` is 0 while we own nothing.
+        send: Sends a command and returns how it ended.
+    """
+
+    def __init__(self, wire: MailboxWire, send: Callable[[Command], Ended]) -> None:
+        self._wire = wire
+        self._send = send
+        self._lost = False
+
+    def require(self, request: str) -> None:
+        """Take the mailbox unless it is ours already.
+
+        Raises:
+            LeaseHeldError: Another client owns it.
+            LeaseLostError: It was ours and another client took it; this session may not take
+                it back behind that client's back.
+        """
+        if self._lost:
+            raise LeaseLostError(
+                tr("{request!r} was not sent: another client took the mailbox.", request=request),
+                remedy=tr("Connect again when it has ended."),
+                controller=self._wire.identity,
+                request=request,
+            )
+        if not self._wire.epoch:
+            self.take()
+
+    def take(self, *, insist: bool = False) -> None:
+        """Take the mailbox.
+
+        Args:
+            insist: A person who sees the cell wants it, whoever owns it now.
+
+        Raises:
+            LeaseHeldError: Another client owns it; the error names its token.
+        """
+        end = self._send(take_command(insist=insist))
+        answer = end.now.answer
+        if end.state != CommandState.DONE or answer.holder != self._wire.owner:
+            error = LeaseHeldError(
+                tr(
+                    "Client {holder:08X} owns the mailbox of {identity}.",
+                    holder=answer.holder,
+                    identity=self._wire.identity,
+                ),
+                remedy=tr(
+                    "Close the other program; 10 s after its last sign the mailbox is free. A "
+                    "person at the cell may insist: 'robolink take-ownership'."
+                ),
+                controller=self._wire.identity,
+            )
+            error.holder = f"{answer.holder:08X}"
+            raise error
+        self._wire.epoch = answer.epoch
+        self._lost = False
+
+    def lose(self) -> None:
+        """Note that the PLC says it is not ours any more."""
+        self._wire.epoch = 0
+        self._lost = True
+
+    def release(self) -> None:
+        """Give the mailbox back, if it is ours; what is unfinished is halted first."""
+        if self._wire.epoch:
+            if self._wire.motions.unfinished:
+                self._send(Command(0, Opcode.HALT))
+            self._give_back()
+            self._wire.epoch = 0
+
+    def _give_back(self) -> None:
+        """Release the ownership, after the stop of another client that may be in work yet."""
+        deadline = Deadline.after(self._wire.clock, _LONGEST_STOP_S)
+        while True:
+            try:
+                self._send(Command(0, Opcode.OWNERSHIP))
+            except RejectedError as error:
+                if error.code != ErrorClass.BUSY or deadline.expired:
+                    raise
+                self._wire.clock.sleep(_AGAIN_S)
+            else:
+                return

@@ -1,0 +1,84 @@
+"""Whose turn it is on the wire: the beat of who waits on a movement goes before everything.
+
+A link carries one exchange at a time, and on a slow serial line one read of the response block
+takes a quarter of a second (docs/reference/softmotion.md 4.2). A thread that reads and reads would
+keep the waiter from beating for longer than the PLC bears. So while somebody waits on a movement,
+every other thread is let in by the waiter alone: one exchange, just after a beat, before the
+waiter's own. Then no two exchanges lie between two beats.
+"""
+
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Final
+
+_PATIENCE_S: Final = 1.0
+"""Longest time without a sign of the waiter: the PLC has ended by then what moved."""
+
+_LONGEST_EXCHANGE_S: Final = 10.0
+"""Longest time in which an exchange of another thread ends; a link's own deadline is shorter."""
+
+
+class Turns:
+    """Lets threads onto the wire. That one exchange follows another is the link's own lock."""
+
+    def __init__(self) -> None:
+        self._changed = threading.Condition()
+        self._waiters = 0
+        self._waiting = 0
+        self._let_in = 0
+        self._inside = 0
+        self._sign_s = 0.0
+
+    @contextmanager
+    def kept(self) -> Iterator[None]:
+        """Have the say over who comes in, for as long as this thread waits on a movement."""
+        with self._changed:
+            self._waiters += 1
+            self._sign_s = time.monotonic()
+            self._changed.wait_for(self._nobody_inside, _LONGEST_EXCHANGE_S)
+        try:
+            yield
+        finally:
+            with self._changed:
+                self._waiters -= 1
+                self._changed.notify_all()
+
+    def let_one_in(self) -> bool:
+        """Let another thread have one exchange and wait for its end; False when none wants it."""
+        with self._changed:
+            self._sign_s = time.monotonic()
+            if not self._waiting:
+                return False
+            self._let_in = 1
+            self._changed.notify_all()
+            self._changed.wait_for(self._nobody_inside, _LONGEST_EXCHANGE_S)
+            self._sign_s = time.monotonic()
+            return True
+
+    @contextmanager
+    def taken(self) -> Iterator[None]:
+        """Wait until the waiter, if there is one, lets this thread in for one exchange."""
+        with self._changed:
+            self._waiting += 1
+            try:
+                # Real time: a clock that stands still would keep this thread out for ever.
+                while self._waiters and not self._let_in:
+                    left_s = self._sign_s + _PATIENCE_S - time.monotonic()
+                    if left_s <= 0:
+                        break
+                    self._changed.wait(left_s)
+            finally:
+                self._waiting -= 1
+            self._let_in = 0
+            self._inside += 1
+        try:
+            yield
+        finally:
+            with self._changed:
+                self._inside -= 1
+                self._changed.notify_all()
+
+    def _nobody_inside(self) -> bool:
+        return not self._inside and not (self._let_in and self._waiting)

@@ -1,0 +1,1 @@
+"""Moving the axis group behind a mailbox."""

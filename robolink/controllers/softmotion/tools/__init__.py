@@ -1,0 +1,1 @@
+"""The tool slots of a mailbox: read, written, preserved, settled."""

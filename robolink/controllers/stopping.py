@@ -1,0 +1,201 @@
+"""A stop from outside: reach the controller, stop it, see it rest, leave.
+
+Nothing stands before the Abort, Stop or 2003 frame: no journal, no lease, no question, and no
+import that the frame does not need (docs/decisions/0017-a-stop-has-its-own-way-to-the-wire.md).
+What is imported inside the functions below is needed afterwards, or for one kind of controller
+only.
+"""
+
+from contextlib import suppress
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+from robolink.errors import (
+    ConnectError,
+    RejectedError,
+    RemoteProtocolError,
+    RobolinkError,
+    TransportError,
+)
+from robolink.messages import tr
+from robolink.transport import LinkUrl, parse_url
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from robolink.controllers.softmotion.link.wire import MailboxWire
+    from robolink.model import Controller, ControllerStatus, Secret
+    from robolink.timing import Clock
+    from robolink.transport import TraceSink
+
+_TRIES: Final = 3
+"""A stop may be repeated: an answer that was lost, or another client's words over ours in a
+mailbox, is no reason to leave the robot moving."""
+
+
+def stop_now(
+    url: "str | Controller",
+    *,
+    password: "str | Secret | None" = None,
+    timeout_s: float = 3.0,
+    clock: "Clock | None" = None,
+    trace: "TraceSink | None" = None,
+    met: "Callable[[str], None] | None" = None,
+) -> "ControllerStatus":
+    """Bring a controller to rest, whoever moves it, and return the state that shows it.
+
+    On an EPSON controller Abort, then Stop; on a mailbox 2003, which holds the group until a
+    reset. Nothing is recorded.
+
+    Args:
+        url: Which controller. One that is open already is stopped over the link that it has.
+        password: An EPSON controller's remote password, if one is set.
+        timeout_s: Longest wait for the connection, and for one answer.
+        clock: Replaces the machine's clock; a simulator brings its own.
+        trace: Called with (time in ns, "sent" or "received", bytes) for all traffic with an
+            EPSON controller but the login frame.
+        met: Called with the name under which the controller is on record, once it stands and
+            where it says of itself who it is.
+
+    Raises:
+        ConfigError: The URL is wrong.
+        ConnectError: It is not reached. Of an EPSON controller LoginUnansweredError: it serves
+            another client, who alone can stop it from a computer.
+        RejectedError: It takes no stop from here.
+        OutcomeUnknownError: It was told to stop and does not come to rest.
+        TransportError, RemoteProtocolError: Whether it stops is not known.
+    """
+    if not isinstance(url, str):
+        url.stop()
+        return url.status()
+    link = parse_url(url)
+    kinds = {"epson": _stop_epson, "softmotion": _stop_group, "plc": _stop_map}
+    stop = kinds.get(link.kind, _stop_other)
+    given = password if isinstance(password, str) else password.reveal() if password else ""
+    means = _Means(given, timeout_s, clock, trace, met)
+    for tries_left in reversed(range(_TRIES)):
+        try:
+            return stop(link, means)
+        except (TransportError, RemoteProtocolError) as error:
+            if isinstance(error, ConnectError) or not tries_left:
+                raise
+    raise AssertionError  # the last try returns or raises
+
+
+def stop_requests(url: str) -> tuple[str, ...]:
+    """Return what a stop sends, as a person may read it; nothing is opened.
+
+    Raises:
+        ConfigError: The URL is wrong.
+    """
+    kind = parse_url(url).kind
+    if kind == "epson":
+        from robolink.controllers.epson.link.requests import as_sent
+        from robolink.protocols.epson_text import Request
+
+        return tuple(as_sent(Request(name)) for name in ("Abort", "Stop"))
+    if kind == "softmotion":
+        from robolink.controllers.softmotion.link.answers import describe
+        from robolink.protocols.mailbox import Command, Opcode
+
+        return (describe(Command(0, Opcode.STOP)),)
+    return ()
+
+
+class _Means(NamedTuple):
+    """With what a controller is reached; see :func:`stop_now`."""
+
+    password: str
+    timeout_s: float
+    clock: "Clock | None"
+    trace: "TraceSink | None"
+    met: "Callable[[str], None] | None"
+
+
+def _stop_epson(link: LinkUrl, means: _Means) -> "ControllerStatus":
+    from robolink.controllers.epson.link.stopping import StopLine
+    from robolink.transport import open_transport
+
+    transport = open_transport(link, timeout_s=means.timeout_s, clock=means.clock)
+    if means.trace is not None:
+        from robolink.transport import TracingTransport
+
+        transport = TracingTransport(transport, means.trace)
+    line = StopLine(transport, timeout_s=means.timeout_s)
+    try:
+        line.login(means.password)
+        flags, code = line.stop()
+        from robolink.controllers.epson.link.answers import status_from_flags
+
+        if means.met is not None and (name := line.who()):
+            means.met(name)
+        line.leave(flags)
+        return status_from_flags(flags, code)
+    finally:
+        line.close()
+
+
+def _stop_group(link: LinkUrl, means: _Means) -> "ControllerStatus":
+    import os
+
+    from robolink.controllers.softmotion.link.commands import CommandSender
+    from robolink.controllers.softmotion.link.snapshots import Snapshots
+    from robolink.controllers.softmotion.link.stopping import bring_group_to_rest
+    from robolink.controllers.softmotion.link.wire import MailboxWire
+    from robolink.transport import open_quick_link
+
+    mailbox = open_quick_link(link, timeout_s=means.timeout_s, clock=means.clock)
+    owner = int.from_bytes(os.urandom(4)) or 1  # a token that nobody else has
+    wire = MailboxWire(mailbox, owner=owner, timeout_s=means.timeout_s)
+    try:
+        snapshots = Snapshots(wire)
+        commands = CommandSender(wire, snapshots)
+        now = bring_group_to_rest(commands, snapshots, wire.clock, controller=wire.identity)
+        from robolink.controllers.softmotion.link.condition import status_of
+
+        if means.met is not None:
+            _tell_which(wire, means.met)
+        return status_of(now)
+    finally:
+        wire.close()
+
+
+def _tell_which(wire: "MailboxWire", met: "Callable[[str], None]") -> None:
+    """Say which PLC stands now, where its program has a number."""
+    from robolink.controllers.softmotion.link.device import identity_of, read_device_id
+
+    with suppress(RobolinkError):
+        device_id = read_device_id(wire)
+        if device_id is not None:
+            met(identity_of(wire, device_id).name)
+
+
+def _stop_other(link: LinkUrl, means: _Means) -> "ControllerStatus":
+    """Stop a controller of a kind that another package brings, by what it offers for that."""
+    from robolink import __version__
+    from robolink.controllers.registry import ConnectionTerms, find_opener
+    from robolink.journal import GlancingLog, signature_here
+    from robolink.model import Secret
+
+    signature = signature_here(__version__)
+    terms = ConnectionTerms(
+        signature,
+        password=Secret(means.password) if means.password else None,
+        timeout_s=means.timeout_s,
+        clock=means.clock,
+        trace=means.trace,
+        # It opens no journal before something has to be recorded.
+        outcomes=GlancingLog(link.address, signature=signature),
+    )
+    with find_opener(link)(link, terms) as controller:
+        controller.stop()
+        return controller.status()
+
+
+def _stop_map(link: LinkUrl, means: _Means) -> "ControllerStatus":
+    del means
+    raise RejectedError(
+        tr("A PLC with a register map is neither moved nor stopped by robolink."),
+        remedy=tr("Do it at the machine."),
+        controller=link.identity,
+        request="Stop",
+    )

@@ -1,0 +1,337 @@
+"""A tool table, but for how its kind of controller is asked and told.
+
+What a person is refused, what is compared and proved, and in which order, is the same whatever
+holds the tools. A kind says which tools there are, how one is read, and how one write leaves.
+
+Clearing a tool never leaves the machine with another tool selected than somebody named. What a
+controller selects when the tool in force loses its definition is not documented, and a program
+that goes on with Tool 0 drives the flange where a nozzle's tip belongs. So clearing the tool in
+force is refused on every kind of controller, unless the caller names the tool to select in its
+place; that one is selected, and read back, before anything is cleared.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from typing import ClassVar
+
+from robolink.controllers.driver_link import DriverLink, MarkedCommand
+from robolink.controllers.markers import MarkerStore
+from robolink.errors import (
+    ControllerError,
+    ReadBackError,
+    ReservedToolError,
+    RobolinkError,
+    SelectedToolError,
+    ToolError,
+    ToolIndexError,
+    UndefinedToolError,
+)
+from robolink.messages import tr
+from robolink.model import ANY, Expected, ToolOffset, ToolReceipt
+from robolink.ways import Way, way
+
+
+class ToolTableCore(ABC):
+    """Implements :class:`robolink.model.ToolTable` with what a kind of controller says.
+
+    Attributes:
+        machine_selects: Whether the machine alone selects tools, so that to name the tool itself
+            in a clear means that it stays selected.
+
+    Args:
+        link: The controller.
+    """
+
+    machine_selects: ClassVar[bool] = False
+
+    def __init__(self, link: DriverLink) -> None:
+        self._driver = link
+
+    # What a kind says.
+
+    @abstractmethod
+    def indices(self) -> Sequence[int]:
+        """Return the tool numbers that can be written."""
+
+    @abstractmethod
+    def same(self, a: ToolOffset | None, b: ToolOffset | None) -> bool:
+        """Tell whether this controller would store both alike; undefined equals undefined only."""
+
+    @abstractmethod
+    def _stored(self, tool: int) -> ToolOffset | None:
+        """Read a tool other than 0, ``None`` when it is undefined."""
+
+    @abstractmethod
+    def _set(self, tool: int, requested: ToolOffset | None, expected: Expected) -> ToolReceipt:
+        """Write or clear a tool, by a :class:`~.tool_writing.ToolWrite` of this kind."""
+
+    @abstractmethod
+    def _request(self, tool: int, requested: ToolOffset | None) -> str:
+        """Return what :meth:`_set` sends besides its reads, in one line."""
+
+    @abstractmethod
+    def _selected(self) -> int | None:
+        """Read which tool is in force."""
+
+    @abstractmethod
+    def _select_request(self, tool: int) -> str:
+        """Return what selecting a tool sends, as a person may read it."""
+
+    @abstractmethod
+    def _send_selection(self, tool: int) -> None:
+        """Put a tool in force; raises unless the controller accepted it."""
+
+    # What a kind may say.
+
+    def _as_sent(self, request: str) -> str:
+        """Return a request as it stands on the wire."""
+        return request
+
+    def _requests(self, tool: int, requested: ToolOffset | None) -> tuple[str, ...]:
+        """Return all that :meth:`_set` sends besides its reads, as it stands on the wire."""
+        return (self._as_sent(self._request(tool, requested)),)
+
+    def _clear_request(self, tool: int) -> str:
+        """Return what clearing is called before it is known whether that is possible."""
+        return self._request(tool, None)
+
+    def _storable(self, tool: int, offset: ToolOffset) -> ToolOffset:
+        """Return what the controller can hold of an offset."""
+        return offset
+
+    def _require_readable(self, tool: int) -> None:
+        """Refuse a read that the state would not allow."""
+
+    def _require_clearable(self, tool: int) -> None:
+        """Refuse a clear that the state would not allow."""
+
+    def _require_selectable(self, request: str) -> None:
+        """Refuse a selection that the state would not allow; before anything is read for it."""
+
+    def _prepare_selection(self, tool: int, request: str) -> None:
+        """Make sure that a selection may be sent; just before it is."""
+
+    def _prove_selected(self, offset: ToolOffset, request: str) -> None:
+        """Prove more of a selection than the number that is read back."""
+
+    def _choices(self) -> str:
+        """Return which tools may be written, as the remedy for tool 0."""
+        lowest, *_, highest = self.indices()
+        return tr("Choose a tool from {lowest} to {highest}.", lowest=lowest, highest=highest)
+
+    def _known(self, lowest: int) -> str:
+        """Return which tools there are, from 0 or 1 on, as the remedy for one that is not."""
+        return tr(
+            "There are tools {lowest} to {highest}.", lowest=lowest, highest=self.indices()[-1]
+        )
+
+    # What is the same for all.
+
+    def require_writable(self, tool: int) -> None:
+        """Refuse a tool number that cannot be written; sends nothing.
+
+        Raises:
+            ReservedToolError, ToolIndexError: As :meth:`write` would.
+        """
+        if tool == 0:
+            raise ReservedToolError(
+                tr("Tool 0 is the flange itself and is never written."), remedy=self._choices()
+            )
+        self._require_known(tool, lowest=1)
+
+    def read_all(self) -> dict[int, ToolOffset | None]:
+        """Read every writable tool; an undefined one is ``None``."""
+        return {tool: self.read(tool) for tool in self.indices()}
+
+    def read(self, tool: int) -> ToolOffset | None:
+        """Read one tool, ``None`` when it is undefined; tool 0 reads as all zeros."""
+        self._require_known(tool)
+        self._require_readable(tool)
+        if tool == 0:
+            return ToolOffset()
+        found = self._stored(tool)
+        self._driver.markers.ledger.saw_tool(tool, found)
+        return found
+
+    def write(self, tool: int, offset: ToolOffset, *, expected: Expected) -> ToolReceipt:
+        """Write and read back; see :class:`robolink.model.ToolTable`."""
+        self.require_writable(tool)
+        return self._set(tool, self._storable(tool, offset), expected)
+
+    def clear(
+        self, tool: int, *, expected: Expected, then_select: int | None = None
+    ) -> ToolReceipt:
+        """Clear and read back; see :class:`robolink.model.ToolTable`."""
+        self.require_writable(tool)
+        with self._driver.lock.held(self._clear_request(tool)):
+            self._require_clearable(tool)
+            if not self._would_lose_selection(tool, expected, then_select):
+                return self._set(tool, None, expected)
+            return self._clear_after_selecting(tool, expected, then_select)
+
+    def preview_write(self, tool: int, offset: ToolOffset) -> tuple[str, ...]:
+        """Return what :meth:`write` would send besides its reads, as it stands on the wire.
+
+        Empty when the value is stored already. Reads only; raises what the write would.
+        """
+        self.require_writable(tool)
+        self._require_readable(tool)
+        requested = self._storable(tool, offset)
+        requests = self._requests(tool, requested)
+        return () if self.same(self._stored(tool), requested) else requests
+
+    def preview_clear(self, tool: int, *, then_select: int | None = None) -> tuple[str, ...]:
+        """Return what :meth:`clear` would send besides its reads; raises what it would."""
+        self.require_writable(tool)
+        requests = self._requests(tool, None)
+        if self.read(tool) is None:
+            return ()
+        if self.selected() != tool:
+            return requests
+        return (*self.preview_select(require_replacement(tool, then_select)), *requests)
+
+    def preview_select(self, tool: int) -> tuple[str, ...]:
+        """Return what :meth:`select` would send besides its reads."""
+        self._require_defined(tool)
+        if self.selected() == tool:
+            return ()
+        return (self._as_sent(self._select_request(tool)),)
+
+    def selected(self) -> int | None:
+        """Read which tool is in force, 0 for the flange; ``None`` where nothing tells it."""
+        found = self._selected()
+        self._driver.markers.ledger.saw_selected(found)
+        return found
+
+    def select(self, tool: int) -> None:
+        """Put a tool in force and read the selection back; see the model."""
+        self._require_known(tool)
+        request = self._select_request(tool)
+        with self._driver.lock.held(request):
+            self._require_selectable(request)
+            before = self._selected()
+            self._driver.markers.ledger.saw_selected(before)
+            if before == tool:
+                return
+            offset = self._require_defined(tool)
+            self._prepare_selection(tool, request)
+            selection = _Selection(
+                request,
+                tool,
+                before,
+                markers=self._driver.markers,
+                transmit=self._send_selection,
+                look=self._selected,
+            )
+            found = self._driver.carry_out(selection)
+            if found != tool:
+                raise ReadBackError(
+                    tr(
+                        "Tool {tool} was selected, but the controller says that tool {found} is "
+                        "in force.",
+                        tool=tool,
+                        found=found,
+                    ),
+                    remedy=tr("Do not move the robot; look at the controller's Tool setting."),
+                    request=request,
+                )
+            self._prove_selected(offset, request)
+
+    def _would_lose_selection(self, tool: int, expected: Expected, then_select: int | None) -> bool:
+        """Whether a clear, if it is not to be skipped or refused, takes the tool in force away."""
+        if self.selected() != tool:
+            return False
+        stored = self.read(tool)
+        if stored is None or not (expected is ANY or self.same(stored, expected)):
+            return False
+        return not (self.machine_selects and then_select == tool)
+
+    def _clear_after_selecting(
+        self, tool: int, expected: Expected, then_select: int | None
+    ) -> ToolReceipt:
+        """Select the tool of the caller's choice, then clear; a refused clear selects it again."""
+        replacement = require_replacement(tool, then_select)
+        with self._driver.uninterrupted():
+            self.select(replacement)
+            try:
+                return self._set(tool, None, expected)
+            except (ControllerError, ToolError):
+                with suppress(RobolinkError):
+                    self.select(tool)
+                raise
+
+    def _require_defined(self, tool: int) -> ToolOffset:
+        # Tool n on an undefined tool leaves an EPSON controller in error
+        # (docs/reference/epson.md 1.5).
+        offset = self.read(tool)
+        if offset is None:
+            raise UndefinedToolError(
+                tr("Tool {tool} is not defined, so it was not selected.", tool=tool),
+                remedy=tr("Define it first, with a calibration or 'robolink tool set'."),
+                request=self._select_request(tool),
+            )
+        return offset
+
+    def _require_known(self, tool: int, *, lowest: int = 0) -> None:
+        there = isinstance(tool, int) and not isinstance(tool, bool)
+        if not there or not (tool in self.indices() or tool == lowest == 0):
+            raise ToolIndexError(
+                tr("There is no tool {tool}.", tool=tool), remedy=self._known(lowest)
+            )
+
+
+class _Selection(MarkedCommand[int | None]):
+    """The selection of one tool."""
+
+    def __init__(
+        self,
+        request: str,
+        tool: int,
+        before: int | None,
+        *,
+        markers: MarkerStore,
+        transmit: Callable[[int], None],
+        look: Callable[[], int | None],
+    ) -> None:
+        super().__init__(request)
+        self._tool = tool
+        self._before = before
+        self._markers = markers
+        self._transmit = transmit
+        self._look = look
+
+    @property
+    def details(self) -> Mapping[str, object]:
+        return {"select": self._tool, "before": self._before}
+
+    def send(self) -> None:
+        self._transmit(self._tool)
+        self._markers.note_selection(self._tool)
+
+    def read(self) -> int | None:
+        found = self._look()
+        if found is not None:
+            self._markers.note_selection(found)
+        return found
+
+    def told_by(self, found: int | None) -> str:
+        return tr("Tool {tool} is selected now.", tool=found)
+
+
+def require_replacement(tool: int, then_select: int | None) -> int:
+    """Return the tool that is to be in force in the place of one that is cleared.
+
+    Raises:
+        SelectedToolError: None is named, or the same.
+    """
+    if then_select is None or then_select == tool:
+        raise SelectedToolError(
+            tr("Tool {tool} is selected, so it was not cleared.", tool=tool),
+            remedy=tr(
+                "Say which tool the machine is to have in its place: {then_select}, 0 for the "
+                "flange; the programs of the machine go on with that one.",
+                then_select=way(Way.THEN_SELECT),
+            ),
+        )
+    return then_select

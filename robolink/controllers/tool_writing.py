@@ -1,0 +1,164 @@
+"""Compare-and-set of a tool offset: the same for every kind of controller.
+
+Source: docs/reference/rules.md 2.
+
+Read; equal to what is wanted: nothing is written, because a write wears the controller's
+memory; not what was expected: nothing is written either; else a durable intent, one write,
+and a read-back of all six components. What became of it goes on record together with the
+end of the intent.
+"""
+
+from abc import abstractmethod
+from collections.abc import Callable, Iterator, Mapping
+
+from robolink.controllers.driver_link import DriverLink, MarkedCommand
+from robolink.errors import ReadBackError
+from robolink.messages import tr
+from robolink.model import (
+    ANY,
+    EntryKind,
+    Expected,
+    Marker,
+    NewEntry,
+    ToolOffset,
+    ToolReceipt,
+    describe_offset,
+    plain_offset,
+    require_engineer,
+    tool_changed,
+)
+
+Same = Callable[[ToolOffset | None, ToolOffset | None], bool]
+
+
+class ToolWrite(MarkedCommand[ToolOffset | None]):
+    """One write of a tool; each kind of controller says how it is read and sent.
+
+    Attributes:
+        tool: Number of the tool.
+        requested: The new value as the controller can hold it; ``None`` clears the tool.
+        before: What it held, once :meth:`compare` has read it.
+
+    Args:
+        link: The controller.
+        tool: See above.
+        requested: See above.
+        request: What is sent, as a person may read it.
+        same: Whether the controller stores two values alike.
+    """
+
+    def __init__(
+        self, link: DriverLink, tool: int, requested: ToolOffset | None, request: str, *, same: Same
+    ) -> None:
+        super().__init__(request)
+        self.tool = tool
+        self.requested = requested
+        self.before: ToolOffset | None = None
+        self._link = link
+        self._same = same
+        self._unconditional = False
+
+    @abstractmethod
+    def read_before(self, expected: Expected) -> ToolOffset | None:
+        """Read what the write replaces; ``expected`` is what the caller believes that is."""
+
+    @abstractmethod
+    def read_back(self) -> ToolOffset | None:
+        """Read what is stored after the controller has accepted the write."""
+
+    def read_doubted(self) -> ToolOffset | None:
+        """Read what is stored when the answer told nothing."""
+        return self.read_back()
+
+    def change(self, expected: Expected) -> ToolReceipt:
+        """Write and read back; see :meth:`robolink.model.ToolTable.write`."""
+        markers, self._unconditional = self._link.markers, expected is ANY
+        if self._unconditional:
+            purpose = tr("write tool {tool} blindly", tool=self.tool)
+            require_engineer(markers.outcomes, purpose)
+        markers.look()
+        self.before = self.read_before(expected)
+        markers.ledger.saw_tool(self.tool, self.before)
+        if self._same(self.before, self.requested):
+            return self._receipt(self.before, skipped=True)
+        if expected is not ANY and not self._same(self.before, expected):
+            raise tool_changed(self.tool, self.before, expected, request=self.request)
+        found = self._link.carry_out(self)
+        if not self._same(found, self.requested):
+            raise self._read_back_differs(found)
+        return self._receipt(found)
+
+    @property
+    def details(self) -> Mapping[str, object]:
+        """Plain JSON values needed to settle it later."""
+        markers = self._link.markers
+        details: dict[str, object] = {
+            "tool": self.tool,
+            "before": plain_offset(self.before),
+            "requested": plain_offset(self.requested),
+        }
+        if self._unconditional:
+            details["unconditional"] = True
+        if markers.outcomes.change:
+            details["change"] = markers.outcomes.change
+        if markers.changing:
+            details["part"] = True
+        return details
+
+    def read(self) -> ToolOffset | None:
+        """Read what it changes."""
+        return self.read_back() if self.acknowledged else self.read_doubted()
+
+    def entries(self, marker: Marker, found: ToolOffset | None) -> Iterator[NewEntry]:
+        """Return what is put on record together with the end of the marker."""
+        now = {**marker.details, "value": plain_offset(found)}
+        for kind in self._ends(found):
+            said = {"request": self.request} if kind is EntryKind.WRITE else now
+            yield NewEntry(kind, operation=marker.operation, tool=self.tool, details=said)
+
+    def told_by(self, found: ToolOffset | None) -> str:
+        """Return what the value that was read says about an answer that told nothing."""
+        if self._same(found, self.requested):
+            return tr("Reading tool {tool} back shows that it did run.", tool=self.tool)
+        if self._same(found, self.before):
+            return tr("Reading tool {tool} back shows that it did not run.", tool=self.tool)
+        return tr(
+            "Tool {tool} reads back as {found}.", tool=self.tool, found=describe_offset(found)
+        )
+
+    def _ends(self, found: ToolOffset | None) -> Iterator[EntryKind]:
+        if not self.acknowledged and self._same(found, self.before):
+            yield EntryKind.NOT_APPLIED
+            return
+        yield EntryKind.WRITE
+        yield EntryKind.READ_BACK
+        if not self._same(found, self.requested):
+            yield EntryKind.CONFLICT
+        elif self.acknowledged and not self._link.markers.changing:
+            # A change of several steps says itself, at its end, whether it is done.
+            yield EntryKind.DONE
+
+    def _receipt(self, found: ToolOffset | None, *, skipped: bool = False) -> ToolReceipt:
+        return ToolReceipt(
+            self.tool,
+            self.before,
+            self.requested,
+            found,
+            skipped=skipped,
+            unconditional=self._unconditional,
+        )
+
+    def _read_back_differs(self, found: ToolOffset | None) -> ReadBackError:
+        return ReadBackError(
+            tr(
+                "Tool {tool} was written as {requested}, but reads back as {found}.",
+                tool=self.tool,
+                requested=describe_offset(self.requested),
+                found=describe_offset(found),
+            ),
+            remedy=tr(
+                "Do not run the cell with it. Before the write it held {before}.",
+                before=describe_offset(self.before),
+            ),
+            request=self.request,
+        )

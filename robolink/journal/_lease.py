@@ -1,0 +1,244 @@
+"""One at a time on a controller: a lease with an epoch.
+
+Source: docs/reference/rules.md 6; docs/reference/faults.md F46, F47.
+
+The epoch counts who held the lease. Whoever writes an intent proves in the same transaction
+that the epoch still is his own, so a holder that was frozen and comes back is told, and sends
+nothing. Whether a holder still lives is judged by what is certain first: a process that has
+ended is gone; else he counts as silent when his beats stood still for :data:`LEASE_S`.
+"""
+
+from dataclasses import asdict, dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING, Final
+
+from robolink.errors import LeaseHeldError, LeaseLostError
+from robolink.journal._processes import LeaseHolder
+from robolink.journal._sightings import FREE, LEASE_S, LeaseSighting
+from robolink.journal.store.chain import canonical, storable
+from robolink.messages import tr
+from robolink.model import NewEntry, new_operation
+from robolink.timing import NS_PER_S, Clock, Deadline, wall_label
+
+if TYPE_CHECKING:
+    from robolink.journal.store.lease_rows import LeaseRows
+    from robolink.journal.store.store import Store
+
+BEAT_S: Final = 1.0
+"""A holder gives a sign of life at most this often."""
+
+
+@dataclass(frozen=True, slots=True)
+class Grip:
+    """What came of asking for the lease inside a transaction.
+
+    Attributes:
+        epoch: The epoch under which it is held.
+        entries: What is put on record about it.
+    """
+
+    epoch: int
+    entries: tuple[NewEntry, ...] = ()
+
+
+class Lease:
+    """The lease of one controller, as one log sees it.
+
+    Attributes:
+        controller: Identity of the controller.
+
+    Args:
+        store: The journal's database.
+        controller: Identity of the controller.
+        holder: This process.
+        clock: In which beats are stamped and watched.
+    """
+
+    def __init__(self, store: "Store", controller: str, holder: LeaseHolder, clock: Clock) -> None:
+        self.controller = controller
+        self._store = store
+        self._holder = holder
+        self._clock = clock
+        self._token = new_operation()
+        self._epoch = 0
+        self._beaten_ns = 0
+        self._lost = False
+        self._seen: tuple[LeaseSighting, str] | None = None  # and why its holder may be replaced
+
+    @property
+    def held(self) -> bool:
+        """Whether it is this log's, as far as this log knows."""
+        return self._epoch != 0
+
+    def look(self, *, afresh: bool = True) -> None:
+        """Remember the lease as it is now; one that is held is proved by the next intent.
+
+        Args:
+            afresh: Whether one that was lost may be forgotten.
+
+        Raises:
+            LeaseHeldError: Somebody else holds it and lives.
+            LeaseLostError: It was lost, and that is not to be forgotten.
+            JournalError: It cannot be read.
+        """
+        if self._lost and not afresh:
+            raise self._lost_error()
+        if not self.held:
+            self._seen, self._lost = self._judged(self._sight()), False
+
+    def at_work(self) -> str:
+        """Return who else holds it and lives, in sentences; empty for nobody.
+
+        A holder on another computer is not watched for that, so whether he lives stays open.
+
+        Raises:
+            JournalError: It cannot be read.
+        """
+        seen = self._sight()
+        if seen.token in (FREE, self._token):
+            return ""
+        who = seen.who()
+        if not self._holder.shares_clock_with(who):
+            return seen.at_work(tr("Whether it still works shows when it is watched for a while."))
+        silent_s = max(0, self._clock.now_ns() - seen.beat_ns) / NS_PER_S
+        if silent_s >= LEASE_S or self._holder.proves_gone(who):
+            return ""
+        return seen.at_work(
+            tr("It is alive: its last sign of life is {seconds:.0f} s old.", seconds=silent_s)
+        )
+
+    def prepare(self) -> None:
+        """Look, unless that was done or the lease is held; outside of any transaction."""
+        if not self.held and not self._lost and self._seen is None:
+            self.look()
+
+    def secure(self, rows: "LeaseRows", purpose: str, operator: str) -> Grip:
+        """Prove inside the caller's transaction that the lease is held, or take it.
+
+        Raises:
+            LeaseHeldError: Somebody else took it since it was looked at.
+            LeaseLostError: Somebody else took it from this log, or held it meanwhile.
+        """
+        now_ns = self._clock.now_ns()
+        if self.held and rows.renew(self.controller, self._epoch, self._token, now_ns):
+            self._beaten_ns = now_ns
+            return Grip(self._epoch)
+        if self.held or self._lost or self._seen is None:
+            self._lose()
+            raise self._lost_error()
+        (seen, because), self._seen = self._seen, None
+        claim = self._claim(purpose, operator, now_ns)
+        epoch = rows.take(self.controller, seen, claim)
+        if epoch == 0:
+            now = rows.sight(self.controller)
+            raise self._held_error(now) if now.token != FREE else self._lost_error()
+        self._beaten_ns = now_ns
+        return Grip(epoch, (seen.taken_entry(because),) if because else ())
+
+    def settle(self, grip: Grip) -> None:
+        """Note, after the commit, that the lease is held."""
+        self._epoch = grip.epoch
+
+    def beat(self) -> None:
+        """Give a sign of life if the last one is old enough; a lost lease is only noted.
+
+        Raises:
+            JournalError: It cannot be stored.
+        """
+        now_ns = self._clock.now_ns()
+        if not self.held or now_ns - self._beaten_ns < BEAT_S * NS_PER_S:
+            return
+        self._beaten_ns = now_ns
+        with self._store.write() as tables:
+            kept = tables.leases.renew(self.controller, self._epoch, self._token, now_ns)
+        if not kept:
+            self._lose()
+
+    def release(self, rows: "LeaseRows") -> None:
+        """Free it inside the caller's transaction; one that was lost is left alone."""
+        if self.held:
+            rows.release(self.controller, self._epoch, self._token)
+
+    def forget(self) -> None:
+        """Note, after the commit, that it was freed; what was seen before is of no use now."""
+        self._epoch, self._seen = 0, None
+
+    def end(self, rows: "LeaseRows", reason: str) -> NewEntry | None:
+        """End the lease of whoever has it, inside the caller's transaction.
+
+        Returns:
+            What is put on record; ``None`` when this log holds it itself.
+        """
+        seen = rows.sight(self.controller)
+        if seen.token == self._token:
+            return None
+        rows.end(self.controller)
+        return seen.taken_entry(reason)
+
+    def _judged(self, seen: LeaseSighting) -> tuple[LeaseSighting, str]:
+        """Return a lease that can be taken, and why if it is another's; or raise LeaseHeldError."""
+        if seen.token in (FREE, self._token):
+            return seen, ""
+        who = seen.who()
+        if self._holder.proves_gone(who):
+            return seen, tr("its process has ended")
+        if not self._holder.shares_clock_with(who):
+            seen = self._watched(seen)
+        elif self._clock.now_ns() - seen.beat_ns < LEASE_S * NS_PER_S:
+            raise self._held_error(seen)
+        if seen.token == FREE:
+            return seen, ""
+        return seen, tr("it gave no sign of life for {seconds:.0f} s", seconds=LEASE_S)
+
+    def _watched(self, seen: LeaseSighting) -> LeaseSighting:
+        """Watch a holder whose clock cannot be read here."""
+        deadline = Deadline.after(self._clock, LEASE_S)
+        while not deadline.expired:
+            self._clock.sleep(BEAT_S)
+            now = self._sight()
+            if now.token == FREE:
+                return now
+            if not now.is_like(seen):
+                raise self._held_error(now)
+        return seen
+
+    def _sight(self) -> LeaseSighting:
+        with self._store.read(tr("The command was not sent.")) as tables:
+            return tables.leases.sight(self.controller)
+
+    def _claim(self, purpose: str, operator: str, now_ns: int) -> dict[str, object]:
+        return {
+            "token": self._token,
+            "holder": _holder_text(self._holder, operator or self._holder.operator),
+            "boot": storable(self._holder.boot),
+            "beat_ns": now_ns,
+            "taken_at": wall_label(),
+            "purpose": storable(purpose),
+        }
+
+    def _lose(self) -> None:
+        self._epoch, self._lost = 0, True
+
+    def _held_error(self, seen: LeaseSighting) -> LeaseHeldError:
+        who = seen.who()
+        if self._holder.shares_clock_with(who):
+            silent_s = max(0, self._clock.now_ns() - seen.beat_ns) / NS_PER_S
+            sign = tr("{seconds:.0f} s ago", seconds=silent_s)
+        else:
+            sign = tr("while it was watched just now")
+        return seen.held_error(self.controller, sign)
+
+    def _lost_error(self) -> LeaseLostError:
+        return LeaseLostError(
+            tr("Another took over {controller} meanwhile.", controller=self.controller),
+            remedy=tr(
+                "Nothing was sent. Read the tool again before you write: 'robolink journal list' "
+                "shows who did what."
+            ),
+            controller=self.controller,
+        )
+
+
+@lru_cache(maxsize=64)
+def _holder_text(holder: LeaseHolder, operator: str) -> str:
+    return canonical({**asdict(holder), "operator": operator})

@@ -1,0 +1,334 @@
+"""The journal as the driver of one controller uses it."""
+
+import threading
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager, suppress
+from typing import TYPE_CHECKING, Final
+
+from robolink.errors import JournalError, OutcomeUnknownError
+from robolink.journal._lease import Lease
+from robolink.journal._naming import Names, Naming
+from robolink.journal._processes import BootClock, LeaseHolder, this_process
+from robolink.journal._traces import leave_trace, traces_of
+from robolink.messages import tr
+from robolink.model import EntryKind, Marker, MarkerKind, NewEntry, Recorded, Signature, Who
+from robolink.timing import Clock
+
+if TYPE_CHECKING:
+    from robolink.journal._journal import Journal
+    from robolink.journal.store.store import Store
+
+_BEGINNINGS: Final = {
+    MarkerKind.SET: EntryKind.INTENT,
+    MarkerKind.CHANGE: EntryKind.INTENT,
+    MarkerKind.SELECTION: EntryKind.SELECTION,
+}
+
+
+class JournalOutcomeLog:
+    """Markers, entries and the lease of one controller (:class:`robolink.model.OutcomeLog`).
+
+    Made by :meth:`Journal.log`. Thread-safe.
+
+    Attributes:
+        signature: Who works here, and with what.
+        change: Id of the tool change under way, empty for none; it goes with every entry.
+        durable: Whether what is recorded outlives this process.
+        trouble: ``None``: this record can be kept, as far as is known.
+    """
+
+    trouble: JournalError | None = None
+
+    def __init__(
+        self,
+        journal: "Journal",
+        store: "Store",
+        controller: str,
+        *,
+        signature: Signature,
+        holder: LeaseHolder | None = None,
+        clock: Clock | None = None,
+    ) -> None:
+        self.signature = signature
+        self.change = ""
+        self.durable = store.durable
+        self._journal = journal
+        self._store = store
+        self._lock = threading.RLock()
+        self._naming = Naming(store, controller)
+        self._holder, self._clock = holder or this_process(), clock or BootClock()
+        self._lease = Lease(store, controller, self._holder, self._clock)
+        self._names = Names(controller)
+        self._begun: set[str] = set()
+        self._holds = 0
+        self._sound = False
+        self._has_history = False
+        self._traced = False
+
+    @property
+    def identity(self) -> str:
+        """Who the controller is; it is asked if it was not asked yet.
+
+        Raises:
+            JournalError: The journal cannot be read.
+            TransportError, RemoteProtocolError: The link failed.
+        """
+        return self._named().identity
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Every name under which the controller is on record, its identity first.
+
+        Raises:
+            JournalError, TransportError, RemoteProtocolError: As for :attr:`identity`.
+        """
+        return self._named().all
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What a person should know about who the controller is, once, in sentences."""
+        return self._naming.remarks
+
+    def ask(self, who: Who) -> None:
+        """Let the controller say who it is, at the next use of this log and not before."""
+        with self._lock:
+            self._naming.ask(who)
+
+    def begin(self, marker: Marker) -> None:
+        """Store ``marker`` in one durable transaction that also proves or takes the lease.
+
+        Raises:
+            JournalError: It is not stored. The command must not be sent.
+            LeaseHeldError: Somebody else is changing this controller.
+            LeaseLostError: Somebody else was, since :meth:`look` or since the lease was taken.
+        """
+        with self._lock:
+            name = self._named().identity
+            self._require_sound()
+            self._lease.prepare()
+            with self._store.write(_untouched()) as tables:
+                grip = self._lease.secure(tables.leases, marker.request, self.signature.operator)
+                first = tables.markers.put(name, marker)
+                told = _beginning(marker, first=first)
+                entries = (*grip.entries, *told)
+                tables.entries.append(name, self.signature, self.change, entries)
+            self._begun.add(marker.operation)
+            self._lease.settle(grip)
+            if told and self.durable and not self._traced:
+                # Only beside what is on record: a trace without a record means a lost one.
+                leave_trace(name, self._journal.location)
+                self._traced = True
+
+    def clear(self, operation: str, *entries: NewEntry) -> None:
+        """Forget a marker and record how it ended, in one durable transaction.
+
+        Raises:
+            JournalError: It is not stored; the marker stays.
+            OutcomeUnknownError: Another has settled it meanwhile, so nothing is recorded: what
+                was true here need not be true any more.
+        """
+        with self._lock:
+            name = self._named().identity
+            last = not self._holds and not self._begun - {operation}
+            with self._store.write(_left_open()) as tables:
+                if last:
+                    self._lease.release(tables.leases)
+                known = tables.markers.remove(name, operation)
+                if operation in self._begun and not known:
+                    raise self._settled_by_another()
+                tables.entries.append(name, self.signature, self.change, entries)
+            self._begun.discard(operation)
+            if last:
+                self._lease.forget()
+
+    def append(self, *entries: NewEntry) -> None:
+        """Put something on record, in one durable transaction.
+
+        Raises:
+            JournalError: It is not stored.
+        """
+        name = self._named().identity
+        with self._store.write() as tables:
+            tables.entries.append(name, self.signature, self.change, entries)
+
+    def open_markers(self) -> tuple[Marker, ...]:
+        """Return what is unsettled on this controller, oldest first, whoever began it.
+
+        A journal that knows nothing of a controller which was changed from here before has lost
+        what was unfinished: that is unsettled too.
+
+        Raises:
+            JournalError: It cannot be read.
+        """
+        names = self._named().all
+        traces = traces_of(names) if self.durable and not self._has_history else None
+        with self._store.read() as tables:
+            found = tables.markers.of(*names)
+            if traces is None or found:
+                return found
+            self._has_history = tables.entries.history(names)
+        return () if self._has_history else (traces.marker(self._journal.location),)
+
+    def recorded(
+        self, *, tool: int | None = None, change: str = "", kinds: Collection[EntryKind] = ()
+    ) -> Iterator[Recorded]:
+        """Yield what is on record about this controller, newest first.
+
+        Args:
+            tool: Only entries about this tool.
+            change: Only entries of this tool change.
+            kinds: Only entries of these kinds; empty for all.
+
+        Raises:
+            JournalError: It cannot be read.
+        """
+        return self._journal.entries(
+            controller=self.identity, tool=tool, change=change or None, kinds=kinds
+        )
+
+    def look(self) -> None:
+        """Note the state of the lease; a later :meth:`begin` fails if it changed meanwhile.
+
+        A holder on another computer is watched for as long as :data:`LEASE_S`.
+
+        Raises:
+            LeaseHeldError: Somebody else is changing this controller.
+            LeaseLostError: Somebody else took over what this log began.
+            JournalError: It cannot be read.
+        """
+        with self._lock:
+            self._named()
+            self._require_sound()
+            # While something that it began is open, a lease that was lost stays lost: clearing
+            # up after it is not for this process any more.
+            self._lease.look(afresh=not self._begun)
+
+    def at_work(self) -> str:
+        """Return who else is working on the controller, in sentences; empty for nobody.
+
+        Raises:
+            JournalError: It cannot be read.
+        """
+        with self._lock:
+            self._named()
+            return self._lease.at_work()
+
+    @contextmanager
+    def hold(self, purpose: str) -> Iterator[None]:
+        """Keep the lease for the whole of a block, markers or not.
+
+        Raises:
+            LeaseHeldError: Somebody else is changing this controller.
+            LeaseLostError: Somebody else was, since :meth:`look`.
+            JournalError: It cannot be stored.
+        """
+        with self._lock:
+            name = self._named().identity
+            self._require_sound()
+            self._lease.prepare()
+            with self._store.write(_untouched()) as tables:
+                grip = self._lease.secure(tables.leases, purpose, self.signature.operator)
+                tables.entries.append(name, self.signature, self.change, grip.entries)
+            self._lease.settle(grip)
+            self._holds += 1
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._holds -= 1
+                if not self._holds and not self._begun:
+                    self.close()
+
+    def beat(self) -> None:
+        """Let others see that this process is alive.
+
+        Cheap, and raises nothing: whether the lease was lost, or the journal with it, the next
+        :meth:`begin` says.
+        """
+        with self._lock, suppress(JournalError):
+            self._lease.beat()
+
+    def take_over(self, reason: str) -> None:
+        """End the lease of whoever has it, because a person insists; this is put on record.
+
+        His open markers stay, and block until they are settled.
+
+        Args:
+            reason: Why, in the person's words.
+
+        Raises:
+            JournalError: It is not stored; the lease is as it was.
+            LeaseHeldError: Yet another has taken it at once.
+        """
+        with self._lock:
+            name = self._named().identity
+            with self._store.write(_untouched()) as tables:
+                ended = self._lease.end(tables.leases, reason)
+                entries = () if ended is None else (ended,)
+                tables.entries.append(name, self.signature, self.change, entries)
+            self._lease.look()
+
+    def _named(self) -> Names:
+        with self._lock:
+            if self._begun or self._holds:
+                return self._names  # whoever works on it is not asked in between
+            names = self._naming.known(self.signature)
+            if names.identity != self._lease.controller:
+                self._lease = Lease(self._store, names.identity, self._holder, self._clock)
+            self._names = names
+            return names
+
+    def _require_sound(self) -> None:
+        """Look for damage, once, before the first change: a bent record is no record."""
+        if not self._sound:
+            self._store.require_sound(self._names.all)
+            self._sound = True
+
+    def _settled_by_another(self) -> OutcomeUnknownError:
+        return OutcomeUnknownError(
+            tr("Another settled meanwhile what was begun on {name}.", name=self._names.identity),
+            remedy=tr("Read the tools again: 'robolink journal list' shows who did what."),
+            controller=self._names.identity,
+        )
+
+    def close(self) -> None:
+        """Give the lease up; open markers stay, and block until they are settled.
+
+        A lease that cannot be given up ends by its holder's silence.
+        """
+        with self._lock:
+            if self._lease.held:
+                with suppress(JournalError), self._store.write() as tables:
+                    self._lease.release(tables.leases)
+                self._lease.forget()
+
+
+def _beginning(marker: Marker, *, first: bool) -> tuple[NewEntry, ...]:
+    """Return what is put on record when a marker is stored.
+
+    A write may be tried twice under one operation, and each try counts; the other markers are
+    stored again to keep what has become of them.
+    """
+    kind, tool = _BEGINNINGS.get(marker.kind), marker.details.get("tool")
+    writes = marker.kind is MarkerKind.SET
+    if kind is None or (writes and tool is None) or not (writes or first):
+        return ()
+    return (
+        NewEntry(
+            kind,
+            operation=marker.operation,
+            tool=tool if isinstance(tool, int) else None,
+            details={**marker.details, "request": marker.request},
+        ),
+    )
+
+
+def _untouched() -> str:
+    return tr("The command was not sent.")
+
+
+def _left_open() -> str:
+    return tr(
+        "How the last command ended could not be recorded, so it counts as unfinished: run "
+        "'robolink recover' after that."
+    )

@@ -1,0 +1,126 @@
+"""A lease as somebody sees it."""
+
+import json
+from dataclasses import asdict, dataclass
+from typing import Final
+
+from robolink.errors import LeaseHeldError
+from robolink.journal._processes import LeaseHolder
+from robolink.messages import tr
+from robolink.model import EntryKind, NewEntry
+
+LEASE_S: Final = 10.0
+"""A holder that gave no sign of life for so long may be replaced."""
+
+FREE: Final = ""
+"""The token of a lease that nobody holds."""
+
+
+@dataclass(frozen=True, slots=True)
+class LeaseSighting:
+    """A lease as it was seen.
+
+    Attributes:
+        epoch: How many holders there were; 0 for a lease that never was held.
+        token: Id of the holder, empty when it is free.
+        beat: Counter of the signs of life.
+        beat_ns: The last one, in the holder's time since the start of his system.
+        holder: The holder as JSON.
+        taken_at: Since when, as a label.
+        purpose: What for.
+    """
+
+    epoch: int = 0
+    token: str = FREE
+    beat: int = 0
+    beat_ns: int = 0
+    holder: str = "{}"
+    taken_at: str = ""
+    purpose: str = ""
+
+    def who(self) -> LeaseHolder:
+        """Return the holder, nobody known when the record of him is damaged."""
+        try:
+            return LeaseHolder(**json.loads(self.holder))
+        except (ValueError, TypeError):
+            return LeaseHolder()
+
+    def held_error(self, controller: str, last_sign: str) -> LeaseHeldError:
+        """Return the error that names the holder.
+
+        Args:
+            controller: Whose lease it is.
+            last_sign: When the holder gave its last sign of life, in words.
+        """
+        return LeaseHeldError(
+            tr(
+                "{holder} has had {controller} since {since} for {purpose!r}; last sign of life "
+                "{sign}.",
+                holder=describe(self.who()),
+                controller=controller,
+                since=self.taken_at,
+                purpose=self.purpose,
+                sign=last_sign,
+            ),
+            remedy=tr(
+                "Nothing was sent. Wait until it has finished, or end it; after {seconds:.0f} s "
+                "without a sign of life it may be replaced.",
+                seconds=LEASE_S,
+            ),
+            controller=controller,
+        )
+
+    def at_work(self, alive: str) -> str:
+        """Return the sentences about a holder who is at it.
+
+        Args:
+            alive: Whether he lives, one sentence.
+        """
+        said = tr(
+            "{holder} is at work on this controller since {since}: {purpose}.",
+            holder=describe(self.who()),
+            since=self.taken_at,
+            purpose=self.purpose,
+        )
+        return f"{said} {alive}"
+
+    def taken_entry(self, because: str) -> NewEntry:
+        """Return what is put on record when this lease was ended by another.
+
+        Args:
+            because: Why that could be done, in words.
+        """
+        if self.token == FREE:
+            verdict = tr("The lease was free; {because}.", because=because)
+        else:
+            holder = describe(self.who())
+            verdict = tr(
+                "The lease was taken from {holder}: {because}.", holder=holder, because=because
+            )
+        details = {
+            "epoch": self.epoch + 1,
+            "holder": asdict(self.who()),
+            "since": self.taken_at,
+            "purpose": self.purpose,
+            "reason": because,
+        }
+        return NewEntry(EntryKind.LEASE, verdict=verdict, details=details)
+
+    def is_like(self, other: "LeaseSighting") -> bool:
+        """Whether nothing happened between two sightings."""
+        return (self.epoch, self.token, self.beat) == (other.epoch, other.token, other.beat)
+
+
+def describe(holder: LeaseHolder) -> str:
+    """Return who it is, as a person is told."""
+    if holder == LeaseHolder():
+        return tr("Somebody unknown")
+    process = tr("process {pid} on {host}", pid=holder.pid, host=holder.host)
+    if holder.operator and holder.operator != holder.os_user:
+        return tr(
+            "{operator} ({os_user}, {process})",
+            operator=holder.operator,
+            os_user=holder.os_user,
+            process=process,
+        )
+    return tr("{os_user} ({process})", os_user=holder.os_user or "?", process=process)

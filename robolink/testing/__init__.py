@@ -1,0 +1,32 @@
+"""For whoever drives another kind of controller: what it is held to, and one that lives in memory.
+
+The checks are plain functions; any test framework, or none, can call them. They are the bar for the
+kinds of this package too (``tests/contract/test_controller_contract.py``).
+"""
+
+from typing import TYPE_CHECKING
+
+from robolink.lazy_exports import lazy_exports
+
+if TYPE_CHECKING:
+    from robolink.testing.memory_controller import MemoryController as MemoryController
+    from robolink.testing.memory_controller import MemoryMachine as MemoryMachine
+    from robolink.testing.motion_checks import MOVING_CHECKS as MOVING_CHECKS
+    from robolink.testing.reading_checks import READING_CHECKS as READING_CHECKS
+    from robolink.testing.subject import Check as Check
+    from robolink.testing.subject import ContractBrokenError as ContractBrokenError
+    from robolink.testing.subject import Subject as Subject
+    from robolink.testing.suite import check_controller as check_controller
+    from robolink.testing.tool_checks import WRITING_CHECKS as WRITING_CHECKS
+else:
+    __getattr__ = lazy_exports(
+        __name__,
+        {
+            "memory_controller": "MemoryController MemoryMachine",
+            "motion_checks": "MOVING_CHECKS",
+            "reading_checks": "READING_CHECKS",
+            "subject": "Check ContractBrokenError Subject",
+            "suite": "check_controller",
+            "tool_checks": "WRITING_CHECKS",
+        },
+    )

@@ -1,0 +1,98 @@
+"""Promises about movement: inside the box, for the tool in force, and ended by a stop."""
+
+from dataclasses import replace
+from typing import Final
+
+from robolink.errors import LimitError, NotReadyError, StoppedError
+from robolink.model import Controller, MotionOutcome, MotionProfile, Path, Pose, WorkBox
+from robolink.testing.subject import Check, Subject, refused, require
+
+_SLACK_MM: Final = 0.1
+_TIMEOUT_S: Final = 30.0
+_PROFILE: Final = MotionProfile(Path.STRAIGHT, speed_mm_s=10.0)
+
+
+def a_movement_arrives(subject: Subject) -> None:
+    """And back again; the pose is measured, and names its tool."""
+    with subject.movable() as controller:
+        group = controller.groups[0]
+        start = group.pose()
+        require(start.tool == controller.tools.selected(), "a pose names the tool in force")
+        for target in (_raised(start, subject.step_mm), start):
+            motion = group.move_to(target, _PROFILE, box=_around(start, subject))
+            require(motion.target == target, "a motion says where it goes")
+            outcome = motion.wait(timeout_s=_TIMEOUT_S)
+            require(outcome is MotionOutcome.ARRIVED, "a movement that ends by itself arrives")
+            off_mm = abs(group.pose().z_mm - target.z_mm)
+            require(off_mm < _SLACK_MM, f"it stands where it was sent: {off_mm:.3f} mm off")
+        require(not controller.outcomes.open_markers(), "nothing is left open")
+
+
+def nothing_moves_out_of_the_box(subject: Subject) -> None:
+    """Whoever sends it there made a mistake."""
+    with subject.movable() as controller:
+        group = controller.groups[0]
+        start = group.pose()
+        with refused(LimitError, "a target outside of the box is refused"):
+            far = _raised(start, 10 * subject.step_mm)
+            group.move_to(far, _PROFILE, box=_around(start, subject))
+        _stands(controller, start)
+
+
+def a_target_counts_for_its_own_tool(subject: Subject) -> None:
+    """The same numbers mean another place for another tool."""
+    with subject.movable() as controller:
+        group = controller.groups[0]
+        start = group.pose()
+        other = replace(start, tool=15 if start.tool != 15 else 14)
+        with refused(NotReadyError, "a target for a tool that is not in force is refused"):
+            group.move_to(other, _PROFILE, box=_around(start, subject))
+        _stands(controller, start)
+
+
+def a_preview_of_a_movement_moves_nothing(subject: Subject) -> None:
+    """It says what would be sent."""
+    with subject.movable() as controller:
+        group = controller.groups[0]
+        start = group.pose()
+        requests = group.requests_for(_raised(start, subject.step_mm), _PROFILE)
+        require(requests and all(requests), "requests_for() says what would be sent")
+        _stands(controller, start)
+
+
+def a_stop_ends_a_movement(subject: Subject) -> None:
+    """Whoever waits on it is told, and the next one is held back."""
+    with subject.movable() as controller:
+        group = controller.groups[0]
+        start = group.pose()
+        box = _around(start, subject)
+        motion = group.move_to(_raised(start, subject.step_mm), _PROFILE, box=box)
+        controller.stop()
+        with refused(StoppedError, "who waits on a movement that is stopped gets StoppedError"):
+            motion.wait(timeout_s=_TIMEOUT_S)
+        with refused(StoppedError, "after a stop nothing moves"):
+            group.move_to(start, _PROFILE, box=box)
+
+
+def _raised(pose: Pose, by_mm: float) -> Pose:
+    return replace(pose, z_mm=pose.z_mm + by_mm)
+
+
+def _around(pose: Pose, subject: Subject) -> WorkBox:
+    reach_mm = 2 * subject.step_mm
+    return WorkBox.around(pose, xy_mm=reach_mm, below_mm=reach_mm, above_mm=reach_mm)
+
+
+def _stands(controller: Controller, start: Pose) -> None:
+    off_mm = abs(controller.groups[0].pose().z_mm - start.z_mm)
+    require(off_mm < _SLACK_MM, f"nothing has moved: {off_mm:.3f} mm off")
+
+
+MOVING_CHECKS: Final[tuple[Check, ...]] = (
+    a_movement_arrives,
+    nothing_moves_out_of_the_box,
+    a_target_counts_for_its_own_tool,
+    a_preview_of_a_movement_moves_nothing,
+    a_stop_ends_a_movement,
+)
+"""They move the robot, a step up and down again."""

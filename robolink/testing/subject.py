@@ -1,0 +1,91 @@
+"""What a check is given, and how it says that a promise is broken."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+
+from robolink.errors import RobolinkError
+from robolink.model import Controller
+
+
+class ContractBrokenError(AssertionError):
+    """A controller does not keep a promise that every kind of controller makes."""
+
+
+@dataclass(frozen=True, slots=True)
+class Subject:
+    """The controller that is looked at.
+
+    Attributes:
+        connect: Connects anew; called once or twice by each check, which closes what it opened.
+        tool: A tool that may be written and cleared; it holds what it held at the end.
+        prepare: Brings a fresh connection to where it may move: motors on, for example.
+        step_mm: How far the checks that move go up and down again.
+    """
+
+    connect: Callable[[], Controller]
+    tool: int = 1
+    prepare: Callable[[Controller], None] = lambda _controller: None
+    step_mm: float = 1.0
+
+    @contextmanager
+    def kept(self) -> Iterator[Controller]:
+        """Connect for a block, and put back the tool and what is selected at its end."""
+        with self.connect() as controller:
+            tools = controller.tools
+            before, selected = tools.read(self.tool), tools.selected()
+            try:
+                yield controller
+            finally:
+                controller.release_stop()
+                now = tools.read(self.tool)
+                if before is not None:
+                    tools.write(self.tool, before, expected=now)
+                if selected is not None and tools.selected() != selected:
+                    tools.select(selected)
+                if before is None and now is not None:
+                    tools.clear(self.tool, expected=now, then_select=selected or 0)
+
+    @contextmanager
+    def movable(self) -> Iterator[Controller]:
+        """Connect for a block in which the robot may be moved."""
+        with self.connect() as controller:
+            self.prepare(controller)
+            try:
+                yield controller
+            finally:
+                if controller.latch.closed:
+                    controller.release_stop()
+                    # A held stop, or motors that went off, must not meet the next check.
+                    with suppress(RobolinkError):
+                        controller.reset_fault()
+
+
+Check = Callable[[Subject], None]
+"""One promise; raises :class:`ContractBrokenError` where it is broken."""
+
+
+def require(kept: object, promise: str) -> None:
+    """Say that a promise is broken unless it is kept.
+
+    Raises:
+        ContractBrokenError: It is not.
+    """
+    if not kept:
+        raise ContractBrokenError(promise)
+
+
+@contextmanager
+def refused(kind: type[RobolinkError], promise: str) -> Iterator[None]:
+    """Surround what has to be refused by an error of one kind.
+
+    Raises:
+        ContractBrokenError: It was not, or by another error.
+    """
+    try:
+        yield
+    except kind:
+        return
+    except RobolinkError as error:
+        raise ContractBrokenError(f"{promise}: {type(error).__name__} instead: {error}") from error
+    raise ContractBrokenError(f"{promise}: {kind.__name__} was not raised")

@@ -1,0 +1,211 @@
+"""Promises about writing: compared, sent once, read back, held back by a stop."""
+
+import threading
+from contextlib import suppress
+from dataclasses import replace
+from typing import Final
+
+from robolink.errors import (
+    BusyError,
+    OutcomeUnknownError,
+    RejectedError,
+    ReservedToolError,
+    RobolinkError,
+    SelectedToolError,
+    StoppedError,
+    ToolChangedError,
+    ToolError,
+    UndefinedToolError,
+)
+from robolink.model import ANY, Controller, MarkerKind, ToolOffset
+from robolink.testing.subject import Check, Subject, refused, require
+
+
+def a_write_is_read_back(subject: Subject) -> None:
+    """The receipt holds what was there, what was asked for, and what is there now."""
+    with subject.kept() as controller:
+        tools, before = controller.tools, controller.tools.read(subject.tool)
+        wanted = _another(before)
+        receipt = tools.write(subject.tool, wanted, expected=before)
+        require(not receipt.skipped, "a new value is written")
+        require(tools.same(receipt.before, before), "the receipt holds the old value")
+        require(tools.same(receipt.read_back, wanted), "the receipt holds what was read back")
+        require(tools.same(tools.read(subject.tool), wanted), "the new value is there")
+        require(not controller.outcomes.open_markers(), "nothing is left open")
+
+
+def what_is_there_already_is_not_written_again(subject: Subject) -> None:
+    """A write wears the memory of a controller."""
+    with subject.kept() as controller:
+        value = _another(controller.tools.read(subject.tool))
+        controller.tools.write(subject.tool, value, expected=ANY)
+        again = controller.tools.write(subject.tool, value, expected=_another(value))
+        require(again.skipped, "an equal value is skipped, whatever was expected")
+        previewed = controller.tools.preview_write(subject.tool, value)
+        require(previewed == (), "and nothing would be sent for it")
+
+
+def an_unexpected_value_is_left_alone(subject: Subject) -> None:
+    """Somebody else changed it meanwhile: he must not be overwritten."""
+    with subject.kept() as controller:
+        tools = controller.tools
+        there = _another(tools.read(subject.tool))
+        tools.write(subject.tool, there, expected=ANY)
+        believed, wanted = _another(there), _another(_another(there))
+        with refused(ToolChangedError, "another value than expected is not overwritten"):
+            tools.write(subject.tool, wanted, expected=believed)
+        require(tools.same(tools.read(subject.tool), there), "it is still there")
+
+
+def the_flange_is_never_written(subject: Subject) -> None:
+    """Tool 0 is no tool."""
+    with subject.connect() as controller:
+        with refused(ReservedToolError, "tool 0 is not written"):
+            controller.tools.write(0, ToolOffset(1.0), expected=ANY)
+        with refused(ReservedToolError, "tool 0 is not cleared"):
+            controller.tools.clear(0, expected=ANY)
+
+
+def a_preview_changes_nothing(subject: Subject) -> None:
+    """It says what would be sent, and sends none of it."""
+    with subject.kept() as controller:
+        before = controller.tools.read(subject.tool)
+        requests = controller.tools.preview_write(subject.tool, _another(before))
+        require(requests and all(requests), "a preview says what would be sent")
+        unchanged = controller.tools.same(controller.tools.read(subject.tool), before)
+        require(unchanged, "a preview changes nothing")
+
+
+def a_cleared_tool_is_undefined(subject: Subject) -> None:
+    """Where a kind cannot forget a tool, it says so and changes nothing."""
+    with subject.kept() as controller:
+        tools = controller.tools
+        value = _another(tools.read(subject.tool))
+        tools.write(subject.tool, value, expected=ANY)
+        try:
+            tools.clear(subject.tool, expected=value, then_select=0)
+        except (ToolError, RejectedError):
+            require(tools.same(tools.read(subject.tool), value), "a refused clear changes nothing")
+            return
+        require(tools.read(subject.tool) is None, "a cleared tool reads as undefined")
+        receipt = tools.write(subject.tool, value, expected=None)
+        require(receipt.before is None, "undefined is a legal expectation")
+
+
+def a_selection_is_read_back(subject: Subject) -> None:
+    """A tool in force keeps its definition, and only a defined one comes into force."""
+    with subject.kept() as controller:
+        tools = controller.tools
+        value = _another(tools.read(subject.tool))
+        tools.write(subject.tool, value, expected=ANY)
+        try:
+            tools.select(subject.tool)
+            require(tools.selected() == subject.tool, "the selection is read back")
+            with refused(SelectedToolError, "the tool in force is not cleared"):
+                tools.clear(subject.tool, expected=value)
+            tools.select(0)
+        except RejectedError:
+            return  # the machine alone selects, and said so
+        with suppress(ToolError):
+            tools.clear(subject.tool, expected=value)
+        if tools.read(subject.tool) is None:
+            with refused(UndefinedToolError, "an undefined tool is not selected"):
+                tools.select(subject.tool)
+
+
+def what_was_selected_is_put_back(subject: Subject) -> None:
+    """Whatever ends a procedure: the next program must find the tool that it was taught with."""
+    with subject.kept() as controller:
+        tools, before = controller.tools, controller.tools.selected()
+        if before is None:
+            return
+        tools.write(subject.tool, _another(tools.read(subject.tool)), expected=ANY)
+        with suppress(_OursError), controller.preserved("a check"):
+            with suppress(RejectedError):  # where the machine alone selects
+                tools.select(0 if before else subject.tool)
+            raise _OursError
+        require(tools.selected() == before, "the tool of before is selected again")
+        require(not controller.outcomes.open_markers(), "and nothing is left open")
+
+
+def one_procedure_at_a_time(subject: Subject) -> None:
+    """A second thread is told at once that it has to wait."""
+    with subject.kept() as controller:
+        ends: list[BaseException | None] = []
+        before = controller.tools.read(subject.tool)
+        other = threading.Thread(target=_write, args=(controller, subject.tool, before, ends))
+        with controller.preserved("a check"):
+            other.start()
+            other.join()
+        require(isinstance(ends[0], BusyError), "a second procedure is refused with BusyError")
+
+
+def what_is_unsettled_blocks(subject: Subject) -> None:
+    """A killed process raised no exception: its marker stops the next one."""
+    with subject.connect() as first:
+        marker = first.begin(MarkerKind.CHANGE, "a check", {"tools": {}, "change": "a check"})
+    with subject.connect() as second:
+        found = {one.operation for one in second.outcomes.open_markers()}
+        if marker.operation in found:  # else the record is kept with the connection only
+            try:
+                with refused(OutcomeUnknownError, "what is unsettled blocks"):
+                    second.require_settled("the next command")
+            finally:
+                second.finish(marker)
+            second.require_settled("the next command")
+
+
+def a_stop_holds_writes_back(subject: Subject) -> None:
+    """Stopped means stopped, until a person says otherwise."""
+    with subject.kept() as controller:
+        tools, before = controller.tools, controller.tools.read(subject.tool)
+        wanted = _another(before)
+        with suppress(RobolinkError):  # a machine that cannot be stopped from here says so
+            controller.stop()
+        require(controller.latch.closed, "stop() closes the latch, whatever becomes of it")
+        with refused(StoppedError, "after a stop nothing is written"):
+            tools.write(subject.tool, wanted, expected=before)
+        require(tools.same(tools.read(subject.tool), before), "the old value is still there")
+        controller.release_stop()
+        with suppress(RobolinkError):  # there may be nothing to reset
+            controller.reset_fault()
+        tools.write(subject.tool, wanted, expected=before)
+
+
+def _another(value: ToolOffset | None) -> ToolOffset:
+    """Return an offset that no controller takes for the same."""
+    return ToolOffset(10.0, 20.0, 30.0) if value is None else replace(value, x_mm=value.x_mm + 0.5)
+
+
+def _write(
+    controller: Controller,
+    tool: int,
+    before: ToolOffset | None,
+    ends: list[BaseException | None],
+) -> None:
+    try:
+        controller.tools.write(tool, _another(before), expected=before)
+    except RobolinkError as error:
+        ends.append(error)
+    else:
+        ends.append(None)
+
+
+class _OursError(Exception):
+    """Ends a procedure early."""
+
+
+WRITING_CHECKS: Final[tuple[Check, ...]] = (
+    a_write_is_read_back,
+    what_is_there_already_is_not_written_again,
+    an_unexpected_value_is_left_alone,
+    the_flange_is_never_written,
+    a_preview_changes_nothing,
+    a_cleared_tool_is_undefined,
+    a_selection_is_read_back,
+    what_was_selected_is_put_back,
+    one_procedure_at_a_time,
+    what_is_unsettled_blocks,
+    a_stop_holds_writes_back,
+)
+"""They write one tool, and put it back."""

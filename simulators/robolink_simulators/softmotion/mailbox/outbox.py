@@ -1,0 +1,134 @@
+"""What the mailbox program gives out: the response block and the tool slots (docs/mailbox.md)."""
+
+from dataclasses import replace
+
+from robolink.protocols.mailbox import (
+    DEVICE,
+    DEVICE_WORDS,
+    RESPONSE,
+    SLOT,
+    SLOTS,
+    Bits,
+    CommandState,
+    ErrorClass,
+    GroupState,
+    Response,
+    WordOrder,
+    Words,
+    encode_device_id,
+    encode_response,
+    encode_slot,
+)
+from robolink_simulators.softmotion.group.axis_group import AxisGroup
+from robolink_simulators.softmotion.kinematics.coordinates import CoordRef, CoordSystem
+from robolink_simulators.softmotion.mailbox.commands.tools import ToolDesk
+from robolink_simulators.softmotion.mailbox.program import MailboxProgram
+from robolink_simulators.softmotion.mailbox.retained import RetainedMemory
+from robolink_simulators.softmotion.mailbox.words.image import arranged
+from robolink_simulators.softmotion.mailbox.words.units import UserUnits
+
+
+class Outbox:
+    """Composes the words that clients read.
+
+    Args:
+        group: The axis group.
+        memory: The retained variables.
+        tools: Knows slot and kinematics.
+        units: Of the mailbox.
+        order: How the program lays values of several words.
+        identified: Whether it gives out the PLC's own number.
+    """
+
+    def __init__(
+        self,
+        group: AxisGroup,
+        memory: RetainedMemory,
+        tools: ToolDesk,
+        units: UserUnits,
+        *,
+        order: WordOrder,
+        identified: bool,
+    ) -> None:
+        self._group = group
+        self._memory = memory
+        self._tools = tools
+        self._units = units
+        self._order = order
+        self._identified = identified
+
+    def words(self, program: MailboxProgram, heartbeat: int) -> Words:
+        """Return response, slots and device block, one behind the other."""
+        response = self.response(program, heartbeat)
+        slots = (word for number in SLOTS for word in self.slot(number))
+        return (*response, *slots, *self.device())
+
+    def response(self, program: MailboxProgram, heartbeat: int) -> Words:
+        """Return the response block."""
+        told = replace(
+            self._without_position(program, heartbeat),
+            tcp=self._units.given(
+                CoordRef(*self._group.read_actual_position(CoordSystem.MCS).values)
+            ),
+            axes=self._units.given_axes(self._group.values, self._group.kinematics.kinds),
+        )
+        return arranged(RESPONSE, encode_response(told), self._order)
+
+    def beginning(self, program: MailboxProgram, heartbeat: int) -> Words:
+        """Return the words before the position: of these clients ask all the time."""
+        told = encode_response(self._without_position(program, heartbeat))
+        return arranged(RESPONSE, told, self._order)[: RESPONSE.at("tcp").start]
+
+    def slot(self, number: int) -> Words:
+        """Return a tool slot."""
+        return arranged(SLOT, encode_slot(self._memory.slot(number)), self._order)
+
+    def device(self) -> Words:
+        """Return the device block; zeros where the program has none."""
+        if not self._identified:
+            return (0,) * DEVICE_WORDS
+        return arranged(DEVICE, encode_device_id(self._memory.device_id), self._order)
+
+    def _without_position(self, program: MailboxProgram, heartbeat: int) -> Response:
+        group, jobs = self._group, program.jobs
+        job = jobs.acknowledged
+        return Response(
+            ack_head=job.command.sequence if job else 0,
+            state=job.state if job else CommandState.EMPTY,
+            error_class=job.error_class if job else ErrorClass.NONE,
+            raw_error=(job.raw if job else 0) or self._group_error(),
+            opcode_echo=job.command.opcode if job else 0,
+            group_state=GroupState(group.state.value),
+            bits=self._bits(program),
+            plc_heartbeat=heartbeat,
+            boot_id=self._memory.boot_id,
+            tool_slot=self._tools.selected,
+            answer=program.answer,
+            kinematics=self._tools.kinematics_code,
+            axis_count=len(group.kinematics.kinds),
+            capabilities=program.capabilities,
+            unit_um=self._units.unit_um,
+            rejected=program.inbox.rejected,
+            active_movement=jobs.active_movement,
+            queue_length=len(jobs.movements),
+            finished=jobs.ends,
+            ack_owner=job.command.owner if job else 0,
+        )
+
+    def _group_error(self) -> int:
+        error = self._group.status().error
+        return error.number if error else 0
+
+    def _bits(self, program: MailboxProgram) -> Bits:
+        status, job = self._group.status(), program.jobs.acknowledged
+        shown = {
+            Bits.POWERED: status.powered,
+            Bits.TOOL_KNOWN: self._tools.tool_known,
+            Bits.BUSY: job is not None and not job.state.final,
+            Bits.JOGGING: status.jogging,
+            Bits.SIMULATED: True,
+            Bits.OWNED: program.ownership.holder != 0,
+            Bits.INTERRUPTED: status.interrupted_movement != 0,
+            Bits.PERMITTED: program.permitted,
+        }
+        return Bits(sum(bit.value for bit, on in shown.items() if on))

@@ -30,6 +30,31 @@ def one_of(values: Iterable[str]) -> str:
     return tr("must be one of {values}", values=", ".join(f'"{value}"' for value in values))
 
 
+def more_than(limit: object) -> str:
+    """Return what to say about a number that is not large enough."""
+    return tr("must be more than {limit:g}", limit=limit)
+
+
+def at_least(limit: object) -> str:
+    """Return what to say about a number that is too small."""
+    return tr("must be at least {limit:g}", limit=limit)
+
+
+def at_most(limit: object) -> str:
+    """Return what to say about a number that is too large."""
+    return tr("must be at most {limit:g}", limit=limit)
+
+
+def holds_at_least(count: object) -> str:
+    """Return what to say about a list that is too short."""
+    return tr("must hold at least {count}", count=count)
+
+
+def holds_at_most(count: object) -> str:
+    """Return what to say about a list that is too long."""
+    return tr("must hold at most {count}", count=count)
+
+
 def sentence(detail: Any) -> str:  # noqa: ANN401 - pydantic's own form
     """Return what to say about a value that pydantic objects to.
 
@@ -39,15 +64,15 @@ def sentence(detail: Any) -> str:  # noqa: ANN401 - pydantic's own form
     limits = detail.get("ctx", {})
     match detail["type"]:
         case "greater_than":
-            return tr("must be more than {limit:g}", limit=limits["gt"])
+            return more_than(limits["gt"])
         case "greater_than_equal":
-            return tr("must be at least {limit:g}", limit=limits["ge"])
+            return at_least(limits["ge"])
         case "less_than_equal":
-            return tr("must be at most {limit:g}", limit=limits["le"])
+            return at_most(limits["le"])
         case "too_short":
-            return tr("must hold at least {count}", count=limits["min_length"])
+            return holds_at_least(limits["min_length"])
         case "too_long":
-            return tr("must hold at most {count}", count=limits["max_length"])
+            return holds_at_most(limits["max_length"])
         case "string_too_long":
             return tr("must be at most {count} characters long", count=limits["max_length"])
         case "literal_error":

@@ -1,4 +1,4 @@
-"""What a limit says about a proposal."""
+"""What was measured, next to what is stored, what limits say of it, and what became of it."""
 
 import math
 from collections.abc import Mapping

@@ -4,8 +4,8 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
+from robolink.recipe._method_tables import MethodTable
 from robolink.recipe._recipe import Basis, HeightRule
-from robolink.recipe._sources import AnySource
 from robolink.recipe._tables import (
     Box,
     Output,
@@ -30,7 +30,7 @@ class Draft:
     basis: Basis | None = None
     z: HeightRule | None = None
     verify: bool | None = None
-    source: AnySource | None = None
+    source: MethodTable | None = None
     station: Station | None = None
     poses: Poses | None = None
     tools: tuple[Tool, ...] | None = None

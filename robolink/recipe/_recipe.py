@@ -4,7 +4,8 @@ from typing import Annotated, Literal, TypeVar
 
 from pydantic import ConfigDict, Field, ValidationInfo, field_validator
 
-from robolink.recipe._sources import Source
+from robolink.methods import method_names
+from robolink.recipe._method_tables import AnyKind, MethodTable
 from robolink.recipe._tables import (
     Box,
     Line,
@@ -46,7 +47,7 @@ class Recipe(Table):
     verify: bool | None = None
     """Whether the robot turns about the new tip after the write. It does so wherever it moves
     unless this is false."""
-    source: Source
+    source: Annotated[MethodTable, AnyKind()]
     """Where the measurements come from."""
     station: Station
     """Where it is measured."""
@@ -70,7 +71,7 @@ class Recipe(Table):
     @property
     def verifies(self) -> bool:
         """Whether the new tips are proved by turning about them."""
-        return self.source.moves and self.verify is not False
+        return self.source.of_method.needs.motion and self.verify is not False
 
     @property
     def attempts(self) -> int:
@@ -84,3 +85,15 @@ class Recipe(Table):
         if isinstance(info.context, dict):
             info.context[info.field_name] = value
         return value
+
+
+_made_for: tuple[str, ...] = method_names()
+
+
+def recipe_of_all_methods() -> type[Recipe]:
+    """Return the recipe, made anew when there are other methods than before."""
+    global _made_for  # noqa: PLW0603 - one registry of methods, one recipe
+    if method_names() != _made_for:
+        Recipe.model_rebuild(force=True)
+        _made_for = method_names()
+    return Recipe

@@ -70,7 +70,7 @@ def require_permit(now: Response, *, controller: str, request: str) -> None:
 
 
 def require_beats(whole_look_s: float, *, controller: str, request: str) -> None:
-    """Hold back what must be kept going on a line that is too slow for it (design part 7).
+    """Hold back what must be kept going on a line that is too slow for it (docs/mailbox.md).
 
     Args:
         whole_look_s: How long a look at the response block and a beat take on the line.

@@ -96,7 +96,8 @@ def lay_out() -> None:
         shutil.copy(file, PAGES)
     api = PAGES / "api"
     api.mkdir()
-    listed = ["API", "===", "", "What each package hands out.", "", ".. toctree::", ""]
+    listed = ["API", "===", "", "What each package hands out.", "", ".. toctree::"]
+    listed += ["   :maxdepth: 1", ""]
     found = packages()
     for package, things in found.items():
         names = {

@@ -5,7 +5,7 @@ from itertools import count
 
 import pytest
 from robolink_cli import main
-from robolink_cli.prompts import consent
+from robolink_cli.prompts import questions
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.in_process.epson import register, unregister
 
@@ -217,8 +217,8 @@ def test_a_person_who_says_no_leaves_everything_as_it_was(run, simulator, golden
     def say_no(question):
         raise DeclinedError(question)
 
-    monkeypatch.setattr(consent, "on_terminal", lambda: True)
-    monkeypatch.setattr(consent, "_require_yes", say_no)
+    monkeypatch.setattr(questions, "on_terminal", lambda: True)
+    monkeypatch.setattr(questions, "require_yes", say_no)
     simulator.machine.tools.set(1, ToolOffset(99))
     code, out, err = run("restore", golden)
     assert (code, "99.000" in out, "Write this" in err) == (9, True, True)

@@ -8,8 +8,8 @@ from typing import Any
 import click
 import pytest
 from robolink_cli import main
-from robolink_cli.session.context import open_controller
-from robolink_cli.session.warnings import marker_notice, note_unsettled
+from robolink_cli.access.warnings import marker_notice, note_unsettled
+from robolink_cli.session.opening import open_controller
 
 import robolink
 from robolink.errors import NotReadyError, NotReadyReason

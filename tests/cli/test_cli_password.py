@@ -3,7 +3,7 @@
 import sys
 
 import pytest
-from robolink_cli.session import password as _password
+from robolink_cli.access import password as _password
 
 from robolink import errors
 

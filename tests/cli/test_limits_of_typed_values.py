@@ -4,8 +4,9 @@ import json
 
 import pytest
 from robolink_cli import main
-from robolink_cli.prompts import consent, jumps
+from robolink_cli.prompts import jumps
 from robolink_cli.prompts import operator as _operator
+from robolink_cli.prompts import questions as consent
 
 from robolink.model import ToolOffset
 from robolink.transaction import Jump

@@ -2,7 +2,9 @@
 
 import pytest
 from robolink_cli import main
-from robolink_cli.prompts import consent, operator, restore_offer
+from robolink_cli.prompts import operator
+from robolink_cli.prompts import questions as consent
+from robolink_cli.session import restore_offer
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.in_process.epson import register, unregister
 

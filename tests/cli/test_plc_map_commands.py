@@ -148,7 +148,7 @@ def test_on_a_terminal_the_person_is_asked_and_may_leave(shown, serve, monkeypat
         def poll(self, wait_s):
             return self.answers.pop(0)
 
-    monkeypatch.setattr("robolink_cli.prompts.consent.on_terminal", lambda: True)
+    monkeypatch.setattr("robolink_cli.prompts.questions.on_terminal", lambda: True)
     for answers, code in (([None, "-5.44", "q"], 9), (["-5.44", None, "-75.07\n"], 0)):
         person = Person(*answers)
         monkeypatch.setattr("robolink_cli.prompts.operator.terminal", lambda person=person: person)

@@ -13,8 +13,8 @@ from types import SimpleNamespace
 import click
 import pytest
 from robolink_cli import entry, main
-from robolink_cli.prompts import consent
 from robolink_cli.prompts import operator as _operator
+from robolink_cli.prompts import questions as consent
 from robolink_cli.stopping.request import FLAGS, VALUES, StopRequest, read_stop
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator

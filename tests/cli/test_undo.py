@@ -4,7 +4,7 @@ import json
 
 import pytest
 from robolink_cli import main
-from robolink_cli.prompts import consent
+from robolink_cli.prompts import questions as consent
 
 from robolink.journal import open_journal
 from robolink.model import EntryKind, ToolOffset

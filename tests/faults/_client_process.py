@@ -20,7 +20,7 @@ _FORKS.set_forkserver_preload(
         "robolink_cli.calibrate",
         "robolink_cli.calibrate.two_pose",
         "robolink_cli.calibrate._live",
-        "robolink_cli.session.password",
+        "robolink_cli.access.password",
         "robolink.transport.stream.tcp",
         "robolink.transport.modbus.opening",
         "robolink.journal.store.store",

@@ -19,6 +19,7 @@ from robolink.nozzle_change import (
 )
 from robolink.procedures import MeasurementContext, PoseMethod
 from robolink.transaction import earlier_corrections
+from robolink_cli.access.warnings import note_change
 from robolink_cli.calibrate._frame import Frame
 from robolink_cli.calibrate._listener import CalibrationListener
 from robolink_cli.calibrate._pins import remark_on_pin
@@ -26,11 +27,11 @@ from robolink_cli.console.render import note, say
 from robolink_cli.options.impact import impact_payload, show_impact
 from robolink_cli.options.pose_source import PoseSource
 from robolink_cli.options.report import ReportDraft, reporting
-from robolink_cli.prompts.consent import agree, on_terminal
 from robolink_cli.prompts.operator import terminal
-from robolink_cli.session.context import CliContext, open_controller
+from robolink_cli.prompts.questions import agree, on_terminal
+from robolink_cli.session.context import CliContext
 from robolink_cli.session.first_backup import back_up_first
-from robolink_cli.session.warnings import note_change
+from robolink_cli.session.opening import open_controller
 from robolink_cli.views.calibration import doubts, judged_payload, report_payload
 
 

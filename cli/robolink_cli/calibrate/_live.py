@@ -16,16 +16,16 @@ from robolink.nozzle_change import (
 )
 from robolink.procedures import TipSource
 from robolink.transaction import earlier_corrections
+from robolink_cli.access.warnings import note_change
 from robolink_cli.calibrate._frame import Frame
 from robolink_cli.calibrate._listener import CalibrationListener
 from robolink_cli.calibrate._pins import remark_on_pin
 from robolink_cli.options.impact import ImpactRequest, impact_payload, show_impact
 from robolink_cli.options.report import ReportDraft, reporting
-from robolink_cli.prompts.consent import agree_to_motion, motion_question
 from robolink_cli.prompts.operator import operator_at
-from robolink_cli.session.context import open_controller
 from robolink_cli.session.first_backup import back_up_first
-from robolink_cli.session.warnings import note_change
+from robolink_cli.session.motion_consent import agree_to_motion, motion_question
+from robolink_cli.session.opening import open_controller
 from robolink_cli.views.calibration import (
     doubts,
     report_payload,

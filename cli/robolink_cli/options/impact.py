@@ -9,9 +9,9 @@ import click
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink_cli.access.capabilities import points_of
 from robolink_cli.console.render import say, table
 from robolink_cli.options.pose_source import point_numbers
-from robolink_cli.session.capabilities import points_of
 
 if TYPE_CHECKING:
     from robolink.calibration import Impact

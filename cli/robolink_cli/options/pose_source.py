@@ -73,7 +73,7 @@ class PoseSource:
         """
         from robolink.methods import taught_poses
         from robolink.pose_files import read_poses
-        from robolink_cli.session.capabilities import points_of
+        from robolink_cli.access.capabilities import points_of
 
         if self.kind == "points":
             return taught_poses(points_of(controller), self.points)

@@ -7,9 +7,9 @@ import click
 from click.core import ParameterSource
 
 from robolink.messages import tr
+from robolink_cli.access.cell import complete_cell
 from robolink_cli.console.render import switch_json_on
 from robolink_cli.options.line import LINE
-from robolink_cli.session.cell import complete_cell
 
 CommandT = TypeVar("CommandT", bound=Callable[..., Any])
 

@@ -12,7 +12,7 @@ import click
 from robolink.errors import DeclinedError
 from robolink.messages import tr
 from robolink_cli.console.render import json_is_on
-from robolink_cli.prompts.consent import asked, on_terminal
+from robolink_cli.prompts.questions import asked, on_terminal
 
 if TYPE_CHECKING:
     from robolink.config import Cell

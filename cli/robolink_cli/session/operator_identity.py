@@ -70,7 +70,7 @@ def signature_of(operator: str | None, cell: "Expected | None", *, changes: bool
 
 
 def _asked_for_badge() -> str:
-    from robolink_cli.prompts.consent import asked_for_text, on_terminal
+    from robolink_cli.prompts.questions import asked_for_text, on_terminal
 
     if json_is_on() or not on_terminal():
         return ""

@@ -58,7 +58,7 @@ def heed_selection(controller: "Controller", cell: "Expected | None", *, yes: bo
         DeclinedError: The answer was no, or nobody could be asked.
     """
     from robolink_cli.console.render import json_is_on
-    from robolink_cli.prompts.consent import asked, on_terminal
+    from robolink_cli.prompts.questions import asked, on_terminal
 
     if controller.outcomes.open_markers():
         return  # which block it, and say more

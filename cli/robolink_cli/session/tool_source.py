@@ -4,7 +4,7 @@ from robolink.backup import ToolState, read_tools
 from robolink.errors import ConfigError, NotReadyError
 from robolink.messages import tr
 from robolink.model import Controller
-from robolink_cli.session.capabilities import require_epson
+from robolink_cli.access.capabilities import require_epson
 
 
 def find_tools(controller: Controller, *, published: bool) -> ToolState:

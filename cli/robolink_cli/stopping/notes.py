@@ -10,7 +10,6 @@ from robolink_cli.console.render import note
 
 if TYPE_CHECKING:
     from robolink.model import Controller
-    from robolink_cli.session.context import CliContext
     from robolink_cli.stopping.request import StopRequest
 
 
@@ -27,7 +26,7 @@ def heed_stop(url: str, controller: "Controller", *, yes: bool) -> None:
             nobody had stopped, or there is no terminal.
         DeclinedError: The answer was no.
     """
-    from robolink_cli.prompts.consent import asked, on_terminal
+    from robolink_cli.prompts.questions import asked, on_terminal
 
     keys, name = far_end_of(url), own_name_of(controller)
     found = find_note(keys, name)
@@ -48,14 +47,14 @@ def heed_stop(url: str, controller: "Controller", *, yes: bool) -> None:
     _clear(keys, name)
 
 
-def forget_stop(context: "CliContext", name: str) -> None:
+def forget_stop(url: str, name: str) -> None:
     """Take the note away after a reset, which a person asked for.
 
     Args:
-        context: How the controller was reached.
+        url: How the controller was reached.
         name: Its own name (:func:`own_name_of`).
     """
-    _clear(far_end_of(context.require_url()), name)
+    _clear(far_end_of(url), name)
 
 
 def own_name_of(controller: "Controller") -> str:
@@ -88,7 +87,7 @@ def release_stop(request: "StopRequest", *, yes: bool) -> dict[str, object]:
         ConfigError: No controller is named, or the note cannot be taken away.
         DeclinedError: The answer was no.
     """
-    from robolink_cli.prompts.consent import agree
+    from robolink_cli.prompts.questions import agree
 
     url = url_of(request)
     keys, name = far_end_of(url), last_known(url)
@@ -106,7 +105,7 @@ def url_of(request: "StopRequest") -> str:
     Raises:
         ConfigError: No controller is named, or no cell file has it.
     """
-    from robolink_cli.session.cell import is_cell_name
+    from robolink_cli.access.cell import is_cell_name
 
     if not request.named:
         raise ConfigError(

@@ -114,7 +114,7 @@ class Telling:
     def _recorded(self) -> list[str]:
         if not self._request.record:
             return []
-        from robolink_cli.session.recording import recording
+        from robolink_cli.access.recording import recording
 
         try:
             with recording(self._request.record, _shown(self._outcome.url)) as trace:
@@ -138,7 +138,7 @@ class Telling:
             open_now = log.open_markers()
         except JournalError as error:
             return [error.what]
-        from robolink_cli.session.warnings import marker_notice, note_at_work
+        from robolink_cli.access.warnings import marker_notice, note_at_work
 
         if open_now and note_at_work(log, self._request.named):
             return []

@@ -200,7 +200,7 @@ def _passwords(outcome: StopOutcome, file: str, variable: str) -> Iterator[str]:
     if not outcome.url.startswith("epson+"):
         yield ""
         return
-    from robolink_cli.session.password import from_keyring, from_places
+    from robolink_cli.access.password import from_keyring, from_places
 
     try:
         near = from_places(file or None, variable or None)

@@ -7,8 +7,8 @@ from typing import Any
 from robolink.config import Cell, check_file, config_files, load_cells
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink_cli.access.cell import link_options
 from robolink_cli.console.render import say
-from robolink_cli.session.cell import link_options
 from robolink_cli.session.context import CliContext, origin_of
 
 

@@ -175,8 +175,8 @@ def _asked(controller: "PlcMapController", values: "MapValues") -> list[str]:
         DeclinedError: Nobody can be asked, or the person does not answer.
     """
     from robolink.runner import POLL_S, Question
-    from robolink_cli.prompts.consent import on_terminal
     from robolink_cli.prompts.operator import terminal
+    from robolink_cli.prompts.questions import on_terminal
 
     wanted = values.to_compare()
     if not on_terminal():

@@ -5,8 +5,10 @@ from pathlib import Path
 import click
 
 from robolink.messages import tr
-from robolink_cli.prompts.consent import agree, dry_run_option, published_option, yes_option
-from robolink_cli.session.context import CliContext, controller_options, open_controller
+from robolink_cli.options.consent import dry_run_option, published_option, yes_option
+from robolink_cli.prompts.questions import agree
+from robolink_cli.session.context import CliContext, controller_options
+from robolink_cli.session.opening import open_controller
 
 _FILE = click.Path(dir_okay=False, path_type=Path)
 

@@ -7,10 +7,12 @@ import click
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink_cli.access.capabilities import io_of, require_epson
 from robolink_cli.console.render import say
-from robolink_cli.prompts.consent import agree, dry_run_option, yes_option
-from robolink_cli.session.capabilities import io_of, require_epson
-from robolink_cli.session.context import CliContext, controller_options, open_controller
+from robolink_cli.options.consent import dry_run_option, yes_option
+from robolink_cli.prompts.questions import agree
+from robolink_cli.session.context import CliContext, controller_options
+from robolink_cli.session.opening import open_controller
 
 if TYPE_CHECKING:
     from robolink.model import Controller

@@ -7,14 +7,11 @@ import click
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink_cli.prompts.consent import (
-    agree_to_motion,
-    dry_run_option,
-    motion_question,
-    yes_option,
-)
-from robolink_cli.session.cell import with_cell_limits
-from robolink_cli.session.context import CliContext, controller_options, open_controller
+from robolink_cli.access.cell import with_cell_limits
+from robolink_cli.options.consent import dry_run_option, yes_option
+from robolink_cli.session.context import CliContext, controller_options
+from robolink_cli.session.motion_consent import agree_to_motion, motion_question
+from robolink_cli.session.opening import open_controller
 
 if TYPE_CHECKING:
     from robolink_cli.prompts.keyboard import Keyboard

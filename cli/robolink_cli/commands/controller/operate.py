@@ -6,26 +6,22 @@ import click
 
 from robolink.messages import tr
 from robolink.model import Act
+from robolink_cli.access.capabilities import preferences_of, require_epson, require_softmotion
 from robolink_cli.console.render import note, say
+from robolink_cli.options.consent import dry_run_option, yes_option
 from robolink_cli.options.shared import shared_options
-from robolink_cli.prompts.consent import (
-    agree,
-    agree_to_motion,
-    dry_run_option,
-    on_terminal,
-    yes_option,
-)
-from robolink_cli.session.capabilities import preferences_of, require_epson, require_softmotion
+from robolink_cli.prompts.questions import agree, on_terminal
 from robolink_cli.session.context import (
     CliContext,
     calming_options,
     controller_options,
     emit,
     looking_options,
-    open_controller,
     show_requests,
     stop_request,
 )
+from robolink_cli.session.motion_consent import agree_to_motion
+from robolink_cli.session.opening import open_controller
 from robolink_cli.stopping.notes import forget_stop, own_name_of
 
 if TYPE_CHECKING:
@@ -126,7 +122,7 @@ def reset(context: CliContext, dry_run: bool, yes: bool) -> None:
         controller.reset_fault()
         state = controller.status().state
         name = own_name_of(controller)
-    forget_stop(context, name)
+    forget_stop(context.require_url(), name)
     payload: dict[str, object] = {"state": state}
     context.emit(
         "reset",

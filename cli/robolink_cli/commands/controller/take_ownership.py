@@ -6,10 +6,12 @@ import click
 
 from robolink.errors import DeclinedError, LeaseHeldError
 from robolink.messages import tr
+from robolink_cli.access.capabilities import require_softmotion
 from robolink_cli.console.render import say
-from robolink_cli.prompts.consent import agree, dry_run_option, on_terminal, yes_option
-from robolink_cli.session.capabilities import require_softmotion
-from robolink_cli.session.context import CliContext, controller_options, open_controller
+from robolink_cli.options.consent import dry_run_option, yes_option
+from robolink_cli.prompts.questions import agree, on_terminal
+from robolink_cli.session.context import CliContext, controller_options
+from robolink_cli.session.opening import open_controller
 
 if TYPE_CHECKING:
     from robolink.controllers.softmotion import SoftMotionController

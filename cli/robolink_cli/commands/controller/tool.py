@@ -6,17 +6,18 @@ import click
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink_cli.access.warnings import note_change
 from robolink_cli.console.render import note, say
-from robolink_cli.prompts.consent import (
-    agree,
+from robolink_cli.options.consent import (
     dry_run_option,
     published_option,
     then_select_option,
     yes_option,
 )
 from robolink_cli.prompts.jumps import Allowed, accept_jump, accept_jump_options, allowed_by
-from robolink_cli.session.context import CliContext, controller_options, open_controller
-from robolink_cli.session.warnings import note_change
+from robolink_cli.prompts.questions import agree
+from robolink_cli.session.context import CliContext, controller_options
+from robolink_cli.session.opening import open_controller
 
 
 @click.group()
@@ -80,7 +81,7 @@ def get(context: CliContext, number: int | None, mode: str | None) -> None:
 def _get_by_mode(context: CliContext, mode: str) -> None:
     """Show what the PLC's own reading block says about the tool in force."""
     from robolink.protocols.mailbox import ReadMode
-    from robolink_cli.session.capabilities import require_softmotion
+    from robolink_cli.access.capabilities import require_softmotion
     from robolink_cli.views.documents import offset_payload
     from robolink_cli.views.tables import show_offset
 

@@ -7,8 +7,10 @@ import click
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_cli.console.render import say
-from robolink_cli.prompts.consent import agree, dry_run_option, yes_option
-from robolink_cli.session.context import CliContext, controller_options, open_controller
+from robolink_cli.options.consent import dry_run_option, yes_option
+from robolink_cli.prompts.questions import agree
+from robolink_cli.session.context import CliContext, controller_options
+from robolink_cli.session.opening import open_controller
 
 if TYPE_CHECKING:
     from robolink.controllers.epson import EpsonVariables
@@ -19,7 +21,7 @@ _TYPES = ("Boolean", "Byte", "Double", "Integer", "Long", "Real", "String")
 
 def variables_of(controller: "Controller") -> "EpsonVariables":
     """Return the project's variables; only EPSON controllers have them."""
-    from robolink_cli.session.capabilities import require_epson
+    from robolink_cli.access.capabilities import require_epson
 
     return require_epson(controller, tr("project variables")).variables
 

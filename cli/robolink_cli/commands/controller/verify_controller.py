@@ -8,9 +8,10 @@ import click
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink_cli.access.recording import recording
 from robolink_cli.console.render import say, table
-from robolink_cli.session.context import CliContext, controller_options, password_of
-from robolink_cli.session.recording import recording
+from robolink_cli.session.context import CliContext, controller_options
+from robolink_cli.session.opening import password_of
 
 if TYPE_CHECKING:
     from robolink.controllers.epson.verify import Fact, Verification

@@ -7,13 +7,15 @@ from robolink.messages import tr
 from robolink.model import Controller
 from robolink.nozzle_change import ChangeReport, preview
 from robolink.recipe import Answers, LoadedRecipe, RecipeRun, require_answers
+from robolink_cli.access.capabilities import io_of
 from robolink_cli.commands.measure.recipe_events import EventStream, Progress
 from robolink_cli.console.render import note, say
-from robolink_cli.prompts.consent import agree_to_motion, asked, motion_question, on_terminal
 from robolink_cli.prompts.operator import operator_at
-from robolink_cli.session.capabilities import io_of
-from robolink_cli.session.context import CliContext, open_controller
+from robolink_cli.prompts.questions import asked, on_terminal
+from robolink_cli.session.context import CliContext
 from robolink_cli.session.first_backup import back_up_first
+from robolink_cli.session.motion_consent import agree_to_motion, motion_question
+from robolink_cli.session.opening import open_controller
 from robolink_cli.views.calibration import report_payload, show_report
 from robolink_cli.views.planned_steps import steps_payload
 

@@ -3,7 +3,7 @@
 import click
 
 from robolink.messages import tr
-from robolink_cli.prompts.consent import dry_run_option, yes_option
+from robolink_cli.options.consent import dry_run_option, yes_option
 from robolink_cli.session.context import CliContext, controller_options
 
 

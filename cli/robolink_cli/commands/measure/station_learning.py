@@ -8,9 +8,10 @@ from robolink.nozzle_change import Limits, flange_now, foresee, require_inside
 from robolink.procedures import MeasurementContext
 from robolink.stations import Found, Station, StationKind, find_stations, station_entry
 from robolink_cli.console.render import note, table
-from robolink_cli.prompts.consent import agree_to_motion, motion_question
 from robolink_cli.prompts.operator import operator_at
-from robolink_cli.session.context import CliContext, open_controller
+from robolink_cli.session.context import CliContext
+from robolink_cli.session.motion_consent import agree_to_motion, motion_question
+from robolink_cli.session.opening import open_controller
 from robolink_cli.views.calibration import show_plan
 from robolink_cli.views.documents import number
 from robolink_cli.views.planned_steps import steps_payload

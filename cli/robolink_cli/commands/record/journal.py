@@ -10,6 +10,7 @@ import click
 
 from robolink.messages import tr
 from robolink.model import EntryKind
+from robolink_cli.access.cell import complete_cell
 from robolink_cli.commands.record.journal_lookup import (
     controller_meant,
     entries_named,
@@ -18,7 +19,6 @@ from robolink_cli.commands.record.journal_lookup import (
 )
 from robolink_cli.console.render import emit_json, json_is_on, say
 from robolink_cli.options.shared import json_option
-from robolink_cli.session.cell import complete_cell
 
 if TYPE_CHECKING:
     from robolink.journal import Journal

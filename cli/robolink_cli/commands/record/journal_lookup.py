@@ -8,8 +8,8 @@ import click
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.transaction import id_of_change
+from robolink_cli.access.cell import is_cell_name
 from robolink_cli.options.shared import GIVEN
-from robolink_cli.session.cell import is_cell_name
 
 if TYPE_CHECKING:
     from robolink.journal import Journal

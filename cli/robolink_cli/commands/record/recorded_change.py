@@ -14,7 +14,8 @@ from robolink.report import Report, reports_of
 from robolink.transaction import id_of_change
 from robolink_cli.commands.record.journal_lookup import controller_meant, entries_of_change
 from robolink_cli.options.impact import ImpactRequest, judge
-from robolink_cli.session.context import CliContext, open_controller
+from robolink_cli.session.context import CliContext
+from robolink_cli.session.opening import open_controller
 
 _OF_A_CHANGE = (
     EntryKind.CALIBRATION,

@@ -4,8 +4,10 @@ import click
 
 from robolink.transaction import Recovery
 from robolink_cli.commands.record.recovery_guide import Guide, show_end
-from robolink_cli.prompts.consent import dry_run_option, on_terminal, yes_option
-from robolink_cli.session.context import CliContext, controller_options, emit, open_controller
+from robolink_cli.options.consent import dry_run_option, yes_option
+from robolink_cli.prompts.questions import on_terminal
+from robolink_cli.session.context import CliContext, controller_options, emit
+from robolink_cli.session.opening import open_controller
 from robolink_cli.views.documents import finding_payload
 
 

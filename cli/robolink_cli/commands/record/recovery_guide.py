@@ -8,7 +8,7 @@ from robolink.messages import tr
 from robolink.model import Controller, Finding, MarkerKind, Pose
 from robolink.transaction import Recovery, Settler, look, recover
 from robolink_cli.console.render import json_is_on, note, say
-from robolink_cli.prompts.consent import agree, asked, on_terminal
+from robolink_cli.prompts.questions import agree, asked, on_terminal
 from robolink_cli.views.documents import finding_payload, pose_payload
 
 DECLINED: Final = 9

@@ -4,14 +4,10 @@ import click
 
 from robolink.errors import ConfigError, DeclinedError
 from robolink.messages import tr
-from robolink_cli.prompts.consent import (
-    agree,
-    dry_run_option,
-    on_terminal,
-    then_select_option,
-    yes_option,
-)
-from robolink_cli.session.context import CliContext, controller_options, open_controller
+from robolink_cli.options.consent import dry_run_option, then_select_option, yes_option
+from robolink_cli.prompts.questions import agree, on_terminal
+from robolink_cli.session.context import CliContext, controller_options
+from robolink_cli.session.opening import open_controller
 
 
 @click.command()

@@ -7,7 +7,7 @@ from robolink.errors import ControllerError
 from robolink.messages import tr
 from robolink.model import Controller, Marker, MarkerKind
 from robolink_cli.console.render import json_is_on, note
-from robolink_cli.prompts.consent import asked, on_terminal
+from robolink_cli.prompts.questions import asked, on_terminal
 
 
 def offer_to_restore(controller: Controller, markers: Iterable[Marker]) -> None:

@@ -1,0 +1,46 @@
+"""Options that answer a question beforehand, or say that nothing is to be changed."""
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import click
+
+from robolink.messages import tr
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def dry_run_option(function: F) -> F:
+    """Add ``--dry-run``."""
+    return click.option(
+        "--dry-run",
+        is_flag=True,
+        help="Show the exact requests and check the limits; read only, write nothing.",
+    )(function)
+
+
+def yes_option(function: F) -> F:
+    """Add ``--yes``."""
+    return click.option("--yes", is_flag=True, help="Answer yes to the question asked.")(function)
+
+
+def then_select_option(function: F) -> F:
+    """Add ``--then-select``."""
+    return click.option(
+        "--then-select",
+        type=click.IntRange(0, 15),
+        metavar="NUMBER",
+        help=tr(
+            "The tool that the machine is to have selected in place of one that is selected and "
+            "loses its definition; 0 is the flange."
+        ),
+    )(function)
+
+
+def published_option(function: F) -> F:
+    """Add ``--published``."""
+    return click.option(
+        "--published",
+        is_flag=True,
+        help="The tools as the companion program published them; works while production runs.",
+    )(function)

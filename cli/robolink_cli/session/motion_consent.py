@@ -1,0 +1,72 @@
+"""Asking before the robot moves: who stopped it, which tool is selected, is the cell clear?"""
+
+from typing import TYPE_CHECKING, Final
+
+import click
+
+from robolink.errors import DeclinedError
+from robolink.messages import tr
+from robolink_cli.prompts import questions
+from robolink_cli.prompts.questions import WATCHED
+from robolink_cli.session.selected_tool import heed_selection
+from robolink_cli.stopping.notes import heed_stop
+
+if TYPE_CHECKING:
+    from robolink.model import Controller
+
+CELL: Final = "robolink.cell"
+"""Where the cell is found that was named, ``None`` for none."""
+
+REACHED: Final = "robolink.reached"
+"""Where it is found by which URL that controller was reached."""
+
+
+def agree_to_motion(question: str, *, yes: bool, in_tool: bool = True) -> None:
+    """Ask before the robot moves; without a terminal only ``--yes`` is consent.
+
+    Args:
+        question: What will happen.
+        yes: Whether the answer was given beforehand.
+        in_tool: Whether it matters which tool is selected.
+
+    Raises:
+        StoppedError: Somebody stopped this controller, and nobody has released it since.
+        DeclinedError: The answer was no, or nobody could be asked; or the selected tool may be
+            a wrong one.
+    """
+    meta = click.get_current_context().meta
+    if REACHED in meta:
+        heed_stop(meta[REACHED], meta[WATCHED], yes=yes)
+    if in_tool and WATCHED in meta:
+        heed_selection(meta[WATCHED], meta.get(CELL), yes=yes)
+    if yes:
+        return
+    if not questions.on_terminal():
+        raise DeclinedError(
+            tr("The robot would move, and nobody can be asked here."),
+            remedy=tr("Run it on a terminal, or give --yes when the cell is clear."),
+        )
+    questions.require_yes(question)
+
+
+def motion_question(
+    controller: "Controller", purpose: str, *, speed_mm_s: float, box_mm: float
+) -> str:
+    """Return the question before something moves: what, how fast, how far, what for.
+
+    Raises:
+        NotReadyError: Nothing can move now, for example because the motors are off; nobody is
+            asked then.
+    """
+    group = controller.groups[0]
+    group.require_able(purpose)
+    terms = group.terms()
+    return tr(
+        "{who} will move at most {speed:g} mm/s fast, within {box:g} mm, {purpose}. {watch} "
+        "Is the cell clear?",
+        who=terms.who,
+        speed=speed_mm_s,
+        box=box_mm,
+        purpose=purpose,
+        watch=terms.watch,
+    )

@@ -29,7 +29,8 @@ METHOD = Method(
         "Find an up-looking camera and the tip together: X and Y, scale, turn and mirror.\n\n"
         "Say to the command, or in the cell file, where the camera looks to within its field of "
         "view. The tip goes to four corners of the image and turns in its middle. What was found "
-        "is kept on record under the name of the station; a camera that is not as it was is refused."
+        "is kept on record under the name of the station; a camera that is not as it was is "
+        "refused."
     ),
     parameters=CameraAffineParameters,
     measures=("x_mm", "y_mm"),

@@ -128,7 +128,7 @@ def test_writing_the_selected_slot_moves_the_tip_and_not_the_robot(cell, control
 def test_the_selected_slot_is_not_cleared(cell, controller):
     with pytest.raises(SelectedToolError, match="Tool 1 is selected") as refusal:
         controller.tools.clear(1, expected=ANY)
-    assert "--then-select" in refusal.value.remedy
+    assert "then_select=NUMBER" in refusal.value.remedy
     assert cell.commands == []
 
 

@@ -13,11 +13,11 @@ from hashlib import sha256
 from pathlib import Path
 
 from robolink.config._files import config_files, read_document
-from robolink.durable_files import file_name, make_folder, state_folder, write_whole
 from robolink.errors import ConfigError
+from robolink.files.durable import file_name, make_folder, state_folder, write_whole
+from robolink.files.named import read_named
 from robolink.messages import tr
 from robolink.model import Role
-from robolink.named_files import read_named
 
 _KIND = "cells"
 

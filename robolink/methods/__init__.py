@@ -72,7 +72,6 @@ if TYPE_CHECKING:
     from robolink.methods.pivot.tilts import informative_tilts as informative_tilts
     from robolink.methods.pivot.tilts import proving_tilts as proving_tilts
     from robolink.methods.points.parameters import PointsParameters as PointsParameters
-    from robolink.methods.points.source import PointReader as PointReader
     from robolink.methods.points.source import PointsSource as PointsSource
     from robolink.methods.points.source import PosesFound as PosesFound
     from robolink.methods.points.source import taught_poses as taught_poses
@@ -133,7 +132,7 @@ __getattr__ = lazy_exports(
         "pivot.source": "PivotSource PivotTouches",
         "pivot.tilts": "OverPin Tilt informative_tilts proving_tilts",
         "points.parameters": "PointsParameters",
-        "points.source": "PointReader PointsSource PosesFound taught_poses",
+        "points.source": "PointsSource PosesFound taught_poses",
         "registry": "METHODS_GROUP all_methods find_method method_names register",
         "site": "Site",
         "six_point.parameters": "SixPointParameters",

@@ -4,8 +4,8 @@ from enum import StrEnum
 
 from robolink.errors import NotAllowedError
 from robolink.messages import tr
-from robolink.model._journal_entries import EntryKind, NewEntry
-from robolink.model._outcomes import OutcomeLog
+from robolink.model.record.journal_entries import EntryKind, NewEntry
+from robolink.model.record.outcomes import OutcomeLog
 from robolink.ways import Way, way
 
 

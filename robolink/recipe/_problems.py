@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from robolink.key_problems import is_not_known, one_of, sentence
+from robolink.files.key_problems import is_not_known, one_of, sentence
+from robolink.files.toml import Problem
 from robolink.messages import tr
 from robolink.recipe._schema import json_schema
-from robolink.toml_files import Problem
 
 if TYPE_CHECKING:
     from pydantic import ValidationError

@@ -38,7 +38,7 @@ class ServedRequest(Protocol):
     def advance(self, now_ns: int) -> None:
         """Let simulated time reach ``now_ns``."""
 
-    def take(self, link: "EpsonLink", event: Request | BadRequest) -> None:
+    def take(self, link: "EpsonServerLink", event: Request | BadRequest) -> None:
         """Deal with a request."""
 
     def leaving(self, exchange: PendingRequest, reply: bytes) -> Sequence[Departure]:
@@ -47,11 +47,11 @@ class ServedRequest(Protocol):
     def announce(self, exchange: PendingRequest, reply: bytes) -> None:
         """Tell whoever watches that a reply is about to leave."""
 
-    def forget(self, link: "EpsonLink") -> None:
+    def forget(self, link: "EpsonServerLink") -> None:
         """The connection is over."""
 
 
-class EpsonLink:
+class EpsonServerLink:
     """Implements :class:`~robolink_simulators.hosting.seam.DeviceLink`.
 
     A client that has not logged in within the login time-out is cut off, and so is one that

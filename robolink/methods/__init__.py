@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from robolink.methods.declaration import Pair as Pair
     from robolink.methods.declaration import PoseHelp as PoseHelp
     from robolink.methods.declaration import Unit as Unit
-    from robolink.methods.fields import Field as Field
+    from robolink.methods.fields import ParameterField as ParameterField
     from robolink.methods.fields import fields_of as fields_of
     from robolink.methods.look_parameters import LookParameters as LookParameters
     from robolink.methods.n_angle.parameters import NAngleParameters as NAngleParameters
@@ -115,7 +115,7 @@ __getattr__ = lazy_exports(
             "Angle AnyMethod Check DEGREES Former Help InputNumber Length "
             "MM MM_S Method MethodParameters Needs Option Pair PoseHelp Unit"
         ),
-        "fields": "Field fields_of",
+        "fields": "ParameterField fields_of",
         "look_parameters": "LookParameters",
         "n_angle.parameters": "NAngleParameters most_informative_order",
         "n_angle.procedure": "measure_n_angle",

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from robolink.model._optional_parts import ValueReceipt as ValueReceipt
     from robolink.model._optional_parts import ValueT as ValueT
     from robolink.model._optional_parts import VariableTable as VariableTable
-    from robolink.model._people import Role as Role
+    from robolink.model._people import PersonRole as PersonRole
     from robolink.model._people import require_engineer as require_engineer
     from robolink.model._secret import Secret as Secret
     from robolink.model._tools import ANY as ANY
@@ -83,7 +83,7 @@ else:
                 "AlarmList DigitalIo PointReader Value ValueReceipt ValueT VariableTable"
             ),
             "record.outcomes": "Marker MarkerKind OutcomeLog new_operation",
-            "_people": "Role require_engineer",
+            "_people": "PersonRole require_engineer",
             "_secret": "Secret",
             "record.standing_words": "describe_standing",
             "motion.tip_sensor": "Spot SpotUnit TIP TipSensor",

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from robolink.methods.declaration import Pair as Pair
     from robolink.methods.declaration import PoseHelp as PoseHelp
     from robolink.methods.declaration import Unit as Unit
-    from robolink.methods.fields import Field as Field
+    from robolink.methods.fields import ParameterField as ParameterField
     from robolink.methods.fields import fields_of as fields_of
     from robolink.methods.look_parameters import LookParameters as LookParameters
     from robolink.methods.n_angle.parameters import NAngleParameters as NAngleParameters
@@ -72,7 +72,6 @@ if TYPE_CHECKING:
     from robolink.methods.pivot.tilts import informative_tilts as informative_tilts
     from robolink.methods.pivot.tilts import proving_tilts as proving_tilts
     from robolink.methods.points.parameters import PointsParameters as PointsParameters
-    from robolink.methods.points.source import PointReader as PointReader
     from robolink.methods.points.source import PointsSource as PointsSource
     from robolink.methods.points.source import PosesFound as PosesFound
     from robolink.methods.points.source import taught_poses as taught_poses
@@ -116,7 +115,7 @@ __getattr__ = lazy_exports(
             "Angle AnyMethod Check DEGREES Former Help InputNumber Length "
             "MM MM_S Method MethodParameters Needs Option Pair PoseHelp Unit"
         ),
-        "fields": "Field fields_of",
+        "fields": "ParameterField fields_of",
         "look_parameters": "LookParameters",
         "n_angle.parameters": "NAngleParameters most_informative_order",
         "n_angle.procedure": "measure_n_angle",
@@ -133,7 +132,7 @@ __getattr__ = lazy_exports(
         "pivot.source": "PivotSource PivotTouches",
         "pivot.tilts": "OverPin Tilt informative_tilts proving_tilts",
         "points.parameters": "PointsParameters",
-        "points.source": "PointReader PointsSource PosesFound taught_poses",
+        "points.source": "PointsSource PosesFound taught_poses",
         "registry": "METHODS_GROUP all_methods find_method method_names register",
         "site": "Site",
         "six_point.parameters": "SixPointParameters",

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Generic, TypeVar
 
 from annotated_types import Ge, Le
 
+from robolink.files.toml import Problem
 from robolink.stations import StationKind
-from robolink.toml_files import Problem
 
 if TYPE_CHECKING:
     from robolink.methods.site import Site

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 
 from annotated_types import Ge, Gt, Le, Len, MaxLen, MinLen
 
-from robolink.key_problems import at_least, at_most, holds_at_least, holds_at_most, more_than
+from robolink.files.key_problems import at_least, at_most, holds_at_least, holds_at_most, more_than
 from robolink.methods.declaration import Help, Option, Unit
 
 _NOTES = "__annotations__"
@@ -16,7 +16,7 @@ _UNITS = ("_mm_s", "_mm_per_px", "_mm", "_deg")
 
 
 @dataclass(frozen=True, slots=True)
-class Field:
+class ParameterField:
     """One parameter.
 
     Attributes:
@@ -53,10 +53,10 @@ class Field:
         return not self.option.from_recipe
 
 
-_read: dict[type[Any], tuple[Field, ...]] = {}
+_read: dict[type[Any], tuple[ParameterField, ...]] = {}
 
 
-def fields_of(parameters: type[Any]) -> tuple[Field, ...]:
+def fields_of(parameters: type[Any]) -> tuple[ParameterField, ...]:
     """Return the parameters of a method, its own before those that it shares with others.
 
     Args:
@@ -70,7 +70,7 @@ def fields_of(parameters: type[Any]) -> tuple[Field, ...]:
     return _read[parameters]
 
 
-def _field(one: "dataclasses.Field[Any]", hint: object) -> Field:
+def _field(one: "dataclasses.Field[Any]", hint: object) -> ParameterField:
     kind, metadata = bare(hint)
 
     def said(wanted: type[Any]) -> Any:  # noqa: ANN401 - the annotation's own
@@ -78,7 +78,7 @@ def _field(one: "dataclasses.Field[Any]", hint: object) -> Field:
 
     explained, unit = said(Help), said(Unit)
     assert explained is not None, one.name  # noqa: S101 - a declaration without help is a mistake
-    return Field(
+    return ParameterField(
         one.name,
         kind,
         tuple(item for item in metadata if not isinstance(item, (Help, Unit, Option))),

@@ -8,6 +8,7 @@ from annotated_types import Ge, Le, MaxLen, MinLen
 
 from robolink.calibration import MIN_ROTATION_DEG, CameraModel, angle_spread_deg
 from robolink.errors import ConfigError
+from robolink.files.toml import Problem
 from robolink.messages import tr
 from robolink.methods.declaration import (
     DEGREES,
@@ -22,7 +23,6 @@ from robolink.methods.declaration import (
 )
 from robolink.methods.pin_parameters import lift_beyond_box
 from robolink.procedures import HALF_ROUND_DEG, LookPlan
-from robolink.toml_files import Problem
 from robolink.ways import Way, way
 
 if TYPE_CHECKING:

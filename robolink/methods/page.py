@@ -9,7 +9,7 @@ from typing import Final, Literal, get_args, get_origin
 from annotated_types import Ge, Gt, Le, Len, MaxLen, MinLen
 
 from robolink.methods.declaration import AnyMethod
-from robolink.methods.fields import Field, bare, fields_of
+from robolink.methods.fields import ParameterField, bare, fields_of
 from robolink.methods.registry import all_methods
 
 _OPENING: Final = """\
@@ -65,7 +65,7 @@ def _needs(method: AnyMethod) -> str:
     return f"Measures {measured}{told}. Needs {what}."
 
 
-def _row(method: AnyMethod, field: Field) -> str:
+def _row(method: AnyMethod, field: ParameterField) -> str:
     option = f"`{field.option.flag or field.flag}`" if method.command else ""
     if field.option.metavar and option:
         # A bar would end the cell.
@@ -75,7 +75,7 @@ def _row(method: AnyMethod, field: Field) -> str:
     return "| " + " | ".join(cells) + " |"
 
 
-def _default(field: Field) -> str:
+def _default(field: ParameterField) -> str:
     own = field.option.default_or(field.default)
     if own != field.default:
         return f"{_shown(own)}; in a recipe {_shown(field.default)}"
@@ -90,7 +90,7 @@ def _shown(value: object) -> str:
     return f"{value:g}" if isinstance(value, (int, float)) else f'`"{value}"`'
 
 
-def _limits(field: Field) -> str:
+def _limits(field: ParameterField) -> str:
     if get_origin(field.kind) is Literal:
         return ", ".join(f'`"{choice}"`' for choice in get_args(field.kind))
     if get_origin(field.kind) is not tuple:
@@ -100,7 +100,7 @@ def _limits(field: Field) -> str:
     return ", each ".join(filter(None, (_count(field), each)))
 
 
-def _count(field: Field) -> str:
+def _count(field: ParameterField) -> str:
     arguments = get_args(field.kind)
     if arguments[1:] != (Ellipsis,):
         return str(len(arguments))

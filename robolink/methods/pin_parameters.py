@@ -6,10 +6,10 @@ from typing import Annotated
 
 from annotated_types import Ge, Le
 
+from robolink.files.toml import Problem
 from robolink.messages import tr
 from robolink.methods.declaration import MM, Check, Help, MethodParameters
 from robolink.procedures import TouchPlan
-from robolink.toml_files import Problem
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     from robolink.recipe._tables import Output as Output
     from robolink.recipe._tables import Poses as Poses
     from robolink.recipe._tables import Prompt as Prompt
-    from robolink.recipe._tables import Refusal as Refusal
+    from robolink.recipe._tables import RefusalTable as RefusalTable
     from robolink.recipe._tables import Speeds as Speeds
-    from robolink.recipe._tables import Station as Station
+    from robolink.recipe._tables import StationTable as StationTable
     from robolink.recipe._tables import Tolerances as Tolerances
     from robolink.recipe._tables import Tool as Tool
 
@@ -46,9 +46,9 @@ _LOADED_LATER = {
     "Output": "_tables",
     "Poses": "_tables",
     "Prompt": "_tables",
-    "Refusal": "_tables",
+    "RefusalTable": "_tables",
     "Speeds": "_tables",
-    "Station": "_tables",
+    "StationTable": "_tables",
     "Tolerances": "_tables",
     "Tool": "_tables",
 }

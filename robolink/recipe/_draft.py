@@ -11,8 +11,8 @@ from robolink.recipe._tables import (
     Output,
     Poses,
     Prompt,
-    Refusal,
-    Station,
+    RefusalTable,
+    StationTable,
     Tolerances,
     Tool,
 )
@@ -31,12 +31,12 @@ class Draft:
     z: HeightRule | None = None
     verify: bool | None = None
     source: MethodTable | None = None
-    station: Station | None = None
+    station: StationTable | None = None
     poses: Poses | None = None
     tools: tuple[Tool, ...] | None = None
     box: Box | None = None
     tolerances: Tolerances | None = None
-    refusal: Refusal | None = None
+    refusal: RefusalTable | None = None
     prompts: tuple[Prompt, ...] | None = None
     outputs: tuple[Output, ...] | None = None
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from robolink.files.toml import FileKind, Problem
 from robolink.messages import tr
-from robolink.toml_files import FileKind, Problem
 
 if TYPE_CHECKING:
     from robolink.recipe._recipe import Recipe

@@ -13,9 +13,9 @@ from robolink.recipe._tables import (
     Output,
     Poses,
     Prompt,
-    Refusal,
+    RefusalTable,
     Speeds,
-    Station,
+    StationTable,
     Table,
     Tolerances,
     Tool,
@@ -49,7 +49,7 @@ class Recipe(Table):
     unless this is false."""
     source: Annotated[MethodTable, AnyKind()]
     """Where the measurements come from."""
-    station: Station
+    station: StationTable
     """Where it is measured."""
     poses: Poses = Field(default_factory=Poses)
     """Poses of the whole change."""
@@ -61,7 +61,7 @@ class Recipe(Table):
     """How far the flange may go from where it is when the recipe starts."""
     tolerances: Tolerances = Field(default_factory=Tolerances)
     """What a measurement must be like to be believed."""
-    refusal: Refusal = Field(default_factory=Refusal)
+    refusal: RefusalTable = Field(default_factory=RefusalTable)
     """What follows when a measurement is not believed."""
     prompts: Annotated[tuple[Prompt, ...], Field(strict=False)] = ()
     """What a person is asked, in this order."""

@@ -7,7 +7,7 @@ from functools import partial
 from robolink.config import Cell
 from robolink.errors import ConfigError, NotAllowedError, RobolinkError
 from robolink.messages import tr
-from robolink.model import Controller, EntryKind, Role
+from robolink.model import Controller, EntryKind, PersonRole
 from robolink.nozzle_change import (
     ChangePlan,
     ChangeReport,
@@ -185,7 +185,7 @@ class RecipeRun:
         if not any(plan.criteria.accepted_change_mm for plan in self.plan.tools):
             return
         signature = self._controller.outcomes.signature
-        if signature.role == Role.OPERATOR:
+        if signature.role == PersonRole.OPERATOR:
             raise NotAllowedError(
                 tr("Letting a tool jump takes an engineer."),
                 remedy=tr(

@@ -60,7 +60,7 @@ class FlangePose(Table):
         return Pose(self.x_mm, self.y_mm, self.z_mm, self.u_deg, self.v_deg, self.w_deg, tool=0)
 
 
-class Station(Table):
+class StationTable(Table):
     """Where it is measured."""
 
     id: Line
@@ -154,7 +154,7 @@ class Tolerances(Table):
     """Largest drift about the new tip that passes the verification, mm."""
 
 
-class Refusal(Table):
+class RefusalTable(Table):
     """What follows when a measurement is not believed."""
 
     action: Literal["stop", "measure_again"] = "stop"

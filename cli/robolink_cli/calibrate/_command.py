@@ -8,10 +8,10 @@ from click.core import ParameterSource
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink.methods import AnyMethod, Check, Field, MethodParameters, fields_of
+from robolink.methods import AnyMethod, Check, MethodParameters, ParameterField, fields_of
 from robolink.methods.fields import refusals
 from robolink.stations import StationKind
-from robolink_cli.calibrate._frame import Frame
+from robolink_cli.calibrate._frame import CalibrationRequest
 from robolink_cli.calibrate._options import calibration_options, sigma_option
 from robolink_cli.calibrate._values import as_typed, is_repeated, type_of
 from robolink_cli.options.motion import motion_option
@@ -34,7 +34,7 @@ def command_of(method: AnyMethod) -> click.Command:
     parameters = fields_of(method.parameters)
 
     def run(
-        frame: Frame,
+        frame: CalibrationRequest,
         *,
         station: str | None,
         sigma_mm: float | None,
@@ -81,7 +81,7 @@ def _station_option(method: AnyMethod) -> Decorator:
     )
 
 
-def _option(field: Field) -> Decorator:
+def _option(field: ParameterField) -> Decorator:
     """Return what adds the option of a parameter."""
     kind = motion_option if field.option.moves else click.option
     default = field.option.default_or(field.default)
@@ -102,7 +102,7 @@ def _option(field: Field) -> Decorator:
     return kind(field.flag, field.name, **attributes)
 
 
-def _is_choice(field: Field) -> bool:
+def _is_choice(field: ParameterField) -> bool:
     return getattr(field.kind, "__origin__", None) is Literal
 
 
@@ -136,13 +136,13 @@ def _parameters(
     return parameters
 
 
-def _value(field: Field, typed: Any) -> object:  # noqa: ANN401 - what click passes
+def _value(field: ParameterField, typed: Any) -> object:  # noqa: ANN401 - what click passes
     if field.option.is_choice:
         return field.option.chooses if typed else field.default
     return None if is_repeated(field) and not typed else typed
 
 
-def _typed(fields: tuple[Field, ...]) -> frozenset[str]:
+def _typed(fields: tuple[ParameterField, ...]) -> frozenset[str]:
     source = click.get_current_context().get_parameter_source
     return frozenset(
         field.name for field in fields if source(field.name) is ParameterSource.COMMANDLINE

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class CalibrationRequest:
     """One calibration of one tool, whatever the method.
 
     Attributes:
@@ -48,11 +48,11 @@ class Frame:
     pin: str = ""
     finds_pin: bool = True
 
-    def at(self, station: str) -> "Frame":
+    def at(self, station: str) -> "CalibrationRequest":
         """Return the same at a station of that name, which goes on record."""
         return replace(self, context=self.context._replace(station=station))
 
-    def at_pin(self, station: str | None, *, finds_pin: bool = True) -> "Frame":
+    def at_pin(self, station: str | None, *, finds_pin: bool = True) -> "CalibrationRequest":
         """Return the same at a pin, whose place is kept for one touch later.
 
         Args:
@@ -99,7 +99,7 @@ def frame_from(
     lot: str | None,
     dry_run: bool,
     yes: bool,
-) -> Frame:
+) -> CalibrationRequest:
     """Return the frame that the options of a command describe.
 
     A larger ``max_change_mm`` than the cell's own takes an engineer.
@@ -120,7 +120,7 @@ def frame_from(
         interval_mm=interval_mm,
         drift_tolerance_mm=tolerance_mm,
     )
-    return Frame(
+    return CalibrationRequest(
         context.with_nozzle(nozzle, lot),
         tool,
         criteria,

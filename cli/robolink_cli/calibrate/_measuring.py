@@ -10,7 +10,7 @@ from robolink.messages import tr
 from robolink.methods import AnyMethod, MethodParameters, Site
 from robolink.model import Controller, EntryKind
 from robolink.stations import Station, StationKind, find_stations
-from robolink_cli.calibrate._frame import Frame
+from robolink_cli.calibrate._frame import CalibrationRequest
 from robolink_cli.calibrate._given import calibrate_from_poses
 from robolink_cli.calibrate._live import calibrate_live
 from robolink_cli.calibrate._stations import station_at
@@ -21,7 +21,7 @@ from robolink_cli.options.pose_source import PoseSource
 def calibrate_with(
     method: AnyMethod,
     parameters: MethodParameters,
-    frame: Frame,
+    frame: CalibrationRequest,
     *,
     station: str | None,
     at: str | None,
@@ -73,7 +73,7 @@ def calibrate_with(
 def _station(
     method: AnyMethod,
     parameters: MethodParameters,
-    frame: Frame,
+    frame: CalibrationRequest,
     controller: Controller,
     place_mm: tuple[float, float, float] | None,
 ) -> Station:

@@ -3,11 +3,11 @@
 from robolink.messages import tr
 from robolink.model import Controller, EntryKind
 from robolink.stations import Station, StationKind, find_station, find_stations
-from robolink_cli.calibrate._frame import Frame
+from robolink_cli.calibrate._frame import CalibrationRequest
 from robolink_cli.console.render import note
 
 
-def station_at(frame: Frame, controller: Controller, kind: StationKind) -> Station:
+def station_at(frame: CalibrationRequest, controller: Controller, kind: StationKind) -> Station:
     """Return the station that the frame names, and say what there is to know about it.
 
     Raises:
@@ -21,7 +21,7 @@ def station_at(frame: Frame, controller: Controller, kind: StationKind) -> Stati
     return station
 
 
-def remark_on_pin(frame: Frame, controller: Controller) -> None:
+def remark_on_pin(frame: CalibrationRequest, controller: Controller) -> None:
     """Say what there is to know about the pin that a calibration names.
 
     A name that nobody knows yet is no mistake: the calibration finds the pin.

@@ -8,13 +8,13 @@ import click
 from annotated_types import Ge, Gt, Le
 
 from robolink.messages import tr
-from robolink.methods import Field, fields_of
+from robolink.methods import ParameterField, fields_of
 from robolink.methods.fields import bare, refusals
 
 _NUMBERS = (float, int)
 
 
-def type_of(field: Field) -> click.ParamType[Any]:
+def type_of(field: ParameterField) -> click.ParamType[Any]:
     """Return the type of one value of an option."""
     if field.kind in _NUMBERS:
         return _number(field.kind, field.metadata)
@@ -29,7 +29,7 @@ def type_of(field: Field) -> click.ParamType[Any]:
     return _Numbers(field.kind, field.metadata, element)
 
 
-def is_repeated(field: Field) -> bool:
+def is_repeated(field: ParameterField) -> bool:
     """Tell whether the option is given once for each part of the value."""
     arguments = get_args(field.kind)
     if get_origin(field.kind) is not tuple or arguments[1:] != (Ellipsis,):

@@ -7,6 +7,7 @@ from typing import Annotated, Final
 from annotated_types import Ge, Le, Len
 
 from robolink.calibration import MIN_ROTATION_DEG
+from robolink.files.toml import Problem
 from robolink.messages import tr
 from robolink.methods.declaration import (
     DEGREES,
@@ -23,7 +24,6 @@ from robolink.methods.declaration import (
 from robolink.methods.z_touch.parameters import retake_of_nothing
 from robolink.model import angle_difference_deg
 from robolink.procedures import SamplingPolicy, may_end_early
-from robolink.toml_files import Problem
 
 _LEAST_ANGLE_DEG: Final = 20.0
 """Beams that cross at less leave one direction badly known, as the solver says too."""

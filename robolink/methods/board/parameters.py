@@ -9,11 +9,11 @@ from typing import Annotated
 from annotated_types import Ge, Len
 
 from robolink.calibration import LEAST_SPACING_MM, BoardDrawing
+from robolink.files.toml import Problem
 from robolink.messages import tr
 from robolink.methods.declaration import MM, Check, Help, Option, Pair
 from robolink.methods.look_parameters import LookParameters, Turns
 from robolink.procedures import TWO_ANGLES_DEG
-from robolink.toml_files import Problem
 
 
 @dataclass(frozen=True, kw_only=True)

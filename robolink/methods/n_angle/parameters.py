@@ -8,12 +8,12 @@ from typing import Annotated, Final
 from annotated_types import Ge, Le, MaxLen, MinLen
 
 from robolink.calibration import MIN_ROTATION_DEG, planar_sigma_gain
+from robolink.files.toml import Problem
 from robolink.messages import tr
 from robolink.methods.declaration import DEGREES, Angle, Check, Help, Length, Option
 from robolink.methods.pin_parameters import PinParameters
 from robolink.model import Pose, angle_difference_deg
 from robolink.procedures import SamplingPolicy
-from robolink.toml_files import Problem
 
 _SAME_ANGLE_DEG: Final = 1e-9
 

@@ -34,7 +34,7 @@ def _source(parameters: PointsParameters, site: Site) -> "TipSource":
     """
     from robolink.methods.points.source import PointsSource, taught_poses
 
-    points = getattr(site.controller, "points", None)
+    points = site.controller.points
     if points is None:
         raise ConfigError(
             tr("{controller} has no taught points.", controller=site.controller.identity),

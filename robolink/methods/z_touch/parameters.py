@@ -7,6 +7,7 @@ from typing import Annotated, Final
 from annotated_types import Ge, Le, MinLen
 
 from robolink.calibration import MIN_ROTATION_DEG
+from robolink.files.toml import Problem
 from robolink.messages import tr
 from robolink.methods.declaration import (
     DEGREES,
@@ -21,7 +22,6 @@ from robolink.methods.declaration import (
 )
 from robolink.methods.pin_parameters import clearance_below_lift
 from robolink.procedures import SamplingPolicy, may_end_early
-from robolink.toml_files import Problem
 
 _SPEEDS_APART: Final = 1.5
 """Speeds that differ by less than this factor do not tell the latency, says the solver too."""

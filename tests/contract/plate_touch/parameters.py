@@ -6,9 +6,9 @@ from typing import Annotated
 
 from annotated_types import Ge, Le
 
+from robolink.files.toml import Problem
 from robolink.messages import tr
 from robolink.methods import MM, MM_S, Check, Help, MethodParameters
-from robolink.toml_files import Problem
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,7 +5,7 @@ from typing import Protocol
 
 from robolink.errors import NotReadyError, NotReadyReason
 from robolink.messages import tr
-from robolink.model._geometry import Pose
+from robolink.model.motion.geometry import Pose
 
 
 @dataclass(frozen=True, slots=True)

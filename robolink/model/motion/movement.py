@@ -8,8 +8,8 @@ from typing import Protocol
 
 from robolink.errors import LimitError
 from robolink.messages import tr
-from robolink.model._geometry import Pose
-from robolink.model._until_input import InputEdge, MotionUntilInput
+from robolink.model.motion.geometry import Pose
+from robolink.model.motion.until_input import InputEdge, MotionUntilInput
 
 
 class Path(StrEnum):

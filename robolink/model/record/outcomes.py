@@ -9,7 +9,7 @@ from typing import Protocol
 
 from robolink.errors import ConfigError
 from robolink.model._identity import Who
-from robolink.model._journal_entries import EntryKind, NewEntry, Recorded, Signature
+from robolink.model.record.journal_entries import EntryKind, NewEntry, Recorded, Signature
 
 
 class MarkerKind(StrEnum):

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from robolink.errors import ConfigError
+from robolink.files.named import read_named
 from robolink.messages import tr
-from robolink.named_files import read_named
 
 
 @dataclass(frozen=True, slots=True)

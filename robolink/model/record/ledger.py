@@ -10,8 +10,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
-from robolink.model._outcomes import Marker, MarkerKind
 from robolink.model._tools import ToolOffset, read_offset
+from robolink.model.record.outcomes import Marker, MarkerKind
 from robolink.standing import Components, Standing, ToolStanding, note_standing
 
 Same = Callable[[ToolOffset | None, ToolOffset | None], bool]

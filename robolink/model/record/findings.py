@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol
 
-from robolink.model._journal_entries import NewEntry
-from robolink.model._outcomes import Marker
+from robolink.model.record.journal_entries import NewEntry
+from robolink.model.record.outcomes import Marker
 
 
 class Verdict(StrEnum):

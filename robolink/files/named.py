@@ -7,8 +7,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Final, TextIO
 
-from robolink.durable_files import sync_folder, write_whole
 from robolink.errors import ConfigError
+from robolink.files.durable import sync_folder, write_whole
 from robolink.messages import tr
 from robolink.ways import Way, way
 

@@ -209,14 +209,15 @@ class EpsonSimulator:
 
     def next_change(self) -> int | None:
         """Return when :meth:`advance` will next do something by itself, if ever."""
-        changes = [
+        times = (
             self._window.next_change(),
             self._slot.deadline(unfinished=self._service.unfinished),
             self._mishaps.next_change(),
             self.machine.timed_bits.next_change(),
-            *(link.next_change() for link in self._links),
-        ]
-        return min((change for change in changes if change is not None), default=None)
+            *[link.next_change() for link in self._links],
+        )
+        changes = [time_ns for time_ns in times if time_ns is not None]
+        return min(changes) if changes else None
 
     def restart(self) -> None:
         """Switch off and on: links are cut, all but the flash and the variables is forgotten."""

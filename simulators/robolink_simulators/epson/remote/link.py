@@ -112,8 +112,10 @@ class EpsonServerLink:
         leaving = self._outbox[0][0] if self._outbox else None
         if leaving is not None and leaving > self._controller.now_ns:
             return leaving
-        deadlines = (self._login_deadline(), self._silent_from_ns)
-        return min((at_ns for at_ns in deadlines if at_ns is not None), default=None)
+        login_ns, silent_ns = self._login_deadline(), self._silent_from_ns
+        if login_ns is None or silent_ns is None:
+            return silent_ns if login_ns is None else login_ns
+        return min(login_ns, silent_ns)
 
     def supervise(self, now_ns: int) -> None:
         """End a request after which nothing came; cut whoever did not log in for too long."""

@@ -1,7 +1,6 @@
 """Meeting a PLC mailbox: version, probe, heartbeat, whole snapshots (docs/mailbox.md)."""
 
 import re
-from collections.abc import Iterator
 from dataclasses import replace
 
 import pytest
@@ -15,14 +14,6 @@ from robolink.errors import (
 )
 from robolink.model import ControllerState
 from robolink.protocols.mailbox import Bits, Capability, GroupState, crc16
-from tests.unit._softmotion_driver_cell import Cell
-
-
-@pytest.fixture
-def cell() -> Iterator[Cell]:
-    cell = Cell()
-    yield cell
-    cell.close()
 
 
 def resealed(words):

@@ -3,7 +3,6 @@
 Source: docs/reference/rules.md 2.
 """
 
-from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
 
@@ -37,23 +36,10 @@ from robolink.protocols.mailbox import (
     Slot,
     kinematics_word,
 )
-from tests.unit._softmotion_driver_cell import Cell
-from tests.unit._softmotion_driver_plc import STRANGER
+from tests.unit.softmotion_driver._plc import STRANGER
 
 OLD = ToolOffset(1.5, -2.0, 40.0, 10.0)
 NEW = ToolOffset(1.7, -2.1, 40.3, 20.0, 30.0, -40.0)
-
-
-@pytest.fixture
-def cell() -> Iterator[Cell]:
-    cell = Cell()
-    yield cell
-    cell.close()
-
-
-@pytest.fixture
-def plc(cell):
-    return cell.plc
 
 
 @pytest.fixture

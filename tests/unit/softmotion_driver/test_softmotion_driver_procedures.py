@@ -1,7 +1,5 @@
 """A PLC behind the interfaces that procedures and tool changes use, and behind its URL."""
 
-from collections.abc import Iterator
-
 import pytest
 
 from robolink.controllers import connect
@@ -17,7 +15,6 @@ from robolink.model import MotionProfile, Path, ToolOffset, WorkBox
 from robolink.protocols.mailbox import ErrorClass, Opcode
 from robolink.runner import Question, Runner, RunSettings
 from robolink.transaction import ToolChange, Wanted, change_tools, recover
-from tests.unit._softmotion_driver_cell import Cell
 
 OLD = ToolOffset(1.5, -2.0, 40.0, 10.0)
 NEW = ToolOffset(1.7, -2.1, 40.3, 20.0)
@@ -36,13 +33,6 @@ class Nobody:
     def poll(self, wait_s: float) -> str | None:
         """Say nothing."""
         return None
-
-
-@pytest.fixture
-def cell() -> Iterator[Cell]:
-    cell = Cell()
-    yield cell
-    cell.close()
 
 
 @pytest.fixture

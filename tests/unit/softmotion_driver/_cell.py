@@ -12,7 +12,7 @@ from robolink.journal import memory_journal
 from robolink.model import Signature, new_operation
 from robolink.protocols.mailbox import encode_slot
 from robolink.transport import MailboxHead
-from tests.unit._softmotion_driver_plc import Plc
+from tests.unit.softmotion_driver._plc import Plc
 
 T = TypeVar("T")
 Distortion = Callable[[tuple[int, ...]], tuple[int, ...]]

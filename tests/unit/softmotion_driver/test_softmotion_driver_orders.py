@@ -1,6 +1,5 @@
 """Commands to a PLC mailbox: whose answer counts, and when a block is written again."""
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import pytest
@@ -23,29 +22,8 @@ from robolink.protocols.mailbox import (
     GroupState,
     Opcode,
 )
-from tests.unit._softmotion_driver_cell import Cell, PlcLink
-from tests.unit._softmotion_driver_plc import MS, STRANGER
-
-
-@pytest.fixture
-def cell() -> Iterator[Cell]:
-    cell = Cell()
-    yield cell
-    cell.close()
-
-
-@pytest.fixture
-def plc(cell):
-    return cell.plc
-
-
-@pytest.fixture
-def controller(cell):
-    controller = cell.met()
-    controller.take()
-    cell.plc.executed.clear()
-    cell.link.sent.clear()
-    return controller
+from tests.unit.softmotion_driver._cell import PlcLink
+from tests.unit.softmotion_driver._plc import MS, STRANGER
 
 
 def corrupt(words):

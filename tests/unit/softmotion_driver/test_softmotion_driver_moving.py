@@ -3,9 +3,9 @@
 Source: docs/mailbox.md, "Movements".
 """
 
+import math
 import signal
 import threading
-from collections.abc import Iterator
 from dataclasses import replace
 
 import pytest
@@ -34,37 +34,10 @@ from robolink.protocols.mailbox import (
     GroupState,
     Opcode,
 )
-from tests.unit._softmotion_driver_cell import Cell
 
 ANYWHERE = WorkBox()
 TARGET = Pose(410.0, 90.0, 250.0, 45.0, tool=0)
 STRAIGHT = MotionProfile(Path.STRAIGHT, speed_mm_s=20.0)
-
-
-@pytest.fixture
-def cell() -> Iterator[Cell]:
-    cell = Cell()
-    yield cell
-    cell.close()
-
-
-@pytest.fixture
-def plc(cell):
-    return cell.plc
-
-
-@pytest.fixture
-def controller(cell):
-    controller = cell.met()
-    controller.take()
-    cell.plc.executed.clear()
-    cell.link.sent.clear()
-    return controller
-
-
-@pytest.fixture
-def group(controller):
-    return controller.groups[0]
 
 
 def move(group, target=TARGET, profile=STRAIGHT):
@@ -88,6 +61,15 @@ def test_a_joint_move_carries_factors(plc, group):
     (command,) = plc.executed
     assert command.opcode == Opcode.MOVE_DIRECT
     assert command.dynamics == (0.05,) * 4
+
+
+@pytest.mark.parametrize(("told_deg", "read_deg"), [(4.9e-13, 0.0), (-8.5e-7, 0.0), (0.001, 0.001)])
+def test_a_tilt_that_is_mere_rounding_is_none(plc, group, told_deg, read_deg):
+    plc.now = replace(plc.now, tcp=(400.0, 80.0, 250.0, 30.0, told_deg, 15.0))
+    pose = group.pose()
+    assert math.hypot(pose.v_deg, pose.w_deg) == pytest.approx(read_deg, abs=1e-9)
+    assert (pose.v_deg, pose.w_deg) == (0.0, 0.0) or read_deg
+    assert pose.u_deg == pytest.approx(45.0)
 
 
 def test_speeds_are_converted_to_the_plcs_unit(cell, plc):

@@ -21,30 +21,9 @@ from robolink.protocols.mailbox import (
     GroupState,
     Opcode,
 )
-from tests.unit._softmotion_driver_cell import Cell
 
 ANYWHERE = WorkBox()
 ALONG_X = Jog(forward=frozenset({0}), speed_mm_s=3.0)
-
-
-@pytest.fixture
-def cell():
-    cell = Cell()
-    yield cell
-    cell.close()
-
-
-@pytest.fixture
-def plc(cell):
-    return cell.plc
-
-
-@pytest.fixture
-def controller(cell):
-    controller = cell.met()
-    controller.take()
-    cell.plc.executed.clear()
-    return controller
 
 
 def jog(controller, duration_s=1.0):

@@ -6,23 +6,27 @@ Tables and numbers of a list are counted from 1, as people do, hence the sign.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 from robolink.files.key_problems import is_not_known, one_of, sentence
 from robolink.files.toml import Problem
 from robolink.messages import tr
+from robolink.methods import method_names
 from robolink.recipe._schema import json_schema
 
 if TYPE_CHECKING:
     from pydantic import ValidationError
 
-_known_schema: Final = cache(json_schema)
-"""Only read here; making it takes longer than checking a recipe."""
+
+@cache
+def _known_schema(_methods: tuple[str, ...]) -> dict[str, Any]:
+    """Return the schema, only to be read; making it takes longer than checking a recipe."""
+    return json_schema()
 
 
 def problems_of(error: "ValidationError") -> list[Problem]:
     """Return everything that pydantic objects to."""
-    schema = _known_schema()
+    schema = _known_schema(method_names())
     details = error.errors(include_url=False, include_input=False)
     return [_problem(detail, schema) for detail in details if not _follows(detail, details)]
 

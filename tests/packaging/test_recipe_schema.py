@@ -22,14 +22,14 @@ LATER_THAN_DRAFT_4 = {"const", "$defs", "exclusiveMinimum", "if", "contains", "p
 HEADINGS = {
     "Recipe": "The top of the file",
     "BeamLine": "`[[source.beams]]`",
-    "Station": "`[station]`",
+    "StationTable": "`[station]`",
     "Poses": "`[poses]`",
     "FlangePose": "`[poses]`",
     "Tool": "`[[tools]]`",
     "Speeds": "`[speeds]`",
     "Box": "`[box]`",
     "Tolerances": "`[tolerances]`",
-    "Refusal": "`[refusal]`",
+    "RefusalTable": "`[refusal]`",
     "Prompt": "`[[prompts]]`",
     "Output": "`[[outputs]]`",
 }

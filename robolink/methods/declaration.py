@@ -137,8 +137,8 @@ class Needs:
         sensor: Whether a camera takes part.
         tilt: Whether the robot has to tilt its tool, so that it also works on a tilted flange.
         motion: Whether the robot moves.
-        place: What a recipe is told where its station does not say X and Y, and where it does not
-            say Z; empty where the place may be unknown.
+        place: What X and Y of the station are to the method, and what Z is, to tell a recipe in
+            which they are missing; empty where the place may be unknown.
     """
 
     station: StationKind

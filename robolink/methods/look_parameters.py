@@ -39,10 +39,10 @@ Turns = Annotated[
 ]
 
 PLACE = (
-    tr('is missing: with kind = "{kind}" it is where the camera looks'),
-    tr('is missing: with kind = "{kind}" it is the height in focus'),
+    tr("where the camera looks"),
+    tr("the height in focus"),
 )
-"""What a recipe is told that does not say where the camera is."""
+"""What X and Y of the station are, and what Z is."""
 
 UNMEASURED_Z = tr('cannot be "measured" by a camera; write "typed" or "kept"')
 

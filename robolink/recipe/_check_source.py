@@ -35,9 +35,13 @@ def place(draft: Draft) -> Iterator[Problem]:
         return  # all of it comes from the station's record
     where, height = source.of_method.needs.place
     if station.x_mm is None and station.y_mm is None:
-        yield Problem("station.x_mm", where.format(kind=source.kind))
+        yield Problem("station.x_mm", _missing(source.kind, where))
     if station.z_mm is None:
-        yield Problem("station.z_mm", height.format(kind=source.kind))
+        yield Problem("station.z_mm", _missing(source.kind, height))
+
+
+def _missing(kind: str, what: str) -> str:
+    return tr('is missing: with kind = "{kind}" it is {what}', kind=kind, what=what)
 
 
 def both_coordinates(draft: Draft) -> Iterator[Problem]:

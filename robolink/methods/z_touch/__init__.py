@@ -37,8 +37,8 @@ METHOD = Method(
     needs=Needs(
         station=StationKind.TOUCH,
         place=(
-            tr('is missing: with kind = "{kind}" it is where to touch'),
-            tr('is missing: with kind = "{kind}" it is the surface'),
+            tr("where to touch"),
+            tr("the surface"),
         ),
     ),
     source=_source,

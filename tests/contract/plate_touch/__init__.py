@@ -22,8 +22,8 @@ METHOD = Method(
     needs=Needs(
         station=StationKind.TOUCH,
         place=(
-            tr('is missing: with kind = "{kind}" it is where to touch'),
-            tr('is missing: with kind = "{kind}" it is the plate'),
+            tr("where to touch"),
+            tr("the plate"),
         ),
     ),
     source=_source,

@@ -88,3 +88,18 @@ def test_a_command_says_where_beams_are_that_nobody_knows(cell):
     refused = cell.calibrate("beams", "--station", "NEW", *beams)
     assert refused.code == 2
     assert "--beams-z: is missing: give --beam and --beams-z" in refused.document["error"]["what"]
+
+
+def test_a_recipe_of_before_runs_and_its_name_of_now_is_told_once(cell, tmp_path):
+    path = tmp_path / "old.toml"
+    now = SIX_POINT.replace('kind = "six-point"\ncount = 4', 'kind = "touch"\ninput = 5')
+    path.write_text(now.replace('"PIN"', '"PLATE"'))
+    shown = cell.run("recalibrate", str(path), "--dry-run")
+    assert shown.code == 0, shown.err
+    assert shown.err.count("old name") == 1
+    assert 'write kind = "z-touch"' in shown.err
+    document = cell.run("recalibrate", str(path), "--dry-run", "--json").document
+    (note,) = document["old_names"]
+    assert "z-touch" in note
+    path.write_text(path.read_text().replace('"touch"', '"z-touch"'))
+    assert cell.run("recalibrate", str(path), "--dry-run", "--json").document["old_names"] == []

@@ -23,7 +23,7 @@ class Way(StrEnum):
     EARLIER_VALUE = "to=NUMBER"
     EXPORT_JOURNAL = "open_journal(..., read_only=True)"
     FORGET_MARKER = "recover(..., confirm=...)"
-    GIVEN_POSES = "GivenPoses"
+    GIVEN_POSES = "PointsSource"
     HEIGHT = "Answers(z_mm={{{tool}: MM}})"
     LENGTH_TOLERANCE = "length_mm=0.05"
     LIST_CHANGES = "outcomes.recorded(kinds=(EntryKind.DONE,))"

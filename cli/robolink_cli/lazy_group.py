@@ -37,7 +37,7 @@ class LazyGroup(click.Group):
         super().__init__(**options)  # type: ignore[arg-type]
         self._lazy = lazy
         self._aliases = aliases or {}
-        self._listing = False
+        self.listing = False
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Return the names in the order of the table."""
@@ -49,7 +49,7 @@ class LazyGroup(click.Group):
             target = self._aliases[cmd_name]
         elif cmd_name in self._lazy:
             target, summary = self._lazy[cmd_name]
-            if self._listing:
+            if self.listing:
                 return click.Command(cmd_name, short_help=summary)
         else:
             return super().get_command(ctx, cmd_name)
@@ -68,8 +68,8 @@ class LazyGroup(click.Group):
 
     @contextmanager
     def _while_listing(self) -> "Iterator[None]":
-        self._listing = True
+        self.listing = True
         try:
             yield
         finally:
-            self._listing = False
+            self.listing = False

@@ -14,9 +14,9 @@ from typing import Final
 from robolink.backup._reading import JsonReader
 from robolink.backup._values import COMPONENTS, TOOLS, Backup, ToolState
 from robolink.errors import ConfigError
+from robolink.files.named import read_named, save_named
 from robolink.messages import tr
 from robolink.model import ControllerFacts, ToolOffset
-from robolink.named_files import read_named, save_named
 
 SCHEMA: Final = "robolink/backup/1"
 

@@ -4,8 +4,8 @@ from pathlib import Path
 
 from robolink.backup._file import save
 from robolink.backup._values import ToolHolder, take_backup
-from robolink.durable_files import file_name, make_folder, state_folder
 from robolink.errors import ConfigError
+from robolink.files.durable import file_name, make_folder, state_folder
 from robolink.messages import tr
 from robolink.model import EntryKind, NewEntry
 

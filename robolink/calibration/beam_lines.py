@@ -22,12 +22,9 @@ from robolink.model import Pose, angle_difference_deg, rotate_xy
 LEAST_ANGLE_DEG = 20.0
 """Beams that cross at less than this leave one direction badly known."""
 
-
 LEAST_LENGTH_MM = 5.0
 
-
 _ALONG_THE_BEAM = 0.2
-
 
 _REFINEMENTS = 5
 

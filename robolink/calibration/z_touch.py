@@ -22,13 +22,10 @@ from robolink.model import ToolOffset
 
 PROBE_TOLERANCE = Tolerance(rms_mm=0.05, max_residual_mm=0.15)
 
-
 RECOMMENDED_TOUCHES = 3
-
 
 _SPEEDS_APART = 1.5
 """Speeds that differ by less than this factor do not tell the latency."""
-
 
 _KEPT = ("x_mm", "y_mm", "u_deg", "v_deg", "w_deg")
 

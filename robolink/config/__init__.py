@@ -7,8 +7,8 @@ checked by pydantic, which is imported when the first file is loaded and not bef
 
 from typing import TYPE_CHECKING
 
+from robolink.files.toml import Problem as Problem
 from robolink.lazy_exports import lazy_exports
-from robolink.toml_files import Problem as Problem
 
 if TYPE_CHECKING:
     from robolink.config._cells import Cell as Cell

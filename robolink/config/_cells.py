@@ -10,8 +10,8 @@ from robolink.config._files import CELL_FILE, config_files, read_document
 from robolink.config._problems import dotted, problems_of
 from robolink.config._reach import Expected
 from robolink.errors import ConfigError
+from robolink.files.toml import Problem
 from robolink.messages import tr
-from robolink.toml_files import Problem
 
 if TYPE_CHECKING:
     from robolink.config._settings import CellSettings

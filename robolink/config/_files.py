@@ -6,8 +6,8 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Final
 
+from robolink.files.toml import FileKind
 from robolink.messages import tr
-from robolink.toml_files import FileKind
 
 _NAME = "robolink.toml"
 

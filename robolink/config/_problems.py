@@ -6,9 +6,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from robolink.key_problems import is_not_known, sentence
+from robolink.files.key_problems import is_not_known, sentence
+from robolink.files.toml import Problem
 from robolink.messages import tr
-from robolink.toml_files import Problem
 
 if TYPE_CHECKING:
     from pydantic import ValidationError

@@ -13,11 +13,11 @@ from hashlib import sha256
 from pathlib import Path
 
 from robolink.config._files import config_files, read_document
-from robolink.durable_files import file_name, make_folder, state_folder, write_whole
 from robolink.errors import ConfigError
+from robolink.files.durable import file_name, make_folder, state_folder, write_whole
+from robolink.files.named import read_named
 from robolink.messages import tr
-from robolink.model import Role
-from robolink.named_files import read_named
+from robolink.model import PersonRole
 
 _KIND = "cells"
 
@@ -38,7 +38,7 @@ class Expected:
     tool: int | None = None
     robot: str | None = None
     robot_file: str = ""
-    people: Mapping[str, Role] | None = None
+    people: Mapping[str, PersonRole] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,7 +171,7 @@ def _recalled_expected(kept: object) -> Expected | None:
         people = found.people
         if people is None:
             return found
-        return replace(found, people={name: Role(role) for name, role in people.items()})
+        return replace(found, people={name: PersonRole(role) for name, role in people.items()})
     except (TypeError, ValueError, AttributeError):
         return None
 

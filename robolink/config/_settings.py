@@ -6,7 +6,7 @@ from pydantic import BaseModel, Field, ValidationInfo, field_validator
 
 from robolink.config._station_settings import STRICT, StationSettings
 from robolink.messages import tr
-from robolink.model import Role
+from robolink.model import PersonRole
 from robolink.transport import parse_url
 
 Text = Annotated[str, Field(min_length=1)]
@@ -65,7 +65,7 @@ class CellSettings(BaseModel):
     rms_tolerance_mm: Positive | None = None
     residual_tolerance_mm: Positive | None = None
     interval_tolerance_mm: Positive | None = None
-    people: dict[Text, Role] | None = None
+    people: dict[Text, PersonRole] | None = None
     stations: dict[Text, StationSettings] | None = None
     notes: str | None = None
 
@@ -110,9 +110,9 @@ class CellSettings(BaseModel):
         return clearance_mm
 
 
-def _role(name: str, role: object) -> Role:
+def _role(name: str, role: object) -> PersonRole:
     try:
-        return Role(str(role))
+        return PersonRole(str(role))
     except ValueError:
         raise ValueError(
             tr("{name} is {role!r}: it must be operator or engineer", name=name, role=role)

@@ -2,6 +2,7 @@
 
 import threading
 from typing import TYPE_CHECKING, Final
+from weakref import WeakValueDictionary
 
 from robolink.errors import JournalError
 from robolink.journal._looking import LookingLog
@@ -13,6 +14,9 @@ if TYPE_CHECKING:
 
 _lock: Final = threading.Lock()
 _opened: Final[dict[tuple[str, bool], "Journal"]] = {}
+_closed: Final[WeakValueDictionary[tuple[str, bool], "Journal"]] = WeakValueDictionary()
+"""Those that :func:`close_files` closed and somebody still has: they open again by themselves,
+and a place must not be opened twice."""
 _in_memory: Final[dict[str, "Journal"]] = {}
 
 
@@ -35,7 +39,8 @@ def open_journal(location: str | None = None, *, read_only: bool = False) -> "Jo
     with _lock:
         known = _opened.get(key)
         if known is None:
-            known = _opened[key] = _open(place, read_only=read_only)
+            known = _closed.get(key) or _open(place, read_only=read_only)
+            _opened[key] = known
         return known
 
 
@@ -77,9 +82,11 @@ def open_log(address: str, *, durable: bool, signature: Signature) -> OutcomeLog
 def close_files() -> None:
     """Close the journals of this process that outlive it; each opens again at its next use."""
     with _lock:
-        for journal in _opened.values():
+        for key, journal in (*_opened.items(), *_closed.items()):
             if journal.durable:
                 journal.close()
+                _closed[key] = journal
+                _opened.pop(key, None)
 
 
 def _open(place: JournalPlace, *, read_only: bool) -> "Journal":

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from robolink.durable_files import file_name, make_folder, state_folder, write_whole
+from robolink.files.durable import file_name, make_folder, state_folder, write_whole
 from robolink.messages import tr
 from robolink.model import Marker, MarkerKind
 from robolink.timing import wall_label

@@ -5,35 +5,64 @@ from typing import TYPE_CHECKING
 from robolink.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
-    from robolink.methods.beams.plan import CrossingPlan as CrossingPlan
+    from robolink.methods.beams.parameters import BeamLine as BeamLine
+    from robolink.methods.beams.parameters import BeamsParameters as BeamsParameters
     from robolink.methods.beams.procedure import measure_beams as measure_beams
     from robolink.methods.beams.procedure import trace_beams as trace_beams
     from robolink.methods.beams.procedure import verify_by_crossing as verify_by_crossing
     from robolink.methods.beams.source import BeamsSource as BeamsSource
+    from robolink.methods.board.parameters import BoardParameters as BoardParameters
     from robolink.methods.board.procedure import measure_board as measure_board
     from robolink.methods.board.procedure import verify_board as verify_board
     from robolink.methods.board.source import BoardSource as BoardSource
+    from robolink.methods.camera.parameters import CameraParameters as CameraParameters
     from robolink.methods.camera.procedure import measure_camera as measure_camera
     from robolink.methods.camera.source import CameraSource as CameraSource
-    from robolink.methods.camera_affine.plan import LEAST_SPAN_MM as LEAST_SPAN_MM
-    from robolink.methods.camera_affine.plan import PatternPlan as PatternPlan
+    from robolink.methods.camera_affine.parameters import LEAST_SPAN_MM as LEAST_SPAN_MM
+    from robolink.methods.camera_affine.parameters import (
+        CameraAffineParameters as CameraAffineParameters,
+    )
     from robolink.methods.camera_affine.procedure import (
         measure_camera_affine as measure_camera_affine,
     )
     from robolink.methods.camera_affine.source import CameraAffineSource as CameraAffineSource
+    from robolink.methods.declaration import DEGREES as DEGREES
+    from robolink.methods.declaration import MM as MM
+    from robolink.methods.declaration import MM_S as MM_S
+    from robolink.methods.declaration import Angle as Angle
+    from robolink.methods.declaration import AnyMethod as AnyMethod
+    from robolink.methods.declaration import Check as Check
+    from robolink.methods.declaration import Former as Former
+    from robolink.methods.declaration import Help as Help
+    from robolink.methods.declaration import InputNumber as InputNumber
+    from robolink.methods.declaration import Length as Length
+    from robolink.methods.declaration import Method as Method
+    from robolink.methods.declaration import MethodParameters as MethodParameters
+    from robolink.methods.declaration import Needs as Needs
+    from robolink.methods.declaration import Option as Option
+    from robolink.methods.declaration import Pair as Pair
+    from robolink.methods.declaration import PoseHelp as PoseHelp
+    from robolink.methods.declaration import Unit as Unit
+    from robolink.methods.fields import ParameterField as ParameterField
+    from robolink.methods.fields import fields_of as fields_of
+    from robolink.methods.look_parameters import LookParameters as LookParameters
+    from robolink.methods.n_angle.parameters import NAngleParameters as NAngleParameters
+    from robolink.methods.n_angle.parameters import most_informative_order as most_informative_order
     from robolink.methods.n_angle.procedure import measure_n_angle as measure_n_angle
-    from robolink.methods.n_angle.procedure import most_informative_order as most_informative_order
     from robolink.methods.n_angle.source import ManyTouches as ManyTouches
     from robolink.methods.n_angle.source import NAngleSource as NAngleSource
     from robolink.methods.one_touch.last_touch import KEPT as KEPT
     from robolink.methods.one_touch.last_touch import LastTouch as LastTouch
     from robolink.methods.one_touch.last_touch import find_last_touch as find_last_touch
+    from robolink.methods.one_touch.parameters import OneTouchParameters as OneTouchParameters
     from robolink.methods.one_touch.procedure import measure_one_touch as measure_one_touch
     from robolink.methods.one_touch.solvers import Absolute as Absolute
     from robolink.methods.one_touch.solvers import Difference as Difference
     from robolink.methods.one_touch.solvers import difference_from_last as difference_from_last
     from robolink.methods.one_touch.source import OneTouchSource as OneTouchSource
+    from robolink.methods.pin_parameters import PinParameters as PinParameters
     from robolink.methods.pivot.axes import require_tilting as require_tilting
+    from robolink.methods.pivot.parameters import PivotParameters as PivotParameters
     from robolink.methods.pivot.procedure import measure_pivot as measure_pivot
     from robolink.methods.pivot.procedure import verify_by_tilting as verify_by_tilting
     from robolink.methods.pivot.source import PivotSource as PivotSource
@@ -42,19 +71,27 @@ if TYPE_CHECKING:
     from robolink.methods.pivot.tilts import Tilt as Tilt
     from robolink.methods.pivot.tilts import informative_tilts as informative_tilts
     from robolink.methods.pivot.tilts import proving_tilts as proving_tilts
-    from robolink.methods.points.source import PointReader as PointReader
+    from robolink.methods.points.parameters import PointsParameters as PointsParameters
     from robolink.methods.points.source import PointsSource as PointsSource
     from robolink.methods.points.source import PosesFound as PosesFound
     from robolink.methods.points.source import taught_poses as taught_poses
+    from robolink.methods.registry import METHODS_GROUP as METHODS_GROUP
+    from robolink.methods.registry import all_methods as all_methods
+    from robolink.methods.registry import find_method as find_method
+    from robolink.methods.registry import method_names as method_names
+    from robolink.methods.registry import register as register
+    from robolink.methods.site import Site as Site
+    from robolink.methods.six_point.parameters import SixPointParameters as SixPointParameters
     from robolink.methods.six_point.procedure import AxisTeachPlan as AxisTeachPlan
     from robolink.methods.six_point.procedure import measure_six_point as measure_six_point
     from robolink.methods.six_point.source import SixPoints as SixPoints
     from robolink.methods.six_point.source import SixPointSource as SixPointSource
     from robolink.methods.station_learning import learn_station as learn_station
+    from robolink.methods.two_pose.parameters import TwoPoseParameters as TwoPoseParameters
     from robolink.methods.two_pose.procedure import measure_two_pose as measure_two_pose
     from robolink.methods.two_pose.source import TwoPoseSource as TwoPoseSource
     from robolink.methods.two_pose.source import TwoTouches as TwoTouches
-    from robolink.methods.z_touch.plan import ZTouchPlan as ZTouchPlan
+    from robolink.methods.z_touch.parameters import ZTouchParameters as ZTouchParameters
     from robolink.methods.z_touch.procedure import measure_z_touch as measure_z_touch
     from robolink.methods.z_touch.procedure import verify_by_touching as verify_by_touching
     from robolink.methods.z_touch.source import ZTouchSource as ZTouchSource
@@ -62,34 +99,51 @@ if TYPE_CHECKING:
 __getattr__ = lazy_exports(
     __name__,
     {
-        "beams.plan": "CrossingPlan",
+        "beams.parameters": "BeamLine BeamsParameters",
         "beams.procedure": "measure_beams trace_beams verify_by_crossing",
         "beams.source": "BeamsSource",
+        "board.parameters": "BoardParameters",
         "board.procedure": "measure_board verify_board",
         "board.source": "BoardSource",
+        "camera.parameters": "CameraParameters",
         "camera.procedure": "measure_camera",
         "camera.source": "CameraSource",
-        "camera_affine.plan": "LEAST_SPAN_MM PatternPlan",
+        "camera_affine.parameters": "CameraAffineParameters LEAST_SPAN_MM",
         "camera_affine.procedure": "measure_camera_affine",
         "camera_affine.source": "CameraAffineSource",
-        "n_angle.procedure": "most_informative_order measure_n_angle",
+        "declaration": (
+            "Angle AnyMethod Check DEGREES Former Help InputNumber Length "
+            "MM MM_S Method MethodParameters Needs Option Pair PoseHelp Unit"
+        ),
+        "fields": "ParameterField fields_of",
+        "look_parameters": "LookParameters",
+        "n_angle.parameters": "NAngleParameters most_informative_order",
+        "n_angle.procedure": "measure_n_angle",
         "n_angle.source": "ManyTouches NAngleSource",
         "one_touch.last_touch": "KEPT LastTouch find_last_touch",
+        "one_touch.parameters": "OneTouchParameters",
         "one_touch.procedure": "measure_one_touch",
         "one_touch.solvers": "Absolute Difference difference_from_last",
         "one_touch.source": "OneTouchSource",
+        "pin_parameters": "PinParameters",
         "pivot.axes": "require_tilting",
+        "pivot.parameters": "PivotParameters",
         "pivot.procedure": "measure_pivot verify_by_tilting",
         "pivot.source": "PivotSource PivotTouches",
         "pivot.tilts": "OverPin Tilt informative_tilts proving_tilts",
-        "points.source": "PointReader PointsSource PosesFound taught_poses",
+        "points.parameters": "PointsParameters",
+        "points.source": "PointsSource PosesFound taught_poses",
+        "registry": "METHODS_GROUP all_methods find_method method_names register",
+        "site": "Site",
+        "six_point.parameters": "SixPointParameters",
         "six_point.procedure": "AxisTeachPlan measure_six_point",
         "six_point.source": "SixPointSource SixPoints",
         "station_learning": "learn_station",
+        "two_pose.parameters": "TwoPoseParameters",
         "two_pose.procedure": "measure_two_pose",
         "two_pose.source": "TwoPoseSource TwoTouches",
-        "z_touch.plan": "ZTouchPlan",
-        "z_touch.procedure": "verify_by_touching measure_z_touch",
+        "z_touch.parameters": "ZTouchParameters",
+        "z_touch.procedure": "measure_z_touch verify_by_touching",
         "z_touch.source": "ZTouchSource",
     },
 )

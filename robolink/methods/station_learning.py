@@ -7,8 +7,8 @@ from typing import Final
 from robolink.calibration import offset_sigma_mm
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink.methods.beams.plan import CrossingPlan
-from robolink.methods.z_touch.plan import ZTouchPlan
+from robolink.methods.beams.parameters import BeamsParameters
+from robolink.methods.z_touch.parameters import ZTouchParameters
 from robolink.model import Path, Pose, ToolOffset
 from robolink.procedures import offset_z
 from robolink.runner import Ask, Move, Procedure
@@ -79,7 +79,7 @@ def _beams(station: Station, here: Pose, tool: int, tip: ToolOffset) -> Procedur
     from robolink.methods.beams.procedure import trace_beams  # numpy, which a look does without
 
     guess = beam_station(station)
-    beams = yield from trace_beams(guess, CrossingPlan(), here=here, tip=tip)
+    beams = yield from trace_beams(guess, BeamsParameters(), here=here, tip=tip)
     lines = [
         {"input": number, **asdict(beam)} for number, beam in zip(guess.inputs, beams, strict=True)
     ]
@@ -105,7 +105,7 @@ def _surface(
 
     guess = touch_station(station)
     found = yield from measure_z_touch(
-        guess, ZTouchPlan(), here=here, stored=tip, sigma_mm=sigma_mm
+        guess, ZTouchParameters(), here=here, stored=tip, sigma_mm=sigma_mm
     )
     return Found(
         id=station.id,

@@ -11,29 +11,9 @@ if TYPE_CHECKING:
     from robolink.model._controller import ControllerState as ControllerState
     from robolink.model._controller import ControllerStatus as ControllerStatus
     from robolink.model._facts import ControllerFacts as ControllerFacts
-    from robolink.model._findings import Finding as Finding
-    from robolink.model._findings import Resolver as Resolver
-    from robolink.model._findings import Verdict as Verdict
-    from robolink.model._geometry import Hand as Hand
-    from robolink.model._geometry import Pose as Pose
-    from robolink.model._geometry import angle_difference_deg as angle_difference_deg
-    from robolink.model._geometry import rotate_xy as rotate_xy
     from robolink.model._identity import Identity as Identity
     from robolink.model._identity import Who as Who
     from robolink.model._identity import is_own_name as is_own_name
-    from robolink.model._journal_entries import EntryKind as EntryKind
-    from robolink.model._journal_entries import NewEntry as NewEntry
-    from robolink.model._journal_entries import Recorded as Recorded
-    from robolink.model._journal_entries import Signature as Signature
-    from robolink.model._ledger import Account as Account
-    from robolink.model._ledger import Ledger as Ledger
-    from robolink.model._motion import Motion as Motion
-    from robolink.model._motion import MotionGroup as MotionGroup
-    from robolink.model._motion import MotionOutcome as MotionOutcome
-    from robolink.model._motion import MotionProfile as MotionProfile
-    from robolink.model._motion import MotionTerms as MotionTerms
-    from robolink.model._motion import Path as Path
-    from robolink.model._motion import WorkBox as WorkBox
     from robolink.model._optional_parts import AlarmList as AlarmList
     from robolink.model._optional_parts import DigitalIo as DigitalIo
     from robolink.model._optional_parts import PointReader as PointReader
@@ -41,18 +21,9 @@ if TYPE_CHECKING:
     from robolink.model._optional_parts import ValueReceipt as ValueReceipt
     from robolink.model._optional_parts import ValueT as ValueT
     from robolink.model._optional_parts import VariableTable as VariableTable
-    from robolink.model._outcomes import Marker as Marker
-    from robolink.model._outcomes import MarkerKind as MarkerKind
-    from robolink.model._outcomes import OutcomeLog as OutcomeLog
-    from robolink.model._outcomes import new_operation as new_operation
-    from robolink.model._people import Role as Role
+    from robolink.model._people import PersonRole as PersonRole
     from robolink.model._people import require_engineer as require_engineer
     from robolink.model._secret import Secret as Secret
-    from robolink.model._standing_words import describe_standing as describe_standing
-    from robolink.model._tip_sensor import TIP as TIP
-    from robolink.model._tip_sensor import Spot as Spot
-    from robolink.model._tip_sensor import SpotUnit as SpotUnit
-    from robolink.model._tip_sensor import TipSensor as TipSensor
     from robolink.model._tools import ANY as ANY
     from robolink.model._tools import Expect as Expect
     from robolink.model._tools import Expected as Expected
@@ -63,32 +34,63 @@ if TYPE_CHECKING:
     from robolink.model._tools import plain_offset as plain_offset
     from robolink.model._tools import read_offset as read_offset
     from robolink.model._tools import tool_changed as tool_changed
-    from robolink.model._until_input import InputEdge as InputEdge
-    from robolink.model._until_input import MotionUntilInput as MotionUntilInput
+    from robolink.model.motion.geometry import Hand as Hand
+    from robolink.model.motion.geometry import Pose as Pose
+    from robolink.model.motion.geometry import angle_difference_deg as angle_difference_deg
+    from robolink.model.motion.geometry import rotate_xy as rotate_xy
+    from robolink.model.motion.movement import Motion as Motion
+    from robolink.model.motion.movement import MotionGroup as MotionGroup
+    from robolink.model.motion.movement import MotionOutcome as MotionOutcome
+    from robolink.model.motion.movement import MotionProfile as MotionProfile
+    from robolink.model.motion.movement import MotionTerms as MotionTerms
+    from robolink.model.motion.movement import Path as Path
+    from robolink.model.motion.movement import WorkBox as WorkBox
+    from robolink.model.motion.tip_sensor import TIP as TIP
+    from robolink.model.motion.tip_sensor import Spot as Spot
+    from robolink.model.motion.tip_sensor import SpotUnit as SpotUnit
+    from robolink.model.motion.tip_sensor import TipSensor as TipSensor
+    from robolink.model.motion.until_input import InputEdge as InputEdge
+    from robolink.model.motion.until_input import MotionUntilInput as MotionUntilInput
+    from robolink.model.record.findings import Finding as Finding
+    from robolink.model.record.findings import Resolver as Resolver
+    from robolink.model.record.findings import Verdict as Verdict
+    from robolink.model.record.journal_entries import EntryKind as EntryKind
+    from robolink.model.record.journal_entries import NewEntry as NewEntry
+    from robolink.model.record.journal_entries import Recorded as Recorded
+    from robolink.model.record.journal_entries import Signature as Signature
+    from robolink.model.record.ledger import Account as Account
+    from robolink.model.record.ledger import Ledger as Ledger
+    from robolink.model.record.outcomes import Marker as Marker
+    from robolink.model.record.outcomes import MarkerKind as MarkerKind
+    from robolink.model.record.outcomes import OutcomeLog as OutcomeLog
+    from robolink.model.record.outcomes import new_operation as new_operation
+    from robolink.model.record.standing_words import describe_standing as describe_standing
 else:
     __getattr__ = lazy_exports(
         __name__,
         {
             "_controller": "Act Capabilities Controller ControllerState ControllerStatus",
             "_facts": "ControllerFacts",
-            "_findings": "Finding Resolver Verdict",
-            "_geometry": "Hand Pose angle_difference_deg rotate_xy",
+            "record.findings": "Finding Resolver Verdict",
+            "motion.geometry": "Hand Pose angle_difference_deg rotate_xy",
             "_identity": "Identity Who is_own_name",
-            "_journal_entries": "EntryKind NewEntry Recorded Signature",
-            "_ledger": "Account Ledger",
-            "_motion": "Motion MotionGroup MotionOutcome MotionProfile MotionTerms Path WorkBox",
+            "record.journal_entries": "EntryKind NewEntry Recorded Signature",
+            "record.ledger": "Account Ledger",
+            "motion.movement": (
+                "Motion MotionGroup MotionOutcome MotionProfile MotionTerms Path WorkBox"
+            ),
             "_optional_parts": (
                 "AlarmList DigitalIo PointReader Value ValueReceipt ValueT VariableTable"
             ),
-            "_outcomes": "Marker MarkerKind OutcomeLog new_operation",
-            "_people": "Role require_engineer",
+            "record.outcomes": "Marker MarkerKind OutcomeLog new_operation",
+            "_people": "PersonRole require_engineer",
             "_secret": "Secret",
-            "_standing_words": "describe_standing",
-            "_tip_sensor": "Spot SpotUnit TIP TipSensor",
+            "record.standing_words": "describe_standing",
+            "motion.tip_sensor": "Spot SpotUnit TIP TipSensor",
             "_tools": (
                 "ANY Expect Expected ToolOffset ToolReceipt ToolTable describe_offset "
                 "plain_offset read_offset tool_changed"
             ),
-            "_until_input": "InputEdge MotionUntilInput",
+            "motion.until_input": "InputEdge MotionUntilInput",
         },
     )

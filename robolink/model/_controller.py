@@ -8,13 +8,13 @@ from types import TracebackType
 from typing import Protocol, Self
 
 from robolink.model._facts import ControllerFacts
-from robolink.model._findings import Resolver
-from robolink.model._journal_entries import NewEntry
-from robolink.model._ledger import Ledger
-from robolink.model._motion import MotionGroup
 from robolink.model._optional_parts import AlarmList, DigitalIo, PointReader, VariableTable
-from robolink.model._outcomes import Marker, MarkerKind, OutcomeLog
 from robolink.model._tools import ToolTable
+from robolink.model.motion.movement import MotionGroup
+from robolink.model.record.findings import Resolver
+from robolink.model.record.journal_entries import NewEntry
+from robolink.model.record.ledger import Ledger
+from robolink.model.record.outcomes import Marker, MarkerKind, OutcomeLog
 from robolink.stop_latch import StopLatch
 from robolink.timing import Clock
 

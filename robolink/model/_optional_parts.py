@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
-from robolink.model._geometry import Pose
+from robolink.model.motion.geometry import Pose
 
 Value = bool | int | float | str
 ValueT = TypeVar("ValueT", bound=Value)

@@ -4,12 +4,12 @@ from enum import StrEnum
 
 from robolink.errors import NotAllowedError
 from robolink.messages import tr
-from robolink.model._journal_entries import EntryKind, NewEntry
-from robolink.model._outcomes import OutcomeLog
+from robolink.model.record.journal_entries import EntryKind, NewEntry
+from robolink.model.record.outcomes import OutcomeLog
 from robolink.ways import Way, way
 
 
-class Role(StrEnum):
+class PersonRole(StrEnum):
     """What a person is, by the cell file.
 
     An operator changes nozzles. Passing the jump limit, clearing a tool, undo, restore, writes
@@ -35,7 +35,7 @@ def require_engineer(outcomes: OutcomeLog, act: str, **details: object) -> None:
         ConfigError: It cannot be recorded.
     """
     signature = outcomes.signature
-    if signature.role == Role.OPERATOR:
+    if signature.role == PersonRole.OPERATOR:
         person = signature.operator or tr("somebody who gave no name")
         raise NotAllowedError(
             tr("{person} may not {act}: it takes an engineer.", person=person, act=act),

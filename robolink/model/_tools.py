@@ -8,7 +8,7 @@ from typing import Final, Literal, Protocol
 
 from robolink.errors import ConfigError, ToolChangedError
 from robolink.messages import tr
-from robolink.model._geometry import angle_difference_deg
+from robolink.model.motion.geometry import angle_difference_deg
 
 _COMPONENTS: Final = ("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
 

@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from robolink.nozzle_change._preview import preview as preview
     from robolink.nozzle_change._preview import require_inside as require_inside
     from robolink.nozzle_change._proposal import ChangeReport as ChangeReport
+    from robolink.nozzle_change._proposal import LimitVerdict as LimitVerdict
     from robolink.nozzle_change._proposal import Proposal as Proposal
     from robolink.nozzle_change._proposal import ToolReport as ToolReport
-    from robolink.nozzle_change._proposal import Verdict as Verdict
 
 __getattr__ = lazy_exports(
     __name__,
@@ -32,6 +32,6 @@ __getattr__ = lazy_exports(
         "_listener": "Listener Moment",
         "_plan": "ChangePlan Limits ToolPlan require_ready",
         "_preview": "PlannedStep flange_now foresee preview require_inside",
-        "_proposal": "ChangeReport Proposal ToolReport Verdict",
+        "_proposal": "ChangeReport Proposal ToolReport LimitVerdict",
     },
 )

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from robolink.calibration import CalibrationResult, require_shrinking
 from robolink.errors import CalibrationError
 from robolink.messages import tr
-from robolink.nozzle_change._proposal import Proposal, Verdict
+from robolink.nozzle_change._proposal import LimitVerdict, Proposal
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,12 +86,14 @@ class AcceptanceCriteria:
                 remedy=" ".join(filter(None, (remedy, self._way_past))),
             )
 
-    def verdicts(self, proposal: Proposal) -> tuple[Verdict, ...]:
+    def verdicts(self, proposal: Proposal) -> tuple[LimitVerdict, ...]:
         """Return what each limit says; nothing about what is not judged or not known."""
         fit = self._of_fit(proposal.result)
         if proposal.change_mm is None:
             return tuple(fit)
-        change = Verdict("implausible_change", tr("The change"), proposal.change_mm, self.limit_mm)
+        change = LimitVerdict(
+            "implausible_change", tr("The change"), proposal.change_mm, self.limit_mm
+        )
         return (*fit, change)
 
     def jumps(self, proposal: Proposal) -> bool:
@@ -119,7 +121,7 @@ class AcceptanceCriteria:
         if self.interval_mm is not None:
             yield tr("95 % interval up to +-{limit:g} mm", limit=self.interval_mm)
 
-    def _of_fit(self, result: CalibrationResult) -> Iterator[Verdict]:
+    def _of_fit(self, result: CalibrationResult) -> Iterator[LimitVerdict]:
         for code, name, found_mm, limit_mm in (
             ("large_rms", tr("The rms residual"), result.rms_mm, self.rms_mm),
             (
@@ -131,4 +133,4 @@ class AcceptanceCriteria:
             ("large_interval", tr("Half the 95 % interval"), result.half95_mm, self.interval_mm),
         ):
             if found_mm is not None and limit_mm is not None:
-                yield Verdict(code, name, found_mm, limit_mm)
+                yield LimitVerdict(code, name, found_mm, limit_mm)

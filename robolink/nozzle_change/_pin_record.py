@@ -10,14 +10,21 @@ from robolink.calibration import (
     offset_sigma_mm,
 )
 from robolink.messages import tr
+from robolink.methods import all_methods
 from robolink.model import (
     rotate_xy,
 )
 from robolink.nozzle_change._proposal import Proposal
 from robolink.stations import Found, StationKind
 
-FULL_METHODS = ("two_pose", "n_angle", "pivot", "six_point")
-"""Methods that find the pin themselves, with the offset."""
+
+def finds_pin(result: CalibrationResult) -> bool:
+    """Tell whether a measurement found the pin itself, with the offset."""
+    # A result names the solver, which a method is called after.
+    return any(
+        method.needs.finds_pin and method.name.replace("-", "_") == result.method
+        for method in all_methods()
+    )
 
 
 def pin_mm(proposal: Proposal) -> tuple[float, float, float]:
@@ -48,7 +55,7 @@ def _touch_sigma_mm(result: CalibrationResult) -> float | None:
 def found_pin(station: str, proposal: Proposal) -> Found | None:
     """Return where a full calibration found the pin; ``None`` for one that only used it."""
     result = proposal.result
-    if result.method not in FULL_METHODS:
+    if not finds_pin(result):
         return None
     x_mm, y_mm, z_mm = pin_mm(proposal)
     return Found(

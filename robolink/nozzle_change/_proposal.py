@@ -1,4 +1,4 @@
-"""What a limit says about a proposal."""
+"""What was measured, next to what is stored, what limits say of it, and what became of it."""
 
 import math
 from collections.abc import Mapping
@@ -10,7 +10,7 @@ from robolink.model import ToolOffset, ToolReceipt
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
+class LimitVerdict:
     """What one limit says about a proposal.
 
     Attributes:
@@ -108,7 +108,7 @@ class ToolReport:
     proposal: Proposal
     receipt: ToolReceipt | None
     verification: VerifyResult | None
-    verdicts: tuple[Verdict, ...] = ()
+    verdicts: tuple[LimitVerdict, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ from robolink.errors import CalibrationError
 from robolink.messages import tr
 from robolink.methods import KEPT
 from robolink.model import Controller, EntryKind, NewEntry, rotate_xy
-from robolink.nozzle_change._pin_record import FULL_METHODS, found_pin
+from robolink.nozzle_change._pin_record import finds_pin, found_pin
 from robolink.nozzle_change._plan import ToolPlan
 from robolink.nozzle_change._proposal import Proposal
 from robolink.procedures import FindsStation
@@ -37,7 +37,7 @@ def check_stations(controller: Controller, proposals: Proposals) -> Proposals:
         shift = judge_shifts(list(_shifts(controller, known.get(name), there)))
         if shift is None or not shift.moved:
             continue
-        relying = [one.tool for one in there if one.result.method not in FULL_METHODS]
+        relying = [one.tool for one in there if not finds_pin(one.result)]
         if len(relying) > 1:
             raise _refusal(name, shift)
         judged = [
@@ -61,7 +61,7 @@ def _shifts(
     controller: Controller, station: Station | None, proposals: Sequence[Proposal]
 ) -> Iterator[TipShift]:
     for proposal in proposals:
-        if proposal.result.method in FULL_METHODS:
+        if finds_pin(proposal.result):
             shift = _measured_shift(station, proposal)
         else:
             shift = _supposed_shift(controller, proposal)

@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from robolink.errors import ConfigError
+from robolink.files.named import read_named
 from robolink.messages import tr
-from robolink.named_files import read_named
 
 
 def read_text(path: Path, *, encoding: str) -> str:

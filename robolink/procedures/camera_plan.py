@@ -10,7 +10,6 @@ HALF_ROUND_DEG: Final = (0.0, 60.0, 120.0, 180.0)
 all; a whole turn would bring 0.50 sigma in place of 0.55. In steps of less than half a turn, so
 that no controller has two ways to choose from, and all in one direction."""
 
-
 TWO_ANGLES_DEG: Final = (0.0, 120.0)
 """Two that tell the camera's own error from what is on the tool."""
 

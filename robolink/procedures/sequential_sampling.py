@@ -12,22 +12,16 @@ from robolink.runner import Confirm, Notify, Procedure
 MOST_REPEATED: Final = 3
 """How often one is offered to be taken again; after that the measurement stands as it is."""
 
-
 _DIGITS: Final = 6
 """Residuals that are equal in so many decimals of a millimetre differ by rounding alone."""
 
-
 PlaceT = TypeVar("PlaceT")
-
 
 TakenT = TypeVar("TakenT")
 
-
 ResultT = TypeVar("ResultT", bound=CalibrationResult)
 
-
 PlaceT_contra = TypeVar("PlaceT_contra", contravariant=True)
-
 
 ResultT_co = TypeVar("ResultT_co", bound=CalibrationResult, covariant=True)
 

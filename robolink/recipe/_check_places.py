@@ -5,8 +5,8 @@ from itertools import combinations
 
 from robolink.config import Problem
 from robolink.messages import tr
+from robolink.methods import PointsParameters
 from robolink.recipe._draft import Draft
-from robolink.recipe._sources import PivotSource, PointsSource
 from robolink.recipe._tables import Box, FlangePose, Tool
 
 
@@ -24,24 +24,24 @@ def points(draft: Draft) -> Iterator[Problem]:
     source = draft.source
     if source is None:
         return
-    owners: dict[int, int] = {}
+    parameters, owners = source.parameters, dict[int, int]()
     for place, tool in _tools(draft):
         where = f"{place}.points"
-        if not isinstance(source, PointsSource):
+        if not isinstance(parameters, PointsParameters):
             if tool.points is not None:
                 yield Problem(where, tr('means nothing without kind = "points" in [source]'))
         elif tool.points is None:
             yield Problem(where, tr("is missing: the numbers of the points that touch the pin"))
         else:
-            yield from _counted(where, len(tool.points), source.method)
+            yield from _counted(where, len(tool.points), parameters.method)
             yield from _owned(where, tool, owners)
 
 
 def _counted(where: str, count: int, method: str) -> Iterator[Problem]:
-    if method == "two_pose" and count != 2:
-        yield Problem(where, tr('must hold two points; more need method = "n_angle"'))
-    if method == "n_angle" and count < 3:
-        yield Problem(where, tr('must hold three points or more for method = "n_angle"'))
+    if method == "two-pose" and count != 2:
+        yield Problem(where, tr('must hold two points; more need method = "n-angle"'))
+    if method == "n-angle" and count < 3:
+        yield Problem(where, tr('must hold three points or more for method = "n-angle"'))
 
 
 def _owned(where: str, tool: Tool, owners: dict[int, int]) -> Iterator[Problem]:
@@ -56,7 +56,7 @@ def _owned(where: str, tool: Tool, owners: dict[int, int]) -> Iterator[Problem]:
 
 def standstill(draft: Draft) -> Iterator[Problem]:
     """Check that nothing says how to move where nothing moves."""
-    if draft.source is None or draft.source.moves:
+    if draft.source is None or draft.source.of_method.needs.motion:
         return
     said = [key for key in ("poses", "speeds", "box") if key in draft.given]
     for place, tool in _tools(draft):
@@ -79,7 +79,10 @@ def standstill(draft: Draft) -> Iterator[Problem]:
 def upright(draft: Draft) -> Iterator[Problem]:
     """Check that the flange is tilted only where the measurement can bear it."""
     source = draft.source
-    if source is None or not source.moves or isinstance(source, PivotSource):
+    if source is None:
+        return
+    needs = source.of_method.needs
+    if needs.tilt or not needs.motion:
         return
     safe = draft.poses.safe if draft.poses else None
     for where, pose in [*_poses(draft), *([("poses.safe", safe)] if safe else [])]:
@@ -88,8 +91,8 @@ def upright(draft: Draft) -> Iterator[Problem]:
                 yield Problem(
                     f"{where}.{key}",
                     tr(
-                        'must be 0 with kind = "{kind}", which measures upright; "pivot" alone '
-                        "works on a tilted flange",
+                        'must be 0 with kind = "{kind}", which measures upright; "pivot" and '
+                        '"six-point" work on a tilted flange',
                         kind=source.kind,
                     ),
                 )

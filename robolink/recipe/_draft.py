@@ -4,15 +4,15 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
+from robolink.recipe._method_tables import MethodTable
 from robolink.recipe._recipe import Basis, HeightRule
-from robolink.recipe._sources import AnySource
 from robolink.recipe._tables import (
     Box,
     Output,
     Poses,
     Prompt,
-    Refusal,
-    Station,
+    RefusalTable,
+    StationTable,
     Tolerances,
     Tool,
 )
@@ -30,13 +30,13 @@ class Draft:
     basis: Basis | None = None
     z: HeightRule | None = None
     verify: bool | None = None
-    source: AnySource | None = None
-    station: Station | None = None
+    source: MethodTable | None = None
+    station: StationTable | None = None
     poses: Poses | None = None
     tools: tuple[Tool, ...] | None = None
     box: Box | None = None
     tolerances: Tolerances | None = None
-    refusal: Refusal | None = None
+    refusal: RefusalTable | None = None
     prompts: tuple[Prompt, ...] | None = None
     outputs: tuple[Output, ...] | None = None
 

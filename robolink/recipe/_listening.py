@@ -145,7 +145,7 @@ class RecipeListener(Listener):
         self._controller.outcomes.signature = signature
 
     def _switch(self, output: Output) -> None:
-        outputs: Outputs | None = getattr(self._controller, "io", None)
+        outputs = self._controller.io
         if outputs is None:
             raise ConfigError(
                 tr("{controller} has no outputs.", controller=self._controller.identity),

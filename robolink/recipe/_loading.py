@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from robolink.files.toml import FileKind, Problem
 from robolink.messages import tr
-from robolink.toml_files import FileKind, Problem
 
 if TYPE_CHECKING:
     from robolink.recipe._recipe import Recipe
@@ -30,11 +30,13 @@ class LoadedRecipe:
         path: The file.
         sha256: Hash of the bytes that were read, hexadecimal; the journal keeps it, so that a
             change of the recipe shows.
+        notes: What to tell whoever wrote it: names of before, with those of now.
     """
 
     recipe: "Recipe"
     path: Path
     sha256: str
+    notes: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
@@ -49,11 +51,14 @@ def load_recipe(path: Path) -> LoadedRecipe:
         ConfigError: It cannot be read, is no TOML, or is wrong; every problem is told with
             its path.
     """
+    from robolink.recipe._former_names import with_names_of_now
+
     content = RECIPE_FILE.read(path)
-    recipe, problems = _checked(RECIPE_FILE.parse(path, content))
+    document, notes = with_names_of_now(RECIPE_FILE.parse(path, content))
+    recipe, problems = _checked(document)
     if recipe is None or problems:
         raise RECIPE_FILE.refusal(path, problems)
-    return LoadedRecipe(recipe, path, hashlib.sha256(content).hexdigest())
+    return LoadedRecipe(recipe, path, hashlib.sha256(content).hexdigest(), notes)
 
 
 def check_recipe(path: Path) -> tuple[Problem, ...]:
@@ -70,13 +75,15 @@ def _checked(document: dict[str, object]) -> tuple["Recipe | None", tuple[Proble
 
     from robolink.recipe._checks import problems_together
     from robolink.recipe._draft import Draft
+    from robolink.recipe._former_names import with_names_of_now
     from robolink.recipe._problems import problems_of
-    from robolink.recipe._recipe import Recipe
+    from robolink.recipe._recipe import recipe_of_all_methods
 
     sound: dict[str, object] = {}
     recipe, problems = None, []
+    document, _ = with_names_of_now(document)
     try:
-        recipe = Recipe.model_validate(document, context=sound)
+        recipe = recipe_of_all_methods().model_validate(document, context=sound)
     except ValidationError as error:
         problems = problems_of(error)
     draft = Draft.of(sound, given=document)

@@ -1,30 +1,17 @@
-"""Where a recipe's station is, when the recipe itself does not say it."""
+"""Where a recipe's station is: what the recipe says of it, and what its record adds."""
 
 from collections.abc import Mapping
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.recipe._recipe import Recipe
-from robolink.recipe._sources import (
-    BeamLine,
-    BeamsSource,
-    LookingSource,
-    OneTouchSource,
-    OperatorSource,
-    TouchSource,
-)
-from robolink.stations import (
-    BeamStation,
-    Station,
-    StationKind,
-    beam_station,
-    camera_station,
-    sensor_of,
-)
+from robolink.stations import Station, StationKind
 
 
-def located(recipe: Recipe, stations: Mapping[str, Station]) -> Recipe:
-    """Return the recipe with what the record of its station adds.
+def located(recipe: Recipe, stations: Mapping[str, Station]) -> tuple[Recipe, Station]:
+    """Return the recipe with the place of its station, and the station as the method is told it.
+
+    What the recipe says goes before the record.
 
     Args:
         recipe: The recipe.
@@ -33,19 +20,31 @@ def located(recipe: Recipe, stations: Mapping[str, Station]) -> Recipe:
     Raises:
         ConfigError: Something about the station is needed that neither recipe nor record says.
     """
-    source, place = recipe.source, recipe.station
-    if isinstance(source, BeamsSource):
-        return recipe if source.beams else _with_beams(recipe, source, stations)
-    if isinstance(source, LookingSource):
-        return _with_camera(recipe, source, stations)
-    if isinstance(source, TouchSource) and place.z_mm is None:
-        return _with_place(recipe, _known(recipe, stations, StationKind.TOUCH))
-    pin_needed = isinstance(source, OneTouchSource) or (
-        isinstance(source, OperatorSource) and recipe.z == "measured"
-    )
-    if pin_needed and recipe.basis == "absolute" and place.z_mm is None:
-        return _with_place(recipe, _known(recipe, stations, StationKind.PIN))
-    return recipe
+    place, needs = recipe.station, recipe.source.of_method.needs
+    if place.z_mm is None and _place_needed(recipe):
+        known = _known(recipe, stations)
+        recipe = _with_place(recipe, known)
+    elif _record_needed(recipe) or (needs.sensor and place.id in stations):
+        known = _known(recipe, stations)
+    else:
+        recorded = stations.get(place.id)
+        fits = recorded is not None and recorded.kind is needs.station and needs.place is not None
+        known = recorded if recorded and fits else Station(id=place.id, kind=needs.station)
+    return recipe, _as_told(recipe, known)
+
+
+def _place_needed(recipe: Recipe) -> bool:
+    method = recipe.source.of_method
+    if method.needs.place is not None:
+        return True
+    measured = method.tells_height and recipe.z == "measured"
+    return recipe.basis == "absolute" and (measured or not method.by_reference)
+
+
+def _record_needed(recipe: Recipe) -> bool:
+    needs = recipe.source.of_method.needs
+    known_otherwise = needs.station is StationKind.PIN or needs.place is not None
+    return not known_otherwise and not recipe.source.parameters.states_station()
 
 
 def _with_place(recipe: Recipe, station: Station) -> Recipe:
@@ -56,31 +55,15 @@ def _with_place(recipe: Recipe, station: Station) -> Recipe:
     return recipe.model_copy(update={"station": recipe.station.model_copy(update=given)})
 
 
-def _with_beams(recipe: Recipe, source: BeamsSource, stations: Mapping[str, Station]) -> Recipe:
-    found: BeamStation = beam_station(_known(recipe, stations, StationKind.BEAMS))
-    lines = tuple(
-        BeamLine(input=number, x_mm=beam.x_mm, y_mm=beam.y_mm, direction_deg=beam.direction_deg)
-        for number, beam in zip(found.inputs, found.beams, strict=True)
-    )
-    beams = {"beams": lines, "z_mm": found.z_mm, "off_when_broken": found.off_when_broken}
-    return recipe.model_copy(update={"source": source.model_copy(update=beams)})
+def _as_told(recipe: Recipe, station: Station) -> Station:
+    place = recipe.station
+    if place.z_mm is None or recipe.source.of_method.needs.station is StationKind.BEAMS:
+        return station
+    return station.at(place.x_mm, place.y_mm, place.z_mm, sigma_mm=place.sigma_mm)
 
 
-def _with_camera(recipe: Recipe, source: LookingSource, stations: Mapping[str, Station]) -> Recipe:
-    """Return the recipe with what it does not say itself: place, sensor, meaning of a pixel."""
-    missing = recipe.station.z_mm is None
-    if not missing and recipe.station.id not in stations:
-        return recipe
-    station = _known(recipe, stations, StationKind.CAMERA)
-    located = _with_place(recipe, station) if missing else recipe
-    added: dict[str, object] = {"sensor": source.sensor or sensor_of(station) or None}
-    model = camera_station(station).model
-    if source.model is None and model is not None:
-        added |= {"mm_per_px": model.mm_per_px, "origin_mm": model.origin_mm}
-    return located.model_copy(update={"source": source.model_copy(update=added)})
-
-
-def _known(recipe: Recipe, stations: Mapping[str, Station], kind: StationKind) -> Station:
+def _known(recipe: Recipe, stations: Mapping[str, Station]) -> Station:
+    kind = recipe.source.of_method.needs.station
     station = stations.get(recipe.station.id)
     if station is None:
         raise _unknown(recipe, tr("no station of that name is known"))

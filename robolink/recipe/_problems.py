@@ -5,20 +5,24 @@ Tables and numbers of a list are counted from 1, as people do, hence the sign.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from functools import cache
+from typing import TYPE_CHECKING, Any, Final
 
-from robolink.key_problems import is_not_known, one_of, sentence
+from robolink.files.key_problems import is_not_known, one_of, sentence
+from robolink.files.toml import Problem
 from robolink.messages import tr
 from robolink.recipe._schema import json_schema
-from robolink.toml_files import Problem
 
 if TYPE_CHECKING:
     from pydantic import ValidationError
 
+_known_schema: Final = cache(json_schema)
+"""Only read here; making it takes longer than checking a recipe."""
+
 
 def problems_of(error: "ValidationError") -> list[Problem]:
     """Return everything that pydantic objects to."""
-    schema = json_schema()
+    schema = _known_schema()
     details = error.errors(include_url=False, include_input=False)
     return [_problem(detail, schema) for detail in details if not _follows(detail, details)]
 

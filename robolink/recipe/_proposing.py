@@ -42,7 +42,7 @@ def proposed(
     """
     tip = measured.result.offset
     offset, notes = tip, list[str]()
-    height = contact_z_mm(measured) if recipe.source.touches else None
+    height = contact_z_mm(measured) if recipe.source.of_method.tells_height else None
     if recipe.basis == "difference" and reference is not None:
         # A height that a touch tells is compared below.
         shown = {name for name in measured.result.measured if name != "z_mm" or height is None}

@@ -4,7 +4,8 @@ from typing import Annotated, Literal, TypeVar
 
 from pydantic import ConfigDict, Field, ValidationInfo, field_validator
 
-from robolink.recipe._sources import Source
+from robolink.methods import method_names
+from robolink.recipe._method_tables import AnyKind, MethodTable
 from robolink.recipe._tables import (
     Box,
     Line,
@@ -12,9 +13,9 @@ from robolink.recipe._tables import (
     Output,
     Poses,
     Prompt,
-    Refusal,
+    RefusalTable,
     Speeds,
-    Station,
+    StationTable,
     Table,
     Tolerances,
     Tool,
@@ -46,9 +47,9 @@ class Recipe(Table):
     verify: bool | None = None
     """Whether the robot turns about the new tip after the write. It does so wherever it moves
     unless this is false."""
-    source: Source
+    source: Annotated[MethodTable, AnyKind()]
     """Where the measurements come from."""
-    station: Station
+    station: StationTable
     """Where it is measured."""
     poses: Poses = Field(default_factory=Poses)
     """Poses of the whole change."""
@@ -60,7 +61,7 @@ class Recipe(Table):
     """How far the flange may go from where it is when the recipe starts."""
     tolerances: Tolerances = Field(default_factory=Tolerances)
     """What a measurement must be like to be believed."""
-    refusal: Refusal = Field(default_factory=Refusal)
+    refusal: RefusalTable = Field(default_factory=RefusalTable)
     """What follows when a measurement is not believed."""
     prompts: Annotated[tuple[Prompt, ...], Field(strict=False)] = ()
     """What a person is asked, in this order."""
@@ -70,7 +71,7 @@ class Recipe(Table):
     @property
     def verifies(self) -> bool:
         """Whether the new tips are proved by turning about them."""
-        return self.source.moves and self.verify is not False
+        return self.source.of_method.needs.motion and self.verify is not False
 
     @property
     def attempts(self) -> int:
@@ -84,3 +85,15 @@ class Recipe(Table):
         if isinstance(info.context, dict):
             info.context[info.field_name] = value
         return value
+
+
+_made_for: tuple[str, ...] = method_names()
+
+
+def recipe_of_all_methods() -> type[Recipe]:
+    """Return the recipe, made anew when there are other methods than before."""
+    global _made_for  # noqa: PLW0603 - one registry of methods, one recipe
+    if method_names() != _made_for:
+        Recipe.model_rebuild(force=True)
+        _made_for = method_names()
+    return Recipe

@@ -7,7 +7,7 @@ from functools import partial
 from robolink.config import Cell
 from robolink.errors import ConfigError, NotAllowedError, RobolinkError
 from robolink.messages import tr
-from robolink.model import Controller, EntryKind, Role
+from robolink.model import Controller, EntryKind, PersonRole
 from robolink.nozzle_change import (
     ChangePlan,
     ChangeReport,
@@ -23,9 +23,8 @@ from robolink.recipe._loading import LoadedRecipe
 from robolink.recipe._locating import located
 from robolink.recipe._plans import plan_of
 from robolink.recipe._reference import Reference, find_reference
-from robolink.recipe._sources import OneTouchSource
 from robolink.runner import Operator
-from robolink.stations import find_stations
+from robolink.stations import Station, find_stations
 from robolink.transaction import ChangedSince, changed_since, earlier_corrections
 from robolink.ways import Way, way
 
@@ -73,19 +72,20 @@ class RecipeRun:
         cell: Cell | None = None,
     ) -> None:
         self._controller = controller
-        self._loaded, self._remark = _located(loaded, controller, cell)
+        self._loaded, station, self._remark = _located(loaded, controller, cell)
         self._operator = operator
         self._answers = answers
         self._audience = audience
         self._references: dict[int, Reference] = {}
         self.plan: ChangePlan = plan_of(
             self._loaded.recipe,
+            station,
             controller,
             ask_before_write=ask_before_write,
             accepted_change_mm=accepted_change_mm,
             sensor=sensor,
         )
-        if take_reference and isinstance(loaded.recipe.source, OneTouchSource):
+        if take_reference and not loaded.recipe.source.of_method.by_reference:
             raise ConfigError(
                 tr("This recipe takes no reference: the last calibration on the pin is one."),
                 remedy=tr("Make a full calibration there with the nozzle of before."),
@@ -114,7 +114,7 @@ class RecipeRun:
         self.changed = tuple(change for change in found if change is not None)
         if self._remark:
             self._operator.tell(tr("Warning: {remark}", remark=self._remark))
-        by_reference = not isinstance(recipe.source, OneTouchSource)
+        by_reference = recipe.source.of_method.by_reference
         if recipe.basis == "difference" and by_reference and not self.takes_reference:
             for tool in stored:
                 reference = find_reference(controller, tool, recipe.station.id)
@@ -185,7 +185,7 @@ class RecipeRun:
         if not any(plan.criteria.accepted_change_mm for plan in self.plan.tools):
             return
         signature = self._controller.outcomes.signature
-        if signature.role == Role.OPERATOR:
+        if signature.role == PersonRole.OPERATOR:
             raise NotAllowedError(
                 tr("Letting a tool jump takes an engineer."),
                 remedy=tr(
@@ -213,10 +213,10 @@ def _switched(listener: RecipeListener, *, stopped: bool) -> str:
 
 def _located(
     loaded: LoadedRecipe, controller: Controller, cell: Cell | None
-) -> tuple[LoadedRecipe, str]:
-    """Return the recipe with the place of its station, and what is to be said about that."""
+) -> tuple[LoadedRecipe, Station, str]:
+    """Return the recipe with the place of its station, the station, and a remark about it."""
     entries = controller.outcomes.recorded(kinds=(EntryKind.STATION,))
     stations = find_stations(cell, entries)
-    station = stations.get(loaded.recipe.station.id)
-    recipe = located(loaded.recipe, stations)
-    return replace(loaded, recipe=recipe), station.remark() if station else ""
+    known = stations.get(loaded.recipe.station.id)
+    recipe, station = located(loaded.recipe, stations)
+    return replace(loaded, recipe=recipe), station, known.remark() if known else ""

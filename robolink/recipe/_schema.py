@@ -9,7 +9,7 @@ from typing import Any
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
-from robolink.recipe._recipe import Recipe
+from robolink.recipe._recipe import recipe_of_all_methods
 
 
 class _ForToml(GenerateJsonSchema):
@@ -36,7 +36,7 @@ def json_schema() -> dict[str, Any]:
 
     How the tables go together is beyond a schema; :func:`check_recipe` looks at that.
     """
-    generated = Recipe.model_json_schema(
+    generated = recipe_of_all_methods().model_json_schema(
         ref_template="#/definitions/{model}", schema_generator=_ForToml
     )
     return {

@@ -22,7 +22,6 @@ Length = Annotated[float, Field(ge=0.001)]
 Angle = Annotated[float, Field(ge=-360, le=360)]
 ToolNumber = Annotated[int, Field(ge=1, le=15)]
 OutputNumber = Annotated[int, Field(ge=0, le=0xFFFF)]
-Method = Literal["two_pose", "n_angle"]
 PointNumber = Annotated[int, Field(ge=0, le=999)]
 
 
@@ -51,7 +50,7 @@ class FlangePose(Table):
     u_deg: float
     """U of the flange, degrees."""
     v_deg: Angle = 0.0
-    """V of the flange, degrees; kind = "pivot" only, whose robots can tilt it."""
+    """V of the flange, degrees; "pivot" and "six-point" only, whose robots can tilt it."""
     w_deg: Angle = 0.0
     """W of the flange, degrees; likewise."""
 
@@ -61,7 +60,7 @@ class FlangePose(Table):
         return Pose(self.x_mm, self.y_mm, self.z_mm, self.u_deg, self.v_deg, self.w_deg, tool=0)
 
 
-class Station(Table):
+class StationTable(Table):
     """Where it is measured."""
 
     id: Line
@@ -73,7 +72,7 @@ class Station(Table):
     """Y of the pin's end, for the record, or of where the surface is touched; base, mm."""
     z_mm: float | None = None
     """Z of the pin's end or of the surface, base, mm; z = "measured" needs it, from here or from
-    the station's record, when basis is "absolute", and source "touch" always."""
+    the station's record, when basis is "absolute", and source "z-touch" always."""
     sigma_mm: Length | None = None
     """Standard deviation of each of them, mm, where it is known; one touch with basis "absolute"
     needs it to say how sure it is."""
@@ -136,11 +135,11 @@ class Tolerances(Table):
     """What a measurement must be like to be believed."""
 
     rms_mm: Length | None = None
-    """Largest rms of the residuals, mm; not for "two_pose", which leaves no residual."""
+    """Largest rms of the residuals, mm; not for "two-pose", which leaves no residual."""
     max_mm: Length | None = None
-    """Largest single residual, mm; not for "two_pose"."""
+    """Largest single residual, mm; not for "two-pose"."""
     interval_mm: Length | None = None
-    """Largest half width of the 95 % interval of any measured length, mm; "two_pose" needs sigma_mm
+    """Largest half width of the 95 % interval of any measured length, mm; "two-pose" needs sigma_mm
     for it."""
     sigma_mm: Length | None = None
     """Standard deviation of one coordinate of one touch, or of one crossing, mm, where known."""
@@ -150,7 +149,7 @@ class Tolerances(Table):
     """Largest drift about the new tip that passes the verification, mm."""
 
 
-class Refusal(Table):
+class RefusalTable(Table):
     """What follows when a measurement is not believed."""
 
     action: Literal["stop", "measure_again"] = "stop"

@@ -4,6 +4,7 @@ A map is a TOML file of the schema ``robolink/plc-map/1``; docs/plc-maps.md expl
 It is checked by pydantic, which is imported when a map is loaded and not before.
 """
 
+from robolink.files.toml import Problem as Problem
 from robolink.register_maps._confirmations import Confirmation as Confirmation
 from robolink.register_maps._confirmations import confirm as confirm
 from robolink.register_maps._confirmations import confirmation_of as confirmation_of
@@ -30,4 +31,3 @@ from robolink.register_maps._places import RegisterWords as RegisterWords
 from robolink.register_maps._places import Signal as Signal
 from robolink.register_maps._places import Word as Word
 from robolink.register_maps._places import describe_place as describe_place
-from robolink.toml_files import Problem as Problem

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 from itertools import combinations
 from typing import Final
 
+from robolink.files.toml import Problem
 from robolink.messages import tr
 from robolink.register_maps._map import CommitKind, MapSlot, RegisterMap, span_of
 from robolink.register_maps._numbers import Number
 from robolink.register_maps._places import LAST_ADDRESS, RegisterTable, Signal, Word, describe_place
 from robolink.register_maps._tables import CommitBitKeys, LevelKeys, MapFile
-from robolink.toml_files import Problem
 
 _MOST_READ: Final = 125
 """Registers that one request reads (docs/reference/softmotion.md 4.3)."""

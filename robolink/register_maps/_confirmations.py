@@ -11,8 +11,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Final
 
-from robolink.durable_files import file_name, make_folder, state_folder, sync_folder, write_whole
 from robolink.errors import ConfigError
+from robolink.files.durable import file_name, make_folder, state_folder, sync_folder, write_whole
 from robolink.messages import tr
 from robolink.register_maps._map import RegisterMap
 from robolink.timing import wall_label

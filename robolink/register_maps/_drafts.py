@@ -25,8 +25,8 @@ from pathlib import Path
 from typing import Final
 
 from robolink.errors import ConfigError
+from robolink.files.named import read_named
 from robolink.messages import tr
-from robolink.named_files import read_named
 from robolink.register_maps._map import COMPONENTS
 from robolink.register_maps._places import LAST_ADDRESS, RegisterTable
 from robolink.register_maps._variable_names import component_of

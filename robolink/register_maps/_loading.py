@@ -4,10 +4,10 @@ import hashlib
 from pathlib import Path
 from typing import Final
 
+from robolink.files.toml import FileKind, Problem
 from robolink.messages import tr
 from robolink.register_maps._map import RegisterMap
 from robolink.register_maps._problems import problems_of
-from robolink.toml_files import FileKind, Problem
 
 MAP_FILE: Final = FileKind(
     named=lambda path: tr("The PLC map {path}", path=path),

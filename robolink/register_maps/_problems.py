@@ -6,9 +6,9 @@ Tables of a list are counted from 1, as people do, hence the sign.
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Final
 
-from robolink.key_problems import is_not_known, sentence
+from robolink.files.key_problems import is_not_known, sentence
+from robolink.files.toml import Problem
 from robolink.messages import tr
-from robolink.toml_files import Problem
 
 if TYPE_CHECKING:
     from pydantic import ValidationError

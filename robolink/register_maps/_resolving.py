@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping
 from typing import Final
 
+from robolink.files.toml import Problem
 from robolink.messages import tr
 from robolink.register_maps._map import (
     ANGLES,
@@ -30,7 +31,6 @@ from robolink.register_maps._tables import (
     WordKeys,
     WordsKeys,
 )
-from robolink.toml_files import Problem
 
 _LENGTHS: Final = {"mm": 1.0, "um": 0.001, "m": 1000.0, "inch": 25.4}
 _ANGLES: Final = {"deg": 1.0, "rad": math.degrees(1.0)}

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from robolink.named_files import save_named
+from robolink.files.named import save_named
 from robolink.report._page import render
 from robolink.report._values import Report
 

@@ -138,9 +138,7 @@ class Confirm:
 
 Step = Move | Ask | Seek | Look | Notify | Confirm
 
-
 T = TypeVar("T")
-
 
 Procedure = Generator[Step, Any, T]
 """Yields steps, is sent what each step is answered with, returns a result.

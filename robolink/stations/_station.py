@@ -1,7 +1,7 @@
 """A station as it is known now: from the cell file, from the journal, or from both."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime, timedelta
 from enum import StrEnum
 from typing import Final
@@ -54,6 +54,17 @@ class Station:
     declared: bool = False
     apart_mm: float = 0.0
     details: Mapping[str, object] = field(default_factory=dict)
+
+    def at(
+        self,
+        x_mm: float | None,
+        y_mm: float | None,
+        z_mm: float | None,
+        *,
+        sigma_mm: float | None = None,
+    ) -> "Station":
+        """Return the same station at another place, base."""
+        return replace(self, x_mm=x_mm, y_mm=y_mm, z_mm=z_mm, sigma_mm=sigma_mm)
 
     @property
     def learnt(self) -> bool:

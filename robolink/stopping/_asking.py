@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Final
 
 from robolink import errors
-from robolink.durable_files import state_folder
+from robolink.files.durable import state_folder
 from robolink.messages import tr
 
 KIND: Final = "holders"

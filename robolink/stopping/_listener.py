@@ -21,8 +21,8 @@ from pathlib import Path
 from typing import Final, Protocol
 
 from robolink.closing import ClosedAtExit
-from robolink.durable_files import make_folder, state_folder
 from robolink.errors import RobolinkError
+from robolink.files.durable import make_folder, state_folder
 from robolink.messages import tr
 from robolink.model import ControllerStatus, is_own_name
 from robolink.stopping._far_end import far_end_of

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Set
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from robolink.durable_files import (
+from robolink.files.durable import (
     file_name,
     make_folder,
     state_folder,

@@ -7,7 +7,7 @@ entry-point group ``robolink.transports``.
 
 from collections.abc import Callable, Mapping
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, Protocol, cast
+from typing import TYPE_CHECKING, Any, Final, Protocol, cast
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
@@ -31,6 +31,10 @@ _REGISTER_MEDIA = {
     "modbus-tcp": ("robolink.transport.modbus.opening", "open_modbus"),
     "modbus-rtu": ("robolink.transport.modbus.opening", "open_modbus"),
 }
+
+_loaded: Final[dict[str, Callable[..., Any]]] = {}
+"""What entry points gave, by scheme: finding one reads what every installed package says of
+itself, and what was imported once stays what it is until the process ends."""
 
 
 class TransportOpener(Protocol):
@@ -121,6 +125,12 @@ def _find(link: LinkUrl, media: Mapping[str, tuple[str, str]]) -> Callable[..., 
     if link.medium in media:
         module, name = media[link.medium]
         return cast(Callable[..., Any], getattr(import_module(module), name))
+    if link.scheme not in _loaded:
+        _loaded[link.scheme] = _load(link, media)
+    return _loaded[link.scheme]
+
+
+def _load(link: LinkUrl, media: Mapping[str, tuple[str, str]]) -> Callable[..., Any]:
     from importlib import metadata  # costs more than all of this package; TCP needs none of it
 
     found = metadata.entry_points(group=TRANSPORTS_GROUP, name=link.scheme)

@@ -4,8 +4,8 @@ import json
 from collections.abc import Mapping
 from pathlib import Path
 
-from robolink.durable_files import sync_folder, write_whole
 from robolink.errors import ConfigError
+from robolink.files.durable import sync_folder, write_whole
 from robolink.messages import tr
 
 

@@ -8,14 +8,13 @@ import pytest
 from robolink.calibration import Beam, toward_zero
 from robolink.errors import CalibrationError
 from robolink.methods import (
-    CrossingPlan,
-    ZTouchPlan,
+    BeamsParameters,
+    ZTouchParameters,
     measure_beams,
     measure_z_touch,
     verify_by_crossing,
 )
 from robolink.model import Path, Pose, ToolOffset, rotate_xy
-from robolink.procedures import SamplingPolicy
 from robolink.runner import Confirm, Move, Notify, Seek
 from robolink.stations import BeamStation, TouchStation
 from tests.calibration._simulated import refused
@@ -112,7 +111,7 @@ def _between(pairs, share):
 @pytest.mark.parametrize("turn_deg", [0.0, 180.0])
 def test_an_ideal_tip_is_found_exactly_and_the_rest_is_kept(turn_deg):
     cell = IdealCell(TIP)
-    procedure = measure_beams(STATION, CrossingPlan(), here=HERE, stored=STORED, turn_deg=turn_deg)
+    procedure = measure_beams(STATION, BeamsParameters(turn_deg=turn_deg), here=HERE, stored=STORED)
     found = cell.run(procedure).offset
     assert (found.x_mm, found.y_mm) == pytest.approx((TIP.x_mm, TIP.y_mm), abs=1e-9)
     assert (found.z_mm, found.u_deg) == (STORED.z_mm, STORED.u_deg)
@@ -120,15 +119,15 @@ def test_an_ideal_tip_is_found_exactly_and_the_rest_is_kept(turn_deg):
 
 def test_nothing_turns_and_no_joint_moves_while_the_tip_is_among_the_beams():
     cell = IdealCell(TIP)
-    cell.run(measure_beams(STATION, CrossingPlan(), here=HERE, stored=STORED, turn_deg=180.0))
-    safe_mm = STATION.z_mm + CrossingPlan().lift_mm - STORED.z_mm
+    cell.run(measure_beams(STATION, BeamsParameters(turn_deg=180.0), here=HERE, stored=STORED))
+    safe_mm = STATION.z_mm + BeamsParameters().lift_mm - STORED.z_mm
     require_safe_ways(cell.steps)
     assert cell.frame.z_mm == pytest.approx(safe_mm)
 
 
 def require_safe_ways(steps):
     """Among the beams it goes straight and keeps U; it comes and goes straight up and down."""
-    safe_mm = STATION.z_mm + CrossingPlan().lift_mm - STORED.z_mm - 1e-9
+    safe_mm = STATION.z_mm + BeamsParameters().lift_mm - STORED.z_mm - 1e-9
     before = HERE
     for step in steps:
         down, up = step.target.z_mm < safe_mm, before.z_mm < safe_mm
@@ -151,7 +150,7 @@ The four of the shaft, made before the tool turns, have no number."""
 
 def test_each_crossing_that_others_check_tells_how_it_fits_and_how_sure_the_tip_is():
     cell = IdealCell(TIP, noise_mm=0.003)
-    cell.run(measure_beams(STATION, CrossingPlan(), here=HERE, stored=STORED))
+    cell.run(measure_beams(STATION, BeamsParameters(), here=HERE, stored=STORED))
     assert [text.partition(" agree")[0] for text in cell.told] == [
         f"{count} crossings" for count in (5, 6, 7, 8)
     ]
@@ -164,7 +163,7 @@ def test_each_crossing_that_others_check_tells_how_it_fits_and_how_sure_the_tip_
 
 def test_where_the_beams_are_is_not_relied_on_before_the_tool_has_turned():
     cell = IdealCell(TIP, noise_mm=0.003)
-    cell.run(measure_beams(STATION, CrossingPlan(), here=HERE, stored=STORED, turn_deg=180.0))
+    cell.run(measure_beams(STATION, BeamsParameters(turn_deg=180.0), here=HERE, stored=STORED))
     assert [int(text.split()[0]) for text in cell.told] == [5, 6, 7, 8, *range(11, 17)]
     assert ["are known to" in text for text in cell.told] == [False] * 4 + [True] * 6
     assert "One more, at beam 2 and U -60.0" in cell.told[4]
@@ -178,11 +177,9 @@ def test_the_crossing_that_fits_worst_is_offered_and_it_alone_is_driven_again(
     found = cell.run(
         measure_beams(
             STATION,
-            CrossingPlan(repeats=repeats),
+            BeamsParameters(repeats=repeats, turn_deg=turn_deg, retake=True),
             here=HERE,
             stored=STORED,
-            turn_deg=turn_deg,
-            sampling=SamplingPolicy(retake=True),
         )
     )
     (question, when), *_ = cell.offers
@@ -203,22 +200,14 @@ def test_the_crossing_that_fits_worst_is_offered_and_it_alone_is_driven_again(
 
 def test_of_two_crossings_that_only_check_each_other_the_second_offer_is_the_other():
     cell = IdealCell(TIP, slips=[8], accepts=2)
-    found = cell.run(
-        measure_beams(
-            STATION, CrossingPlan(), here=HERE, stored=STORED, sampling=SamplingPolicy(retake=True)
-        )
-    )
+    found = cell.run(measure_beams(STATION, BeamsParameters(retake=True), here=HERE, stored=STORED))
     assert [question[:10] for question, _ in cell.offers[:2]] == ["Crossing 2", "Crossing 8"]
     assert found.max_residual_mm < 1e-9
 
 
 def test_who_declines_keeps_the_crossings_with_their_doubt():
     cell = IdealCell(TIP, slips=[4])
-    found = cell.run(
-        measure_beams(
-            STATION, CrossingPlan(), here=HERE, stored=STORED, sampling=SamplingPolicy(retake=True)
-        )
-    )
+    found = cell.run(measure_beams(STATION, BeamsParameters(retake=True), here=HERE, stored=STORED))
     assert len(cell.offers) == 1
     assert "large_residual" in found.warnings
 
@@ -229,16 +218,14 @@ def test_who_declines_keeps_the_crossings_with_their_doubt():
 def test_crossings_end_when_the_interval_is_narrow_enough(sigma_mm, turn_deg, least):
     """With two angles not before the tool has turned; the shaft is measured in any case."""
     cell = IdealCell(TIP, noise_mm=0.003)
-    plan = CrossingPlan(repeats=10)
+    plan = BeamsParameters(repeats=10, turn_deg=turn_deg, until_mm=0.03)
     found = cell.run(
         measure_beams(
             STATION,
             plan,
             here=HERE,
             stored=STORED,
-            turn_deg=turn_deg,
             sigma_mm=sigma_mm,
-            sampling=SamplingPolicy(until_mm=0.03),
         )
     )
     assert len(found.inputs) == least
@@ -251,7 +238,7 @@ def test_crossings_end_when_the_interval_is_narrow_enough(sigma_mm, turn_deg, le
 def test_a_silent_beam_lifts_the_tip_straight_up_before_the_refusal():
     cell = IdealCell(TIP, silent=(4,))
     with refused("no_edge"):
-        cell.run(measure_beams(STATION, CrossingPlan(), here=HERE, stored=STORED))
+        cell.run(measure_beams(STATION, BeamsParameters(), here=HERE, stored=STORED))
     seek, lift = cell.steps[-2:]
     assert isinstance(seek, Seek)
     assert isinstance(lift, Move)
@@ -265,7 +252,7 @@ def test_the_drift_is_where_the_tip_of_the_frame_in_force_really_is():
     cell = IdealCell(off, here=replace(HERE, tool=1))
     result = cell.run(
         verify_by_crossing(
-            STATION, CrossingPlan(), here=cell.frame, angles_deg=(-60.0,), tolerance_mm=0.2
+            STATION, BeamsParameters(), here=cell.frame, angles_deg=(-60.0,), tolerance_mm=0.2
         )
     )
     expected = rotate_xy(-off.x_mm, -off.y_mm, -60.0)
@@ -280,7 +267,7 @@ def test_a_tip_that_is_expected_aside_does_not_drift():
     result = cell.run(
         verify_by_crossing(
             STATION,
-            CrossingPlan(),
+            BeamsParameters(),
             here=cell.frame,
             angles_deg=(-60.0,),
             tolerance_mm=0.2,
@@ -292,7 +279,7 @@ def test_a_tip_that_is_expected_aside_does_not_drift():
 
 def test_each_touch_begins_above_the_last_one_and_the_tip_ends_lifted():
     cell = IdealCell(TIP)
-    plan = ZTouchPlan(back_off_mm=0.8)
+    plan = ZTouchParameters(back_off_mm=0.8)
     found = cell.run(measure_z_touch(PLATE, plan, here=HERE, stored=STORED)).offset
     assert found.z_mm == pytest.approx(TIP.z_mm)
     assert found.x_mm == STORED.x_mm
@@ -305,10 +292,8 @@ def test_each_touch_begins_above_the_last_one_and_the_tip_ends_lifted():
 def test_each_touch_tells_how_it_fits_and_the_worst_alone_is_made_again():
     speeds = (2.0, 1.0, 2.0, 1.0, 2.0, 1.0)
     cell = IdealCell(TIP, slips=[3], accepts=1)
-    plan = ZTouchPlan(speeds_mm_s=speeds)
-    found = cell.run(
-        measure_z_touch(PLATE, plan, here=HERE, stored=STORED, sampling=SamplingPolicy(retake=True))
-    )
+    plan = ZTouchParameters(speeds_mm_s=speeds, retake=True)
+    found = cell.run(measure_z_touch(PLATE, plan, here=HERE, stored=STORED))
     assert [text.partition(" agree")[0] for text in cell.told] == [
         f"{count} touches" for count in (3, 4, 5, 6, 6)
     ]
@@ -327,11 +312,8 @@ def test_each_touch_tells_how_it_fits_and_the_worst_alone_is_made_again():
 @pytest.mark.parametrize(("sigma_mm", "least"), [(None, 6), (0.003, 3)])
 def test_touches_end_when_the_interval_is_narrow_enough(sigma_mm, least):
     cell = IdealCell(TIP, noise_mm=0.003)
-    plan = ZTouchPlan(speeds_mm_s=(2.0, 1.0) * 6)
-    sampling = SamplingPolicy(until_mm=0.1)
-    procedure = measure_z_touch(
-        PLATE, plan, here=HERE, stored=STORED, sigma_mm=sigma_mm, sampling=sampling
-    )
+    plan = ZTouchParameters(speeds_mm_s=(2.0, 1.0) * 6, until_mm=0.1)
+    procedure = measure_z_touch(PLATE, plan, here=HERE, stored=STORED, sigma_mm=sigma_mm)
     found = cell.run(procedure)
     assert found.dof == least - 2
     assert len(cell.seeks) == least

@@ -8,7 +8,7 @@ import pytest
 from robolink.calibration import BoardDrawing, CameraModel
 from robolink.errors import CalibrationError
 from robolink.methods import (
-    PatternPlan,
+    CameraAffineParameters,
     measure_board,
     measure_camera,
     measure_camera_affine,
@@ -184,7 +184,9 @@ def test_the_look_that_fits_worst_is_offered_and_taken_again():
 def test_a_camera_of_unknown_pose_is_found_with_the_tip():
     blank = replace(STATION, x_mm=300.8, y_mm=79.5, model=None)
     cell = tip_cell(off_mm=(0.0, 0.0))
-    result = cell.run(measure_camera_affine(blank, PatternPlan(), here=HERE, stored=STORED))
+    result = cell.run(
+        measure_camera_affine(blank, CameraAffineParameters(), here=HERE, stored=STORED)
+    )
     assert miss(result.offset, TIP) < 1e-9
     for found, true in zip(result.camera.mm_per_px, MODEL.mm_per_px, strict=True):
         assert found == pytest.approx(true)
@@ -196,7 +198,7 @@ def test_a_camera_of_unknown_pose_is_found_with_the_tip():
 def test_a_camera_that_is_not_as_it_was_is_refused():
     before = replace(MODEL, mm_per_px=((0.0215, 0.001), (0.001, -0.02)))
     station = replace(STATION, model=before)
-    procedure = measure_camera_affine(station, PatternPlan(), here=HERE, stored=STORED)
+    procedure = measure_camera_affine(station, CameraAffineParameters(), here=HERE, stored=STORED)
     with refused("camera_changed"):
         tip_cell().run(procedure)
 
@@ -204,8 +206,8 @@ def test_a_camera_that_is_not_as_it_was_is_refused():
 @pytest.mark.parametrize(
     ("plan", "code"),
     [
-        (PatternPlan(span_mm=0.0), "rank_deficient"),
-        (PatternPlan(LookPlan(turns_deg=(0.0, 20.0))), "insufficient_rotation"),
+        (CameraAffineParameters(span_mm=0.0), "rank_deficient"),
+        (CameraAffineParameters(turns_deg=(0.0, 20.0)), "insufficient_rotation"),
     ],
 )
 def test_a_pattern_that_cannot_tell_is_refused_before_anything_moves(plan, code):

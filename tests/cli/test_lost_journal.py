@@ -6,13 +6,14 @@ import pytest
 
 from robolink.errors import JournalError
 from robolink.journal import open_journal
-from robolink.journal._opening import _opened, close_files
+from robolink.journal._opening import _closed, _opened, close_files
 
 
 def forget_connections():
     """Begin as a new process does."""
     close_files()
     _opened.clear()
+    _closed.clear()
 
 
 def delete(path):

@@ -11,7 +11,7 @@ from robolink_cli import entry, main
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 
-from robolink.named_files import MOST_BYTES, append_to_named, holds, read_named
+from robolink.files.named import MOST_BYTES, append_to_named, holds, read_named
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="POSIX pipes and devices")
 

@@ -184,15 +184,15 @@ BOARD = ("calibrate", "board")
     ("options", "command", "code", "said"),
     [
         ("", (*AFFINE, "--sensor", "basler"), 7, "No sensor is called"),
-        ("", (*AFFINE, "--sensor", SIM, "--span", "0"), 7, "what a pixel is"),
-        ("", (*AFFINE, "--sensor", SIM, "--angles", "0,20"), 7, "turns the tool by 20.0"),
-        ("", (*AFFINE, "--sensor", SIM, "--angles", "0,0"), 2, "are not angles"),
+        ("", (*AFFINE, "--sensor", SIM, "--span", "0"), 2, "must be at least 0.2"),
+        ("", (*AFFINE, "--sensor", SIM, "--angles", "0,20"), 2, "spread over at least 30"),
+        ("", (*AFFINE, "--sensor", SIM, "--angles", "0,361"), 2, "must be at most 360"),
         ("", AFFINE, 2, "through which sensor"),
         ("?world.camera_miss_share=1", (*AFFINE, "--sensor", SIM), 7, "does not see the tip"),
         ("", ("calibrate", "camera", "--sensor", SIM), 7, "nothing says what they mean"),
-        ("", (*BOARD, "--sensor", SIM, "--spacing", "3"), 7, "3.000 mm apart"),
-        ("", (*BOARD, "--sensor", SIM), 2, "The drawing of the board is missing"),
-        ("", (*BOARD, "--sensor", SIM, "--fiducial", "1"), 2, "is no fiducial"),
+        ("", (*BOARD, "--sensor", SIM, "--spacing", "3"), 2, "must be at least 5"),
+        ("", (*BOARD, "--sensor", SIM), 2, "--fiducial: is missing: say where"),
+        ("", (*BOARD, "--sensor", SIM, "--fiducial", "1"), 2, "must hold 2 numbers"),
     ],
 )
 def test_what_cannot_be_is_refused_with_its_code_and_nothing_is_written(

@@ -156,7 +156,7 @@ def test_a_page_that_cannot_be_saved_changes_nothing_about_the_end(
     def fill_the_disk(*_arguments, **_options):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("robolink.named_files.write_whole", fill_the_disk)
+    monkeypatch.setattr("robolink.files.named.write_whole", fill_the_disk)
     code, out, err = command(*FROM_POSES, "--yes", "--report", "page.html", "--json")
     assert (code, json.loads(out)["report"]) == (0, None)
     assert "cannot be written: No space left on device" in err

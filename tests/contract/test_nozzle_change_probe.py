@@ -6,11 +6,12 @@ import pytest
 from robolink_simulators.epson.options import EpsonOptions
 
 from robolink.errors import CalibrationError, VerifyError
-from robolink.methods import ZTouchPlan, ZTouchSource
+from robolink.methods import ZTouchParameters, ZTouchSource
 from robolink.runner import Move, Seek
 from tests.contract._sensor_cell import TOOL, Followed, sensor_cell
 
-SLOWEST_MM_S, FASTEST_MM_S = min(ZTouchPlan().speeds_mm_s), max(ZTouchPlan().speeds_mm_s)
+SPEEDS_MM_S = ZTouchParameters().speeds_mm_s
+SLOWEST_MM_S, FASTEST_MM_S = min(SPEEDS_MM_S), max(SPEEDS_MM_S)
 DECEL_MM_S2 = 200.0
 BRAKING_MM = FASTEST_MM_S**2 / (2 * DECEL_MM_S2)
 
@@ -66,7 +67,7 @@ def test_the_tip_stops_at_the_touch_and_retreats_before_anything_else(cell):
     followed = Followed()
     cell.run(ZTouchSource(cell.plate), followed, write=False)
     touch_mm = cell.plate.z_mm - cell.truth.z_mm
-    assert len(followed.edges) == len(ZTouchPlan().speeds_mm_s)
+    assert len(followed.edges) == len(ZTouchParameters().speeds_mm_s)
     for done in followed.edges:
         assert done.pose.z_mm > touch_mm - BRAKING_MM - 0.01
         after = followed.steps[followed.steps.index(done) + 1]
@@ -121,7 +122,7 @@ def refused(cell, code, listener=None):
 
 
 def test_a_surface_that_is_not_there_is_sought_so_far_and_no_further(cell):
-    lowest = cell.plate.z_mm - ZTouchPlan().beyond_mm - cell.stored.z_mm
+    lowest = cell.plate.z_mm - ZTouchParameters().beyond_mm - cell.stored.z_mm
     followed = Followed()
     refused(cell, "no_edge", followed)
     assert not followed.edges

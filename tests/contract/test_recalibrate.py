@@ -37,7 +37,7 @@ name = "touch"
 basis = "{basis}"
 z = "{z}"
 [source]
-kind = "operator"
+kind = "two-pose"
 [station]
 id = "PIN"
 {station}
@@ -281,9 +281,7 @@ def test_a_target_outside_the_box_is_refused_before_anything_moves(cell, recipe)
 def test_a_measurement_that_is_refused_is_taken_again_and_then_ends_the_change(cell, recipe):
     source = '[refusal]\naction = "measure_again"\nattempts = 3\n[tolerances]\nrms_mm = 0.001'
     path = Path(recipe(TOUCH, more=source))
-    path.write_text(
-        path.read_text().replace('"operator"', '"operator"\nmethod = "n_angle"\ncount = 3')
-    )
+    path.write_text(path.read_text().replace('"two-pose"', '"n-angle"\ncount = 3'))
     refused = assisted(cell, str(path), "--jsonl")
     assert refused.code == 7, refused.err
     events = [json.loads(line) for line in refused.out.splitlines()]

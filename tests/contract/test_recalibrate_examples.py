@@ -20,6 +20,8 @@ pytestmark = pytest.mark.simulator_only
 EXAMPLES = Path(__file__).parents[2] / "examples" / "recipes"
 BEAMS_MM = (175.0, 488.0, -106.0)
 MOST_S = {"needle-beams": 20.0}
+"""What the product promises. It is counted by the simulated clock, which only movements move on
+here, so it is the same in each run and on each machine: 19.69 s."""
 
 
 @pytest.fixture

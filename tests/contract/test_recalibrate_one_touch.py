@@ -21,7 +21,7 @@ name = "two needles, one touch each"
 basis = "difference"
 z = "measured"
 [source]
-kind = "one_touch"
+kind = "one-touch"
 [station]
 id = "PIN-07"
 [[tools]]
@@ -130,7 +130,7 @@ def test_a_bumped_pin_shifts_all_tools_and_nothing_is_written(arm, tmp_path):
 
 
 EARLY_BEAMS = 'kind = "beams"\nrepeats = 3\nuntil_mm = 0.05\nretake = true'
-EARLY_TOUCH = """kind = "touch"
+EARLY_TOUCH = """kind = "z-touch"
 input = 5
 speeds_mm_s = [2, 1, 2, 1, 2, 1, 2, 1]
 until_mm = 0.1
@@ -159,7 +159,7 @@ def test_a_recipe_names_beams_and_a_surface_by_their_stations_and_may_end_early(
     [
         ('kind = "beams"', "BEAMS-99", "kept", "no station of that name is known"),
         ('kind = "beams"', "PLATE", "kept", "of kind touch, not beams"),
-        ('kind = "operator"', "PIN-07", "measured", "its place is not known"),
+        ('kind = "two-pose"', "PIN-07", "measured", "its place is not known"),
     ],
 )
 def test_a_station_that_nobody_can_place_stops_the_recipe_first(
@@ -175,7 +175,7 @@ def test_a_station_that_nobody_can_place_stops_the_recipe_first(
 def test_a_recipe_offers_the_worst_pose_again_and_the_answer_is_on_record(
     arm, tmp_path, monkeypatch
 ):
-    source = 'kind = "operator"\nmethod = "n_angle"\ncount = 4\nretake = true\nuntil_mm = 1.0'
+    source = 'kind = "n-angle"\ncount = 4\nretake = true\nuntil_mm = 1.0'
     text = AT_STATION.format(source=source, station="PIN-07", z="kept")
     path = written(tmp_path / "recipe.toml", text)
     monkeypatch.setattr("robolink_cli.prompts.questions.on_terminal", lambda: True)

@@ -4,8 +4,12 @@ import json
 
 import pytest
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.epson.options import EpsonOptions, option_names, options_from_text
-from robolink_simulators.epson.profile import read_profile
+from robolink_simulators.epson.options import (
+    EpsonOptions,
+    option_names,
+    options_from_text,
+    read_profile,
+)
 from robolink_simulators.epson.spel.expressions.machine_functions import MACHINE_FUNCTIONS
 from robolink_simulators.faults import Fault, FaultAction
 from robolink_simulators.hosting.in_process.epson import register, unregister

@@ -15,27 +15,7 @@ from pathlib import Path
 _FORKS = multiprocessing.get_context("forkserver")
 _FORKS.set_forkserver_preload(
     [
-        "_pytest.config",  # which the main module of a test run imports, in each fork anew
-        "robolink_cli.main",
-        "robolink_cli.calibrate",
-        "robolink_cli.calibrate.two_pose",
-        "robolink_cli.calibrate._live",
-        "robolink_cli.access.password",
-        "robolink.transport.stream.tcp",
-        "robolink.transport.modbus.opening",
-        "robolink.journal.store.store",
-        "robolink.controllers",
-        "robolink.transaction",
-        "sqlalchemy.dialects.postgresql",
-        "sqlalchemy.dialects.sqlite",
-        "sqlite3",
-        "robolink_simulators.assist.port",
-        "robolink_simulators.cell.clock",
-        "rich.console",
-        "rich.table",
-        "platformdirs",
-        "json",
-        "uuid",
+        "tests.faults._loaded_first",
         # What else is started from here. It imports this module, which is whole by then.
         "tests.faults._change_process",
         "tests.faults._operator_process",

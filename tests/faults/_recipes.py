@@ -12,7 +12,7 @@ basis = "absolute"
 z = "kept"
 
 [source]
-kind = "operator"
+kind = "two-pose"
 lift_mm = 5
 
 [station]
@@ -97,7 +97,7 @@ basis = "absolute"
 z = "kept"
 
 [source]
-kind = "operator"
+kind = "two-pose"
 turn_deg = 60
 lift_mm = 3
 clearance_mm = 1

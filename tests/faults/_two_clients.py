@@ -1,7 +1,7 @@
 """A controller that lets two clients be logged in at once, which no EPSON controller does."""
 
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.epson.remote.link import EpsonLink
+from robolink_simulators.epson.remote.link import EpsonServerLink
 
 from robolink.protocols.epson_text import BadRequest, Request
 
@@ -9,7 +9,7 @@ from robolink.protocols.epson_text import BadRequest, Request
 class SharedSimulator(EpsonSimulator):
     """Without the rule of one client, the lease is all that keeps two operators apart."""
 
-    def take(self, link: EpsonLink, event: Request | BadRequest) -> None:
+    def take(self, link: EpsonServerLink, event: Request | BadRequest) -> None:
         """Serve whoever asks as the one who is logged in, if he has logged in."""
         self._slot.client = link if link in self._logged_in else None
         super().take(link, event)
@@ -18,6 +18,6 @@ class SharedSimulator(EpsonSimulator):
             self._logged_in.add(link)
 
     @property
-    def _logged_in(self) -> set[EpsonLink]:
-        links: set[EpsonLink] = self.__dict__.setdefault("_all_logged_in", set())
+    def _logged_in(self) -> set[EpsonServerLink]:
+        links: set[EpsonServerLink] = self.__dict__.setdefault("_all_logged_in", set())
         return links

@@ -7,7 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from robolink.recipe import json_schema
+from robolink.methods import all_methods
+from robolink.methods.page import method_page
+from robolink.recipe import json_schema, method_table
 
 ROOT = Path(__file__).parents[2]
 SHIPPED = ROOT / "docs" / "recipe.schema.json"
@@ -19,16 +21,7 @@ AGAIN = (
 LATER_THAN_DRAFT_4 = {"const", "$defs", "exclusiveMinimum", "if", "contains", "propertyNames"}
 HEADINGS = {
     "Recipe": "The top of the file",
-    "OperatorSource": '`[source]` with `kind = "operator"`',
-    "PointsSource": '`[source]` with `kind = "points"`',
-    "BeamsSource": '`[source]` with `kind = "beams"`',
     "BeamLine": "`[[source.beams]]`",
-    "TouchSource": '`[source]` with `kind = "touch"`',
-    "CameraSource": '`[source]` with `kind = "camera"`',
-    "CameraAffineSource": '`[source]` with `kind = "camera_affine"`',
-    "BoardSource": '`[source]` with `kind = "board"`',
-    "PivotSource": '`[source]` with `kind = "pivot"`',
-    "OneTouchSource": '`[source]` with `kind = "one_touch"`',
     "Station": "`[station]`",
     "Poses": "`[poses]`",
     "FlangePose": "`[poses]`",
@@ -106,7 +99,26 @@ def test_the_page_explains_every_key_with_its_default_and_limits(table):
 
 
 def test_every_table_has_its_place_on_the_page():
-    assert HEADINGS.keys() == tables(json_schema()).keys()
+    of_methods = {method_table(method).__name__ for method in all_methods()}
+    assert HEADINGS.keys() | of_methods == tables(json_schema()).keys()
+
+
+def test_the_page_of_the_methods_is_not_stale():
+    shipped = (ROOT / "docs" / "methods.md").read_text(encoding="utf-8")
+    assert shipped == method_page(), "run: python -m robolink.methods.page > docs/methods.md"
+
+
+@pytest.mark.parametrize("method", all_methods(), ids=lambda method: method.name)
+def test_the_page_of_the_methods_shows_every_key_with_its_limits(method):
+    _, _, rest = method_page().partition(f"\n## `{method.name}`\n")
+    lines = rest.partition("\n## ")[0]
+    schema = tables(json_schema())[method_table(method).__name__]
+    for key, value in schema["properties"].items():
+        if key == "kind":
+            continue
+        (row,) = (line for line in lines.splitlines() if f"| `{key}` |" in line)
+        for words in spelled(value, required=False):
+            assert re.search(rf"(?<![\w.]){re.escape(words)}(?![\w.])", row), (key, words)
 
 
 @pytest.mark.parametrize(

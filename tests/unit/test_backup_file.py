@@ -18,8 +18,8 @@ from robolink.backup import (
     save,
 )
 from robolink.errors import ConfigError
+from robolink.files.named import require_free
 from robolink.model import ControllerFacts, ToolOffset
-from robolink.named_files import require_free
 
 TIP = ToolOffset(12.345, -3.25, -20.002, 90.0)
 AXES = ("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")

@@ -19,7 +19,7 @@ from robolink.protocols.mailbox import (
     encode_device_id,
 )
 from tests.unit._mailbox_client import linked
-from tests.unit._softmotion_driver_cell import Cell
+from tests.unit.softmotion_driver._cell import Cell
 
 
 @pytest.fixture

@@ -14,7 +14,7 @@ z = "kept"
 [station]
 id = "PIN"
 [source]
-kind = "operator"
+kind = "two-pose"
 [[tools]]
 number = 3
 """
@@ -32,7 +32,7 @@ number = 3
 points = [1, 2]
 """
 BEAMS = (
-    PIN.replace('"operator"', '"beams"\nz_mm = -60')
+    PIN.replace('"two-pose"', '"beams"\nz_mm = -60')
     + """\
 [[source.beams]]
 input = 3
@@ -47,11 +47,11 @@ direction_deg = 88
 """
 )
 TOUCH = (
-    PIN.replace('"operator"', '"touch"\ninput = 5')
+    PIN.replace('"two-pose"', '"z-touch"\ninput = 5')
     .replace('"kept"', '"measured"')
     .replace('id = "PIN"', 'id = "PLATE"\nx_mm = 300\ny_mm = 80\nz_mm = -90')
 )
-ANGLES = PIN.replace('"operator"', '"operator"\nmethod = "n_angle"')
+ANGLES = PIN.replace('"two-pose"', '"n-angle"')
 
 
 def at(x_mm, z_mm):
@@ -80,18 +80,17 @@ def test_the_recipes_that_are_varied_here_are_right(text):
 @pytest.mark.parametrize(
     ("text", "where", "what"),
     [
-        (with_(PIN, "[source]", "count = 4"), "source.count", "means nothing with method"),
+        (with_(PIN, "[source]", "count = 4"), "source.count", "is not known"),
         (
             with_(PIN, "[source]", "angles_deg = [0, 90, 180]"),
             "source.angles_deg",
-            "means nothing with method",
+            "is not known",
         ),
         (
             with_(ANGLES, "[source]", "count = 4", "turn_deg = 180"),
             "source.turn_deg",
-            "means nothing with method",
+            "is not known",
         ),
-        (ANGLES, "source.angles_deg", "is missing"),
         (
             with_(ANGLES, "[source]", "count = 4", "angles_deg = [0, 90, 180]"),
             "source.count",
@@ -149,7 +148,7 @@ def test_the_angles_are_those_of_the_method(text, where, what):
         (
             with_(BEAMS, "[source]", "until_mm = 0.01"),
             "source.until_mm",
-            "has nothing to leave out; use repeats = 3",
+            "has nothing to leave out; give 3 repeats",
         ),
         (BEAMS + "points = [1, 2]\n", "source.beams#2.points", "is not known"),
         (BEAMS.replace("input = 4", "input = -4"), "source.beams#2.input", "must be at least 0"),
@@ -263,10 +262,10 @@ def test_a_camera_has_a_place_and_a_meaning_and_is_judged(text, where, what):
     assert found[where].startswith(what)
 
 
-AFFINE = CAMERA.replace('"camera"', '"camera_affine"')
+AFFINE = CAMERA.replace('"camera"', '"camera-affine"')
 BOARD = CAMERA.replace('"camera"', '"board"\nspacing_mm = 40')
 MARKS = BOARD.replace("spacing_mm = 40", "fiducials_mm = [[20, 0], [-20, 0], [-20, 3]]")
-PIVOT = PIN.replace('"operator"', '"pivot"')
+PIVOT = PIN.replace('"two-pose"', '"pivot"')
 
 
 @pytest.mark.parametrize(
@@ -292,7 +291,7 @@ def test_what_these_kinds_can_measure_is_accepted(text):
     [
         (AFFINE.replace('"kept"', '"measured"'), "z", 'cannot be "measured" by a camera'),
         (BOARD.replace('"kept"', '"measured"'), "z", 'cannot be "measured" by a camera'),
-        (AFFINE.replace("z_mm = -60\n", ""), "station.z_mm", 'is missing: with kind = "camera_aff'),
+        (AFFINE.replace("z_mm = -60\n", ""), "station.z_mm", 'is missing: with kind = "camera-aff'),
         (
             BOARD.replace("x_mm = 300\ny_mm = 80\n", ""),
             "station.x_mm",
@@ -321,7 +320,7 @@ def test_what_these_kinds_can_measure_is_accepted(text):
         (
             PIN.replace("number = 3", f"number = 3\nretreat = {at(1, 2)[:-1]}, v_deg = 5 }}"),
             "tools#1.retreat.v_deg",
-            'must be 0 with kind = "operator", which measures upright',
+            'must be 0 with kind = "two-pose", which measures upright',
         ),
         (
             f"{PIN}[poses]\nsafe = {at(1, 2)[:-1]}, w_deg = 180 }}\n",
@@ -393,12 +392,12 @@ def test_each_tool_stands_there_once():
 @pytest.mark.parametrize(
     ("method", "points", "where"),
     [
-        ("two_pose", "points = [1, 2, 3]", "tools#1.points"),
-        ("n_angle", "points = [1, 2]", "tools#1.points"),
-        ("n_angle", "points = [1, 2, 3]", None),
-        ("two_pose", "", "tools#1.points"),
-        ("two_pose", "points = [1, 1]", "tools#1.points#2"),
-        ("two_pose", "points = [1, 2]\n[[tools]]\nnumber = 4\npoints = [3, 2]", "tools#2.points#2"),
+        ("two-pose", "points = [1, 2, 3]", "tools#1.points"),
+        ("n-angle", "points = [1, 2]", "tools#1.points"),
+        ("n-angle", "points = [1, 2, 3]", None),
+        ("two-pose", "", "tools#1.points"),
+        ("two-pose", "points = [1, 1]", "tools#1.points#2"),
+        ("two-pose", "points = [1, 2]\n[[tools]]\nnumber = 4\npoints = [3, 2]", "tools#2.points#2"),
     ],
 )
 def test_each_tool_has_its_own_points_as_many_as_the_method_needs(method, points, where):
@@ -499,8 +498,9 @@ def test_an_interval_that_no_measurement_reaches_is_refused_beforehand(text, rea
 
 
 def test_an_interval_of_unknown_angles_is_not_judged():
-    text = with_(ANGLES, "[tolerances]", "sigma_mm = 0.1", "interval_mm = 0.001")
-    assert list(problems(text)) == ["source.angles_deg"]
+    wrong = with_(ANGLES, "[source]", "count = 2")
+    text = with_(wrong, "[tolerances]", "sigma_mm = 0.1", "interval_mm = 0.001")
+    assert list(problems(text)) == ["source.count"]
 
 
 def test_attempts_belong_to_measuring_again():

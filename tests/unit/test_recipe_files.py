@@ -5,7 +5,6 @@ import hashlib
 import subprocess
 import sys
 import tomllib
-from dataclasses import fields
 from pathlib import Path
 from typing import get_args
 
@@ -14,21 +13,24 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robolink.errors import ConfigError
-from robolink.methods import CrossingPlan, PatternPlan, ZTouchPlan
+from robolink.methods import (
+    BeamsParameters,
+    BoardParameters,
+    CameraAffineParameters,
+    CameraParameters,
+    NAngleParameters,
+    OneTouchParameters,
+    PivotParameters,
+    PointsParameters,
+    TwoPoseParameters,
+    ZTouchParameters,
+)
 from robolink.nozzle_change import AcceptanceCriteria, Limits, Moment
 from robolink.procedures import TWO_ANGLES_DEG, LookPlan, TouchPlan
 from robolink.recipe import (
-    BeamsSource,
-    BoardSource,
-    CameraAffineSource,
-    CameraSource,
-    OperatorSource,
     Output,
-    PivotSource,
-    PointsSource,
     Prompt,
     Recipe,
-    TouchSource,
     check_recipe,
     load_recipe,
 )
@@ -36,15 +38,15 @@ from robolink.recipe._loading import _checked
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples" / "recipes").iterdir())
 KINDS = (
-    'must be one of "beams", "board", "camera", "camera_affine", "one_touch", "operator", "pivot", '
-    '"points", "touch"'
+    'must be one of "beams", "board", "camera", "camera-affine", "n-angle", "one-touch", "pivot", '
+    '"points", "six-point", "two-pose", "z-touch"'
 )
 LEAST = """\
 schema = "robolink/recipe/1"
 name = "Needle"
 basis = "absolute"
 z = "kept"
-source = { kind = "operator" }
+source = { kind = "two-pose" }
 station = { id = "PIN" }
 tools = [{ number = 1 }]
 """
@@ -96,44 +98,49 @@ def test_the_examples_are_those_that_the_page_describes():
     pivot, gantry, board, beams, one_touch, affine, points, camera, pin, nozzles = (
         load_recipe(path).recipe for path in EXAMPLES
     )
-    assert isinstance(pivot.source, PivotSource)
-    assert (pivot.z, pivot.source.count, pivot.source.tilt_deg) == ("measured", 6, 20)
-    assert isinstance(board.source, BoardSource)
-    assert board.source.drawing
-    assert len(board.source.drawing.fiducials_mm) == 4
-    assert isinstance(affine.source, CameraAffineSource)
-    assert affine.source.model is None
-    assert isinstance(gantry.source, TouchSource)
-    assert (gantry.z, gantry.source.proof_turn_deg) == ("measured", 0.0)
-    assert isinstance(camera.source, CameraSource)
-    assert camera.source.model is not None
-    assert camera.source.model.mirrored
-    assert (one_touch.source.kind, one_touch.z, one_touch.basis) == (
-        "one_touch",
-        "measured",
-        "difference",
-    )
-    assert isinstance(beams.source, BeamsSource)
-    assert ([beam.input for beam in beams.source.beams or ()], beams.attempts) == ([3, 4], 2)
-    assert isinstance(points.source, PointsSource)
+    source = pivot.source.parameters
+    assert isinstance(source, PivotParameters)
+    assert (pivot.z, source.count, source.tilt_deg) == ("measured", 6, 20)
+    source = board.source.parameters
+    assert isinstance(source, BoardParameters)
+    assert source.drawing
+    assert len(source.drawing.fiducials_mm) == 4
+    source = affine.source.parameters
+    assert isinstance(source, CameraAffineParameters)
+    assert source.model is None
+    source = gantry.source.parameters
+    assert isinstance(source, ZTouchParameters)
+    assert (gantry.z, source.proof_turn_deg) == ("measured", 0.0)
+    source = camera.source.parameters
+    assert isinstance(source, CameraParameters)
+    assert source.model is not None
+    assert source.model.mirrored
+    assert isinstance(one_touch.source.parameters, OneTouchParameters)
+    assert (one_touch.z, one_touch.basis) == ("measured", "difference")
+    source = beams.source.parameters
+    assert isinstance(source, BeamsParameters)
+    assert ([beam.input for beam in source.beams or ()], beams.attempts) == ([3, 4], 2)
+    assert isinstance(points.source.parameters, PointsParameters)
     assert (points.basis, points.verifies, points.tools[0].points) == (
         "difference",
         False,
         (901, 902),
     )
-    assert isinstance(pin.source, OperatorSource)
+    source = pin.source.parameters
+    assert isinstance(source, TwoPoseParameters)
     assert (pin.basis, pin.z, pin.verifies, pin.attempts) == ("absolute", "kept", True, 1)
-    assert isinstance(nozzles.source, OperatorSource)
-    assert nozzles.source.turns_deg == (90, 180, 270)
-    assert pin.source.touches_deg == (0, 180)
+    assert source.turn_deg == 180
+    source = nozzles.source.parameters
+    assert isinstance(source, NAngleParameters)
+    assert source.turns_deg == (90, 180, 270)
     assert ([tool.number for tool in nozzles.tools], nozzles.attempts) == ([1, 2], 2)
 
 
 def test_what_is_left_out_is_as_in_a_calibration_by_hand():
     recipe = Recipe.model_validate(tomllib.loads(LEAST))
-    source, limits = recipe.source, Limits()
-    assert isinstance(source, OperatorSource)
-    assert TouchPlan(source.lift_mm, source.clearance_mm, source.turn_deg) == TouchPlan()
+    source, limits = recipe.source.parameters, Limits()
+    assert source == TwoPoseParameters()
+    assert TwoPoseParameters().touch == TouchPlan()
     assert recipe.box.model_dump() == {
         "sideways_mm": limits.box_mm,
         "down_mm": limits.box_down_mm,
@@ -145,43 +152,44 @@ def test_what_is_left_out_is_as_in_a_calibration_by_hand():
     }
     assert recipe.tolerances.jump_mm == AcceptanceCriteria().max_change_mm
     assert recipe.tolerances.drift_mm == AcceptanceCriteria().drift_tolerance_mm
-    assert (recipe.verifies, recipe.attempts, source.turns_deg) == (True, 1, ())
+    assert (recipe.verifies, recipe.attempts) == (True, 1)
 
 
-def test_what_is_left_out_about_beams_is_as_in_the_library():
-    beams = load_recipe(example("needle-beams")).recipe.source
-    assert isinstance(beams, BeamsSource)
-    plan = CrossingPlan()
-    told = {name: field.default for name, field in BeamsSource.model_fields.items()}
-    own = {f"{field.name}": getattr(plan, field.name) for field in fields(plan)}
-    own["crossing_mm_s"] = own.pop("speed_mm_s")
-    assert own.items() <= told.items()
+def test_what_is_left_out_is_as_in_the_procedures():
+    assert CameraParameters().look == LookPlan()
+    assert BoardParameters().look == LookPlan(turns_deg=TWO_ANGLES_DEG)
+    assert NAngleParameters().touch == PivotParameters().touch == TouchPlan()
 
 
-def test_what_is_left_out_about_a_camera_is_as_in_the_library():
-    told = {name: field.default for name, field in CameraSource.model_fields.items()}
-    plan = LookPlan()
-    said = {name: getattr(plan, name) for name in ("turns_deg", "pictures", "lift_mm", "beside_mm")}
-    assert said.items() <= told.items()
+OLD_NAMES = [
+    ('kind = "operator"', TwoPoseParameters(), "two-pose"),
+    ('kind = "operator"\nmethod = "two_pose"\nturn_deg = 90', TwoPoseParameters(turn_deg=90), ""),
+    ('kind = "operator"\nmethod = "n_angle"\ncount = 4', NAngleParameters(count=4), "n-angle"),
+    ('kind = "touch"\ninput = 5', ZTouchParameters(input=5), "z-touch"),
+    ('kind = "one_touch"', OneTouchParameters(), "one-touch"),
+    ('kind = "camera_affine"', CameraAffineParameters(), "camera-affine"),
+    ('kind = "points"\nmethod = "n_angle"', PointsParameters(method="n-angle"), "n-angle"),
+]
 
 
-def test_what_is_left_out_about_a_pattern_a_board_and_tilted_touches_is_as_in_the_library():
-    told = {
-        source: {name: field.default for name, field in source.model_fields.items()}
-        for source in (CameraAffineSource, BoardSource, PivotSource)
-    }
-    pattern, touch = PatternPlan(), TouchPlan()
-    assert told[CameraAffineSource]["span_mm"] == pattern.span_mm
-    assert told[CameraAffineSource]["turns_deg"] == pattern.look.turns_deg
-    assert told[BoardSource]["turns_deg"] == TWO_ANGLES_DEG
-    apart = {"lift_mm": touch.lift_mm, "clearance_mm": touch.clearance_mm}
-    assert apart.items() <= told[PivotSource].items()
+@pytest.mark.parametrize(("source", "meant", "name"), OLD_NAMES)
+def test_a_name_of_before_is_read_and_its_name_of_now_is_told(tmp_path, source, meant, name):
+    path = tmp_path / "old.toml"
+    text = without("source").replace('z = "kept"', 'z = "measured"' if "touch" in source else "")
+    text = text if "touch" in source else text.replace("name =", 'z = "kept"\nname =')
+    points = "points = [1, 2, 3]\n" if "points" in source else ""
+    tools = f"[[tools]]\nnumber = 1\n{points}"
+    text = "".join(line for line in text.splitlines(True) if not line.startswith("tools"))
+    path.write_text(f"{text}\n[source]\n{source}\n{tools}")
+    loaded = load_recipe(path)
+    assert loaded.recipe.source.parameters == meant
+    (note,) = loaded.notes
+    assert "old name" in note
+    assert name in note
 
 
-def test_what_is_left_out_about_touches_is_as_in_the_library():
-    told = {name: field.default for name, field in TouchSource.model_fields.items()}
-    plan = ZTouchPlan()
-    assert {field.name: getattr(plan, field.name) for field in fields(plan)}.items() <= told.items()
+def test_a_name_of_now_needs_no_note():
+    assert all(load_recipe(path).notes == () for path in EXAMPLES)
 
 
 def test_an_output_can_be_switched_at_every_moment_of_a_nozzle_change():
@@ -240,16 +248,16 @@ def test_a_missing_basis_says_what_both_mean(problems):
             "source.kind",
             KINDS,
         ),
-        ('[source]\nkind = "operator"\nlift_mm = 0.5', "source.lift_mm", "must be at least 1"),
-        ('[source]\nkind = "operator"\nturn_deg = 350', "source.turn_deg", "must be at most 330"),
-        ('[source]\nkind = "operator"\ncount = 2', "source.count", "must be at least 3"),
+        ('[source]\nkind = "two-pose"\nlift_mm = 0.5', "source.lift_mm", "must be at least 1"),
+        ('[source]\nkind = "two-pose"\nturn_deg = 350', "source.turn_deg", "must be at most 330"),
+        ('[source]\nkind = "n-angle"\ncount = 2', "source.count", "must be at least 3"),
         (
-            '[source]\nkind = "operator"\nangles_deg = [0, 90]',
+            '[source]\nkind = "n-angle"\nangles_deg = [0, 90]',
             "source.angles_deg",
             "must hold at least 3",
         ),
         (
-            '[source]\nkind = "operator"\nangles_deg = [0, 90, "180"]',
+            '[source]\nkind = "n-angle"\nangles_deg = [0, 90, "180"]',
             "source.angles_deg#3",
             "must be a number",
         ),

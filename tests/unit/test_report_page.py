@@ -7,8 +7,8 @@ import pytest
 
 from robolink.calibration import Drift, VerifyResult, impact_on
 from robolink.errors import ConfigError
+from robolink.files.named import require_free
 from robolink.model import ControllerFacts, Hand, Pose, ToolOffset
-from robolink.named_files import require_free
 from robolink.report import Outcome, Report, render, save
 
 OLD = ToolOffset(12.0, -3.5, -20.0)

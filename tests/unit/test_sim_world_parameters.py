@@ -8,7 +8,7 @@ from statistics import fmean, pstdev
 import pytest
 from robolink_cli.commands.simulate.serving import world_from
 from robolink_simulators.assist.acts import perform
-from robolink_simulators.cell.camera import CameraOptics, SimulatedCamera
+from robolink_simulators.cell.camera import CameraOptics, CameraTruth
 from robolink_simulators.cell.tip_switches import LightBeam
 from robolink_simulators.cell.world_parameters import WorldParameters, parameter_names
 from robolink_simulators.epson import EpsonSimulator
@@ -132,7 +132,7 @@ def optics(**values):
 
 
 def seen(places, **values):
-    return SimulatedCamera((0.0, 0.0, 0.0), optics(**values), random.Random(1)).picture(places)
+    return CameraTruth((0.0, 0.0, 0.0), optics(**values), random.Random(1)).picture(places)
 
 
 def test_a_camera_maps_by_scale_turn_shear_and_mirror():
@@ -164,7 +164,7 @@ def test_what_is_out_of_the_image_or_of_focus_is_not_seen():
 
 
 def test_a_finder_scatters_errs_and_misses_as_often_as_it_is_told():
-    camera = SimulatedCamera((0, 0, 0), optics(noise_px=0.2), random.Random(3))
+    camera = CameraTruth((0, 0, 0), optics(noise_px=0.2), random.Random(3))
     xs = [camera.picture([(0.0, 0.0, 0.0)])[0][0] for _ in range(400)]
     assert pstdev(xs) == pytest.approx(0.2, rel=0.15)
     camera.optics = optics(outlier_share=0.1, miss_share=0.2)

@@ -13,7 +13,7 @@ from robolink.errors import (
     ToolError,
     VerifyError,
 )
-from robolink.model import ANY, EntryKind, MarkerKind, Role, ToolOffset, read_offset
+from robolink.model import ANY, EntryKind, MarkerKind, PersonRole, ToolOffset, read_offset
 from robolink.transaction import ToolChange, Wanted, change_tools, recover
 from tests.unit._transaction_cell import NEW, OLD, OTHER, UNDEFINED, tool_cell, wanted
 
@@ -207,7 +207,7 @@ def test_a_change_that_another_recovered_meanwhile_is_neither_kept_nor_taken_bac
 
 
 def test_an_operator_may_not_write_blindly(cell):
-    with cell.connected(cell.log("Ann", role=Role.OPERATOR)) as controller:
+    with cell.connected(cell.log("Ann", role=PersonRole.OPERATOR)) as controller:
         with pytest.raises(NotAllowedError, match="Ann may not write tool 2 blindly"):
             change_tools(controller, [*wanted(1), Wanted(2, NEW[2], ANY)])
     assert cell.tools == OLD
@@ -216,7 +216,7 @@ def test_an_operator_may_not_write_blindly(cell):
 
 def test_an_engineer_who_writes_blindly_is_on_record(cell):
     cell.put(1, OTHER)
-    with cell.connected(cell.log("Bob", role=Role.ENGINEER)) as controller:
+    with cell.connected(cell.log("Bob", role=PersonRole.ENGINEER)) as controller:
         (receipt,) = change_tools(controller, [Wanted(1, NEW[1], ANY)])
     assert receipt.unconditional
     decision, intent, *_ = cell.entries()

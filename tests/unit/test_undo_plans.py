@@ -9,7 +9,7 @@ from robolink.errors import (
     ToolChangedError,
     ToolError,
 )
-from robolink.model import EntryKind, Marker, MarkerKind, Role, ToolOffset
+from robolink.model import EntryKind, Marker, MarkerKind, PersonRole, ToolOffset
 from robolink.transaction import ToolChange, Wanted, change_tools, plan_undo, undo
 from tests.unit._transaction_cell import NEW, OLD, OTHER, UNDEFINED, tool_cell, wanted
 
@@ -153,7 +153,7 @@ def test_an_entry_of_another_tool_is_refused(cell, controller):
 
 
 def test_an_operator_may_look_but_not_undo(cell):
-    with cell.connected(cell.log(role=Role.OPERATOR)) as controller:
+    with cell.connected(cell.log(role=PersonRole.OPERATOR)) as controller:
         change_tools(controller, wanted(1))
         plan = plan_undo(controller)
         written = cell.writes

@@ -8,8 +8,7 @@ from robolink.messages import tr
 if TYPE_CHECKING:
     from robolink.controllers.epson import EpsonController
     from robolink.controllers.softmotion import SoftMotionController
-    from robolink.methods import PointReader
-    from robolink.model import Controller, DigitalIo
+    from robolink.model import Controller, DigitalIo, PointReader
     from robolink.protocols.epson_text import Preference
 
 
@@ -49,7 +48,7 @@ def points_of(controller: "Controller") -> "PointReader":
     Raises:
         ConfigError: This kind has none.
     """
-    points: PointReader | None = getattr(controller, "points", None)
+    points = controller.points
     if points is None:
         raise _without(controller, tr("taught points"))
     return points
@@ -61,7 +60,7 @@ def io_of(controller: "Controller") -> "DigitalIo":
     Raises:
         ConfigError: This kind has none.
     """
-    io: DigitalIo | None = getattr(controller, "io", None)
+    io = controller.io
     if io is None:
         raise _without(controller, tr("inputs and outputs"))
     return io

@@ -4,9 +4,9 @@ import os
 from pathlib import Path
 
 from robolink.errors import ConfigError
+from robolink.files.named import OthersMayReadError, read_named
 from robolink.messages import tr
 from robolink.model import Secret
-from robolink.named_files import OthersMayReadError, read_named
 
 KEYRING_SERVICE = "robolink"
 _MOST_BYTES = 100_000

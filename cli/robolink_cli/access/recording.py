@@ -29,7 +29,7 @@ def recording(path: str | None, controller: str) -> "Iterator[TraceSink | None]"
     if path is None:
         yield None
         return
-    from robolink.named_files import append_to_named
+    from robolink.files.named import append_to_named
     from robolink.timing import wall_label
     from robolink.transport import DialogueLog, Direction, opening_line, passage_line
 

@@ -1,29 +1,23 @@
 """The frame in which every method calibrates: what was asked for, and the two ways it goes."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import click
-
 from robolink.errors import ConfigError, ReservedToolError, ToolIndexError
 from robolink.messages import tr
 from robolink_cli.options.impact import ImpactRequest, impact_request
-from robolink_cli.options.motion import refuse_motion_options
-from robolink_cli.options.pose_source import PoseSource
 from robolink_cli.options.report import ReportRequest, report_request
 from robolink_cli.prompts.jumps import jump_limit_mm
 from robolink_cli.session.context import CliContext
 
 if TYPE_CHECKING:
-    from robolink.model import Controller
     from robolink.nozzle_change import AcceptanceCriteria, ChangePlan, Limits
-    from robolink.procedures import PoseMethod, TipSource
+    from robolink.procedures import TipSource
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class CalibrationRequest:
     """One calibration of one tool, whatever the method.
 
     Attributes:
@@ -54,11 +48,11 @@ class Frame:
     pin: str = ""
     finds_pin: bool = True
 
-    def at(self, station: str) -> "Frame":
+    def at(self, station: str) -> "CalibrationRequest":
         """Return the same at a station of that name, which goes on record."""
         return replace(self, context=self.context._replace(station=station))
 
-    def at_pin(self, station: str | None, *, finds_pin: bool = True) -> "Frame":
+    def at_pin(self, station: str | None, *, finds_pin: bool = True) -> "CalibrationRequest":
         """Return the same at a pin, whose place is kept for one touch later.
 
         Args:
@@ -67,29 +61,14 @@ class Frame:
         """
         return replace(self.at(station or ""), pin=station or "", finds_pin=finds_pin)
 
-    def measure(self, source: "Callable[[Controller], TipSource]") -> None:
-        """Let the robot measure, then propose, ask, write and verify.
+    def require_something_to_show(self) -> None:
+        """Refuse to show in a dry run what only a measurement can give.
 
-        Args:
-            source: Makes the source for a controller that is connected; it may read there.
+        Raises:
+            ConfigError: An impact or a report is wanted.
         """
-        from robolink_cli.calibrate._live import calibrate_live
-
         if self.dry_run:
             _refuse_to_show_nothing(self.impact, self.report)
-        calibrate_live(self, source)
-
-    def solve(self, poses: PoseSource, method: "Callable[[Controller], PoseMethod]") -> None:
-        """Take poses that exist already, then propose, ask and write. Nothing moves.
-
-        Args:
-            poses: Where they come from.
-            method: Makes the method for a controller that is connected; it may read there.
-        """
-        from robolink_cli.calibrate._given import calibrate_from_poses
-
-        refuse_motion_options(click.get_current_context())
-        calibrate_from_poses(self, poses, method)
 
     def plan(self, source: "TipSource") -> "ChangePlan":
         """Return what is to be done with the measurements of ``source``."""
@@ -120,7 +99,7 @@ def frame_from(
     lot: str | None,
     dry_run: bool,
     yes: bool,
-) -> Frame:
+) -> CalibrationRequest:
     """Return the frame that the options of a command describe.
 
     A larger ``max_change_mm`` than the cell's own takes an engineer.
@@ -141,7 +120,7 @@ def frame_from(
         interval_mm=interval_mm,
         drift_tolerance_mm=tolerance_mm,
     )
-    return Frame(
+    return CalibrationRequest(
         context.with_nozzle(nozzle, lot),
         tool,
         criteria,

@@ -20,9 +20,9 @@ from robolink.nozzle_change import (
 from robolink.procedures import MeasurementContext, PoseMethod
 from robolink.transaction import earlier_corrections
 from robolink_cli.access.warnings import note_change
-from robolink_cli.calibrate._frame import Frame
+from robolink_cli.calibrate._frame import CalibrationRequest
 from robolink_cli.calibrate._listener import CalibrationListener
-from robolink_cli.calibrate._pins import remark_on_pin
+from robolink_cli.calibrate._stations import remark_on_pin
 from robolink_cli.console.render import note, say
 from robolink_cli.options.impact import impact_payload, show_impact
 from robolink_cli.options.pose_source import PoseSource
@@ -41,7 +41,7 @@ class _PosesListener(CalibrationListener):
     def __init__(
         self,
         draft: ReportDraft,
-        frame: Frame,
+        frame: CalibrationRequest,
         given: PointsSource,
         *,
         controller: Controller,
@@ -106,7 +106,7 @@ class _PosesListener(CalibrationListener):
 
 
 def calibrate_from_poses(
-    frame: Frame, source: PoseSource, method_for: Callable[[Controller], PoseMethod]
+    frame: CalibrationRequest, source: PoseSource, method_for: Callable[[Controller], PoseMethod]
 ) -> None:
     """Propose, ask, write and read back.
 
@@ -150,7 +150,7 @@ def calibrate_from_poses(
 
 
 def _carry_out(
-    controller: Controller, frame: Frame, given: PointsSource, listener: Listener
+    controller: Controller, frame: CalibrationRequest, given: PointsSource, listener: Listener
 ) -> ToolReport:
     one = ToolPlan(frame.tool, given, frame.criteria, verify=False, pin=frame.pin)
     change = NozzleChange(
@@ -165,7 +165,7 @@ def _carry_out(
 
 
 def _dry_run(
-    controller: Controller, frame: Frame, given: PointsSource, listener: Listener
+    controller: Controller, frame: CalibrationRequest, given: PointsSource, listener: Listener
 ) -> dict[str, object]:
     """Propose and judge; return the document with what would be sent."""
     before = controller.tools.read(frame.tool)

@@ -1,4 +1,4 @@
-"""The options that every method of ``calibrate`` has, and those of all that touch a pin."""
+"""The options that every method of ``calibrate`` has."""
 
 from collections.abc import Callable
 from functools import wraps
@@ -52,45 +52,6 @@ def calibration_options(function: Callable[..., None]) -> Callable[..., int | No
     command = impact_options(report_options(nozzle_options(command)))
     for option in reversed(_own_options()):
         command = option(command)
-    return command
-
-
-def touch_options(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Add ``--lift`` and ``--clearance``."""
-    below = motion_option(
-        "--clearance",
-        "clearance_mm",
-        type=click.FloatRange(0.5, 50),
-        default=2.0,
-        show_default=True,
-        help=tr("How far above the pin the tip stops; the rest is yours."),
-    )
-    above = motion_option(
-        "--lift", "lift_mm", type=click.FloatRange(1, 100), default=10.0, show_default=True
-    )
-    command: Callable[..., Any] = above(below(function))
-    return command
-
-
-def until_option(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Add ``--until``."""
-    command: Callable[..., Any] = motion_option(
-        "--until",
-        "until_mm",
-        type=_LENGTH,
-        metavar="MM",
-        help=tr("End early when half the 95 % interval of each length is at most this."),
-    )(function)
-    return command
-
-
-def pin_option(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Add ``--station`` for a pin."""
-    command: Callable[..., Any] = click.option(
-        "--station",
-        metavar="ID",
-        help=tr("Name of the pin; where it is found is kept, for one touch later."),
-    )(function)
     return command
 
 

@@ -52,7 +52,7 @@ def report_request(path: Path | None, *, force: bool) -> ReportRequest | None:
     Raises:
         ConfigError: The file cannot be written, or ``--force`` stands alone.
     """
-    from robolink.named_files import require_free
+    from robolink.files.named import require_free
 
     if path is None:
         if force:

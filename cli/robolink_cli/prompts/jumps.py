@@ -92,13 +92,13 @@ def accept_jump(
         NotAllowedError: It takes an engineer; nobody was asked.
         DeclinedError: The answer was no, or nobody could be asked.
     """
-    from robolink.model import Role, require_engineer
+    from robolink.model import PersonRole, require_engineer
 
     if not jump.exceeds(*allowed):
         return False
     outcomes = controller.outcomes
     # Who may not is refused, not asked.
-    if outcomes.signature.role != Role.OPERATOR and jump.exceeds(
+    if outcomes.signature.role != PersonRole.OPERATOR and jump.exceeds(
         accepted.length_mm or allowed.length_mm, accepted.angle_deg or allowed.angle_deg
     ):
         _ask(tool, jump, allowed)

@@ -51,7 +51,7 @@ def signature_of(operator: str | None, cell: "Expected | None", *, changes: bool
     """
     from robolink import __version__
     from robolink.journal import signature_here
-    from robolink.model import Role
+    from robolink.model import PersonRole
 
     people = cell.people if cell else None
     here = signature_here(__version__)
@@ -60,7 +60,7 @@ def signature_of(operator: str | None, cell: "Expected | None", *, changes: bool
     if operator is None and changes:
         operator = _asked_for_badge()
     if not operator:
-        return replace(here, role=Role.OPERATOR)
+        return replace(here, role=PersonRole.OPERATOR)
     if operator not in people:
         raise ConfigError(
             tr("{operator!r} is not among the people of this cell.", operator=operator),

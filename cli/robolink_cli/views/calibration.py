@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from robolink.calibration import VerifyResult
 from robolink.messages import tr
-from robolink.nozzle_change import PlannedStep, Proposal, ToolReport, Verdict
+from robolink.nozzle_change import LimitVerdict, PlannedStep, Proposal, ToolReport
 from robolink.runner import TeachPrompt
 from robolink_cli.console.render import note, say
 from robolink_cli.views.documents import (
@@ -36,7 +36,7 @@ def show_proposal(proposal: Proposal) -> None:
         say(f"  ! {sentence}")
 
 
-def show_verdicts(verdicts: Sequence[Verdict]) -> None:
+def show_verdicts(verdicts: Sequence[LimitVerdict]) -> None:
     """Show what the limits say about a proposal."""
     for verdict in verdicts:
         mark = tr("ok") if verdict.passed else tr("too much")
@@ -87,7 +87,7 @@ def _proof(verification: VerifyResult) -> str:
     )
 
 
-def judged_payload(proposal: Proposal, verdicts: Sequence[Verdict]) -> dict[str, object]:
+def judged_payload(proposal: Proposal, verdicts: Sequence[LimitVerdict]) -> dict[str, object]:
     """Return a proposal with what the limits say about it."""
     judged = [
         {

@@ -17,7 +17,6 @@ from robolink.model import ToolOffset
 
 LEAST_SPACING_MM = 5.0
 
-
 SPACING_TOLERANCE = 0.01
 """Largest relative difference from the nominal spacing (docs/reference/calibration.md 3)."""
 

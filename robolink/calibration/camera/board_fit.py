@@ -24,7 +24,6 @@ from robolink.model import ToolOffset, rotate_xy
 
 UNKNOWNS = 3
 
-
 _KEPT = ("z_mm", "v_deg", "w_deg")
 
 

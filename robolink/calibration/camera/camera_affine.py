@@ -31,9 +31,7 @@ from robolink.model import Pose, ToolOffset
 
 UNKNOWNS = 8
 
-
 MAX_CONDITION = 100.0
-
 
 _KEPT = ("z_mm", "u_deg", "v_deg", "w_deg")
 

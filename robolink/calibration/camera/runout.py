@@ -25,9 +25,7 @@ from robolink.calibration.pin.planar import Complexes
 HARMONICS_FROM = 8
 """Sightings from which on ellipse and second harmonic are looked for."""
 
-
 SIGNIFICANT = 3.0
-
 
 _BENT_ARC_DEG = 180.0
 

@@ -13,12 +13,9 @@ from robolink.model import Pose
 
 MIN_ROTATION_DEG = 30.0
 
-
 WARN_ROTATION_DEG = 90.0
 
-
 _SAME_ANGLE_DEG = 1e-9
-
 
 _LIKE_A_NEEDLE_MM = 150.0
 

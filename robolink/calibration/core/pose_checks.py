@@ -72,6 +72,8 @@ def keep_unmeasured(stored: ToolOffset | None, **measured: float) -> ToolOffset:
 def _check_finite(poses: Sequence[Pose]) -> None:
     names = ("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
     for number, pose in enumerate(poses, start=1):
+        if all(type(value) is float and math.isfinite(value) for value in pose.coordinates()):
+            continue  # nearly always; what is no float may be one all the same
         for name, value in zip(names, pose.coordinates(), strict=True):
             if not isinstance(value, (int, float)) or not math.isfinite(value):
                 raise CalibrationError(

@@ -17,19 +17,14 @@ from robolink.messages import tr
 
 Floats = NDArray[np.float64]
 
-
 Mask = NDArray[np.bool_]
-
 
 FitT = TypeVar("FitT")
 
-
 ResidualsT = TypeVar("ResidualsT")
-
 
 REJECT_BEYOND = 3.0
 """Residual distance, in standard deviations of a coordinate, beyond which a pose is rejected."""
-
 
 MOST_REFITS = 20
 

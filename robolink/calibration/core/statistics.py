@@ -10,7 +10,6 @@ from functools import lru_cache
 NORMAL_95 = 1.959963984540054
 """97.5 % quantile of the normal distribution."""
 
-
 _EXPANDED_ABOVE = 200
 
 

@@ -14,10 +14,8 @@ from robolink.model import Pose
 LEAST_WAY_MM: Final = 5.0
 """A shorter way shows no direction."""
 
-
 GOOD_WAY_MM: Final = 50.0
 """With a scatter of 0.01 mm at both ends it shows one to 0.02 degrees."""
-
 
 _TURNED_DEG: Final = 0.01
 

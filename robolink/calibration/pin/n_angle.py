@@ -19,7 +19,6 @@ RECOMMENDED_POSES = 4
 # Two poses always agree with each other: more have to confirm them before any is an outlier.
 _ROBUST_POSES = 4
 
-
 _KEPT = ("z_mm", "u_deg", "v_deg", "w_deg")
 
 

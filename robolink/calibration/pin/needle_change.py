@@ -19,7 +19,6 @@ from robolink.model import Pose, ToolOffset, rotate_xy
 Point = tuple[float, ...]
 """(x, y) or (x, y, z) in the base, mm."""
 
-
 USUAL_LIMITS = NeedleLimits()
 
 

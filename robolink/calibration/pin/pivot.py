@@ -29,13 +29,10 @@ from robolink.model import Pose, ToolOffset
 
 WARN_CONDITION = 20.0
 
-
 MAX_CONDITION = 100.0
-
 
 LEAST_SINGULAR_VALUE = 0.1
 """Of the 3N x 6 system for 30 poses; it grows with the root of their number."""
-
 
 RECOMMENDED_POSES = 4
 
@@ -43,12 +40,9 @@ RECOMMENDED_POSES = 4
 # Three poses always agree on something; more have to confirm it before any is an outlier.
 _ROBUST_POSES = 5
 
-
 _MEASURED = ("x_mm", "y_mm", "z_mm")
 
-
 _KEPT = ("u_deg", "v_deg", "w_deg")
-
 
 _CLEARLY_ALONG = 0.98
 

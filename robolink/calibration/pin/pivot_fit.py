@@ -28,15 +28,11 @@ from robolink.calibration.core.robust import (
 
 UNKNOWNS = 6
 
-
 MINIMAL = 3
-
 
 QR_ABOVE_CONDITION = 50.0
 
-
 _ONE = np.eye(3)
-
 
 _RANK_BELOW = 1e-9
 """1 - s below this is a direction that the rotations leave alone."""

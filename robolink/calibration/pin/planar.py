@@ -27,13 +27,10 @@ from robolink.calibration.core.robust import (
 
 Complexes = NDArray[np.complex128]
 
-
 UNKNOWNS = 4
-
 
 _NEARLY_PARALLEL = 0.2
 """Draws of two poses that differ by less than about 11 degrees are not believed."""
-
 
 _ALL_PAIRS_UP_TO = 16
 

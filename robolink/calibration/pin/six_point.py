@@ -30,22 +30,17 @@ from robolink.model import Pose, ToolOffset
 MOST_OFF_SQUARE_DEG = 2.0
 """Raw axes that are further from a right angle are refused (docs/reference/calibration.md 2.4)."""
 
-
 FAR_DEG = 45.0
 """A way that leads further from where its axis is stored is nearer to another axis."""
-
 
 _MOST_ASKEW = 2.0
 """How many halves of its 95 % interval the angle between the ways may be off a right angle."""
 
-
 _LEAST_ASKEW_DEG = 0.001
 """Below what a controller prints nothing is doubted."""
 
-
 _START = -3
 """Where among all poses the ways start: before their two ends."""
-
 
 _MEASURED = ("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
 

@@ -21,10 +21,8 @@ from statistics import NormalDist
 ALIKE_PROBABILITY = 0.99
 """Shifts that differ by more than this share of equal ones would are not one shift."""
 
-
 MOVED_PROBABILITY = 0.999
 """A shift is believed when fewer than one in a thousand unmoved stations would show it."""
-
 
 LEAST_SHIFT_MM = 0.05
 """Less is no harm, however sure it is: it is what a touch repeats to."""

@@ -28,6 +28,5 @@ class Tolerance:
 PLANAR_TOLERANCE = Tolerance(rms_mm=0.05, max_residual_mm=0.15)
 """For a camera or a well visible pin on four axes."""
 
-
 TOUCH_TOLERANCE = Tolerance(rms_mm=0.3, max_residual_mm=1.0)
 """For a pin touched with six axes."""

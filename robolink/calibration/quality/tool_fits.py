@@ -22,7 +22,6 @@ from robolink.model import ToolOffset, rotate_xy
 UNSUSPICIOUS_MM = 1.0
 """A change up to this is an ordinary nozzle change and raises no doubt about the tool."""
 
-
 MUCH_NEARER = 4.0
 """Another tool has to explain the poses this many times better before it is named."""
 

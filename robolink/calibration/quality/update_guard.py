@@ -18,7 +18,6 @@ NEEDLE_LIMIT_MM = 2.0
 """Largest plausible change by a new needle; 0.5 mm is usual for a nozzle
 (docs/reference/calibration.md 2.9)."""
 
-
 NOISE_MM = 0.05
 
 

@@ -19,7 +19,6 @@ from robolink.model import Pose, ToolOffset
 PLACING_TOLERANCE_MM = 0.1
 """Drift allowed for placing; dispensing is content with 0.2 (docs/reference/calibration.md 3)."""
 
-
 RECOMMENDED_ANGLES = 4
 
 

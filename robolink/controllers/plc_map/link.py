@@ -1,7 +1,7 @@
 """What every part of this driver works with: registers, the map of them, and when both count."""
 
 from robolink.controllers.driver_link import DriverLink
-from robolink.controllers.plc_map.probe import IdentityReader, require_probe
+from robolink.controllers.plc_map.probe import MapIdentityReader, require_probe
 from robolink.controllers.plc_map.registers import RegisterClient, Registers
 from robolink.errors import ConfigError, NotReadyError, NotReadyReason, RejectedError
 from robolink.messages import tr
@@ -27,7 +27,7 @@ class MappedPlc(DriverLink):
     ) -> None:
         registers = self.registers = Registers(client)
         self.register_map = register_map
-        self._identity = IdentityReader(registers, register_map)
+        self._identity = MapIdentityReader(registers, register_map)
         outcomes.ask(self._identity.read)
         super().__init__(
             client.identity, registers.clock, registers.latch, outcomes, gate=registers.gate

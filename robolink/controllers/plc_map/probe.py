@@ -84,7 +84,7 @@ def _found(registers: Registers, probe: MapProbe) -> Number | None:
     return None
 
 
-class IdentityReader:
+class MapIdentityReader:
     """Reads the machine's own number, where the map says where it stands."""
 
     def __init__(self, registers: Registers, register_map: RegisterMap) -> None:

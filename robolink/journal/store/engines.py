@@ -11,8 +11,8 @@ from urllib.parse import quote
 from sqlalchemy import Engine, create_engine, event, text
 from sqlalchemy.pool import NullPool, Pool, StaticPool
 
-from robolink.durable_files import make_folder, sync_folder
 from robolink.errors import JournalError
+from robolink.files.durable import make_folder, sync_folder
 from robolink.journal._places import JournalPlace
 from robolink.journal.store.prepared import Prepared
 from robolink.messages import tr

@@ -15,8 +15,8 @@ from sqlalchemy import (
     MetaData,
     Table,
     Text,
+    bindparam,
     insert,
-    inspect,
     select,
     text,
     update,
@@ -26,6 +26,7 @@ from sqlalchemy.sql.ddl import DDLElement
 
 from robolink.errors import JournalError
 from robolink.journal.store.chain import FIRST
+from robolink.journal.store.prepared import Prepared, StatementRunner
 from robolink.journal.store.tables import HEAD, IN_A_CHANGE, SCHEMA_VERSION
 from robolink.messages import tr
 from robolink.ways import Way, way
@@ -35,6 +36,11 @@ _NUMBER: Final = BigInteger().with_variant(Integer, "sqlite")
 
 _MAKERS: Final[dict[tuple[Callable[[], MetaData], str], tuple[str, ...]]] = {}
 """The statements that make some tables in a kind of database."""
+
+_FIRST_HEAD: Final = Prepared(insert(HEAD).values(number=0, hash=FIRST))
+_FIRST_VERSION: Final = Prepared(insert(SCHEMA_VERSION).values(version=0))
+_VERSION: Final = Prepared(select(SCHEMA_VERSION.c.version))
+_SET_VERSION: Final = Prepared(update(SCHEMA_VERSION).values(version=bindparam("own")))
 
 
 def _create(connection: Connection, tables: Callable[[], MetaData]) -> None:
@@ -50,14 +56,16 @@ def _create(connection: Connection, tables: Callable[[], MetaData]) -> None:
         makers: list[DDLElement] = [CreateTable(table, if_not_exists=True) for table in wanted]
         makers += [CreateIndex(indexes[name], if_not_exists=True) for name in sorted(indexes)]
         _MAKERS[key] = tuple(str(maker.compile(dialect=dialect)) for maker in makers)
+    runner = StatementRunner(connection)
     for statement in _MAKERS[key]:
-        connection.exec_driver_sql(statement)
+        runner.run_text(statement)
 
 
 def _first_tables(connection: Connection) -> None:
     _create(connection, _first_metadata)
-    connection.execute(insert(HEAD).values(number=0, hash=FIRST))
-    connection.execute(insert(SCHEMA_VERSION).values(version=0))
+    runner = StatementRunner(connection)
+    runner.run(_FIRST_HEAD)
+    runner.run(_FIRST_VERSION)
 
 
 def _first_metadata() -> MetaData:
@@ -131,6 +139,10 @@ def _names(connection: Connection) -> None:
 
     Entries are chained and stay as they are: whose they are stands in ``former_names``.
     """
+    _create(connection, _names_metadata)
+
+
+def _names_metadata() -> MetaData:
     metadata = MetaData()
     Table(
         "addresses",
@@ -139,7 +151,7 @@ def _names(connection: Connection) -> None:
         *map(_text, ("controller", "met_at")),
     )
     Table("former_names", metadata, Column("name", Text, primary_key=True), _text("controller"))
-    metadata.create_all(connection)
+    return metadata
 
 
 MIGRATIONS: tuple[Callable[[Connection], None], ...] = (_first_tables, _names)
@@ -154,7 +166,8 @@ def stored_version(connection: Connection, name: str) -> int:
     Raises:
         JournalError: The database holds something else.
     """
-    tables = inspect(connection).get_table_names()
+    # Not by an Inspector: each command asks, and its memory of the answer serves nobody here.
+    tables = connection.dialect.get_table_names(connection)
     if not tables:
         return 0
     if not {"schema_version", "entries", "head", "markers", "leases"} <= set(tables):
@@ -165,15 +178,15 @@ def stored_version(connection: Connection, name: str) -> int:
                 "ROBOLINK_JOURNAL names it."
             ),
         )
-    version = connection.execute(select(SCHEMA_VERSION.c.version)).scalar_one_or_none()
-    return 0 if version is None else version
+    rows = StatementRunner(connection).rows(_VERSION)
+    return rows[0][0] if rows else 0
 
 
 def migrate(connection: Connection, found: int) -> None:
     """Bring tables of version ``found`` to the present one, inside the caller's transaction."""
     for step in MIGRATIONS[found:]:
         step(connection)
-    connection.execute(update(SCHEMA_VERSION).values(version=len(MIGRATIONS)))
+    StatementRunner(connection).run(_SET_VERSION, {"own": len(MIGRATIONS)})
 
 
 def newer_error(name: str, found: int) -> JournalError:

@@ -107,6 +107,17 @@ class StatementRunner:
             raise self._refused(words.text, error) from error
         return self._cursor.rowcount
 
+    def run_text(self, text: str) -> None:
+        """Run a statement without values that is worded for this database.
+
+        Raises:
+            DBAPIError: The database refuses.
+        """
+        try:
+            self._cursor.execute(text)
+        except self._dialect.loaded_dbapi.Error as error:
+            raise self._refused(text, error) from error
+
     def run_many(self, statement: Prepared, rows: Sequence[Values]) -> None:
         """Run it for each row.
 

@@ -1,1 +1,41 @@
 """beams: two crossed light beams."""
+
+from dataclasses import asdict, replace
+
+from robolink.messages import tr
+from robolink.methods.beams.parameters import BeamsParameters
+from robolink.methods.declaration import Method, Needs
+from robolink.methods.site import Site
+from robolink.procedures import TipSource
+from robolink.stations import StationKind, beam_station
+
+
+def _source(parameters: BeamsParameters, site: Site) -> TipSource:
+    from robolink.methods.beams.source import BeamsSource
+
+    station = site.station
+    if parameters.beams is not None:
+        stated = site.stating(
+            beams=tuple(asdict(line) for line in parameters.beams),
+            off_when_broken=parameters.off_when_broken,
+        )
+        station = replace(stated, z_mm=parameters.z_mm)
+    return BeamsSource(beam_station(station), parameters, sigma_mm=site.sigma_mm)
+
+
+METHOD = Method(
+    name="beams",
+    summary=tr("Drive the tip through two crossed light beams: X and Y."),
+    description=tr(
+        "Drive the tip through two crossed light beams: X and Y; nobody touches anything.\n\n"
+        "As soon as the crossings check each other it says after each how well they agree and how "
+        "sure the tip is. At the end the one that fits worst is named and may be made again.\n\n"
+        "The station is declared in the cell file, or was learnt with 'station learn'. Afterwards "
+        "the tip turns half a turn about itself and crosses the beams again."
+    ),
+    parameters=BeamsParameters,
+    measures=("x_mm", "y_mm"),
+    needs=Needs(station=StationKind.BEAMS),
+    source=_source,
+    unmeasured_z=tr('cannot be "measured" with beams; write "typed" or "kept"'),
+)

@@ -35,7 +35,7 @@ class CrossingSampler:
     shaft: list[Crossing] = field(default_factory=list)
 
     @property
-    def passages(self) -> list[BeamScan]:
+    def scans(self) -> list[BeamScan]:
         """All that are planned for the tip, in their order."""
         return self.first.rounds() + (self.turned.rounds() if self.turned else [])
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 from robolink.calibration import Crossing, where_they_cross
 from robolink.messages import tr
-from robolink.methods.beams.plan import CrossingPlan
+from robolink.methods.beams.parameters import BeamsParameters
 from robolink.model import Path, Pose, ToolOffset, rotate_xy
 from robolink.procedures import approach_path, seek_or_retract
 from robolink.runner import Move, Procedure, Seek
@@ -24,7 +24,7 @@ class BeamDrive:
     """
 
     station: BeamStation
-    plan: CrossingPlan
+    plan: BeamsParameters
     frame: Pose
     tip: ToolOffset
     deeper_mm: float = 0.0
@@ -48,7 +48,7 @@ class BeamDrive:
         )
 
     def round(self, first: int = 0) -> "list[BeamScan]":
-        """Return the passages that cross both beams, both ways, beginning with one of them."""
+        """Return the scans that cross both beams, both ways, beginning with one of them."""
         return [BeamScan(self, beam, side) for beam in (first, 1 - first) for side in (1, -1)]
 
     def rounds(self) -> "list[BeamScan]":
@@ -57,9 +57,7 @@ class BeamDrive:
         Each begins with the beam with which the one before ended. That spares a way, and what
         drifts evenly meanwhile is the same for both beams.
         """
-        return [
-            passage for number in range(self.plan.repeats) for passage in self.round(number % 2)
-        ]
+        return [scan for number in range(self.plan.repeats) for scan in self.round(number % 2)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,14 +106,14 @@ class BeamScan:
         step = Seek(
             self.end,
             drive.station.edge(self.beam, broken=broken),
-            drive.plan.speed_mm_s,
+            drive.plan.crossing_mm_s,
             purpose,
         )
         return (yield from seek_or_retract(step, here=here, safe_z_mm=drive.safe_z_mm))
 
 
 class BeamTravel:
-    """Takes a frame from passage to passage.
+    """Takes a frame from scan to scan.
 
     Among the beams it goes straight and does not turn. It comes and goes straight up and down, and
     whatever turns or goes elsewhere does so above them.
@@ -130,25 +128,25 @@ class BeamTravel:
 
     @property
     def last(self) -> BeamScan | None:
-        """The passage at whose end it stands, ``None`` above the beams."""
+        """The scan at whose end it stands, ``None`` above the beams."""
         return self._last
 
-    def through(self, passages: Sequence[BeamScan]) -> Procedure[list[Crossing]]:
-        """Take passages at one angle of U; begins lifted, or where an earlier call at it ended.
+    def through(self, scans: Sequence[BeamScan]) -> Procedure[list[Crossing]]:
+        """Take scans at one angle of U; begins lifted, or where an earlier call at it ended.
 
         Raises:
             CalibrationError: As :meth:`BeamScan.cross`.
         """
         found = []
-        for passage in passages:
-            start = passage.start
+        for scan in scans:
+            start = scan.start
             if self._last is None:
-                above = replace(start, z_mm=passage.drive.safe_z_mm)
+                above = replace(start, z_mm=scan.drive.safe_z_mm)
                 yield from approach_path(above, here=self._here, purpose=tr("go above the beams"))
             if self._last is None or self._last.end != start:
                 yield Move(start, Path.STRAIGHT, tr("go beside the beam"))
-            found.append((yield from passage.cross()))
-            self._last = passage
+            found.append((yield from scan.cross()))
+            self._last = scan
         return found
 
     def lifted(self) -> Procedure[None]:

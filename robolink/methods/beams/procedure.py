@@ -21,9 +21,9 @@ from robolink.calibration import (
 )
 from robolink.methods.beams.crossings import CrossingSampler
 from robolink.methods.beams.drive import BeamDrive, BeamTravel
-from robolink.methods.beams.plan import CrossingPlan
+from robolink.methods.beams.parameters import BeamsParameters
 from robolink.model import Pose, ToolOffset, rotate_xy
-from robolink.procedures import NO_OFFSET, TAKE_ALL, SamplingPolicy, sample_sequentially
+from robolink.procedures import NO_OFFSET, sample_sequentially
 from robolink.runner import Procedure
 from robolink.stations import BeamStation
 
@@ -33,25 +33,22 @@ REFERENCE_ASIDES_MM: Final = (-12.0, -6.0, 6.0, 12.0)
 
 def measure_beams(
     station: BeamStation,
-    plan: CrossingPlan,
+    plan: BeamsParameters,
     *,
     here: Pose,
     stored: ToolOffset | None,
-    turn_deg: float = 0.0,
     sigma_mm: float | None = None,
-    sampling: SamplingPolicy = TAKE_ALL,
 ) -> Procedure[BeamsResult]:
     """Measure X and Y of a tip with two beams. Runs in Tool 0; see :func:`sample_sequentially`.
 
     Args:
         station: Where the beams are.
-        plan: How they are crossed.
+        plan: How they are crossed. With a turn, U is turned by it, toward zero, for a second
+            measurement: only the directions of the beams are relied on then, not their places, and
+            the offset is absolute.
         here: Where the flange is; its U is that of the measurement.
         stored: The offset stored now; the tip is expected there.
-        turn_deg: Measure again with U turned by this, toward zero. Only the directions of the
-            beams are relied on then, not their places, and the offset is absolute.
         sigma_mm: Standard deviation of one crossing's middle, where it is known.
-        sampling: When it ends, and whether a crossing may be made again.
 
     Raises:
         CalibrationError: ``no_edge``, ``edge_passed``, ``bent_needle``, and those of
@@ -59,17 +56,17 @@ def measure_beams(
     """
     drive = BeamDrive(station, plan, here, stored or NO_OFFSET)
     turned = None
-    if turn_deg:
-        turned = replace(drive, frame=replace(here, u_deg=toward_zero(here.u_deg, turn_deg)))
+    if plan.turn_deg:
+        turned = replace(drive, frame=replace(here, u_deg=toward_zero(here.u_deg, plan.turn_deg)))
     crossings = CrossingSampler(BeamTravel(here), drive, turned, stored, sigma_mm)
-    passages = crossings.passages
-    first = yield from crossings.take(passages[0])
-    return (yield from sample_sequentially(crossings, first, passages, sampling))
+    scans = crossings.scans
+    first = yield from crossings.take(scans[0])
+    return (yield from sample_sequentially(crossings, first, scans, plan.sampling))
 
 
 def trace_beams(
     guess: BeamStation,
-    plan: CrossingPlan,
+    plan: BeamsParameters,
     *,
     here: Pose,
     tip: ToolOffset,
@@ -98,7 +95,7 @@ def trace_beams(
 
 def verify_by_crossing(
     station: BeamStation,
-    plan: CrossingPlan,
+    plan: BeamsParameters,
     *,
     here: Pose,
     angles_deg: Sequence[float],

@@ -1,12 +1,12 @@
 """Two crossed light beams in the cell; nobody has to touch anything."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from robolink.calibration import CalibrationResult, VerifyResult, seen_from
 from robolink.messages import tr
-from robolink.methods.beams.plan import CrossingPlan
+from robolink.methods.beams.parameters import BeamsParameters
 from robolink.model import Pose, ToolOffset
-from robolink.procedures import MeasurementContext, SamplingPolicy
+from robolink.procedures import MeasurementContext
 from robolink.runner import Procedure
 from robolink.stations import BeamStation
 
@@ -20,21 +20,17 @@ class BeamsSource:
     Attributes:
         station: Where the beams are, from the reference record.
         plan: How they are crossed.
-        turn_deg: Measure at a second U too, so that beams that were moved do no harm; 0 for not.
         sigma_mm: Standard deviation of one crossing's middle, where it is known.
-        sampling: When it ends, and whether a crossing is offered to be made again.
     """
 
     station: BeamStation
-    plan: CrossingPlan = field(default_factory=CrossingPlan)
-    turn_deg: float = 0.0
+    plan: BeamsParameters = field(default_factory=BeamsParameters)
     sigma_mm: float | None = None
-    sampling: SamplingPolicy = field(default_factory=SamplingPolicy)
 
     @property
     def sentence(self) -> str:
         """What it does, for a report."""
-        if self.turn_deg:
+        if self.plan.turn_deg:
             return tr("measured on the robot: two crossed beams at two angles of U")
         return tr("measured on the robot: two crossed beams")
 
@@ -53,31 +49,21 @@ class BeamsSource:
         stored: ToolOffset | None,
     ) -> CalibrationResult:
         """Cross and solve; see :class:`~robolink.procedures.MovingSource`."""
-        return context.measure(lambda here: self._steps(stored, here, self.sampling))
+        return context.measure(lambda here: self._steps(stored, here, self.plan))
 
     def procedure(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:
         """Return the steps of a measurement; see :class:`~robolink.procedures.MovingSource`.
 
         All of them: when it ends early depends on crossings that nobody has made yet.
         """
-        return self._steps(stored, here, SamplingPolicy())
+        return self._steps(stored, here, replace(self.plan, until_mm=None, retake=False))
 
     def _steps(
-        self, stored: ToolOffset | None, here: Pose, sampling: SamplingPolicy
+        self, stored: ToolOffset | None, here: Pose, plan: BeamsParameters
     ) -> Procedure[CalibrationResult]:
-        from robolink.methods.beams.procedure import (
-            measure_beams,  # numpy, which a look does without
-        )
+        from robolink.methods.beams.procedure import measure_beams  # numpy, a look does without
 
-        return measure_beams(
-            self.station,
-            self.plan,
-            here=here,
-            stored=stored,
-            turn_deg=self.turn_deg,
-            sigma_mm=self.sigma_mm,
-            sampling=sampling,
-        )
+        return measure_beams(self.station, plan, here=here, stored=stored, sigma_mm=self.sigma_mm)
 
     def verify(
         self,
@@ -94,7 +80,7 @@ class BeamsSource:
 
         context.controller.tools.select(tool)
         # Half a turn on shows an error twofold; where that was measured already, half of it.
-        turn_deg = self.turn_deg / 2 if self.turn_deg else _HALF_A_TURN_DEG
+        turn_deg = self.plan.turn_deg / 2 if self.plan.turn_deg else _HALF_A_TURN_DEG
         measured_deg = result.inputs[-1].u_deg + result.offset.u_deg
         procedure = verify_by_crossing(
             self.station,

@@ -1,1 +1,35 @@
 """camera: a calibrated, up-looking camera sees the tip."""
+
+from robolink.messages import tr
+from robolink.methods.camera.parameters import CameraParameters
+from robolink.methods.declaration import Method, Needs
+from robolink.methods.look_parameters import PLACE, UNMEASURED_Z, camera_at
+from robolink.methods.site import Site
+from robolink.procedures import TipSource
+from robolink.stations import StationKind
+
+
+def _source(parameters: CameraParameters, site: Site) -> TipSource:
+    from robolink.methods.camera.source import CameraSource
+
+    sensor, station = camera_at(parameters, site)
+    return CameraSource(
+        sensor, station, parameters.look, sigma_mm=site.sigma_mm, retake=parameters.retake
+    )
+
+
+METHOD = Method(
+    name="camera",
+    summary=tr("See the tip with a calibrated, up-looking camera: X and Y."),
+    description=tr(
+        "See the tip with an up-looking camera: X and Y; nobody touches anything.\n\n"
+        "What a pixel means is known from 'calibrate camera-affine', or stands in the cell file, "
+        "or the camera answers in millimetres. Looks at several angles tell the tip from what the "
+        "camera itself is off by; a single one believes the camera."
+    ),
+    parameters=CameraParameters,
+    measures=("x_mm", "y_mm"),
+    needs=Needs(station=StationKind.CAMERA, sensor=True, place=PLACE),
+    source=_source,
+    unmeasured_z=UNMEASURED_Z,
+)

@@ -1,1 +1,41 @@
 """camera-affine: an up-looking camera of unknown pose, found together with the tip."""
+
+from dataclasses import replace
+
+from robolink.messages import tr
+from robolink.methods.camera_affine.parameters import CameraAffineParameters
+from robolink.methods.declaration import Former, Method, Needs
+from robolink.methods.look_parameters import PLACE, UNMEASURED_Z, camera_at
+from robolink.methods.site import Site
+from robolink.procedures import TipSource
+from robolink.stations import StationKind
+
+
+def _source(parameters: CameraAffineParameters, site: Site) -> TipSource:
+    from robolink.methods.camera_affine.source import CameraAffineSource
+
+    sensor, station = camera_at(parameters, site)
+    if parameters.new_camera:
+        station = replace(station, model=None)
+    return CameraAffineSource(
+        sensor, station, parameters, sigma_mm=site.sigma_mm, name=site.station.id
+    )
+
+
+METHOD = Method(
+    name="camera-affine",
+    summary=tr("Find an up-looking camera and the tip together."),
+    description=tr(
+        "Find an up-looking camera and the tip together: X and Y, scale, turn and mirror.\n\n"
+        "Say to the command, or in the cell file, where the camera looks to within its field of "
+        "view. The tip goes to four corners of the image and turns in its middle. What was found "
+        "is kept on record under the name of the station; a camera that is not as it was is "
+        "refused."
+    ),
+    parameters=CameraAffineParameters,
+    measures=("x_mm", "y_mm"),
+    needs=Needs(station=StationKind.CAMERA, sensor=True, place=PLACE),
+    source=_source,
+    unmeasured_z=UNMEASURED_Z,
+    formerly=(Former(kind="camera_affine"),),
+)

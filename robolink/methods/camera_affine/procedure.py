@@ -12,7 +12,7 @@ from robolink.calibration import (
 )
 from robolink.errors import CalibrationError
 from robolink.messages import tr
-from robolink.methods.camera_affine.plan import LEAST_SPAN_MM, PatternPlan
+from robolink.methods.camera_affine.parameters import LEAST_SPAN_MM, CameraAffineParameters
 from robolink.model import Pose, ToolOffset
 from robolink.procedures import NO_OFFSET, CameraDrive, CameraSamples, Place
 from robolink.runner import Procedure, SeenAt
@@ -21,12 +21,11 @@ from robolink.stations import CameraStation
 
 def measure_camera_affine(
     station: CameraStation,
-    plan: PatternPlan,
+    plan: CameraAffineParameters,
     *,
     here: Pose,
     stored: ToolOffset | None,
     sigma_mm: float | None = None,
-    retake: bool = False,
 ) -> Procedure[CameraCalibration]:
     """Measure X and Y of a tip, and the camera with it. Runs in Tool 0.
 
@@ -36,11 +35,10 @@ def measure_camera_affine(
     Args:
         station: Where the camera is, to within its field of view; with its model of before,
             against which a changed camera is refused.
-        plan: The pattern.
+        plan: The pattern, and whether the look that fits worst is offered again.
         here: Where the flange is; its U is that of the corners.
         stored: The offset stored now; the tip is expected there.
         sigma_mm: Standard deviation of one coordinate of one look, where it is known.
-        retake: Offer to take the look again that fits worst.
 
     Raises:
         CalibrationError: ``rank_deficient`` and ``insufficient_rotation`` before anything moves
@@ -60,10 +58,10 @@ def measure_camera_affine(
             sightings, stored=stored, sigma_mm=sigma_mm, before=station.model
         )
 
-    return (yield from CameraSamples(drive, solve, here).at(places, retake=retake))
+    return (yield from CameraSamples(drive, solve, here).at(places, retake=plan.retake))
 
 
-def _require_pattern(plan: PatternPlan) -> None:
+def _require_pattern(plan: CameraAffineParameters) -> None:
     """Refuse a pattern that cannot tell camera and offset apart, before anything moves."""
     if plan.span_mm < LEAST_SPAN_MM:
         raise CalibrationError(

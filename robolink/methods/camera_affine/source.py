@@ -4,7 +4,7 @@ from dataclasses import dataclass, field, replace
 
 from robolink.calibration import CalibrationResult, VerifyResult, offset_sigma_mm, seen_from
 from robolink.messages import tr
-from robolink.methods.camera_affine.plan import PatternPlan
+from robolink.methods.camera_affine.parameters import CameraAffineParameters
 from robolink.model import Pose, ToolOffset
 from robolink.procedures import MeasurementContext, angles_between, pixel_camera
 from robolink.runner import Procedure
@@ -21,15 +21,13 @@ class CameraAffineSource:
             that changed is refused.
         plan: The pattern.
         sigma_mm: Standard deviation of one coordinate of one look, where it is known.
-        retake: Offer to take the look again that fits worst.
         name: Name of the station, under which the camera is kept on record; empty for not.
     """
 
     sensor: str
     station: CameraStation
-    plan: PatternPlan = field(default_factory=PatternPlan)
+    plan: CameraAffineParameters = field(default_factory=CameraAffineParameters)
     sigma_mm: float | None = None
-    retake: bool = False
     name: str = ""
 
     @property
@@ -88,9 +86,7 @@ class CameraAffineSource:
 
     def procedure(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:
         """Return the steps of a measurement; see :class:`~robolink.procedures.MovingSource`."""
-        from robolink.methods.camera_affine.procedure import (
-            measure_camera_affine,  # numpy, which a look does without
-        )
+        from robolink.methods.camera_affine.procedure import measure_camera_affine  # numpy, late
 
         return measure_camera_affine(
             self.station,
@@ -98,7 +94,6 @@ class CameraAffineSource:
             here=here,
             stored=stored,
             sigma_mm=self.sigma_mm,
-            retake=self.retake,
         )
 
     def verify(

@@ -45,19 +45,6 @@ def measure_n_angle(
     return (yield from sample_sequentially(turning, first, [first.u_deg, *angles], sampling))
 
 
-def most_informative_order(turns_deg: Sequence[float]) -> tuple[float, ...]:
-    """Return the same angles, those first that tell the most together with the ones before.
-
-    The first touch is at 0. Whoever ends early then ends with angles that are spread well.
-    """
-    chosen, left = [0.0], list(turns_deg)
-    while left:
-        best = min(left, key=lambda turn: (round(_gain([*chosen, turn]), 9), left.index(turn)))
-        left.remove(best)
-        chosen.append(best)
-    return tuple(chosen[1:])
-
-
 @dataclass(slots=True)
 class _NAngleSampler:
     """Touches at angles of U; implements :class:`SequentialSampler`. Each ends lifted off the pin.
@@ -102,7 +89,3 @@ class _NAngleSampler:
 
     def which(self, number: int, pose: Pose) -> str:
         return tr("Pose {number}, at {where}", number=number, where=self.named(pose))
-
-
-def _gain(turns_deg: Sequence[float]) -> float:
-    return planar_sigma_gain([Pose(0.0, 0.0, 0.0, turn) for turn in turns_deg])

@@ -13,7 +13,6 @@ from robolink.procedures import NO_OFFSET
 
 TURNS_DEG: Final = (0.0, 60.0, 120.0, 180.0, -120.0, -60.0)
 
-
 STEP_DEG: Final = 10.0
 """A tool leans by at most this in one movement. Between two poses with the tip at one height the
 joints let it sink by L a^2 / 8, with L from the wrist to the tip: by 0.4 % of L."""
@@ -105,7 +104,6 @@ def apart_deg(one: Pose, other: Pose) -> float:
 
 
 _ANYWHERE: Final = Pose(0.0, 0.0, 0.0, 0.0)
-
 
 _ORIGIN: Final = (0.0, 0.0, 0.0)
 

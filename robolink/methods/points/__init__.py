@@ -1,1 +1,66 @@
-"""points: poses that exist already, taught on the pendant, typed or kept in a file."""
+"""points: poses that exist already, taught on the pendant; nothing moves.
+
+On the command line every method that can do with such poses takes them with ``--points``,
+``--pose`` and ``--poses``, so there is no command of this name.
+"""
+
+from robolink.errors import ConfigError
+from robolink.messages import tr
+from robolink.methods.declaration import Method, Needs
+from robolink.methods.points.parameters import PointsParameters
+from robolink.methods.site import Site
+from robolink.model import Pose
+from robolink.procedures import PoseMethod, TipSource
+from robolink.stations import StationKind
+
+
+def _solver(parameters: PointsParameters, site: Site) -> PoseMethod:
+    from robolink.methods.n_angle.source import ManyTouches
+    from robolink.methods.two_pose.source import TwoTouches
+
+    many = parameters.method == "n-angle"
+    return ManyTouches(site.sigma_mm) if many else TwoTouches(site.sigma_mm)
+
+
+def _source(parameters: PointsParameters, site: Site) -> TipSource:
+    """Return what reads the points.
+
+    Raises:
+        ConfigError: This kind of controller has none.
+    """
+    from robolink.methods.points.source import PointsSource, taught_poses
+
+    points = site.controller.points
+    if points is None:
+        raise ConfigError(
+            tr("{controller} has no taught points.", controller=site.controller.identity),
+            remedy=tr('Use a recipe with source.kind = "two-pose" or "n-angle".'),
+        )
+
+    def read() -> tuple[Pose, ...]:
+        return taught_poses(points, site.points)
+
+    return PointsSource(
+        read,
+        _solver(parameters, site),
+        taught_tool=parameters.taught_tool,
+        plausible_mm=site.max_change_mm,
+        sentence=tr(
+            "points {names} taught on the pendant with tool {tool}",
+            names=", ".join(f"P{number}" for number in site.points),
+            tool=parameters.taught_tool,
+        ),
+    )
+
+
+METHOD = Method(
+    name="points",
+    summary=tr("Take points that were taught on the pendant: X and Y; nothing moves."),
+    description=tr("Points taught on the pendant are read from the controller; nothing moves."),
+    parameters=PointsParameters,
+    measures=("x_mm", "y_mm"),
+    needs=Needs(station=StationKind.PIN, named=False, motion=False),
+    source=_source,
+    unmeasured_z=tr('cannot be "measured" from taught points; write "typed" or "kept"'),
+    command=False,
+)

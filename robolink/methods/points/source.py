@@ -5,9 +5,8 @@ With the guard open in Teach, where a person touches a tip to a pin, a PC comman
 moves here and no tool is selected; therefore nothing is proved by turning about the new tip either.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 from robolink.calibration import (
     CalibrationResult,
@@ -20,16 +19,9 @@ from robolink.calibration import (
 from robolink.errors import CalibrationError, UndefinedToolError
 from robolink.messages import tr
 from robolink.methods.two_pose.source import TwoTouches
-from robolink.model import Controller, Pose, ToolOffset
+from robolink.model import Controller, PointReader, Pose, ToolOffset
 from robolink.procedures import MeasurementContext, PoseMethod
 from robolink.ways import Way, way
-
-
-class PointReader(Protocol):
-    """The taught points of a controller."""
-
-    def read_all(self, numbers: Sequence[int]) -> Mapping[int, Pose | None]:
-        """Read some of them; an undefined one is ``None``."""
 
 
 def taught_poses(points: PointReader, numbers: Sequence[int]) -> tuple[Pose, ...]:

@@ -1,1 +1,56 @@
 """six-point: position and orientation of a tool, on five axes and six."""
+
+from robolink.messages import tr
+from robolink.methods.declaration import Method, Needs, PoseHelp
+from robolink.methods.site import Site
+from robolink.methods.six_point.parameters import SixPointParameters
+from robolink.procedures import PoseMethod, TipSource
+from robolink.stations import StationKind
+
+
+def _source(parameters: SixPointParameters, site: Site) -> TipSource:
+    from robolink.methods.pivot.axes import require_tilting
+    from robolink.methods.pivot.tilts import informative_tilts  # numpy, for this robot alone
+    from robolink.methods.six_point.procedure import AxisTeachPlan
+    from robolink.methods.six_point.source import SixPointSource
+
+    require_tilting(site.controller, METHOD.name)
+    return SixPointSource(
+        informative_tilts(parameters.count - 1, parameters.tilt_deg),
+        parameters.touch,
+        sigma_mm=site.sigma_mm,
+        sampling=parameters.sampling,
+        ways=AxisTeachPlan(parameters.way_mm, parameters.second_is),
+    )
+
+
+def _from_poses(parameters: SixPointParameters, site: Site) -> PoseMethod:
+    from robolink.methods.six_point.source import SixPoints
+
+    return SixPoints(parameters.second_is, site.sigma_mm)
+
+
+METHOD = Method(
+    name="six-point",
+    summary=tr("A pivot and two ways along the tool's axes: all six components."),
+    description=tr(
+        "Find all six components: a pivot, then a way along the tool's X and one along its Z.\n\n"
+        "The touches go as in 'calibrate pivot'. Then, in the air and without turning, you bring "
+        "the tip to where it has room, and jog it along the tool's own +X; the robot goes straight "
+        "back; and along its own +Z. A way that is too short or has turned is said at once. The "
+        "work box reaches higher by the length of a way.\n\n"
+        "With poses that exist already nothing moves: three or more on one pin, tilted and turned; "
+        "the last two, in this order, after a way along +X and one along +Z, both from the last "
+        "pose on the pin."
+    ),
+    parameters=SixPointParameters,
+    measures=("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg"),
+    needs=Needs(station=StationKind.PIN, named=False, finds_pin=True, tilt=True),
+    source=_source,
+    from_poses=_from_poses,
+    pose_help=PoseHelp(
+        points=tr("The points on the pin, then the one along X and the one along Z."),
+        typed=tr("A pose X,Y,Z,U,V,W in mm and degrees; give it five times or more."),
+        path=tr("A .json or .csv file with x_mm, y_mm, z_mm, u_deg, v_deg and w_deg of each pose."),
+    ),
+)

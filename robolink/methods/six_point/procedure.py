@@ -29,7 +29,6 @@ from robolink.runner import Ask, Confirm, Move, Notify, Procedure, TeachPrompt
 
 _SIDE_DEG: Final = 90.0
 
-
 MOST_SHOWINGS: Final = 3
 """How often a person is asked for the same thing before the refusal ends the measurement."""
 

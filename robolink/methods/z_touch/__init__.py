@@ -1,1 +1,42 @@
-"""z-touch: a surface that switches an input."""
+"""z-touch: a surface that switches an input when a tip touches it."""
+
+from robolink.messages import tr
+from robolink.methods.declaration import Former, Method, Needs
+from robolink.methods.site import Site
+from robolink.methods.z_touch.parameters import ZTouchParameters
+from robolink.procedures import TipSource
+from robolink.stations import StationKind, touch_station
+
+
+def _source(parameters: ZTouchParameters, site: Site) -> TipSource:
+    from robolink.methods.z_touch.source import ZTouchSource
+
+    stated = parameters.input is not None
+    station = site.stating(
+        input=parameters.input, off_when_touched=parameters.off_when_touched if stated else None
+    )
+    return ZTouchSource(touch_station(station), parameters, sigma_mm=site.sigma_mm)
+
+
+METHOD = Method(
+    name="z-touch",
+    summary=tr("Touch a surface that switches an input: Z."),
+    description=tr(
+        "Touch a surface that switches an input: Z; nobody touches anything.\n\n"
+        "X and Y are kept. The tip stops at the touch and retreats; two speeds tell the latency. "
+        "After each touch from the third on it says how well they agree and how sure Z is; at the "
+        "end the one that fits worst is named and may be made again."
+    ),
+    parameters=ZTouchParameters,
+    measures=("z_mm",),
+    needs=Needs(
+        station=StationKind.TOUCH,
+        place=(
+            tr('is missing: with kind = "{kind}" it is where to touch'),
+            tr('is missing: with kind = "{kind}" it is the surface'),
+        ),
+    ),
+    source=_source,
+    tells_height=True,
+    formerly=(Former(kind="touch"),),
+)

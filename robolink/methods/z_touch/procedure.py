@@ -12,12 +12,10 @@ from robolink.calibration import (
     touch_sigma_gain,
 )
 from robolink.messages import tr
-from robolink.methods.z_touch.plan import ZTouchPlan
+from robolink.methods.z_touch.parameters import ZTouchParameters
 from robolink.model import Path, Pose, ToolOffset, rotate_xy
 from robolink.procedures import (
     NO_OFFSET,
-    TAKE_ALL,
-    SamplingPolicy,
     approach_path,
     offset_z,
     sample_sequentially,
@@ -29,12 +27,11 @@ from robolink.stations import TouchStation
 
 def measure_z_touch(
     station: TouchStation,
-    plan: ZTouchPlan,
+    plan: ZTouchParameters,
     *,
     here: Pose,
     stored: ToolOffset | None,
     sigma_mm: float | None = None,
-    sampling: SamplingPolicy = TAKE_ALL,
 ) -> Procedure[ZTouchResult]:
     """Measure Z of a tip by touching a surface. Runs in Tool 0; see :func:`sample_sequentially`.
 
@@ -44,19 +41,18 @@ def measure_z_touch(
         here: Where the flange is.
         stored: The offset stored now; the tip is expected there.
         sigma_mm: Standard deviation of one touch, where it is known.
-        sampling: When it ends, and whether a touch may be made again.
 
     Raises:
         CalibrationError: ``no_edge``, ``edge_passed``, and those of :func:`solve_z_touch`.
     """
     probing = _ZTouchSampler(station, plan, here, stored or NO_OFFSET, here, stored, sigma_mm)
     first = yield from probing.take(plan.speeds_mm_s[0])
-    return (yield from sample_sequentially(probing, first, plan.speeds_mm_s, sampling))
+    return (yield from sample_sequentially(probing, first, plan.speeds_mm_s, plan.sampling))
 
 
 def verify_by_touching(
     station: TouchStation,
-    plan: ZTouchPlan,
+    plan: ZTouchParameters,
     *,
     here: Pose,
     angles_deg: Sequence[float],
@@ -103,7 +99,7 @@ class _ZTouchSampler:
     """
 
     station: TouchStation
-    plan: ZTouchPlan
+    plan: ZTouchParameters
     frame: Pose
     tip: ToolOffset
     here: Pose

@@ -1,12 +1,12 @@
 """A surface in the cell that switches an input when a tip touches it."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from robolink.calibration import CalibrationResult, VerifyResult, seen_from
 from robolink.messages import tr
-from robolink.methods.z_touch.plan import ZTouchPlan
+from robolink.methods.z_touch.parameters import ZTouchParameters
 from robolink.model import Pose, ToolOffset
-from robolink.procedures import MeasurementContext, SamplingPolicy
+from robolink.procedures import MeasurementContext
 from robolink.runner import Procedure
 from robolink.stations import TouchStation
 
@@ -19,16 +19,11 @@ class ZTouchSource:
         station: Where the surface is.
         plan: How it is touched.
         sigma_mm: Standard deviation of one touch, where it is known.
-        proof_turn_deg: By how much U differs at the touch that proves the new value; 0 on a
-            machine that cannot turn.
-        sampling: When it ends, and whether a touch is offered to be made again.
     """
 
     station: TouchStation
-    plan: ZTouchPlan = field(default_factory=ZTouchPlan)
+    plan: ZTouchParameters = field(default_factory=ZTouchParameters)
     sigma_mm: float | None = None
-    proof_turn_deg: float = 180.0
-    sampling: SamplingPolicy = field(default_factory=SamplingPolicy)
 
     @property
     def sentence(self) -> str:
@@ -47,30 +42,21 @@ class ZTouchSource:
         stored: ToolOffset | None,
     ) -> CalibrationResult:
         """Touch and solve; see :class:`~robolink.procedures.MovingSource`."""
-        return context.measure(lambda here: self._steps(stored, here, self.sampling))
+        return context.measure(lambda here: self._steps(stored, here, self.plan))
 
     def procedure(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:
         """Return the steps of a measurement; see :class:`~robolink.procedures.MovingSource`.
 
         All of them: when it ends early depends on touches that nobody has made yet.
         """
-        return self._steps(stored, here, SamplingPolicy())
+        return self._steps(stored, here, replace(self.plan, until_mm=None, retake=False))
 
     def _steps(
-        self, stored: ToolOffset | None, here: Pose, sampling: SamplingPolicy
+        self, stored: ToolOffset | None, here: Pose, plan: ZTouchParameters
     ) -> Procedure[CalibrationResult]:
-        from robolink.methods.z_touch.procedure import (
-            measure_z_touch,  # numpy, which a look does without
-        )
+        from robolink.methods.z_touch.procedure import measure_z_touch  # numpy, late
 
-        return measure_z_touch(
-            self.station,
-            self.plan,
-            here=here,
-            stored=stored,
-            sigma_mm=self.sigma_mm,
-            sampling=sampling,
-        )
+        return measure_z_touch(self.station, plan, here=here, stored=stored, sigma_mm=self.sigma_mm)
 
     def verify(
         self,
@@ -91,7 +77,7 @@ class ZTouchSource:
             self.station,
             self.plan,
             here=here,
-            angles_deg=(toward_zero(here.u_deg, self.proof_turn_deg),),
+            angles_deg=(toward_zero(here.u_deg, self.plan.proof_turn_deg),),
             tolerance_mm=tolerance_mm,
             aside=seen_from(result.offset, tip),
         )

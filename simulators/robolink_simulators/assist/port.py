@@ -17,7 +17,7 @@ from robolink.errors import ConfigError, ConnectError, RobolinkError, TransportB
 from robolink.messages import tr
 from robolink_simulators.assist.acts import Assisted, perform
 from robolink_simulators.cell.clock import ScaledClock
-from robolink_simulators.cell.person import Look
+from robolink_simulators.cell.person import PersonLook
 from robolink_simulators.cell.places import Axis, XyzMm
 from robolink_simulators.epson.refusals import SpelRefusal
 from robolink_simulators.hosting.in_process import epson as in_process
@@ -154,9 +154,9 @@ class AssistClient(ClosedAtExit):
             raise ConfigError(str(answer["error"]))
         return answer
 
-    def look(self, tool: int | None = None) -> Look:
+    def look(self, tool: int | None = None) -> PersonLook:
         """Return the vector, in base axes, that the operator sees from the tip to the pin."""
-        return Look(**(self.do("look") if tool is None else self.do("look", tool=tool)))
+        return PersonLook(**(self.do("look") if tool is None else self.do("look", tool=tool)))
 
     def way_along(self, axis: Axis, length_mm: float, tool: int) -> XyzMm:
         """Return the way, in base axes, that the operator sees an axis of a tool lead."""
@@ -195,7 +195,7 @@ class InProcessEyes:
     def __init__(self, simulator: Assisted) -> None:
         self._simulator = simulator
 
-    def look(self, tool: int | None = None) -> Look:
+    def look(self, tool: int | None = None) -> PersonLook:
         """Return the vector, in base axes, that the operator sees from the tip to the pin."""
         with self._simulator.lock:
             return self._simulator.world.operator.look(tool)

@@ -95,7 +95,7 @@ class CameraOptics:
 
 
 @dataclass(slots=True)
-class SimulatedCamera:
+class CameraTruth:
     """A camera in the cell.
 
     Attributes:

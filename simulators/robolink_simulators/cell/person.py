@@ -11,7 +11,7 @@ from robolink_simulators.cell.workplace import MOUNTED_TOOL, Workplace
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class PersonLook:
     """What an eye sees: the vector from the physical tip to the pin, in base axes."""
 
     dx_mm: float
@@ -38,9 +38,9 @@ class SimulatedOperator:
         self._require_jogging = require_jogging
         self._random = random.Random(f"operator {seed}")
         self._placement: tuple[Hashable, int] | None = None
-        self._error = Look(0.0, 0.0, 0.0)
+        self._error = PersonLook(0.0, 0.0, 0.0)
 
-    def look(self, tool: int | None = None) -> Look:
+    def look(self, tool: int | None = None) -> PersonLook:
         """Return the vector from the tip to the pin, with the eye's error.
 
         Args:
@@ -52,7 +52,7 @@ class SimulatedOperator:
             self._placement = placement
             self._error = self._drawn_error()
         dx, dy, dz = self._gap(tool)
-        return Look(dx, dy, dz)
+        return PersonLook(dx, dy, dz)
 
     def way_along(self, axis: Axis, length_mm: float, tool: int | None = None) -> XyzMm:
         """Return, in base axes, a way along an axis of the tool, with the eye's error at its end.
@@ -92,7 +92,7 @@ class SimulatedOperator:
             pin[2] - tip[2] + error.dz_mm,
         )
 
-    def _drawn_error(self) -> Look:
+    def _drawn_error(self) -> PersonLook:
         rng, parameters = self._random, self._workplace.parameters
         sigma_mm = self._workplace.operator_sigma_mm
         dx, dy, dz = (rng.gauss(0.0, sigma_mm) for _ in range(3))
@@ -100,4 +100,4 @@ class SimulatedOperator:
             way = rng.uniform(0.0, math.tau)
             dx += parameters.eye_outlier_mm * math.cos(way)
             dy += parameters.eye_outlier_mm * math.sin(way)
-        return Look(dx, dy, dz)
+        return PersonLook(dx, dy, dz)

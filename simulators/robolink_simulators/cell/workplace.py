@@ -10,7 +10,7 @@ from dataclasses import asdict, replace
 from typing import Any, Final, Protocol
 
 from robolink.model import TIP, Pose, ToolOffset
-from robolink_simulators.cell.camera import Pixel, SimulatedCamera
+from robolink_simulators.cell.camera import CameraTruth, Pixel
 from robolink_simulators.cell.held_board import SimulatedBoard
 from robolink_simulators.cell.places import Axis, Direction, axis_of
 from robolink_simulators.cell.places import XyzMm as XyzMm
@@ -82,7 +82,7 @@ class Workplace:
         self._random = random.Random(f"nozzles {seed}")
         self._replaced = replaced
         rng = random.Random(f"camera {seed}")
-        self.camera = SimulatedCamera(camera_beside(self.tip_mm(), rng), parameters.optics, rng)
+        self.camera = CameraTruth(camera_beside(self.tip_mm(), rng), parameters.optics, rng)
         self.parameters = WorldParameters()
         self.set_up(parameters)
 

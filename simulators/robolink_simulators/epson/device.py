@@ -31,7 +31,7 @@ from robolink_simulators.epson.remote.client_slot import ClientSlot
 from robolink_simulators.epson.remote.command_window import SpelWindow
 from robolink_simulators.epson.remote.commands import CommandDesk
 from robolink_simulators.epson.remote.exchange import PendingRequest
-from robolink_simulators.epson.remote.link import EpsonLink
+from robolink_simulators.epson.remote.link import EpsonServerLink
 from robolink_simulators.epson.remote.queries import Alarms
 from robolink_simulators.epson.remote.service import Service
 from robolink_simulators.epson.remote.wire_text import shown_reply, shown_request
@@ -115,7 +115,7 @@ class EpsonSimulator:
         self.on_request: RequestHook | None = None
         self.on_reply: RequestHook | None = None
         self._requests = 0
-        self._links: list[EpsonLink] = []
+        self._links: list[EpsonServerLink] = []
         self.machine = Machine(find_robot(robot), serial=serial or drawn_serial())
         self.machine.switch_motors(True)
         self.world = World.seeded(
@@ -192,10 +192,10 @@ class EpsonSimulator:
         for watcher in tuple(self.watchers):
             watcher()
 
-    def connect(self, now_ns: int) -> EpsonLink:
+    def connect(self, now_ns: int) -> EpsonServerLink:
         """Accept one client; see ``EpsonOptions.second_client``."""
         self.advance(now_ns)
-        link = EpsonLink(self, now_ns)
+        link = EpsonServerLink(self, now_ns)
         self._links.append(link)
         if self._slot.client is not None and self.options.second_client == "closed":
             link.cut()
@@ -209,14 +209,15 @@ class EpsonSimulator:
 
     def next_change(self) -> int | None:
         """Return when :meth:`advance` will next do something by itself, if ever."""
-        changes = [
+        times = (
             self._window.next_change(),
             self._slot.deadline(unfinished=self._service.unfinished),
             self._mishaps.next_change(),
             self.machine.timed_bits.next_change(),
-            *(link.next_change() for link in self._links),
-        ]
-        return min((change for change in changes if change is not None), default=None)
+            *[link.next_change() for link in self._links],
+        )
+        changes = [time_ns for time_ns in times if time_ns is not None]
+        return min(changes) if changes else None
 
     def restart(self) -> None:
         """Switch off and on: links are cut, all but the flash and the variables is forgotten."""
@@ -236,7 +237,7 @@ class EpsonSimulator:
             for link in self._links:
                 link.push(data)
 
-    def take(self, link: EpsonLink, event: Request | BadRequest) -> None:
+    def take(self, link: EpsonServerLink, event: Request | BadRequest) -> None:
         """Deal with a request of a client; while another is logged in, it is not heard."""
         shown = shown_request(event)
         self.log.append((self._now_ns, ">", shown))
@@ -271,7 +272,7 @@ class EpsonSimulator:
         if self.on_reply is not None:
             self.on_reply(exchange.number, shown_reply(reply))
 
-    def forget(self, link: EpsonLink) -> None:
+    def forget(self, link: EpsonServerLink) -> None:
         """A connection is over; what runs goes on or not, as the option says."""
         if self._slot.client is link:
             # Production that another device started is not this client's to supervise.

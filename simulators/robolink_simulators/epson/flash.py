@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Final
 
 from robolink.errors import ConfigError
+from robolink.files.named import read_named
 from robolink.messages import tr
-from robolink.named_files import read_named
 from robolink_simulators.epson.arm.robot_settings import RobotSettings
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.points import LocalTable, PointTable

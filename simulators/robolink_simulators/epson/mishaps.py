@@ -27,7 +27,7 @@ class EpsonMishaps:
 
     def next_change(self) -> int | None:
         """Return when the next one is due."""
-        return min((at_ns for at_ns, _ in self._planned), default=None)
+        return min(at_ns for at_ns, _ in self._planned) if self._planned else None
 
     def carry_out(self, now_ns: int) -> None:
         """Do what is due by now."""

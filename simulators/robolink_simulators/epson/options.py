@@ -5,10 +5,15 @@ tests run with each). Evidence marks: [D] document, [R] transcript of a real con
 [I] inferred, [U] unverified, [open] the references contradict each other.
 """
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
+from pathlib import Path
 from typing import Final, Literal
 
+from robolink.errors import ConfigError
+from robolink.files.named import read_named
+from robolink.messages import tr
 from robolink_simulators.option_values import require_known, values_from_text
 
 
@@ -156,6 +161,7 @@ class EpsonOptions:
     numbers: SpelNumbers = SpelNumbers()
 
 
+PROFILE_SCHEMA: Final = "robolink/epson-profile/1"
 _NUMBERS: Final = "numbers."
 
 
@@ -175,3 +181,23 @@ def options_from_text(pairs: Mapping[str, str]) -> EpsonOptions:
     numbers = values_from_text(SpelNumbers, pairs, prefix=_NUMBERS)
     own = values_from_text(EpsonOptions, pairs)
     return replace(EpsonOptions(), **own, numbers=replace(SpelNumbers(), **numbers))
+
+
+def read_profile(path: Path) -> Mapping[str, str]:
+    """Return the options of a cell profile as text; what was not settled is absent.
+
+    Names and values are checked where the options are made.
+
+    Raises:
+        ConfigError: The file cannot be read, or is no profile.
+    """
+    try:
+        document = json.loads(read_named(path))
+        if document["schema"] != PROFILE_SCHEMA:
+            raise ValueError(document["schema"])
+        return {str(name): str(value) for name, value in document["options"].items()}
+    except (OSError, AttributeError, KeyError, TypeError, ValueError) as error:
+        raise ConfigError(
+            tr("{path} is not a cell profile.", path=path),
+            remedy=tr("Give a file that 'robolink verify-controller --profile' has written."),
+        ) from error

@@ -8,7 +8,7 @@ from typing import Any, Final
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import Pose, ToolOffset, rotate_xy
-from robolink_simulators.cell.person import Look as Look
+from robolink_simulators.cell.person import PersonLook as PersonLook
 from robolink_simulators.cell.person import SimulatedOperator
 from robolink_simulators.cell.places import Direction
 from robolink_simulators.cell.tip_switches import TipSwitch

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Final
 
 from robolink.errors import ConfigError
+from robolink.files.named import read_named
 from robolink.messages import tr
-from robolink.named_files import read_named
 from robolink.transport import Dialogue, Passage, parse_dialogues
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.hosting.streams.tcp_host import TcpHost

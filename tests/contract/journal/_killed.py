@@ -13,7 +13,7 @@ from itertools import count
 
 from sqlalchemy import Engine, event
 
-from robolink.journal import EntryKind, JournalOutcomeLog, NewEntry, open_journal
+from robolink.journal import EntryKind, JournalOutcomeLog, NewEntry, close_files, open_journal
 from robolink.journal.store.prepared import StatementRunner
 from tests.contract.journal._acts import marker
 
@@ -39,7 +39,7 @@ def kill_at(number: int) -> None:
     event.listen(Engine, "before_cursor_execute", step)
     event.listen(Engine, "commit", step)
     # Prepared statements go past SQLAlchemy, so it tells nobody of them.
-    for name in ("run", "run_many", "rows", "commit"):
+    for name in ("run", "run_text", "run_many", "rows", "commit"):
         setattr(StatementRunner, name, _after(step, getattr(StatementRunner, name)))
 
 
@@ -66,9 +66,18 @@ def make_once(number: int, location: str) -> None:
     open_journal(f"{location}-{number}")
 
 
+def load_all(location: str) -> None:
+    """Let this process load and compile what every run needs, so that each begins with it."""
+    log = open_journal(location).log("cell-0")
+    for step in STEPS:
+        step(log)
+    close_files()
+
+
 def main() -> None:
     """Run until one run comes to its end."""
     location, anew = sys.argv[1], sys.argv[2] == "anew"
+    load_all(f"{location}-0" if anew else location)
     for number in count(1):
         reader, writer = os.pipe()
         child = os.fork()

@@ -5,10 +5,10 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Final
 
-from robolink.durable_files import sync_folder, write_whole
 from robolink.errors import ConfigError
+from robolink.files.durable import sync_folder, write_whole
+from robolink.files.named import holds
 from robolink.messages import tr
-from robolink.named_files import holds
 
 _EPSON: Final = ("epson/robolink_tools.prg", "LICENSE")
 

@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from robolink.errors import ConfigError
+from robolink.files.named import holds, require_free, save_named
 from robolink.messages import tr
-from robolink.named_files import holds, require_free, save_named
 from robolink.protocols.mailbox import (
     ExportProfile,
     electronic_data_sheet,

@@ -5,8 +5,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from robolink.config import cell_names, check_file, config_files
-from robolink.durable_files import state_folder
 from robolink.errors import ConfigError
+from robolink.files.durable import state_folder
 from robolink.messages import tr
 from robolink_cli.commands.computer.doctor_finding import Level, Remark
 from robolink_cli.commands.computer.requirements import check_name, check_versions

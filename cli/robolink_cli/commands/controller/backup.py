@@ -20,7 +20,7 @@ _FILE = click.Path(dir_okay=False, path_type=Path)
 def backup(context: CliContext, file: Path, force: bool) -> None:
     """Save all fifteen tools, the one in force, and which controller it is. Reads only."""
     from robolink.backup import save, take_backup
-    from robolink.named_files import require_free
+    from robolink.files.named import require_free
     from robolink_cli.views.backup import backup_payload, show_backup
 
     require_free(file, replace=force)

@@ -185,7 +185,7 @@ def clear(
     The tool that is selected is cleared only with --then-select: the machine goes on with that
     one.
     """
-    from robolink.model import Role, require_engineer
+    from robolink.model import PersonRole, require_engineer
     from robolink.transaction import Wanted, change_tools
     from robolink_cli.session.first_backup import back_up_first
     from robolink_cli.views.documents import receipt_payload
@@ -199,7 +199,7 @@ def clear(
         act, outcomes = tr("clear tool {tool}", tool=number), controller.outcomes
         # What is refused is refused before anybody is asked.
         controller.tools.preview_clear(number, then_select=then_select)
-        if outcomes.signature.role == Role.OPERATOR:
+        if outcomes.signature.role == PersonRole.OPERATOR:
             require_engineer(outcomes, act)
         if not context.json:
             agree(_clear_question(number, then_select), yes=yes)

@@ -66,11 +66,14 @@ def recalibrate(
     from robolink.recipe import load_recipe
     from robolink_cli.commands.measure.recalibration import Recalibration
     from robolink_cli.commands.measure.recipe_events import EventStream
+    from robolink_cli.console.render import note
     from robolink_cli.options.recipe_answers import answers_from
 
     events = EventStream(click.get_current_context(), on=jsonl)
     with events.closing():
         loaded = load_recipe(recipe)
+        for sentence in loaded.notes:
+            note(sentence)
         prepared = answers_from(
             loaded.recipe, texts=answers, z_mm=z_mm, nozzle=nozzle, lot=lot, yes=yes
         )

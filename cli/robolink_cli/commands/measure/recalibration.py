@@ -171,6 +171,7 @@ class Recalibration:
             "recipe": self._loaded.name,
             "tools": [plan.tool for plan in run.plan.tools],
             "takes_reference": run.takes_reference,
+            "old_names": list(self._loaded.notes),
             "steps": steps_payload(controller, preview(controller, run.plan)),
             "prompts": [{"at": prompt.at, "text": prompt.text} for prompt in recipe.prompts],
             "outputs": [
@@ -197,6 +198,7 @@ class Recalibration:
             "recipe_hash": self._loaded.sha256,
             "controller": controller.identity,
             **_payload(report),
+            "old_names": list(self._loaded.notes),
             "reference_taken": run.takes_reference,
         }
 

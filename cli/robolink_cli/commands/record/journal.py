@@ -177,7 +177,7 @@ def export(
     **meant: Any,  # noqa: ANN401 - click's form
 ) -> None:
     """Write entries to FILE, oldest first; all of them, or those that are meant."""
-    from robolink.named_files import require_free, save_named
+    from robolink.files.named import require_free, save_named
     from robolink_cli.commands.record.journal_export import FORMATS, Counted, form_of
 
     form = form or form_of(file)

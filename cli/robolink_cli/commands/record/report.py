@@ -37,7 +37,7 @@ def report(
     page comes from the journal alone and needs no controller, except for --points. Exit code 1
     when the check of the journal finds something wrong.
     """
-    from robolink.named_files import require_free
+    from robolink.files.named import require_free
     from robolink.report import save
     from robolink.transaction import id_of_change
     from robolink_cli.commands.record.journal_lookup import journal_to_read

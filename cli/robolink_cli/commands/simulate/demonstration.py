@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.epson.world import Look
+from robolink_simulators.epson.world import PersonLook
 from robolink_simulators.hosting.in_process.softmotion import simulator_named
 from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 
@@ -170,7 +170,7 @@ def _announce(simulated: str) -> None:
     say()
 
 
-def _change(controller: Controller, eyes: Callable[[int], Look]) -> ToolReport:
+def _change(controller: Controller, eyes: Callable[[int], PersonLook]) -> ToolReport:
     def look() -> tuple[float, float, float]:
         seen = eyes(TOOL)
         return seen.dx_mm, seen.dy_mm, seen.dz_mm

@@ -10,8 +10,7 @@ from click.core import ParameterSource
 from robolink_simulators.assist.port import serve_assist
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson import EpsonOptions, EpsonSimulator
-from robolink_simulators.epson.options import options_from_text
-from robolink_simulators.epson.profile import read_profile
+from robolink_simulators.epson.options import options_from_text, read_profile
 from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 from robolink_simulators.serial_numbers import drawn_serial
 

@@ -10,7 +10,7 @@ from robolink.controllers.softmotion.link.snapshots import Snapshots
 from robolink.controllers.softmotion.link.wire import MailboxWire
 from robolink.errors import RemoteProtocolError
 from robolink.messages import tr
-from robolink.model import OutcomeLog, ToolOffset
+from robolink.model import OutcomeLog, Pose, ToolOffset
 from robolink.protocols.mailbox import (
     Command,
     Response,
@@ -24,6 +24,9 @@ from robolink.protocols.mailbox import (
 TOLERANCE = 1e-9
 """Two LREALs this near are equal: user units, and elements of a rotation matrix
 (docs/reference/rules.md 3)."""
+
+ROUNDED_TILT_DEG = 1e-6
+"""A smaller tilt is what a PLC's arithmetic leaves: 0.02 um at the end of a tool of 1 m."""
 
 
 class Mailbox(DriverLink):
@@ -94,6 +97,24 @@ class Mailbox(DriverLink):
     def tool_in(self, slot: Slot) -> ToolOffset | None:
         """Return what a slot holds, ``None`` when it is empty."""
         return self.from_plc(slot.tool) if slot.defined else None
+
+    def pose(self, frame: Six, *, tool: int | None) -> Pose:
+        """Return where a frame that the PLC tells is, without the tilt that is mere rounding.
+
+        A kinematics that cannot tilt works out its orientation all the same, and not every one
+        ends at exactly 0; what only serves an upright flange asks for exactly that.
+
+        Args:
+            frame: As the mailbox carries it.
+            tool: Whose frame it is, where that is known.
+
+        Raises:
+            RemoteProtocolError: A number in it is not finite.
+        """
+        x_mm, y_mm, z_mm, u_deg, v_deg, w_deg = self.coordinates(frame)
+        if max(abs(v_deg), abs(w_deg)) < ROUNDED_TILT_DEG:
+            v_deg = w_deg = 0.0
+        return Pose(x_mm, y_mm, z_mm, u_deg, v_deg, w_deg, tool=tool)
 
     def coordinates(self, frame: Six) -> Six:
         """Return x, y, z in mm and u, v, w in degrees of a frame from the PLC.

@@ -51,7 +51,7 @@ class SoftMotionGroup(MotionGroupCore):
     def pose(self) -> Pose:
         """Read where the tip of the selected tool is now."""
         now = self._mailbox.snapshots.take()
-        return Pose(*self._mailbox.coordinates(now.tcp), tool=now.tool_slot)
+        return self._mailbox.pose(now.tcp, tool=now.tool_slot)
 
     def axes(self) -> dict[str, tuple[float, ...]]:
         """Read the axes of the machine, in the PLC's units and degrees."""

@@ -267,7 +267,7 @@ class JogWatch:
         return error
 
     def _pose(self, now: Response) -> Pose:
-        return Pose(*self._mailbox.coordinates(now.tcp), tool=now.tool_slot)
+        return self._mailbox.pose(now.tcp, tool=now.tool_slot)
 
 
 def _mask(axes: Iterable[int]) -> int:

@@ -224,4 +224,4 @@ class SoftMotionMotionUntilInput:
                 request=describe(self._motion.command),
             )
         target = self._motion.target
-        return Pose(*self._mailbox.coordinates(now.answer.pose), tool=target.tool)
+        return self._mailbox.pose(now.answer.pose, tool=target.tool)

@@ -99,8 +99,12 @@ class Layout:
         field = self._by_name[name]
         return slice(field.word, field.end)
 
-    def pack(self, values: Mapping[str, Any]) -> Words:
+    def pack(self, values: Mapping[str, Any], *, seal: bool = True) -> Words:
         """Return the words of every field but ``crc``, which is worked out.
+
+        Args:
+            values: By field name; what is missing is 0.
+            seal: Whether ``crc`` is needed; without it the checksum stays 0.
 
         Raises:
             BlockError: A value does not fit its field.
@@ -113,7 +117,7 @@ class Layout:
             words: Words = self._registers.unpack(self._image.pack(*parts))
         except (struct.error, OverflowError) as error:
             raise BlockError(BlockFault.VALUE) from error
-        if not self.guarded:
+        if not (seal and self.guarded):
             return words
         crc = self._by_name["crc"]
         return (*words[: crc.word], crc16(words[: crc.word]), *words[crc.end :])

@@ -24,10 +24,12 @@ class TimedBits:
 
     def next_change(self) -> int | None:
         """Return when the next bit changes."""
-        return min((at_ns for at_ns, *_ in self._planned), default=None)
+        return min(at_ns for at_ns, *_ in self._planned) if self._planned else None
 
     def advance(self, now_ns: int) -> None:
         """Switch what is due by now, in order."""
+        if not self._planned:
+            return
         due = sorted((p for p in self._planned if p[0] <= now_ns), key=lambda p: p[0])
         self._planned = [p for p in self._planned if p[0] > now_ns]
         for _, bank, number, on in due:

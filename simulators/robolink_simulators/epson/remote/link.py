@@ -38,7 +38,7 @@ class ServedRequest(Protocol):
     def advance(self, now_ns: int) -> None:
         """Let simulated time reach ``now_ns``."""
 
-    def take(self, link: "EpsonLink", event: Request | BadRequest) -> None:
+    def take(self, link: "EpsonServerLink", event: Request | BadRequest) -> None:
         """Deal with a request."""
 
     def leaving(self, exchange: PendingRequest, reply: bytes) -> Sequence[Departure]:
@@ -47,11 +47,11 @@ class ServedRequest(Protocol):
     def announce(self, exchange: PendingRequest, reply: bytes) -> None:
         """Tell whoever watches that a reply is about to leave."""
 
-    def forget(self, link: "EpsonLink") -> None:
+    def forget(self, link: "EpsonServerLink") -> None:
         """The connection is over."""
 
 
-class EpsonLink:
+class EpsonServerLink:
     """Implements :class:`~robolink_simulators.hosting.seam.DeviceLink`.
 
     A client that has not logged in within the login time-out is cut off, and so is one that
@@ -112,8 +112,10 @@ class EpsonLink:
         leaving = self._outbox[0][0] if self._outbox else None
         if leaving is not None and leaving > self._controller.now_ns:
             return leaving
-        deadlines = (self._login_deadline(), self._silent_from_ns)
-        return min((at_ns for at_ns in deadlines if at_ns is not None), default=None)
+        login_ns, silent_ns = self._login_deadline(), self._silent_from_ns
+        if login_ns is None or silent_ns is None:
+            return silent_ns if login_ns is None else login_ns
+        return min(login_ns, silent_ns)
 
     def supervise(self, now_ns: int) -> None:
         """End a request after which nothing came; cut whoever did not log in for too long."""

@@ -16,7 +16,7 @@ from robolink_simulators.epson.remote.client_slot import ClientSlot
 from robolink_simulators.epson.remote.command_window import SpelWindow
 from robolink_simulators.epson.remote.commands import CommandDesk
 from robolink_simulators.epson.remote.exchange import PendingRequest
-from robolink_simulators.epson.remote.link import EpsonLink
+from robolink_simulators.epson.remote.link import EpsonServerLink
 from robolink_simulators.epson.request_refusals import RequestRefused
 
 
@@ -55,7 +55,11 @@ class Service:
         return self._window.busy or self._condition.task is not Task.NONE
 
     def carry_out(
-        self, link: EpsonLink, exchange: PendingRequest, event: Request | BadRequest, now_ns: int
+        self,
+        link: EpsonServerLink,
+        exchange: PendingRequest,
+        event: Request | BadRequest,
+        now_ns: int,
     ) -> None:
         """Do what a request asks, or refuse it."""
         logged_in = self._slot.client is link
@@ -74,7 +78,7 @@ class Service:
 
     def _dispatch(
         self,
-        link: EpsonLink,
+        link: EpsonServerLink,
         exchange: PendingRequest,
         command: RemoteCommand,
         request: Request,
@@ -101,7 +105,7 @@ class Service:
             case _:
                 exchange.reply(*self._desk.serve(request))
 
-    def _login(self, link: EpsonLink, request: Request, now_ns: int) -> None:
+    def _login(self, link: EpsonServerLink, request: Request, now_ns: int) -> None:
         bare = not request.parameters
         if bare and self._options.login_without_parameter == "error_12":
             raise RequestRefused(ErrorCode.MALFORMED)
@@ -112,7 +116,7 @@ class Service:
         self._slot.admit(link, now_ns)
         link.logged_in(True, now_ns)
 
-    def _logout(self, link: EpsonLink, now_ns: int) -> None:
+    def _logout(self, link: EpsonServerLink, now_ns: int) -> None:
         if self.unfinished:
             # Logging out while a task runs raises an error (documented,
             # docs/reference/epson.md 1.1); that the error ends what runs, as errors do, is assumed.

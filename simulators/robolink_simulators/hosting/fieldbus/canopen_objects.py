@@ -3,6 +3,7 @@
 import io
 import struct
 from collections.abc import Callable, Sequence
+from functools import cache
 from typing import Any, Final, Protocol
 
 from canopen.objectdictionary import ObjectDictionary
@@ -142,8 +143,9 @@ class MailboxObjects:
         return values.get(subindex)
 
 
+@cache
 def object_dictionary(node: int) -> ObjectDictionary:
-    """Return the objects of the mailbox's own data sheet.
+    """Return the objects of the mailbox's own data sheet, read once: they hold no values.
 
     The heartbeat's period cannot be written here: canopen would start a second one.
     """

@@ -122,8 +122,8 @@ class InProcessMailboxLink:
                     remedy=tr("Connect again."),
                     controller=self._identity,
                 )
-            self._pass(self._exchange_s / 2)
-            served = serve(self._clock.now_ns())
+            self._clock.advance(self._exchange_s / 2)
+            served = serve(self._clock.now_ns())  # the simulator follows before it serves
             if served.cut:
                 raise self._ended(
                     TransportBrokenError(

@@ -174,10 +174,11 @@ class StateMachine:
 
     def next_change(self) -> int | None:
         """Return when :meth:`advance` will next do something by itself, if ever."""
-        changes = [self._motion.next_change(self.now_ns)]
-        if self._settled and (self._rest_ns is None or not self.stop_held):
-            changes.append(self._cycle_after(self.now_ns))
-        return min((change for change in changes if change is not None), default=None)
+        change = self._motion.next_change(self.now_ns)
+        if not self._settled or (self._rest_ns is not None and self.stop_held):
+            return change
+        cycle_ns = self._cycle_after(self.now_ns)
+        return cycle_ns if change is None else min(change, cycle_ns)
 
     def _step(self) -> None:
         self._guarded(self._motion.step)

@@ -36,10 +36,12 @@ class PlcMishaps:
 
     def next_change(self) -> int | None:
         """Return when the next one is due."""
-        return min((at_ns for at_ns, _ in self._planned), default=None)
+        return min(at_ns for at_ns, _ in self._planned) if self._planned else None
 
     def carry_out(self, now_ns: int) -> None:
         """Do what is due by now."""
+        if not self._planned:
+            return
         due = [act for at_ns, act in self._planned if at_ns <= now_ns]
         self._planned = [plan for plan in self._planned if plan[0] > now_ns]
         for act in due:

@@ -20,6 +20,7 @@ from robolink.protocols.mailbox import (
     encode_slot,
 )
 from robolink_simulators.softmotion.group.axis_group import AxisGroup
+from robolink_simulators.softmotion.group.condition import GroupStatus
 from robolink_simulators.softmotion.kinematics.coordinates import CoordRef, CoordSystem
 from robolink_simulators.softmotion.mailbox.commands.tools import ToolDesk
 from robolink_simulators.softmotion.mailbox.program import MailboxProgram
@@ -76,7 +77,7 @@ class Outbox:
 
     def beginning(self, program: MailboxProgram, heartbeat: int) -> Words:
         """Return the words before the position: of these clients ask all the time."""
-        told = encode_response(self._without_position(program, heartbeat))
+        told = encode_response(self._without_position(program, heartbeat), seal=False)
         return arranged(RESPONSE, told, self._order)[: RESPONSE.at("tcp").start]
 
     def slot(self, number: int) -> Words:
@@ -90,16 +91,16 @@ class Outbox:
         return arranged(DEVICE, encode_device_id(self._memory.device_id), self._order)
 
     def _without_position(self, program: MailboxProgram, heartbeat: int) -> Response:
-        group, jobs = self._group, program.jobs
+        group, jobs, status = self._group, program.jobs, self._group.status()
         job = jobs.acknowledged
         return Response(
             ack_head=job.command.sequence if job else 0,
             state=job.state if job else CommandState.EMPTY,
             error_class=job.error_class if job else ErrorClass.NONE,
-            raw_error=(job.raw if job else 0) or self._group_error(),
+            raw_error=(job.raw if job else 0) or (status.error.number if status.error else 0),
             opcode_echo=job.command.opcode if job else 0,
             group_state=GroupState(group.state.value),
-            bits=self._bits(program),
+            bits=self._bits(program, status),
             plc_heartbeat=heartbeat,
             boot_id=self._memory.boot_id,
             tool_slot=self._tools.selected,
@@ -115,12 +116,8 @@ class Outbox:
             ack_owner=job.command.owner if job else 0,
         )
 
-    def _group_error(self) -> int:
-        error = self._group.status().error
-        return error.number if error else 0
-
-    def _bits(self, program: MailboxProgram) -> Bits:
-        status, job = self._group.status(), program.jobs.acknowledged
+    def _bits(self, program: MailboxProgram, status: GroupStatus) -> Bits:
+        job = program.jobs.acknowledged
         shown = {
             Bits.POWERED: status.powered,
             Bits.TOOL_KNOWN: self._tools.tool_known,

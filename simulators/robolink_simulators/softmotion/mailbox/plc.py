@@ -111,10 +111,13 @@ class Plc:
 
     def next_change(self, now_ns: int) -> int | None:
         """Return when :meth:`advance` will next do something by itself, if ever."""
-        changes = [self.group.next_change()]
-        if not self.frozen:
-            changes.append(self.program.next_change(now_ns))
-        return min((change for change in changes if change is not None), default=None)
+        change = self.group.next_change()
+        if self.frozen:
+            return change
+        look_ns = self.program.next_change(now_ns)
+        if change is None or look_ns is None:
+            return look_ns if change is None else change
+        return min(change, look_ns)
 
     def output(self, now_ns: int) -> Words:
         """Return response, slots and device block, one behind the other."""

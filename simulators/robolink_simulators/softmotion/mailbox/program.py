@@ -126,8 +126,9 @@ class MailboxProgram:
         if self.jobs.moving and self._reason_to_end(now_ns):
             # The permit went since the last cycle, or a halt was refused: try again.
             deadline_ns = self._next_cycle_ns(now_ns)
-        changes = (self._look_ns, deadline_ns)
-        return min((change for change in changes if change is not None), default=None)
+        if self._look_ns is None or deadline_ns is None:
+            return deadline_ns if self._look_ns is None else self._look_ns
+        return min(self._look_ns, deadline_ns)
 
     def _follow(self) -> None:
         self._motion.follow()

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from robolink.errors import ConfigError
+from robolink.files.named import read_named
 from robolink.messages import tr
-from robolink.named_files import read_named
 from robolink.protocols.mailbox import (
     SLOTS,
     Six,

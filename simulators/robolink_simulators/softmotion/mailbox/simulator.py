@@ -153,12 +153,13 @@ class SoftMotionSimulator:
 
     def next_change(self) -> int | None:
         """Return when :meth:`advance` will next do something by itself, if ever."""
-        changes = (
+        times = (
             self.plc.next_change(self._now_ns),
             self._mishaps.next_change(),
             self._watchdog.deadline_ns,
         )
-        return min((change for change in changes if change is not None), default=None)
+        changes = [time_ns for time_ns in times if time_ns is not None]
+        return min(changes) if changes else None
 
     def read(self, first: int, count: int, now_ns: int) -> ServedAccess:
         """Serve a client that reads words of response and slots."""

@@ -163,13 +163,14 @@ class GroupMotion:
 
     def next_change(self, now_ns: int) -> int | None:
         """Return when something ends or begins; every cycle where each has to be looked at."""
-        changes = [axis.next_change() for axis in self._axes()]
-        changes.append(self.queue.next_change(now_ns))
         running = self.queue.running
-        watched = any(movement.watch for movement in running)
-        if self.jog is not None or watched or len(running) > 1:
+        changes = [self.queue.next_change(now_ns)]
+        if self._singles:
+            changes += [axis.next_change() for axis in self._axes()]
+        if self.jog is not None or len(running) > 1 or (running and running[0].watch):
             changes.append((now_ns // self._cycle_ns + 1) * self._cycle_ns)
-        return min((change for change in changes if change is not None), default=None)
+        known = [change for change in changes if change is not None]
+        return min(known) if known else None
 
     def _place(self, values: AxisValues) -> None:
         for axis, value in zip(self._axes(), values, strict=True):

@@ -2,13 +2,14 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import NamedTuple
 
 from robolink_simulators.softmotion.kinematics.frames import (
     Frame,
     Matrix,
+    Vector,
     about,
     add,
     axis_and_angle,
@@ -96,14 +97,25 @@ class LinePath:
     end: AxisValues
     start_tcp: Frame
     end_tcp: Frame
+    _way: Vector = field(init=False, repr=False, compare=False)
+    _turn: tuple[Vector, float] = field(init=False, repr=False, compare=False)
+    _unturned: Matrix = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        # A movement asks for its way in every cycle.
+        a, b = self.start_tcp, self.end_tcp
+        axis, angle_deg = axis_and_angle(product(b.rotation, transposed(a.rotation)))
+        object.__setattr__(self, "_way", subtract(b.shift_mm, a.shift_mm))
+        object.__setattr__(self, "_turn", (axis, angle_deg))
+        object.__setattr__(self, "_unturned", product(about(axis, 0.0), a.rotation))
 
     def tcp_at(self, share: float) -> Frame:
         """Return the TCP after a share of the path."""
-        a, b = self.start_tcp, self.end_tcp
-        way = subtract(b.shift_mm, a.shift_mm)
-        axis, angle_deg = axis_and_angle(product(b.rotation, transposed(a.rotation)))
-        part: Matrix = product(about(axis, angle_deg * share), a.rotation)
-        return Frame(add(a.shift_mm, scale(way, share)), part)
+        a, (axis, angle_deg) = self.start_tcp, self._turn
+        part = self._unturned
+        if angle_deg:
+            part = product(about(axis, angle_deg * share), a.rotation)
+        return Frame(add(a.shift_mm, scale(self._way, share)), part)
 
     def axes_at(self, share: float) -> AxisValues:
         """Return the axes after a share of the path."""
@@ -124,8 +136,7 @@ class LinePath:
     @property
     def turn_deg(self) -> float:
         """How far the orientation turns."""
-        turn = product(self.end_tcp.rotation, transposed(self.start_tcp.rotation))
-        return axis_and_angle(turn)[1]
+        return self._turn[1]
 
     def _axes_for(self, tcp: Frame, share: float) -> AxisValues:
         near = JointPath(self.start, self.end).axes_at(share)

@@ -6,7 +6,7 @@ rounds the corners; nothing here depends on that.
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple, Self
 
 _STILL = 1e-12
@@ -36,11 +36,21 @@ class SpeedProfile:
         start: Share at time 0, at rest.
         phases: What follows; at rest afterwards.
         end: Share at rest.
+        duration_s: How long it takes to come to rest.
+        falls_after_s: When it begins to slow down for the last time.
     """
 
     start: float
     phases: tuple[Phase, ...]
     end: float
+    duration_s: float = field(init=False, compare=False)
+    falls_after_s: float = field(init=False, compare=False)
+
+    def __post_init__(self) -> None:
+        # Asked for in every cycle of the motion task, so worked out once.
+        object.__setattr__(self, "duration_s", sum(phase.duration_s for phase in self.phases))
+        falls_after_s = sum(phase.duration_s for phase in self.phases[:-1])
+        object.__setattr__(self, "falls_after_s", falls_after_s)
 
     @classmethod
     def fastest(cls, start: float, pace: Pace | None) -> Self:
@@ -60,16 +70,6 @@ class SpeedProfile:
             Phase(peak / pace.fall_per_s2, -pace.fall_per_s2),
         )
         return cls(start, phases, 1.0)
-
-    @property
-    def duration_s(self) -> float:
-        """How long it takes to come to rest."""
-        return sum(phase.duration_s for phase in self.phases)
-
-    @property
-    def falls_after_s(self) -> float:
-        """When it begins to slow down for the last time."""
-        return sum(phase.duration_s for phase in self.phases[:-1])
 
     def share_at(self, time_s: float) -> float:
         """Return the share of the path covered by then."""

@@ -105,12 +105,14 @@ class MovementQueue:
 
     def next_change(self, now_ns: int) -> int | None:
         """Return the cycle in which a movement ends or begins, after ``now_ns``."""
+        if self.empty:
+            return None
         instants = [movement.rest_ns for movement in self._running[:1]]
         if self._waiting and not self._running:
             instants.append(now_ns)
         elif self._corner_ahead():
             instants.append(self._running[0].falls_ns)
-        return min((self._cycle_after(at_ns, now_ns) for at_ns in instants), default=None)
+        return self._cycle_after(min(instants), now_ns)
 
     def settle(self, now_ns: int) -> list[Movement]:
         """Take off what has come to rest by now, and return it."""

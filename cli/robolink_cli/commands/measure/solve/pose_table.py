@@ -3,8 +3,8 @@
 from pathlib import Path
 from typing import Final
 
+from robolink.files.named import read_named
 from robolink.messages import tr
-from robolink.named_files import read_named
 from robolink_cli.commands.measure.solve.case import Node, unusable
 
 COLUMNS: Final = ("x", "y", "z", "u", "v", "w", "qx", "qy", "qz", "qs", "hand")

@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Final
 
 from robolink.errors import CalibrationError
+from robolink.files.named import read_named
 from robolink.messages import tr
-from robolink.named_files import read_named
 from robolink_cli.commands.measure.solve.case import Node, read_poses, unusable
 from robolink_cli.commands.measure.solve.methods import FROM_POSES
 from robolink_cli.commands.measure.solve.more_methods import MORE_METHODS

@@ -1,0 +1,149 @@
+"""The command of a calibration method, made from what the method declares."""
+
+from collections.abc import Callable, Mapping
+from typing import Any, Final, Literal
+
+import click
+from click.core import ParameterSource
+
+from robolink.errors import ConfigError
+from robolink.messages import tr
+from robolink.methods import AnyMethod, Check, MethodParameters, ParameterField, fields_of
+from robolink.methods.fields import refusals
+from robolink.stations import StationKind
+from robolink_cli.calibrate._frame import CalibrationRequest
+from robolink_cli.calibrate._options import calibration_options, sigma_option
+from robolink_cli.calibrate._values import as_typed, is_repeated, type_of
+from robolink_cli.options.motion import motion_option
+from robolink_cli.options.pose_source import PoseSource, pose_source_options
+
+_METAVARS: Final = {"mm": "MM", "degrees": "DEG", "mm/s": "MM_S"}
+
+_STATIONS: Final = {
+    StationKind.PIN: tr("Name of the pin."),
+    StationKind.BEAMS: tr("Name of the beams."),
+    StationKind.TOUCH: tr("Name of the surface."),
+    StationKind.CAMERA: tr("Name of the camera's station."),
+}
+
+Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
+
+
+def command_of(method: AnyMethod) -> click.Command:
+    """Return the command ``calibrate NAME`` of a method."""
+    parameters = fields_of(method.parameters)
+
+    def run(
+        frame: CalibrationRequest,
+        *,
+        station: str | None,
+        sigma_mm: float | None,
+        at: str | None = None,
+        poses: PoseSource | None = None,
+        **given: Any,  # noqa: ANN401 - click passes the options by name
+    ) -> None:
+        from robolink_cli.calibrate._measuring import calibrate_with
+
+        chosen = _parameters(method, given, sigma_stated=sigma_mm is not None)
+        calibrate_with(
+            method, chosen, frame, station=station, at=at, sigma_mm=sigma_mm, poses=poses
+        )
+
+    command: Callable[..., Any] = calibration_options(run)
+    for add in reversed([*map(_option, parameters), *_of_the_place(method)]):
+        command = add(command)
+    return click.command(method.name, help=method.description, short_help=method.summary)(command)
+
+
+def _of_the_place(method: AnyMethod) -> list[Decorator]:
+    """Return the options that say where it is measured, and with which poses."""
+    options: list[Decorator] = [sigma_option, _station_option(method)]
+    if method.needs.place is not None:
+        options.append(
+            motion_option(
+                "--at",
+                metavar="X,Y,Z",
+                help=tr("Where the station is, in the base; else what is known of it."),
+            )
+        )
+    if method.from_poses is not None and method.pose_help is not None:
+        said = method.pose_help
+        options.append(pose_source_options(points=said.points, typed=said.typed, path=said.path))
+    return options
+
+
+def _station_option(method: AnyMethod) -> Decorator:
+    needs = method.needs
+    known = _STATIONS[needs.station]
+    found = tr("Name of the pin; where it is found is kept, for one touch later.")
+    return click.option(
+        "--station", metavar="ID", required=needs.named, help=found if needs.finds_pin else known
+    )
+
+
+def _option(field: ParameterField) -> Decorator:
+    """Return what adds the option of a parameter."""
+    kind = motion_option if field.option.moves else click.option
+    default = field.option.default_or(field.default)
+    if field.option.is_choice or field.kind is bool:
+        said = False if field.option.is_choice else default
+        flags = field.option.flag or field.flag
+        return kind(
+            flags, field.name, is_flag=True, default=said, show_default=bool(said), help=field.help
+        )
+    attributes: dict[str, Any] = {"type": type_of(field), "help": field.help}
+    metavar = field.option.metavar or _METAVARS.get(field.unit, "")
+    if metavar and not _is_choice(field):
+        attributes["metavar"] = metavar
+    if is_repeated(field):
+        attributes["multiple"] = True
+    elif default is not None:
+        attributes |= {"default": as_typed(default), "show_default": True}
+    return kind(field.flag, field.name, **attributes)
+
+
+def _is_choice(field: ParameterField) -> bool:
+    return getattr(field.kind, "__origin__", None) is Literal
+
+
+def _parameters(
+    method: AnyMethod, given: Mapping[str, Any], *, sigma_stated: bool
+) -> MethodParameters:
+    """Return the parameters of a method.
+
+    Raises:
+        ConfigError: Some are outside their limits, or do not go together.
+    """
+    fields = fields_of(method.parameters)
+    values = {field.name: _value(field, given[field.name]) for field in fields}
+    spelled = {"sigma_mm": "--sigma", **{field.name: field.flag for field in fields}}
+    problems = [
+        (field.name, why)
+        for field in fields
+        if values[field.name] is not None
+        for why in refusals(values[field.name], field.kind, field.metadata)
+    ]
+    parameters: MethodParameters = method.parameters(**values)
+    if not problems:
+        check = Check(given=_typed(fields), sigma_stated=sigma_stated, spell=spelled.__getitem__)
+        problems = [(one.where, one.what) for one in parameters.problems(check)]
+    if problems:
+        lines = [f"{spelled[where.partition('#')[0]]}: {what}" for where, what in problems]
+        raise ConfigError(
+            "\n".join(f"{line}." for line in lines),
+            remedy=tr("Nothing was sent. 'robolink calibrate {name} --help'.", name=method.name),
+        )
+    return parameters
+
+
+def _value(field: ParameterField, typed: Any) -> object:  # noqa: ANN401 - what click passes
+    if field.option.is_choice:
+        return field.option.chooses if typed else field.default
+    return None if is_repeated(field) and not typed else typed
+
+
+def _typed(fields: tuple[ParameterField, ...]) -> frozenset[str]:
+    source = click.get_current_context().get_parameter_source
+    return frozenset(
+        field.name for field in fields if source(field.name) is ParameterSource.COMMANDLINE
+    )

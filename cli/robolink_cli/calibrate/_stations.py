@@ -1,0 +1,43 @@
+"""The station at which a calibration is made: named, looked up, doubted."""
+
+from robolink.messages import tr
+from robolink.model import Controller, EntryKind
+from robolink.stations import Station, StationKind, find_station, find_stations
+from robolink_cli.calibrate._frame import CalibrationRequest
+from robolink_cli.console.render import note
+
+
+def station_at(frame: CalibrationRequest, controller: Controller, kind: StationKind) -> Station:
+    """Return the station that the frame names, and say what there is to know about it.
+
+    Raises:
+        ConfigError: There is none of that name, or it is something else.
+    """
+    entries = controller.outcomes.recorded(kinds=(EntryKind.STATION,))
+    station = find_station(frame.context.cell, entries, frame.context.station, kind=kind)
+    remark = station.remark()
+    if remark:
+        note(tr("Warning: {remark}", remark=remark))
+    return station
+
+
+def remark_on_pin(frame: CalibrationRequest, controller: Controller) -> None:
+    """Say what there is to know about the pin that a calibration names.
+
+    A name that nobody knows yet is no mistake: the calibration finds the pin.
+
+    Raises:
+        ConfigError: The station of that name is no pin.
+    """
+    if not frame.pin or not frame.finds_pin:
+        return
+    entries = controller.outcomes.recorded(kinds=(EntryKind.STATION,))
+    if frame.pin in find_stations(frame.context.cell, entries):
+        station_at(frame, controller, StationKind.PIN)
+    else:
+        note(
+            tr(
+                "Station {station} is not known yet: a full calibration there finds it.",
+                station=frame.pin,
+            )
+        )

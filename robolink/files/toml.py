@@ -1,0 +1,96 @@
+"""The TOML files that people write: read, and refused with all that is wrong in them at once.
+
+Cell files, recipes and PLC maps differ in their keys. How one is read, how a problem names its
+key and how all problems of a file are told is the same for them.
+"""
+
+import tomllib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from robolink.errors import ConfigError
+from robolink.files.named import read_named
+from robolink.messages import tr
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """One thing that is wrong in a file.
+
+    Attributes:
+        where: Path of the key inside the file; empty for the file as a whole.
+        what: What is wrong with it. Never the value: it might be a password.
+    """
+
+    where: str
+    what: str
+
+    def __str__(self) -> str:
+        return f"{self.where}: {self.what}" if self.where else self.what
+
+
+@dataclass(frozen=True, slots=True)
+class FileKind:
+    """What a kind of file is called, and what to do about one that is of no use.
+
+    The sentences are asked for when they are shown, in the language of that moment.
+
+    Attributes:
+        named: Returns its name in a sentence: "The recipe change.toml".
+        unreadable_remedy: Returns what to do when it cannot be read.
+        wrong_remedy: Returns what to do when something in it is wrong.
+    """
+
+    named: Callable[[Path], str]
+    unreadable_remedy: Callable[[], str]
+    wrong_remedy: Callable[[], str]
+
+    def read(self, path: Path) -> bytes:
+        """Return what is in a file.
+
+        Raises:
+            ConfigError: It cannot be read.
+        """
+        try:
+            return read_named(path)
+        except OSError as error:
+            raise self._unreadable(path, error.strerror or str(error)) from error
+
+    def parse(self, path: Path, content: bytes) -> dict[str, object]:
+        """Return what a file says whose content was read.
+
+        Raises:
+            ConfigError: It is no TOML.
+        """
+        try:
+            # Editors on Windows put a byte order mark in front, which TOML does not know.
+            return tomllib.loads(content.decode("utf-8-sig"))
+        except UnicodeError as error:
+            raise self._unreadable(path, tr("it is not UTF-8 text")) from error
+        except RecursionError as error:
+            raise self._unreadable(path, tr("it is nested too deeply")) from error
+        except ValueError as error:  # TOML, or a number with thousands of digits
+            raise self._unreadable(path, str(error)) from error
+
+    def refusal(self, path: Path, problems: Sequence[Problem]) -> ConfigError:
+        """Return the error that tells all problems of one file at once."""
+        lines = "\n".join(f"    {problem}" for problem in problems)
+        named = self.named(path)
+        return ConfigError(
+            tr(
+                "{file} is wrong in {count} places:\n{lines}",
+                file=named,
+                count=len(problems),
+                lines=lines,
+            )
+            if len(problems) > 1
+            else tr("{file} is wrong:\n{lines}", file=named, lines=lines),
+            remedy=self.wrong_remedy(),
+        )
+
+    def _unreadable(self, path: Path, cause: str) -> ConfigError:
+        return ConfigError(
+            tr("{file} cannot be read: {cause}.", file=self.named(path), cause=cause),
+            remedy=self.unreadable_remedy(),
+        )

@@ -1,0 +1,60 @@
+"""The parameters of camera-affine."""
+
+from dataclasses import dataclass
+from typing import Annotated, Final
+
+from annotated_types import Ge, Le
+
+from robolink.messages import tr
+from robolink.methods.declaration import MM, Help, Option, Pair, Rows
+from robolink.methods.look_parameters import LookParameters
+
+LEAST_SPAN_MM: Final = 0.2
+"""A smaller pattern does not tell what a pixel is."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CameraAffineParameters(LookParameters):
+    """The pattern that finds a camera and an offset together."""
+
+    span_mm: Annotated[
+        float,
+        Ge(LEAST_SPAN_MM),
+        Le(50),
+        MM,
+        Help(tr("How far the tip goes from the middle of the image, in X and in Y.")),
+    ] = 3.0
+    new_camera: Annotated[
+        bool,
+        Help(tr("Camera, lens or mount were changed: do not compare with the last calibration.")),
+    ] = False
+    mm_per_px: Annotated[
+        Rows | None,
+        MM,
+        Option(flag="--mm-per-px", metavar="XX,XY,YX,YY", moves=False),
+        Help(
+            tr(
+                "What a pixel was in the base when the camera was found last; a camera that "
+                "differs is refused. Else the station's record says so, and without that nothing "
+                "is compared."
+            )
+        ),
+    ] = None
+    origin_mm: Annotated[
+        Pair | None,
+        MM,
+        Option(metavar="X,Y", moves=False),
+        Help(tr("Base point that was seen at pixel (0, 0) then; goes with what a pixel was.")),
+    ] = None
+
+    @property
+    def corners_deg(self) -> tuple[float, ...]:
+        """Angles of the corners of the pattern, which are looked at without a turn."""
+        return (0.0,)
+
+    @property
+    def places(self) -> tuple[tuple[float, float, float], ...]:
+        """Every look: X and Y from the middle in mm, turn in degrees."""
+        span = self.span_mm
+        cross = ((-span, -span), (span, -span), (span, span), (-span, span))
+        return (*((dx, dy, 0.0) for dx, dy in cross), *((0.0, 0.0, t) for t in self.turns_deg))

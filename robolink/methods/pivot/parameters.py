@@ -1,0 +1,49 @@
+"""The parameters of pivot."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from annotated_types import Ge, Le
+
+from robolink.messages import tr
+from robolink.methods.declaration import DEGREES, MM, Help, Length, Option
+from robolink.methods.pin_parameters import PinParameters
+from robolink.procedures import SamplingPolicy
+
+
+@dataclass(frozen=True, kw_only=True)
+class PivotParameters(PinParameters):
+    """How one pin is touched with the tool tilted and turned."""
+
+    count: Annotated[
+        int,
+        Ge(4),
+        Le(12),
+        Help(tr("Number of touches, the first one in the orientation in which the tool stands.")),
+    ] = 6
+    tilt_deg: Annotated[
+        float,
+        Ge(5),
+        Le(45),
+        DEGREES,
+        Option(metavar="DEG"),
+        Help(tr("How far the tool leans in the others, against the first one.")),
+    ] = 20.0
+    lift_mm: Annotated[
+        float, Ge(1), Le(100), MM, Help(tr("How far the tip is lifted before it tilts and turns."))
+    ] = 10.0
+    until_mm: Annotated[
+        Length | None,
+        Option(metavar="MM"),
+        Help(tr("End early when half the 95 % interval of X, of Y and of Z is at most this.")),
+    ] = None
+    retake: Annotated[
+        bool,
+        Option(flag="--retake/--no-retake", default=True),
+        Help(tr("Whether the pose that fits worst is offered to be taken again.")),
+    ] = False
+
+    @property
+    def sampling(self) -> SamplingPolicy:
+        """When it ends, and whether a pose is offered to be taken again."""
+        return SamplingPolicy(self.until_mm, retake=self.retake)

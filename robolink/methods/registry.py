@@ -1,0 +1,80 @@
+"""Which calibration methods there are: those of robolink, and those that others bring.
+
+A package brings one by an entry point of the group ``robolink.methods``, whose name is the
+method's and which leads to its :class:`~robolink.methods.Method`; :func:`register` takes the
+object itself.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib import import_module, metadata
+from typing import Final
+
+from robolink.errors import ConfigError
+from robolink.messages import tr
+from robolink.methods.declaration import AnyMethod
+
+METHODS_GROUP: Final = "robolink.methods"
+
+_OWN: Final = {
+    "two-pose": "robolink.methods.two_pose",
+    "n-angle": "robolink.methods.n_angle",
+    "one-touch": "robolink.methods.one_touch",
+    "beams": "robolink.methods.beams",
+    "z-touch": "robolink.methods.z_touch",
+    "camera": "robolink.methods.camera",
+    "camera-affine": "robolink.methods.camera_affine",
+    "board": "robolink.methods.board",
+    "pivot": "robolink.methods.pivot",
+    "six-point": "robolink.methods.six_point",
+    "points": "robolink.methods.points",
+}
+"""Name and folder, in the order of the help page."""
+
+_registered: dict[str, AnyMethod] = {}
+
+
+def method_names() -> tuple[str, ...]:
+    """Return the names of all methods, in the order of the help page."""
+    brought = sorted(metadata.entry_points(group=METHODS_GROUP).names)
+    return tuple(dict.fromkeys((*_OWN, *brought, *_registered)))
+
+
+def find_method(name: str) -> AnyMethod:
+    """Return the method of that name.
+
+    Raises:
+        ConfigError: There is none, or two packages bring one.
+    """
+    if name in _registered:
+        return _registered[name]
+    if name in _OWN:
+        own: AnyMethod = import_module(_OWN[name]).METHOD
+        return own
+    found = tuple(metadata.entry_points(group=METHODS_GROUP, name=name))
+    if len(found) != 1:
+        raise ConfigError(
+            tr("There is no calibration method {name!r}.", name=name)
+            if not found
+            else tr("Several packages bring a calibration method {name!r}.", name=name),
+            remedy=tr("These are known: {names}.", names=", ".join(method_names())),
+        )
+    method: AnyMethod = found[0].load()
+    return method
+
+
+def all_methods() -> tuple[AnyMethod, ...]:
+    """Return all methods, in the order of the help page."""
+    return tuple(find_method(name) for name in method_names())
+
+
+@contextmanager
+def register(method: AnyMethod) -> Iterator[None]:
+    """Have a method inside the block: as a command, and as a kind of a recipe's source."""
+    if method.name in method_names():
+        raise ValueError(f"there is a method {method.name!r} already")
+    _registered[method.name] = method
+    try:
+        yield
+    finally:
+        del _registered[method.name]

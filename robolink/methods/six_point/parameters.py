@@ -1,0 +1,33 @@
+"""The parameters of six-point."""
+
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from annotated_types import Ge, Le
+
+from robolink.messages import tr
+from robolink.methods.declaration import MM, Help, Option
+from robolink.methods.pivot.parameters import PivotParameters
+
+
+@dataclass(frozen=True, kw_only=True)
+class SixPointParameters(PivotParameters):
+    """How one pin is touched, and how the axes of the tool are shown."""
+
+    way_mm: Annotated[
+        float,
+        Ge(10),
+        Le(200),
+        MM,
+        Option(metavar="MM"),
+        Help(tr("Least length of each of the two ways; the longer, the surer the axes.")),
+    ] = 50.0
+    second_is: Annotated[
+        Literal["z", "xz"],
+        Option(moves=False),
+        Help(tr("What the second way shows: the tool's +Z, or its XZ plane on the side of +Z.")),
+    ] = "z"
+
+    def height_mm(self) -> float:
+        """Return how much higher than the box the flange goes: a way up."""
+        return self.way_mm

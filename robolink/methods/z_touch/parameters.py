@@ -1,0 +1,147 @@
+"""The parameters of z-touch."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Annotated, Final
+
+from annotated_types import Ge, Le, MinLen
+
+from robolink.calibration import MIN_ROTATION_DEG
+from robolink.files.toml import Problem
+from robolink.messages import tr
+from robolink.methods.declaration import (
+    DEGREES,
+    MM,
+    MM_S,
+    Check,
+    Help,
+    InputNumber,
+    Length,
+    MethodParameters,
+    Option,
+)
+from robolink.methods.pin_parameters import clearance_below_lift
+from robolink.procedures import SamplingPolicy, may_end_early
+
+_SPEEDS_APART: Final = 1.5
+"""Speeds that differ by less than this factor do not tell the latency, says the solver too."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ZTouchParameters(MethodParameters):
+    """How a tip is brought down on a surface that switches an input."""
+
+    input: Annotated[
+        InputNumber | None,
+        Help(tr("Number of the input that the surface switches; else the station's.")),
+    ] = None
+    off_when_touched: Annotated[
+        bool,
+        Help(tr("Whether the input goes off, not on, at a touch; goes with the input.")),
+    ] = False
+    speeds_mm_s: Annotated[
+        tuple[Annotated[float, Ge(0.1), Le(10)], ...],
+        MinLen(2),
+        MM_S,
+        Option(metavar="2,1,.."),
+        Help(tr("Speed of each touch; two that differ tell the latency of the trigger.")),
+    ] = (2.0, 1.0, 2.0, 1.0)
+    clearance_mm: Annotated[
+        float,
+        Ge(0.5),
+        Le(20),
+        MM,
+        Help(tr("How far above the expected touch the tip begins to seek it.")),
+    ] = 3.0
+    beyond_mm: Annotated[
+        float,
+        Ge(0.1),
+        Le(10),
+        MM,
+        Help(tr("How far below it the search ends; a new tip may be shorter by less.")),
+    ] = 2.0
+    back_off_mm: Annotated[
+        float, Ge(0.2), Le(10), MM, Help(tr("How far the tip is lifted after each touch."))
+    ] = 1.0
+    lift_mm: Annotated[
+        float,
+        Ge(1),
+        Le(100),
+        MM,
+        Help(tr("How far above the surface the tip comes, goes and turns.")),
+    ] = 10.0
+    proof_turn_deg: Annotated[
+        float,
+        Ge(0),
+        Le(360 - MIN_ROTATION_DEG),
+        DEGREES,
+        Option(metavar="DEG"),
+        Help(
+            tr(
+                "By how much U differs at the touch that proves the new value; 0 on a machine that "
+                "cannot turn, such as a gantry."
+            )
+        ),
+    ] = 180.0
+    until_mm: Annotated[
+        Length | None,
+        Option(metavar="MM"),
+        Help(tr("End early when half the 95 % interval of Z is at most this.")),
+    ] = None
+    retake: Annotated[
+        bool,
+        Option(flag="--retake/--no-retake", default=True),
+        Help(tr("Whether the touch that fits worst is offered to be made again.")),
+    ] = False
+
+    @property
+    def sampling(self) -> SamplingPolicy:
+        """When it ends, and whether a touch is offered to be made again."""
+        return SamplingPolicy(self.until_mm, retake=self.retake)
+
+    def may_end_early(self, *, sigma_stated: bool) -> bool:
+        """Tell whether the tip can be known well enough before the last touch.
+
+        Args:
+            sigma_stated: Whether somebody stated the standard deviation of a touch.
+        """
+        # Z and the latency.
+        return may_end_early(len(self.speeds_mm_s), unknowns=2, sigma_stated=sigma_stated)
+
+    def problems(self, check: Check) -> Iterator[Problem]:
+        """Check speeds and heights, and that an early end and a retake can do something."""
+        if "retake" in check.given and self.retake and self.no_residual():
+            yield retake_of_nothing()
+        if (
+            self.until_mm is not None
+            and check.sigma_stated is not None
+            and not self.may_end_early(sigma_stated=check.sigma_stated)
+        ):
+            yield Problem(
+                "until_mm",
+                tr(
+                    "has nothing to leave out; give 7 {speeds}, or 4 with {sigma}",
+                    speeds=check.spell("speeds_mm_s"),
+                    sigma=check.spell("sigma_mm"),
+                ),
+            )
+        if max(self.speeds_mm_s) < _SPEEDS_APART * min(self.speeds_mm_s):
+            yield Problem(
+                "speeds_mm_s",
+                tr("must differ by a factor of {factor:g} or more", factor=_SPEEDS_APART),
+            )
+        yield from clearance_below_lift(self.clearance_mm, self.lift_mm, check)
+
+    def no_residual(self) -> str:
+        """Return why residuals cannot be judged, empty when they can."""
+        if len(self.speeds_mm_s) > 2:
+            return ""
+        return tr(
+            "cannot be judged: two touches always agree, so they leave no residual; give four "
+            "speeds_mm_s, or interval_mm with sigma_mm"
+        )
+
+
+def retake_of_nothing() -> Problem:
+    """Return what is wrong with a retake where nothing is repeated."""
+    return Problem("retake", tr("means nothing: nothing is repeated, so nothing can fit badly"))

@@ -1,0 +1,1 @@
+"""Poses, movements, and what sees or switches at the tip."""

@@ -1,0 +1,179 @@
+"""Movements, and the limits inside which they are allowed."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum, StrEnum
+from typing import Protocol
+
+from robolink.errors import LimitError
+from robolink.messages import tr
+from robolink.model.motion.geometry import Pose
+from robolink.model.motion.until_input import InputEdge, MotionUntilInput
+
+
+class Path(StrEnum):
+    """How the robot travels to a target."""
+
+    JOINT = "joint"
+    STRAIGHT = "straight"
+
+
+@dataclass(frozen=True, slots=True)
+class MotionProfile:
+    """How fast to move. Power is always low; these are set and read back before a move.
+
+    ``speed_percent`` rules joint moves, ``speed_mm_s`` straight ones.
+    """
+
+    path: Path = Path.JOINT
+    speed_percent: int = 5
+    speed_mm_s: float = 20.0
+
+
+@dataclass(frozen=True, slots=True)
+class WorkBox:
+    """The box, in base coordinates of the frame that moves, that no target may leave."""
+
+    x_min_mm: float = -math.inf
+    x_max_mm: float = math.inf
+    y_min_mm: float = -math.inf
+    y_max_mm: float = math.inf
+    z_min_mm: float = -math.inf
+    z_max_mm: float = math.inf
+
+    @classmethod
+    def around(cls, pose: Pose, *, xy_mm: float, below_mm: float, above_mm: float) -> "WorkBox":
+        """Return the box that reaches ``xy_mm`` sideways, down and up from ``pose``."""
+        return cls(
+            pose.x_mm - xy_mm,
+            pose.x_mm + xy_mm,
+            pose.y_mm - xy_mm,
+            pose.y_mm + xy_mm,
+            pose.z_mm - below_mm,
+            pose.z_mm + above_mm,
+        )
+
+    def check(self, target: Pose) -> None:
+        """Refuse a target outside the box.
+
+        Raises:
+            LimitError: Names the axis, the value and the limit.
+        """
+        for axis in "xyz":
+            value = getattr(target, f"{axis}_mm")
+            low, high = getattr(self, f"{axis}_min_mm"), getattr(self, f"{axis}_max_mm")
+            if not low <= value <= high:
+                raise LimitError(
+                    tr(
+                        "The target {axis} = {value:.3f} mm lies outside the work box "
+                        "({low:.3f} to {high:.3f} mm); nothing was sent.",
+                        axis=axis.upper(),
+                        value=value,
+                        low=low,
+                        high=high,
+                    ),
+                    remedy=tr("Start nearer to the reference point, or widen the box."),
+                )
+
+
+class MotionOutcome(Enum):
+    """How a movement ended."""
+
+    ARRIVED = "arrived"
+    STOPPED = "stopped"
+
+
+class Motion(Protocol):
+    """A movement under way. Someone must wait on it."""
+
+    @property
+    def target(self) -> Pose:
+        """Where it goes."""
+
+    def wait(self, *, timeout_s: float) -> MotionOutcome:
+        """Wait for the end; past ``timeout_s`` the movement is aborted.
+
+        Raises:
+            ControllerFaultError: The controller went into error, e-stop or guard included.
+            OutcomeUnknownError: The link fell silent; the movement may go on.
+            TransportTimeoutError: It did not arrive in time and was aborted.
+        """
+
+
+@dataclass(frozen=True, slots=True)
+class MotionTerms:
+    """What a person must know before an axis group moves.
+
+    Attributes:
+        who: What moves, and in which mode, to be followed by "will move".
+        watch: Who stops it when this computer falls silent, one sentence.
+    """
+
+    who: str
+    watch: str
+
+
+class MotionGroup(Protocol):
+    """Axes that move together: a robot arm or an axis group."""
+
+    @property
+    def name(self) -> str:
+        """What a person calls it."""
+
+    def pose(self) -> Pose:
+        """Read where the frame in force is now (measured, not commanded)."""
+
+    def move_to(self, target: Pose, profile: MotionProfile, *, box: WorkBox) -> Motion:
+        """Start one movement of the frame ``target.tool``; sent at most once.
+
+        Raises:
+            LimitError: The target lies outside ``box``.
+            NotReadyError: The state, the motors or the tool in force forbid it.
+            OutcomeUnknownError: An earlier command on this controller is unresolved.
+        """
+
+    def move_until_input(
+        self, target: Pose, edge: InputEdge, *, speed_mm_s: float, box: WorkBox
+    ) -> MotionUntilInput:
+        """Start one straight movement during which the controller watches an input.
+
+        Sent at most once, and not at all when the input shows already what is waited for.
+
+        Raises:
+            ConfigError: There is no such input or speed.
+            LimitError, NotReadyError, OutcomeUnknownError: As :meth:`move_to`.
+        """
+
+    def requests_until(
+        self, target: Pose, edge: InputEdge, *, speed_mm_s: float
+    ) -> tuple[str, ...]:
+        """Return what :meth:`move_until_input` would send besides its reads."""
+
+    def requests_for(self, target: Pose, profile: MotionProfile) -> tuple[str, ...]:
+        """Return what :meth:`move_to` would send besides its reads, as it stands on the wire."""
+
+    def require_able(self, purpose: str) -> None:
+        """Refuse what no movement could begin in now; reads only.
+
+        For whoever asks a person first: nobody is asked whether the cell is clear, and then told
+        that the motors are off.
+
+        Args:
+            purpose: What it is to move for, in words.
+
+        Raises:
+            NotReadyError: The motors are off, or the state forbids every movement.
+        """
+
+    def terms(self) -> MotionTerms:
+        """Read what a person must know before it moves."""
+
+    def axes(self) -> Mapping[str, tuple[float, ...]]:
+        """Read the positions of the axes, by the names of what they count in."""
+
+    def stop(self) -> None:
+        """Stop it; may be called from any thread, at any time, more than once."""
+
+    def abort_unfinished(self) -> None:
+        """End the movements that were begun here and whose end nobody has seen."""

@@ -1,0 +1,1 @@
+"""What is kept about what was done: entries, markers, findings, and what stands now."""

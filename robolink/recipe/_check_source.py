@@ -1,0 +1,69 @@
+"""Whether the method of a recipe, its station and the rules for basis and Z fit each other."""
+
+from collections.abc import Iterator
+
+from robolink.config import Problem
+from robolink.messages import tr
+from robolink.methods import Check
+from robolink.recipe._draft import Draft
+
+
+def parameters(draft: Draft) -> Iterator[Problem]:
+    """Check what the method says about its parameters, in the words of the command."""
+    source, limits, box = draft.source, draft.tolerances, draft.box
+    if source is None:
+        return
+    sigma_stated: bool | None = limits is not None and limits.sigma_mm is not None
+    if limits is None and "tolerances" in draft.given:
+        sigma_stated = None
+    check = Check(
+        given=source.model_fields_set,
+        sigma_stated=sigma_stated,
+        box_height_mm=None if box is None else box.down_mm + box.up_mm,
+        spell=lambda name: "tolerances.sigma_mm" if name == "sigma_mm" else name,
+    )
+    for problem in source.parameters.problems(check):
+        yield Problem(f"source.{problem.where}", problem.what)
+
+
+def place(draft: Draft) -> Iterator[Problem]:
+    """Check that the station says where it is, where the method goes there."""
+    station, source = draft.station, draft.source
+    if station is None or source is None or source.of_method.needs.place is None:
+        return
+    if station.x_mm is None and station.y_mm is None and station.z_mm is None:
+        return  # all of it comes from the station's record
+    where, height = source.of_method.needs.place
+    if station.x_mm is None and station.y_mm is None:
+        yield Problem("station.x_mm", where.format(kind=source.kind))
+    if station.z_mm is None:
+        yield Problem("station.z_mm", height.format(kind=source.kind))
+
+
+def both_coordinates(draft: Draft) -> Iterator[Problem]:
+    """Check that the place of the station is whole."""
+    station = draft.station
+    if station is not None and (station.x_mm is None) != (station.y_mm is None):
+        absent = "x_mm" if station.x_mm is None else "y_mm"
+        yield Problem(f"station.{absent}", tr("is missing: give x_mm and y_mm, or neither"))
+
+
+def height(draft: Draft) -> Iterator[Problem]:
+    """Check that Z can be measured where it is to be."""
+    if draft.source is None or draft.z is None:
+        return
+    method = draft.source.of_method
+    if draft.z != "measured" and method.only_z:
+        yield Problem("z", tr('must be "measured": a touch tells Z and nothing else'))
+    if draft.z == "measured" and method.unmeasured_z:
+        yield Problem("z", method.unmeasured_z)
+
+
+def orientation(draft: Draft) -> Iterator[Problem]:
+    """Check that a measured orientation is not to be compared with a reference."""
+    if draft.source is None or draft.basis != "difference":
+        return
+    if "v_deg" in draft.source.of_method.measures:
+        yield Problem(
+            "basis", tr('must be "absolute": a whole orientation is written as it was measured')
+        )

@@ -1,0 +1,91 @@
+"""Who adds a method writes its folder and names it once: command, recipe, schema follow."""
+
+import importlib
+import sys
+
+import pytest
+from click.testing import CliRunner
+from robolink_cli.calibrate import calibrate
+
+from robolink.methods import find_method, method_names, register
+from robolink.recipe import json_schema, load_recipe
+from tests.contract._method_cell import KINDS, method_cell
+from tests.contract.plate_touch import METHOD
+from tests.contract.plate_touch.parameters import PlateTouchParameters
+
+RECIPE = """\
+schema = "robolink/recipe/1"
+name = "Length on the plate"
+basis = "absolute"
+z = "measured"
+[source]
+kind = "plate-touch"
+slow_mm_s = 0.5
+[station]
+id = "PLATE"
+[[tools]]
+number = 1
+"""
+
+
+@pytest.fixture(params=KINDS)
+def cell(request, tmp_path, monkeypatch):
+    with method_cell(request.param, tmp_path, monkeypatch) as cell, register(METHOD):
+        cell.mount()
+        yield cell
+
+
+def test_it_is_a_command_and_a_kind_of_a_recipe(cell, tmp_path):
+    done = cell.calibrate("plate-touch", "--station", "PLATE")
+    assert done.code == 0, done.err
+    assert abs(cell.stored.z_mm - cell.truth.z_mm) < 0.02
+    cell.lengthen(0.4)
+    path = tmp_path / "plate.toml"
+    path.write_text(RECIPE)
+    assert load_recipe(path).recipe.source.parameters == PlateTouchParameters(slow_mm_s=0.5)
+    done = cell.run("recalibrate", str(path), "--assist", cell.cell.url, "--yes")
+    assert done.code == 0, done.err
+    assert abs(cell.stored.z_mm - cell.truth.z_mm) < 0.02
+
+
+def test_its_limits_are_refused_in_the_same_words_everywhere(cell, tmp_path):
+    path = tmp_path / "plate.toml"
+    path.write_text(RECIPE.replace("slow_mm_s = 0.5", "slow_mm_s = 9\nclearance_mm = 12"))
+    in_recipe = cell.run("recalibrate", str(path)).err
+    assert "source.slow_mm_s: must be at most 5" in in_recipe
+    at_station = ("--station", "PLATE")
+    refused = cell.calibrate("plate-touch", *at_station, "--slow", "9")
+    assert "must be at most 5" in refused.document["error"]["what"]
+    path.write_text(RECIPE.replace("slow_mm_s = 0.5", "clearance_mm = 12"))
+    in_recipe = cell.run("recalibrate", str(path)).err
+    assert "source.clearance_mm: must be smaller than lift_mm" in in_recipe
+    refused = cell.calibrate("plate-touch", *at_station, "--clearance", "12")
+    assert "--clearance: must be smaller than --lift" in refused.document["error"]["what"]
+
+
+def test_help_and_schema_show_it_while_it_is_there():
+    with register(METHOD):
+        assert "Touch a plate twice: Z." in CliRunner().invoke(calibrate, ["--help"]).output
+        assert "--slow" in CliRunner().invoke(calibrate, ["plate-touch", "--help"]).output
+        shown = json_schema()["definitions"]["PlateTouchSource"]["properties"]["slow_mm_s"]
+        assert (shown["minimum"], shown["maximum"]) == (0.1, 5)
+    assert "plate-touch" not in method_names()
+    assert "PlateTouchSource" not in json_schema()["definitions"]
+
+
+def test_a_package_brings_it_by_an_entry_point(tmp_path, monkeypatch):
+    info = tmp_path / "brought-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: brought\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(
+        "[robolink.methods]\nplate-touch = tests.contract.plate_touch:METHOD\n"
+    )
+    monkeypatch.setattr(sys, "path", [str(tmp_path), *sys.path])
+    importlib.invalidate_caches()
+    assert find_method("plate-touch") is METHOD
+    assert "plate-touch" in method_names()
+
+
+def test_two_methods_of_one_name_are_refused():
+    with register(METHOD), pytest.raises(ValueError, match="already"), register(METHOD):
+        pass

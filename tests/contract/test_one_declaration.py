@@ -1,0 +1,131 @@
+"""A method declares its parameters once: commands and recipes take and refuse the same values."""
+
+import json
+import tomllib
+
+import pytest
+from annotated_types import Ge, Le
+from click.testing import CliRunner
+from robolink_cli import main
+from robolink_cli.calibrate._command import command_of
+
+from robolink.methods import all_methods, fields_of
+from robolink.recipe._loading import _checked
+
+NOBODY = "epson+tcp://127.0.0.1:9"
+"""Refused before anything is sent, nothing is asked for there."""
+
+
+def beyond(field):
+    """Yield values just outside the limits of a parameter."""
+    for limit in field.metadata:
+        if isinstance(limit, Ge):
+            yield limit.ge - 1  # type: ignore[operator]
+        if isinstance(limit, Le):
+            yield limit.le + 1  # type: ignore[operator]
+
+
+LIMITS = [
+    (method, field, value)
+    for method in all_methods()
+    if method.command
+    for field in fields_of(method.parameters)
+    if field.kind in (float, int)
+    for value in beyond(field)
+]
+RELATIONS = [
+    ("two-pose", {"clearance_mm": 12}, "clearance_mm", "must be smaller than"),
+    ("pivot", {"clearance_mm": 12}, "clearance_mm", "must be smaller than"),
+    ("z-touch", {"clearance_mm": 12, "input": 5}, "clearance_mm", "must be smaller than"),
+    ("z-touch", {"speeds_mm_s": (2, 2), "input": 5}, "speeds_mm_s", "must differ by a factor"),
+    ("z-touch", {"until_mm": 0.1, "input": 5}, "until_mm", "has nothing to leave out"),
+    ("beams", {"search_mm": 6}, "aside_mm", "must be larger than"),
+    ("beams", {"repeats": 1, "retake": True}, "retake", "means nothing: nothing is repeated"),
+    ("beams", {"until_mm": 0.1}, "until_mm", "has nothing to leave out"),
+    ("n-angle", {"angles_deg": (0, 90, 90)}, "angles_deg", "must not hold the same angle"),
+    ("n-angle", {"angles_deg": (0, 90, 180), "count": 4}, "count", "excludes"),
+    ("camera", {"turns_deg": (0, 10)}, "turns_deg", "must spread over at least 30 degrees"),
+    ("camera-affine", {"turns_deg": (0,)}, "turns_deg", "must spread over at least 30 degrees"),
+    ("board", {"turns_deg": (0, 120)}, "fiducials_mm", "is missing: say where the fiducials"),
+]
+
+
+def method_of(name):
+    (method,) = (method for method in all_methods() if method.name == name)
+    return method
+
+
+def typed(method, values):
+    """Return the options of a command that say the same as keys of a recipe."""
+    flags = {field.name: field.flag for field in fields_of(method.parameters)}
+    for name, value in values.items():
+        if value is True:
+            yield flags[name]
+        else:
+            texts = [f"{number:g}" for number in (value if isinstance(value, tuple) else (value,))]
+            yield f"{flags[name]}={','.join(texts)}"
+
+
+def in_recipe(method, values):
+    """Return what a recipe of that method is told."""
+    z = "measured" if method.only_z else "kept"
+    lines = [
+        'schema = "robolink/recipe/1"',
+        'name = "Needle"',
+        'basis = "absolute"',
+        f'z = "{z}"',
+        "[station]",
+        'id = "S"',
+        "[source]",
+        f'kind = "{method.name}"',
+        *(f"{name} = {json.dumps(value)}" for name, value in values.items()),
+        "[[tools]]",
+        "number = 1",
+    ]
+    return {one.where: one.what for one in _checked(tomllib.loads("\n".join(lines)))[1]}
+
+
+def refused(method, values, capsys):
+    """Return what a command of that method says."""
+    station = ("--station", "S") if method.needs.named else ()
+    words = ("calibrate", method.name, "--tool", "1", *station, *typed(method, values))
+    assert main.run(["-c", NOBODY, *words]) == 2
+    return " ".join(capsys.readouterr().err.split())
+
+
+@pytest.mark.parametrize(
+    ("method", "field", "value"),
+    LIMITS,
+    ids=[f"{method.name} {field.name} {value:g}" for method, field, value in LIMITS],
+)
+def test_a_limit_is_refused_in_the_same_words_before_anything_is_sent(method, field, value, capsys):
+    found = in_recipe(method, {field.name: value})[f"source.{field.name}"]
+    said = refused(method, {field.name: value}, capsys)
+    assert found in said
+    assert field.flag in said
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "where", "words"), RELATIONS, ids=[f"{r[0]} {r[2]}" for r in RELATIONS]
+)
+def test_what_does_not_go_together_is_refused_in_the_same_words(name, values, where, words, capsys):
+    method = method_of(name)
+    assert in_recipe(method, values)[f"source.{where}"].startswith(words)
+    flags = {field.name: field.flag for field in fields_of(method.parameters)}
+    assert f"{flags[where]}: {words}" in refused(method, values, capsys)
+
+
+def test_a_turn_that_tells_nothing_is_refused_before_the_robot_has_moved(capsys):
+    assert "must be at least 30" in refused(method_of("two-pose"), {"turn_deg": 5}, capsys)
+
+
+@pytest.mark.parametrize("method", all_methods(), ids=lambda method: method.name)
+def test_every_parameter_is_an_option_and_a_key(method):
+    keys = {field.name for field in fields_of(method.parameters) if field.in_recipe}
+    given = tomllib.loads(f'source = {{ kind = "{method.name}", nothing = 1 }}')
+    (what,) = (p.what for p in _checked(given)[1] if p.where == "source.nothing")
+    assert keys <= {*what.partition("these are: ")[2].split(", ")}
+    if method.command:
+        shown = CliRunner().invoke(command_of(method), ["--help"]).output
+        for field in fields_of(method.parameters):
+            assert field.flag in shown

@@ -1,0 +1,221 @@
+"""Meeting a PLC mailbox: version, probe, heartbeat, whole snapshots (docs/mailbox.md)."""
+
+import re
+from dataclasses import replace
+
+import pytest
+
+from robolink.errors import (
+    ConnectError,
+    RemoteProtocolError,
+    TransportBrokenError,
+    TransportClosedError,
+    TransportTimeoutError,
+)
+from robolink.model import ControllerState
+from robolink.protocols.mailbox import Bits, Capability, GroupState, crc16
+
+
+def resealed(words):
+    """Return the words with the checksum that belongs to them."""
+    return (*words[:110], crc16(words[:110]), words[111])
+
+
+def test_meeting_a_mailbox_writes_nothing(cell):
+    with cell.met() as controller:
+        controller.status()
+        controller.tools.read_all()
+        controller.groups[0].pose()
+    assert cell.link.sent == []
+    assert cell.link.beats == []
+
+
+def test_a_wrong_word_order_is_named_and_nothing_is_written(cell):
+    def big_end_first(words):
+        probe = slice(84, 88)
+        return resealed((*words[:84], *reversed(words[probe]), *words[88:]))
+
+    cell.link.response = big_end_first
+    with pytest.raises(RemoteProtocolError, match="high word first"):
+        cell.met()
+    assert cell.link.sent == []
+    assert cell.link.closed
+
+
+def test_swapped_bytes_in_every_word_are_named(cell):
+    cell.link.response = lambda words: tuple((word & 0xFF) << 8 | word >> 8 for word in words)
+    with pytest.raises(RemoteProtocolError, match="bytes swapped"):
+        cell.met()
+
+
+@pytest.mark.parametrize("shift", [1, -1, 4])
+def test_a_shifted_map_is_named_with_its_distance(cell, shift):
+    cell.link.response = lambda words: (*words[-shift:], *words[:-shift])
+    with pytest.raises(RemoteProtocolError, match=re.escape(f"{shift:+d} registers")):
+        cell.met()
+
+
+def test_a_map_without_a_probe_is_refused(cell):
+    cell.plc.now = replace(cell.plc.now, probe=1.0)
+    with pytest.raises(RemoteProtocolError, match="probe value is missing"):
+        cell.met()
+
+
+def test_another_major_version_is_refused(cell):
+    cell.plc.now = replace(cell.plc.now, version=0x0200)
+    with pytest.raises(RemoteProtocolError, match="another major version"):
+        cell.met()
+
+
+def test_an_empty_block_is_no_mailbox(cell):
+    cell.link.response = lambda words: (0,) * len(words)
+    with pytest.raises(RemoteProtocolError, match="no mailbox program has filled it"):
+        cell.met()
+
+
+@pytest.mark.parametrize(("field", "value"), [("boot_id", 0), ("unit_um", 0.0)])
+def test_a_block_with_an_impossible_value_is_refused(cell, field, value):
+    cell.plc.now = replace(cell.plc.now, **{field: value})
+    with pytest.raises(RemoteProtocolError, match=field):
+        cell.met()
+
+
+def test_a_heartbeat_that_stands_still_is_found_on_connecting(cell):
+    cell.plc.frozen = True
+    with pytest.raises(ConnectError, match="stands still"):
+        cell.met()
+    assert cell.link.closed
+
+
+def test_a_torn_snapshot_is_read_again(cell):
+    controller = cell.met()
+    torn = iter([True, True, False])
+    cell.link.response = lambda words: (*words[:-1], 9) if next(torn) else words
+    assert controller.status().ready
+
+
+def test_a_snapshot_that_stays_corrupt_ends_the_session(cell):
+    controller = cell.met()
+    reads = []
+
+    def corrupt(words):
+        reads.append(words)
+        return (*words[:20], words[20] ^ 1, *words[21:])
+
+    cell.link.response = corrupt
+    with pytest.raises(RemoteProtocolError, match="checksum"):
+        controller.status()
+    assert len(reads) == 3
+    assert cell.link.closed
+
+
+def test_a_line_that_recovers_is_asked_again(cell):
+    cell.link.recovers = True
+    controller = cell.met()
+    cell.link.lose_answer("read_response")
+    assert controller.status().ready
+
+
+def test_a_link_that_does_not_recover_is_not_asked_again(cell):
+    controller = cell.met()
+    cell.link.lose_answer("read_response")
+    with pytest.raises(TransportTimeoutError):
+        controller.status()
+
+
+def test_a_plc_that_started_anew_ends_the_session(cell):
+    controller = cell.met()
+    cell.plc.restart()
+    with pytest.raises(TransportBrokenError, match="started anew"):
+        controller.status()
+    assert cell.link.closed
+
+
+def cut_by(cell, *, restarted):
+    """Let the link be cut, as TCP is by a start of the PLC, or for another reason."""
+
+    def mishap(_deliver):
+        if restarted:
+            cell.plc.restart()
+        cell.link.close()
+        raise TransportBrokenError("The connection was closed.", remedy="connect again")
+
+    return mishap
+
+
+@pytest.mark.parametrize(
+    ("restarted", "reachable", "sentence"),
+    [
+        (True, True, "started anew"),
+        (True, False, "connection was closed"),
+        (False, True, "connection was closed"),
+    ],
+)
+@pytest.mark.parametrize("method", ["read_response", "write_command"])
+def test_a_start_that_cuts_the_link_is_told_as_one_if_the_plc_answers_again(
+    cell, method, restarted, reachable, sentence
+):
+    controller = cell.met()
+    cell.link.reachable = reachable
+    cell.link.plan(method, cut_by(cell, restarted=restarted))
+    with pytest.raises(TransportBrokenError, match=sentence) as broken:
+        controller.take() if method == "write_command" else controller.status()
+    assert broken.value.controller == controller.identity
+    assert cell.plc.executed == []
+    with pytest.raises(TransportClosedError):
+        controller.status()
+
+
+def test_another_unit_of_length_ends_the_session(cell):
+    controller = cell.met()
+    cell.plc.now = replace(cell.plc.now, unit_um=25400.0)
+    with pytest.raises(TransportBrokenError, match="unit of length"):
+        controller.groups[0].pose()
+
+
+@pytest.mark.parametrize(
+    ("state", "bits", "expected"),
+    [
+        (GroupState.STANDBY, Bits.PERMITTED | Bits.POWERED, ControllerState.READY),
+        (GroupState.DISABLED, Bits.PERMITTED | Bits.POWERED, ControllerState.DISABLED),
+        (GroupState.DISABLED, Bits.PERMITTED, ControllerState.NO_POWER),
+        (GroupState.STANDBY, Bits.PERMITTED, ControllerState.NO_POWER),
+        (GroupState.STANDBY, Bits(0), ControllerState.NOT_REMOTE),
+        (GroupState.ERRORSTOP, Bits.PERMITTED, ControllerState.FAULT),
+        (GroupState.STOPPING, Bits.PERMITTED, ControllerState.PAUSED),
+        (GroupState.STANDBY, Bits.PERMITTED | Bits.INTERRUPTED, ControllerState.PAUSED),
+        (GroupState.HOMING, Bits.PERMITTED | Bits.POWERED, ControllerState.RUNNING),
+    ],
+)
+def test_the_group_state_is_told_in_the_words_of_all_controllers(cell, state, bits, expected):
+    cell.plc.now = replace(cell.plc.now, group_state=state, bits=bits)
+    status = cell.met().status()
+    assert status.state is expected
+    assert status.ready is (expected is ControllerState.READY)
+
+
+def test_the_facts_name_the_kinematics_and_the_version(cell):
+    controller = cell.met()
+    facts = controller.mailbox_facts()
+    assert (facts.kinematics, facts.axis_count, facts.version) == ("Kin_Scara3_Z", 4, "1.0")
+    assert controller.facts().robot_models == ("Kin_Scara3_Z",)
+
+
+def test_a_mailbox_with_the_tools_profile_moves_nothing(cell):
+    cell.plc.now = replace(cell.plc.now, capabilities=Capability.TOOLS)
+    able = cell.met().capabilities
+    assert able.tool_write
+    assert not able.motion
+
+
+def test_positions_are_converted_from_the_plcs_units(cell):
+    cell.plc.now = replace(cell.plc.now, unit_um=25400.0, tcp=(1.0, 2.0, 3.0, 0.0, 90.0, 0.0))
+    pose = cell.met().groups[0].pose()
+    assert (pose.x_mm, pose.z_mm) == pytest.approx((25.4, 76.2))
+    assert pose.v_deg == pytest.approx(90.0)
+
+
+def test_a_position_that_is_no_number_is_not_believed(cell):
+    cell.plc.now = replace(cell.plc.now, tcp=(float("nan"), 0.0, 0.0, 0.0, 0.0, 0.0))
+    with pytest.raises(RemoteProtocolError, match="no number"):
+        cell.met().groups[0].pose()

@@ -1,0 +1,144 @@
+"""How a jog ends at a PLC that does not take its end, or that ended it before."""
+
+from dataclasses import replace
+
+import pytest
+
+from robolink.controllers.softmotion import Jog
+from robolink.errors import (
+    ControllerFaultError,
+    OutcomeUnknownError,
+    RejectedError,
+    TransportClosedError,
+)
+from robolink.model import MotionProfile, Path, Pose, WorkBox
+from robolink.protocols.mailbox import (
+    Bits,
+    Command,
+    CommandState,
+    ErrorClass,
+    Finished,
+    GroupState,
+    Opcode,
+)
+
+ANYWHERE = WorkBox()
+ALONG_X = Jog(forward=frozenset({0}), speed_mm_s=3.0)
+
+
+def jog(controller, duration_s=1.0):
+    return controller.groups[0].jog(ALONG_X, duration_s=duration_s, box=ANYWHERE)
+
+
+def ends_a_jog(command: Command) -> bool:
+    return command.opcode == Opcode.JOG and not any(command.operands[:2])
+
+
+def moves_nothing(plc) -> bool:
+    return plc.now.group_state != GroupState.MOVING and not plc.now.bits & Bits.JOGGING
+
+
+def test_a_jog_whose_end_is_refused_is_halted(cell, plc, controller):
+    plc.refuses = lambda command: ErrorClass.NOT_PERMITTED if ends_a_jog(command) else 0
+    with pytest.raises(RejectedError, match="114") as refusal:
+        jog(controller)
+    assert refusal.value.code == ErrorClass.NOT_PERMITTED
+    assert plc.opcodes() == [Opcode.JOG, Opcode.JOG, Opcode.HALT]
+    assert moves_nothing(plc)
+    assert cell.open_requests() == []
+
+
+def test_a_jog_whose_end_is_not_acknowledged_is_halted(cell, plc, controller):
+    plc.overhears = ends_a_jog
+    with pytest.raises(ControllerFaultError, match=r"not acknowledged.*stands still"):
+        jog(controller)
+    assert plc.opcodes() == [Opcode.JOG, Opcode.HALT]
+    assert moves_nothing(plc)
+    # The session goes on, and what became of the jog was seen.
+    assert not controller.status().running
+    assert cell.open_requests() == []
+
+
+def test_a_jog_whose_end_and_halt_are_not_acknowledged_is_stopped(plc, controller):
+    plc.overhears = lambda command: ends_a_jog(command) or command.opcode == Opcode.HALT
+    with pytest.raises(ControllerFaultError, match=r"not acknowledged.*stands still"):
+        jog(controller)
+    assert plc.opcodes() == [Opcode.JOG, Opcode.STOP]
+    assert moves_nothing(plc)
+    assert controller.status().paused
+
+
+def test_a_jog_that_nothing_ends_is_unknown_and_no_beat_follows(cell, plc, controller):
+    plc.overhears = lambda command: command.only_ends
+    ending = []
+    cell.link.before("write_command", lambda: ending.append(len(cell.link.beats)), nth=2)
+    with pytest.raises(OutcomeUnknownError) as unknown:
+        jog(controller)
+    assert "emergency stop" in unknown.value.remedy
+    assert ending == [len(cell.link.beats)]
+    assert len(cell.open_requests()) == 1
+    with pytest.raises(TransportClosedError):
+        controller.status()
+    plc.advance()
+    assert moves_nothing(plc)  # its own watch has ended it
+
+
+def ended_by_plc(plc, state, error, *, seen="head"):
+    """Let the PLC end the jog by itself, shown in the head or among the last ends only."""
+
+    def end():
+        (command,) = plc.executed
+        plc.now = replace(plc.now, bits=plc.now.bits & ~Bits.JOGGING)
+        end = Finished(command.sequence, state, error)
+        if seen == "head":
+            plc.now = replace(plc.now, state=state, error_class=error)
+        else:
+            plc.now = replace(plc.now, finished=(end, *plc.now.finished[:3]), ack_head=9999)
+
+    return end
+
+
+@pytest.mark.parametrize("seen", ["head", "ends"])
+@pytest.mark.parametrize(
+    ("state", "error", "expected"),
+    [
+        (CommandState.ABORTED, ErrorClass.NOT_PERMITTED, RejectedError),
+        (CommandState.ABORTED, ErrorClass.HEARTBEAT_LOST, ControllerFaultError),
+        (CommandState.ABORTED, ErrorClass.NONE, ControllerFaultError),
+        (CommandState.ERROR, ErrorClass.UNREACHABLE, RejectedError),
+    ],
+)
+def test_a_jog_that_the_plc_ended_is_no_success(
+    cell, plc, controller, state, error, expected, seen
+):
+    cell.link.before("read_head", ended_by_plc(plc, state, error, seen=seen), nth=20)
+    with pytest.raises(expected) as failure:
+        jog(controller, duration_s=30.0)
+    assert failure.value.code == error
+    assert plc.opcodes() == [Opcode.JOG]  # nothing is left to end
+    assert cell.open_requests() == []
+
+
+def test_a_beat_for_the_ownership_goes_out_once_a_second_while_nothing_is_unfinished(
+    cell, plc, controller
+):
+    for _ in range(100):
+        controller.status()
+        plc.clock.sleep(0.1)
+    assert 9 <= len(cell.link.beats) <= 12
+
+
+def test_looking_does_not_keep_a_movement_going(cell, plc, controller):
+    group = controller.groups[0]
+    target = Pose(410.0, 90.0, 250.0, 45.0, tool=0)
+    profile = MotionProfile(Path.STRAIGHT, speed_mm_s=20.0)
+    motions = [group.move_to(target, profile, box=ANYWHERE) for _ in range(4)]
+    before = len(cell.link.beats)
+    for _ in range(10):
+        controller.status()
+        group.pose()
+        controller.tools.read(3)
+        plc.clock.sleep(0.1)
+    assert len(cell.link.beats) == before
+    with pytest.raises(ControllerFaultError, match="heartbeat was missing"):
+        motions[3].wait(timeout_s=5)

@@ -1,0 +1,113 @@
+"""A PLC behind the interfaces that procedures and tool changes use, and behind its URL."""
+
+import pytest
+
+from robolink.controllers import connect
+from robolink.controllers.softmotion import SoftMotionController, opening
+from robolink.errors import (
+    ConfigError,
+    ConnectError,
+    OutcomeUnknownError,
+    RejectedError,
+    RobolinkError,
+)
+from robolink.model import MotionProfile, Path, ToolOffset, WorkBox
+from robolink.protocols.mailbox import ErrorClass, Opcode
+from robolink.runner import Question, Runner, RunSettings
+from robolink.transaction import ToolChange, Wanted, change_tools, recover
+
+OLD = ToolOffset(1.5, -2.0, 40.0, 10.0)
+NEW = ToolOffset(1.7, -2.1, 40.3, 20.0)
+
+
+class Nobody:
+    """An operator who is never asked."""
+
+    def tell(self, text: str) -> None:
+        """Hear nothing."""
+
+    def ask(self, question: str, kind: Question) -> None:
+        """Be asked nothing."""
+        raise AssertionError(question)
+
+    def poll(self, wait_s: float) -> str | None:
+        """Say nothing."""
+        return None
+
+
+@pytest.fixture
+def controller(cell):
+    controller = cell.met()
+    controller.tools.write(3, OLD, expected=None)
+    return controller
+
+
+def test_two_tools_change_together(cell, controller):
+    change_tools(controller, [Wanted(3, NEW, OLD), Wanted(4, NEW, None)])
+    assert controller.tools.same(controller.tools.read(3), NEW)
+    assert controller.tools.same(controller.tools.read(4), NEW)
+    assert cell.open_requests() == []
+
+
+def test_a_change_that_is_refused_half_way_is_taken_back(cell, controller):
+    with (
+        pytest.raises(RejectedError),
+        ToolChange(controller, [Wanted(3, NEW, OLD), Wanted(4, NEW, None)]) as change,
+    ):
+        cell.link.before(
+            "write_command",
+            lambda: cell.plc.refusals.update({Opcode.WRITE_TOOL: ErrorClass.TOOL_INCOMPATIBLE}),
+            nth=2,
+        )
+        cell.link.before("write_command", cell.plc.refusals.clear)
+        change.write()
+    assert controller.tools.same(controller.tools.read(3), OLD)
+    assert controller.tools.read(4) is None
+    assert cell.open_requests() == []
+
+
+def test_a_change_cut_off_in_the_middle_is_recovered(cell, controller):
+    cell.link.lose_request("write_command", nth=2)
+    with pytest.raises(OutcomeUnknownError):
+        change_tools(controller, [Wanted(3, NEW, OLD), Wanted(4, NEW, None)])
+    controller.close()
+    with pytest.raises(RobolinkError, match="owns the mailbox"), cell.connect() as soon:
+        recover(soon)
+    cell.plc.clock.sleep(10.0)
+    later = cell.connect()
+    recover(later)
+    assert later.tools.same(later.tools.read(3), OLD)
+    assert later.tools.read(4) is None
+    assert cell.open_requests() == []
+
+
+def test_a_runner_moves_and_jogs_the_group(controller):
+    group = controller.groups[0]
+    here = group.pose()
+    box = WorkBox.around(here, xy_mm=10, below_mm=10, above_mm=10)
+    runner = Runner(controller, group, Nobody(), RunSettings(box))
+    assert runner.jog("x+1.5 z-0.5").x_mm == pytest.approx(here.x_mm + 1.5)
+    motion = group.move_to(here, MotionProfile(Path.JOINT), box=box)
+    motion.wait(timeout_s=5)
+    assert group.pose().coordinates() == pytest.approx(here.coordinates())
+
+
+def test_a_softmotion_url_leads_to_a_mailbox(cell, monkeypatch):
+    monkeypatch.setattr(opening, "open_mailbox_link", lambda *_args, **_options: cell.link)
+    with connect("softmotion+modbus-tcp://192.0.2.1") as controller:
+        assert isinstance(controller, SoftMotionController)
+        assert controller.identity == cell.link.identity
+    assert cell.link.closed
+
+
+def test_a_mailbox_that_does_not_run_is_not_reached(cell, monkeypatch):
+    monkeypatch.setattr(opening, "open_mailbox_link", lambda *_args, **_options: cell.link)
+    cell.plc.frozen = True
+    with pytest.raises(ConnectError):
+        connect("softmotion+modbus-tcp://192.0.2.1")
+    assert cell.link.closed
+
+
+def test_a_dialogue_with_a_plc_is_not_recorded_by_half():
+    with pytest.raises(ConfigError, match="cannot be recorded"):
+        connect("softmotion+modbus-tcp://192.0.2.1", trace=lambda *_passage: None)

@@ -116,7 +116,7 @@ def test_a_tool_of_it_is_calibrated_at_two_poses(server, monkeypatch):
         plan = ToolPlan(1, TwoPoseSource(), AcceptanceCriteria(), verify=True)
         change = NozzleChange(controller, ChangePlan((plan,)), operator=Fitter(server.machine))
         change.run()
-        written = controller.tools.read(1)
+        written = controller.tools.read(1) or ToolOffset()
         assert controller.tools.selected() == 1
         assert not controller.outcomes.open_markers()
     assert written.x_mm == pytest.approx(TRUE.x_mm, abs=0.01)
@@ -130,7 +130,7 @@ def test_a_controller_that_writes_what_it_likes_does_not_keep_its_promises():
     machine = Careless(tools={1: ToolOffset(1.0)})
     store = dict.__setitem__
 
-    class Off(dict):
+    class Off(dict[int, ToolOffset]):
         def __setitem__(self, tool, offset):
             store(self, tool, ToolOffset(offset.x_mm + 0.25))
 

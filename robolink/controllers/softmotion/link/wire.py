@@ -35,6 +35,13 @@ T = TypeVar("T")
 ErrorT = TypeVar("ErrorT", bound=RobolinkError)
 
 
+class _ThisThread(threading.local):
+    """What the thread that asks is doing."""
+
+    attends = False
+    goes_first = False
+
+
 class MailboxWire:
     """Exchanges on an open link, which it owns from here on.
 
@@ -54,7 +61,7 @@ class MailboxWire:
         self._gate = InterruptGate()
         self._gate.open()
         self._beat = ClientHeartbeat()
-        self._here = threading.local()
+        self._here = _ThisThread()
         self._turns = Turns()
         self._ended_by: RobolinkError | None = None
         self.owner = owner
@@ -194,11 +201,11 @@ class MailboxWire:
 
     @property
     def _attends(self) -> bool:
-        return getattr(self._here, "attends", False)
+        return self._here.attends
 
     @property
     def _goes_first(self) -> bool:
-        return getattr(self._here, "goes_first", False)
+        return self._here.goes_first
 
     def _turn(self) -> AbstractContextManager[None]:
         return nullcontext() if self._goes_first else self._turns.taken()

@@ -16,6 +16,9 @@ WIDTH, LEFT, TOP, HEIGHT, GAP = 1080, 46, 20, 44, 8
 COLOURS = {"robolink_cli": "#fde8c8", "robolink_simulators": "#dcecd8", "robolink": "#eef2f8"}
 
 WORDS = {
+    "testing": "what every kind of controller is held to; one in memory",
+    "files": "of robolink, of people, by name",
+    "closing": "what is closed",
     "robolink_cli": "commands, options, questions, views",
     "robolink_simulators": "cell, assist, hosting, epson, softmotion, plc: the fakes",
     "recipe": "a nozzle change written down once, as TOML",
@@ -36,16 +39,12 @@ WORDS = {
     "transport": "moves bytes: TCP, serial, Modbus, CAN",
     "protocols": "codecs for both ends, no I/O",
     "register_maps": "a builder's own registers",
-    "toml_files": "files that people write",
     "journal": "what was done, chained",
-    "named_files": "files that people name",
-    "key_problems": "words for a wrong key",
     "model": "values and interfaces, no I/O",
     "stop_latch": "what is sent passes here",
     "errors": "every exception",
     "timing": "clocks, deadlines",
     "interrupts": "Ctrl-C and others",
-    "durable_files": "whole and durable",
     "messages": "the catalogue",
     "ways": "words of who shows",
     "lazy_exports": "names on first use",

@@ -24,7 +24,6 @@ from robolink.errors import (
 from robolink.interrupts import InterruptGate
 from robolink.messages import tr
 from robolink.stop_latch import StopLatch
-from robolink.timing import Clock
 from robolink.transport import MailboxHead, MailboxLink
 
 _READS: Final = 3
@@ -46,6 +45,9 @@ class MailboxWire:
     """Exchanges on an open link, which it owns from here on.
 
     Attributes:
+        identity: Which PLC this is.
+        place: Where it was reached, the same for each spelling of the URL.
+        clock: The clock on which the PLC's time passes.
         owner: This client's token, never 0.
         epoch: The epoch of our ownership, 0 while we have none.
         motions: The movements of this client.
@@ -58,6 +60,7 @@ class MailboxWire:
 
     def __init__(self, link: MailboxLink, *, owner: int, timeout_s: float) -> None:
         self._link = link
+        self.identity, self.place, self.clock = link.identity, link.place, link.clock
         self._gate = InterruptGate()
         self._gate.open()
         self._beat = ClientHeartbeat()
@@ -73,24 +76,9 @@ class MailboxWire:
         self.look_back: Callable[[MailboxLink], RobolinkError | None] | None = None
 
     @property
-    def identity(self) -> str:
-        """Which PLC this is."""
-        return self._link.identity
-
-    @property
-    def place(self) -> str:
-        """Where it was reached, the same for each spelling of the URL."""
-        return self._link.place
-
-    @property
     def whole_look_s(self) -> float:
         """How long the response block and a beat take on the line alone; 0 on a network."""
         return self._link.whole_look_s
-
-    @property
-    def clock(self) -> Clock:
-        """The clock on which the PLC's time passes."""
-        return self._link.clock
 
     @property
     def alive(self) -> bool:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from annotated_types import Ge, Le, MaxLen, MinLen
 
@@ -22,10 +22,12 @@ from robolink.methods.declaration import (
     Rows,
 )
 from robolink.methods.pin_parameters import lift_beyond_box
-from robolink.methods.site import Site
 from robolink.procedures import HALF_ROUND_DEG, LookPlan
-from robolink.stations import CameraStation, camera_station, sensor_of
 from robolink.ways import Way, way
+
+if TYPE_CHECKING:
+    from robolink.methods.site import Site
+    from robolink.stations import CameraStation
 
 Turns = Annotated[
     tuple[Angle, ...],
@@ -141,12 +143,14 @@ class LookParameters(MethodParameters):
             yield Problem("mm_per_px", tr("maps all pixels onto one line"))
 
 
-def camera_at(parameters: LookParameters, site: Site) -> tuple[str, CameraStation]:
+def camera_at(parameters: LookParameters, site: "Site") -> "tuple[str, CameraStation]":
     """Return the camera's name or URL, and where it looks.
 
     Raises:
         ConfigError: Nobody knows one of them.
     """
+    from robolink.stations import camera_station, sensor_of  # what --help does without
+
     sensor = parameters.sensor or sensor_of(site.station)
     if not sensor:
         raise ConfigError(

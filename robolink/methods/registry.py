@@ -5,8 +5,10 @@ method's and which leads to its :class:`~robolink.methods.Method`; :func:`regist
 object itself.
 """
 
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 from importlib import import_module, metadata
 from typing import Final
 
@@ -34,10 +36,15 @@ _OWN: Final = {
 _registered: dict[str, AnyMethod] = {}
 
 
+@cache
+def _brought(_path: tuple[str, ...]) -> metadata.EntryPoints:
+    """Return what installed packages bring; looking through all of them takes long."""
+    return metadata.entry_points(group=METHODS_GROUP)
+
+
 def method_names() -> tuple[str, ...]:
     """Return the names of all methods, in the order of the help page."""
-    brought = sorted(metadata.entry_points(group=METHODS_GROUP).names)
-    return tuple(dict.fromkeys((*_OWN, *brought, *_registered)))
+    return tuple(dict.fromkeys((*_OWN, *sorted(_brought(tuple(sys.path)).names), *_registered)))
 
 
 def find_method(name: str) -> AnyMethod:
@@ -51,7 +58,7 @@ def find_method(name: str) -> AnyMethod:
     if name in _OWN:
         own: AnyMethod = import_module(_OWN[name]).METHOD
         return own
-    found = tuple(metadata.entry_points(group=METHODS_GROUP, name=name))
+    found = tuple(_brought(tuple(sys.path)).select(name=name))
     if len(found) != 1:
         raise ConfigError(
             tr("There is no calibration method {name!r}.", name=name)

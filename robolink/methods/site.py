@@ -1,9 +1,11 @@
 """Where and for what a method measures: what it is told besides its own parameters."""
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
-from robolink.model import Controller
-from robolink.stations import Station
+if TYPE_CHECKING:
+    from robolink.model import Controller
+    from robolink.stations import Station  # what --help does without
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -20,15 +22,15 @@ class Site:
         interval_mm: Largest half width of a 95 % interval that is believed, if one is judged.
     """
 
-    controller: Controller
+    controller: "Controller"
     tool: int
-    station: Station
+    station: "Station"
     points: tuple[int, ...] = ()
     sigma_mm: float | None = None
     max_change_mm: float = 2.0
     interval_mm: float | None = None
 
-    def stating(self, **details: object) -> Station:
+    def stating(self, **details: object) -> "Station":
         """Return the station with what the parameters say of it; ``None`` says nothing."""
         said = {name: value for name, value in details.items() if value is not None}
         return replace(self.station, details={**self.station.details, **said})

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from robolink.nozzle_change._plan import Limits as Limits
     from robolink.nozzle_change._plan import ToolPlan as ToolPlan
     from robolink.nozzle_change._plan import require_ready as require_ready
+    from robolink.nozzle_change._plan import usual_box as usual_box
     from robolink.nozzle_change._preview import PlannedStep as PlannedStep
     from robolink.nozzle_change._preview import flange_now as flange_now
     from robolink.nozzle_change._preview import foresee as foresee
@@ -30,7 +31,7 @@ __getattr__ = lazy_exports(
         "_acceptance": "AcceptanceCriteria",
         "_change": "Earlier NozzleChange",
         "_listener": "Listener Moment",
-        "_plan": "ChangePlan Limits ToolPlan require_ready",
+        "_plan": "ChangePlan Limits ToolPlan require_ready usual_box",
         "_preview": "PlannedStep flange_now foresee preview require_inside",
         "_proposal": "ChangeReport Proposal ToolReport LimitVerdict",
     },

@@ -1,7 +1,7 @@
 """What a nozzle change is to do, and within which limits."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from robolink.methods import TwoPoseSource
 from robolink.model import Pose, ToolOffset, WorkBox, plain_offset
@@ -12,20 +12,21 @@ from robolink.procedures import MovingSource, RequiresSensor, TipSource
 from robolink.runner import RunSettings
 
 
+def usual_box(sideways_mm: float = 150.0) -> WorkBox:
+    """Return how far targets may lie from the start where nobody says how far down and up."""
+    return WorkBox.reaching(sideways_mm, down_mm=30.0, up_mm=50.0)
+
+
 @dataclass(frozen=True, slots=True)
 class Limits:
     """Where and how fast the robot may go.
 
     Attributes:
-        box_mm: How far targets may lie, sideways, from where the flange is at the start.
-        box_down_mm: How far below the start they may lie.
-        box_up_mm: How far above.
+        box: How far targets may lie from where the flange is at the start.
         speed_percent, speed_mm_s: Speeds, in low power.
     """
 
-    box_mm: float = 150.0
-    box_down_mm: float = 30.0
-    box_up_mm: float = 50.0
+    box: WorkBox = field(default_factory=usual_box)
     speed_percent: int = 5
     speed_mm_s: float = 20.0
 
@@ -37,15 +38,8 @@ class Limits:
             offset: The tip that moves, ``None`` for the flange.
         """
         shift_z, aside = _tip_about(start, offset) if offset else (0.0, 0.0)
-        reach = self.box_mm + aside
-        box = WorkBox(
-            start.x_mm - reach,
-            start.x_mm + reach,
-            start.y_mm - reach,
-            start.y_mm + reach,
-            start.z_mm + shift_z - self.box_down_mm,
-            start.z_mm + shift_z + self.box_up_mm,
-        )
+        above = replace(start, z_mm=start.z_mm + shift_z)
+        box = self.box.larger(sideways_mm=aside).about(above)
         return RunSettings(box, speed_percent=self.speed_percent, speed_mm_s=self.speed_mm_s)
 
 

@@ -111,8 +111,9 @@ def room(draft: Draft) -> Iterator[Problem]:
     if poses.safe is None:
         yield from _together(box, [pose for _, pose in targets])
         return
+    inside = box.reach.about(poses.safe.pose)
     for where, pose in targets:
-        if not _inside(box, pose, about=poses.safe):
+        if not inside.holds(pose.pose):
             yield Problem(
                 where,
                 tr(
@@ -132,14 +133,6 @@ def _together(box: Box, poses: list[FlangePose]) -> Iterator[Problem]:
         yield Problem(
             "box", tr("is too small: wherever the robot starts, some pose of a tool lies outside")
         )
-
-
-def _inside(box: Box, pose: FlangePose, *, about: FlangePose) -> bool:
-    return (
-        abs(pose.x_mm - about.x_mm) <= box.sideways_mm
-        and abs(pose.y_mm - about.y_mm) <= box.sideways_mm
-        and -box.down_mm <= pose.z_mm - about.z_mm <= box.up_mm
-    )
 
 
 def _poses(draft: Draft) -> Iterator[tuple[str, FlangePose]]:

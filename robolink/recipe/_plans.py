@@ -109,9 +109,7 @@ def _limits(recipe: Recipe, parameters: MethodParameters) -> Limits:
     box, speeds = recipe.box, recipe.speeds
     higher_mm = 0.0 if "up_mm" in box.model_fields_set else parameters.height_mm()
     return Limits(
-        box_mm=box.sideways_mm,
-        box_down_mm=box.down_mm,
-        box_up_mm=box.up_mm + higher_mm,
+        box.reach.larger(up_mm=higher_mm),
         speed_percent=speeds.percent,
         speed_mm_s=speeds.mm_s,
     )

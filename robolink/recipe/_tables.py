@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from robolink.model import Pose
+from robolink.model import Pose, WorkBox
 
 Line = Annotated[str, Field(min_length=1, max_length=200, pattern=r"^[^\x00-\x1f\x7f-\x9f]*$")]
 """One line for people. No control characters: they would reach a terminal."""
@@ -129,6 +129,11 @@ class Box(Table):
     """How far down, mm."""
     up_mm: Annotated[float, Field(ge=1)] = 50.0
     """How far up, mm."""
+
+    @property
+    def reach(self) -> WorkBox:
+        """The same, about wherever the flange will be."""
+        return WorkBox.reaching(self.sideways_mm, down_mm=self.down_mm, up_mm=self.up_mm)
 
 
 class Tolerances(Table):

@@ -7,26 +7,43 @@ so the prompt is polled, and the status is read between polls. That also shows a
 an open guard at once.
 """
 
-from robolink.runner._jog_steps import jog_target as jog_target
-from robolink.runner._jog_steps import parse_decimal as parse_decimal
-from robolink.runner._jog_steps import parse_steps as parse_steps
-from robolink.runner._operator import Operator as Operator
-from robolink.runner._operator import Question as Question
-from robolink.runner._runner import MOST_REFUSED as MOST_REFUSED
-from robolink.runner._runner import POLL_S as POLL_S
-from robolink.runner._runner import Runner as Runner
-from robolink.runner._runner import StepDone as StepDone
-from robolink.runner._runner import ask_for_pose as ask_for_pose
-from robolink.runner._settings import RunSettings as RunSettings
-from robolink.runner._steps import Ask as Ask
-from robolink.runner._steps import Confirm as Confirm
-from robolink.runner._steps import Look as Look
-from robolink.runner._steps import Move as Move
-from robolink.runner._steps import Notify as Notify
-from robolink.runner._steps import Procedure as Procedure
-from robolink.runner._steps import Seek as Seek
-from robolink.runner._steps import SeenAt as SeenAt
-from robolink.runner._steps import Step as Step
-from robolink.runner._steps import TeachPrompt as TeachPrompt
-from robolink.runner._yes_no import ask_yes_no as ask_yes_no
-from robolink.runner._yes_no import yes_or_no as yes_or_no
+from typing import TYPE_CHECKING
+
+from robolink.lazy_exports import lazy_exports
+
+if TYPE_CHECKING:
+    from robolink.runner._jog_steps import jog_target as jog_target
+    from robolink.runner._jog_steps import parse_decimal as parse_decimal
+    from robolink.runner._jog_steps import parse_steps as parse_steps
+    from robolink.runner._operator import Operator as Operator
+    from robolink.runner._operator import Question as Question
+    from robolink.runner._runner import MOST_REFUSED as MOST_REFUSED
+    from robolink.runner._runner import POLL_S as POLL_S
+    from robolink.runner._runner import Runner as Runner
+    from robolink.runner._runner import StepDone as StepDone
+    from robolink.runner._runner import ask_for_pose as ask_for_pose
+    from robolink.runner._settings import RunSettings as RunSettings
+    from robolink.runner._steps import Ask as Ask
+    from robolink.runner._steps import Confirm as Confirm
+    from robolink.runner._steps import Look as Look
+    from robolink.runner._steps import Move as Move
+    from robolink.runner._steps import Notify as Notify
+    from robolink.runner._steps import Procedure as Procedure
+    from robolink.runner._steps import Seek as Seek
+    from robolink.runner._steps import SeenAt as SeenAt
+    from robolink.runner._steps import Step as Step
+    from robolink.runner._steps import TeachPrompt as TeachPrompt
+    from robolink.runner._yes_no import ask_yes_no as ask_yes_no
+    from robolink.runner._yes_no import yes_or_no as yes_or_no
+
+__getattr__ = lazy_exports(
+    __name__,
+    {
+        "_jog_steps": "jog_target parse_decimal parse_steps",
+        "_operator": "Operator Question",
+        "_runner": "MOST_REFUSED POLL_S Runner StepDone ask_for_pose",
+        "_settings": "RunSettings",
+        "_steps": "Ask Confirm Look Move Notify Procedure Seek SeenAt Step TeachPrompt",
+        "_yes_no": "ask_yes_no yes_or_no",
+    },
+)

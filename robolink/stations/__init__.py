@@ -4,17 +4,33 @@ What a person knows about a station stands in the cell file; where a measurement
 in the journal, and counts from then on. docs/stations.md explains both.
 """
 
-from robolink.stations._finding import find_station as find_station
-from robolink.stations._finding import find_stations as find_stations
-from robolink.stations._places import beam_station as beam_station
-from robolink.stations._places import camera_station as camera_station
-from robolink.stations._places import pin_of as pin_of
-from robolink.stations._places import sensor_of as sensor_of
-from robolink.stations._places import touch_station as touch_station
-from robolink.stations._records import Found as Found
-from robolink.stations._records import station_entry as station_entry
-from robolink.stations._sensors import BeamStation as BeamStation
-from robolink.stations._sensors import CameraStation as CameraStation
-from robolink.stations._sensors import TouchStation as TouchStation
-from robolink.stations._station import Station as Station
-from robolink.stations._station import StationKind as StationKind
+from typing import TYPE_CHECKING
+
+from robolink.lazy_exports import lazy_exports
+
+if TYPE_CHECKING:
+    from robolink.stations._finding import find_station as find_station
+    from robolink.stations._finding import find_stations as find_stations
+    from robolink.stations._places import beam_station as beam_station
+    from robolink.stations._places import camera_station as camera_station
+    from robolink.stations._places import pin_of as pin_of
+    from robolink.stations._places import sensor_of as sensor_of
+    from robolink.stations._places import touch_station as touch_station
+    from robolink.stations._records import Found as Found
+    from robolink.stations._records import station_entry as station_entry
+    from robolink.stations._sensors import BeamStation as BeamStation
+    from robolink.stations._sensors import CameraStation as CameraStation
+    from robolink.stations._sensors import TouchStation as TouchStation
+    from robolink.stations._station import Station as Station
+    from robolink.stations._station import StationKind as StationKind
+
+__getattr__ = lazy_exports(
+    __name__,
+    {
+        "_finding": "find_station find_stations",
+        "_places": "beam_station camera_station pin_of sensor_of touch_station",
+        "_records": "Found station_entry",
+        "_sensors": "BeamStation CameraStation TouchStation",
+        "_station": "Station StationKind",
+    },
+)

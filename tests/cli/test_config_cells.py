@@ -168,7 +168,7 @@ def test_calibrate_takes_its_limits_from_the_cell(cell, simulator, monkeypatch, 
     (one,) = plan.tools
     assert (
         plan.limits.speed_mm_s,
-        plan.limits.box_mm,
+        plan.limits.box.x_max_mm,
         one.source.touch.lift_mm,
         one.source.touch.clearance_mm,
         one.criteria.max_change_mm,

@@ -1,6 +1,8 @@
 """A method declares its parameters once: commands and recipes take and refuse the same values."""
 
 import json
+import subprocess
+import sys
 import tomllib
 
 import pytest
@@ -129,3 +131,19 @@ def test_every_parameter_is_an_option_and_a_key(method):
         shown = CliRunner().invoke(command_of(method), ["--help"]).output
         for field in fields_of(method.parameters):
             assert field.flag in shown
+
+
+def test_help_asks_for_no_mathematics_and_no_recipes():
+    code = (
+        "import sys\n"
+        "from click.testing import CliRunner\n"
+        "from robolink_cli.calibrate import calibrate\n"
+        "from robolink.methods import all_methods\n"
+        "commands = [[method.name] for method in all_methods() if method.command]\n"
+        "for words in [[], *commands]:\n"
+        "    shown = CliRunner().invoke(calibrate, [*words, '--help'])\n"
+        "    assert shown.exit_code == 0, shown.output\n"
+        "late = {'numpy', 'pydantic', 'sqlalchemy', 'pymodbus', 'can', 'rich'}\n"
+        "assert not late & {*sys.modules}, late & {*sys.modules}"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=30)

@@ -141,11 +141,7 @@ def test_what_is_left_out_is_as_in_a_calibration_by_hand():
     source, limits = recipe.source.parameters, Limits()
     assert source == TwoPoseParameters()
     assert TwoPoseParameters().touch == TouchPlan()
-    assert recipe.box.model_dump() == {
-        "sideways_mm": limits.box_mm,
-        "down_mm": limits.box_down_mm,
-        "up_mm": limits.box_up_mm,
-    }
+    assert recipe.box.reach == limits.box
     assert recipe.speeds.model_dump() == {
         "percent": limits.speed_percent,
         "mm_s": limits.speed_mm_s,

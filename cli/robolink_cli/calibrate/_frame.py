@@ -108,7 +108,7 @@ def frame_from(
         ReservedToolError, ToolIndexError: There is no such tool to calibrate.
         ConfigError: Options exclude each other, or the report cannot be written.
     """
-    from robolink.nozzle_change import AcceptanceCriteria, Limits
+    from robolink.nozzle_change import AcceptanceCriteria, Limits, usual_box
 
     _require_tool(tool)
     criteria = AcceptanceCriteria(
@@ -124,7 +124,7 @@ def frame_from(
         context.with_nozzle(nozzle, lot),
         tool,
         criteria,
-        Limits(box_mm=box_mm, speed_mm_s=speed_mm_s),
+        Limits(usual_box(box_mm), speed_mm_s=speed_mm_s),
         verify=not no_verify,
         assist=assist,
         impact=impact_request(impact, impact_pts, names=("--impact", "--impact-pts")),

@@ -158,7 +158,7 @@ def calibrate_live(frame: CalibrationRequest, source: Callable[[Controller], Tip
                 controller,
                 tr("to measure tool {tool}", tool=live.tool),
                 speed_mm_s=frame.limits.speed_mm_s,
-                box_mm=frame.limits.box_mm,
+                box_mm=frame.limits.box.x_max_mm,
             ),
             yes=frame.yes,
         )

@@ -45,7 +45,7 @@ def calibrate_with(
     else:
         frame = frame.at(station or "")
     limits = frame.limits
-    higher = replace(limits, box_up_mm=limits.box_up_mm + parameters.height_mm())
+    higher = replace(limits, box=limits.box.larger(up_mm=parameters.height_mm()))
     frame = replace(frame, limits=higher)
     place_mm = None if at is None else _three(at)
 

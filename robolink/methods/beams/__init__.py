@@ -1,17 +1,21 @@
 """beams: two crossed light beams."""
 
 from dataclasses import asdict, replace
+from typing import TYPE_CHECKING
 
 from robolink.messages import tr
 from robolink.methods.beams.parameters import BeamsParameters
 from robolink.methods.declaration import Method, Needs
 from robolink.methods.site import Site
-from robolink.procedures import TipSource
-from robolink.stations import StationKind, beam_station
+from robolink.stations import StationKind
+
+if TYPE_CHECKING:
+    from robolink.procedures import TipSource
 
 
-def _source(parameters: BeamsParameters, site: Site) -> TipSource:
+def _source(parameters: BeamsParameters, site: Site) -> "TipSource":
     from robolink.methods.beams.source import BeamsSource
+    from robolink.stations import beam_station
 
     station = site.station
     if parameters.beams is not None:

@@ -1,15 +1,19 @@
 """board: a held board, by its fiducials before an up-looking camera."""
 
+from typing import TYPE_CHECKING
+
 from robolink.messages import tr
 from robolink.methods.board.parameters import BoardParameters
 from robolink.methods.declaration import Method, Needs
 from robolink.methods.look_parameters import PLACE, UNMEASURED_Z, camera_at
 from robolink.methods.site import Site
-from robolink.procedures import TipSource
 from robolink.stations import StationKind
 
+if TYPE_CHECKING:
+    from robolink.procedures import TipSource
 
-def _source(parameters: BoardParameters, site: Site) -> TipSource:
+
+def _source(parameters: BoardParameters, site: Site) -> "TipSource":
     from robolink.methods.board.source import BoardSource
 
     drawing = parameters.drawing

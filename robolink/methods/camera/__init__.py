@@ -1,15 +1,19 @@
 """camera: a calibrated, up-looking camera sees the tip."""
 
+from typing import TYPE_CHECKING
+
 from robolink.messages import tr
 from robolink.methods.camera.parameters import CameraParameters
 from robolink.methods.declaration import Method, Needs
 from robolink.methods.look_parameters import PLACE, UNMEASURED_Z, camera_at
 from robolink.methods.site import Site
-from robolink.procedures import TipSource
 from robolink.stations import StationKind
 
+if TYPE_CHECKING:
+    from robolink.procedures import TipSource
 
-def _source(parameters: CameraParameters, site: Site) -> TipSource:
+
+def _source(parameters: CameraParameters, site: Site) -> "TipSource":
     from robolink.methods.camera.source import CameraSource
 
     sensor, station = camera_at(parameters, site)

@@ -1,17 +1,20 @@
 """camera-affine: an up-looking camera of unknown pose, found together with the tip."""
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from robolink.messages import tr
 from robolink.methods.camera_affine.parameters import CameraAffineParameters
 from robolink.methods.declaration import Former, Method, Needs
 from robolink.methods.look_parameters import PLACE, UNMEASURED_Z, camera_at
 from robolink.methods.site import Site
-from robolink.procedures import TipSource
 from robolink.stations import StationKind
 
+if TYPE_CHECKING:
+    from robolink.procedures import TipSource
 
-def _source(parameters: CameraAffineParameters, site: Site) -> TipSource:
+
+def _source(parameters: CameraAffineParameters, site: Site) -> "TipSource":
     from robolink.methods.camera_affine.source import CameraAffineSource
 
     sensor, station = camera_at(parameters, site)

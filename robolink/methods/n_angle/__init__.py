@@ -1,14 +1,18 @@
 """n-angle: one pin touched at several angles of U, each checked by the others."""
 
+from typing import TYPE_CHECKING
+
 from robolink.messages import tr
 from robolink.methods.declaration import Former, Method, Needs, PoseHelp
 from robolink.methods.n_angle.parameters import NAngleParameters
 from robolink.methods.site import Site
-from robolink.procedures import PoseMethod, TipSource
 from robolink.stations import StationKind
 
+if TYPE_CHECKING:
+    from robolink.procedures import PoseMethod, TipSource
 
-def _source(parameters: NAngleParameters, site: Site) -> TipSource:
+
+def _source(parameters: NAngleParameters, site: Site) -> "TipSource":
     from robolink.methods.n_angle.source import NAngleSource
 
     return NAngleSource(
@@ -19,7 +23,7 @@ def _source(parameters: NAngleParameters, site: Site) -> TipSource:
     )
 
 
-def _from_poses(_parameters: NAngleParameters, site: Site) -> PoseMethod:
+def _from_poses(_parameters: NAngleParameters, site: Site) -> "PoseMethod":
     from robolink.methods.n_angle.source import ManyTouches
 
     return ManyTouches(site.sigma_mm)

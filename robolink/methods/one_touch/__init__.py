@@ -6,11 +6,11 @@ from robolink.messages import tr
 from robolink.methods.declaration import Former, Method, Needs, PoseHelp
 from robolink.methods.one_touch.parameters import OneTouchParameters
 from robolink.methods.site import Site
-from robolink.procedures import LazySource, MovingSource, PoseMethod, TipSource
-from robolink.stations import StationKind, pin_of
+from robolink.stations import StationKind
 
 if TYPE_CHECKING:
     from robolink.methods.one_touch.solvers import Absolute, Difference
+    from robolink.procedures import MovingSource, PoseMethod, TipSource
 
 
 def _solver(parameters: OneTouchParameters, site: Site) -> "Absolute | Difference":
@@ -22,6 +22,7 @@ def _solver(parameters: OneTouchParameters, site: Site) -> "Absolute | Differenc
     """
     from robolink.calibration import NeedleLimits
     from robolink.methods.one_touch.solvers import Absolute, difference_from_last
+    from robolink.stations import pin_of
 
     if parameters.basis == "absolute":
         # Whoever does not know how sure the pin is cannot say how sure the tip is.
@@ -36,9 +37,11 @@ def _solver(parameters: OneTouchParameters, site: Site) -> "Absolute | Differenc
     )
 
 
-def _source(parameters: OneTouchParameters, site: Site) -> TipSource:
+def _source(parameters: OneTouchParameters, site: Site) -> "TipSource":
+    from robolink.procedures import LazySource
+
     # The last touch is read when it is needed: a plan alone reads nothing.
-    def make() -> MovingSource:
+    def make() -> "MovingSource":
         from robolink.methods.one_touch.source import OneTouchSource
 
         return OneTouchSource(_solver(parameters, site), parameters.touch)
@@ -46,7 +49,7 @@ def _source(parameters: OneTouchParameters, site: Site) -> TipSource:
     return LazySource(make, sentence=tr("measured on the robot: one pin touched once"))
 
 
-def _from_poses(parameters: OneTouchParameters, site: Site) -> PoseMethod:
+def _from_poses(parameters: OneTouchParameters, site: Site) -> "PoseMethod":
     return _solver(parameters, site)
 
 

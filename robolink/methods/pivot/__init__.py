@@ -1,14 +1,18 @@
 """pivot: one pin touched in tilted orientations, on five axes and six."""
 
+from typing import TYPE_CHECKING
+
 from robolink.messages import tr
 from robolink.methods.declaration import Method, Needs, PoseHelp
 from robolink.methods.pivot.parameters import PivotParameters
 from robolink.methods.site import Site
-from robolink.procedures import PoseMethod, TipSource
 from robolink.stations import StationKind
 
+if TYPE_CHECKING:
+    from robolink.procedures import PoseMethod, TipSource
 
-def _source(parameters: PivotParameters, site: Site) -> TipSource:
+
+def _source(parameters: PivotParameters, site: Site) -> "TipSource":
     from robolink.methods.pivot.axes import require_tilting
     from robolink.methods.pivot.source import PivotSource
     from robolink.methods.pivot.tilts import informative_tilts  # numpy, for this robot alone
@@ -22,7 +26,7 @@ def _source(parameters: PivotParameters, site: Site) -> TipSource:
     )
 
 
-def _from_poses(_parameters: PivotParameters, site: Site) -> PoseMethod:
+def _from_poses(_parameters: PivotParameters, site: Site) -> "PoseMethod":
     from robolink.methods.pivot.source import PivotTouches
 
     return PivotTouches(site.sigma_mm)

@@ -4,17 +4,21 @@ On the command line every method that can do with such poses takes them with ``-
 ``--pose`` and ``--poses``, so there is no command of this name.
 """
 
+from typing import TYPE_CHECKING
+
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.methods.declaration import Method, Needs
 from robolink.methods.points.parameters import PointsParameters
 from robolink.methods.site import Site
 from robolink.model import Pose
-from robolink.procedures import PoseMethod, TipSource
 from robolink.stations import StationKind
 
+if TYPE_CHECKING:
+    from robolink.procedures import PoseMethod, TipSource
 
-def _solver(parameters: PointsParameters, site: Site) -> PoseMethod:
+
+def _solver(parameters: PointsParameters, site: Site) -> "PoseMethod":
     from robolink.methods.n_angle.source import ManyTouches
     from robolink.methods.two_pose.source import TwoTouches
 
@@ -22,7 +26,7 @@ def _solver(parameters: PointsParameters, site: Site) -> PoseMethod:
     return ManyTouches(site.sigma_mm) if many else TwoTouches(site.sigma_mm)
 
 
-def _source(parameters: PointsParameters, site: Site) -> TipSource:
+def _source(parameters: PointsParameters, site: Site) -> "TipSource":
     """Return what reads the points.
 
     Raises:

@@ -1,14 +1,18 @@
 """six-point: position and orientation of a tool, on five axes and six."""
 
+from typing import TYPE_CHECKING
+
 from robolink.messages import tr
 from robolink.methods.declaration import Method, Needs, PoseHelp
 from robolink.methods.site import Site
 from robolink.methods.six_point.parameters import SixPointParameters
-from robolink.procedures import PoseMethod, TipSource
 from robolink.stations import StationKind
 
+if TYPE_CHECKING:
+    from robolink.procedures import PoseMethod, TipSource
 
-def _source(parameters: SixPointParameters, site: Site) -> TipSource:
+
+def _source(parameters: SixPointParameters, site: Site) -> "TipSource":
     from robolink.methods.pivot.axes import require_tilting
     from robolink.methods.pivot.tilts import informative_tilts  # numpy, for this robot alone
     from robolink.methods.six_point.procedure import AxisTeachPlan
@@ -24,7 +28,7 @@ def _source(parameters: SixPointParameters, site: Site) -> TipSource:
     )
 
 
-def _from_poses(parameters: SixPointParameters, site: Site) -> PoseMethod:
+def _from_poses(parameters: SixPointParameters, site: Site) -> "PoseMethod":
     from robolink.methods.six_point.source import SixPoints
 
     return SixPoints(parameters.second_is, site.sigma_mm)

@@ -1,20 +1,24 @@
 """two-pose: one pin touched at two angles of U."""
 
+from typing import TYPE_CHECKING
+
 from robolink.messages import tr
 from robolink.methods.declaration import Former, Method, Needs, PoseHelp
 from robolink.methods.site import Site
 from robolink.methods.two_pose.parameters import TwoPoseParameters
-from robolink.procedures import PoseMethod, TipSource
 from robolink.stations import StationKind
 
+if TYPE_CHECKING:
+    from robolink.procedures import PoseMethod, TipSource
 
-def _source(parameters: TwoPoseParameters, site: Site) -> TipSource:
+
+def _source(parameters: TwoPoseParameters, site: Site) -> "TipSource":
     from robolink.methods.two_pose.source import TwoPoseSource
 
     return TwoPoseSource(parameters.touch, sigma_mm=site.sigma_mm)
 
 
-def _from_poses(_parameters: TwoPoseParameters, site: Site) -> PoseMethod:
+def _from_poses(_parameters: TwoPoseParameters, site: Site) -> "PoseMethod":
     from robolink.methods.two_pose.source import TwoTouches
 
     return TwoTouches(site.sigma_mm)

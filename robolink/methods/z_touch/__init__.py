@@ -1,15 +1,20 @@
 """z-touch: a surface that switches an input when a tip touches it."""
 
+from typing import TYPE_CHECKING
+
 from robolink.messages import tr
 from robolink.methods.declaration import Former, Method, Needs
 from robolink.methods.site import Site
 from robolink.methods.z_touch.parameters import ZTouchParameters
-from robolink.procedures import TipSource
-from robolink.stations import StationKind, touch_station
+from robolink.stations import StationKind
+
+if TYPE_CHECKING:
+    from robolink.procedures import TipSource
 
 
-def _source(parameters: ZTouchParameters, site: Site) -> TipSource:
+def _source(parameters: ZTouchParameters, site: Site) -> "TipSource":
     from robolink.methods.z_touch.source import ZTouchSource
+    from robolink.stations import touch_station
 
     stated = parameters.input is not None
     station = site.stating(

@@ -33,7 +33,11 @@ class MotionProfile:
 
 @dataclass(frozen=True, slots=True)
 class WorkBox:
-    """The box, in base coordinates of the frame that moves, that no target may leave."""
+    """The box that no target may leave, in base coordinates of the frame that moves.
+
+    A plan holds it about the place where the frame will be at the start (:meth:`reaching`); there
+    it is put when that place is known (:meth:`about`).
+    """
 
     x_min_mm: float = -math.inf
     x_max_mm: float = math.inf
@@ -43,15 +47,43 @@ class WorkBox:
     z_max_mm: float = math.inf
 
     @classmethod
+    def reaching(cls, sideways_mm: float, *, down_mm: float, up_mm: float) -> "WorkBox":
+        """Return the box that reaches so far from a place that is not known yet."""
+        return cls(-sideways_mm, sideways_mm, -sideways_mm, sideways_mm, -down_mm, up_mm)
+
+    @classmethod
     def around(cls, pose: Pose, *, xy_mm: float, below_mm: float, above_mm: float) -> "WorkBox":
         """Return the box that reaches ``xy_mm`` sideways, down and up from ``pose``."""
-        return cls(
-            pose.x_mm - xy_mm,
-            pose.x_mm + xy_mm,
-            pose.y_mm - xy_mm,
-            pose.y_mm + xy_mm,
-            pose.z_mm - below_mm,
-            pose.z_mm + above_mm,
+        return cls.reaching(xy_mm, down_mm=below_mm, up_mm=above_mm).about(pose)
+
+    def about(self, pose: Pose) -> "WorkBox":
+        """Return the same box about a place, which so far stood for nothing."""
+        return WorkBox(
+            pose.x_mm + self.x_min_mm,
+            pose.x_mm + self.x_max_mm,
+            pose.y_mm + self.y_min_mm,
+            pose.y_mm + self.y_max_mm,
+            pose.z_mm + self.z_min_mm,
+            pose.z_mm + self.z_max_mm,
+        )
+
+    def larger(self, *, sideways_mm: float = 0.0, up_mm: float = 0.0) -> "WorkBox":
+        """Return the box that reaches further by so much, to all sides and up."""
+        return WorkBox(
+            self.x_min_mm - sideways_mm,
+            self.x_max_mm + sideways_mm,
+            self.y_min_mm - sideways_mm,
+            self.y_max_mm + sideways_mm,
+            self.z_min_mm,
+            self.z_max_mm + up_mm,
+        )
+
+    def holds(self, target: Pose) -> bool:
+        """Tell whether a target lies inside."""
+        return (
+            self.x_min_mm <= target.x_mm <= self.x_max_mm
+            and self.y_min_mm <= target.y_mm <= self.y_max_mm
+            and self.z_min_mm <= target.z_mm <= self.z_max_mm
         )
 
     def check(self, target: Pose) -> None:

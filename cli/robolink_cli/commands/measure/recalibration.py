@@ -132,7 +132,7 @@ class Recalibration:
                 tools=", ".join(str(plan.tool) for plan in run.plan.tools),
             ),
             speed_mm_s=limits.speed_mm_s,
-            box_mm=limits.box_mm,
+            box_mm=limits.box.x_max_mm,
         )
 
     def _explain_reference(self) -> None:

@@ -85,10 +85,10 @@ def learn(
     A pin is touched by a person; beams and surfaces are sought about where the cell file says. No
     tool is written. What is wrong with the tool's offset shifts the station by as much.
     """
-    from robolink.nozzle_change import Limits
+    from robolink.nozzle_change import Limits, usual_box
     from robolink_cli.commands.measure.station_learning import learn as learn_it
 
-    limits = Limits(box_mm=box_mm, speed_mm_s=speed_mm_s)
+    limits = Limits(usual_box(box_mm), speed_mm_s=speed_mm_s)
     learn_it(
         context,
         name,

@@ -51,7 +51,7 @@ def learn(
         controller.require_settled(tr("learn station {name}", name=name))
         purpose = tr("to find station {name} with tool {tool}", name=name, tool=tool)
         question = motion_question(
-            controller, purpose, speed_mm_s=limits.speed_mm_s, box_mm=limits.box_mm
+            controller, purpose, speed_mm_s=limits.speed_mm_s, box_mm=limits.box.x_max_mm
         )
         agree_to_motion(question, yes=yes)
         with (

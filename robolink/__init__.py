@@ -11,7 +11,9 @@ Names are loaded when they are first used, so that importing the package costs n
 
 from typing import TYPE_CHECKING
 
-__version__ = "0.1.0"
+from robolink.version import VERSION
+
+__version__ = VERSION
 
 if TYPE_CHECKING:
     from robolink.controllers import connect as connect

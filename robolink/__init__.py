@@ -11,24 +11,51 @@ Names are loaded when they are first used, so that importing the package costs n
 
 from typing import TYPE_CHECKING
 
-__version__ = "0.1.0"
+from robolink.version import VERSION
+
+__version__ = VERSION
 
 if TYPE_CHECKING:
     from robolink.controllers import connect as connect
     from robolink.errors import RobolinkError as RobolinkError
     from robolink.model import ANY as ANY
+    from robolink.model import Controller as Controller
     from robolink.model import Pose as Pose
     from robolink.model import Secret as Secret
+    from robolink.model import Spot as Spot
+    from robolink.model import SpotUnit as SpotUnit
+    from robolink.model import TipSensor as TipSensor
     from robolink.model import ToolOffset as ToolOffset
+    from robolink.runner import Operator as Operator
+    from robolink.runner import Question as Question
 
-__all__ = ["ANY", "Pose", "RobolinkError", "Secret", "ToolOffset", "connect"]
+__all__ = [
+    "ANY",
+    "Controller",
+    "Operator",
+    "Pose",
+    "Question",
+    "RobolinkError",
+    "Secret",
+    "Spot",
+    "SpotUnit",
+    "TipSensor",
+    "ToolOffset",
+    "connect",
+]
 
 _HOMES = {
     "connect": "robolink.controllers",
     "RobolinkError": "robolink.errors",
     "ANY": "robolink.model",
+    "Controller": "robolink.model",
+    "Operator": "robolink.runner",
     "Pose": "robolink.model",
+    "Question": "robolink.runner",
     "Secret": "robolink.model",
+    "Spot": "robolink.model",
+    "SpotUnit": "robolink.model",
+    "TipSensor": "robolink.model",
     "ToolOffset": "robolink.model",
 }
 

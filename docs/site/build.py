@@ -8,6 +8,7 @@ heading that is not there; what it wrote is then looked through once more, link 
 import ast
 import importlib
 import inspect
+import json
 import re
 import shutil
 import subprocess
@@ -88,14 +89,20 @@ def api_page(package: str, names: dict[str, str], things: dict[str, object]) -> 
 
 
 def lay_out() -> None:
+    """Copy what pages link to, and write the pages of the API."""
     shutil.rmtree(PAGES.parent, ignore_errors=True)
     PAGES.mkdir(parents=True)
     for name in LINKED:
         shutil.copytree(ROOT / name, PAGES / name, ignore=shutil.ignore_patterns("__pycache__"))
     for file in (*ROOT.glob("*.md"), *(ROOT / name for name in ("LICENSE", "NOTICE", "Makefile"))):
         shutil.copy(file, PAGES)
-    api = PAGES / "api"
+    write_api(PAGES / "api")
+
+
+def write_api(api: Path) -> None:
+    """Write a page for each package, their list, and where names are that several hand out."""
     api.mkdir()
+    elsewhere: dict[str, str] = {}
     listed = ["API", "===", "", "What each package hands out.", "", ".. toctree::"]
     listed += ["   :maxdepth: 1", ""]
     found = packages()
@@ -105,7 +112,9 @@ def lay_out() -> None:
             for name, thing in things.items()
         }
         (api / f"{package}.rst").write_text(api_page(package, names, things), encoding="utf-8")
+        elsewhere |= {f"{package}.{n}": f"{at}.{n}" for n, at in names.items() if at != package}
         listed.append(f"   {package}")
+    (PAGES / "elsewhere.json").write_text(json.dumps(elsewhere), encoding="utf-8")
     (api / "index.rst").write_text("\n".join([*listed, ""]), encoding="utf-8")
 
 

@@ -1,6 +1,8 @@
 """Settings of Sphinx for `make docs`; the pages are laid out by build.py beside this file."""
 
+import json
 import re
+from pathlib import Path
 
 from docutils import nodes
 from sphinx.addnodes import pending_xref
@@ -49,14 +51,23 @@ templates_path = ["templates"]
 _log = logging.getLogger("robolink.docs")
 
 
-def _report_dead_role(
+def _find_elsewhere(
     app: Sphinx, env: BuildEnvironment, node: pending_xref, content: nodes.Element
-) -> None:
-    """Warn of a role in a docstring that leads nowhere; types in signatures may do so."""
+) -> nodes.Element | None:
+    """Resolve a name by the package that describes it; warn of a role that leads nowhere.
+
+    Types in signatures may lead nowhere: what no package hands out has no page.
+    """
+    elsewhere = json.loads((Path(app.srcdir) / "elsewhere.json").read_text(encoding="utf-8"))
+    if there := elsewhere.get(str(node.get("reftarget", ""))):
+        python = env.domains["py"]
+        page, kind = node["refdoc"], node["reftype"]
+        return python.resolve_xref(env, page, app.builder, kind, there, node, content)
     source = str(node.source or getattr(node.parent, "source", ""))
     ours = "docstring of" in source and str(node.get("reftarget", "")).startswith("robolink")
     if isinstance(content, nodes.literal) and node.get("refdomain") == "py" and ours:
         _log.warning("%s leads nowhere", node["reftarget"], location=node)
+    return None
 
 
 _COLON = "\x1f"
@@ -89,4 +100,4 @@ def setup(app: Sphinx) -> None:
     """Connect what is above."""
     app.connect("autodoc-process-docstring", _before_napoleon, priority=400)
     app.connect("autodoc-process-docstring", _after_napoleon, priority=600)
-    app.connect("missing-reference", _report_dead_role)
+    app.connect("missing-reference", _find_elsewhere)

@@ -49,6 +49,7 @@ WORDS = {
     "ways": "words of who shows",
     "lazy_exports": "names on first use",
     "standing": "what is left",
+    "version": "which robolink",
     "checkpoints": "where another thread may come in",
 }
 """What each room is, in words that fit its box."""

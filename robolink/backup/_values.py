@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final, Protocol
 
-import robolink
 from robolink.model import ControllerFacts, OutcomeLog, ToolOffset, ToolTable
 from robolink.timing import wall_label
+from robolink.version import VERSION
 
 TOOLS: Final = range(1, 16)
 """The tools that a controller can define (docs/reference/epson.md 3.1); a backup names every
@@ -86,6 +86,4 @@ def take_backup(controller: ToolHolder) -> Backup:
         NotReadyError: As for :func:`read_tools`.
     """
     state = read_tools(controller)
-    return Backup(
-        controller.identity, wall_label(), robolink.__version__, controller.facts(), state
-    )
+    return Backup(controller.identity, wall_label(), VERSION, controller.facts(), state)

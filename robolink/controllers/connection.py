@@ -1,11 +1,11 @@
 """From a URL to a controller."""
 
-from robolink import __version__
 from robolink.controllers.registry import ConnectionTerms, find_opener
 from robolink.journal import signature_here
 from robolink.model import Controller, OutcomeLog, Secret, Signature
 from robolink.timing import Clock
 from robolink.transport import TraceSink, parse_url
+from robolink.version import VERSION
 
 
 def connect(
@@ -56,7 +56,7 @@ def connect(
         return url
     link = parse_url(url)
     terms = ConnectionTerms(
-        signature or signature_here(__version__),
+        signature or signature_here(VERSION),
         password=Secret(password) if isinstance(password, str) else password,
         timeout_s=timeout_s,
         remote_timeout_s=remote_timeout_s,

@@ -7,6 +7,7 @@ read. Markers, latch, ledger, recovery, and what happens at the end of a connect
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
+from functools import cached_property
 from types import TracebackType
 from typing import Final, Self
 
@@ -48,28 +49,15 @@ class ControllerCore(ABC):
         capabilities: What can be asked for.
         tools: The tool offsets.
         groups: What moves.
-        resolver: Settles what was begun here and not proved finished.
-        io: Inputs and outputs, where this kind has them.
-        points: Taught points, likewise.
-        variables: Variables of the machine's program, likewise.
-        alarms: Alarms beside the error state, likewise.
 
     Args:
         link: The controller, connected.
         capabilities: See above.
         tools: See above.
-        groups: See above.
-        preserver: Puts back what procedures change.
-        resolver: See above; by default what settles tools and movements.
     """
 
     tools: ToolTable
-    groups: Sequence[MotionGroup]
-    resolver: Resolver
-    io: DigitalIo | None = None
-    points: PointReader | None = None
-    variables: VariableTable | None = None
-    alarms: AlarmList | None = None
+    groups: Sequence[MotionGroup] = ()
 
     def __init__(
         self,
@@ -77,12 +65,8 @@ class ControllerCore(ABC):
         *,
         capabilities: Capabilities,
         tools: ToolTable,
-        groups: Sequence[MotionGroup],
-        preserver: Preserver,
-        resolver: Resolver | None = None,
     ) -> None:
         self._driver = link
-        self._preserver = preserver
         self.identity = link.identity
         self.clock = link.clock
         self.latch = link.latch
@@ -90,8 +74,6 @@ class ControllerCore(ABC):
         self.ledger = link.markers.ledger
         self.capabilities = capabilities
         self.tools = tools
-        self.groups = groups
-        self.resolver = resolver or MarkerResolver(link, tools, preserver)
 
     # What a kind says.
 
@@ -111,7 +93,37 @@ class ControllerCore(ABC):
     def _take_leave(self) -> None:
         """Do what is proper before the link is closed; whatever it raises is passed over."""
 
-    # What a kind may have.
+    # What a kind may have; a command that needs none of it does without making it.
+
+    @property
+    def io(self) -> DigitalIo | None:
+        """Inputs and outputs."""
+        return None
+
+    @property
+    def points(self) -> PointReader | None:
+        """Points that a person taught."""
+        return None
+
+    @property
+    def variables(self) -> VariableTable | None:
+        """Variables of the machine's program."""
+        return None
+
+    @property
+    def alarms(self) -> AlarmList | None:
+        """Alarms beside the error state."""
+        return None
+
+    @cached_property
+    def resolver(self) -> Resolver:
+        """Settles what was begun here and not proved finished."""
+        return MarkerResolver(self._driver, self.tools, self._preserver)
+
+    @cached_property
+    def _preserver(self) -> Preserver:
+        """Puts back what procedures change."""
+        return Preserver(self._driver, self.tools, self.groups)
 
     def condition(self) -> Mapping[str, object]:
         """Read more about the state than the flags say, plain JSON."""

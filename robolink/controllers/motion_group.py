@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 
 from robolink.controllers.driver_link import DriverLink
-from robolink.errors import NotReadyError, NotReadyReason, StoppedError
+from robolink.errors import MotionTimeoutError, NotReadyError, NotReadyReason, StoppedError
 from robolink.messages import tr
 from robolink.model import (
     InputEdge,
@@ -108,6 +108,20 @@ class MotionGroupCore(ABC):
                 controller=self._driver.identity,
                 request=request,
             )
+
+
+def not_ended_in_time(controller: str, request: str, timeout_s: float) -> MotionTimeoutError:
+    """Return the error for a movement that took too long and was aborted."""
+    return MotionTimeoutError(
+        tr(
+            "{statement!r} did not end within {timeout_s:.0f} s and was aborted.",
+            statement=request,
+            timeout_s=timeout_s,
+        ),
+        remedy=tr("Read where the robot is ('robolink where') before you go on."),
+        controller=controller,
+        request=request,
+    )
 
 
 def stopped_before_edge(controller: str, request: str) -> StoppedError:

@@ -8,10 +8,9 @@ from abc import abstractmethod
 from typing import Final
 
 from robolink.controllers.driver_link import DriverLink
-from robolink.controllers.motion_group import MotionGroupCore
+from robolink.controllers.motion_group import MotionGroupCore, not_ended_in_time
 from robolink.errors import (
     ControllerError,
-    MotionTimeoutError,
     OutcomeUnknownError,
     StoppedError,
 )
@@ -138,16 +137,7 @@ class PolledMotion:
                 raise
             if not arrived:
                 self.abort()
-                raise MotionTimeoutError(
-                    tr(
-                        "{statement!r} did not end within {timeout_s:.0f} s and was aborted.",
-                        statement=request,
-                        timeout_s=timeout_s,
-                    ),
-                    remedy=tr("Read where the robot is ('robolink where') before you go on."),
-                    controller=self._link.identity,
-                    request=request,
-                )
+                raise not_ended_in_time(self._link.identity, request, timeout_s)
             self._settle()
         return MotionOutcome.STOPPED if self._aborted else MotionOutcome.ARRIVED
 

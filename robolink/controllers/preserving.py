@@ -6,14 +6,22 @@ tip belongs. So a durable marker names the cell's own tool before anything is ch
 when that tool has been read back (docs/reference/rules.md 4).
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 
 from robolink.controllers.driver_link import DriverLink
-from robolink.controllers.motion_group import MotionGroupCore
 from robolink.errors import ConfigError, JournalError, RobolinkError
 from robolink.messages import tr
-from robolink.model import EntryKind, Finding, Marker, MarkerKind, NewEntry, ToolTable, Verdict
+from robolink.model import (
+    EntryKind,
+    Finding,
+    Marker,
+    MarkerKind,
+    MotionGroup,
+    NewEntry,
+    ToolTable,
+    Verdict,
+)
 from robolink.ways import Way, way
 
 
@@ -25,15 +33,15 @@ class Preserver:
     Args:
         link: The controller.
         tools: Its tools.
-        group: What moves, ``None`` where nothing does.
+        groups: What moves.
     """
 
     def __init__(
-        self, link: DriverLink, tools: ToolTable, group: MotionGroupCore | None = None
+        self, link: DriverLink, tools: ToolTable, groups: Sequence[MotionGroup] = ()
     ) -> None:
         self._link = link
         self._tools = tools
-        self._group = group
+        self._groups = groups
 
     @contextmanager
     def preserved(self, reason: str) -> Iterator[None]:
@@ -66,8 +74,8 @@ class Preserver:
         """
         tool = tool_before(marker)
         with self._link.uninterrupted(), self._link.latch.restoring():
-            if self._group is not None:
-                self._group.abort_unfinished()
+            for group in self._groups:
+                group.abort_unfinished()
             self._tools.select(tool)
             self._restore_more(marker)
             self._link.markers.clear(marker)

@@ -171,12 +171,12 @@ def _tell_which(wire: "MailboxWire", met: "Callable[[str], None]") -> None:
 
 def _stop_other(link: LinkUrl, means: _Means) -> "ControllerStatus":
     """Stop a controller of a kind that another package brings, by what it offers for that."""
-    from robolink import __version__
     from robolink.controllers.registry import ConnectionTerms, find_opener
     from robolink.journal import GlancingLog, signature_here
     from robolink.model import Secret
+    from robolink.version import VERSION
 
-    signature = signature_here(__version__)
+    signature = signature_here(VERSION)
     terms = ConnectionTerms(
         signature,
         password=Secret(means.password) if means.password else None,

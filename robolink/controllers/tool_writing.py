@@ -82,7 +82,13 @@ class ToolWrite(MarkedCommand[ToolOffset | None]):
         if self._same(self.before, self.requested):
             return self._receipt(self.before, skipped=True)
         if expected is not ANY and not self._same(self.before, expected):
-            raise tool_changed(self.tool, self.before, expected, request=self.request)
+            raise tool_changed(
+                self.tool,
+                self.before,
+                expected,
+                controller=self._link.identity,
+                request=self.request,
+            )
         found = self._link.carry_out(self)
         if not self._same(found, self.requested):
             raise self._read_back_differs(found)

@@ -37,7 +37,7 @@ def camera_error_of(result: CalibrationResult) -> tuple[float, float]:
 
 
 @contextmanager
-def calibrated_camera(sensor: str, station: CameraStation) -> Iterator[TipSensor]:
+def calibrated_camera(sensor: str | TipSensor, station: CameraStation) -> Iterator[TipSensor]:
     """Open a camera whose pixels mean something, or that answers in millimetres.
 
     Raises:
@@ -51,7 +51,7 @@ def calibrated_camera(sensor: str, station: CameraStation) -> Iterator[TipSensor
 
 
 @contextmanager
-def pixel_camera(sensor: str) -> Iterator[TipSensor]:
+def pixel_camera(sensor: str | TipSensor) -> Iterator[TipSensor]:
     """Open a camera that answers in pixels.
 
     Raises:
@@ -73,11 +73,11 @@ class CalibratedCameraSource(ABC):
     """Measures by looks of a camera whose place and pixels are known.
 
     Attributes:
-        sensor: URL or name of the camera (:func:`robolink.sensing.open_sensor`).
+        sensor: URL or name of the camera (:func:`robolink.sensing.open_sensor`), or the camera.
         station: Where it is, and what its pixels mean.
     """
 
-    sensor: str
+    sensor: str | TipSensor
     station: CameraStation
 
     def require_ready(self) -> None:

@@ -13,44 +13,44 @@ from robolink.recipe._loading import load_recipe as load_recipe
 if TYPE_CHECKING:
     from robolink.recipe._answers import Answers as Answers
     from robolink.recipe._answers import require_answers as require_answers
-    from robolink.recipe._method_tables import MethodTable as MethodTable
-    from robolink.recipe._method_tables import method_table as method_table
-    from robolink.recipe._recipe import Basis as Basis
-    from robolink.recipe._recipe import HeightRule as HeightRule
-    from robolink.recipe._recipe import Recipe as Recipe
     from robolink.recipe._run import RecipeRun as RecipeRun
-    from robolink.recipe._schema import json_schema as json_schema
-    from robolink.recipe._tables import Box as Box
-    from robolink.recipe._tables import FlangePose as FlangePose
-    from robolink.recipe._tables import Output as Output
-    from robolink.recipe._tables import Poses as Poses
-    from robolink.recipe._tables import Prompt as Prompt
-    from robolink.recipe._tables import RefusalTable as RefusalTable
-    from robolink.recipe._tables import Speeds as Speeds
-    from robolink.recipe._tables import StationTable as StationTable
-    from robolink.recipe._tables import Tolerances as Tolerances
-    from robolink.recipe._tables import Tool as Tool
+    from robolink.recipe.file.method_tables import MethodTable as MethodTable
+    from robolink.recipe.file.method_tables import method_table as method_table
+    from robolink.recipe.file.recipe import Basis as Basis
+    from robolink.recipe.file.recipe import HeightRule as HeightRule
+    from robolink.recipe.file.recipe import Recipe as Recipe
+    from robolink.recipe.file.schema import json_schema as json_schema
+    from robolink.recipe.file.tables import Box as Box
+    from robolink.recipe.file.tables import FlangePose as FlangePose
+    from robolink.recipe.file.tables import Output as Output
+    from robolink.recipe.file.tables import Poses as Poses
+    from robolink.recipe.file.tables import Prompt as Prompt
+    from robolink.recipe.file.tables import RefusalTable as RefusalTable
+    from robolink.recipe.file.tables import Speeds as Speeds
+    from robolink.recipe.file.tables import StationTable as StationTable
+    from robolink.recipe.file.tables import Tolerances as Tolerances
+    from robolink.recipe.file.tables import Tool as Tool
 
 _LOADED_LATER = {
     "Answers": "_answers",
     "require_answers": "_answers",
     "RecipeRun": "_run",
-    "MethodTable": "_method_tables",
-    "method_table": "_method_tables",
-    "Basis": "_recipe",
-    "HeightRule": "_recipe",
-    "Recipe": "_recipe",
-    "json_schema": "_schema",
-    "Box": "_tables",
-    "FlangePose": "_tables",
-    "Output": "_tables",
-    "Poses": "_tables",
-    "Prompt": "_tables",
-    "RefusalTable": "_tables",
-    "Speeds": "_tables",
-    "StationTable": "_tables",
-    "Tolerances": "_tables",
-    "Tool": "_tables",
+    "MethodTable": "file.method_tables",
+    "method_table": "file.method_tables",
+    "Basis": "file.recipe",
+    "HeightRule": "file.recipe",
+    "Recipe": "file.recipe",
+    "json_schema": "file.schema",
+    "Box": "file.tables",
+    "FlangePose": "file.tables",
+    "Output": "file.tables",
+    "Poses": "file.tables",
+    "Prompt": "file.tables",
+    "RefusalTable": "file.tables",
+    "Speeds": "file.tables",
+    "StationTable": "file.tables",
+    "Tolerances": "file.tables",
+    "Tool": "file.tables",
 }
 
 

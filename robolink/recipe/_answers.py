@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from robolink.errors import ConfigError, DeclinedError
 from robolink.messages import tr
 from robolink.procedures import MeasurementContext
-from robolink.recipe._recipe import Recipe
-from robolink.recipe._tables import Prompt
+from robolink.recipe.file.recipe import Recipe
+from robolink.recipe.file.tables import Prompt
 from robolink.runner import MOST_REFUSED, parse_decimal
 from robolink.ways import Way, way
 

@@ -12,9 +12,9 @@ from robolink.nozzle_change import Listener, Moment, Proposal
 from robolink.procedures import MeasurementContext
 from robolink.recipe._answers import Answers, ask_height, ask_prompt, confirm_height
 from robolink.recipe._proposing import proposed
-from robolink.recipe._recipe import Recipe
 from robolink.recipe._reference import Reference
-from robolink.recipe._tables import Output, Prompt
+from robolink.recipe.file.recipe import Recipe
+from robolink.recipe.file.tables import Output, Prompt
 from robolink.runner import StepDone
 
 

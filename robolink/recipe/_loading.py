@@ -9,7 +9,7 @@ from robolink.files.toml import FileKind, Problem
 from robolink.messages import tr
 
 if TYPE_CHECKING:
-    from robolink.recipe._recipe import Recipe
+    from robolink.recipe.file.recipe import Recipe
 
 
 RECIPE_FILE: Final = FileKind(
@@ -51,7 +51,7 @@ def load_recipe(path: Path) -> LoadedRecipe:
         ConfigError: It cannot be read, is no TOML, or is wrong; every problem is told with
             its path.
     """
-    from robolink.recipe._former_names import with_names_of_now
+    from robolink.recipe.file.former_names import with_names_of_now
 
     content = RECIPE_FILE.read(path)
     document, notes = with_names_of_now(RECIPE_FILE.parse(path, content))
@@ -73,11 +73,11 @@ def check_recipe(path: Path) -> tuple[Problem, ...]:
 def _checked(document: dict[str, object]) -> tuple["Recipe | None", tuple[Problem, ...]]:
     from pydantic import ValidationError
 
-    from robolink.recipe._checks import problems_together
-    from robolink.recipe._draft import Draft
-    from robolink.recipe._former_names import with_names_of_now
-    from robolink.recipe._problems import problems_of
-    from robolink.recipe._recipe import recipe_of_all_methods
+    from robolink.recipe.checks.draft import Draft
+    from robolink.recipe.checks.together import problems_together
+    from robolink.recipe.file.former_names import with_names_of_now
+    from robolink.recipe.file.problems import problems_of
+    from robolink.recipe.file.recipe import recipe_of_all_methods
 
     sound: dict[str, object] = {}
     recipe, problems = None, []

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink.recipe._recipe import Recipe
+from robolink.recipe.file.recipe import Recipe
 from robolink.stations import Station, StationKind
 
 

@@ -6,8 +6,8 @@ from robolink.methods import MethodParameters, Site, fields_of
 from robolink.model import Controller
 from robolink.nozzle_change import AcceptanceCriteria, ChangePlan, Limits, ToolPlan
 from robolink.procedures import TipSource
-from robolink.recipe._recipe import Recipe
-from robolink.recipe._tables import Tool
+from robolink.recipe.file.recipe import Recipe
+from robolink.recipe.file.tables import Tool
 from robolink.stations import Station, StationKind
 from robolink.ways import Way, way
 

@@ -8,8 +8,8 @@ from robolink.errors import CalibrationError
 from robolink.messages import tr
 from robolink.model import ToolOffset, angle_difference_deg, rotate_xy
 from robolink.nozzle_change import Proposal
-from robolink.recipe._recipe import Recipe
 from robolink.recipe._reference import Reference, reference_details
+from robolink.recipe.file.recipe import Recipe
 from robolink.ways import Way, way
 
 

@@ -8,3 +8,4 @@ from robolink.sensing._asking import seen_once as seen_once
 from robolink.sensing._registry import SENSORS_GROUP as SENSORS_GROUP
 from robolink.sensing._registry import SensorOpener as SensorOpener
 from robolink.sensing._registry import open_sensor as open_sensor
+from robolink.sensing._registry import sensor_name as sensor_name

@@ -31,22 +31,31 @@ class SensorOpener(Protocol):
 
 
 @contextmanager
-def open_sensor(url: str) -> Iterator[TipSensor]:
+def open_sensor(url: str | TipSensor) -> Iterator[TipSensor]:
     """Open a camera, and let go of it at the end of the block.
 
     Args:
-        url: For example ``assist+tcp://127.0.0.1:40001`` or the name of a plug-in.
+        url: For example ``assist+tcp://127.0.0.1:40001`` or the name of a plug-in. A camera that is
+            open already is used as it is, and left open for whoever opened it.
 
     Raises:
         CalibrationError: ``sensor_not_found``: nothing of that name is installed.
         ConfigError: The rest of the URL makes no sense.
         ConnectError: The camera is not there.
     """
+    if not isinstance(url, str):
+        yield url
+        return
     sensor = _opener(url)(url)
     try:
         yield sensor
     finally:
         sensor.close()
+
+
+def sensor_name(sensor: str | TipSensor) -> str:
+    """Return what a camera is called in a sentence or a record: its name, or who it says it is."""
+    return sensor if isinstance(sensor, str) else sensor.identity
 
 
 def _opener(url: str) -> SensorOpener:

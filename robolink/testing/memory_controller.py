@@ -13,7 +13,6 @@ from typing import Final
 from robolink.controllers.controller_core import ControllerCore
 from robolink.controllers.driver_link import DriverLink
 from robolink.controllers.polled_motion import PolledGroup
-from robolink.controllers.preserving import Preserver
 from robolink.controllers.tool_table import ToolTableCore
 from robolink.controllers.tool_writing import ToolWrite
 from robolink.errors import ToolError, TransportClosedError
@@ -30,6 +29,7 @@ from robolink.model import (
     Pose,
     ToolOffset,
     ToolReceipt,
+    ToolTable,
     rotate_xy,
 )
 from robolink.stop_latch import CommandClass, StopLatch
@@ -158,15 +158,9 @@ class MemoryController(ControllerCore):
         outcomes = outcomes or memory_journal(identity).log(identity)
         link = MemoryLink(machine or MemoryMachine(), identity, outcomes, clock or SystemClock())
         self._link = link
-        tools = _MemoryTools(link)
-        group = _MemoryGroup(link, tools)
-        super().__init__(
-            link,
-            capabilities=Capabilities(tool_write=True, motion=True),
-            tools=tools,
-            groups=(group,),
-            preserver=Preserver(link, tools, group),
-        )
+        able = Capabilities(tool_write=True, motion=True)
+        super().__init__(link, capabilities=able, tools=_MemoryTools(link))
+        self.groups = (_MemoryGroup(link, self.tools),)
 
     @property
     def exchanges(self) -> int:
@@ -245,7 +239,7 @@ class _MemoryWrite(ToolWrite):
 
 
 class _MemoryGroup(PolledGroup):
-    def __init__(self, link: MemoryLink, tools: ToolTableCore) -> None:
+    def __init__(self, link: MemoryLink, tools: ToolTable) -> None:
         super().__init__(link, tools)
         self._link = link
 

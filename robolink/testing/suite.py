@@ -1,5 +1,6 @@
 """All checks that apply to a controller, one after the other."""
 
+from robolink.errors import RobolinkError
 from robolink.testing.motion_checks import MOVING_CHECKS
 from robolink.testing.reading_checks import READING_CHECKS
 from robolink.testing.subject import Check, ContractBrokenError, Subject
@@ -28,7 +29,7 @@ def check_controller(subject: Subject, *, writes: bool = True, moves: bool = Tru
     for check in checks:
         try:
             check(subject)
-        except ContractBrokenError as error:
+        except (ContractBrokenError, RobolinkError) as error:
             broken.append(f"{check.__name__}: {error}")
     if broken:
         raise ContractBrokenError("\n".join(broken))

@@ -6,7 +6,7 @@ of one tool that nothing is to verify is done then. Any other is open, in the jo
 until :meth:`ToolChange.keep`; whatever ends it earlier puts the old values back, once.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from types import TracebackType
@@ -21,7 +21,6 @@ from robolink.errors import (
     ReadBackError,
     RemoteProtocolError,
     RobolinkError,
-    ToolChangedError,
     ToolError,
     TransportError,
 )
@@ -37,9 +36,9 @@ from robolink.model import (
     NewEntry,
     ToolOffset,
     ToolReceipt,
-    describe_offset,
     new_operation,
     plain_offset,
+    tool_changed,
 )
 from robolink.standing import note_standing
 from robolink.transaction._put_back import PutBack, Step, put_back
@@ -140,7 +139,7 @@ class ToolChange:
         """
         self._controller.latch.require_open(self.request)
         self._controller.require_settled(self.request)
-        steps = self._compare()
+        steps = self._believed() or self._compare()
         self._selected = self._selected_before(steps)
         if self._several_steps and any(self._differs(step) for step in steps):
             tools = {
@@ -159,9 +158,8 @@ class ToolChange:
                 details["selected"] = self._selected
             with self._controller.uninterrupted():
                 self._marker = self._controller.begin(MarkerKind.CHANGE, self.request, details)
-        self._receipts = tuple(
-            self._write(wanted, step) for wanted, step in zip(self._wanted, steps, strict=True)
-        )
+        for wanted, step in zip(self._wanted, steps, strict=True):
+            self._receipts += (self._write(wanted, step),)
         return self._receipts
 
     def keep(self, verdict: str = "") -> None:
@@ -209,6 +207,22 @@ class ToolChange:
         numbers = ", ".join(str(wanted.tool) for wanted in self._wanted)
         return tr("change of tool {numbers}", numbers=numbers)
 
+    def _believed(self) -> list[Step]:
+        """Return the step of a single write that nothing verifies, without reading anything.
+
+        The write itself reads the tool, just before it, and refuses another value than is
+        expected: nothing can have been written yet that would have to be taken back. Of several
+        tools all are read before the first is written, and each again before its own write, which
+        the writes of the others keep waiting. A clear, or a tool that gets its first definition,
+        may change what is selected, so those are looked at beforehand too.
+        """
+        if self._several_steps:
+            return []
+        (wanted,) = self._wanted
+        if wanted.offset is None or not isinstance(wanted.expected, ToolOffset):
+            return []
+        return [Step(wanted.tool, wanted.expected, wanted.offset, was_read=False)]
+
     def _compare(self) -> list[Step]:
         """Read every tool before the first is written."""
         tools = self._controller.tools
@@ -225,19 +239,8 @@ class ToolChange:
                     # Raises what a clear would, before the first of several tools is written.
                     tools.preview_clear(wanted.tool, then_select=wanted.then_select)
                 continue
-            raise ToolChangedError(
-                tr(
-                    "Tool {tool} holds {found}, not the expected {expected}; nothing was written.",
-                    tool=wanted.tool,
-                    found=describe_offset(before),
-                    expected=describe_offset(expected),
-                ),
-                remedy=tr(
-                    "Someone changed it: a program that runs TLSet at its start, the pendant, or "
-                    "a restored project. Read it again and decide anew."
-                ),
-                controller=self._controller.identity,
-            )
+            identity = self._controller.identity
+            raise tool_changed(wanted.tool, before, expected, controller=identity)
         return steps
 
     def _selected_before(self, steps: list[Step]) -> int | None:
@@ -269,9 +272,8 @@ class ToolChange:
         if isinstance(error, _OUT_OF_REACH):
             self._leave_open(error)
             return
-        done = put_back(
-            self._controller, self._begun, spoiled=self._spoiled, selected=self._selected
-        )
+        begun = list(self._proved_begun())
+        done = put_back(self._controller, begun, spoiled=self._spoiled, selected=self._selected)
         for result in done:
             self._tell(result.sentence)
         self._select_again()
@@ -279,6 +281,16 @@ class ToolChange:
             sentences = (result.sentence for result in done)
             error.remedy = " ".join((error.remedy, *sentences)).strip()
         self._record(done)
+
+    def _proved_begun(self) -> Iterator[Step]:
+        """Return what was begun, with what was read before each write, not what was believed."""
+        account = self._account
+        assert account is not None  # noqa: S101 - __enter__ opened it
+        for step in self._begun:
+            if step.tool in account.before:
+                yield replace(step, before=account.before[step.tool])
+            elif step.was_read:
+                yield step
 
     def _select_again(self) -> None:
         """Put the tool in force again that gave way to a clear of this change."""

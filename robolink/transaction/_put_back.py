@@ -24,11 +24,13 @@ class Step:
         tool: Its number.
         before: What it held; ``None`` for undefined.
         requested: What it is to hold.
+        was_read: Whether ``before`` was read, or is what the caller believes.
     """
 
     tool: int
     before: ToolOffset | None
     requested: ToolOffset | None
+    was_read: bool = True
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,6 +10,7 @@ import textwrap
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -26,7 +27,8 @@ import robolink
 from robolink import ToolOffset
 from robolink.model import TIP, Hand, Pose, Secret, Spot, SpotUnit, WorkBox, rotate_xy
 from robolink.protocols.epson_text import VariableType
-from robolink.runner import RunSettings
+from robolink.runner import RunSettings, ask_yes_no
+from robolink.sensing import open_sensor, seen_once
 
 pytest_plugins = ["pytester"]
 
@@ -182,6 +184,32 @@ def a_connected_plc(stack: ExitStack) -> dict[str, Any]:
     return {"plc": plc, "then": lambda: simulator.plc.group.movements_started == 1}
 
 
+def an_acme_camera(stack: ExitStack) -> dict[str, Any]:
+    given = dict[str, Any]()
+    acme = SimpleNamespace(grab=lambda: SimpleNamespace(tip_mm=(300.1, 80.2)))
+
+    def seen() -> bool:
+        with open_sensor(given["source"].sensor) as camera:
+            return seen_once(camera, TIP, pictures=3) == Spot(300.1, 80.2)
+
+    given |= {"acme": acme, "then": seen}
+    return given
+
+
+def a_panel(stack: ExitStack) -> dict[str, Any]:
+    given = dict[str, Any]()
+    shown: list[str] = []
+    panel = SimpleNamespace(show=lambda text, **_how: shown.append(text), next_line=lambda _s: "y")
+
+    def answered() -> bool:
+        operator = given["Panel"]()
+        yes = ask_yes_no(operator, "Write it?", lambda: operator.poll(1.0))
+        return yes and shown == ["Write it?"]
+
+    given |= {"panel": panel, "then": answered}
+    return given
+
+
 def nothing(stack: ExitStack) -> dict[str, Any]:
     return {}
 
@@ -194,6 +222,9 @@ MAKERS = {
     "beams-and-probe.md 1": above_two_beams,
     "beams-and-probe.md 2": nothing,
     "camera-and-board.md 1": lambda stack: {"SpotUnit": SpotUnit, "Spot": Spot, "TIP": TIP},
+    "extending.md 1": an_acme_camera,
+    "extending.md 2": a_panel,
+    "extending.md 3": nothing,
     "io-and-variables.md 1": with_variables,
     "journal.md 1": a_journal,
     "plc-maps.md 1": a_map,

@@ -1,5 +1,7 @@
 """An EPSON controller on Remote Ethernet."""
 
+from functools import cached_property
+
 from robolink.controllers.controller_core import ControllerCore
 from robolink.controllers.epson.condition import ConditionReader
 from robolink.controllers.epson.io.alarms import EpsonAlarms
@@ -27,10 +29,6 @@ class EpsonController(ControllerCore):
     Attributes:
         tools: Tools 1 to 15.
         groups: The one robot that Execute acts on.
-        io: Inputs, outputs and memory bits.
-        points: The taught points of the robot in force; read only.
-        variables: The project's Global Preserve variables.
-        alarms: The alarms that stand.
 
     Args:
         session: A session that has logged in.
@@ -41,40 +39,57 @@ class EpsonController(ControllerCore):
 
     tools: EpsonToolTable
     groups: tuple[EpsonGroup]
-    io: EpsonIo
-    points: EpsonPoints
-    variables: EpsonVariables
-    alarms: EpsonAlarms
 
     def __init__(
         self, session: EpsonSession, outcomes: OutcomeLog, *, remote_timeout_s: float
     ) -> None:
         link = self._link = EpsonLink(session, outcomes)
-        group = EpsonGroup(link, remote_timeout_s=remote_timeout_s)
-        tools = EpsonToolTable(link)
-        preserver = EpsonPreserver(link, tools, group)
-        self.io = EpsonIo(link)
-        self.points = EpsonPoints(link.window)
-        self.variables = EpsonVariables(link)
-        self.alarms = EpsonAlarms(link)
-        values = PendingValues(self.io, self.variables)
-        self._acts = EpsonActs(link, group)
-        super().__init__(
-            link,
-            capabilities=Capabilities(
-                tool_write=True,
-                motion=True,
-                motors=True,
-                io=True,
-                points=True,
-                variables=True,
-                alarms=True,
-            ),
-            tools=tools,
-            groups=(group,),
-            preserver=preserver,
-            resolver=EpsonResolver(link, tools, preserver, group=group, values=values),
+        self.groups = (EpsonGroup(link, remote_timeout_s=remote_timeout_s),)
+        able = Capabilities(
+            tool_write=True,
+            motion=True,
+            motors=True,
+            io=True,
+            points=True,
+            variables=True,
+            alarms=True,
         )
+        super().__init__(link, capabilities=able, tools=EpsonToolTable(link))
+
+    @cached_property
+    def io(self) -> EpsonIo:
+        """Inputs, outputs and memory bits."""
+        return EpsonIo(self._link)
+
+    @cached_property
+    def points(self) -> EpsonPoints:
+        """The taught points of the robot in force; read only."""
+        return EpsonPoints(self._link.window)
+
+    @cached_property
+    def variables(self) -> EpsonVariables:
+        """The project's Global Preserve variables."""
+        return EpsonVariables(self._link)
+
+    @cached_property
+    def alarms(self) -> EpsonAlarms:
+        """The alarms that stand."""
+        return EpsonAlarms(self._link)
+
+    @cached_property
+    def resolver(self) -> EpsonResolver:
+        """Settles what was begun here and not proved finished."""
+        values = PendingValues(self.io, self.variables)
+        group = self.groups[0]
+        return EpsonResolver(self._link, self.tools, self._preserver, group=group, values=values)
+
+    @cached_property
+    def _preserver(self) -> EpsonPreserver:
+        return EpsonPreserver(self._link, self.tools, self.groups[0])
+
+    @cached_property
+    def _acts(self) -> EpsonActs:
+        return EpsonActs(self._link, self.groups[0])
 
     @property
     def exchanges(self) -> int:

@@ -1,5 +1,7 @@
 """A PLC that keeps its tool offsets in registers of the machine builder's own."""
 
+from functools import cached_property
+
 from robolink.controllers.controller_core import ControllerCore
 from robolink.controllers.plc_map.flange import FlangeReader
 from robolink.controllers.plc_map.inputs import MappedInputs
@@ -28,7 +30,6 @@ class PlcMapController(ControllerCore):
         register_map: Where everything stands.
         tools: The tools of the map.
         groups: One, which tells where the flange is, if the map has that, and refuses to move.
-        io: The inputs that the map names.
 
     Args:
         client: An open Modbus client; the controller owns it from here on.
@@ -38,24 +39,29 @@ class PlcMapController(ControllerCore):
 
     tools: RegisterToolTable
     groups: tuple[FlangeReader]
-    io: MappedInputs
 
     def __init__(
         self, client: RegisterClient, register_map: RegisterMap, outcomes: OutcomeLog
     ) -> None:
         plc = self._plc = MappedPlc(client, register_map, outcomes)
         self.register_map = register_map
-        self.io = MappedInputs(plc.registers, register_map)
-        tools = RegisterToolTable(plc)
-        preserver = _KeepsOthersOut(plc, tools)
-        super().__init__(
-            plc,
-            capabilities=Capabilities(tool_write=register_map.writable, io=True),
-            tools=tools,
-            groups=(FlangeReader(plc),),
-            preserver=preserver,
-            resolver=RegisterResolver(plc, tools, preserver),
-        )
+        self.groups = (FlangeReader(plc),)
+        able = Capabilities(tool_write=register_map.writable, io=True)
+        super().__init__(plc, capabilities=able, tools=RegisterToolTable(plc))
+
+    @cached_property
+    def io(self) -> MappedInputs:
+        """The inputs that the map names."""
+        return MappedInputs(self._plc.registers, self.register_map)
+
+    @cached_property
+    def resolver(self) -> RegisterResolver:
+        """Settles what was begun here and not proved finished."""
+        return RegisterResolver(self._plc, self.tools, self._preserver)
+
+    @cached_property
+    def _preserver(self) -> Preserver:
+        return _KeepsOthersOut(self._plc, self.tools)
 
     @property
     def exchanges(self) -> int:

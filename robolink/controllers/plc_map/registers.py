@@ -57,6 +57,9 @@ class Registers:
     """The tables of one PLC.
 
     Attributes:
+        identity: Which PLC this is.
+        place: Where it was reached, the same for each spelling of the URL.
+        clock: The clock on which its time passes.
         exchanges: Requests sent so far.
         gate: Holds Ctrl-C back inside an exchange, and inside whatever else enters it.
         latch: What holds writes back while a stop is in force.
@@ -64,26 +67,12 @@ class Registers:
 
     def __init__(self, client: RegisterClient) -> None:
         self._client = client
+        self.identity, self.place, self.clock = client.identity, client.place, client.clock
         self.exchanges = 0
         self.gate = InterruptGate()
         self.gate.open()
         self.latch = StopLatch(client.identity)
         self._writing = threading.Lock()
-
-    @property
-    def identity(self) -> str:
-        """Which PLC this is."""
-        return self._client.identity
-
-    @property
-    def place(self) -> str:
-        """Where it was reached, the same for each spelling of the URL."""
-        return self._client.place
-
-    @property
-    def clock(self) -> Clock:
-        """The clock on which its time passes."""
-        return self._client.clock
 
     def read(self, table: RegisterTable, addresses: range) -> tuple[int, ...]:
         """Return what stands there, in one request."""

@@ -1,9 +1,9 @@
 """An axis group of a CODESYS SoftMotion PLC behind its mailbox."""
 
+from functools import cached_property
 from typing import TYPE_CHECKING, Final
 
 from robolink.controllers.controller_core import ControllerCore
-from robolink.controllers.preserving import Preserver
 from robolink.controllers.softmotion.facts import MailboxFacts, set_kinematics
 from robolink.controllers.softmotion.io import SoftMotionIo
 from robolink.controllers.softmotion.link.answers import describe
@@ -55,7 +55,6 @@ class SoftMotionController(ControllerCore):
     Attributes:
         tools: Slots 1 to 15.
         groups: The one axis group of this mailbox.
-        io: Inputs and outputs.
 
     Args:
         mailbox: The mailbox.
@@ -63,26 +62,26 @@ class SoftMotionController(ControllerCore):
 
     tools: SoftMotionToolTable
     groups: tuple[SoftMotionGroup]
-    io: SoftMotionIo
 
     def __init__(self, mailbox: Mailbox) -> None:
         self._mailbox = mailbox
-        group = self._group = SoftMotionGroup(mailbox)
-        tools = SoftMotionToolTable(mailbox)
-        preserver = Preserver(mailbox, tools, group)
-        self.io = SoftMotionIo(mailbox)
+        self.groups = (SoftMotionGroup(mailbox),)
         able = mailbox.snapshots.met.capabilities
         moves = Capability.MOTION in able
-        super().__init__(
-            mailbox,
-            capabilities=Capabilities(
-                tool_write=Capability.TOOLS in able, motion=moves, motors=moves, io=True
-            ),
-            tools=tools,
-            groups=(group,),
-            preserver=preserver,
-            resolver=SoftMotionResolver(mailbox, tools, preserver),
+        offered = Capabilities(
+            tool_write=Capability.TOOLS in able, motion=moves, motors=moves, io=True
         )
+        super().__init__(mailbox, capabilities=offered, tools=SoftMotionToolTable(mailbox))
+
+    @cached_property
+    def io(self) -> SoftMotionIo:
+        """Inputs and outputs."""
+        return SoftMotionIo(self._mailbox)
+
+    @cached_property
+    def resolver(self) -> SoftMotionResolver:
+        """Settles what was begun here and not proved finished."""
+        return SoftMotionResolver(self._mailbox, self.tools, self._preserver)
 
     @property
     def device_id(self) -> int | None:
@@ -174,9 +173,9 @@ class SoftMotionController(ControllerCore):
     def motors(self, on: bool) -> None:
         """Enable or disable the group, and prove it; the PLC's program switches the drives."""
         if on:
-            self._group.enable()
+            self.groups[0].enable()
         else:
-            self._group.disable()
+            self.groups[0].disable()
 
     def set_kinematics(
         self, position: Kinematics, orientation: Kinematics = Kinematics.NONE
@@ -196,7 +195,7 @@ class SoftMotionController(ControllerCore):
     def _take_leave(self) -> None:
         """Halt what nobody waited on, and give the mailbox back."""
         if self._mailbox.wire.alive:
-            self._group.abort_unfinished()
+            self.groups[0].abort_unfinished()
             self._mailbox.commands.ownership.release()
 
     def _close_link(self) -> None:

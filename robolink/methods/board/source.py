@@ -15,6 +15,7 @@ from robolink.procedures import (
     camera_error_of,
 )
 from robolink.runner import Procedure
+from robolink.sensing import sensor_name
 
 _TWO_ANGLES = LookPlan(turns_deg=TWO_ANGLES_DEG)
 
@@ -41,7 +42,7 @@ class BoardSource(CalibratedCameraSource):
         return tr(
             "measured on the robot: {count} fiducials of a held board seen by the camera {sensor}",
             count=len(self.board.fiducials_mm),
-            sensor=self.sensor,
+            sensor=sensor_name(self.sensor),
         )
 
     @property

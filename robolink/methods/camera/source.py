@@ -14,6 +14,7 @@ from robolink.procedures import (
     camera_error_of,
 )
 from robolink.runner import Procedure
+from robolink.sensing import sensor_name
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +36,7 @@ class CameraSource(CalibratedCameraSource):
         """What it does, for a report."""
         return tr(
             "measured on the robot: seen by the camera {sensor} at {count} angles of U",
-            sensor=self.sensor,
+            sensor=sensor_name(self.sensor),
             count=len(self.plan.turns_deg),
         )
 

@@ -5,9 +5,10 @@ from dataclasses import dataclass, field, replace
 from robolink.calibration import CalibrationResult, VerifyResult, offset_sigma_mm, seen_from
 from robolink.messages import tr
 from robolink.methods.camera_affine.parameters import CameraAffineParameters
-from robolink.model import Pose, ToolOffset
+from robolink.model import Pose, TipSensor, ToolOffset
 from robolink.procedures import MeasurementContext, angles_between, pixel_camera
 from robolink.runner import Procedure
+from robolink.sensing import sensor_name
 from robolink.stations import CameraStation, Found, StationKind
 
 
@@ -16,7 +17,7 @@ class CameraAffineSource:
     """Measures X and Y of a tip, and the camera that sees it, in one pattern of looks.
 
     Attributes:
-        sensor: URL or name of the camera; it answers in pixels.
+        sensor: URL or name of the camera, or the camera; it answers in pixels.
         station: Where it is to within its field of view; with its model of before, a camera
             that changed is refused.
         plan: The pattern.
@@ -24,7 +25,7 @@ class CameraAffineSource:
         name: Name of the station, under which the camera is kept on record; empty for not.
     """
 
-    sensor: str
+    sensor: str | TipSensor
     station: CameraStation
     plan: CameraAffineParameters = field(default_factory=CameraAffineParameters)
     sigma_mm: float | None = None
@@ -35,7 +36,7 @@ class CameraAffineSource:
         """What it does, for a report."""
         return tr(
             "measured on the robot: camera {sensor} and tip found together by {count} looks",
-            sensor=self.sensor,
+            sensor=sensor_name(self.sensor),
             count=len(self.plan.places),
         )
 
@@ -63,7 +64,7 @@ class CameraAffineSource:
             how=tr("{method} with tool {tool}", method=result.method, tool=tool),
             tool=tool,
             details={
-                "seen_by": self.sensor,
+                "seen_by": sensor_name(self.sensor),
                 "mm_per_px": [list(row) for row in model.mm_per_px],
                 "origin_mm": list(model.origin_mm),
             },

@@ -206,3 +206,6 @@ class MotionGroup(Protocol):
 
     def stop(self) -> None:
         """Stop it; may be called from any thread, at any time, more than once."""
+
+    def abort_unfinished(self) -> None:
+        """End the movements that were begun here and whose end nobody has seen."""

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from robolink.controllers import ConnectionTerms
 from robolink.controllers.controller_core import ControllerCore
 from robolink.controllers.polled_motion import PolledGroup
-from robolink.controllers.preserving import Preserver
 from robolink.controllers.tool_table import ToolTableCore
 from robolink.controllers.tool_writing import ToolWrite
 from robolink.model import (
@@ -17,6 +16,7 @@ from robolink.model import (
     Pose,
     ToolOffset,
     ToolReceipt,
+    ToolTable,
 )
 from robolink.stop_latch import CommandClass
 from robolink.transport import LinkUrl, open_transport
@@ -35,15 +35,9 @@ class BenchController(ControllerCore):
 
     def __init__(self, link: BenchLink) -> None:
         self._link = link
-        tools = BenchTools(link)
-        group = BenchArm(link, tools)
-        super().__init__(
-            link,
-            capabilities=Capabilities(tool_write=True, motion=True),
-            tools=tools,
-            groups=(group,),
-            preserver=Preserver(link, tools, group),
-        )
+        able = Capabilities(tool_write=True, motion=True)
+        super().__init__(link, capabilities=able, tools=BenchTools(link))
+        self.groups = (BenchArm(link, self.tools),)
 
     @property
     def exchanges(self) -> int:
@@ -117,7 +111,7 @@ class BenchWrite(ToolWrite):
 class BenchArm(PolledGroup):
     """The arm."""
 
-    def __init__(self, link: BenchLink, tools: BenchTools) -> None:
+    def __init__(self, link: BenchLink, tools: ToolTable) -> None:
         super().__init__(link, tools)
         self._link = link
 

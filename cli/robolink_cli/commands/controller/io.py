@@ -15,7 +15,7 @@ from robolink_cli.session.context import CliContext, controller_options
 from robolink_cli.session.opening import open_controller
 
 if TYPE_CHECKING:
-    from robolink.model import Controller
+    from robolink.model import Controller, ValueReceipt
 
 _number = click.IntRange(min=0, max=0xFFFF)
 _memory = click.option("--memory", is_flag=True, help="Memory bits in place of inputs or outputs.")
@@ -94,9 +94,9 @@ def set_bit(
     payload: dict[str, object] = {
         "kind": "memory" if memory else "output",
         "number": bit,
-        "before": getattr(receipt, "before", None),
-        "value": getattr(receipt, "read_back", None),
-        "skipped": getattr(receipt, "skipped", False),
+        "before": None if receipt is None else receipt.before,
+        "value": None if receipt is None else receipt.read_back,
+        "skipped": receipt is not None and receipt.skipped,
     }
     if payload["skipped"]:
         done = tr("was so already")
@@ -110,7 +110,9 @@ def set_bit(
 
 def _switching(
     controller: "Controller", *, memory: bool
-) -> "tuple[Callable[[int, bool], Sequence[str]], Callable[[int, bool], object]]":
+) -> (
+    "tuple[Callable[[int, bool], Sequence[str]], Callable[[int, bool], ValueReceipt[bool] | None]]"
+):
     """Return what shows the requests of switching a bit, and what switches it."""
     if memory:
         bank = require_epson(controller, tr("memory bits")).io

@@ -45,7 +45,7 @@ from robolink.protocols.epson_text import (
 )
 from robolink.protocols.spel import Statement
 from robolink.stop_latch import StopLatch
-from robolink.timing import Clock, Deadline
+from robolink.timing import Deadline
 from robolink.transport import Transport
 
 
@@ -66,6 +66,9 @@ class EpsonSession:
     """Requests and answers on one connection.
 
     Attributes:
+        identity: Which controller this is.
+        place: Where it was reached, the same for each spelling of the URL.
+        clock: The clock on which the controller's time passes.
         latch: What holds requests back while a stop is in force.
 
     Args:
@@ -75,6 +78,7 @@ class EpsonSession:
 
     def __init__(self, transport: Transport, *, timeout_s: float = 3.0) -> None:
         self._transport = transport
+        self.identity, self.place, self.clock = transport.identity, transport.place, transport.clock
         self._codec = EpsonTextCodec(Role.HOST)
         self._wire = threading.Lock()
         self._gate = InterruptGate()
@@ -84,21 +88,6 @@ class EpsonSession:
         self.latch = StopLatch(transport.identity)
         self.timeout_s = timeout_s
         self.exchanges = 0
-
-    @property
-    def identity(self) -> str:
-        """Which controller this is."""
-        return self._transport.identity
-
-    @property
-    def place(self) -> str:
-        """Where it was reached, the same for each spelling of the URL."""
-        return self._transport.place
-
-    @property
-    def clock(self) -> Clock:
-        """The clock on which the controller's time passes."""
-        return self._transport.clock
 
     @property
     def alive(self) -> bool:

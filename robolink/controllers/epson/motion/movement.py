@@ -4,8 +4,8 @@ from contextlib import suppress
 
 from robolink.controllers.epson.link.link import EpsonLink
 from robolink.controllers.epson.link.session import PendingExecute
+from robolink.controllers.motion_group import not_ended_in_time
 from robolink.errors import (
-    MotionTimeoutError,
     RejectedError,
     TransportError,
     TransportTimeoutError,
@@ -64,16 +64,7 @@ class EpsonMotion:
             raise
         if not arrived:
             self.abort()
-            raise MotionTimeoutError(
-                tr(
-                    "{statement!r} did not end within {timeout_s:.0f} s and was aborted.",
-                    statement=self.statement,
-                    timeout_s=timeout_s,
-                ),
-                remedy=tr("Read where the robot is ('robolink where') before you go on."),
-                controller=self._link.identity,
-                request=self.statement,
-            )
+            raise not_ended_in_time(self._link.identity, self.statement, timeout_s)
         return self._settle()
 
     def abort(self) -> None:

@@ -63,7 +63,7 @@ class EpsonPreserver(Preserver):
     """Puts back the selected tool, and power and speed with it."""
 
     def __init__(self, link: EpsonLink, tools: EpsonToolTable, group: EpsonGroup) -> None:
-        super().__init__(link, tools, group)
+        super().__init__(link, tools, (group,))
         self._epson = link
         self._table = tools
         self._settings = group.settings

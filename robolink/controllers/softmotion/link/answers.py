@@ -37,7 +37,7 @@ class Ended(NamedTuple):
 
 def describe(command: Command) -> str:
     """Return a command as a person may read it: its number, its name, and what it carries."""
-    name = getattr(command.opcode, "name", "")
+    name = command.opcode.name if isinstance(command.opcode, Opcode) else ""
     operands = list(command.operands)
     while operands and not operands[-1]:
         operands.pop()

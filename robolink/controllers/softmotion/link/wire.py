@@ -24,7 +24,6 @@ from robolink.errors import (
 from robolink.interrupts import InterruptGate
 from robolink.messages import tr
 from robolink.stop_latch import StopLatch
-from robolink.timing import Clock
 from robolink.transport import MailboxHead, MailboxLink
 
 _READS: Final = 3
@@ -35,10 +34,20 @@ T = TypeVar("T")
 ErrorT = TypeVar("ErrorT", bound=RobolinkError)
 
 
+class _ThisThread(threading.local):
+    """What the thread that asks is doing."""
+
+    attends = False
+    goes_first = False
+
+
 class MailboxWire:
     """Exchanges on an open link, which it owns from here on.
 
     Attributes:
+        identity: Which PLC this is.
+        place: Where it was reached, the same for each spelling of the URL.
+        clock: The clock on which the PLC's time passes.
         owner: This client's token, never 0.
         epoch: The epoch of our ownership, 0 while we have none.
         motions: The movements of this client.
@@ -51,10 +60,11 @@ class MailboxWire:
 
     def __init__(self, link: MailboxLink, *, owner: int, timeout_s: float) -> None:
         self._link = link
+        self.identity, self.place, self.clock = link.identity, link.place, link.clock
         self._gate = InterruptGate()
         self._gate.open()
         self._beat = ClientHeartbeat()
-        self._here = threading.local()
+        self._here = _ThisThread()
         self._turns = Turns()
         self._ended_by: RobolinkError | None = None
         self.owner = owner
@@ -66,24 +76,9 @@ class MailboxWire:
         self.look_back: Callable[[MailboxLink], RobolinkError | None] | None = None
 
     @property
-    def identity(self) -> str:
-        """Which PLC this is."""
-        return self._link.identity
-
-    @property
-    def place(self) -> str:
-        """Where it was reached, the same for each spelling of the URL."""
-        return self._link.place
-
-    @property
     def whole_look_s(self) -> float:
         """How long the response block and a beat take on the line alone; 0 on a network."""
         return self._link.whole_look_s
-
-    @property
-    def clock(self) -> Clock:
-        """The clock on which the PLC's time passes."""
-        return self._link.clock
 
     @property
     def alive(self) -> bool:
@@ -194,11 +189,11 @@ class MailboxWire:
 
     @property
     def _attends(self) -> bool:
-        return getattr(self._here, "attends", False)
+        return self._here.attends
 
     @property
     def _goes_first(self) -> bool:
-        return getattr(self._here, "goes_first", False)
+        return self._here.goes_first
 
     def _turn(self) -> AbstractContextManager[None]:
         return nullcontext() if self._goes_first else self._turns.taken()

@@ -5,8 +5,8 @@ from typing import Annotated, Literal, TypeVar
 from pydantic import ConfigDict, Field, ValidationInfo, field_validator
 
 from robolink.methods import method_names
-from robolink.recipe._method_tables import AnyKind, MethodTable
-from robolink.recipe._tables import (
+from robolink.recipe.file.method_tables import AnyKind, MethodTable
+from robolink.recipe.file.tables import (
     Box,
     Line,
     Note,

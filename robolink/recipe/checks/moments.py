@@ -5,8 +5,8 @@ from typing import Final
 
 from robolink.config import Problem
 from robolink.messages import tr
-from robolink.recipe._draft import Draft
-from robolink.recipe._tables import Output, Prompt
+from robolink.recipe.checks.draft import Draft
+from robolink.recipe.file.tables import Output, Prompt
 
 _OF_ONE_TOOL: Final = frozenset({"before_measure", "after_measure"})
 _FOR_THE_RECORD: Final = frozenset({"nozzle", "lot"})

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from robolink.calibration import NORMAL_95
 from robolink.config import Problem
 from robolink.messages import tr
-from robolink.recipe._draft import Draft
+from robolink.recipe.checks.draft import Draft
 
 
 def residuals(draft: Draft) -> Iterator[Problem]:

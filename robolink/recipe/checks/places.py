@@ -6,8 +6,8 @@ from itertools import combinations
 from robolink.config import Problem
 from robolink.messages import tr
 from robolink.methods import PointsParameters
-from robolink.recipe._draft import Draft
-from robolink.recipe._tables import Box, FlangePose, Tool
+from robolink.recipe.checks.draft import Draft
+from robolink.recipe.file.tables import Box, FlangePose, Tool
 
 
 def tool_numbers(draft: Draft) -> Iterator[Problem]:

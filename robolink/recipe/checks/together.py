@@ -4,17 +4,17 @@ from collections.abc import Callable, Iterator
 from typing import Final
 
 from robolink.config import Problem
-from robolink.recipe._check_moments import answers, moments
-from robolink.recipe._check_places import (
+from robolink.recipe.checks.draft import Draft
+from robolink.recipe.checks.moments import answers, moments
+from robolink.recipe.checks.places import (
     points,
     room,
     standstill,
     tool_numbers,
     upright,
 )
-from robolink.recipe._check_source import both_coordinates, height, orientation, parameters, place
-from robolink.recipe._check_tolerances import intervals, refusals, residuals, verification
-from robolink.recipe._draft import Draft
+from robolink.recipe.checks.source import both_coordinates, height, orientation, parameters, place
+from robolink.recipe.checks.tolerances import intervals, refusals, residuals, verification
 
 _CHECKS: Final[tuple[Callable[[Draft], Iterator[Problem]], ...]] = (
     parameters,

@@ -12,7 +12,7 @@ from robolink.files.key_problems import is_not_known, one_of, sentence
 from robolink.files.toml import Problem
 from robolink.messages import tr
 from robolink.methods import method_names
-from robolink.recipe._schema import json_schema
+from robolink.recipe.file.schema import json_schema
 
 if TYPE_CHECKING:
     from pydantic import ValidationError

@@ -4,9 +4,9 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
-from robolink.recipe._method_tables import MethodTable
-from robolink.recipe._recipe import Basis, HeightRule
-from robolink.recipe._tables import (
+from robolink.recipe.file.method_tables import MethodTable
+from robolink.recipe.file.recipe import Basis, HeightRule
+from robolink.recipe.file.tables import (
     Box,
     Output,
     Poses,

@@ -10,7 +10,7 @@ from pydantic_core import CoreSchema
 from robolink.methods import AnyMethod, Help, MethodParameters, Unit, all_methods, fields_of
 from robolink.methods.fields import ParameterField as Parameter
 from robolink.methods.fields import bare
-from robolink.recipe._tables import Table
+from robolink.recipe.file.tables import Table
 
 
 class MethodTable(Table):

@@ -9,7 +9,7 @@ from typing import Any
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
-from robolink.recipe._recipe import recipe_of_all_methods
+from robolink.recipe.file.recipe import recipe_of_all_methods
 
 
 class _ForToml(GenerateJsonSchema):

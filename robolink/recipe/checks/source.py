@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from robolink.config import Problem
 from robolink.messages import tr
 from robolink.methods import Check
-from robolink.recipe._draft import Draft
+from robolink.recipe.checks.draft import Draft
 
 
 def parameters(draft: Draft) -> Iterator[Problem]:

@@ -1,0 +1,41 @@
+"""The house: rooms that can be taken in at a look, and one thing under one name."""
+
+import ast
+from collections import defaultdict
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+PACKAGES = ("robolink", "cli/robolink_cli", "simulators/robolink_simulators")
+MOST_MODULES = 12
+MOST_LINES = 400
+
+
+def modules():
+    """Yield every module of the three packages."""
+    for package in PACKAGES:
+        yield from sorted((ROOT / package).rglob("*.py"))
+
+
+def test_a_folder_holds_no_more_modules_than_a_newcomer_can_tell_apart():
+    held = defaultdict(list)
+    for path in modules():
+        if path.name != "__init__.py":
+            held[str(path.parent.relative_to(ROOT))].append(path.stem)
+    assert {folder: names for folder, names in held.items() if len(names) > MOST_MODULES} == {}
+
+
+def test_a_module_can_be_read_in_one_go():
+    lines = {
+        str(path.relative_to(ROOT)): len(path.read_text(encoding="utf-8").splitlines())
+        for path in modules()
+    }
+    assert {path: count for path, count in lines.items() if count > MOST_LINES} == {}
+
+
+def test_a_public_class_shares_its_name_with_no_other():
+    homes = defaultdict(list)
+    for path in modules():
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                homes[node.name].append(str(path.relative_to(ROOT)))
+    assert {name: paths for name, paths in homes.items() if len(paths) > 1} == {}

@@ -11,7 +11,8 @@ from dataclasses import replace
 from robolink.controllers.softmotion.link.answers import describe
 from robolink.controllers.softmotion.link.condition import require_enabled, require_still
 from robolink.controllers.softmotion.link.mailbox import Mailbox
-from robolink.controllers.softmotion.tools.slot_write import GroupTool, SlotWrite
+from robolink.controllers.softmotion.tools.group_tool import GroupTool
+from robolink.controllers.softmotion.tools.slot_write import SlotWrite
 from robolink.controllers.tool_table import ToolTableCore, require_replacement
 from robolink.messages import tr
 from robolink.model import Expected, ToolOffset, ToolReceipt

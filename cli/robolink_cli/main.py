@@ -107,7 +107,7 @@ COMMANDS: Final = {
     ),
     "jog": ("robolink_cli.commands.controller.jog:jog", tr("Move a small step, in Power Low.")),
     "calibrate": (
-        "robolink_cli.calibrate:calibrate",
+        "robolink_cli.commands.measure.calibrate:calibrate",
         tr("Measure a tool offset, propose it, write it and prove it."),
     ),
     "recalibrate": (

@@ -4,8 +4,8 @@ import json
 
 import pytest
 from robolink_cli import main
-from robolink_cli.calibrate import _options
 from robolink_cli.commands.controller import jog
+from robolink_cli.commands.measure.calibrate import options as _options
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.in_process.epson import register, unregister
 
@@ -162,7 +162,7 @@ def test_calibrate_takes_its_limits_from_the_cell(cell, simulator, monkeypatch, 
         plans.append(plan)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("robolink_cli.calibrate._live.LiveCalibration", remember)
+    monkeypatch.setattr("robolink_cli.commands.measure.calibrate.live.LiveCalibration", remember)
     assert main.run(["-c", "a", "calibrate", "two-pose", "--tool", "1", *options]) == 130
     (plan,) = plans
     (one,) = plan.tools

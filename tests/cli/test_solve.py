@@ -419,7 +419,7 @@ def test_no_method_is_left_untried():
 def test_looking_at_a_controller_does_not_load_numpy():
     program = (
         "import sys; import robolink.calibration, robolink_cli.views.documents\n"
-        "import robolink_cli.calibrate\n"
+        "import robolink_cli.commands.measure.calibrate\n"
         "print('numpy' in sys.modules)\n"
     )
     paths = os.pathsep.join(path for path in sys.path if path)

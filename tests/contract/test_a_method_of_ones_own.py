@@ -5,7 +5,7 @@ import sys
 
 import pytest
 from click.testing import CliRunner
-from robolink_cli.calibrate import calibrate
+from robolink_cli.commands.measure.calibrate import calibrate
 
 from robolink.methods import find_method, method_names, register
 from robolink.recipe import json_schema, load_recipe

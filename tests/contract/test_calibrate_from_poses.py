@@ -6,7 +6,7 @@ import sys
 
 import pytest
 from robolink_cli import main
-from robolink_cli.calibrate import _given
+from robolink_cli.commands.measure.calibrate import given_poses
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.memory.points import Point
 
@@ -138,8 +138,8 @@ def test_on_a_terminal_a_no_writes_nothing(command, simulator, monkeypatch):
         asked.append(question)
         raise robolink.errors.DeclinedError("You said no.")
 
-    monkeypatch.setattr(_given, "on_terminal", lambda: True)
-    monkeypatch.setattr(_given, "agree", decline)
+    monkeypatch.setattr(given_poses, "on_terminal", lambda: True)
+    monkeypatch.setattr(given_poses, "agree", decline)
     assert command(*calibrate("--points", "901,902"))[0] == 9
     assert asked == ["Write this to tool 1?"]
     assert stored(simulator) == STORED
@@ -240,7 +240,7 @@ def test_a_tool_changed_meanwhile_is_not_overwritten(command, simulator, monkeyp
     def change(tool, *, yes):
         simulator.machine.tools.set(1, ToolOffset(1, 2, 3))
 
-    monkeypatch.setattr(_given, "_agree_to_write", change)
+    monkeypatch.setattr(given_poses, "_agree_to_write", change)
     code, _, err = command(*calibrate("--points", "901,902", "--yes"))
     assert code == 5
     assert "nothing was written" in err

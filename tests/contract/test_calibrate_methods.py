@@ -142,7 +142,9 @@ def test_a_sensor_stops_inside_the_tolerance_and_its_worst_is_offered_for_retaki
     tmp_path, monkeypatch, kind, words, which
 ):
     """The simulated person accepts each offer; the answers are on record."""
-    monkeypatch.setattr("robolink_cli.calibrate._live.agree_to_motion", lambda *_, **__: None)
+    monkeypatch.setattr(
+        "robolink_cli.commands.measure.calibrate.live.agree_to_motion", lambda *_, **__: None
+    )
     with method_cell(kind, tmp_path, monkeypatch) as cell:
         cell.mount()
         course = ("--until", "0.05", "--no-verify", "--tool", "1", "--speed", "100")

@@ -9,7 +9,7 @@ import pytest
 from annotated_types import Ge, Le
 from click.testing import CliRunner
 from robolink_cli import main
-from robolink_cli.calibrate._command import command_of
+from robolink_cli.commands.measure.calibrate.method_command import command_of
 
 from robolink.methods import all_methods, fields_of
 from robolink.recipe._loading import _checked
@@ -137,7 +137,7 @@ def test_help_asks_for_no_mathematics_and_no_recipes():
     code = (
         "import sys\n"
         "from click.testing import CliRunner\n"
-        "from robolink_cli.calibrate import calibrate\n"
+        "from robolink_cli.commands.measure.calibrate import calibrate\n"
         "from robolink.methods import all_methods\n"
         "commands = [[method.name] for method in all_methods() if method.command]\n"
         "for words in [[], *commands]:\n"

@@ -14,8 +14,8 @@ import _pytest.config  # the main module of a test run imports it, in each fork 
 import rich.console
 import rich.table
 import robolink_cli.access.password
-import robolink_cli.calibrate
 import robolink_cli.commands.controller.jog
+import robolink_cli.commands.measure.calibrate
 import robolink_cli.commands.record.recover
 import robolink_cli.main
 import robolink_cli.session.selected_tool
@@ -33,7 +33,12 @@ import robolink.transport.modbus.frames
 import robolink.transport.modbus.opening
 import robolink.transport.stream.tcp
 
-_ALL_OF = (robolink.controllers, robolink.journal, robolink.stopping, robolink_cli.calibrate)
+_ALL_OF = (
+    robolink.controllers,
+    robolink.journal,
+    robolink.stopping,
+    robolink_cli.commands.measure.calibrate,
+)
 
 for _package in _ALL_OF:
     for _module in pkgutil.walk_packages(_package.__path__, f"{_package.__name__}."):

@@ -10,10 +10,10 @@ from robolink.messages import tr
 from robolink.methods import AnyMethod, MethodParameters, Site
 from robolink.model import Controller, EntryKind
 from robolink.stations import Station, StationKind, find_stations
-from robolink_cli.calibrate._frame import CalibrationRequest
-from robolink_cli.calibrate._given import calibrate_from_poses
-from robolink_cli.calibrate._live import calibrate_live
-from robolink_cli.calibrate._stations import station_at
+from robolink_cli.commands.measure.calibrate.given_poses import calibrate_from_poses
+from robolink_cli.commands.measure.calibrate.live import calibrate_live
+from robolink_cli.commands.measure.calibrate.request import CalibrationRequest
+from robolink_cli.commands.measure.calibrate.stations import station_at
 from robolink_cli.options.motion import refuse_motion_options
 from robolink_cli.options.pose_source import PoseSource
 

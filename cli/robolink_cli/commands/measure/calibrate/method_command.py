@@ -11,9 +11,9 @@ from robolink.messages import tr
 from robolink.methods import AnyMethod, Check, MethodParameters, ParameterField, fields_of
 from robolink.methods.fields import refusals
 from robolink.stations import StationKind
-from robolink_cli.calibrate._frame import CalibrationRequest
-from robolink_cli.calibrate._options import calibration_options, sigma_option
-from robolink_cli.calibrate._values import as_typed, is_repeated, type_of
+from robolink_cli.commands.measure.calibrate.options import calibration_options, sigma_option
+from robolink_cli.commands.measure.calibrate.request import CalibrationRequest
+from robolink_cli.commands.measure.calibrate.values import as_typed, is_repeated, type_of
 from robolink_cli.options.motion import motion_option
 from robolink_cli.options.pose_source import PoseSource, pose_source_options
 
@@ -42,7 +42,7 @@ def command_of(method: AnyMethod) -> click.Command:
         poses: PoseSource | None = None,
         **given: Any,  # noqa: ANN401 - click passes the options by name
     ) -> None:
-        from robolink_cli.calibrate._measuring import calibrate_with
+        from robolink_cli.commands.measure.calibrate.measuring import calibrate_with
 
         chosen = _parameters(method, given, sigma_stated=sigma_mm is not None)
         calibrate_with(

@@ -26,7 +26,7 @@ class MethodGroup(LazyGroup):
         method = find_method(cmd_name)
         if self.listing:
             return click.Command(cmd_name, short_help=method.summary)
-        from robolink_cli.calibrate._command import command_of
+        from robolink_cli.commands.measure.calibrate.method_command import command_of
 
         return command_of(method)
 

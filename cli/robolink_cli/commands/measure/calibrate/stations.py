@@ -3,7 +3,7 @@
 from robolink.messages import tr
 from robolink.model import Controller, EntryKind
 from robolink.stations import Station, StationKind, find_station, find_stations
-from robolink_cli.calibrate._frame import CalibrationRequest
+from robolink_cli.commands.measure.calibrate.request import CalibrationRequest
 from robolink_cli.console.render import note
 
 

@@ -1,4 +1,4 @@
-"""The frame in which every method calibrates: what was asked for, and the two ways it goes."""
+"""What one calibration was asked for, whatever the method, and the two ways it goes."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -78,7 +78,7 @@ class CalibrationRequest:
         return ChangePlan((one,), limits=self.limits, ask_before_write=not self.yes)
 
 
-def frame_from(
+def request_from(
     context: CliContext,
     *,
     tool: int,

@@ -17,9 +17,9 @@ from robolink.nozzle_change import (
 from robolink.procedures import TipSource
 from robolink.transaction import earlier_corrections
 from robolink_cli.access.warnings import note_change
-from robolink_cli.calibrate._frame import CalibrationRequest
-from robolink_cli.calibrate._listener import CalibrationListener
-from robolink_cli.calibrate._stations import remark_on_pin
+from robolink_cli.commands.measure.calibrate.listener import CalibrationListener
+from robolink_cli.commands.measure.calibrate.request import CalibrationRequest
+from robolink_cli.commands.measure.calibrate.stations import remark_on_pin
 from robolink_cli.options.impact import ImpactRequest, impact_payload, show_impact
 from robolink_cli.options.report import ReportDraft, reporting
 from robolink_cli.prompts.operator import operator_at

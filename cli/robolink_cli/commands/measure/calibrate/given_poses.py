@@ -20,9 +20,9 @@ from robolink.nozzle_change import (
 from robolink.procedures import MeasurementContext, PoseMethod
 from robolink.transaction import earlier_corrections
 from robolink_cli.access.warnings import note_change
-from robolink_cli.calibrate._frame import CalibrationRequest
-from robolink_cli.calibrate._listener import CalibrationListener
-from robolink_cli.calibrate._stations import remark_on_pin
+from robolink_cli.commands.measure.calibrate.listener import CalibrationListener
+from robolink_cli.commands.measure.calibrate.request import CalibrationRequest
+from robolink_cli.commands.measure.calibrate.stations import remark_on_pin
 from robolink_cli.console.render import note, say
 from robolink_cli.options.impact import impact_payload, show_impact
 from robolink_cli.options.pose_source import PoseSource

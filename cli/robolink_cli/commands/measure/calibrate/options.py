@@ -8,7 +8,7 @@ import click
 
 from robolink.messages import tr
 from robolink_cli.access.cell import with_cell_limits
-from robolink_cli.calibrate._frame import frame_from
+from robolink_cli.commands.measure.calibrate.request import request_from
 from robolink_cli.options.consent import dry_run_option, yes_option
 from robolink_cli.options.impact import impact_options
 from robolink_cli.options.motion import motion_option
@@ -44,7 +44,7 @@ def calibration_options(function: Callable[..., None]) -> Callable[..., int | No
         options = with_cell_limits(
             context.cell, given, {o: k for o, k in _CELL_KEYS.items() if o in given}
         )
-        frame = frame_from(context, **{name: options.pop(name) for name in _FRAME})
+        frame = request_from(context, **{name: options.pop(name) for name in _FRAME})
         function(frame, **options)
 
     command: Callable[..., Any] = framed

@@ -7,7 +7,7 @@ import can
 NODE = 5
 IDENTITY = "softmotion+can://desk?node=5"
 SDO_ASK, SDO_ANSWER = 0x600 + NODE, 0x580 + NODE
-TPDO1, HEARTBEAT = 0x180 + NODE, 0x700 + NODE
+TPDO1, RPDO1, HEARTBEAT = 0x180 + NODE, 0x200 + NODE, 0x700 + NODE
 
 
 class FakeClock:
@@ -29,6 +29,7 @@ class ScriptedBus:
         self.answer = answer
         self.sent = []
         self.coming = []
+        self.late = []
         self.failure = None
 
     def send(self, message, timeout=None):
@@ -49,6 +50,9 @@ class ScriptedBus:
         if self.coming:
             return self.coming.pop(0)
         self.clock.sleep(timeout)
+        if timeout:
+            self.hear(*self.late)
+            self.late = []
         return None
 
     def shutdown(self):

@@ -20,6 +20,7 @@ from tests.unit._scripted_can import (
     HEARTBEAT,
     IDENTITY,
     NODE,
+    RPDO1,
     SDO_ANSWER,
     SDO_ASK,
     TPDO1,
@@ -87,6 +88,14 @@ def test_a_lost_heartbeat_names_itself_while_an_answer_is_awaited(link_to):
     _, link = link_to(node_with(100))
     with pytest.raises(TransportBrokenError, match="lost its heartbeat"):
         link.read_slot(1)
+
+
+def test_a_heartbeat_that_this_computer_was_too_busy_to_hear_is_waited_for(link_to):
+    bus, link = link_to(node_with(200))
+    bus.clock.sleep(60)  # nobody ran: not this thread, and not the one that hands frames over
+    bus.late = [(HEARTBEAT, b"\x05")]
+    link.beat(0x0101)
+    assert bus.sent[-1] == (RPDO1, b"\x01\x01")
 
 
 def test_heartbeats_that_waited_in_the_queue_count(link_to):

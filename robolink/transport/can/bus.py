@@ -26,7 +26,7 @@ from robolink.transport._url_options import UrlOptions
 # It writes to standard error when nobody listens; every failure is an exception here.
 logging.getLogger("can").addHandler(logging.NullHandler())
 
-_SLICE_S: Final = 0.05
+SLICE_S: Final = 0.05
 _MULTICAST_PORT: Final = 43113
 _SOCKETCAND_PORT: Final = 29536
 _BUS_OFF: Final = 0x40
@@ -110,7 +110,7 @@ class CanLine:
             TransportClosedError: The line was closed.
         """
         try:
-            message = self._bus.recv(min(deadline.remaining_s(), _SLICE_S))
+            message = self._bus.recv(min(deadline.remaining_s(), SLICE_S))
         except (can.CanError, OSError, ValueError) as error:
             raise self._ended(error) from error
         if message and message.is_error_frame and message.arbitration_id & _BUS_OFF:

@@ -11,7 +11,7 @@ from robolink.errors import RemoteProtocolError, TransportBrokenError
 from robolink.messages import tr
 from robolink.timing import NS_PER_S, Clock, Deadline
 from robolink.transport._mailbox_link import MailboxHead
-from robolink.transport.can.bus import CanLine
+from robolink.transport.can.bus import SLICE_S, CanLine
 
 TPDO1: Final = 0x180
 RPDO1: Final = 0x200
@@ -48,7 +48,7 @@ class NodeWatch:
         line: The bus, owned by the caller.
         node: Node identifier.
         identity: Names the far end in errors.
-        clock: Tells how old a heartbeat is.
+        clock: Tells how old a heartbeat is, and for how long somebody listened.
     """
 
     def __init__(self, line: CanLine, node: int, identity: str, clock: Clock) -> None:
@@ -58,13 +58,14 @@ class NodeWatch:
         self._clock = clock
         self._period_s = 0.0
         self._heard_ns = 0
+        self._listened_ns = 0
         self._head: MailboxHead | None = None
         self.answers: deque[bytes] = deque(maxlen=_MOST_ANSWERS)
 
     def expect_heartbeat(self, period_s: float) -> None:
         """Supervise a heartbeat of this period from now on; 0 means there is none."""
         self._period_s = period_s
-        self._heard_ns = self._clock.now_ns()
+        self._note_heartbeat()
 
     def take_head(self) -> MailboxHead | None:
         """Return the newest head that was not taken yet."""
@@ -72,7 +73,7 @@ class NodeWatch:
         return head
 
     def drain(self) -> None:
-        """Sort what has arrived while nobody listened.
+        """Sort what has arrived while nobody listened; a node that was silent is listened for.
 
         Raises:
             RemoteProtocolError: It does not end.
@@ -80,7 +81,7 @@ class NodeWatch:
         """
         for _ in range(_MOST_WAITING):
             if not self._take(Deadline(self._clock, 0)):
-                self._require_heartbeat()
+                self._listen_if_silent()
                 return
         raise RemoteProtocolError(
             tr(
@@ -116,7 +117,9 @@ class NodeWatch:
         self._line.send(RPDO1 + self._node, word.to_bytes(2, "little"))
 
     def _take(self, deadline: Deadline) -> bool:
+        begun_ns = self._clock.now_ns()
         message = self._line.receive(deadline)
+        self._listened_ns += min(self._clock.now_ns() - begun_ns, round(SLICE_S * NS_PER_S))
         if message is None:
             return False
         if message.is_error_frame:
@@ -129,14 +132,36 @@ class NodeWatch:
             ack, state, group_state, error_class, heartbeat = _HEAD.unpack(data)
             self._head = MailboxHead(ack, state, error_class, group_state, heartbeat)
         elif kind == HEARTBEAT and data:
-            self._heard_ns = self._clock.now_ns()
+            self._note_heartbeat()
             if data[0] == _BOOT_UP:
                 raise self._restarted()
         return True
 
+    def _note_heartbeat(self) -> None:
+        self._heard_ns = self._clock.now_ns()
+        self._listened_ns = 0
+
+    def _listen_if_silent(self) -> None:
+        """Wait for a heartbeat that is overdue, before anything is sent to the node.
+
+        On a computer that is busy this thread, or the one that hands frames over, may not run for
+        longer than a node may be silent. So a node is lost when nothing came for as long as that
+        while somebody listened.
+        """
+        while self._silent_s() > self._limit_s() > 0:
+            if not self._take(Deadline.after(self._clock, SLICE_S)):
+                self._require_heartbeat()
+
+    def _limit_s(self) -> float:
+        """Return for how long the node may be silent; 0 for as long as it likes."""
+        return max(_MISSED * self._period_s, _SHORTEST_LOSS_S) if self._period_s else 0.0
+
+    def _silent_s(self) -> float:
+        return (self._clock.now_ns() - self._heard_ns) / NS_PER_S
+
     def _require_heartbeat(self) -> None:
-        silent_s = (self._clock.now_ns() - self._heard_ns) / NS_PER_S
-        if self._period_s and silent_s > max(_MISSED * self._period_s, _SHORTEST_LOSS_S):
+        limit_s = self._limit_s()
+        if limit_s and self._listened_ns / NS_PER_S > limit_s:
             raise TransportBrokenError(
                 tr(
                     "Node {node} of {identity} lost its heartbeat: one is due every "
@@ -144,7 +169,7 @@ class NodeWatch:
                     node=self._node,
                     identity=self._identity,
                     period_s=self._period_s,
-                    silent_s=silent_s,
+                    silent_s=self._silent_s(),
                 ),
                 remedy=tr("Check the PLC's power and state and the cable, then connect again."),
                 controller=self._identity,

@@ -1,4 +1,7 @@
-"""Codec + transport + semantics = a machine that can be used."""
+"""Codec + transport + semantics = a machine that can be used.
+
+What another kind of controller is made of is offered here too (docs/extending.md).
+"""
 
 from typing import TYPE_CHECKING
 
@@ -6,19 +9,35 @@ from robolink.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from robolink.controllers.connection import connect as connect
+    from robolink.controllers.controller_core import ControllerCore as ControllerCore
+    from robolink.controllers.driver_link import DriverLink as DriverLink
+    from robolink.controllers.driver_link import MarkedCommand as MarkedCommand
     from robolink.controllers.driver_link import advise_emergency_stop as advise_emergency_stop
+    from robolink.controllers.motion_group import MotionGroupCore as MotionGroupCore
+    from robolink.controllers.polled_motion import PolledGroup as PolledGroup
+    from robolink.controllers.preserving import Preserver as Preserver
     from robolink.controllers.registry import CONTROLLERS_GROUP as CONTROLLERS_GROUP
     from robolink.controllers.registry import ConnectionTerms as ConnectionTerms
     from robolink.controllers.registry import ControllerOpener as ControllerOpener
+    from robolink.controllers.resolving import MarkerResolver as MarkerResolver
     from robolink.controllers.stopping import stop_now as stop_now
     from robolink.controllers.stopping import stop_requests as stop_requests
+    from robolink.controllers.tool_table import ToolTableCore as ToolTableCore
+    from robolink.controllers.tool_writing import ToolWrite as ToolWrite
 else:
     __getattr__ = lazy_exports(
         __name__,
         {
             "connection": "connect",
-            "driver_link": "advise_emergency_stop",
+            "controller_core": "ControllerCore",
+            "driver_link": "DriverLink MarkedCommand advise_emergency_stop",
+            "motion_group": "MotionGroupCore",
+            "polled_motion": "PolledGroup",
+            "preserving": "Preserver",
             "registry": "CONTROLLERS_GROUP ConnectionTerms ControllerOpener",
+            "resolving": "MarkerResolver",
             "stopping": "stop_now stop_requests",
+            "tool_table": "ToolTableCore",
+            "tool_writing": "ToolWrite",
         },
     )

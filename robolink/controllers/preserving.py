@@ -94,7 +94,8 @@ class Preserver:
     def _in_force(self, reason: str) -> Mapping[str, object] | None:
         """Read what is to be put back, as plain JSON; ``None`` where nothing is ever changed."""
         tool = self._tools.selected()
-        return {"tool": tool, "now": tool}
+        # Who does not tell which tool is in force lets none be selected either.
+        return None if tool is None else {"tool": tool, "now": tool}
 
     def _restore_more(self, marker: Marker) -> None:
         """Put back what this kind of controller has besides the tool."""

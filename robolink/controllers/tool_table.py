@@ -20,6 +20,7 @@ from robolink.controllers.markers import MarkerStore
 from robolink.errors import (
     ControllerError,
     ReadBackError,
+    RejectedError,
     ReservedToolError,
     RobolinkError,
     SelectedToolError,
@@ -214,6 +215,16 @@ class ToolTableCore(ABC):
             self._driver.markers.ledger.saw_selected(before)
             if before == tool:
                 return
+            if before is None:  # what was in force could not be put back, nor the new one proved
+                raise RejectedError(
+                    tr(
+                        "{controller} does not tell which tool is in force.",
+                        controller=self._driver.identity,
+                    ),
+                    remedy=tr("Select tool {tool} at the machine.", tool=tool),
+                    controller=self._driver.identity,
+                    request=request,
+                )
             offset = self._require_defined(tool)
             self._prepare_selection(tool, request)
             selection = _Selection(

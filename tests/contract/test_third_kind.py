@@ -8,7 +8,7 @@ import pytest
 import robolink
 from robolink import ToolOffset
 from robolink.controllers import CONTROLLERS_GROUP, stop_now
-from robolink.errors import ConfigError, ConnectError
+from robolink.errors import ConfigError, ConnectError, RejectedError
 from robolink.methods import TwoPoseSource
 from robolink.nozzle_change import AcceptanceCriteria, ChangePlan, NozzleChange, ToolPlan
 from robolink.runner import Question
@@ -137,6 +137,17 @@ def test_a_controller_that_writes_what_it_likes_does_not_keep_its_promises():
     machine.tools = Off(machine.tools)
     with pytest.raises(ContractBrokenError, match="a_write_is_read_back"):
         check_controller(Subject(lambda: MemoryController(machine)))
+
+
+def test_a_machine_that_does_not_tell_which_tool_is_in_force_selects_none():
+    machine = MemoryMachine(tools={1: ToolOffset(1.0)})
+    machine.selected = None  # type: ignore[assignment]
+    with MemoryController(machine) as controller:
+        with pytest.raises(RejectedError, match="does not tell"):
+            controller.tools.select(1)
+        with controller.preserved("a procedure"):
+            controller.tools.write(1, ToolOffset(2.0), expected=ToolOffset(1.0))
+        assert not controller.outcomes.open_markers()
 
 
 def test_the_whole_suite_passes_on_a_controller_in_memory():

@@ -2,11 +2,13 @@
 
 from collections.abc import Sequence
 
-from robolink.controllers import ConnectionTerms
-from robolink.controllers.controller_core import ControllerCore
-from robolink.controllers.polled_motion import PolledGroup
-from robolink.controllers.tool_table import ToolTableCore
-from robolink.controllers.tool_writing import ToolWrite
+from robolink.controllers import (
+    ConnectionTerms,
+    ControllerCore,
+    PolledGroup,
+    ToolTableCore,
+    ToolWrite,
+)
 from robolink.model import (
     Capabilities,
     Controller,

@@ -2,7 +2,7 @@
 
 import threading
 
-from robolink.controllers.driver_link import DriverLink
+from robolink.controllers import DriverLink
 from robolink.errors import RejectedError, TransportBrokenError
 from robolink.interrupts import InterruptGate
 from robolink.model import OutcomeLog

@@ -1,5 +1,6 @@
 """Settings of Sphinx for `make docs`; the pages are laid out by build.py beside this file."""
 
+import inspect
 import json
 import re
 from pathlib import Path
@@ -96,8 +97,26 @@ def _after_napoleon(
     lines[:] = [line.replace(_COLON, ":") for line in lines]
 
 
+def _plain_signature(
+    app: Sphinx,
+    what: str,
+    name: str,
+    thing: object,
+    options: object,
+    signature: str | None,
+    returns: str | None,
+) -> tuple[str, str | None] | None:
+    """Leave out annotations that hold limits and sentences; docs/methods.md shows these."""
+    if not signature or "Annotated[" not in signature or not callable(thing):
+        return None
+    found = inspect.signature(thing)
+    bare = [one.replace(annotation=one.empty) for one in found.parameters.values()]
+    return str(found.replace(parameters=bare, return_annotation=found.empty)), returns
+
+
 def setup(app: Sphinx) -> None:
     """Connect what is above."""
     app.connect("autodoc-process-docstring", _before_napoleon, priority=400)
     app.connect("autodoc-process-docstring", _after_napoleon, priority=600)
+    app.connect("autodoc-process-signature", _plain_signature)
     app.connect("missing-reference", _find_elsewhere)

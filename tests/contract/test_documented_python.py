@@ -14,7 +14,6 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-import sqlalchemy.dialects.sqlite  # noqa: F401 - pytester forgets imports; it bears one only
 from robolink_simulators.cell.tip_switches import LightBeam
 from robolink_simulators.epson.arm.kinematics import inverse
 from robolink_simulators.epson.device import EpsonSimulator
@@ -264,7 +263,7 @@ def test_a_block_runs(name, tmp_path, monkeypatch):
 
 def test_the_tests_of_readme_pass_in_somebody_else_s_run(pytester):
     pytester.makepyfile(BLOCKS["README.md 3"] + BLOCKS["README.md 4"])
-    result = pytester.runpytest_inprocess("-p", "no:cacheprovider")
+    result = pytester.runpytest_subprocess("-p", "no:cacheprovider")
     result.assert_outcomes(passed=4)
 
 
@@ -290,4 +289,4 @@ def test_the_test_of_a_recording_passes_and_sees_a_difference(pytester):
         """
     )
     pytester.makepyfile(recorded + BLOCKS["verify-controller.md 1"])
-    pytester.runpytest_inprocess("-p", "no:cacheprovider").assert_outcomes(passed=1)
+    pytester.runpytest_subprocess("-p", "no:cacheprovider").assert_outcomes(passed=1)

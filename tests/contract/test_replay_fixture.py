@@ -51,6 +51,6 @@ def recorded(pytester, monkeypatch):
 )
 def test_a_replay_fails_the_test_that_asks_otherwise(recorded, body, outcome, said):
     recorded.makepyfile(TEST.format(body=body))
-    result = recorded.runpytest_inprocess("-p", "no:cacheprovider")
+    result = recorded.runpytest_subprocess("-p", "no:cacheprovider")
     result.stdout.fnmatch_lines([said])
     result.assert_outcomes(**outcome)

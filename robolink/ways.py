@@ -7,52 +7,54 @@ sentence says with :func:`speaking` how its users say each of them.
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from enum import StrEnum, unique
+from typing import Final
 
 
-@unique
-class Way(StrEnum):
-    """What a sentence may ask for; the value is how a Python program says it."""
+class Way:
+    """What a sentence may ask for, as a Python program says it; each is its own key.
 
-    ACCEPT_JUMP = "accepted_change_mm"
-    ANSWER = "Answers(texts={{{number}: TEXT}})"
-    CALIBRATE_AT = "ToolPlan(..., pin={station!r})"
-    CALIBRATE_CAMERA_AT = "the method camera-affine, with tool {tool} at {station!r}"
-    CALIBRATE_TOOL_AT = "ToolPlan({tool}, ..., pin={station!r})"
-    DIALOGUE_FILE = "DialogueLog"
-    EARLIER_VALUE = "to=NUMBER"
-    EXPORT_JOURNAL = "open_journal(..., read_only=True)"
-    FORGET_MARKER = "recover(..., confirm=...)"
-    GIVEN_POSES = "PointsSource"
-    HEIGHT = "Answers(z_mm={{{tool}: MM}})"
-    LENGTH_TOLERANCE = "length_mm=0.05"
-    LIST_CHANGES = "outcomes.recorded(kinds=(EntryKind.DONE,))"
-    LOT = "Answers(lot=ID)"
-    NOZZLE = "Answers(nozzle=ID)"
-    OPERATOR = "connect(..., signature=...)"
-    OTHER_CONTROLLER = "leave require_same_controller out"
-    OVERWRITE = "replace=True"
-    PASSWORD = "connect(..., password=...)"
-    RECORD = "trace"
-    REFERENCE = "reference=True"
-    REMOTE_TIMEOUT = "remote_timeout_s"
-    SELECTED_TOO = "selected"
-    SENSOR = "sensor"
-    SIGMA = "sigma_mm"
-    TAUGHT_POINTS = "taught_poses"
-    TAUGHT_TOOL = "taught_tool"
-    THEN_SELECT = "then_select=NUMBER"
-    TILT = "tilt_deg"
-    TOOL = "tool"
-    TOOLS = "tools"
-    YES = "Answers(yes=True)"
+    Plain texts and no enumeration, because a stop loads them before its first frame.
+    """
+
+    ACCEPT_JUMP: Final = "accepted_change_mm"
+    ANSWER: Final = "Answers(texts={{{number}: TEXT}})"
+    CALIBRATE_AT: Final = "ToolPlan(..., pin={station!r})"
+    CALIBRATE_CAMERA_AT: Final = "the method camera-affine, with tool {tool} at {station!r}"
+    CALIBRATE_TOOL_AT: Final = "ToolPlan({tool}, ..., pin={station!r})"
+    DIALOGUE_FILE: Final = "DialogueLog"
+    EARLIER_VALUE: Final = "to=NUMBER"
+    EXPORT_JOURNAL: Final = "open_journal(..., read_only=True)"
+    FORGET_MARKER: Final = "recover(..., confirm=...)"
+    GIVEN_POSES: Final = "PointsSource"
+    HEIGHT: Final = "Answers(z_mm={{{tool}: MM}})"
+    LENGTH_TOLERANCE: Final = "length_mm=0.05"
+    LIST_CHANGES: Final = "outcomes.recorded(kinds=(EntryKind.DONE,))"
+    LOT: Final = "Answers(lot=ID)"
+    NOZZLE: Final = "Answers(nozzle=ID)"
+    OPERATOR: Final = "connect(..., signature=...)"
+    OTHER_CONTROLLER: Final = "leave require_same_controller out"
+    OVERWRITE: Final = "replace=True"
+    PASSWORD: Final = "connect(..., password=...)"
+    RECORD: Final = "trace"
+    REFERENCE: Final = "reference=True"
+    REMOTE_TIMEOUT: Final = "remote_timeout_s"
+    SELECTED_TOO: Final = "selected"
+    SENSOR: Final = "sensor"
+    SIGMA: Final = "sigma_mm"
+    TAUGHT_POINTS: Final = "taught_poses"
+    TAUGHT_TOOL: Final = "taught_tool"
+    THEN_SELECT: Final = "then_select=NUMBER"
+    TILT: Final = "tilt_deg"
+    TOOL: Final = "tool"
+    TOOLS: Final = "tools"
+    YES: Final = "Answers(yes=True)"
 
 
-_spoken: Mapping[Way, str] = {}
+_spoken: Mapping[str, str] = {}
 
 
 @contextmanager
-def speaking(words: Mapping[Way, str]) -> Iterator[None]:
+def speaking(words: Mapping[str, str]) -> Iterator[None]:
     """Use these words for the ways that they name, inside the block and in the whole process."""
     global _spoken  # noqa: PLW0603 - one program shows the sentences of a process
     before = _spoken
@@ -63,7 +65,7 @@ def speaking(words: Mapping[Way, str]) -> Iterator[None]:
         _spoken = before
 
 
-def way(which: Way, **values: object) -> str:
+def way(which: str, /, **values: object) -> str:
     """Return how the users of this program say ``which``, with its placeholders filled."""
-    text = _spoken.get(which, which.value)
+    text = _spoken.get(which, which)
     return text.format(**values) if values else text

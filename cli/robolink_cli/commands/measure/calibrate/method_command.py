@@ -131,7 +131,10 @@ def _parameters(
         lines = [f"{spelled[where.partition('#')[0]]}: {what}" for where, what in problems]
         raise ConfigError(
             "\n".join(f"{line}." for line in lines),
-            remedy=tr("Nothing was sent. 'robolink calibrate {name} --help'.", name=method.name),
+            remedy=tr(
+                "Nothing was sent. 'robolink calibrate {name} --help' shows what can be given.",
+                name=method.name,
+            ),
         )
     return parameters
 

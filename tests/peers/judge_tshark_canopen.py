@@ -97,7 +97,8 @@ def test_sdo_pdo_and_heartbeat_frames_are_named(capture):
 def test_the_objects_are_those_of_the_data_sheet(capture):
     found = dissected(capture, OBJECT, where=OBJECT[0], options=CANOPEN)
     objects = {(int(index, 16), int(subindex, 16)) for index, subindex in found}
-    assert objects == {(0x1017, 0), (COMMAND, 0), (0x2101, 0), (0x2102, 5), (0x2200, SLOT)}
+    fixed = {(0x1017, 0), (0x1018, 4)}
+    assert objects == {*fixed, (COMMAND, 0), (0x2101, 0), (0x2102, 5), (0x2200, SLOT)}
 
 
 def test_the_segments_make_up_the_commands_that_write_the_tool(capture):

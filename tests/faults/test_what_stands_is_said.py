@@ -24,7 +24,9 @@ _SAMPLE = 8
 """Exchanges of a long run that are disturbed."""
 
 
-def disturbed_and_checked(name: str, command: Command, runs: list[Disturbed], folder) -> None:
+def disturbed_and_checked(
+    name: str, command: Command, runs: list[Disturbed], folder, *, mended: bool = False
+) -> None:
     ends = Counter[str]()
     for disturbed in runs:
         try:
@@ -33,7 +35,10 @@ def disturbed_and_checked(name: str, command: Command, runs: list[Disturbed], fo
             error.add_note(f"{name}: {disturbed}")
             raise
     print(f"\n{name}: {len(runs)} runs, {dict(ends)}")  # noqa: T201 - for pytest -s
-    assert any(end != "done" for end in ends), "nothing was disturbed"
+    if mended:
+        assert set(ends) == {"done"}
+    else:
+        assert set(ends) > {"done"} or "done" not in ends, "nothing was disturbed"
 
 
 @pytest.mark.parametrize("name", [name for name in COMMANDS if "tool set" in name])
@@ -71,4 +76,6 @@ def test_what_stands_is_said_at_every_exchange_and_commit(tmp_path, name, how):
     requests, commits = whole_run(command, tmp_path)
     count = len(requests) if how in WIRE else commits
     runs = [Disturbed(how, number) for number in range(count)]
-    disturbed_and_checked(name, command, runs, tmp_path)
+    # A snapshot of a PLC has a checksum: one that was bent is read again, and nothing is lost.
+    mended = name.startswith("PLC") and str(how).endswith("GARBLE_REPLY")
+    disturbed_and_checked(name, command, runs, tmp_path, mended=mended)

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from robolink.procedures.camera_verify import nearest_first as nearest_first
     from robolink.procedures.camera_verify import seen_drift as seen_drift
     from robolink.procedures.camera_verify import verify_by_looking as verify_by_looking
+    from robolink.procedures.input_source import InputSource as InputSource
     from robolink.procedures.lazy_source import LazySource as LazySource
     from robolink.procedures.pin_source import ManualPinSource as ManualPinSource
     from robolink.procedures.pin_source import PinSource as PinSource
@@ -59,6 +60,7 @@ __getattr__ = lazy_exports(
             "CalibratedCameraSource angles_between calibrated_camera camera_error_of pixel_camera"
         ),
         "camera_verify": "NO_ERROR nearest_first seen_drift verify_by_looking",
+        "input_source": "InputSource",
         "lazy_source": "LazySource",
         "pin_source": "ManualPinSource PinSource",
         "pin_touch": "TouchPlan contact_pose lift_off touch_again verify_by_turning",

@@ -1,12 +1,12 @@
 """Two crossed light beams in the cell; nobody has to touch anything."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from robolink.calibration import CalibrationResult, VerifyResult, seen_from
 from robolink.messages import tr
 from robolink.methods.beams.parameters import BeamsParameters
 from robolink.model import Pose, ToolOffset
-from robolink.procedures import MeasurementContext
+from robolink.procedures import InputSource, MeasurementContext
 from robolink.runner import Procedure
 from robolink.stations import BeamStation
 
@@ -14,7 +14,7 @@ _HALF_A_TURN_DEG = 180.0
 
 
 @dataclass(frozen=True, slots=True)
-class BeamsSource:
+class BeamsSource(InputSource[BeamsParameters]):
     """Measures X and Y by driving the tip through two beams, from wherever the flange is.
 
     Attributes:
@@ -41,22 +41,6 @@ class BeamsSource:
             "Look whether the beams were moved since the reference record, and whether the "
             "needle sits straight."
         )
-
-    def measure(
-        self,
-        context: MeasurementContext,
-        tool: int,  # noqa: ARG002 - the flange is what moves
-        stored: ToolOffset | None,
-    ) -> CalibrationResult:
-        """Cross and solve; see :class:`~robolink.procedures.MovingSource`."""
-        return context.measure(lambda here: self._steps(stored, here, self.plan))
-
-    def procedure(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:
-        """Return the steps of a measurement; see :class:`~robolink.procedures.MovingSource`.
-
-        All of them: when it ends early depends on crossings that nobody has made yet.
-        """
-        return self._steps(stored, here, replace(self.plan, until_mm=None, retake=False))
 
     def _steps(
         self, stored: ToolOffset | None, here: Pose, plan: BeamsParameters

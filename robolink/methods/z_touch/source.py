@@ -1,18 +1,18 @@
 """A surface in the cell that switches an input when a tip touches it."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from robolink.calibration import CalibrationResult, VerifyResult, seen_from
 from robolink.messages import tr
 from robolink.methods.z_touch.parameters import ZTouchParameters
 from robolink.model import Pose, ToolOffset
-from robolink.procedures import MeasurementContext
+from robolink.procedures import InputSource, MeasurementContext
 from robolink.runner import Procedure
 from robolink.stations import TouchStation
 
 
 @dataclass(frozen=True, slots=True)
-class ZTouchSource:
+class ZTouchSource(InputSource[ZTouchParameters]):
     """Measures Z by touching a surface at two speeds, from wherever the flange is.
 
     Attributes:
@@ -34,22 +34,6 @@ class ZTouchSource:
     def remedy(self) -> str:
         """What to do when a measurement makes the tip jump."""
         return tr("Clean the tip and the surface, and look whether the nozzle sits firmly.")
-
-    def measure(
-        self,
-        context: MeasurementContext,
-        tool: int,  # noqa: ARG002 - the flange is what moves
-        stored: ToolOffset | None,
-    ) -> CalibrationResult:
-        """Touch and solve; see :class:`~robolink.procedures.MovingSource`."""
-        return context.measure(lambda here: self._steps(stored, here, self.plan))
-
-    def procedure(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:
-        """Return the steps of a measurement; see :class:`~robolink.procedures.MovingSource`.
-
-        All of them: when it ends early depends on touches that nobody has made yet.
-        """
-        return self._steps(stored, here, replace(self.plan, until_mm=None, retake=False))
 
     def _steps(
         self, stored: ToolOffset | None, here: Pose, plan: ZTouchParameters

@@ -1,0 +1,49 @@
+"""What measurements have in common in which the tip itself switches an input."""
+
+from abc import ABC, abstractmethod
+from dataclasses import replace
+from typing import TYPE_CHECKING, Generic, TypeVar
+
+from robolink.calibration import CalibrationResult
+from robolink.model import Pose, ToolOffset
+from robolink.procedures.source import MeasurementContext
+from robolink.runner import Procedure
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+PlanT = TypeVar("PlanT", bound="DataclassInstance")
+
+
+class InputSource(ABC, Generic[PlanT]):
+    """Measures from wherever the flange is; nobody touches anything.
+
+    Attributes:
+        plan: How it goes, with ``until_mm`` and ``retake``.
+    """
+
+    __slots__ = ()
+
+    plan: PlanT
+
+    def measure(
+        self,
+        context: MeasurementContext,
+        tool: int,  # noqa: ARG002 - the flange is what moves
+        stored: ToolOffset | None,
+    ) -> CalibrationResult:
+        """Drive and solve; see :class:`~robolink.procedures.MovingSource`."""
+        return context.measure(lambda here: self._steps(stored, here, self.plan))
+
+    def procedure(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:
+        """Return the steps of a measurement; see :class:`~robolink.procedures.MovingSource`.
+
+        All of them: when it ends early depends on what nobody has measured yet.
+        """
+        return self._steps(stored, here, replace(self.plan, until_mm=None, retake=False))
+
+    @abstractmethod
+    def _steps(
+        self, stored: ToolOffset | None, here: Pose, plan: PlanT
+    ) -> Procedure[CalibrationResult]:
+        """Return the steps, as ``plan`` says."""

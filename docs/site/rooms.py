@@ -44,6 +44,7 @@ WORDS = {
     "stop_latch": "what is sent passes here",
     "errors": "every exception",
     "timing": "clocks, deadlines",
+    "plug_ins": "of other packages",
     "interrupts": "Ctrl-C and others",
     "messages": "the catalogue",
     "ways": "words of who shows",

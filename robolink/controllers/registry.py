@@ -14,6 +14,7 @@ from robolink.errors import ConfigError
 from robolink.journal import GlancingLog, open_log
 from robolink.messages import tr
 from robolink.model import Controller, OutcomeLog, Secret, Signature
+from robolink.plug_ins import PlugInError, find_plug_in
 from robolink.timing import Clock
 from robolink.transport import LinkUrl, TraceSink
 
@@ -108,21 +109,16 @@ def find_opener(url: LinkUrl) -> ControllerOpener:
     if url.kind in _KINDS:
         module, name = _KINDS[url.kind]
         return cast(ControllerOpener, getattr(import_module(module), name))
-    from importlib import metadata  # costs more than all of this package
-
     for name in (url.scheme, url.kind):
-        for found in metadata.entry_points(group=CONTROLLERS_GROUP, name=name):
-            try:
-                return cast(ControllerOpener, found.load())
-            except (ImportError, AttributeError) as error:
-                raise ConfigError(
-                    tr(
-                        "What connects to {kind!r} cannot be loaded: {cause}.",
-                        kind=name,
-                        cause=error,
-                    ),
-                    remedy=tr("Install the package that brings it again."),
-                ) from error
+        try:
+            found = find_plug_in(CONTROLLERS_GROUP, name)
+        except PlugInError as error:
+            raise ConfigError(
+                tr("What connects to {kind!r} cannot be loaded: {cause}.", kind=name, cause=error),
+                remedy=tr("Install the package that brings it again."),
+            ) from error.origin
+        if found is not None:
+            return cast(ControllerOpener, found)
     raise ConfigError(
         tr("robolink does not know controllers of the kind {kind!r}.", kind=url.kind),
         remedy=tr("Write for example epson+tcp://192.168.0.1:5000."),

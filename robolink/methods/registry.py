@@ -10,11 +10,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
 from importlib import import_module, metadata
-from typing import Final
+from typing import Final, cast
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.methods.declaration import AnyMethod
+from robolink.plug_ins import PlugInError, find_plug_in
 
 METHODS_GROUP: Final = "robolink.methods"
 
@@ -51,23 +52,28 @@ def find_method(name: str) -> AnyMethod:
     """Return the method of that name.
 
     Raises:
-        ConfigError: There is none, or two packages bring one.
+        ConfigError: There is none, or what a package brings cannot be used.
     """
     if name in _registered:
         return _registered[name]
     if name in _OWN:
         own: AnyMethod = import_module(_OWN[name]).METHOD
         return own
-    found = tuple(_brought(tuple(sys.path)).select(name=name))
-    if len(found) != 1:
+    try:
+        found = find_plug_in(METHODS_GROUP, name)
+    except PlugInError as error:
         raise ConfigError(
-            tr("There is no calibration method {name!r}.", name=name)
-            if not found
-            else tr("Several packages bring a calibration method {name!r}.", name=name),
+            tr(
+                "The calibration method {name!r} cannot be loaded: {cause}.", name=name, cause=error
+            ),
+            remedy=tr("Install the package that brings it again."),
+        ) from error.origin
+    if found is None:
+        raise ConfigError(
+            tr("There is no calibration method {name!r}.", name=name),
             remedy=tr("These are known: {names}.", names=", ".join(method_names())),
         )
-    method: AnyMethod = found[0].load()
-    return method
+    return cast(AnyMethod, found)
 
 
 def all_methods() -> tuple[AnyMethod, ...]:

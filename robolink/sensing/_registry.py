@@ -12,6 +12,7 @@ from typing import Final, Protocol, cast
 from robolink.errors import CalibrationError
 from robolink.messages import tr
 from robolink.model import TipSensor
+from robolink.plug_ins import PlugInError, find_plug_in
 
 SENSORS_GROUP: Final = "robolink.sensors"
 
@@ -59,11 +60,18 @@ def sensor_name(sensor: str | TipSensor) -> str:
 
 
 def _opener(url: str) -> SensorOpener:
-    from importlib import metadata  # costs more than the rest of this package
-
     name = _NAME.match(url)
-    found = tuple(metadata.entry_points(group=SENSORS_GROUP, name=name[0])) if name else ()
-    if not found:
+    try:
+        found = find_plug_in(SENSORS_GROUP, name[0]) if name else None
+    except PlugInError as error:
+        raise CalibrationError(
+            "sensor_not_found",
+            tr("The sensor {url!r} cannot be loaded: {cause}.", url=url, cause=error),
+            remedy=tr("Install the package that brings it again."),
+        ) from error.origin
+    if found is None:
+        from importlib import metadata  # costs more than the rest of this package
+
         known = sorted(metadata.entry_points(group=SENSORS_GROUP).names)
         raise CalibrationError(
             "sensor_not_found",
@@ -74,11 +82,4 @@ def _opener(url: str) -> SensorOpener:
                 known=", ".join(known),
             ),
         )
-    try:
-        return cast(SensorOpener, found[0].load())
-    except (ImportError, AttributeError) as error:
-        raise CalibrationError(
-            "sensor_not_found",
-            tr("The sensor {url!r} cannot be loaded: {cause}.", url=url, cause=error),
-            remedy=tr("Install the package that brings it again."),
-        ) from error
+    return cast(SensorOpener, found)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final, Protocol, cast
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink.plug_ins import PlugInError, find_plug_in
 from robolink.timing import Clock
 from robolink.transport._mailbox_link import MailboxLink
 from robolink.transport._url import LinkUrl, parse_url
@@ -131,19 +132,9 @@ def _find(link: LinkUrl, media: Mapping[str, tuple[str, str]]) -> Callable[..., 
 
 
 def _load(link: LinkUrl, media: Mapping[str, tuple[str, str]]) -> Callable[..., Any]:
-    from importlib import metadata  # costs more than all of this package; TCP needs none of it
-
-    found = metadata.entry_points(group=TRANSPORTS_GROUP, name=link.scheme)
-    if not found:
-        known = {f"{link.kind}+{medium}" for medium in media}
-        known |= metadata.entry_points(group=TRANSPORTS_GROUP).names
-        raise ConfigError(
-            tr("Nothing here knows how to reach {scheme!r}.", scheme=link.scheme),
-            remedy=tr("Known are: {known}.", known=", ".join(sorted(known))),
-        )
     try:
-        return cast(Callable[..., Any], next(iter(found)).load())
-    except (ImportError, AttributeError) as error:
+        found = find_plug_in(TRANSPORTS_GROUP, link.scheme)
+    except PlugInError as error:
         raise ConfigError(
             tr(
                 "What reaches {scheme!r} cannot be loaded: {cause}.",
@@ -151,4 +142,14 @@ def _load(link: LinkUrl, media: Mapping[str, tuple[str, str]]) -> Callable[..., 
                 cause=error,
             ),
             remedy=tr("Install robolink again, or the package that brings this scheme."),
-        ) from error
+        ) from error.origin
+    if found is None:
+        from importlib import metadata  # costs more than all of this package
+
+        known = {f"{link.kind}+{medium}" for medium in media}
+        known |= metadata.entry_points(group=TRANSPORTS_GROUP).names
+        raise ConfigError(
+            tr("Nothing here knows how to reach {scheme!r}.", scheme=link.scheme),
+            remedy=tr("Known are: {known}.", known=", ".join(sorted(known))),
+        )
+    return cast(Callable[..., Any], found)

@@ -5,7 +5,9 @@ from importlib.metadata import EntryPoint, EntryPoints
 
 import pytest
 
+from robolink.controllers.registry import find_opener
 from robolink.errors import ConfigError
+from robolink.methods import find_method
 from robolink.transport import TRANSPORTS_GROUP, open_transport, parse_url
 
 
@@ -70,3 +72,22 @@ def test_an_entry_point_that_cannot_be_loaded_is_an_error_of_ours(entry_points, 
 def test_a_tcp_url_is_host_and_port_and_nothing_else(url):
     with pytest.raises(ConfigError):
         open_transport(url)
+
+
+def test_of_two_packages_that_bring_the_same_none_is_guessed(monkeypatch):
+    both = metadata.EntryPoints(
+        metadata.EntryPoint("gantry", place, "robolink.controllers")
+        for place in ("one:open", "another:open")
+    )
+    monkeypatch.setattr(metadata, "entry_points", lambda **by: both.select(**by))
+    with pytest.raises(ConfigError, match="cannot be loaded: several packages bring it"):
+        find_opener(parse_url("gantry+tcp://192.168.0.1"))
+
+
+def test_a_method_that_cannot_be_loaded_is_refused_by_name(monkeypatch):
+    broken = metadata.EntryPoints(
+        [metadata.EntryPoint("spiral", "nothing_here:METHOD", "robolink.methods")]
+    )
+    monkeypatch.setattr(metadata, "entry_points", lambda **by: broken.select(**by))
+    with pytest.raises(ConfigError, match="method 'spiral' cannot be loaded: No module"):
+        find_method("spiral")

@@ -12,6 +12,7 @@ from robolink.model import (
     ToolOffset,
     describe_offset,
     read_offset,
+    with_method_name_now,
 )
 from robolink.report._recorded_fit import recorded_fit, recorded_pose
 from robolink.report._values import Attempt, Judgement, Outcome, Record, Report
@@ -40,7 +41,7 @@ def report_of_tool(
     """
     outcome, ending = _outcome(entries)
     measured = _last(entries, EntryKind.CALIBRATION)
-    calibration: Mapping[str, Any] = measured.details if measured else {}
+    calibration = with_method_name_now(measured.details) if measured else {}
     compared = _offsets(tool, entries, done=outcome in (Outcome.VERIFIED, Outcome.WRITTEN))
     return Report(
         made_at=made_at,

@@ -14,7 +14,6 @@ from robolink.nozzle_change import (
     Moment,
     NozzleChange,
     Proposal,
-    ToolPlan,
     ToolReport,
 )
 from robolink.procedures import MeasurementContext, PoseMethod
@@ -152,7 +151,7 @@ def calibrate_from_poses(
 def _carry_out(
     controller: Controller, frame: CalibrationRequest, given: PointsSource, listener: Listener
 ) -> ToolReport:
-    one = ToolPlan(frame.tool, given, frame.criteria, verify=False, pin=frame.pin)
+    one = frame.tool_plan(given, verify=False)
     change = NozzleChange(
         controller,
         ChangePlan((one,), ask_before_write=False),
@@ -170,7 +169,8 @@ def _dry_run(
     """Propose and judge; return the document with what would be sent."""
     before = controller.tools.read(frame.tool)
     given.found = given.find(controller, frame.tool, before)
-    proposal = Proposal(frame.tool, before, given.found.result)
+    result = frame.tool_plan(given, verify=False).named(given.found.result)
+    proposal = Proposal(frame.tool, before, result)
     if not frame.context.json:
         listener.proposed([proposal])
     frame.criteria.judge_fit(proposal.result)

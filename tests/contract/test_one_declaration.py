@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 import tomllib
+from typing import cast
 
 import pytest
 from annotated_types import Ge, Le
@@ -11,7 +12,9 @@ from click.testing import CliRunner
 from robolink_cli import main
 from robolink_cli.commands.measure.calibrate.method_command import command_of
 
-from robolink.methods import all_methods, fields_of
+from robolink.errors import ConfigError
+from robolink.methods import Site, StatedLimits, all_methods, fields_of, source_of
+from robolink.nozzle_change import usual_box
 from robolink.recipe._loading import _checked
 
 NOBODY = "epson+tcp://127.0.0.1:9"
@@ -68,7 +71,7 @@ def typed(method, values):
             yield f"{flags[name]}={','.join(texts)}"
 
 
-def in_recipe(method, values):
+def in_recipe(method, values, *tables):
     """Return what a recipe of that method is told."""
     z = "measured" if method.only_z else "kept"
     lines = [
@@ -81,16 +84,17 @@ def in_recipe(method, values):
         "[source]",
         f'kind = "{method.name}"',
         *(f"{name} = {json.dumps(value)}" for name, value in values.items()),
+        *tables,
         "[[tools]]",
         "number = 1",
     ]
     return {one.where: one.what for one in _checked(tomllib.loads("\n".join(lines)))[1]}
 
 
-def refused(method, values, capsys):
+def refused(method, values, capsys, *more):
     """Return what a command of that method says."""
     station = ("--station", "S") if method.needs.named else ()
-    words = ("calibrate", method.name, "--tool", "1", *station, *typed(method, values))
+    words = ("calibrate", method.name, "--tool", "1", *station, *typed(method, values), *more)
     assert main.run(["-c", NOBODY, *words]) == 2
     return " ".join(capsys.readouterr().err.split())
 
@@ -115,6 +119,82 @@ def test_what_does_not_go_together_is_refused_in_the_same_words(name, values, wh
     assert in_recipe(method, values)[f"source.{where}"].startswith(words)
     flags = {field.name: field.flag for field in fields_of(method.parameters)}
     assert f"{flags[where]}: {words}" in refused(method, values, capsys)
+
+
+HALVES = {"board": {"spacing_mm": 40.0, "turns_deg": (0.0,)}, "camera": {"turns_deg": (0.0,)}}
+HALVES |= {"z-touch": {"speeds_mm_s": (2.0, 1.0)}, "beams": {"repeats": 1, "turn_deg": 0.0}}
+"""With these a measurement leaves no residual; two-pose, points and one-touch never do."""
+
+NO_RESIDUAL = ("two-pose", "one-touch", "points", *HALVES)
+TYPED = {"rms_mm": "--max-rms", "max_mm": "--max-residual", "interval_mm": "--max-interval"}
+UNKNOWN_SIGMA = "is missing: the measurement leaves no residual"
+
+
+def of_the_library(method, values, **more):
+    """Return what a script is told that asks for the source of measurements."""
+    with pytest.raises(ConfigError) as caught:
+        source_of(method, method.parameters(**values), cast(Site, None), **more)
+    return caught.value.what
+
+
+@pytest.mark.parametrize("limit", TYPED)
+@pytest.mark.parametrize("name", NO_RESIDUAL)
+def test_what_leaves_no_residual_is_judged_by_none_wherever_one_asks(name, limit, capsys):
+    method, values = method_of(name), HALVES.get(name, {})
+    where = "sigma_mm" if limit == "interval_mm" else limit
+    if where == "sigma_mm" and not method.by_reference:
+        pytest.skip("one touch may take its standard deviation from the calibration before")
+    what = in_recipe(method, values, "[tolerances]", f"{limit} = 0.1")[f"tolerances.{where}"]
+    assert what.startswith(UNKNOWN_SIGMA if where == "sigma_mm" else "cannot be judged: ")
+    if method.command:
+        option = {**TYPED, "sigma_mm": "--sigma"}[where]
+        said = refused(method, values, capsys, TYPED[limit], "0.1")
+        assert f"{option}: {what}." in said
+    said = of_the_library(method, values, limits=StatedLimits(**{limit: 0.1}))
+    assert f"{where}: {what}." in said
+
+
+def test_an_interval_that_is_never_met_is_refused_in_the_same_words(capsys):
+    method, tables = method_of("two-pose"), ("[tolerances]", "sigma_mm = 0.1", "interval_mm = 0.1")
+    what = in_recipe(method, {}, *tables)["tolerances.interval_mm"]
+    assert what.startswith("can never be met")
+    typed_too = ("--sigma", "0.1", "--max-interval", "0.1")
+    assert f"--max-interval: {what}." in refused(method, {}, capsys, *typed_too)
+    limits = StatedLimits(sigma_mm=0.1, interval_mm=0.1)
+    assert f"interval_mm: {what}." in of_the_library(method, {}, limits=limits)
+
+
+def test_what_a_cell_allows_every_method_is_no_reason_to_refuse_one(tmp_path, monkeypatch, capsys):
+    """A cell's limits stand for methods that can be judged by them; nobody typed them here."""
+    (tmp_path / "robolink.toml").write_text(
+        f'[cells.a]\nurl = "{NOBODY}"\nrms_tolerance_mm = 0.1\n', encoding="utf-8"
+    )
+    monkeypatch.setenv("ROBOLINK_CONFIG", str(tmp_path / "robolink.toml"))
+    code = main.run(["-c", "a", "calibrate", "two-pose", "--tool", "1", "--dry-run"])
+    assert code == 3, capsys.readouterr().err
+
+
+LIFTING = [
+    method
+    for method in all_methods()
+    if "lift_mm" in {field.name for field in fields_of(method.parameters)}
+]
+
+
+@pytest.mark.parametrize("method", LIFTING, ids=lambda method: method.name)
+def test_a_lift_that_the_box_has_no_room_for_is_refused_wherever_one_asks(method, capsys):
+    values = {"lift_mm": 81.0, **({"spacing_mm": 40.0} if method.name == "board" else {})}
+    what = in_recipe(method, values)["source.lift_mm"]
+    assert what.startswith("must leave room: ")
+    assert what.endswith("and the box is 80 mm high")
+    assert f"--lift: {what}." in refused(method, values, capsys)
+    assert f"lift_mm: {what}." in of_the_library(method, values, box=usual_box())
+
+
+def test_a_limit_is_refused_in_the_same_words_to_a_script(capsys):
+    method, values = method_of("two-pose"), {"turn_deg": 5}
+    what = in_recipe(method, values)["source.turn_deg"]
+    assert of_the_library(method, values) == f"turn_deg: {what}."
 
 
 def test_a_turn_that_tells_nothing_is_refused_before_the_robot_has_moved(capsys):

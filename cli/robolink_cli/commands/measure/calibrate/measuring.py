@@ -7,7 +7,7 @@ import click
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink.methods import AnyMethod, MethodParameters, Site
+from robolink.methods import AnyMethod, MethodParameters, Site, source_of
 from robolink.model import Controller, EntryKind
 from robolink.stations import Station, StationKind, find_stations
 from robolink_cli.commands.measure.calibrate.given_poses import calibrate_from_poses
@@ -67,7 +67,7 @@ def calibrate_with(
         )
         return
     frame.require_something_to_show()
-    calibrate_live(frame, lambda controller: method.source(parameters, site(controller)))
+    calibrate_live(frame, lambda controller: source_of(method, parameters, site(controller)))
 
 
 def _station(

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from robolink.model._tools import ANY as ANY
     from robolink.model._tools import Expect as Expect
     from robolink.model._tools import Expected as Expected
+    from robolink.model._tools import Jump as Jump
     from robolink.model._tools import ToolOffset as ToolOffset
     from robolink.model._tools import ToolReceipt as ToolReceipt
     from robolink.model._tools import ToolTable as ToolTable
@@ -92,7 +93,7 @@ else:
             "record.standing_words": "describe_standing",
             "motion.tip_sensor": "Spot SpotUnit TIP TipSensor",
             "_tools": (
-                "ANY Expect Expected ToolOffset ToolReceipt ToolTable describe_offset "
+                "ANY Expect Expected Jump ToolOffset ToolReceipt ToolTable describe_offset "
                 "plain_offset read_offset tool_changed"
             ),
             "motion.until_input": "InputEdge MotionUntilInput",

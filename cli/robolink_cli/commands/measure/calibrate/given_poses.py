@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from functools import partial
 
+from robolink.backup import keep_first_backup
 from robolink.calibration import ToolFit
 from robolink.errors import DeclinedError
 from robolink.messages import tr
@@ -29,7 +30,6 @@ from robolink_cli.options.report import ReportDraft, reporting
 from robolink_cli.prompts.operator import terminal
 from robolink_cli.prompts.questions import agree, on_terminal
 from robolink_cli.session.context import CliContext
-from robolink_cli.session.first_backup import back_up_first
 from robolink_cli.session.opening import open_controller
 from robolink_cli.views.calibration import doubts, judged_payload, report_payload
 
@@ -74,7 +74,7 @@ class _PosesListener(CalibrationListener):
     def moment(self, moment: Moment, bench: MeasurementContext, tool: int | None = None) -> None:  # noqa: ARG002 - one tool only
         if moment is Moment.BEFORE_WRITE:
             _agree_to_write(self._frame.tool, yes=self._frame.yes)
-            back_up_first(bench.controller)
+            keep_first_backup(bench.controller, tell=note)
 
     def _doubts(self, proposal: Proposal) -> tuple[str, ...]:
         known = doubts(proposal)

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from functools import partial
 
+from robolink.backup import keep_first_backup
 from robolink.messages import tr
 from robolink.model import Controller
 from robolink.nozzle_change import (
@@ -20,10 +21,10 @@ from robolink_cli.access.warnings import note_change
 from robolink_cli.commands.measure.calibrate.listener import CalibrationListener
 from robolink_cli.commands.measure.calibrate.request import CalibrationRequest
 from robolink_cli.commands.measure.calibrate.stations import remark_on_pin
+from robolink_cli.console.render import note
 from robolink_cli.options.impact import ImpactRequest, impact_payload, show_impact
 from robolink_cli.options.report import ReportDraft, reporting
 from robolink_cli.prompts.operator import operator_at
-from robolink_cli.session.first_backup import back_up_first
 from robolink_cli.session.motion_consent import agree_to_motion, motion_question
 from robolink_cli.session.opening import open_controller
 from robolink_cli.views.calibration import (
@@ -83,7 +84,7 @@ class LiveCalibration:
         self._controller.require_settled(tr("calibrate tool {tool}", tool=self.tool))
         require_ready(self._plan)
         note_change(self._controller, self.tool, self._controller.tools.read(self.tool))
-        back_up_first(self._controller)
+        keep_first_backup(self._controller, tell=note)
 
     def dry_run(self) -> dict[str, object]:
         """Return the foreseen steps with their requests and limit checks; reads only."""

@@ -43,7 +43,11 @@ def source_of(
             is to be judged by a limit leaves nothing to judge. Nothing has been sent.
         RobolinkError: What the method itself finds missing at the site.
     """
-    check = Check(limits=limits, box_height_mm=None if box is None else box.height_mm)
+    check = Check(
+        limits=limits,
+        box_height_mm=None if box is None else box.height_mm,
+        points=len(site.points) if site.points else None,
+    )
     found = tuple(parameter_problems(method, parameters, check))
     if found:
         raise ConfigError(

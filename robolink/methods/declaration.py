@@ -111,6 +111,7 @@ class Check:
         limits: What was stated besides; ``None`` where that cannot be told.
         box_height_mm: Height of the box in which the flange may go, ``None`` where it is not known.
         poses_exist: Whether the poses exist already, so that nothing is measured at set angles.
+        points: How many taught points were named, ``None`` where none are.
         spell: Returns a parameter's name as whoever wrote it knows it: a key, or an option.
     """
 
@@ -118,6 +119,7 @@ class Check:
     limits: StatedLimits | None = None
     box_height_mm: float | None = None
     poses_exist: bool = False
+    points: int | None = None
     spell: Callable[[str], str] = str
 
     @property
@@ -227,7 +229,6 @@ class Method(Generic[P]):
         by_reference: Whether basis "difference" compares with a reference that a run records.
         unmeasured_z: Why ``z = "measured"`` is refused, empty where Z can be measured.
         formerly: How recipes named it before.
-        command: Whether ``calibrate`` has a command of this name.
     """
 
     name: str
@@ -243,7 +244,6 @@ class Method(Generic[P]):
     by_reference: bool = True
     unmeasured_z: str = ""
     formerly: tuple[Former, ...] = ()
-    command: bool = True
 
     @property
     def only_z(self) -> bool:

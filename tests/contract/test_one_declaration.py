@@ -14,8 +14,10 @@ from robolink_cli.commands.measure.calibrate.method_command import command_of
 
 from robolink.errors import ConfigError
 from robolink.methods import Site, StatedLimits, all_methods, fields_of, source_of
+from robolink.model import Controller
 from robolink.nozzle_change import usual_box
 from robolink.recipe._loading import _checked
+from robolink.stations import Station
 
 NOBODY = "epson+tcp://127.0.0.1:9"
 """Refused before anything is sent, nothing is asked for there."""
@@ -33,7 +35,6 @@ def beyond(field):
 LIMITS = [
     (method, field, value)
     for method in all_methods()
-    if method.command
     for field in fields_of(method.parameters)
     if field.kind in (float, int)
     for value in beyond(field)
@@ -94,7 +95,8 @@ def in_recipe(method, values, *tables):
 def refused(method, values, capsys, *more):
     """Return what a command of that method says."""
     station = ("--station", "S") if method.needs.named else ()
-    words = ("calibrate", method.name, "--tool", "1", *station, *typed(method, values), *more)
+    where = station if method.needs.motion else ("--points", "901,902")
+    words = ("calibrate", method.name, "--tool", "1", *where, *typed(method, values), *more)
     assert main.run(["-c", NOBODY, *words]) == 2
     return " ".join(capsys.readouterr().err.split())
 
@@ -132,8 +134,10 @@ UNKNOWN_SIGMA = "is missing: the measurement leaves no residual"
 
 def of_the_library(method, values, **more):
     """Return what a script is told that asks for the source of measurements."""
+    station = Station(id="S", kind=method.needs.station)
+    site = Site(controller=cast(Controller, None), tool=1, station=station)
     with pytest.raises(ConfigError) as caught:
-        source_of(method, method.parameters(**values), cast(Site, None), **more)
+        source_of(method, method.parameters(**values), site, **more)
     return caught.value.what
 
 
@@ -146,10 +150,9 @@ def test_what_leaves_no_residual_is_judged_by_none_wherever_one_asks(name, limit
         pytest.skip("one touch may take its standard deviation from the calibration before")
     what = in_recipe(method, values, "[tolerances]", f"{limit} = 0.1")[f"tolerances.{where}"]
     assert what.startswith(UNKNOWN_SIGMA if where == "sigma_mm" else "cannot be judged: ")
-    if method.command:
-        option = {**TYPED, "sigma_mm": "--sigma"}[where]
-        said = refused(method, values, capsys, TYPED[limit], "0.1")
-        assert f"{option}: {what}." in said
+    option = {**TYPED, "sigma_mm": "--sigma"}[where]
+    said = refused(method, values, capsys, TYPED[limit], "0.1")
+    assert f"{option}: {what}." in said
     said = of_the_library(method, values, limits=StatedLimits(**{limit: 0.1}))
     assert f"{where}: {what}." in said
 
@@ -207,10 +210,9 @@ def test_every_parameter_is_an_option_and_a_key(method):
     given = tomllib.loads(f'source = {{ kind = "{method.name}", nothing = 1 }}')
     (what,) = (p.what for p in _checked(given)[1] if p.where == "source.nothing")
     assert keys <= {*what.partition("these are: ")[2].split(", ")}
-    if method.command:
-        shown = CliRunner().invoke(command_of(method), ["--help"]).output
-        for field in fields_of(method.parameters):
-            assert field.flag in shown
+    shown = CliRunner().invoke(command_of(method), ["--help"]).output
+    for field in fields_of(method.parameters):
+        assert field.flag in shown
 
 
 def test_help_asks_for_no_mathematics_and_no_recipes():
@@ -219,7 +221,7 @@ def test_help_asks_for_no_mathematics_and_no_recipes():
         "from click.testing import CliRunner\n"
         "from robolink_cli.commands.measure.calibrate import calibrate\n"
         "from robolink.methods import all_methods\n"
-        "commands = [[method.name] for method in all_methods() if method.command]\n"
+        "commands = [[method.name] for method in all_methods()]\n"
         "for words in [[], *commands]:\n"
         "    shown = CliRunner().invoke(calibrate, [*words, '--help'])\n"
         "    assert shown.exit_code == 0, shown.output\n"

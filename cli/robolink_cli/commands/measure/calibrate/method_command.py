@@ -21,8 +21,8 @@ from robolink.stations import StationKind
 from robolink_cli.commands.measure.calibrate.options import calibration_options, sigma_option
 from robolink_cli.commands.measure.calibrate.request import CalibrationRequest
 from robolink_cli.commands.measure.calibrate.values import as_typed, is_repeated, type_of
-from robolink_cli.options.motion import motion_option
-from robolink_cli.options.pose_source import PoseSource, pose_source_options
+from robolink_cli.options.motion import MotionOption, motion_option
+from robolink_cli.options.pose_source import PoseSource, pose_source_options, taught_points_option
 
 _METAVARS: Final = {"mm": "MM", "degrees": "DEG", "mm/s": "MM_S"}
 
@@ -59,7 +59,7 @@ def command_of(method: AnyMethod) -> click.Command:
     ) -> None:
         from robolink_cli.commands.measure.calibrate.measuring import calibrate_with
 
-        check = _check(method, frame, sigma_mm=sigma_mm, poses_exist=poses is not None)
+        check = _check(method, frame, sigma_mm=sigma_mm, poses=poses)
         chosen = _parameters(method, given, check)
         calibrate_with(
             method, chosen, frame, station=station, at=at, sigma_mm=sigma_mm, poses=poses
@@ -68,7 +68,12 @@ def command_of(method: AnyMethod) -> click.Command:
     command: Callable[..., Any] = calibration_options(run)
     for add in reversed([*map(_option, parameters), *_of_the_place(method)]):
         command = add(command)
-    return click.command(method.name, help=method.description, short_help=method.summary)(command)
+    made = click.command(method.name, help=method.description, short_help=method.summary)(command)
+    if not method.needs.motion:
+        for option in made.params:
+            if isinstance(option, MotionOption):
+                option.hidden = True
+    return made
 
 
 def _of_the_place(method: AnyMethod) -> list[Decorator]:
@@ -84,7 +89,11 @@ def _of_the_place(method: AnyMethod) -> list[Decorator]:
         )
     if method.from_poses is not None and method.pose_help is not None:
         said = method.pose_help
-        options.append(pose_source_options(points=said.points, typed=said.typed, path=said.path))
+        if method.needs.motion:
+            added = pose_source_options(points=said.points, typed=said.typed, path=said.path)
+        else:
+            added = taught_points_option(said.points)
+        options.append(added)
     return options
 
 
@@ -123,7 +132,11 @@ def _is_choice(field: ParameterField) -> bool:
 
 
 def _check(
-    method: AnyMethod, frame: CalibrationRequest, *, sigma_mm: float | None, poses_exist: bool
+    method: AnyMethod,
+    frame: CalibrationRequest,
+    *,
+    sigma_mm: float | None,
+    poses: PoseSource | None,
 ) -> Check:
     """Return what is known beside the parameters: limits that were typed, not those of the cell."""
     given, criteria = _typed(), frame.criteria
@@ -137,14 +150,19 @@ def _check(
         given=given,
         limits=stated,
         box_height_mm=frame.limits.box.height_mm,
-        poses_exist=poses_exist,
+        poses_exist=poses is not None,
+        points=len(poses.points) if poses is not None and poses.kind == "points" else None,
         spell=_spelled(method).__getitem__,
     )
 
 
 def _spelled(method: AnyMethod) -> dict[str, str]:
     """Return the option of each parameter and of each limit."""
-    return {**_LIMITS, **{field.name: field.flag for field in fields_of(method.parameters)}}
+    return {
+        "points": "--points",
+        **_LIMITS,
+        **{field.name: field.flag for field in fields_of(method.parameters)},
+    }
 
 
 def _parameters(method: AnyMethod, given: Mapping[str, Any], check: Check) -> MethodParameters:

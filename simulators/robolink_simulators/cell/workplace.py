@@ -42,6 +42,9 @@ class Handled(Protocol):
         What it cannot reach it refuses with the error of its own controller.
         """
 
+    def turn(self, by_deg: float) -> None:
+        """Turn the flange about the base's Z where it stands; where it cannot, it stays."""
+
     def loosen(self, parameters: WorldParameters) -> None:
         """Give the axes the play that the parameters say."""
 
@@ -101,6 +104,22 @@ class Workplace:
             self.board = None
         elif self.board is None:
             self.board = SimulatedBoard.grasped(random.Random(f"board {self._seed}"))
+
+    def gap_mm(self, tool: int = MOUNTED_TOOL) -> XyzMm:
+        """Return the way from a physical tip to the pin."""
+        tip = self.tip_mm(tool)
+        return self.pin_mm[0] - tip[0], self.pin_mm[1] - tip[1], self.pin_mm[2] - tip[2]
+
+    def touch_begins(self, done: int) -> None:
+        """Let happen what happens between two touches: somebody bumps the pin.
+
+        Args:
+            done: How many touches came before.
+        """
+        bump = self.parameters.bump
+        if done and done == bump.after_touch:
+            (dx, dy), (x_mm, y_mm, z_mm) = bump.by_mm, self.pin_mm
+            self.pin_mm = (x_mm + dx, y_mm + dy, z_mm)
 
     def lean_of(self, tool: int) -> Lean:
         """Return by how much a nozzle is bent, in the flange's axes."""

@@ -2,6 +2,7 @@
 
 import random
 from collections.abc import Callable, Hashable
+from contextlib import suppress
 from dataclasses import asdict, replace
 from typing import Any, Final
 
@@ -19,6 +20,7 @@ from robolink_simulators.epson.arm.kinematics import Joints, inverse, tip_of
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.epson.memory.tip_input import Nozzle, TipInput
+from robolink_simulators.epson.refusals import OutOfReach
 
 STORED: Final = ToolOffset(12.0, -3.5, -20.0)
 """What the controller holds for tool 1 at first: the nozzle that was there before."""
@@ -216,6 +218,12 @@ class _HandledArm:
             z_mm=flange.z_mm + by_mm[2],
         )
         arm.place(inverse(arm.model, target, arm.hand), self._now_ns())
+
+    def turn(self, by_deg: float) -> None:
+        arm = self._machine.arm
+        target = replace(arm.flange(), u_deg=arm.flange().u_deg + by_deg)
+        with suppress(OutOfReach):
+            arm.place(inverse(arm.model, target, arm.hand), self._now_ns())
 
     def loosen(self, parameters: WorldParameters) -> None:
         arm = self._machine.arm

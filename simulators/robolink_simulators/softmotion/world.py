@@ -2,6 +2,7 @@
 
 import random
 from collections.abc import Hashable
+from contextlib import suppress
 from typing import Final
 
 from robolink.errors import ConfigError
@@ -23,8 +24,11 @@ from robolink_simulators.softmotion.group.condition import SmcGroupState
 from robolink_simulators.softmotion.kinematics.frames import (
     NO_TURN,
     ORIGIN,
+    Z_AXIS,
     Frame,
+    about,
     add,
+    product,
     subtract,
     turned,
     zyx,
@@ -154,6 +158,14 @@ class _HandledGroup:
 
     def turned(self, direction: Direction) -> Direction:
         return _turned_at(self._group, trailing(self._group, self._group.values), direction)
+
+    def turn(self, by_deg: float) -> None:
+        group, kinematics = self._group, self._group.kinematics
+        here = kinematics.flange(group.values)
+        wanted = Frame(here.shift_mm, product(about(Z_AXIS, by_deg), here.rotation))
+        with suppress(BlockRefused):
+            configuration = kinematics.configuration(group.values)
+            group.place(kinematics.axes_for(wanted, configuration, group.values))
 
     def loosen(self, parameters: WorldParameters) -> None:
         for axis in self._group.axes:

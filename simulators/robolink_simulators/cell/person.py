@@ -7,11 +7,16 @@ import math
 import random
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass
+from typing import Final
 
 from robolink.model import Pose
 from robolink_simulators.cell.habits import PersonManner, TouchCourse
 from robolink_simulators.cell.places import Axis, XyzMm
 from robolink_simulators.cell.workplace import MOUNTED_TOOL, Workplace
+
+LAMP_MM: Final = 0.025
+"""So much below the first contact, and not above it, a person stops who watches the lamp of a
+contact input (assumed)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,10 +155,12 @@ class SimulatedOperator:
         robot, error = self._workplace.robot, self._error
         aim = self._course.aim_mm(robot.turned((1.0, 0.0, 0.0)), robot.turned((0.0, 1.0, 0.0)))
         gap = self._workplace.gap_mm(tool)
+        wired = self._workplace.parameters.contact_input is not None and tool == MOUNTED_TOOL
+        dz_mm = -abs(error.dz_mm) - LAMP_MM if wired else error.dz_mm
         return (
             gap[0] + aim[0] + error.dx_mm,
             gap[1] + aim[1] + error.dy_mm,
-            gap[2] + aim[2] + error.dz_mm,
+            gap[2] + aim[2] + dz_mm,
         )
 
     def _drawn_error(self) -> PersonLook:

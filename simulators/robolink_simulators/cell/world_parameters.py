@@ -49,6 +49,9 @@ class WorldParameters:
         person_presses_mm: How much deeper than the contact the person goes.
         person_types_ahead: Whether ENTER is pressed before each touch is asked for.
         person_thinks_s: How long the person looks before the first answer to a question.
+        contact_input: Number of the input that is on while the mounted nozzle touches the pin;
+            none where they are not wired.
+        pin_radius_mm: Half the thickness of the pin, for that.
         pin_bumped_after_touch, pin_bump_mm, pin_bump_toward_deg: After which touch the pin is
             bumped, how far, and in which direction of the base.
     """
@@ -85,6 +88,8 @@ class WorldParameters:
     person_presses_mm: float = 0.0
     person_types_ahead: bool = False
     person_thinks_s: float = 1.0
+    contact_input: int | None = None
+    pin_radius_mm: float = 0.25
     pin_bumped_after_touch: int = 2
     pin_bump_mm: float = 0.0
     pin_bump_toward_deg: float = 0.0
@@ -111,6 +116,11 @@ class WorldParameters:
         """The person."""
         names = [field.name for field in fields(PersonHabits)]
         return PersonHabits(**{name: getattr(self, f"person_{name}") for name in names})
+
+    @property
+    def contact(self) -> tuple[int | None, float]:
+        """How nozzle and pin are wired: the input, and the pin's radius in mm."""
+        return self.contact_input, self.pin_radius_mm
 
     @property
     def bump(self) -> PinBump:

@@ -18,6 +18,7 @@ from robolink_simulators.cell.workplace import Workplace, XyzMm, exchanged, pin_
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.epson.arm.kinematics import Joints, inverse, tip_of
 from robolink_simulators.epson.machine import Machine
+from robolink_simulators.epson.memory.bits import IO_BITS
 from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.epson.memory.tip_input import Nozzle, TipInput
 from robolink_simulators.epson.refusals import OutOfReach
@@ -42,6 +43,8 @@ class World(Workplace):
         operator: The person at the cell.
     """
 
+    inputs = IO_BITS
+
     def __init__(
         self,
         machine: Machine,
@@ -53,6 +56,7 @@ class World(Workplace):
         now_ns: Callable[[], int],
         parameters: WorldParameters | None = None,
     ) -> None:
+        self.machine = machine  # its inputs are wired by what follows
         super().__init__(
             _HandledArm(machine, now_ns),
             tips,
@@ -61,7 +65,6 @@ class World(Workplace):
             replaced=STORED,
             parameters=parameters or WorldParameters(),
         )
-        self.machine = machine
         self.operator = PendantOperator(self, pendant_live=pendant_live, now_ns=now_ns, seed=seed)
 
     @classmethod
@@ -128,6 +131,10 @@ class World(Workplace):
             rng=random.Random(f"input {number} {self._seed}"),
         )
         self.machine.inputs.connect(number, sense)
+
+    def disconnect(self, number: int) -> None:
+        """Take off what an input is connected to; it is off then."""
+        self.machine.inputs.set(number, on=False)
 
     def truth(self) -> dict[str, Any]:
         """Return all of it, ready for JSON."""

@@ -35,6 +35,7 @@ from robolink_simulators.softmotion.kinematics.frames import (
     zyx_angles,
 )
 from robolink_simulators.softmotion.kinematics.kinematics import AxisKind, AxisValues
+from robolink_simulators.softmotion.signals import SIGNALS
 from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind
 
 STORED: Final = ToolOffset(12.0, -3.5, -20.0)
@@ -64,6 +65,8 @@ class SoftMotionWorld(Workplace):
         stored: The nozzle that was there before.
     """
 
+    inputs = SIGNALS
+
     def __init__(
         self,
         group: AxisGroup,
@@ -74,6 +77,7 @@ class SoftMotionWorld(Workplace):
         stored: ToolOffset,
         parameters: WorldParameters | None = None,
     ) -> None:
+        self.group = group  # its inputs are wired by what follows
         super().__init__(
             _HandledGroup(group),
             tips,
@@ -82,7 +86,6 @@ class SoftMotionWorld(Workplace):
             replaced=stored,
             parameters=parameters or WorldParameters(),
         )
-        self.group = group
         self.stored = stored
         self.operator = SimulatedOperator(self, require_jogging=self._require_rest, seed=seed)
 
@@ -130,6 +133,10 @@ class SoftMotionWorld(Workplace):
             return switch.trips(place, _lean_at(group, true_axes, self.lean_of(tool)))
 
         group.inputs.connect(number, sense)
+
+    def disconnect(self, number: int) -> None:
+        """Take off what an input is connected to; it is off then."""
+        self.group.inputs.switch(number, on=False)
 
     def _require_rest(self) -> None:
         if self.group.state not in (SmcGroupState.DISABLED, SmcGroupState.STANDBY):

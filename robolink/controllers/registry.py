@@ -22,9 +22,9 @@ from robolink.version import VERSION
 CONTROLLERS_GROUP: Final = "robolink.controllers"
 
 _KINDS: Final = {
-    "epson": ("robolink.controllers.epson.opening", "open_epson_url"),
-    "softmotion": ("robolink.controllers.softmotion.opening", "open_softmotion_url"),
-    "plc": ("robolink.controllers.plc_map.opening", "open_plc_map_url"),
+    "epson": ("robolink.controllers.epson.controller", "open_epson_url"),
+    "softmotion": ("robolink.controllers.softmotion.controller", "open_softmotion_url"),
+    "plc": ("robolink.controllers.plc_map.controller", "open_plc_map_url"),
 }
 
 

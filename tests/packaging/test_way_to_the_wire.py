@@ -6,7 +6,7 @@ import pytest
 
 from tests.packaging._way_to_the_wire import follow_a_tool_write
 
-MOST_FILES = {"set_tool": 78, "change_tools": 40}
+MOST_FILES = {"set_tool": 76, "change_tools": 40}
 MOST_CALLS = 14
 MOST_FILES_OPEN = 9
 

@@ -1,18 +1,9 @@
-"""What the controller's answers mean: refusals, a login unanswered, status flags."""
+"""What the controller's answers mean: refusals, status flags, held-back commands."""
 
-from typing import Final
-
-from robolink.errors import (
-    LoginRefusedError,
-    LoginUnansweredError,
-    NotReadyError,
-    NotReadyReason,
-    RejectedError,
-)
+from robolink.errors import NotReadyError, NotReadyReason, RejectedError
 from robolink.messages import tr
 from robolink.model import ControllerStatus
 from robolink.protocols.epson_text import ErrorCode, Refusal, StatusFlags
-from robolink.ways import Way, way
 
 NOT_EXECUTED = frozenset({10, 11, 12, 13, 14, 15, 16, 20, 21})
 """Refusals that say that nothing was carried out (docs/reference/epson.md 1.6); 19 and 99 do not
@@ -167,35 +158,3 @@ def _occupied(status: ControllerStatus) -> tuple[NotReadyReason, str, str] | Non
             tr("Wait until it has started, then try again."),
         )
     return None
-
-
-PASSWORD_REFUSALS: Final = (13, 98)
-"""The password is wrong, or one is demanded (docs/reference/epson.md 1.6)."""
-
-
-def unanswered(controller: str) -> LoginUnansweredError:
-    """Return the error for a controller that is reached and does not answer the login."""
-    return LoginUnansweredError(
-        tr("{identity} is reached but does not answer the login.", identity=controller),
-        remedy=tr(
-            "Only one client may be logged in: close the other one. If there is none, "
-            "check that this port is the controller's Remote Ethernet port."
-        ),
-        controller=controller,
-        request="Login",
-    )
-
-
-def refused(code: int, controller: str) -> LoginRefusedError:
-    """Return the error for a password that the controller does not take."""
-    return LoginRefusedError(
-        tr("The controller refused the login (code {code}).", code=code),
-        code=code,
-        remedy=tr(
-            "Give the password set in the controller's Remote Ethernet page: {password}. No "
-            "second attempt was made.",
-            password=way(Way.PASSWORD),
-        ),
-        controller=controller,
-        request="Login",
-    )

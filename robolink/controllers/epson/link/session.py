@@ -18,7 +18,8 @@ from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 
 from robolink.checkpoints import Checkpoint, checkpoint
-from robolink.controllers.epson.link.answers import PASSWORD_REFUSALS, refused, rejected, unanswered
+from robolink.controllers.epson.link.answers import rejected
+from robolink.controllers.epson.link.login import PASSWORD_REFUSALS, refused, unanswered
 from robolink.controllers.epson.link.requests import command_class_of
 from robolink.errors import (
     BusyError,

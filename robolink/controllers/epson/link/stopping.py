@@ -14,7 +14,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Final
 
-from robolink.controllers.epson.link.answers import PASSWORD_REFUSALS, refused, unanswered
+from robolink.controllers.epson.link.login import PASSWORD_REFUSALS, refused, unanswered
 from robolink.errors import (
     BusyError,
     OutcomeUnknownError,

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 
 from robolink.backup import keep_first_backup
-from robolink.calibration import ToolFit
+from robolink.calibration import ToolFit, known_doubts
 from robolink.errors import DeclinedError
 from robolink.messages import tr
 from robolink.methods import PointsSource
@@ -31,7 +31,7 @@ from robolink_cli.prompts.operator import terminal
 from robolink_cli.prompts.questions import agree, on_terminal
 from robolink_cli.session.context import CliContext
 from robolink_cli.session.opening import open_controller
-from robolink_cli.views.calibration import doubts, judged_payload, report_payload
+from robolink_cli.views.calibration import judged_payload, report_payload
 
 
 class _PosesListener(CalibrationListener):
@@ -77,7 +77,7 @@ class _PosesListener(CalibrationListener):
             keep_first_backup(bench.controller, tell=note)
 
     def _doubts(self, proposal: Proposal) -> tuple[str, ...]:
-        known = doubts(proposal)
+        known = known_doubts(proposal.result.warnings)
         if self.better is None:
             return known
         other = tr(

@@ -10,7 +10,7 @@ from robolink.calibration import MIN_ROTATION_DEG, CameraModel, angle_spread_deg
 from robolink.errors import ConfigError
 from robolink.files.toml import Problem
 from robolink.messages import tr
-from robolink.methods.declaration import (
+from robolink.methods.declaration.method import (
     DEGREES,
     MM,
     Angle,
@@ -25,7 +25,7 @@ from robolink.procedures import HALF_ROUND_DEG, LookPlan
 from robolink.ways import Way, way
 
 if TYPE_CHECKING:
-    from robolink.methods.site import Site
+    from robolink.methods.declaration.site import Site
     from robolink.model import TipSensor
     from robolink.stations import CameraStation
 

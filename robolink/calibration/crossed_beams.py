@@ -56,7 +56,7 @@ def solve_crossed_beams(
     Raises:
         CalibrationError: ``too_few_poses``, ``insufficient_rotation``, ``parallel_beams``,
             ``no_crossing``, ``turned_in_crossing``, ``implausible_offset``, and those of
-            :func:`check_poses`.
+            ``pose_checks.check_poses``.
         ConfigError: ``sigma_mm`` is not positive.
     """
     warnings = check_crossings(crossings, minimum=1)

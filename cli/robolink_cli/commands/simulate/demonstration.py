@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
-from robolink_simulators.assist.port import InProcessEyes
+from robolink_simulators.assist.port import LEAST_THINKING_S, InProcessEyes
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.epson.device import EpsonSimulator
@@ -25,7 +25,6 @@ from robolink.nozzle_change import (
     ToolPlan,
     ToolReport,
 )
-from robolink.timing import Clock
 from robolink_cli.commands.simulate.demonstrated import (
     TOOL,
     AcceptedChange,
@@ -116,14 +115,16 @@ def require_refused(changes: Sequence[DemonstratedChange]) -> None:
 
 def _on_epson(seed: int, speed: float, operator: DemoOperator) -> DemonstratedChange:
     """Change a nozzle on a simulated EPSON SCARA, over a real TCP connection."""
-    world = WorldParameters(person_stays_share=_stays_share(operator))
-    simulator, clock = EpsonSimulator("T6-602S", seed=seed, world=world), ScaledClock(speed)
+    # The driver has the clock that really passes, and so has the person whom it asks.
+    share, thinks_s = _stays_share(operator), LEAST_THINKING_S
+    world = WorldParameters(person_stays_share=share, person_thinks_s=thinks_s)
+    simulator = EpsonSimulator("T6-602S", seed=seed, world=world)
     wire = WireLog()
-    with serve_tcp(simulator, clock=clock) as host:
+    with serve_tcp(simulator, clock=ScaledClock(speed)) as host:
         _announce(tr("SIMULATED EPSON T6-602S, served at {url}", url=host.url), operator)
         outcomes = memory_journal(host.url).log(host.url)
         with robolink.connect(host.url, outcomes=outcomes, trace=wire) as controller:
-            done = _Cell("epson", "T6-602S", simulator, clock, operator).change(controller)
+            done = _Cell("epson", "T6-602S", simulator, operator).change(controller)
     done.show()
     say()
     say(tr("sent on the wire (left out: reads, and low power and speed before each move):"))
@@ -140,8 +141,8 @@ def _on_plc(seed: int, operator: DemoOperator) -> DemonstratedChange:
         url += f"&world.person_stays_share={_stays_share(operator):g}"
     _announce(tr("SIMULATED CODESYS SoftMotion PLC, {url}", url=url), operator)
     with robolink.connect(url) as controller:
-        simulator, clock = simulator_named(name), controller.clock
-        done = _Cell("softmotion", _KINEMATICS, simulator, clock, operator).change(controller)
+        cell = _Cell("softmotion", _KINEMATICS, simulator_named(name), operator)
+        done = cell.change(controller)
     done.show()
     return done
 
@@ -165,7 +166,6 @@ class _Cell:
     kind: str
     robot: str
     simulator: EpsonSimulator | SoftMotionSimulator
-    clock: Clock
     operator: DemoOperator
 
     def change(self, controller: Controller) -> DemonstratedChange:
@@ -191,7 +191,7 @@ class _Cell:
             InProcessEyes(self.simulator),
             lambda text: say(f"  {text}"),
             tool=lambda: TOOL,
-            clock=self.clock,
+            clock=controller.clock,
         )
         plan = ChangePlan((ToolPlan(TOOL),), ask_before_write=False)
         change = NozzleChange(controller, plan, operator=person, listener=_Shown())

@@ -61,6 +61,9 @@ if TYPE_CHECKING:
     from robolink.model.record.journal_entries import Signature as Signature
     from robolink.model.record.ledger import Account as Account
     from robolink.model.record.ledger import Ledger as Ledger
+    from robolink.model.record.method_names import finding_named_now as finding_named_now
+    from robolink.model.record.method_names import method_name_now as method_name_now
+    from robolink.model.record.method_names import with_method_name_now as with_method_name_now
     from robolink.model.record.outcomes import Marker as Marker
     from robolink.model.record.outcomes import MarkerKind as MarkerKind
     from robolink.model.record.outcomes import OutcomeLog as OutcomeLog
@@ -82,6 +85,7 @@ else:
             "_optional_parts": (
                 "AlarmList DigitalIo PointReader Value ValueReceipt ValueT VariableTable"
             ),
+            "record.method_names": "finding_named_now method_name_now with_method_name_now",
             "record.outcomes": "Marker MarkerKind OutcomeLog new_operation",
             "_people": "PersonRole require_engineer",
             "_secret": "Secret",

@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 
 from robolink.backup import keep_first_backup
+from robolink.calibration import known_doubts
 from robolink.messages import tr
 from robolink.model import Controller
 from robolink.nozzle_change import (
@@ -28,7 +29,6 @@ from robolink_cli.prompts.operator import operator_at
 from robolink_cli.session.motion_consent import agree_to_motion, motion_question
 from robolink_cli.session.opening import open_controller
 from robolink_cli.views.calibration import (
-    doubts,
     report_payload,
     show_course,
     show_plan,
@@ -44,7 +44,9 @@ class _LiveListener(CalibrationListener):
 
     def proposed(self, proposals: Sequence[Proposal]) -> None:
         (proposal,) = proposals
-        self.propose(proposal, source=self._source.sentence, warnings=doubts(proposal))
+        self.propose(
+            proposal, source=self._source.sentence, warnings=known_doubts(proposal.result.warnings)
+        )
         if self.impact is not None:
             show_impact(proposal.tool, self.impact)
 
@@ -104,7 +106,7 @@ class LiveCalibration:
     def run(self) -> dict[str, object]:
         """Measure, propose, write, verify; return the document of the whole."""
         self._listener.read_points(self._controller)
-        with operator_at(self._assist_url, lambda: self.tool) as operator:
+        with operator_at(self._assist_url, lambda: self.tool, self._controller.clock) as operator:
             change = NozzleChange(
                 self._controller,
                 self._plan,

@@ -30,6 +30,10 @@ if TYPE_CHECKING:
     from robolink.calibration.camera.runout import runout_report as runout_report
     from robolink.calibration.camera.up_camera import Sighting as Sighting
     from robolink.calibration.camera.up_camera import solve_up_camera as solve_up_camera
+    from robolink.calibration.core.budget import BudgetRow as BudgetRow
+    from robolink.calibration.core.budget import UncertaintyBudget as UncertaintyBudget
+    from robolink.calibration.core.evidence import FitEvidence as FitEvidence
+    from robolink.calibration.core.evidence import RunOrder as RunOrder
     from robolink.calibration.core.frames import flange_of as flange_of
     from robolink.calibration.core.frames import flange_pose as flange_pose
     from robolink.calibration.core.frames import seen_from as seen_from
@@ -39,11 +43,11 @@ if TYPE_CHECKING:
     from robolink.calibration.core.planar_checks import MIN_ROTATION_DEG as MIN_ROTATION_DEG
     from robolink.calibration.core.planar_checks import angle_spread_deg as angle_spread_deg
     from robolink.calibration.core.planar_checks import planar_sigma_gain as planar_sigma_gain
-    from robolink.calibration.core.pose_design import select_poses as select_poses
-    from robolink.calibration.core.pose_design import sigma_gain as sigma_gain
     from robolink.calibration.core.pose_suggestion import PoseLimits as PoseLimits
     from robolink.calibration.core.pose_suggestion import PosePlan as PosePlan
     from robolink.calibration.core.pose_suggestion import precise_enough as precise_enough
+    from robolink.calibration.core.pose_suggestion import select_poses as select_poses
+    from robolink.calibration.core.pose_suggestion import sigma_gain as sigma_gain
     from robolink.calibration.core.pose_suggestion import suggest_poses as suggest_poses
     from robolink.calibration.core.result import CalibrationResult as CalibrationResult
     from robolink.calibration.core.result import Drift as Drift
@@ -58,6 +62,13 @@ if TYPE_CHECKING:
     from robolink.calibration.core.rotations import uvw_deg as uvw_deg
     from robolink.calibration.core.rotations import zyz_deg as zyz_deg
     from robolink.calibration.core.statistics import NORMAL_95 as NORMAL_95
+    from robolink.calibration.core.statistics import chi_square_quantile as chi_square_quantile
+    from robolink.calibration.core.statistics import f_quantile as f_quantile
+    from robolink.calibration.core.statistics import normal_quantile as normal_quantile
+    from robolink.calibration.core.statistics import student_t as student_t
+    from robolink.calibration.core.statistics import (
+        studentized_range_0999 as studentized_range_0999,
+    )
     from robolink.calibration.crossed_beams import BeamsResult as BeamsResult
     from robolink.calibration.crossed_beams import crossing_sigma_gain as crossing_sigma_gain
     from robolink.calibration.crossed_beams import solve_crossed_beams as solve_crossed_beams
@@ -130,14 +141,17 @@ __getattr__ = lazy_exports(
         "camera.camera_round": "CameraRound as_round solve_camera_round",
         "camera.runout": "RunoutReport runout_report",
         "camera.up_camera": "Sighting solve_up_camera",
+        "core.budget": "BudgetRow UncertaintyBudget",
+        "core.evidence": "FitEvidence RunOrder",
         "core.frames": "flange_of flange_pose seen_from tilted_flange_pose tilted_from toward_zero",
         "core.planar_checks": "MIN_ROTATION_DEG angle_spread_deg planar_sigma_gain",
-        "core.pose_design": "select_poses sigma_gain",
-        "core.pose_suggestion": "PoseLimits PosePlan precise_enough suggest_poses",
+        "core.pose_suggestion": "PoseLimits PosePlan precise_enough select_poses sigma_gain "
+        "suggest_poses",
         "core.result": "CalibrationResult Drift VerifyResult offset_sigma_mm",
         "core.robust": "Floats Robust",
         "core.rotations": "pose_arrays quaternion_rotations rotation_of rotations uvw_deg zyz_deg",
-        "core.statistics": "NORMAL_95",
+        "core.statistics": "NORMAL_95 chi_square_quantile f_quantile normal_quantile student_t "
+        "studentized_range_0999",
         "crossed_beams": "BeamsResult crossing_sigma_gain solve_crossed_beams where_they_cross",
         "pin.axis_displacement": "GOOD_WAY_MM axis_displacement between_deg require_unturned",
         "pin.joint": "JointResult JointTouch ToolDifference solve_joint",

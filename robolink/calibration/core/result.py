@@ -3,6 +3,8 @@
 import math
 from dataclasses import dataclass
 
+from robolink.calibration.core.budget import UncertaintyBudget
+from robolink.calibration.core.evidence import FitEvidence
 from robolink.calibration.core.statistics import NORMAL_95
 from robolink.model import (
     Pose,
@@ -46,6 +48,13 @@ class CalibrationResult:
         rank: Of the design matrix.
         dof: Degrees of freedom that are left: equations less unknowns.
         unobservable: Components that these data cannot tell, whatever their number.
+        notes: Named facts that are no doubts, for example ``resolution_floor``.
+        interval_from: What decided the interval: ``residuals``, ``stated`` or ``resolution``;
+            empty without an interval.
+        region95_radius_mm: The measured place lies within this distance of the truth in 95 %,
+            all its lengths together: the largest half axis of the ellipse.
+        budget: Where the uncertainty of the worst length comes from.
+        evidence: Figures behind notes and doubts.
     """
 
     method: str
@@ -68,6 +77,11 @@ class CalibrationResult:
     rank: int | None = None
     dof: int | None = None
     unobservable: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    interval_from: str = ""
+    region95_radius_mm: float | None = None
+    budget: UncertaintyBudget | None = None
+    evidence: FitEvidence | None = None
 
     def details(self) -> dict[str, object]:
         """Return what the method tells besides, plain JSON; nothing for most."""

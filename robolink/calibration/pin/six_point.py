@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 
 from robolink.calibration.core.dispersion import require_positive
-from robolink.calibration.core.error_propagation import sensitivity
+from robolink.calibration.core.least_squares import sensitivity
 from robolink.calibration.core.pose_checks import check_poses, keep_unmeasured
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.core.robust import Floats

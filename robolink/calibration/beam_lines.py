@@ -208,7 +208,7 @@ class _BeamFit:
     dof: int
 
     def with_spread(self, sigma_mm: float, dof: int | None, tip_sigma_mm: float) -> Beam:
-        """Return the beam with its uncertainty, for crossings of standard deviation ``sigma_mm``."""
+        """Return the beam and how sure it is, for crossings of standard deviation ``sigma_mm``."""
         (turn, both), (_, shift) = (self.unit_covariance * sigma_mm**2).tolist()
         distance = math.sqrt(shift + tip_sigma_mm**2)
         spread = distance * math.sqrt(turn)

@@ -2,17 +2,19 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from robolink.calibration.beam_lines import Beam, Crossing, check_crossings, require_crossed
+from robolink.calibration.beam_uncertainty import beams_part
 from robolink.calibration.core.least_squares import LinearFit, linear_fit
 from robolink.calibration.core.planar_checks import MIN_ROTATION_DEG, angle_spread_deg
 from robolink.calibration.core.pose_checks import keep_unmeasured
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.core.robust import Floats
 from robolink.calibration.quality.fit_quality import judged
+from robolink.calibration.quality.station_part import with_station
 from robolink.calibration.quality.tolerances import PLANAR_TOLERANCE, Tolerance
 from robolink.errors import CalibrationError
 from robolink.messages import tr
@@ -28,9 +30,12 @@ class BeamsResult(CalibrationResult):
     Attributes:
         lag_mm: For each beam, by how much latency and backlash shift a crossing along its
             travel; ``None`` where only one direction was driven.
+        u_without_beams_mm: Standard uncertainty of X and of Y by the crossings alone; empty
+            without an interval.
     """
 
     lag_mm: tuple[float | None, float | None]
+    u_without_beams_mm: tuple[float, ...] = ()
 
 
 def solve_crossed_beams(
@@ -46,7 +51,8 @@ def solve_crossed_beams(
 
     Args:
         crossings: Travels through both beams, best in both directions.
-        beams: Where the beams are, from :func:`find_beams` with a reference pin.
+        beams: Where the beams are, from :func:`find_beams` with a reference pin; what is
+            uncertain about them goes into the interval.
         stored: The offset stored now; Z, U, V and W are kept from it, or 0 without one.
         sigma_mm: Standard deviation of one crossing's middle, across the beam.
         beams_may_have_moved: Take only the directions of the beams as known. Needs crossings
@@ -89,7 +95,7 @@ def solve_crossed_beams(
             lags.pop(0) if two_ways[1] else None,
         ),
     )
-    return judged(
+    found = judged(
         result,
         fit.residuals[:, None],
         fit.unit_covariance[:2, :2],
@@ -97,6 +103,9 @@ def solve_crossed_beams(
         sigma_mm=sigma_mm,
         tolerance=tolerance,
     )
+    alone = tuple(math.sqrt(row[index]) for index, row in enumerate(found.covariance))
+    found = replace(found, u_without_beams_mm=alone)
+    return with_station(found, beams_part(a, crossings, beams, found.offset))
 
 
 def crossing_sigma_gain(

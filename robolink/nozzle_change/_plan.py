@@ -69,7 +69,11 @@ class ToolPlan:
 
     def details(self, proposal: Proposal) -> dict[str, object]:
         """Return what the journal keeps about the value beside it, plain JSON."""
-        own = {"tip": plain_offset(proposal.tip), "method": proposal.result.method}
+        own = {
+            "tip": plain_offset(proposal.tip),
+            "method": proposal.result.method,
+            "z_from": "measured" if "z_mm" in proposal.result.measured else proposal.z_from,
+        }
         touch = {"touch": touch_details(self.pin, proposal)} if self.pin else {}
         return {**own, **touch, **proposal.kept_record}
 

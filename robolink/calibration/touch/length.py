@@ -94,7 +94,8 @@ def length_change(
         before_z_mm: Z of the flange at each touch when the stored Z was right, base, mm.
         after_z_mm: Z of the flange at each touch now.
         stored_z_mm: Z of the stored offset.
-        v_deg, w_deg: V and W of the flange at all touches, the same in both runs.
+        v_deg: V of the flange at all touches, the same in both runs.
+        w_deg: W of the flange, likewise.
         sigma_z_mm: Standard deviation of the height of one touch.
         pin_moved: Whether the pin is another, or moved since.
 

@@ -50,10 +50,16 @@ if TYPE_CHECKING:
     from robolink.calibration.core.pose_suggestion import select_poses as select_poses
     from robolink.calibration.core.pose_suggestion import sigma_gain as sigma_gain
     from robolink.calibration.core.pose_suggestion import suggest_poses as suggest_poses
+    from robolink.calibration.core.result import GUARD_FACTOR as GUARD_FACTOR
+    from robolink.calibration.core.result import PERSON_U_DRIFT_MM as PERSON_U_DRIFT_MM
+    from robolink.calibration.core.result import PROBE_U_DRIFT_MM as PROBE_U_DRIFT_MM
     from robolink.calibration.core.result import CalibrationResult as CalibrationResult
     from robolink.calibration.core.result import Drift as Drift
+    from robolink.calibration.core.result import DriftVerdict as DriftVerdict
     from robolink.calibration.core.result import VerifyResult as VerifyResult
+    from robolink.calibration.core.result import judge_drift as judge_drift
     from robolink.calibration.core.result import offset_sigma_mm as offset_sigma_mm
+    from robolink.calibration.core.result import worst_of as worst_of
     from robolink.calibration.core.robust import Floats as Floats
     from robolink.calibration.core.robust import Robust as Robust
     from robolink.calibration.core.rotations import pose_arrays as pose_arrays
@@ -129,13 +135,24 @@ if TYPE_CHECKING:
         PLACING_TOLERANCE_MM as PLACING_TOLERANCE_MM,
     )
     from robolink.calibration.quality.verify_drift import verify_drift as verify_drift
-    from robolink.calibration.touch.length import PERSON_SIGMA_Z_MM as PERSON_SIGMA_Z_MM
     from robolink.calibration.touch.length import LengthChange as LengthChange
     from robolink.calibration.touch.length import LengthDecision as LengthDecision
     from robolink.calibration.touch.length import length_change as length_change
     from robolink.calibration.touch.length import (
         length_not_observable as length_not_observable,
     )
+    from robolink.calibration.touch.standoff import FARTHEST_MM as FARTHEST_MM
+    from robolink.calibration.touch.standoff import HIGHEST_MM as HIGHEST_MM
+    from robolink.calibration.touch.standoff import Standoff as Standoff
+    from robolink.calibration.touch.standoff import StandoffSeries as StandoffSeries
+    from robolink.calibration.touch.touch_evidence import PERSON_SIGMA_Z_MM as PERSON_SIGMA_Z_MM
+    from robolink.calibration.touch.touch_evidence import PROBE_SIGMA_Z_MM as PROBE_SIGMA_Z_MM
+    from robolink.calibration.touch.touch_evidence import TouchEvidence as TouchEvidence
+    from robolink.calibration.touch.touch_evidence import WitnessedTouch as WitnessedTouch
+    from robolink.calibration.touch.touch_evidence import height_limit_mm as height_limit_mm
+    from robolink.calibration.touch.touch_evidence import judge_touches as judge_touches
+    from robolink.calibration.touch.touch_evidence import least_jog_mm as least_jog_mm
+    from robolink.calibration.touch.touch_evidence import stand_upright as stand_upright
     from robolink.calibration.z_touch import Touch as Touch
     from robolink.calibration.z_touch import ZTouchResult as ZTouchResult
     from robolink.calibration.z_touch import solve_z_touch as solve_z_touch
@@ -161,7 +178,8 @@ __getattr__ = lazy_exports(
         "core.planar_checks": "MIN_ROTATION_DEG angle_spread_deg planar_sigma_gain",
         "core.pose_suggestion": "PoseLimits PosePlan precise_enough select_poses sigma_gain "
         "suggest_poses",
-        "core.result": "CalibrationResult Drift VerifyResult offset_sigma_mm",
+        "core.result": "CalibrationResult Drift DriftVerdict GUARD_FACTOR PERSON_U_DRIFT_MM "
+        "PROBE_U_DRIFT_MM VerifyResult judge_drift offset_sigma_mm worst_of",
         "core.robust": "Floats Robust",
         "core.rotations": "pose_arrays quaternion_rotations rotation_of rotations uvw_deg zyz_deg",
         "core.statistics": "NORMAL_95 chi_square_quantile f_quantile normal_quantile student_t "
@@ -184,9 +202,10 @@ __getattr__ = lazy_exports(
         "quality.tool_fits": "ToolFit better_fit tool_fits",
         "quality.update_guard": "Correction NEEDLE_LIMIT_MM require_shrinking update_guard",
         "quality.verify_drift": "PLACING_TOLERANCE_MM verify_drift",
-        "touch.length": (
-            "LengthChange LengthDecision PERSON_SIGMA_Z_MM length_change length_not_observable"
-        ),
+        "touch.length": ("LengthChange LengthDecision length_change length_not_observable"),
+        "touch.standoff": "HIGHEST_MM FARTHEST_MM Standoff StandoffSeries",
+        "touch.touch_evidence": "PERSON_SIGMA_Z_MM PROBE_SIGMA_Z_MM TouchEvidence WitnessedTouch "
+        "height_limit_mm judge_touches least_jog_mm stand_upright",
         "z_touch": "Touch ZTouchResult solve_z_touch touch_sigma_gain",
     },
 )

@@ -19,15 +19,13 @@ from typing import Final, Literal
 
 from robolink.calibration.core.dispersion import require_positive
 from robolink.calibration.core.pose_checks import require_finite
-from robolink.calibration.core.statistics import NORMAL_95, studentized_range_0999
+from robolink.calibration.core.statistics import NORMAL_95
+from robolink.calibration.touch.touch_evidence import PERSON_SIGMA_Z_MM, height_limit_mm
 from robolink.errors import CalibrationError
 from robolink.messages import tr
 
 LengthDecision = Literal["difference", "keep", "measure"]
 """What is done about a length that changed: write Z by difference, keep it, measure it."""
-
-PERSON_SIGMA_Z_MM: Final = 0.05
-"""Standard deviation of the height of one touch by a person, until a cell has recorded its own."""
 
 LEAST_LENGTH_CHANGE_MM: Final = 0.10
 """Less is what touches of a person differ by, and no other length."""
@@ -141,10 +139,7 @@ def _require_agreeing(name: str, heights_mm: Sequence[float], sigma_z_mm: float)
     for number, height in enumerate(heights_mm, start=1):
         require_finite(**{f"height {number} {name}": height})
     spread = max(heights_mm) - min(heights_mm)
-    limit = LEAST_LENGTH_CHANGE_MM
-    if len(heights_mm) > 1:
-        limit = max(limit, studentized_range_0999(len(heights_mm)) * sigma_z_mm)
-    if spread > limit:
+    if len(heights_mm) > 1 and spread > height_limit_mm(len(heights_mm), sigma_z_mm):
         raise CalibrationError(
             "touch_heights_differ",
             tr(

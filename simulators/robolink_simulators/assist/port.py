@@ -17,6 +17,7 @@ from robolink.errors import ConfigError, ConnectError, RobolinkError, TransportB
 from robolink.messages import tr
 from robolink_simulators.assist.acts import Assisted, perform
 from robolink_simulators.cell.clock import ScaledClock
+from robolink_simulators.cell.habits import PersonManner
 from robolink_simulators.cell.person import PersonLook
 from robolink_simulators.cell.places import Axis, XyzMm
 from robolink_simulators.epson.refusals import SpelRefusal
@@ -45,7 +46,7 @@ def serve_assist(simulator: Assisted, *, port: int = 0, clock: ScaledClock) -> T
         ConnectError: The port is taken.
     """
     return TcpHost(
-        _AssistDevice(simulator),
+        _AssistDevice(simulator, clock),
         _SCHEME,
         ("127.0.0.1", port),
         clock=clock,
@@ -56,11 +57,12 @@ def serve_assist(simulator: Assisted, *, port: int = 0, clock: ScaledClock) -> T
 class _AssistDevice:
     """Implements :class:`~robolink_simulators.hosting.seam.WireDevice`."""
 
-    def __init__(self, simulator: Assisted) -> None:
+    def __init__(self, simulator: Assisted, clock: ScaledClock) -> None:
         self._simulator = simulator
+        self._clock = clock
 
     def connect(self, now_ns: int) -> "_AssistLink":  # noqa: ARG002 - time plays no part
-        return _AssistLink(self._simulator)
+        return _AssistLink(self._simulator, self._clock)
 
     def advance(self, now_ns: int) -> None:
         """Nothing happens here by itself."""
@@ -72,8 +74,9 @@ class _AssistDevice:
 class _AssistLink:
     """Implements :class:`~robolink_simulators.hosting.seam.DeviceLink`."""
 
-    def __init__(self, simulator: Assisted) -> None:
+    def __init__(self, simulator: Assisted, clock: ScaledClock) -> None:
         self._simulator = simulator
+        self._clock = clock
         self._held = b""
         self._out = b""
         self.closed = False
@@ -100,7 +103,9 @@ class _AssistLink:
             self.closed = True
             return b""
         try:
-            answer = {"ok": True, **perform(self._simulator, request)}
+            answer: dict[str, Any] = {"ok": True, **perform(self._simulator, request)}
+            if "thinks_s" in answer:  # whoever asks waits by the clock that really passes
+                answer["thinks_s"] = self._clock.really_takes_s(answer["thinks_s"])
         except (RobolinkError, SpelRefusal, BlockRefused) as error:
             answer = {"ok": False, "error": str(error)}
         return json.dumps(answer).encode() + b"\n"
@@ -164,6 +169,15 @@ class AssistClient(ClosedAtExit):
         x_mm, y_mm, z_mm = answer["way_mm"]
         return x_mm, y_mm, z_mm
 
+    def be_asked(self, *, touch: bool, tool: int) -> PersonManner:
+        """Ask the operator something, and return how they take it.
+
+        Args:
+            touch: Whether they are to bring a tip onto the pin.
+            tool: Whose.
+        """
+        return PersonManner(**self.do("be_asked", touch=touch, tool=tool))
+
     def jog_onto_pin(self) -> dict[str, float]:
         """Jog the tip onto the pin on the pendant (Teach only); return the flange pose."""
         flange: dict[str, float] = self.do("jog_onto_pin")["flange"]
@@ -204,6 +218,12 @@ class InProcessEyes:
         """Return the way, in base axes, that the operator sees an axis of a tool lead."""
         with self._simulator.lock:
             return self._simulator.world.operator.way_along(axis, length_mm, tool)
+
+    def be_asked(self, *, touch: bool, tool: int) -> PersonManner:
+        """Ask the operator something, and return how they take it."""
+        with self._simulator.lock:
+            operator = self._simulator.world.operator
+            return operator.begin_touch(tool) if touch else operator.be_asked()
 
 
 def simulator_at(url: str) -> Assisted:

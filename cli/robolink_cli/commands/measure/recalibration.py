@@ -66,7 +66,7 @@ class Recalibration:
         progress = Progress(self._events)
         with (
             open_controller(self._context, changes=not dry_run) as controller,
-            operator_at(self._assist_url, lambda: progress.tool) as operator,
+            operator_at(self._assist_url, lambda: progress.tool, controller.clock) as operator,
         ):
             run = RecipeRun(
                 controller,

@@ -1,12 +1,12 @@
 """The demonstration: serve a simulator, connect to it, change a nozzle, compare with truth."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
+from robolink_simulators.assist.port import InProcessEyes
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.epson.world import PersonLook
 from robolink_simulators.hosting.in_process.softmotion import simulator_named
 from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 
@@ -140,7 +140,7 @@ def _on_epson(seed: int, speed: float) -> Demonstrated:
         _announce(tr("SIMULATED EPSON T6-602S, served at {url}", url=host.url))
         outcomes = memory_journal(host.url).log(host.url)
         with robolink.connect(host.url, outcomes=outcomes, trace=wire) as controller:
-            report = _change(controller, simulator.world.operator.look)
+            report = _change(controller, InProcessEyes(simulator))
             exchanges = controller.exchanges
     done = Demonstrated("epson", "T6-602S", report, simulator.world.tips[TOOL], exchanges)
     done.show()
@@ -156,10 +156,10 @@ def _on_plc(seed: int) -> Demonstrated:
     url = f"softmotion+sim://demo-{seed}?kinematics={_KINEMATICS}&seed={seed}"
     _announce(tr("SIMULATED CODESYS SoftMotion PLC, {url}", url=url))
     with robolink.connect(url) as controller:
-        world = simulator_named(f"demo-{seed}").world
-        report = _change(controller, world.operator.look)
+        simulator = simulator_named(f"demo-{seed}")
+        report = _change(controller, InProcessEyes(simulator))
         exchanges = controller.exchanges
-    done = Demonstrated("softmotion", _KINEMATICS, report, world.tips[TOOL], exchanges)
+    done = Demonstrated("softmotion", _KINEMATICS, report, simulator.world.tips[TOOL], exchanges)
     done.show()
     return done
 
@@ -170,16 +170,12 @@ def _announce(simulated: str) -> None:
     say()
 
 
-def _change(controller: Controller, eyes: Callable[[int], PersonLook]) -> ToolReport:
-    def look() -> tuple[float, float, float]:
-        seen = eyes(TOOL)
-        return seen.dx_mm, seen.dy_mm, seen.dz_mm
-
+def _change(controller: Controller, eyes: InProcessEyes) -> ToolReport:
     controller.motors(True)
     change = NozzleChange(
         controller,
         ChangePlan((ToolPlan(TOOL),), ask_before_write=False),
-        operator=AssistedOperator(look, lambda text: say(f"  {text}")),
+        operator=AssistedOperator.with_eyes(eyes, lambda text: say(f"  {text}"), tool=lambda: TOOL),
         listener=_Shown(),
     )
     (report,) = change.run().tools

@@ -103,7 +103,7 @@ class LiveCalibration:
     def run(self) -> dict[str, object]:
         """Measure, propose, write, verify; return the document of the whole."""
         self._listener.read_points(self._controller)
-        with operator_at(self._assist_url, lambda: self.tool) as operator:
+        with operator_at(self._assist_url, lambda: self.tool, self._controller.clock) as operator:
             change = NozzleChange(
                 self._controller,
                 self._plan,

@@ -11,9 +11,10 @@ from robolink_cli.commands.measure.solve.case import Node, read_poses, unusable
 from robolink_cli.commands.measure.solve.methods import FROM_POSES
 from robolink_cli.commands.measure.solve.more_methods import MORE_METHODS
 from robolink_cli.commands.measure.solve.station_methods import STATION_METHODS
+from robolink_cli.commands.measure.solve.touch_methods import TOUCH_METHODS
 
 CASE_SCHEMA: Final = "robolink-calibration-vectors/1"
-METHODS: Final = {**FROM_POSES, **MORE_METHODS, **STATION_METHODS}
+METHODS: Final = {**FROM_POSES, **MORE_METHODS, **STATION_METHODS, **TOUCH_METHODS}
 
 _GAINS_OF: Final = ("two_pose", "two_pose_general", "n_angle", "n_angle_robust")
 _SEVERITY: Final = ("ok", "warn", "error")
@@ -75,8 +76,8 @@ def solve_case(node: Node) -> dict[str, object]:
         return head | _refusal(error, method, given)
     given.finish()
     codes = found.pop("codes", [])
-    # Some methods have figures to show although they refuse.
-    return head | {"status": "warn" if codes else "ok", "codes": codes} | found
+    status = found.pop("status", "warn" if codes else "ok")
+    return head | {"status": status, "codes": codes} | found
 
 
 def _refusal(error: CalibrationError, method: str, given: Node) -> dict[str, object]:

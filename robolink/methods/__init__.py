@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from robolink.methods.declaration import Help as Help
     from robolink.methods.declaration import InputNumber as InputNumber
     from robolink.methods.declaration import Length as Length
+    from robolink.methods.declaration import LengthRule as LengthRule
     from robolink.methods.declaration import Method as Method
     from robolink.methods.declaration import MethodParameters as MethodParameters
     from robolink.methods.declaration import Needs as Needs
@@ -61,6 +62,7 @@ if TYPE_CHECKING:
     from robolink.methods.one_touch.solvers import difference_from_last as difference_from_last
     from robolink.methods.one_touch.source import OneTouchSource as OneTouchSource
     from robolink.methods.pin_parameters import PinParameters as PinParameters
+    from robolink.methods.pin_parameters import UprightPinParameters as UprightPinParameters
     from robolink.methods.pivot.axes import require_tilting as require_tilting
     from robolink.methods.pivot.parameters import PivotParameters as PivotParameters
     from robolink.methods.pivot.procedure import measure_pivot as measure_pivot
@@ -112,7 +114,7 @@ __getattr__ = lazy_exports(
         "camera_affine.procedure": "measure_camera_affine",
         "camera_affine.source": "CameraAffineSource",
         "declaration": (
-            "Angle AnyMethod Check DEGREES Former Help InputNumber Length "
+            "Angle AnyMethod Check DEGREES Former Help InputNumber Length LengthRule "
             "MM MM_S Method MethodParameters Needs Option Pair PoseHelp Unit"
         ),
         "fields": "ParameterField fields_of",
@@ -125,7 +127,7 @@ __getattr__ = lazy_exports(
         "one_touch.procedure": "measure_one_touch",
         "one_touch.solvers": "Absolute Difference difference_from_last",
         "one_touch.source": "OneTouchSource",
-        "pin_parameters": "PinParameters",
+        "pin_parameters": "PinParameters UprightPinParameters",
         "pivot.axes": "require_tilting",
         "pivot.parameters": "PivotParameters",
         "pivot.procedure": "measure_pivot verify_by_tilting",

@@ -72,6 +72,7 @@ def _pin(station: Station, tool: int, tip: ToolOffset, sigma_mm: float | None) -
         how=tr("touched with tool {tool}", tool=tool),
         gauge=station.gauge,
         tool=tool,
+        details={"z_from": "touched"},
     )
 
 

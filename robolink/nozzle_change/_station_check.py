@@ -52,10 +52,11 @@ def check_stations(controller: Controller, proposals: Proposals) -> Proposals:
     return judged
 
 
-def stations_found(proposals: Proposals) -> Iterator[NewEntry]:
+def stations_found(controller: Controller, proposals: Proposals) -> Iterator[NewEntry]:
     """Yield what calibrations that were kept say about where pins are, and how cameras see."""
+    known = find_stations(None, controller.outcomes.recorded(kinds=(EntryKind.STATION,)))
     for plan, proposal in proposals:
-        found = found_pin(plan.pin, proposal) if plan.pin else None
+        found = found_pin(plan.pin, proposal, known.get(plan.pin)) if plan.pin else None
         if isinstance(plan.source, FindsStation):
             found = plan.source.found_station(proposal.result, proposal.tool)
         if found is not None:

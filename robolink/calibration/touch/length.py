@@ -84,6 +84,7 @@ def length_change(
     v_deg: float = 0.0,
     w_deg: float = 0.0,
     sigma_z_mm: float = PERSON_SIGMA_Z_MM,
+    u_place_mm: float = 0.0,
     pin_moved: bool = False,
 ) -> LengthChange:
     """Compare the heights of two runs on one pin.
@@ -95,6 +96,8 @@ def length_change(
         v_deg: V of the flange at all touches, the same in both runs.
         w_deg: W of the flange, likewise.
         sigma_z_mm: Standard deviation of the height of one touch.
+        u_place_mm: Standard uncertainty of the height of then beside that of its touches: that of a
+            pin whose height another tool found.
         pin_moved: Whether the pin is another, or moved since.
 
     Raises:
@@ -109,7 +112,8 @@ def length_change(
     if pin_moved:
         raise length_not_observable(tr("The pin is not where it was."))
     change = fmean(after_z_mm) - fmean(before_z_mm)
-    u_mm = sigma_z_mm * math.sqrt(1 / len(before_z_mm) + 1 / len(after_z_mm))
+    touches = sigma_z_mm * math.sqrt(1 / len(before_z_mm) + 1 / len(after_z_mm))
+    u_mm = math.hypot(touches, u_place_mm)
     along = math.cos(math.radians(v_deg)) * math.cos(math.radians(w_deg))
     return LengthChange(
         height_change_mm=change,

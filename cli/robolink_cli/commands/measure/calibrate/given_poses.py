@@ -152,10 +152,13 @@ def calibrate_from_poses(
 def _carry_out(
     controller: Controller, frame: CalibrationRequest, given: PointsSource, listener: Listener
 ) -> ToolReport:
-    one = ToolPlan(frame.tool, given, frame.criteria, verify=False, pin=frame.pin)
+    one = ToolPlan(
+        frame.tool, given, frame.criteria, verify=False, pin=frame.pin, length=frame.length
+    )
+    attended = not frame.yes and on_terminal()
     change = NozzleChange(
         controller,
-        ChangePlan((one,), ask_before_write=False),
+        ChangePlan((one,), ask_before_write=False, attended=attended),
         operator=terminal(),
         listener=listener,
         earlier=partial(earlier_corrections, controller),

@@ -12,6 +12,7 @@ from robolink_cli.prompts.jumps import jump_limit_mm
 from robolink_cli.session.context import CliContext
 
 if TYPE_CHECKING:
+    from robolink.methods import LengthRule
     from robolink.nozzle_change import AcceptanceCriteria, ChangePlan, Limits
     from robolink.procedures import TipSource
 
@@ -33,6 +34,7 @@ class CalibrationRequest:
         yes: Whether questions are answered beforehand.
         pin: Name of the pin that is touched; empty where nobody named one.
         finds_pin: Whether the method finds the pin itself, so that it need not be known.
+        length: What is done where the touches show that the tip is longer or shorter.
     """
 
     context: CliContext
@@ -47,6 +49,7 @@ class CalibrationRequest:
     yes: bool
     pin: str = ""
     finds_pin: bool = True
+    length: "LengthRule" = "ask"
 
     def at(self, station: str) -> "CalibrationRequest":
         """Return the same at a station of that name, which goes on record."""
@@ -74,7 +77,14 @@ class CalibrationRequest:
         """Return what is to be done with the measurements of ``source``."""
         from robolink.nozzle_change import ChangePlan, ToolPlan
 
-        one = ToolPlan(self.tool, source, self.criteria, verify=self.verify, pin=self.pin)
+        one = ToolPlan(
+            self.tool,
+            source,
+            self.criteria,
+            verify=self.verify,
+            pin=self.pin,
+            length=self.length,
+        )
         return ChangePlan((one,), limits=self.limits, ask_before_write=not self.yes)
 
 

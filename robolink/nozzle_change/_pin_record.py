@@ -31,9 +31,7 @@ def tells_height(result: CalibrationResult) -> bool:
 
 
 def _methods_of(result: CalibrationResult) -> Iterator[AnyMethod]:
-    # A result names the solver, which a method is called after.
-    name = result.method.replace("-", "_")
-    yield from (method for method in all_methods() if method.name.replace("-", "_") == name)
+    yield from (method for method in all_methods() if method.name == result.method)
 
 
 def touch_heights_mm(proposal: Proposal) -> list[float]:

@@ -3,6 +3,7 @@
 import math
 from dataclasses import asdict, dataclass, field, replace
 
+from robolink.calibration import CalibrationResult
 from robolink.methods import LengthRule, TwoPoseSource
 from robolink.model import Pose, ToolOffset, WorkBox, plain_offset
 from robolink.nozzle_change._acceptance import AcceptanceCriteria
@@ -58,6 +59,7 @@ class ToolPlan:
         pin: Name of the station where a pin is touched; empty for none, or none that is kept.
         length: What is done where the heights of the touches show that the tip is longer or
             shorter: ``ask``, write Z by ``difference``, or ``keep`` it.
+        method: Name of the calibration method, for the record; empty for what the result says.
     """
 
     tool: int
@@ -69,6 +71,11 @@ class ToolPlan:
     retreat: Pose | None = None
     pin: str = ""
     length: LengthRule = "ask"
+    method: str = ""
+
+    def named(self, result: CalibrationResult) -> CalibrationResult:
+        """Return a result under the name of the method, whichever solver it borrows."""
+        return replace(result, method=self.method) if self.method else result
 
     def details(self, proposal: Proposal) -> dict[str, object]:
         """Return what the journal keeps about the value beside it, plain JSON."""

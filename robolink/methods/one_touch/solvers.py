@@ -67,7 +67,7 @@ class Difference:
             # The old tip is where its own touch left it; nobody touches it again.
             shared_touch=True,
         )
-        result = replace(found, method="one_touch")
+        result = replace(found, method="one-touch")
         if result.full_calibration_due or not self._one_more(result):
             return result
         return replace(result, warnings=("full_calibration_due",), full_calibration_due=True)

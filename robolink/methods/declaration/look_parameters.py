@@ -10,7 +10,7 @@ from robolink.calibration import MIN_ROTATION_DEG, CameraModel, angle_spread_deg
 from robolink.errors import ConfigError
 from robolink.files.toml import Problem
 from robolink.messages import tr
-from robolink.methods.declaration import (
+from robolink.methods.declaration.method import (
     DEGREES,
     MM,
     Angle,
@@ -21,12 +21,12 @@ from robolink.methods.declaration import (
     Pair,
     Rows,
 )
-from robolink.methods.pin_parameters import lift_beyond_box
 from robolink.procedures import HALF_ROUND_DEG, LookPlan
 from robolink.ways import Way, way
 
 if TYPE_CHECKING:
-    from robolink.methods.site import Site
+    from robolink.methods.declaration.site import Site
+    from robolink.model import TipSensor
     from robolink.stations import CameraStation
 
 Turns = Annotated[
@@ -117,7 +117,7 @@ class LookParameters(MethodParameters):
         return ()
 
     def problems(self, check: Check) -> Iterator[Problem]:
-        """Check that pixels are explained whole, that the tool turns, and that there is room."""
+        """Check that pixels are explained whole, and that the tool turns."""
         yield from self._of_pixels(check)
         angles_deg = (*self.corners_deg, *self.turns_deg)
         if len(angles_deg) > 1 and angle_spread_deg(angles_deg) < MIN_ROTATION_DEG:
@@ -125,8 +125,10 @@ class LookParameters(MethodParameters):
                 "turns_deg",
                 tr("must spread over at least {limit:g} degrees", limit=MIN_ROTATION_DEG),
             )
-        if check.box_height_mm is not None and self.lift_mm > check.box_height_mm:
-            yield lift_beyond_box()
+
+    def room_mm(self) -> float:
+        """Return how high the box has to be."""
+        return self.lift_mm
 
     def _of_pixels(self, check: Check) -> Iterator[Problem]:
         if (self.mm_per_px is None) != (self.origin_mm is None):
@@ -143,15 +145,15 @@ class LookParameters(MethodParameters):
             yield Problem("mm_per_px", tr("maps all pixels onto one line"))
 
 
-def camera_at(parameters: LookParameters, site: "Site") -> "tuple[str, CameraStation]":
-    """Return the camera's name or URL, and where it looks.
+def camera_at(parameters: LookParameters, site: "Site") -> "tuple[str | TipSensor, CameraStation]":
+    """Return the camera, its name or URL, and where it looks.
 
     Raises:
         ConfigError: Nobody knows one of them.
     """
     from robolink.stations import camera_station, sensor_of  # what --help does without
 
-    sensor = parameters.sensor or sensor_of(site.station)
+    sensor = site.sensor or parameters.sensor or sensor_of(site.station)
     if not sensor:
         raise ConfigError(
             tr("Nobody knows through which sensor station {id} sees.", id=site.station.id),

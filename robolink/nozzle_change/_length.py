@@ -6,7 +6,7 @@ what the touches show. A length that changed is never swallowed: a person decide
 beforehand, or nothing is written.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -81,6 +81,15 @@ def height_is_known(controller: Controller, tool: int) -> bool:
     kept = controller.outcomes.recorded(tool=tool, kinds=(EntryKind.DONE, EntryKind.DECISION))
     newest = next((entry for entry in kept if "question" not in entry.details), None)
     return newest is None or newest.details.get("z_from") != "kept"
+
+
+def tip_sigma_mm(controller: Controller, tool: int) -> float:
+    """Return how uncertain the stored tip of a tool is by its last calibration, 0 for unknown."""
+    kept = controller.outcomes.recorded(tool=tool, kinds=(EntryKind.DONE, EntryKind.DECISION))
+    newest = next((entry for entry in kept if "question" not in entry.details), None)
+    touch = newest.details.get("touch") if newest else None
+    sigma = touch.get("sigma_mm") if isinstance(touch, Mapping) else None
+    return float(sigma) if isinstance(sigma, (int, float)) else 0.0
 
 
 def settle_lengths(

@@ -128,10 +128,11 @@ def _spread(result: CalibrationResult) -> dict[str, object]:
     if not result.covariance or len(lengths) not in (2, 3):
         return {}
     # The normal equations are the same for tip and pin up to a turn; of the worst axis all are.
+    # As wide as few degrees of freedom made the interval, for who reads it later knows of none.
     half = max(result.half_width95[i] for i in lengths)
     variance = (half / NORMAL_95) ** 2
     rows = [[variance if i == j else 0.0 for j in lengths] for i in lengths]
-    return {"covariance_mm2": rows, "dof": None if result.sigma_stated else result.dof}
+    return {"covariance_mm2": rows}
 
 
 def touch_details(station: str, proposal: Proposal) -> dict[str, object]:

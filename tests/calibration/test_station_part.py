@@ -7,15 +7,20 @@ import pytest
 
 from robolink.calibration import (
     Beam,
+    CameraModel,
     Crossing,
     NeedleChain,
     Pin,
+    PixelSighting,
+    Sighting,
     StationPart,
     chain_sigma_mm,
     find_beams,
     shared_station,
+    solve_camera_affine,
     solve_crossed_beams,
     solve_one_touch,
+    solve_up_camera,
     with_station,
 )
 from robolink.errors import ConfigError
@@ -159,3 +164,39 @@ def test_a_chain_of_shared_touches_does_not_grow():
     # A record that does not say how its chain began is never made better than it was.
     old = NeedleChain(0.03, 4).after(0.01, shared_touch=True)
     assert old.sigma_mm == pytest.approx(math.hypot(0.03, 0.01))
+
+
+def test_one_look_carries_place_and_scale_of_the_camera():
+    camera = CameraModel(
+        ((0.02, 0.0), (0.0, -0.02)),
+        (0.0, 0.0),
+        centre_mm=(100.0, 50.0),
+        place_sigma_mm=0.003,
+        scale_sigma=0.002,
+    )
+    sighting = Sighting(Pose(300.0, 200.0, 0.0, 30.0), 102.0, 50.0)
+    found = solve_up_camera(sighting, sigma_mm=0.01, camera=camera)
+    u_mm = math.hypot(0.01, 0.003, 0.004)
+    assert found.half_width95 == pytest.approx([1.96 * u_mm] * 2, rel=1e-4)
+    plain = solve_up_camera(sighting, sigma_mm=0.01)
+    assert plain.half_width95 == pytest.approx([1.96 * 0.01] * 2, rel=1e-4)
+
+
+def test_a_camera_that_was_found_knows_how_sure_it_is():
+    rng = np.random.default_rng(4)
+    scales = []
+    true = CameraModel(((0.02, 0.0), (0.0, -0.02)), (90.0, 60.0))
+    for _ in range(40):
+        seen = []
+        for dx, dy, u in ((0, 0, 0), (4, 0, 0), (0, 4, 0), (0, 0, 90), (0, 0, 180), (0, 0, -90)):
+            turn = math.radians(u)
+            px, py = 500 + dx / 0.02, 500 - dy / 0.02
+            x, y = true.base_mm(px, py)
+            tip = (6 * math.cos(turn) + 2 * math.sin(turn), 6 * math.sin(turn) - 2 * math.cos(turn))
+            flange = Pose(x - tip[0] + rng.normal(0, 0.01), y - tip[1] + rng.normal(0, 0.01), 0, u)
+            seen.append(PixelSighting(flange, px, py))
+        camera = solve_camera_affine(seen, sigma_mm=0.01).camera
+        scales.append(camera.mm_per_px[0][0])
+    assert camera.scale_sigma * 0.02 == pytest.approx(float(np.std(scales)), rel=0.5)
+    assert 0 < camera.place_sigma_mm < 0.02
+    assert camera.centre_mm == pytest.approx((100.67, 50.67), abs=0.1)

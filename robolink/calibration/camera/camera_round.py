@@ -9,6 +9,7 @@ point, and the least squares are those of a pin touched at several angles
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 
+from robolink.calibration.camera.camera_model import CameraModel
 from robolink.calibration.camera.up_camera import Sighting, check_sightings, solve_up_camera
 from robolink.calibration.core.planar_checks import require_poses
 from robolink.calibration.core.result import CalibrationResult
@@ -42,6 +43,7 @@ def solve_camera_round(
     *,
     stored: ToolOffset | None = None,
     sigma_mm: float | None = None,
+    camera: CameraModel | None = None,
     tolerance: Tolerance = PLANAR_TOLERANCE,
 ) -> CameraRound:
     """Return the offset of a tip that a calibrated camera saw at one or several angles.
@@ -51,6 +53,8 @@ def solve_camera_round(
             the camera being where its calibration put it.
         stored: The offset stored now; Z, U, V and W are kept from it, or 0 without one.
         sigma_mm: Standard deviation of one coordinate of one look, where it is known.
+        camera: The camera; what is uncertain about it counts for a single look. Several looks find
+            what it is off by.
         tolerance: Residuals above which the result carries a warning.
 
     Raises:
@@ -62,7 +66,8 @@ def solve_camera_round(
     check_sightings(tuple(sightings))
     inputs = tuple(sighting.flange for sighting in sightings)
     if len(sightings) == 1:
-        return as_round(solve_up_camera(sightings[0], stored=stored, sigma_mm=sigma_mm))
+        single = solve_up_camera(sightings[0], stored=stored, sigma_mm=sigma_mm, camera=camera)
+        return as_round(single)
     mean_x = sum(sighting.x_mm for sighting in sightings) / len(sightings)
     mean_y = sum(sighting.y_mm for sighting in sightings) / len(sightings)
     on_one_point = [

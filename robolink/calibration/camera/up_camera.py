@@ -7,9 +7,12 @@ arguments to get wrong (docs/reference/calibration.md 1.2).
 
 from dataclasses import dataclass
 
+from robolink.calibration.camera.camera_model import CameraModel
 from robolink.calibration.core.dispersion import Dispersion
 from robolink.calibration.core.pose_checks import check_poses, keep_unmeasured, require_finite
 from robolink.calibration.core.result import CalibrationResult
+from robolink.calibration.quality.station_part import StationPart, with_station
+from robolink.messages import tr
 from robolink.model import Pose, ToolOffset, rotate_xy
 
 
@@ -34,7 +37,11 @@ class Sighting:
 
 
 def solve_up_camera(
-    sighting: Sighting, *, stored: ToolOffset | None = None, sigma_mm: float | None = None
+    sighting: Sighting,
+    *,
+    stored: ToolOffset | None = None,
+    sigma_mm: float | None = None,
+    camera: CameraModel | None = None,
 ) -> CalibrationResult:
     """Return the offset of a tip that a calibrated camera saw once.
 
@@ -43,6 +50,7 @@ def solve_up_camera(
         stored: The offset stored now; Z, U, V and W are kept from it, or 0 without one.
         sigma_mm: Standard deviation of one coordinate of one sighting, robot and camera
             together. Without it the result has no interval: one look leaves no residual.
+        camera: The camera, whose place and scale are as uncertain as they say.
 
     An error of the camera's own calibration goes into the offset in full and shows in no
     residual. Several looks at different U tell it (:func:`solve_n_angle`).
@@ -55,7 +63,7 @@ def solve_up_camera(
     x_mm, y_mm = sighting.in_flange_mm()
     scatter = Dispersion.of(0.0, 0, sigma_mm)
     covariance = ((scatter.sigma_mm**2, 0.0), (0.0, scatter.sigma_mm**2)) if scatter else ()
-    return CalibrationResult(
+    result = CalibrationResult(
         method="camera",
         offset=keep_unmeasured(stored, x_mm=x_mm, y_mm=y_mm),
         measured=("x_mm", "y_mm"),
@@ -72,6 +80,15 @@ def solve_up_camera(
         dof=0,
         unobservable=("z_mm", "u_deg", "v_deg", "w_deg"),
     )
+    if camera is None:
+        return result
+    variance = camera.sigma_at_mm(sighting.x_mm, sighting.y_mm) ** 2
+    part = StationPart(
+        tr("place and scale of the camera"),
+        ((variance, 0.0), (0.0, variance)),
+        origin=tr("record of the station"),
+    )
+    return with_station(result, part)
 
 
 def check_sightings(

@@ -46,7 +46,7 @@ def measure_camera(
 
     def solve(looks: Sequence[SeenAt]) -> CameraRound:
         sightings = [station.sighting(look) for look in looks]
-        return solve_camera_round(sightings, stored=stored, sigma_mm=sigma_mm)
+        return solve_camera_round(sightings, stored=stored, sigma_mm=sigma_mm, camera=station.model)
 
     looks = CameraSamples(drive, solve, here, before_camera=centred)
     return (yield from looks.at(places, retake=retake))

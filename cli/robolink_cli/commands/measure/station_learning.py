@@ -12,6 +12,7 @@ from robolink.nozzle_change import (
     foresee,
     height_is_known,
     require_inside,
+    tip_sigma_mm,
 )
 from robolink.procedures import MeasurementContext
 from robolink.stations import Found, Station, StationKind, find_stations, station_entry
@@ -70,7 +71,14 @@ def learn(
             start = controller.groups[0].pose()
             bench = MeasurementContext(controller, operator, start=start, settings=limits.settings)
             found = bench.run(
-                learn_station(known, here=start, tool=tool, tip=tip, sigma_mm=sigma_mm)
+                learn_station(
+                    known,
+                    here=start,
+                    tool=tool,
+                    tip=tip,
+                    sigma_mm=sigma_mm,
+                    tip_sigma_mm=tip_sigma_mm(controller, tool),
+                )
             )
             found = _height_of_pin(controller, known, found, tool)
             _show(known, found)

@@ -15,9 +15,11 @@ import numpy as np
 from robolink.calibration.core.least_squares import linear_fit
 from robolink.calibration.core.pose_checks import check_poses
 from robolink.calibration.core.robust import Floats
+from robolink.calibration.flange_checks import require_flange_in_base
+from robolink.calibration.flange_plane import FlangePlane, solvable_planes
 from robolink.errors import CalibrationError
 from robolink.messages import tr
-from robolink.model import Pose, angle_difference_deg, rotate_xy
+from robolink.model import Pose, angle_difference_deg
 
 LEAST_ANGLE_DEG = 20.0
 """Beams that cross at less than this leave one direction badly known."""
@@ -97,9 +99,13 @@ def find_beams(crossings: Sequence[Crossing], tip_mm: tuple[float, float]) -> tu
 
     Raises:
         CalibrationError: ``too_few_poses``, ``short_beam``, ``parallel_beams``,
-            ``no_crossing``, or those of :func:`check_crossings`.
+            ``no_crossing``, ``tool_pose``, ``local_pose``, ``tilted_pose``, or those of
+            :func:`check_crossings`.
     """
     check_crossings(crossings, minimum=4)
+    entries = [crossing.entry for crossing in crossings]
+    require_flange_in_base(entries)
+    solvable_planes(entries, None)
     first, second = (
         _fit_beam([crossing for crossing in crossings if crossing.beam == beam], tip_mm)
         for beam in (0, 1)
@@ -126,7 +132,8 @@ def check_crossings(crossings: Sequence[Crossing], *, minimum: int) -> tuple[str
     poses = [pose for crossing in crossings for pose in (crossing.entry, crossing.exit)]
     doubts = check_poses(poses, allow_mixed_hand=False)
     for crossing in crossings:
-        if abs(angle_difference_deg(crossing.exit.u_deg, crossing.entry.u_deg)) > 0.01:
+        angles = zip(crossing.exit.coordinates()[3:], crossing.entry.coordinates()[3:], strict=True)
+        if any(abs(angle_difference_deg(after, before)) > 0.01 for after, before in angles):
             raise CalibrationError(
                 "turned_in_crossing",
                 tr("The tool turned while it crossed beam {beam}.", beam=crossing.beam + 1),
@@ -187,5 +194,5 @@ def _straightened(beam: Beam, points: Floats, directions: Sequence[float]) -> Be
 
 def _tip_at(crossing: Crossing, tip_mm: tuple[float, float]) -> tuple[float, float]:
     x, y = crossing.middle_mm
-    dx, dy = rotate_xy(tip_mm[0], tip_mm[1], crossing.entry.u_deg)
+    dx, dy = FlangePlane.of(crossing.entry).in_base(*tip_mm)
     return x + dx, y + dy

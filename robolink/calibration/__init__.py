@@ -80,6 +80,11 @@ if TYPE_CHECKING:
     from robolink.calibration.crossed_beams import crossing_sigma_gain as crossing_sigma_gain
     from robolink.calibration.crossed_beams import solve_crossed_beams as solve_crossed_beams
     from robolink.calibration.crossed_beams import where_they_cross as where_they_cross
+    from robolink.calibration.flange_plane import FlangePlane as FlangePlane
+    from robolink.calibration.flange_plane import TipHeight as TipHeight
+    from robolink.calibration.flange_plane import carrying as carrying
+    from robolink.calibration.flange_plane import height_of as height_of
+    from robolink.calibration.flange_plane import solvable_planes as solvable_planes
     from robolink.calibration.pin.axis_displacement import GOOD_WAY_MM as GOOD_WAY_MM
     from robolink.calibration.pin.axis_displacement import axis_displacement as axis_displacement
     from robolink.calibration.pin.axis_displacement import between_deg as between_deg
@@ -111,8 +116,14 @@ if TYPE_CHECKING:
     from robolink.calibration.pin.six_point import solve_tool_axis as solve_tool_axis
     from robolink.calibration.pin.two_pose import solve_two_pose as solve_two_pose
     from robolink.calibration.pin.two_pose import two_of as two_of
+    from robolink.calibration.quality.control_chart import USUAL_LAMBDA as USUAL_LAMBDA
+    from robolink.calibration.quality.control_chart import USUAL_WIDTH as USUAL_WIDTH
+    from robolink.calibration.quality.control_chart import ControlChart as ControlChart
+    from robolink.calibration.quality.control_chart import control_chart as control_chart
     from robolink.calibration.quality.doubts import doubt_sentence as doubt_sentence
     from robolink.calibration.quality.doubts import known_doubts as known_doubts
+    from robolink.calibration.quality.gauge_study import GaugeStudy as GaugeStudy
+    from robolink.calibration.quality.gauge_study import gauge_study as gauge_study
     from robolink.calibration.quality.impact import Impact as Impact
     from robolink.calibration.quality.impact import PointImpact as PointImpact
     from robolink.calibration.quality.impact import impact_on as impact_on
@@ -155,6 +166,7 @@ if TYPE_CHECKING:
     from robolink.calibration.touch.touch_evidence import judge_touches as judge_touches
     from robolink.calibration.touch.touch_evidence import least_jog_mm as least_jog_mm
     from robolink.calibration.touch.touch_evidence import stand_upright as stand_upright
+    from robolink.calibration.z_touch import USUAL_DECELERATION_MM_S2 as USUAL_DECELERATION_MM_S2
     from robolink.calibration.z_touch import Touch as Touch
     from robolink.calibration.z_touch import ZTouchResult as ZTouchResult
     from robolink.calibration.z_touch import solve_z_touch as solve_z_touch
@@ -187,6 +199,7 @@ __getattr__ = lazy_exports(
         "core.statistics": "NORMAL_95 chi_square_quantile f_quantile normal_quantile student_t "
         "studentized_range_0999",
         "crossed_beams": "BeamsResult crossing_sigma_gain solve_crossed_beams where_they_cross",
+        "flange_plane": "FlangePlane TipHeight carrying height_of solvable_planes",
         "pin.axis_displacement": "GOOD_WAY_MM axis_displacement between_deg require_unturned",
         "pin.joint": "JointResult JointTouch ToolDifference solve_joint",
         "pin.n_angle": "solve_n_angle",
@@ -197,6 +210,8 @@ __getattr__ = lazy_exports(
         "pin.pivot_fit": "PivotDesign PivotFit fit_pivot fit_pivot_robust pivot_design",
         "pin.six_point": "FAR_DEG SixPointResult ToolAxis solve_six_point solve_tool_axis",
         "pin.two_pose": "solve_two_pose two_of",
+        "quality.control_chart": "USUAL_LAMBDA USUAL_WIDTH ControlChart control_chart",
+        "quality.gauge_study": "GaugeStudy gauge_study",
         "quality.doubts": "doubt_sentence known_doubts",
         "quality.impact": "Impact PointImpact impact_on",
         "quality.moved_station": "StationShift TipShift judge_shifts",
@@ -209,6 +224,6 @@ __getattr__ = lazy_exports(
         "touch.standoff": "HIGHEST_MM FARTHEST_MM Standoff StandoffSeries",
         "touch.touch_evidence": "PERSON_SIGMA_Z_MM PROBE_SIGMA_Z_MM TouchEvidence WitnessedTouch "
         "height_limit_mm judge_touches least_jog_mm stand_upright",
-        "z_touch": "Touch ZTouchResult solve_z_touch touch_sigma_gain",
+        "z_touch": "USUAL_DECELERATION_MM_S2 Touch ZTouchResult solve_z_touch touch_sigma_gain",
     },
 )

@@ -16,9 +16,11 @@ from robolink.calibration.core.dispersion import Dispersion
 from robolink.calibration.core.least_squares import LinearFit, linear_fit
 from robolink.calibration.core.pose_checks import check_poses
 from robolink.calibration.core.robust import Floats
+from robolink.calibration.flange_checks import require_flange_in_base
+from robolink.calibration.flange_plane import FlangePlane, solvable_planes
 from robolink.errors import CalibrationError
 from robolink.messages import tr
-from robolink.model import Pose, angle_difference_deg, rotate_xy
+from robolink.model import Pose, angle_difference_deg
 
 LEAST_ANGLE_DEG = 20.0
 """Beams that cross at less than this leave one direction badly known."""
@@ -137,9 +139,13 @@ def find_beams(
 
     Raises:
         CalibrationError: ``too_few_poses``, ``short_beam``, ``parallel_beams``,
-            ``no_crossing``, or those of :func:`check_crossings`.
+            ``no_crossing``, ``tool_pose``, ``local_pose``, ``tilted_pose``, or those of
+            :func:`check_crossings`.
     """
     check_crossings(crossings, minimum=4)
+    entries = [crossing.entry for crossing in crossings]
+    require_flange_in_base(entries)
+    solvable_planes(entries, None)
     first, second = (
         _fit_beam([crossing for crossing in crossings if crossing.beam == beam], tip_mm)
         for beam in (0, 1)
@@ -173,7 +179,8 @@ def check_crossings(crossings: Sequence[Crossing], *, minimum: int) -> tuple[str
     poses = [pose for crossing in crossings for pose in (crossing.entry, crossing.exit)]
     doubts = check_poses(poses, allow_mixed_hand=False)
     for crossing in crossings:
-        if abs(angle_difference_deg(crossing.exit.u_deg, crossing.entry.u_deg)) > 0.01:
+        angles = zip(crossing.exit.coordinates()[3:], crossing.entry.coordinates()[3:], strict=True)
+        if any(abs(angle_difference_deg(after, before)) > 0.01 for after, before in angles):
             raise CalibrationError(
                 "turned_in_crossing",
                 tr("The tool turned while it crossed beam {beam}.", beam=crossing.beam + 1),
@@ -261,5 +268,5 @@ def _straightened(
 
 def _tip_at(crossing: Crossing, tip_mm: tuple[float, float]) -> tuple[float, float]:
     x, y = crossing.middle_mm
-    dx, dy = rotate_xy(tip_mm[0], tip_mm[1], crossing.entry.u_deg)
+    dx, dy = FlangePlane.of(crossing.entry).in_base(*tip_mm)
     return x + dx, y + dy

@@ -15,6 +15,7 @@ from robolink.calibration.core.dispersion import Dispersion
 from robolink.calibration.core.pose_checks import check_poses, keep_unmeasured, require_finite
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.core.rotations import rotation_of
+from robolink.calibration.flange_checks import require_flange_in_base
 from robolink.calibration.quality.station_part import StationPart, with_station
 from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
@@ -77,10 +78,12 @@ def solve_one_touch(
     A pin that was moved puts all tools wrong by the same amount, and no touch can tell.
 
     Raises:
-        CalibrationError: ``non_finite``, ``suspect_units`` or ``implausible_offset``.
+        CalibrationError: ``non_finite``, ``suspect_units``, ``tool_pose``, ``local_pose`` or
+            ``implausible_offset``.
         ConfigError: ``sigma_mm`` is not positive.
     """
     check_poses((flange,), allow_mixed_hand=False)
+    require_flange_in_base((flange,))
     require_finite(x_mm=pin.x_mm, y_mm=pin.y_mm, z_mm=pin.z_mm, sigma_mm=pin.sigma_mm)
     away = np.array([pin.x_mm - flange.x_mm, pin.y_mm - flange.y_mm, pin.z_mm - flange.z_mm])
     x, y, z = (rotation_of(flange).T @ away).tolist()

@@ -2,7 +2,11 @@
 
 import pytest
 
+from robolink.calibration import Pin, solve_one_touch
+from robolink.errors import CalibrationError
 from robolink.journal import EntryKind
+from robolink.model import Pose
+from robolink.nozzle_change import AcceptanceCriteria
 from robolink.stations import (
     Found,
     Station,
@@ -75,3 +79,15 @@ def test_what_is_learnt_is_written_as_plain_json():
     details = {"covariance_mm2": [[1e-4, 0.0], [0.0, 1e-4]], "z_from": ""}
     found = Found(id="P", kind=StationKind.PIN, x_mm=1.0, y_mm=2.0, details=details)
     assert station_entry(found).details["covariance_mm2"] == details["covariance_mm2"]
+
+
+def test_the_limit_of_a_process_is_compared_with_the_region():
+    pin = Pin(101.0, 2.0, 3.0, 0.01)
+    found = solve_one_touch(Pose(100.0, 0.0, 0.0, 0.0), pin, sigma_mm=0.01)
+    # 1.96 and 2.80 times 0.014: each axis alone, and all three together.
+    assert found.half95_mm == pytest.approx(0.0277, abs=1e-4)
+    assert found.region95_radius_mm == pytest.approx(0.0395, abs=1e-4)
+    AcceptanceCriteria(interval_mm=0.041).judge_fit(found)
+    with pytest.raises(CalibrationError, match="region") as refused:
+        AcceptanceCriteria(interval_mm=0.03).judge_fit(found)
+    assert refused.value.code == "large_interval"

@@ -222,7 +222,8 @@ def _decided(
     # A Z that the heights confirm, or that follows them, is as good as the one it goes back to.
     good = replace(proposal, kept_record={**proposal.kept_record, "z_from": known.z_from})
     if not told.changed:
-        return replace(good, length=told)
+        # The height of then stays what is compared with: small changes would else add up unseen.
+        return replace(good, length=told, pin_z_mm=known.place_mm[2], pin_touches=known.touches)
     decision = plan.length
     if decision == "ask":
         if not attended:

@@ -144,15 +144,16 @@ def touch_details(station: str, proposal: Proposal) -> dict[str, object]:
     touch = min(reversed(result.inputs), key=lambda pose: abs(pose.v_deg) + abs(pose.w_deg))
     # Where a difference was written, the value puts the pin elsewhere than the tip does.
     tip, value = _turned(touch, proposal.tip), _turned(touch, proposal.offset)
+    height_mm = z_mm + value[2] - tip[2] if proposal.pin_z_mm is None else proposal.pin_z_mm
     return {
         "station": station,
         "x_mm": x_mm + value[0] - tip[0],
         "y_mm": y_mm + value[1] - tip[1],
-        "z_mm": z_mm + value[2] - tip[2],
+        "z_mm": height_mm,
         "u_deg": touch.u_deg,
         "sigma_mm": chain.sigma_mm,
         "changes": chain.changes,
         "full_sigma_mm": chain.full_sigma_mm,
         "touch_sigma_mm": _touch_sigma_mm(result),
-        "touches": len(result.inputs) - len(result.rejected),
+        "touches": proposal.pin_touches or len(result.inputs) - len(result.rejected),
     }

@@ -12,7 +12,7 @@ import pytest
 
 from robolink.calibration import TipShift, judge_shifts
 
-PAGE = Path(__file__).parents[2] / "docs" / "reference" / "evidence.md"
+PAGE = Path(__file__).parents[2] / "docs/reference/evidence.md"
 RUNS = 4000
 TOUCH = 0.02
 MOVED = (0.0, 0.1, 0.2, 0.3, 0.5, 1.0)

@@ -5,8 +5,9 @@ import pytest
 from robolink.calibration import Pin, solve_one_touch
 from robolink.errors import CalibrationError
 from robolink.journal import EntryKind
-from robolink.model import Pose
+from robolink.model import NewEntry, Pose, ToolOffset, plain_offset
 from robolink.nozzle_change import AcceptanceCriteria
+from robolink.nozzle_change._seating import Seating, seating_of
 from robolink.stations import (
     Found,
     Station,
@@ -91,3 +92,29 @@ def test_the_limit_of_a_process_is_compared_with_the_region():
     with pytest.raises(CalibrationError, match="region") as refused:
         AcceptanceCriteria(interval_mm=0.03).judge_fit(found)
     assert refused.value.code == "large_interval"
+
+
+def kept(number, x_mm, z_mm, z_from, nozzle):
+    """Return what is kept of a value at a pin."""
+    details = {
+        "tip": plain_offset(ToolOffset(x_mm, -3.5, z_mm)),
+        "touch": {"station": "PIN-07"},
+        "z_from": z_from,
+        "nozzle": nozzle,
+    }
+    return NewEntry(EntryKind.DECISION, tool=number, verdict="", details=details)
+
+
+def test_how_nozzles_sit_is_pooled_from_eight_changes_on_record(arm):
+    places = [0.0, 0.3, 0.0, 0.3, 0.0, 0.3, 0.0, 0.3]
+    with arm.cell.connected() as controller:
+        for number, x_mm in enumerate(places):
+            controller.outcomes.append(kept(1, x_mm, -20.0, "kept", f"N-{number}"))
+        # Seven changes, and one that is none: the same nozzle again, which says nothing.
+        controller.outcomes.append(kept(1, 0.0, -20.0, "kept", "N-7"))
+        assert seating_of(controller) == Seating()
+        controller.outcomes.append(kept(1, 0.3, -20.0, "kept", "N-8"))
+        found = seating_of(controller)
+    assert found.changes == 8
+    # X moved by 0.3 in each, Y by nothing; a Z that was kept is no Z that sits alike.
+    assert found.sigma_mm == pytest.approx((0.3 / 2**0.5, 0.3 / 2**0.5, 0.05))

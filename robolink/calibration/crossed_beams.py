@@ -76,7 +76,7 @@ def solve_crossed_beams(
     Raises:
         CalibrationError: ``too_few_poses``, ``insufficient_rotation``, ``parallel_beams``,
             ``no_crossing``, ``turned_in_crossing``, ``implausible_offset``, ``tool_pose``,
-            ``local_pose``, ``tilted_pose``, and those of :func:`check_poses`.
+            ``local_pose``, ``tilted_pose``, and those of ``pose_checks.check_poses``.
         ConfigError: ``sigma_mm`` is not positive.
     """
     warnings = check_crossings(crossings, minimum=1)

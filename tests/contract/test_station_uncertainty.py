@@ -7,7 +7,7 @@ from robolink.errors import CalibrationError
 from robolink.journal import EntryKind
 from robolink.model import NewEntry, Pose, ToolOffset, plain_offset
 from robolink.nozzle_change import AcceptanceCriteria
-from robolink.nozzle_change._seating import Seating, seating_of
+from robolink.nozzle_change._seating import Seating, seating_of, touch_sigma_z_mm
 from robolink.stations import (
     Found,
     Station,
@@ -118,3 +118,20 @@ def test_how_nozzles_sit_is_pooled_from_eight_changes_on_record(arm):
     assert found.changes == 8
     # X moved by 0.3 in each, Y by nothing; a Z that was kept is no Z that sits alike.
     assert found.sigma_mm == pytest.approx((0.3 / 2**0.5, 0.3 / 2**0.5, 0.05))
+
+
+def test_how_well_touches_repeat_in_height_is_pooled_from_ten_of_them(arm):
+    with arm.cell.connected() as controller:
+        assert touch_sigma_z_mm(controller, "PIN-07") == 0.05
+        for run in range(4):
+            touch = {"station": "PIN-07", "heights_mm2": 0.0012, "heights_dof": 3}
+            controller.outcomes.append(
+                NewEntry(EntryKind.DECISION, tool=1, verdict="", details={"touch": touch})
+            )
+            assert touch_sigma_z_mm(controller, "OTHER") == 0.05
+            pooled = touch_sigma_z_mm(controller, "PIN-07")
+            assert pooled == pytest.approx(0.02 if run == 3 else 0.05)
+    assert arm.calibrate("n-angle", "--station", "PIN-07", "--count", "4").code == 0
+    touch = arm.recorded(EntryKind.DONE)[0].details["touch"]
+    assert touch["heights_dof"] == 3
+    assert touch["heights_mm2"] > 0

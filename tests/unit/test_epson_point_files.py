@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from robolink.errors import CalibrationError, ConfigError
 from robolink.model import Hand, Pose
-from robolink.pose_files import parse_pts, read_poses, read_pts
+from robolink.pose_tables import parse_pts, read_poses, read_pts
 
 GOOD = [
     {"x_mm": 287.5, "y_mm": 103.25, "u_deg": 0},

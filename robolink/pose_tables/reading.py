@@ -116,16 +116,13 @@ def _read(text: str, suffix: str, choices: ReadingChoices) -> RawTable:
         return _undisputed(raw, choices)
     if begins == "[" and _is_json(text):
         return read_json(text, choices)
+    raw = read_matrices(lines) if choices.columns is None else None
+    if raw is not None:
+        return _undisputed(raw, choices)
     if suffix in (".yaml", ".yml") or looks_indented(lines):
         return read_document(read_indented(lines), choices, layout="YAML")
-    if choices.columns is None:
-        raw = read_matrices(lines)
-        if raw is not None:
-            return _undisputed(raw, choices)
-        raw = read_labelled(lines, choices)
-        if raw is not None:
-            return raw
-    return read_table(lines, choices)
+    raw = read_labelled(lines, choices) if choices.columns is None else None
+    return read_table(lines, choices) if raw is None else raw
 
 
 def _is_json(text: str) -> bool:

@@ -80,6 +80,8 @@ def read_points_table(text: str) -> RawTable | None:
     Raises:
         UnusableText: A point of it cannot be read.
     """
+    if "nNumberOfPoints" not in text:
+        return None
     if not text.startswith("ENVT") and not (_COUNT.search(text) and _BLOCK.search(text)):
         return None
     poses: list[RawPose] = []

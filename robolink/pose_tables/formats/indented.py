@@ -13,6 +13,7 @@ from robolink.pose_tables.refusals import UnusableText
 _KEY: Final = re.compile(
     r"(\"[^\"]*\"|'[^']*'|[^\s\"'\[\]{},#&*!|>%@-][^:\[\]{}]*?)\s*:(?:\s+(.*))?"
 )
+_LISTED: Final = re.compile(r"- +[A-Za-z_]\w*:(?:\s|$)")
 _NUMBER: Final = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 _COMMENT: Final = re.compile(r"(?:^|\s)#.*$")
 _FLOW: Final = re.compile(r"\s*([\[\]{},:]|\"[^\"]*\"|'[^']*'|[^\[\]{},:\"']+)")
@@ -28,8 +29,8 @@ def looks_indented(lines: Sequence[str]) -> bool:
     opens = any(text.endswith(":") for text in texts)
     keys = [_KEY.fullmatch(text.lstrip("- ")) or text[:3] in ("---", "...") for text in texts]
     plain = [text.startswith("- ") or text[0] in "[{" for text in texts]
-    flows = any(text.startswith(("- {", "{")) for text in texts)
-    return (opens or flows) and all(key or listed for key, listed in zip(keys, plain, strict=True))
+    listed = any(text.startswith(("- {", "{")) or _LISTED.match(text) for text in texts)
+    return (opens or listed) and all(key or other for key, other in zip(keys, plain, strict=True))
 
 
 def read_indented(lines: Sequence[str]) -> list[object]:

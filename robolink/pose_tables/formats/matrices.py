@@ -18,6 +18,8 @@ from robolink.pose_tables.values import RawPose, RawTable
 
 _BRACKETS: Final = re.compile(r"[\[\](){};,|]")
 _NUMBER: Final = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
+_OTHER_BRACKETS: Final = re.compile(r"[\[\](){};|]")
+_WITH_COMMA: Final = re.compile(r"[+-]?\d+(?:,\d+)?(?:[eE][+-]?\d+)?", re.ASCII)
 _TITLE: Final = re.compile(r"[^\d\s]")
 _LAST: Final = (0.0, 0.0, 0.0, 1.0)
 
@@ -80,7 +82,11 @@ def _blocks(kept: Sequence[tuple[int, str]], lines: Sequence[str]) -> list[Block
 
 
 def _numbers(text: str) -> list[float] | None:
-    words = _BRACKETS.sub(" ", text).replace("\u2212", "-").split()
+    text = text.replace("\u2212", "-")
+    words = _OTHER_BRACKETS.sub(" ", text).split()
+    if len(words) in (3, 4) and all(map(_WITH_COMMA.fullmatch, words)):
+        return [float(word.replace(",", ".")) for word in words]
+    words = _BRACKETS.sub(" ", text).split()
     if not words or not all(_NUMBER.fullmatch(word) for word in words):
         return None
     return [float(word) for word in words]

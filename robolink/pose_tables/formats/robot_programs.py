@@ -58,6 +58,7 @@ _UR_POSE: Final = re.compile(
 )
 _UR_NUMBER: Final = re.compile(rf"({_N})\s*(mm|m|in|rad|deg|°)?")
 _UR_MOVES: Final = ("movel", "movej", "movep", "movec", "servoc")
+_UR_JOINTS: Final = re.compile(r"\bmove[jlpc]\s*\(\s*\[|\w_q\s*=\s*\[")
 _UR_COMMENT: Final = re.compile(r"#.*")
 
 
@@ -67,6 +68,8 @@ def read_kuka(text: str) -> RawTable | None:
     Raises:
         UnusableText: A pose lacks a component.
     """
+    if "{" not in text:
+        return None
     text = re.sub(r"^[ \t]*;.*", "", text, flags=re.MULTILINE)
     line_at = line_counter(text)
     data = {name.upper(): (int(tool), int(base)) for name, tool, base in _KUKA_DATA.findall(text)}
@@ -96,7 +99,9 @@ def read_abb(text: str) -> RawTable | None:
     Raises:
         UnusableText: A quaternion has not the length 1.
     """
-    text = re.sub(r"^([^!\"]*)!.*", r"\1", text, flags=re.MULTILINE)
+    if "[" not in text:
+        return None
+    text = re.sub(r"^([^!\"\n]*)!.*", r"\1", text, flags=re.MULTILINE)
     text = _ABB_OTHER.sub(_blanked, text)
     line_at = line_counter(text)
     poses: list[RawPose] = []
@@ -120,6 +125,8 @@ def read_fanuc(text: str) -> RawTable | None:
     Raises:
         UnusableText: A point lacks a component.
     """
+    if "{" not in text:
+        return None
     line_at = line_counter(text)
     poses: list[RawPose] = []
     skipped = 0
@@ -147,6 +154,8 @@ def read_urscript(text: str) -> RawTable | None:
     Raises:
         UnusableText: A pose has not six numbers, or units that are none of its.
     """
+    if "[" not in text:
+        return None
     poses: list[RawPose] = []
     lengths: set[str] = set()
     line_at = line_counter(text)
@@ -167,12 +176,13 @@ def read_urscript(text: str) -> RawTable | None:
             raise UnusableText(tr("a rotation vector is longer than a turn in radians"), line)
         given: dict[str, object] = {"name": name} if name else {}
         poses.append(_turned(line, numbers[:3], _ROTATION_VECTOR.matrix(turned), given))
-    if not poses:
+    joints = len(_UR_JOINTS.findall(text))
+    if not poses and not joints:
         return None
     if len(lengths) > 1 or not lengths <= {"", "mm", "m", "in"}:
         raise UnusableText(tr("its lengths have different units"))
-    said = next(iter(lengths))
-    raw = _program("URScript", poses, _ROTATION_VECTOR.formula, 0, angle="rad")
+    raw = _program("URScript", poses, _ROTATION_VECTOR.formula, joints, angle="rad")
+    (said,) = lengths
     raw.length, raw.stated_length = LengthUnit(said or "m"), bool(said)
     return raw
 

@@ -1,6 +1,7 @@
 """A table of poses: one a line, columns named in a header, in a comment above, or by a person."""
 
 import math
+import re
 from collections.abc import Sequence
 from typing import Final
 
@@ -35,6 +36,7 @@ from robolink.pose_tables.values import LengthUnit, RawTable, ReadingChoices
 
 Row = tuple[int, list[str]]
 
+_WORD: Final = re.compile(r"[^\s;|,\"]+")
 _OPENS: Final = ("(", "[")
 _ONE_MATRIX: Final = {
     12: "r11,r12,r13,x,r21,r22,r23,y,r31,r32,r33,z",
@@ -52,7 +54,7 @@ def read_table(lines: Sequence[str], choices: ReadingChoices) -> RawTable:
         UnusableText: It is no table of poses.
     """
     kept, comments = table_lines(lines)
-    if not kept:
+    if not any(any(map(is_number, _WORD.findall(text))) for _, text in kept):
         raise UnusableText(tr("there is no pose in it"))
     form = form_of(kept)
     rows = list(form.cells(kept))

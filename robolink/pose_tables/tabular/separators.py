@@ -8,6 +8,7 @@ number; what can be read both ways is refused.
 import csv
 import math
 import re
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -134,11 +135,14 @@ def _columns_of_numbers(form: TableForm, lines: Sequence[Line]) -> int:
         rows = [cells for _, cells in form.cells(lines)]
     except UnusableText:
         return 0
-    # What stands above the values may be a title; the values decide.
-    values = [row for row in rows if sum(map(is_number, row)) >= FEWEST]
-    width = without_trailing(values)
-    if not values or values[-1] is not rows[-1] or any(len(row) < width for row in values):
+    # What stands above the values may be a title; most values decide, and a line that has other
+    # columns than most is refused by its number later.
+    rows = [row for row in rows if sum(map(is_number, row)) >= FEWEST]
+    if not rows:
         return 0
+    widths = Counter(without_trailing([row]) for row in rows)
+    width = max(widths, key=lambda one: (widths[one], one))
+    values = [[*row, *[""] * width][:width] for row in rows if without_trailing([row]) == width]
     columns = [
         place
         for place in range(width)

@@ -20,6 +20,7 @@ _POINT: Final = re.compile(
     re.IGNORECASE,
 )
 _ASSIGNED: Final = re.compile(r"\s*P\s*\(?\s*\d+\s*\)?\s*=", re.IGNORECASE)
+_COORDINATES: Final = re.compile(r"\s*(?:XY\b|[+-]?[\d.])", re.IGNORECASE)
 _NUMBER: Final = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 _HAND: Final = re.compile(r"/\s*([RL])\b", re.IGNORECASE)
 _LOCAL: Final = re.compile(r"/\s*(\d+)\b|/\s*Local\s*(\d+)", re.IGNORECASE)
@@ -36,9 +37,13 @@ def read_spel(lines: Sequence[str]) -> RawTable | None:
     poses: list[RawPose] = []
     skipped = 0
     for line, text in enumerate(lines, start=1):
+        text = text.partition("'")[0]
         found = _POINT.fullmatch(text)
         if found is None or not (found["number"] or found["form"]):
-            skipped += bool(_ASSIGNED.match(text))
+            assigned = _ASSIGNED.match(text)
+            if assigned and _COORDINATES.match(text, assigned.end()):
+                raise UnusableText(tr("the point does not hold four or six numbers"), line)
+            skipped += bool(assigned)
             continue
         poses.append(_point(line, found))
     if not poses:

@@ -30,6 +30,10 @@ if TYPE_CHECKING:
     from robolink.calibration.camera.runout import runout_report as runout_report
     from robolink.calibration.camera.up_camera import Sighting as Sighting
     from robolink.calibration.camera.up_camera import solve_up_camera as solve_up_camera
+    from robolink.calibration.core.budget import BudgetRow as BudgetRow
+    from robolink.calibration.core.budget import UncertaintyBudget as UncertaintyBudget
+    from robolink.calibration.core.evidence import FitEvidence as FitEvidence
+    from robolink.calibration.core.evidence import RunOrder as RunOrder
     from robolink.calibration.core.frames import flange_of as flange_of
     from robolink.calibration.core.frames import flange_pose as flange_pose
     from robolink.calibration.core.frames import seen_from as seen_from
@@ -39,16 +43,22 @@ if TYPE_CHECKING:
     from robolink.calibration.core.planar_checks import MIN_ROTATION_DEG as MIN_ROTATION_DEG
     from robolink.calibration.core.planar_checks import angle_spread_deg as angle_spread_deg
     from robolink.calibration.core.planar_checks import planar_sigma_gain as planar_sigma_gain
-    from robolink.calibration.core.pose_design import select_poses as select_poses
-    from robolink.calibration.core.pose_design import sigma_gain as sigma_gain
     from robolink.calibration.core.pose_suggestion import PoseLimits as PoseLimits
     from robolink.calibration.core.pose_suggestion import PosePlan as PosePlan
     from robolink.calibration.core.pose_suggestion import precise_enough as precise_enough
+    from robolink.calibration.core.pose_suggestion import select_poses as select_poses
+    from robolink.calibration.core.pose_suggestion import sigma_gain as sigma_gain
     from robolink.calibration.core.pose_suggestion import suggest_poses as suggest_poses
+    from robolink.calibration.core.result import GUARD_FACTOR as GUARD_FACTOR
+    from robolink.calibration.core.result import PERSON_U_DRIFT_MM as PERSON_U_DRIFT_MM
+    from robolink.calibration.core.result import PROBE_U_DRIFT_MM as PROBE_U_DRIFT_MM
     from robolink.calibration.core.result import CalibrationResult as CalibrationResult
     from robolink.calibration.core.result import Drift as Drift
+    from robolink.calibration.core.result import DriftVerdict as DriftVerdict
     from robolink.calibration.core.result import VerifyResult as VerifyResult
+    from robolink.calibration.core.result import judge_drift as judge_drift
     from robolink.calibration.core.result import offset_sigma_mm as offset_sigma_mm
+    from robolink.calibration.core.result import worst_of as worst_of
     from robolink.calibration.core.robust import Floats as Floats
     from robolink.calibration.core.robust import Robust as Robust
     from robolink.calibration.core.rotations import pose_arrays as pose_arrays
@@ -58,6 +68,13 @@ if TYPE_CHECKING:
     from robolink.calibration.core.rotations import uvw_deg as uvw_deg
     from robolink.calibration.core.rotations import zyz_deg as zyz_deg
     from robolink.calibration.core.statistics import NORMAL_95 as NORMAL_95
+    from robolink.calibration.core.statistics import chi_square_quantile as chi_square_quantile
+    from robolink.calibration.core.statistics import f_quantile as f_quantile
+    from robolink.calibration.core.statistics import normal_quantile as normal_quantile
+    from robolink.calibration.core.statistics import student_t as student_t
+    from robolink.calibration.core.statistics import (
+        studentized_range_0999 as studentized_range_0999,
+    )
     from robolink.calibration.crossed_beams import BeamsResult as BeamsResult
     from robolink.calibration.crossed_beams import crossing_sigma_gain as crossing_sigma_gain
     from robolink.calibration.crossed_beams import solve_crossed_beams as solve_crossed_beams
@@ -92,6 +109,8 @@ if TYPE_CHECKING:
     from robolink.calibration.pin.six_point import solve_tool_axis as solve_tool_axis
     from robolink.calibration.pin.two_pose import solve_two_pose as solve_two_pose
     from robolink.calibration.pin.two_pose import two_of as two_of
+    from robolink.calibration.quality.doubts import doubt_sentence as doubt_sentence
+    from robolink.calibration.quality.doubts import known_doubts as known_doubts
     from robolink.calibration.quality.impact import Impact as Impact
     from robolink.calibration.quality.impact import PointImpact as PointImpact
     from robolink.calibration.quality.impact import impact_on as impact_on
@@ -112,6 +131,18 @@ if TYPE_CHECKING:
         PLACING_TOLERANCE_MM as PLACING_TOLERANCE_MM,
     )
     from robolink.calibration.quality.verify_drift import verify_drift as verify_drift
+    from robolink.calibration.touch.standoff import FARTHEST_MM as FARTHEST_MM
+    from robolink.calibration.touch.standoff import HIGHEST_MM as HIGHEST_MM
+    from robolink.calibration.touch.standoff import Standoff as Standoff
+    from robolink.calibration.touch.standoff import StandoffSeries as StandoffSeries
+    from robolink.calibration.touch.touch_evidence import PERSON_SIGMA_Z_MM as PERSON_SIGMA_Z_MM
+    from robolink.calibration.touch.touch_evidence import PROBE_SIGMA_Z_MM as PROBE_SIGMA_Z_MM
+    from robolink.calibration.touch.touch_evidence import TouchEvidence as TouchEvidence
+    from robolink.calibration.touch.touch_evidence import WitnessedTouch as WitnessedTouch
+    from robolink.calibration.touch.touch_evidence import height_limit_mm as height_limit_mm
+    from robolink.calibration.touch.touch_evidence import judge_touches as judge_touches
+    from robolink.calibration.touch.touch_evidence import least_jog_mm as least_jog_mm
+    from robolink.calibration.touch.touch_evidence import stand_upright as stand_upright
     from robolink.calibration.z_touch import Touch as Touch
     from robolink.calibration.z_touch import ZTouchResult as ZTouchResult
     from robolink.calibration.z_touch import solve_z_touch as solve_z_touch
@@ -130,14 +161,18 @@ __getattr__ = lazy_exports(
         "camera.camera_round": "CameraRound as_round solve_camera_round",
         "camera.runout": "RunoutReport runout_report",
         "camera.up_camera": "Sighting solve_up_camera",
+        "core.budget": "BudgetRow UncertaintyBudget",
+        "core.evidence": "FitEvidence RunOrder",
         "core.frames": "flange_of flange_pose seen_from tilted_flange_pose tilted_from toward_zero",
         "core.planar_checks": "MIN_ROTATION_DEG angle_spread_deg planar_sigma_gain",
-        "core.pose_design": "select_poses sigma_gain",
-        "core.pose_suggestion": "PoseLimits PosePlan precise_enough suggest_poses",
-        "core.result": "CalibrationResult Drift VerifyResult offset_sigma_mm",
+        "core.pose_suggestion": "PoseLimits PosePlan precise_enough select_poses sigma_gain "
+        "suggest_poses",
+        "core.result": "CalibrationResult Drift DriftVerdict GUARD_FACTOR PERSON_U_DRIFT_MM "
+        "PROBE_U_DRIFT_MM VerifyResult judge_drift offset_sigma_mm worst_of",
         "core.robust": "Floats Robust",
         "core.rotations": "pose_arrays quaternion_rotations rotation_of rotations uvw_deg zyz_deg",
-        "core.statistics": "NORMAL_95",
+        "core.statistics": "NORMAL_95 chi_square_quantile f_quantile normal_quantile student_t "
+        "studentized_range_0999",
         "crossed_beams": "BeamsResult crossing_sigma_gain solve_crossed_beams where_they_cross",
         "pin.axis_displacement": "GOOD_WAY_MM axis_displacement between_deg require_unturned",
         "pin.joint": "JointResult JointTouch ToolDifference solve_joint",
@@ -149,12 +184,16 @@ __getattr__ = lazy_exports(
         "pin.pivot_fit": "PivotDesign PivotFit fit_pivot fit_pivot_robust pivot_design",
         "pin.six_point": "FAR_DEG SixPointResult ToolAxis solve_six_point solve_tool_axis",
         "pin.two_pose": "solve_two_pose two_of",
+        "quality.doubts": "doubt_sentence known_doubts",
         "quality.impact": "Impact PointImpact impact_on",
         "quality.moved_station": "StationShift TipShift judge_shifts",
         "quality.tolerances": "PLANAR_TOLERANCE TOUCH_TOLERANCE Tolerance",
         "quality.tool_fits": "ToolFit better_fit tool_fits",
         "quality.update_guard": "Correction NEEDLE_LIMIT_MM require_shrinking update_guard",
         "quality.verify_drift": "PLACING_TOLERANCE_MM verify_drift",
+        "touch.standoff": "HIGHEST_MM FARTHEST_MM Standoff StandoffSeries",
+        "touch.touch_evidence": "PERSON_SIGMA_Z_MM PROBE_SIGMA_Z_MM TouchEvidence WitnessedTouch "
+        "height_limit_mm judge_touches least_jog_mm stand_upright",
         "z_touch": "Touch ZTouchResult solve_z_touch touch_sigma_gain",
     },
 )

@@ -56,7 +56,7 @@ def solve_crossed_beams(
     Raises:
         CalibrationError: ``too_few_poses``, ``insufficient_rotation``, ``parallel_beams``,
             ``no_crossing``, ``turned_in_crossing``, ``implausible_offset``, and those of
-            :func:`check_poses`.
+            ``pose_checks.check_poses``.
         ConfigError: ``sigma_mm`` is not positive.
     """
     warnings = check_crossings(crossings, minimum=1)
@@ -72,7 +72,7 @@ def solve_crossed_beams(
         raise _too_few(len(a))
     lags = fit.x[2 : 2 + sum(two_ways)].tolist()
     result = BeamsResult(
-        method="crossed_beams",
+        method="beams",
         offset=keep_unmeasured(stored, x_mm=float(fit.x[0]), y_mm=float(fit.x[1])),
         measured=("x_mm", "y_mm"),
         kept=_KEPT,

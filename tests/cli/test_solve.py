@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from robolink_cli import main
 from robolink_cli.commands.measure.solve.solving import METHODS
+from robolink_cli.commands.measure.solve.touch_methods import TOUCH_METHODS
 
 from robolink.calibration import Beam
 from robolink.model import rotate_xy
@@ -413,7 +414,8 @@ def test_no_method_is_left_untried():
         "orientation_convert",
     }
     here = {"find_beams", "joint", "board_fit"}
-    assert set(METHODS) == set(MORE) | shared | here
+    touching = {*TOUCH_METHODS}  # tests/calibration/test_touch_evidence.py
+    assert set(METHODS) == set(MORE) | shared | here | touching
 
 
 def test_looking_at_a_controller_does_not_load_numpy():

@@ -48,7 +48,7 @@ def solve_board_fit(
 
     Raises:
         CalibrationError: ``too_few_poses``, ``coincident_fiducials``, ``spacing_mismatch``,
-            and those of :func:`check_poses`.
+            and those of ``pose_checks.check_poses``.
         ConfigError: ``sigma_mm`` is not positive.
         ValueError: The lists differ in length.
     """
@@ -65,7 +65,7 @@ def solve_board_fit(
     residuals = seen - origin - turn * drawing
     unit = _unit_covariance(turn, drawing)
     result = CalibrationResult(
-        method="board_fit",
+        method="board",
         offset=keep_unmeasured(
             stored,
             x_mm=origin.real,

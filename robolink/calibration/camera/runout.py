@@ -73,7 +73,7 @@ def runout_report(sightings: Sequence[Sighting], *, sigma_mm: float | None = Non
 
     Raises:
         CalibrationError: ``too_few_poses``, ``insufficient_rotation``, ``degenerate_angles``
-            and those of :func:`check_poses`.
+            and those of ``pose_checks.check_poses``.
         ConfigError: ``sigma_mm`` is not positive.
     """
     flanges = [sighting.flange for sighting in sightings]

@@ -1,5 +1,6 @@
-"""Linear least squares with what is needed to trust the answer."""
+"""Linear least squares with what is needed to trust the answer, and how errors reach a result."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,6 +8,8 @@ import numpy as np
 from robolink.calibration.core.robust import Floats
 
 _RANK_BELOW = 1e-10
+
+_STEP_MM = 1e-4
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,3 +48,20 @@ def linear_fit(a: Floats, b: Floats) -> LinearFit:
         covariance = np.full((a.shape[1],) * 2, np.inf)
     condition = float(s[0] / s[-1]) if known.all() else np.inf
     return LinearFit(x, b - a @ x, covariance, condition, int(known.sum()), v[-1])
+
+
+def sensitivity(calculate: Callable[[Floats], Floats], measured_mm: Floats) -> Floats:
+    """Return by how much ``calculate(measured_mm)`` changes per mm, a row for each input.
+
+    The derivative is taken by central differences; the calculations are smooth, and a step of
+    0.1 um leaves eight digits.
+    """
+    flat = measured_mm.ravel()
+    rows = []
+    for index in range(flat.size):
+        step = np.zeros_like(flat)
+        step[index] = _STEP_MM
+        ahead = calculate((flat + step).reshape(measured_mm.shape))
+        behind = calculate((flat - step).reshape(measured_mm.shape))
+        rows.append((ahead - behind) / (2 * _STEP_MM))
+    return np.array(rows)

@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 
 from robolink.calibration.core.dispersion import require_positive
-from robolink.calibration.core.error_propagation import sensitivity
+from robolink.calibration.core.least_squares import sensitivity
 from robolink.calibration.core.pose_checks import check_poses, keep_unmeasured
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.core.robust import Floats
@@ -130,7 +130,7 @@ def solve_six_point(
     touches = len(pivot_poses)
     unit = _unit_covariance(positions, turned, frame, touches=touches, square=second_is == "xz")
     result = SixPointResult(
-        method="six_point",
+        method="six-point",
         offset=keep_unmeasured(pivot.offset, u_deg=u, v_deg=v, w_deg=w),
         measured=_MEASURED,
         kept=(),

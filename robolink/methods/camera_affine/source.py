@@ -71,7 +71,10 @@ class CameraAffineSource:
         )
 
     def require_ready(self) -> None:
-        """Find out whether the camera is there; see :class:`RequiresSensor`."""
+        """Find out whether the camera is there.
+
+        See :class:`~robolink.procedures.RequiresSensor`.
+        """
         with pixel_camera(self.sensor):
             pass
 

@@ -9,7 +9,7 @@ from annotated_types import Ge, Le, MinLen
 from robolink.calibration import MIN_ROTATION_DEG
 from robolink.files.toml import Problem
 from robolink.messages import tr
-from robolink.methods.declaration import (
+from robolink.methods.declaration.method import (
     DEGREES,
     MM,
     MM_S,
@@ -20,7 +20,7 @@ from robolink.methods.declaration import (
     MethodParameters,
     Option,
 )
-from robolink.methods.pin_parameters import clearance_below_lift
+from robolink.methods.declaration.pin_parameters import clearance_below_lift
 from robolink.procedures import SamplingPolicy, may_end_early
 
 _SPEEDS_APART: Final = 1.5
@@ -132,13 +132,17 @@ class ZTouchParameters(MethodParameters):
             )
         yield from clearance_below_lift(self.clearance_mm, self.lift_mm, check)
 
+    def room_mm(self) -> float:
+        """Return how high the box has to be."""
+        return self.lift_mm
+
     def no_residual(self) -> str:
         """Return why residuals cannot be judged, empty when they can."""
         if len(self.speeds_mm_s) > 2:
             return ""
         return tr(
             "cannot be judged: two touches always agree, so they leave no residual; give four "
-            "speeds_mm_s, or interval_mm with sigma_mm"
+            "speeds, or limit the interval and state the standard deviation"
         )
 
 

@@ -55,7 +55,7 @@ def learn(
         )
         agree_to_motion(question, yes=yes)
         with (
-            operator_at(assist, lambda: tool) as operator,
+            operator_at(assist, lambda: tool, controller.clock) as operator,
             controller.preserved(purpose),
         ):
             controller.tools.select(0)

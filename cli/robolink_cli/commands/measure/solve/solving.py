@@ -10,9 +10,10 @@ from robolink.messages import tr
 from robolink_cli.commands.measure.solve.case import Node, read_poses, unusable
 from robolink_cli.commands.measure.solve.methods import FROM_POSES
 from robolink_cli.commands.measure.solve.more_methods import MORE_METHODS
+from robolink_cli.commands.measure.solve.touch_methods import TOUCH_METHODS
 
 CASE_SCHEMA: Final = "robolink-calibration-vectors/1"
-METHODS: Final = {**FROM_POSES, **MORE_METHODS}
+METHODS: Final = {**FROM_POSES, **MORE_METHODS, **TOUCH_METHODS}
 
 _GAINS_OF: Final = ("two_pose", "two_pose_general", "n_angle", "n_angle_robust")
 _SEVERITY: Final = ("ok", "warn", "error")
@@ -74,7 +75,8 @@ def solve_case(node: Node) -> dict[str, object]:
         return head | _refusal(error, method, given)
     given.finish()
     codes = found.pop("codes", [])
-    return head | {"status": "warn" if codes else "ok", "codes": codes} | found
+    status = found.pop("status", "warn" if codes else "ok")
+    return head | {"status": status, "codes": codes} | found
 
 
 def _refusal(error: CalibrationError, method: str, given: Node) -> dict[str, object]:

@@ -79,6 +79,7 @@ _ALIASES: Final = {
     "yaskawa": "motoman",
     "denso": "motoman",
     "ur": ROTATION_VECTOR,
+    "urscript": ROTATION_VECTOR,
     "vector": ROTATION_VECTOR,
     "rotationvector": ROTATION_VECTOR,
     "axisangle": ROTATION_VECTOR,

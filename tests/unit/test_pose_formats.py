@@ -102,6 +102,7 @@ FORMS = {
             }
         }
     ),
+    "values with their names": "P1: X 405.8, Y -62.9, Z 251.6, U 40, V 12, W -172\n",
     "where": '{"schema": "robolink/where/1", "x_mm": 405.8, "y_mm": -62.9, "z_mm": 251.6, '
     '"u_deg": 40.0, "v_deg": 12.0, "w_deg": -172.0, "hand": null, "local": 0, "tool": null, '
     '"joints_deg": [1.0, 2.0, 3.0]}',
@@ -139,6 +140,10 @@ def test_names_tools_and_frames_are_kept_where_the_file_says_them(read):
     where = FORMS["where"].replace('"tool": null', '"tool": 2').replace("null", '"left"')
     (pose,) = read(f"[{where}]").poses
     assert (pose.tool, pose.hand, pose.local) == (2, Hand.LEFT, 0)
+
+
+def test_answers_that_were_appended_to_a_file_are_read_one_after_the_other(read):
+    assert len(read(FORMS["where"] + "\n" + FORMS["where"].replace(" ", "\n")).poses) == 2
 
 
 def test_units_that_a_format_defines_are_not_believed_against_reason(read):

@@ -60,6 +60,9 @@ LAYOUTS = {
     "comments": "; by hand\n! so\n// and\nx;y;z;u;\n287.5;103.25;-50;90;\n-12.25;87.5;-50;-45;\n",
     "a typographic minus": "x;y;z;u\n287,5;103,25;\u221250;90\n"
     "\u221212,25;87,5;\u221250;\u221245\n",
+    "what a spreadsheet is told": "sep=;\nX;Y;Z;U\n287,5;103,25;-50;90\n-12,25;87,5;-50;-45\n",
+    "two numbers, two names": "No,ID,Name,Point,x,y,z,u\n1,7,a,b,287.5,103.25,-50,90\n"
+    "2,8,c,d,-12.25,87.5,-50,-45\n",
     "bars": "| x | y | z | u |\n| 287.5 | 103.25 | -50 | 90 |\n| -12.25 | 87.5 | -50 | -45 |\n",
     "about Z alone": "x,y,z,rz\n287.5,103.25,-50,90\n-12.25,87.5,-50,-45\n",
     "names and values": "Pin 1: X=287.5 mm Y=103.25 mm Z=-50 mm U=90 deg\n"

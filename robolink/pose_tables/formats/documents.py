@@ -16,7 +16,12 @@ from robolink.pose_tables.lengths import metres_question
 from robolink.pose_tables.questions import which_columns
 from robolink.pose_tables.refusals import UnclearText, UnusableText
 from robolink.pose_tables.tabular.columns import PoseColumns
-from robolink.pose_tables.tabular.header import column_head, named_by_person, names_place
+from robolink.pose_tables.tabular.header import (
+    column_head,
+    column_heads,
+    named_by_person,
+    names_place,
+)
 from robolink.pose_tables.values import LengthUnit, RawPose, RawTable, ReadingChoices
 
 _PARTS: Final = ("position", "orientation", "translation", "rotation")
@@ -35,10 +40,23 @@ def read_json(text: str, choices: ReadingChoices) -> RawTable:
         UnusableText: It is no JSON, or holds no poses.
     """
     try:
-        document = json.loads(text)
+        documents = list(_documents(text))
     except (ValueError, RecursionError) as error:
         raise UnusableText(tr("it is not JSON ({error})", error=error)) from error
+    document = documents[0] if len(documents) == 1 else documents
     return read_document(document, choices, layout="JSON")
+
+
+def _documents(text: str) -> Iterator[object]:
+    """Yield the documents of a text; a command whose output was appended leaves several."""
+    decoder, place = json.JSONDecoder(), 0
+    while True:
+        while text[place : place + 1].isspace():
+            place += 1
+        document, place = decoder.raw_decode(text, place)
+        yield document
+        if not text[place:].strip():
+            return
 
 
 def read_document(document: object, choices: ReadingChoices, *, layout: str) -> RawTable:
@@ -101,7 +119,7 @@ class _Made:
     def _object(self, place: int, one: dict[str, object]) -> RawPose:
         keys = tuple(one)
         if keys not in self._known:
-            columns = PoseColumns([column_head(key) for key in keys], self._choices, as_number)
+            columns = PoseColumns(column_heads(keys), self._choices, as_number)
             self._known[keys] = columns
             self._ask(columns, place, one)
         columns = self._known[keys]

@@ -11,11 +11,12 @@ from typing import Final
 
 from robolink.messages import tr
 from robolink.pose_tables.formats.documents import read_document
+from robolink.pose_tables.tabular.header import MEANINGS
 from robolink.pose_tables.tabular.separators import table_lines
 from robolink.pose_tables.values import RawTable, ReadingChoices
 
 _PAIR: Final = re.compile(
-    r"(?<![\w.])([A-Za-z][A-Za-z_]{0,11})\s*[:=]\s*"
+    r"(?<![\w.])([A-Za-z][A-Za-z_]{0,11})(\s*[:=]\s*|\s+)"
     r"([+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?)(?![\w.])\s*(mm|cm|m|in|deg|rad|°)?(?![\w])"
 )
 _FLAG: Final = re.compile(r"/\s*([RL]|\d+)\b")
@@ -34,13 +35,14 @@ def read_labelled(lines: Sequence[str], choices: ReadingChoices) -> RawTable | N
     poses: list[dict[str, object]] = []
     name = ""
     for _, text in kept:
-        pairs = _PAIR.findall(text)
+        found = [pair for pair in _PAIR.finditer(text) if _is_label(pair)]
+        pairs = [(pair[1], pair[3], pair[4]) for pair in found]
         if len(pairs) < _FEWEST:
             quoted = re.search(r"['\"]([^'\"]+)['\"]", text)
             name = quoted[1] if quoted else name
             continue
         if {"x", "y"} <= {label.lower() for label, _, _ in pairs}:
-            before = _PAIR.split(text, maxsplit=1)[0].strip(" \t:=,;({[")
+            before = text[: found[0].start()].strip(" \t:=,;({[")
             called = before or name
             poses.append({"name": called} if called else {})
             name = ""
@@ -57,6 +59,11 @@ def read_labelled(lines: Sequence[str], choices: ReadingChoices) -> RawTable | N
     if choices.euler is None and any(_POSITION_REGISTERS.search(line) for line in lines[:5]):
         choices = replace(choices, euler="fanuc")
     return read_document(poses, choices, layout=tr("values with names"))
+
+
+def _is_label(pair: re.Match[str]) -> bool:
+    """Tell a name of a value from other words; without a sign between only known names count."""
+    return bool(pair[2].strip()) or pair[1].lower() in MEANINGS
 
 
 def _add_flags(pose: dict[str, object], text: str) -> None:

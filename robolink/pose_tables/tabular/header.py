@@ -1,7 +1,7 @@
 """What the columns of a table are called, and in which units: by name, without case."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -31,6 +31,7 @@ _ALIASES: Final[Mapping[str, str]] = {
     **{f"translation.{axis}": axis for axis in "xyz"},
     **{f"orientation.{axis}": f"q{axis}" for axis in "xyzw"},
     **{f"rotation.{axis}": f"q{axis}" for axis in "xyzw"},
+    **{f"{before}{axis}": f"q{axis}" for axis in "xyzw" for before in ("quat", "orientation")},
     "qs": "qw",
     "rotw": "qw",
     **{f"rot{axis}": f"r{axis}" for axis in "xyz"},
@@ -38,6 +39,9 @@ _ALIASES: Final[Mapping[str, str]] = {
     "label": "name",
     "target": "name",
     "pose": "name",
+    "waypoint": "name",
+    "pointname": "name",
+    "targetname": "name",
     "punkt": "name",
     "bezeichnung": "name",
     "no": "number",
@@ -62,7 +66,7 @@ _UNITS: Final[Mapping[str, LengthUnit | AngleUnit]] = {
 _BRACKETED: Final = re.compile(r"(.+?)\s*[(\[{<]\s*(.*?)\s*[)\]}>]")
 _TAILED: Final = re.compile(r"(.+?)(?:[_\s/]|, )(?:in )?([a-z°º\"]+\.?)")
 _ROS_TOPIC: Final = re.compile(
-    r"(?:.*\.)?((?:position|orientation|translation|rotation)\.[xyzw])", re.IGNORECASE
+    r"(?:.*[./])?(position|orientation|translation|rotation)[./]([xyzw])", re.IGNORECASE
 )
 _JOINT: Final = re.compile(r"(?:j|joint|axis|achse|a|e|q|theta)[_ ]?[1-7]", re.IGNORECASE)
 
@@ -93,7 +97,7 @@ def column_head(text: str) -> ColumnHead:
     plain = text.strip().lower()
     ros = _ROS_TOPIC.fullmatch(plain)
     if ros:
-        return ColumnHead(_ALIASES[ros[1]], None, text, from_ros=True)
+        return ColumnHead(_ALIASES[f"{ros[1]}.{ros[2]}"], None, text, from_ros=True)
     meaning = _meaning(plain)
     if meaning:
         return ColumnHead(meaning, None, text)
@@ -103,6 +107,22 @@ def column_head(text: str) -> ColumnHead:
         if parts and meaning and (parts[2] in _UNITS or form is _BRACKETED):
             return ColumnHead(meaning, _unit_of(meaning, parts[2], text), text)
     return ColumnHead(SKIPPED, None, text)
+
+
+def column_heads(texts: Iterable[str]) -> tuple[ColumnHead, ...]:
+    """Return what the columns of a file hold; of two names or numbers one only is kept.
+
+    Raises:
+        UnusableText: As of :func:`column_head`.
+    """
+    heads = list(map(column_head, texts))
+    for meaning in ("name", "number"):
+        alike = [place for place, head in enumerate(heads) if head.meaning == meaning]
+        called_so = [place for place in alike if heads[place].text.strip().lower() == meaning]
+        for place in alike:
+            if place != (called_so or alike)[0] and place not in called_so:
+                heads[place] = ColumnHead(SKIPPED, None, heads[place].text)
+    return tuple(heads)
 
 
 def is_unit(text: str) -> bool:

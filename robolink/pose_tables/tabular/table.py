@@ -17,7 +17,7 @@ from robolink.pose_tables.tabular.header import (
     WORDS,
     ColumnHead,
     are_joints,
-    column_head,
+    column_heads,
     is_unit,
     named_by_person,
     names_place,
@@ -110,7 +110,7 @@ def _headed(
     if choices.columns is not None:
         return named_by_person(choices.columns), body
     for place, (line, cells) in enumerate(above):
-        heads = tuple(map(column_head, _joined(cells, form)))
+        heads = column_heads(_joined(cells, form))
         if names_place(heads):
             units = above[place + 1 :]
             heads = _trimmed(heads, width)
@@ -157,7 +157,7 @@ def _in_comments(comments: Sequence[str], form: TableForm, width: int) -> tuple[
     for comment in comments:
         for text in (comment, comment.lstrip("#/!%; ")):
             ((_, cells),) = form.cells([(0, text)]) if '"' not in text else [(0, [])]
-            heads = tuple(map(column_head, _joined(cells, form)))
+            heads = column_heads(_joined(cells, form))
             whole = len(heads) == width and all(head.meaning != SKIPPED for head in heads)
             if whole and names_place(heads):
                 require_each_once(heads)

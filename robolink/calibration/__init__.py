@@ -30,12 +30,15 @@ if TYPE_CHECKING:
     from robolink.calibration.camera.runout import runout_report as runout_report
     from robolink.calibration.camera.up_camera import Sighting as Sighting
     from robolink.calibration.camera.up_camera import solve_up_camera as solve_up_camera
+    from robolink.calibration.core.budget import DIVISORS as DIVISORS
     from robolink.calibration.core.budget import BudgetRow as BudgetRow
     from robolink.calibration.core.budget import UncertaintyBudget as UncertaintyBudget
     from robolink.calibration.core.evidence import FitEvidence as FitEvidence
     from robolink.calibration.core.evidence import RunOrder as RunOrder
     from robolink.calibration.core.frames import flange_of as flange_of
     from robolink.calibration.core.frames import flange_pose as flange_pose
+    from robolink.calibration.core.frames import flange_poses as flange_poses
+    from robolink.calibration.core.frames import in_base as in_base
     from robolink.calibration.core.frames import seen_from as seen_from
     from robolink.calibration.core.frames import tilted_flange_pose as tilted_flange_pose
     from robolink.calibration.core.frames import tilted_from as tilted_from
@@ -115,10 +118,17 @@ if TYPE_CHECKING:
     from robolink.calibration.quality.tool_fits import ToolFit as ToolFit
     from robolink.calibration.quality.tool_fits import better_fit as better_fit
     from robolink.calibration.quality.tool_fits import tool_fits as tool_fits
+    from robolink.calibration.quality.units import RobotReach as RobotReach
+    from robolink.calibration.quality.units import require_near as require_near
+    from robolink.calibration.quality.units import require_stored_scale as require_stored_scale
+    from robolink.calibration.quality.units import require_within_reach as require_within_reach
     from robolink.calibration.quality.update_guard import NEEDLE_LIMIT_MM as NEEDLE_LIMIT_MM
     from robolink.calibration.quality.update_guard import Correction as Correction
     from robolink.calibration.quality.update_guard import require_shrinking as require_shrinking
     from robolink.calibration.quality.update_guard import update_guard as update_guard
+    from robolink.calibration.quality.update_guard import (
+        writes_refused_unattended as writes_refused_unattended,
+    )
     from robolink.calibration.quality.verify_drift import (
         PLACING_TOLERANCE_MM as PLACING_TOLERANCE_MM,
     )
@@ -141,9 +151,10 @@ __getattr__ = lazy_exports(
         "camera.camera_round": "CameraRound as_round solve_camera_round",
         "camera.runout": "RunoutReport runout_report",
         "camera.up_camera": "Sighting solve_up_camera",
-        "core.budget": "BudgetRow UncertaintyBudget",
+        "core.budget": "BudgetRow DIVISORS UncertaintyBudget",
         "core.evidence": "FitEvidence RunOrder",
-        "core.frames": "flange_of flange_pose seen_from tilted_flange_pose tilted_from toward_zero",
+        "core.frames": "flange_of flange_pose flange_poses in_base seen_from tilted_flange_pose "
+        "tilted_from toward_zero",
         "core.planar_checks": "MIN_ROTATION_DEG angle_spread_deg planar_sigma_gain",
         "core.pose_suggestion": "PoseLimits PosePlan precise_enough select_poses sigma_gain "
         "suggest_poses",
@@ -167,7 +178,9 @@ __getattr__ = lazy_exports(
         "quality.moved_station": "StationShift TipShift judge_shifts",
         "quality.tolerances": "PLANAR_TOLERANCE TOUCH_TOLERANCE Tolerance",
         "quality.tool_fits": "ToolFit better_fit tool_fits",
-        "quality.update_guard": "Correction NEEDLE_LIMIT_MM require_shrinking update_guard",
+        "quality.units": "RobotReach require_near require_stored_scale require_within_reach",
+        "quality.update_guard": "Correction NEEDLE_LIMIT_MM require_shrinking update_guard "
+        "writes_refused_unattended",
         "quality.verify_drift": "PLACING_TOLERANCE_MM verify_drift",
         "z_touch": "Touch ZTouchResult solve_z_touch touch_sigma_gain",
     },

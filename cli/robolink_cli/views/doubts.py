@@ -19,8 +19,24 @@ _SENTENCES: Final[Mapping[str, Callable[[], str]]] = {
     "few_poses": lambda: tr("Few poses: four or more tell errors of placement from each other."),
     "large_rms": lambda: tr("The residuals are large for this method."),
     "large_residual": lambda: tr("One pose is far off; take it again."),
-    "sigma_too_small": lambda: tr(
+    "sigma_contradicted": lambda: tr(
         "The poses scatter more than the stated standard deviation says."
+    ),
+    "residuals_too_small": lambda: tr(
+        "The poses agree better than the stated standard deviation allows: copied, or it was "
+        "stated with care for the worst."
+    ),
+    "duplicate_poses": lambda: tr(
+        "Some poses are copies of others, digit by digit; each counts once."
+    ),
+    "high_leverage": lambda: tr(
+        "One pose alone decides: its own error leaves no trace. Take one more near it."
+    ),
+    "step_in_run_order": lambda: tr(
+        "Something moved between two touches: pin, nozzle or robot. Take the run again."
+    ),
+    "drift_in_run_order": lambda: tr(
+        "Something moved slowly during the touches. Take the run again."
     ),
     "camera_moved": lambda: tr(
         "The camera sees things beside where they are: it was moved, or its calibration is old."

@@ -1,0 +1,151 @@
+"""What poses on one point show about themselves: copies, order, and how much hangs on one.
+
+Planar fits and fits in space are checked alike; in the plane the rotations are 2 x 2
+(docs/reference/evidence.md 5, 8).
+"""
+
+from dataclasses import replace
+from typing import Final, TypeVar
+
+import numpy as np
+
+from robolink.calibration.core.evidence import FitEvidence
+from robolink.calibration.core.result import CalibrationResult
+from robolink.calibration.core.robust import Floats, Indices, Mask
+from robolink.calibration.quality.run_order import LEAST_TOUCHES, run_order
+from robolink.errors import CalibrationError
+from robolink.messages import tr
+
+HIGH_LEVERAGE: Final = 0.9
+"""A pose above it leaves next to nothing of its own error in its residual."""
+
+UNSTABLE_BEYOND: Final = 0.1
+"""Robust results further apart than this part of the half interval are not believed."""
+
+ResultT = TypeVar("ResultT", bound=CalibrationResult)
+
+
+def copies(table: Floats) -> tuple[int, ...]:
+    """Return the indices of rows that agree with an earlier row in every number.
+
+    Args:
+        table: N x 6, positions in mm and angles in degrees, as they were printed.
+    """
+    # One number a row, made of all: where these differ nothing needs a closer look.
+    mixed = table[:, 0].copy()
+    for column, factor in zip(table.T[1:], (1.37, 2.61, 3.83, 5.23, 7.91), strict=True):
+        mixed += factor * column
+    mixed.sort()
+    if not (mixed[1:] == mixed[:-1]).any():
+        return ()
+    seen: set[tuple[float, ...]] = set()
+    found = []
+    for index, row in enumerate(map(tuple, (table + 0.0).tolist())):  # -0.0 is 0.0
+        if row in seen:
+            found.append(index)
+        seen.add(row)
+    return tuple(found)
+
+
+def leverages(turned: Floats) -> Floats:
+    """Return each pose's leverage, 1 / N + its part of what tells the offset; 0 to 1.
+
+    Args:
+        turned: What multiplies the offset, N x d x d rotations. In the plane this is
+            1 / N + |z - mean z|^2 / sum |z - mean z|^2; in space the mean over the axes.
+    """
+    count, dimensions = turned.shape[:2]
+    centred = (turned - turned.sum(axis=0) / count).reshape(-1, dimensions)
+    spread = centred @ np.linalg.inv(centred.T @ centred)
+    own = np.einsum("ij,ij->i", spread.reshape(count, -1), centred.reshape(count, -1))
+    found: Floats = 1 / count + own / dimensions
+    return found
+
+
+def with_evidence(
+    result: ResultT,
+    turned: Floats,
+    residuals_mm: Floats,
+    *,
+    kept: Indices,
+    duplicates: tuple[int, ...],
+    unknowns: int,
+) -> ResultT:
+    """Return ``result`` with the evidence of its poses, and the doubts that follow.
+
+    Args:
+        result: The solution.
+        turned: Rotations of the poses that were kept, N x d x d, in the order of the touches.
+        residuals_mm: Theirs, N x d.
+        kept: Their indices among all poses.
+        duplicates: Indices of copies.
+        unknowns: How many numbers the fit had to find.
+    """
+    found = leverages(turned)
+    alone = kept[found > HIGH_LEVERAGE] if len(kept) > 2 else kept[:0]
+    order = run_order(turned, residuals_mm, unknowns=unknowns)
+    evidence = replace(
+        result.evidence or FitEvidence(),
+        distinct=len(result.inputs) - len(duplicates),
+        duplicates=duplicates,
+        leverage=tuple(found.tolist()),
+        high_leverage=tuple(alone.tolist()),
+        run_order=order,
+    )
+    doubts = (
+        "duplicate_poses" if duplicates else "",
+        "high_leverage" if alone.size else "",
+        order.finding if order is not None else "",
+    )
+    # Where the grid decides, the residuals say nothing about the order either.
+    testable = len(kept) >= LEAST_TOUCHES or "resolution_floor" in result.notes
+    return replace(
+        result,
+        evidence=evidence,
+        warnings=(*result.warnings, *filter(None, doubts)),
+        notes=result.notes if testable else (*result.notes, "order_not_testable"),
+    )
+
+
+def with_consensus(result: ResultT, kept: Mask, spread_mm: float) -> ResultT:
+    """Return a robust ``result`` with its consensus, or refuse one that the draws decided.
+
+    Args:
+        result: The solution with its interval.
+        kept: The poses that agree.
+        spread_mm: How far the results of different draws lie apart.
+
+    Raises:
+        CalibrationError: ``robust_unstable``.
+    """
+    half_mm = result.half95_mm
+    if spread_mm > UNSTABLE_BEYOND * (half_mm or 0.0):
+        raise CalibrationError(
+            "robust_unstable",
+            tr(
+                "Different draws keep different poses, and their results lie {apart:.3f} mm apart.",
+                apart=spread_mm,
+            ),
+            remedy=tr("Take more poses, or state how large an outlier is."),
+        )
+    count = int(np.count_nonzero(kept))
+    evidence = replace(result.evidence or FitEvidence(), consensus=count, seed_spread_mm=spread_mm)
+    return replace(result, evidence=evidence)
+
+
+def require_robust_poses(count: int, minimum: int) -> None:
+    """Refuse an outlier search among too few poses.
+
+    Raises:
+        CalibrationError: ``robust_too_few``.
+    """
+    if count < minimum:
+        raise CalibrationError(
+            "robust_too_few",
+            tr(
+                "Among {count} poses no outlier can be told; it takes {minimum}.",
+                count=count,
+                minimum=minimum,
+            ),
+            remedy=tr("Take more poses, or solve them without a search for outliers."),
+        )

@@ -118,6 +118,7 @@ if TYPE_CHECKING:
     from robolink.calibration.quality.tool_fits import ToolFit as ToolFit
     from robolink.calibration.quality.tool_fits import better_fit as better_fit
     from robolink.calibration.quality.tool_fits import tool_fits as tool_fits
+    from robolink.calibration.quality.type_b import with_type_b as with_type_b
     from robolink.calibration.quality.units import RobotReach as RobotReach
     from robolink.calibration.quality.units import require_near as require_near
     from robolink.calibration.quality.units import require_stored_scale as require_stored_scale
@@ -178,6 +179,7 @@ __getattr__ = lazy_exports(
         "quality.moved_station": "StationShift TipShift judge_shifts",
         "quality.tolerances": "PLANAR_TOLERANCE TOUCH_TOLERANCE Tolerance",
         "quality.tool_fits": "ToolFit better_fit tool_fits",
+        "quality.type_b": "with_type_b",
         "quality.units": "RobotReach require_near require_stored_scale require_within_reach",
         "quality.update_guard": "Correction NEEDLE_LIMIT_MM require_shrinking update_guard "
         "writes_refused_unattended",

@@ -47,16 +47,17 @@ def copies(table: Floats) -> tuple[int, ...]:
     return tuple(found)
 
 
-def leverages(turned: Floats) -> Floats:
+def leverages(centred: Floats, inverse: Floats) -> Floats:
     """Return each pose's leverage, 1 / N + its part of what tells the offset; 0 to 1.
 
     Args:
-        turned: What multiplies the offset, N x d x d rotations. In the plane this is
-            1 / N + |z - mean z|^2 / sum |z - mean z|^2; in space the mean over the axes.
+        centred: What multiplies the offset, less its mean, N x d x d: rotations. In the plane the
+            leverage is 1 / N + |z - mean z|^2 / sum |z - mean z|^2; in space the mean over the
+            axes.
+        inverse: Of the sum of ``centred' centred``.
     """
-    count, dimensions = turned.shape[:2]
-    centred = (turned - turned.sum(axis=0) / count).reshape(-1, dimensions)
-    spread = centred @ np.linalg.inv(centred.T @ centred)
+    count, dimensions = centred.shape[:2]
+    spread = centred.reshape(-1, dimensions) @ inverse
     own = np.einsum("ij,ij->i", spread.reshape(count, -1), centred.reshape(count, -1))
     found: Floats = 1 / count + own / dimensions
     return found
@@ -81,9 +82,12 @@ def with_evidence(
         duplicates: Indices of copies.
         unknowns: How many numbers the fit had to find.
     """
-    found = leverages(turned)
+    centred = turned - turned.sum(axis=0) / len(turned)
+    flat = centred.reshape(-1, turned.shape[1])
+    inverse = np.linalg.inv(flat.T @ flat)
+    found = leverages(centred, inverse)
     alone = kept[found > HIGH_LEVERAGE] if len(kept) > 2 else kept[:0]
-    order = run_order(turned, residuals_mm, unknowns=unknowns)
+    order = run_order(centred, inverse, residuals_mm, unknowns=unknowns)
     evidence = replace(
         result.evidence or FitEvidence(),
         distinct=len(result.inputs) - len(duplicates),

@@ -30,14 +30,19 @@ NOTICEABLE_MM: Final = 0.002
 _SEEN: Final = 1e-6
 """A split is judged when the design leaves so much of its column."""
 
-_MOST_SPLITS: Final = 200
+_ALL_SPLITS_OF: Final = 100
+
+_FEW_SPLITS: Final = 32
 
 
-def run_order(turned: Floats, residuals: Floats, *, unknowns: int) -> RunOrder | None:
+def run_order(
+    centred: Floats, inverse: Floats, residuals: Floats, *, unknowns: int
+) -> RunOrder | None:
     """Return what the order of the touches shows; ``None`` below six touches.
 
     Args:
-        turned: What multiplies the offset in each touch, N x d x d: the rotations.
+        centred: What multiplies the offset in each touch, less its mean, N x d x d: rotations.
+        inverse: Of the sum of ``centred' centred``, d x d: the offset's unit covariance.
         residuals: N x d, mm, of the least squares over offset and point.
         unknowns: Of that fit.
     """
@@ -45,33 +50,29 @@ def run_order(turned: Floats, residuals: Floats, *, unknowns: int) -> RunOrder |
     spare = residuals.size - unknowns - dimensions
     if count < LEAST_TOUCHES or spare < 1:
         return None
-    centred = (turned - turned.sum(axis=0) / count).reshape(count, -1)
-    flat = centred.reshape(-1, dimensions)
-    told = flat.T @ flat
     splits = _splits(count)
-    after = count - splits
-    steps = _Columns(after, after, _sums_after(centred, splits), _sums_after(residuals, splits))
-    ramp = np.arange(count) / (count - 1.0)
-    drifts = _Columns(*(np.array([part]) for part in _sums_of(ramp, centred, residuals)))
-    whole = float((residuals * residuals).sum())
-    f_steps, shifts = _f_of(steps, told, whole, count, spare)
-    f_drift, drift = _f_of(drifts, told, whole, count, spare)
-    seen = int(np.count_nonzero(f_steps >= 0)) or 1
-    at = int(np.argmax(f_steps))
+    gained, shifts = _gained(
+        _columns(centred.reshape(count, -1), residuals, splits), inverse, count
+    )
+    whole = float(np.einsum("ij,ij->", residuals, residuals))
+    f = _as_f(gained, shifts, whole, spare)
+    steps, drift = f[:-1], float(f[-1])
+    at = int(np.argmax(steps))
+    seen = max(int(np.count_nonzero(steps >= 0)), 1)
     return RunOrder(
-        step_f=float(max(f_steps[at], 0.0)),
+        step_f=max(float(steps[at]), 0.0),
         step_f_limit=f_quantile(1 - FALSE_ALARM / seen, dimensions, spare),
         step_after=int(splits[at]),
         step_mm=tuple(shifts[at].tolist()),
-        drift_f=float(max(f_drift[0], 0.0)),
+        drift_f=max(drift, 0.0),
         drift_f_limit=f_quantile(1 - FALSE_ALARM, dimensions, spare),
-        drift_mm=tuple(drift[0].tolist()),
+        drift_mm=tuple(shifts[-1].tolist()),
     )
 
 
 @dataclass(frozen=True, slots=True)
 class _Columns:
-    """Sums over the touches of columns c, a row for each column.
+    """Sums over the touches of columns c, a row for each: the steps, and last the drift.
 
     Attributes:
         sums, squares: Of c and c^2.
@@ -86,41 +87,52 @@ class _Columns:
 
 
 def _splits(count: int) -> Indices:
-    """Return after how many touches a step is looked for; not everywhere among thousands."""
-    if count - 1 <= _MOST_SPLITS:
+    """Return after how many touches a step is looked for; not everywhere among hundreds."""
+    if count <= _ALL_SPLITS_OF:
         return np.arange(1, count)
-    return np.unique(np.linspace(1, count - 1, _MOST_SPLITS).round().astype(np.intp))
+    return np.linspace(1, count - 1, _FEW_SPLITS).round().astype(np.intp)
 
 
-def _sums_after(rows: Floats, splits: Indices) -> Floats:
-    """Return the sum of the rows after each split: from its index on."""
-    parts = np.add.reduceat(rows, splits, axis=0)
-    sums: Floats = parts[::-1].cumsum(axis=0)[::-1]
-    return sums
+def _columns(flat: Floats, residuals: Floats, splits: Indices) -> _Columns:
+    count = len(residuals)
+    after = (count - splits).astype(float)
+    ramp = np.arange(count) / (count - 1.0)
+
+    def summed(rows: Floats) -> Floats:
+        parts = np.add.reduceat(rows, splits, axis=0)
+        return np.concatenate((parts[::-1].cumsum(axis=0)[::-1], (ramp @ rows)[None]))
+
+    return _Columns(
+        np.append(after, ramp.sum()),
+        np.append(after, ramp @ ramp),
+        summed(flat),
+        summed(residuals),
+    )
 
 
-def _sums_of(column: Floats, centred: Floats, residuals: Floats) -> tuple[Floats, ...]:
-    return column.sum(), column @ column, column @ centred, column @ residuals
+def _gained(columns: _Columns, inverse: Floats, count: int) -> tuple[Floats, Floats]:
+    """Return by how much each column shrinks the squares, and the vector that goes with it.
 
-
-def _f_of(
-    columns: _Columns, told: Floats, whole: float, count: int, spare: int
-) -> tuple[Floats, Floats]:
-    """Return F of each column, -1 where the design hides it, and the vector that goes with it.
-
-    A column c stands for c_i times one unknown vector, added to each touch.
+    A column c stands for c_i times one unknown vector, added to each touch. The first is -1 where
+    the design hides the column.
     """
-    dimensions = len(told)
+    dimensions = len(inverse)
     one = np.eye(dimensions)
     across = columns.across.reshape(-1, dimensions, dimensions)
     # d' d: the column's own squares, less what the point and the offset take over.
     left = (columns.squares - columns.sums**2 / count)[:, None, None] * one
-    left = left - across @ np.linalg.solve(told, across.transpose(0, 2, 1))
+    left = left - across @ inverse @ across.transpose(0, 2, 1)
     hidden = np.linalg.eigvalsh(left)[:, 0] < _SEEN * columns.squares
     left[hidden] = one
     shifts: Floats = np.linalg.solve(left, columns.right[..., None])[..., 0].astype(float)
-    gained = (shifts * columns.right).sum(axis=1)
-    f: Floats = gained / dimensions / (np.maximum(whole - gained, 1e-300) / spare)
-    f[np.sqrt((shifts**2).sum(axis=1)) < NOTICEABLE_MM] = 0.0
-    f[hidden] = -1.0
-    return f, shifts
+    gained: Floats = np.einsum("ij,ij->i", shifts, columns.right)
+    return np.where(hidden, -1.0, gained), shifts
+
+
+def _as_f(gained: Floats, shifts: Floats, whole: float, spare: int) -> Floats:
+    left_over = np.maximum(whole - gained, 1e-300) / spare
+    f: Floats = gained / shifts.shape[1] / left_over
+    small = np.einsum("ij,ij->i", shifts, shifts) < NOTICEABLE_MM**2
+    f[small & (gained >= 0)] = 0.0
+    f[gained < 0] = -1.0
+    return f

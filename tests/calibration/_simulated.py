@@ -14,10 +14,10 @@ from robolink.model import Pose, rotate_xy
 PIN = (310.0, 95.0, -40.0)
 TRIALS = 2000
 LEAST, MOST = 0.93, 0.97
+"""What a 95 % interval may hold in 2,000 trials (the standard deviation is 0.5 %)."""
 
 MOST_OF_WIDER = 0.998
 """Where the wider of two intervals is taken, the estimated and the stated one."""
-"""What a 95 % interval may hold in 2,000 trials (the standard deviation is 0.5 %)."""
 
 
 def touching(tip, u_deg, *, pin=PIN, hand=None):

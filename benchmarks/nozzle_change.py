@@ -5,6 +5,7 @@ from statistics import median
 from time import perf_counter_ns
 
 from robolink_cli.prompts.operator import AssistedOperator
+from robolink_simulators.assist.port import InProcessEyes
 from robolink_simulators.hosting.in_process.epson import simulator_named, unregister
 
 import robolink
@@ -27,19 +28,14 @@ def measure_nozzle_change() -> Iterator[Figure]:
 def _change(seed: int) -> tuple[float, float]:
     name = f"bench-{seed}"
     with robolink.connect(f"epson+sim://{name}?seed={seed}") as controller:
-        world = simulator_named(name).world
-
-        def look() -> tuple[float, float, float]:
-            seen = world.operator.look(1)
-            return seen.dx_mm, seen.dy_mm, seen.dz_mm
-
+        eyes = InProcessEyes(simulator_named(name))
         controller.motors(True)
         simulated_ns = controller.clock.now_ns()
         start = perf_counter_ns()
         NozzleChange(
             controller,
             ChangePlan((ToolPlan(1),), ask_before_write=False),
-            operator=AssistedOperator(look, lambda _: None),
+            operator=AssistedOperator.with_eyes(eyes, lambda _: None),
         ).run()
         wall_ns = perf_counter_ns() - start
         simulated_ns = controller.clock.now_ns() - simulated_ns

@@ -53,6 +53,10 @@ def _value(name: str, text: str, hint: Any) -> object:  # noqa: ANN401 - a type 
             if text == str(choice):
                 return choice
         raise _refused(name, text, ", ".join(str(choice) for choice in get_args(hint)))
+    if hint == int | None:
+        if text.lower() == "none":
+            return None
+        hint = int
     if hint is bool:
         if text.lower() in _TRUTH:
             return _TRUTH[text.lower()]

@@ -16,9 +16,10 @@ import pytest
 from robolink.calibration import (
     CalibrationResult,
     Robust,
+    StationPart,
     solve_n_angle,
     student_t,
-    with_type_b,
+    with_station,
     writes_refused_unattended,
 )
 from tests.calibration._simulated import shaken, touching
@@ -101,7 +102,7 @@ def encoder(length_mm, *, common, counted, u_deg=0.01):
             return result
         # An error of all angles alike turns the offset, at right angles to itself.
         parts = ((0.0, 0.0), (0.0, tangential)) if common else np.eye(2) * tangential / 8
-        return with_type_b(result, "angle of U", [list(row) for row in parts], nu=50)
+        return with_station(result, StationPart("angle of U", [list(row) for row in parts], 50))
 
     return measure
 

@@ -9,6 +9,7 @@ import pytest
 from robolink.calibration import (
     RobotReach,
     Robust,
+    StationPart,
     flange_poses,
     in_base,
     require_near,
@@ -19,7 +20,7 @@ from robolink.calibration import (
     solve_pivot,
     solve_two_pose,
     uvw_deg,
-    with_type_b,
+    with_station,
     writes_refused_unattended,
 )
 from robolink.errors import CalibrationError, ConfigError
@@ -240,18 +241,13 @@ def test_residuals_far_beyond_the_stated_sigma_need_somebody_to_look():
 def test_the_uncertainty_of_a_station_is_added_as_squares():
     result = solve_n_angle(shaken(PLAIN, np.random.default_rng(1), 0.02))
     own, nu = math.sqrt(result.covariance[0][0]), 12
-    wider = with_type_b(result, "pin", [[0.01**2, 0.0], [0.0, 0.01**2]], nu=8)
+    wider = with_station(result, StationPart("pin", [[0.01**2, 0.0], [0.0, 0.01**2]], 8))
     assert wider.covariance[0][0] == pytest.approx(own**2 + 0.01**2)
     assert [row.kind for row in budget_of(wider).rows] == ["A", "B"]
     assert wider.half_width95[0] == pytest.approx(budget_of(wider).expanded_mm)
     effective = wider.covariance[0][0] ** 2 / (own**4 / nu + 0.01**4 / 8)
     assert budget_of(wider).nu_eff == pytest.approx(effective)
     assert (wider.region95_radius_mm or 0.0) > (result.region95_radius_mm or 0.0)
-    unknown = with_type_b(solve_two_pose(*PLAIN[:2]), "pin", [[1e-4, 0.0], [0.0, 1e-4]])
-    assert unknown.half_width95 == ()
-    assert budget_of(unknown).not_assessed == ("scatter of the touches",)
-    with pytest.raises(ValueError, match="2 lengths"):
-        with_type_b(result, "pin", [[1.0]])
 
 
 def scattered(count, tips, random):

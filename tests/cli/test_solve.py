@@ -9,6 +9,8 @@ from typing import Any
 import pytest
 from robolink_cli import main
 from robolink_cli.commands.measure.solve.solving import METHODS
+from robolink_cli.commands.measure.solve.station_methods import STATION_METHODS
+from robolink_cli.commands.measure.solve.touch_methods import TOUCH_METHODS
 
 from robolink.calibration import Beam
 from robolink.model import rotate_xy
@@ -311,6 +313,17 @@ MORE: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
         {"sightings": [{"flange": p, "tip": {"x": PIN[0], "y": PIN[1]}} for p in ROUND]},
         {"offset": [12.5, -3.25], "centre_mm": [0, 0]},
     ),
+    "gauge_rr": (
+        {
+            "values": [[[1.0, 1.2], [1.0, 1.2]], [[4.0, 4.2], [4.0, 4.2]]],
+            "axes": ["nozzle", "person", "repeat"],
+        },
+        {"interaction_p": 1, "reproducibility_mm": 0, "repeatability_mm": 0.1264911064067352},
+    ),
+    "control_chart": (
+        {"baseline": [1, 2] * 12, "values": [1, 2]},
+        {"centre": 1.5, "limits": [1.5 - 3 / 1.128, 1.5 + 3 / 1.128]},
+    ),
     "verify": ({"poses": ROUND, "offset": TIP}, {"max_drift_mm": 0, "passed": True}),
     "update_guard": ({"new": {"x": 12.5}, "stored": {"x": 12.2}}, {"correction_mm": 0.3}),
     "suggest_poses": (
@@ -431,7 +444,9 @@ def test_no_method_is_left_untried():
         "orientation_convert",
     }
     here = {"find_beams", "joint", "board_fit", "uncertainty_budget"}
-    assert set(METHODS) == set(MORE) | shared | here
+    touching = {*TOUCH_METHODS}  # tests/calibration/test_touch_evidence.py
+    lasting = {*STATION_METHODS}  # tests/calibration/test_station_part.py
+    assert set(METHODS) == set(MORE) | shared | here | touching | lasting
 
 
 def test_looking_at_a_controller_does_not_load_numpy():

@@ -2,6 +2,7 @@
 
 import pytest
 from robolink_cli.prompts.operator import AssistedOperator
+from robolink_simulators.assist.port import InProcessEyes
 
 from robolink.errors import ControllerFaultError, DeclinedError, HeartbeatLostError
 from robolink.model import Path, WorkBox
@@ -129,16 +130,10 @@ def test_nobody_is_asked_when_the_cell_is_not_as_it_was(cell, controller, change
 
 def calibrated(cell, controller):
     """Calibrate slot 1 as a person does who looks at the tip and says yes to everything."""
-    world = cell.simulator.world
-
-    def look():
-        seen = world.operator.look(1)
-        return seen.dx_mm, seen.dy_mm, seen.dz_mm
-
     said: list[str] = []
     limits = Limits(speed_percent=5, speed_mm_s=20.0)
     plan = ChangePlan((ToolPlan(1),), limits)
-    operator = AssistedOperator(look, said.append)
+    operator = AssistedOperator.with_eyes(InProcessEyes(cell.simulator), said.append)
     (report,) = NozzleChange(controller, plan, operator=operator).run().tools
     return report, said
 

@@ -10,6 +10,7 @@ from itertools import count
 import pytest
 from robolink_cli import main
 from robolink_cli.prompts.operator import AssistedOperator
+from robolink_simulators.assist.port import InProcessEyes
 from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.hosting.in_process import softmotion
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
@@ -70,11 +71,7 @@ def slot(simulator, number=1):
 
 
 def eyes(simulator):
-    def look():
-        seen = simulator.world.operator.look(1)
-        return seen.dx_mm, seen.dy_mm, seen.dz_mm
-
-    return AssistedOperator(look, lambda _text: None)
+    return AssistedOperator.with_eyes(InProcessEyes(simulator), lambda _text: None)
 
 
 def change(controller, simulator, *, listener=None, verify=True):
@@ -183,7 +180,7 @@ def test_six_axes_are_sent_v_and_w_but_four_are_refused(tmp_path, monkeypatch):
         monkeypatch.setattr(
             f"{robot}.motion.group.EpsonGroup.axes", lambda _: {"joints": (0.0,) * 6}
         )
-        monkeypatch.setattr(f"{robot}.link.robot.Robot.six_axes", property(lambda _: True))
+        monkeypatch.setattr(f"{robot}.link.asked_once.Robot.six_axes", property(lambda _: True))
         shown = cell.run("calibrate", "pivot", "--tool", "1", "--dry-run", "--json")
         assert shown.code == 0, shown.err
         sent = [line for step in shown.document["steps"] for line in step["requests"]]

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 from robolink_cli.prompts.operator import AssistedOperator
+from robolink_simulators.assist.port import InProcessEyes
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
@@ -31,15 +32,8 @@ def orientation(offset):
 
 
 def person(simulator, way_mm=12.0):
-    operator = simulator.world.operator
-
-    def look():
-        seen = operator.look(1)
-        return seen.dx_mm, seen.dy_mm, seen.dz_mm
-
-    return AssistedOperator(
-        look, lambda _text: None, way=lambda axis: operator.way_along(axis, way_mm)
-    )
+    eyes = InProcessEyes(simulator)
+    return AssistedOperator.with_eyes(eyes, lambda _text: None, way_mm=way_mm)
 
 
 def change(controller, simulator, *, listener=None, verify=True):
@@ -157,7 +151,7 @@ def test_six_axes_of_an_arm_would_do_it_too(tmp_path, monkeypatch):
         monkeypatch.setattr(
             f"{robot}.motion.group.EpsonGroup.axes", lambda _: {"joints": (0.0,) * 6}
         )
-        monkeypatch.setattr(f"{robot}.link.robot.Robot.six_axes", property(lambda _: True))
+        monkeypatch.setattr(f"{robot}.link.asked_once.Robot.six_axes", property(lambda _: True))
         shown = cell.run("calibrate", "six-point", "--tool", "1", "--dry-run", "--json")
         assert shown.code == 0, shown.err
         steps = shown.document["steps"]

@@ -79,7 +79,8 @@ def test_the_assist_port_pushes_buttons(assisted):
 
 def test_the_assist_port_counts_and_changes_the_nozzle(assisted):
     _, assist, simulator = assisted
-    assert assist.do("counters") == {"exchanges": 0, "moves_started": 0, "flash_writes": 0}
+    counted = {"exchanges": 0, "moves_started": 0, "flash_writes": 0, "touches": 0}
+    assert assist.do("counters") == counted
     tip = assist.do("change_nozzle")["tip"]
     assert tip["x_mm"] == simulator.world.tips[1].x_mm
 

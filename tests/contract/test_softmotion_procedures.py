@@ -2,6 +2,7 @@
 
 import pytest
 from robolink_cli.prompts.operator import AssistedOperator
+from robolink_simulators.assist.port import InProcessEyes
 from robolink_simulators.softmotion.mailbox import PlcFault, PlcFaultAction
 
 from robolink.backup import (
@@ -103,14 +104,10 @@ def test_a_backup_goes_through_a_file_and_a_restore_brings_it_back(cell, control
 def test_a_nozzle_change_finds_the_true_tip_writes_it_once_and_proves_it(cell, controller):
     world, before = cell.simulator.world, cell.slot_changes(1)
 
-    def look():
-        seen = world.operator.look(1)
-        return seen.dx_mm, seen.dy_mm, seen.dz_mm
-
     said: list[str] = []
     limits = Limits(speed_percent=100, speed_mm_s=2000.0)
     plan = ChangePlan((ToolPlan(1),), limits, ask_before_write=False)
-    operator = AssistedOperator(look, said.append)
+    operator = AssistedOperator.with_eyes(InProcessEyes(cell.simulator), said.append)
     (report,) = NozzleChange(controller, plan, operator=operator).run().tools
     found, truth = controller.tools.read(1), world.tips[1]
     assert found is not None

@@ -13,6 +13,7 @@ from queue import SimpleQueue
 
 import pytest
 from robolink_cli.prompts.operator import AssistedOperator
+from robolink_simulators.assist.port import InProcessEyes
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.in_process.epson import register, unregister
 
@@ -178,12 +179,8 @@ class Change:
     said: list[str] = field(default_factory=list)
 
     def run(self, outcomes: InterruptingLog) -> None:
-        def look():
-            seen = self.simulator.world.operator.look(1)
-            return seen.dx_mm, seen.dy_mm, seen.dz_mm
-
         with robolink.connect(register("interrupted", self.simulator), outcomes=outcomes) as robot:
-            operator = AssistedOperator(look, self.said.append)
+            operator = AssistedOperator.with_eyes(InProcessEyes(self.simulator), self.said.append)
             plan = ChangePlan((ToolPlan(1),), ask_before_write=False)
             NozzleChange(robot, plan, operator=operator).run()
 

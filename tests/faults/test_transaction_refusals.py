@@ -5,6 +5,7 @@ from itertools import count
 
 import pytest
 from robolink_cli.prompts.operator import AssistedOperator
+from robolink_simulators.assist.port import InProcessEyes
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.world import STORED
 from robolink_simulators.hosting.in_process.epson import register, unregister
@@ -30,15 +31,12 @@ class Cell:
         """Put a nozzle on whose tip is off the first one's by so much."""
         self.simulator.world.tips[1] = replace(STORED, x_mm=STORED.x_mm + dx_mm)
 
-    def look(self):
-        seen = self.simulator.world.operator.look(1)
-        return seen.dx_mm, seen.dy_mm, seen.dz_mm
-
     def change(self, *, operator=None, listener=None):
         NozzleChange(
             self.controller,
             ChangePlan((ToolPlan(1),), ask_before_write=False),
-            operator=operator or AssistedOperator(self.look, lambda _: None),
+            operator=operator
+            or AssistedOperator.with_eyes(InProcessEyes(self.simulator), lambda _: None),
             listener=listener,
             earlier=lambda tool: earlier_corrections(self.controller, tool),
         ).run()
@@ -90,7 +88,7 @@ def test_a_pin_that_is_not_reached_is_refused(cell):
     cell.simulator.world.pin_mm = (x_mm, y_mm, z_mm - 100)
     said: list[str] = []
     with pytest.raises(DeclinedError, match="jogs in a row were refused"):
-        cell.change(operator=GivesUp(cell.look, said.append))
+        cell.change(operator=GivesUp.with_eyes(InProcessEyes(cell.simulator), said.append))
     assert any("box" in sentence for sentence in said), said
     cell.check_the_tool_is(STORED, writes=0)
     (entry,) = cell.recorded(EntryKind.REFUSED)

@@ -13,7 +13,11 @@ from robolink_cli.console.render import note
 from robolink_cli.prompts.lines import QUIET_S, Lines, open_lines
 
 if TYPE_CHECKING:
+    from robolink_simulators.assist.port import AssistClient, InProcessEyes
+    from robolink_simulators.cell.habits import PersonManner
     from robolink_simulators.cell.places import Axis, XyzMm
+
+    from robolink.timing import Clock
 
 WAY_MM: Final = 60.0
 """How far the stand-in jogs to show an axis."""
@@ -26,7 +30,8 @@ class TerminalOperator:
     """Asks on the terminal, with a prompt that can be polled.
 
     The caller can look after the controller while the person takes their time; ``input()`` could
-    not be left. What was typed before something was shown is no answer to it: see :mod:`._lines`.
+    not be left. What was typed before something was shown is no answer to it: see
+    :mod:`robolink_cli.prompts.lines`.
     """
 
     def __init__(self, show: Callable[[str], None]) -> None:
@@ -88,12 +93,18 @@ def terminal() -> TerminalOperator:
 class AssistedOperator:
     """Stands in for the person on a simulator: looks at the tip and types jog steps.
 
+    The one simulated person of demonstration, tests and ``--assist``; :meth:`with_eyes` makes it.
+    Their habits are parameters of the simulated world (docs/camera-and-board.md, "Habits").
+
     Args:
         look: Returns the vector, in mm, that the simulated person sees from the tip to the
             pin.
         show: Where to echo questions and answers.
         way: Returns the vector, in mm, along an axis of the tool as the simulated person sees it;
             without it they know of none, and jog nowhere to show one.
+        manner: Returns how they take a question, given whether it asks for a touch; without it
+            they have no habits and do not think.
+        clock: By which they think.
         max_step_mm: Largest step it types at once.
         satisfied_mm: Content when less than this is seen on each axis; an eye that reads
             with an error would otherwise jog for ever.
@@ -105,35 +116,80 @@ class AssistedOperator:
         show: Callable[[str], None],
         *,
         way: "Callable[[Axis], XyzMm]" = lambda _axis: (0.0, 0.0, 0.0),
+        manner: "Callable[[bool], PersonManner] | None" = None,
+        clock: "Clock | None" = None,
         max_step_mm: float = 5.0,
         satisfied_mm: float = 0.02,
     ) -> None:
         self._look = look
         self._show = show
         self._way = way
+        self._manner = manner
+        self._clock = clock
         self._max_step_mm = max_step_mm
         self._satisfied_mm = satisfied_mm
         self._kind = Question.PLACE
         self._ahead: list[str] = []
         self._answers = 0
+        self._stays = False
+        self._thinking_s = 0.0
+
+    @classmethod
+    def with_eyes(
+        cls,
+        eyes: "AssistClient | InProcessEyes",
+        show: Callable[[str], None],
+        *,
+        tool: Callable[[], int] = lambda: 1,
+        clock: "Clock | None" = None,
+        way_mm: float = WAY_MM,
+    ) -> "AssistedOperator":
+        """Return the person of a simulated cell, with the habits that its world gives them.
+
+        Args:
+            eyes: Theirs.
+            show: Where to echo questions and answers.
+            tool: Tells which tip they are to look at.
+            clock: By which they think, that of the controller; without one they do not.
+            way_mm: How far they jog to show an axis.
+        """
+
+        def look() -> "XyzMm":
+            seen = eyes.look(tool())
+            return seen.dx_mm, seen.dy_mm, seen.dz_mm
+
+        return cls(
+            look,
+            show,
+            way=lambda axis: eyes.way_along(axis, way_mm, tool()),
+            manner=lambda touch: eyes.be_asked(touch=touch, tool=tool()),
+            clock=clock,
+        )
 
     def tell(self, text: str) -> None:
         """Echo a line."""
         self._show(text)
 
     def ask(self, question: str, kind: Question) -> None:
-        """Echo the question."""
+        """Echo the question, and take it in the way that this person has."""
         self._kind = kind
         self._answers = 0
-        self._ahead = list(self._steps_along(kind))
+        self._stays, self._thinking_s, turns = False, 0.0, list[str]()
+        if self._manner is not None:
+            manner = self._manner(kind is Question.PLACE)
+            self._stays, self._thinking_s = manner.stays, manner.thinks_s
+            turns = [f"u{manner.turn_deg:+.3f}"] if manner.turn_deg else []
+        self._ahead = [*turns, *self._steps_along(kind)]
         self._show(question)
 
-    def poll(self, wait_s: float) -> str | None:  # noqa: ARG002 - it answers at once
-        """Answer: the jog steps still needed, or done.
+    def poll(self, wait_s: float) -> str | None:
+        """Answer: the jog steps still needed, or done; ``None`` while the person thinks.
 
         Raises:
             DeclinedError: It has answered this question so often that it will never get there.
         """
+        if self._thinks(wait_s):
+            return None
         self._answers += 1
         if self._answers > MOST_STEPS:
             raise DeclinedError(
@@ -147,12 +203,23 @@ class AssistedOperator:
             return "y"
         if self._kind is Question.TEXT:
             return tr("simulated")
+        if self._stays:
+            self._show(tr("  operator: presses ENTER, without a look"))
+            return ""
+        steps, arrived = self._ahead.pop(0) if self._ahead else "", tr("there")
         if self._kind is Question.PLACE:
-            steps, arrived = self._steps_to_pin(), tr("on the pin")
-        else:
-            steps, arrived = self._ahead.pop(0) if self._ahead else "", tr("there")
+            steps, arrived = steps or self._steps_to_pin(), tr("on the pin")
         self._show(tr("  operator: {answer}", answer=steps or arrived))
         return steps or "done"
+
+    def _thinks(self, wait_s: float) -> bool:
+        """Let the person think, for ``wait_s`` at most; tell whether they go on thinking."""
+        if self._clock is None:
+            return False
+        pause_s = min(wait_s, self._thinking_s)
+        self._clock.sleep(pause_s)
+        self._thinking_s -= pause_s
+        return self._thinking_s > 0
 
     def _steps_to_pin(self) -> str:
         # Sideways first, down last, as one does with a needle.
@@ -187,12 +254,15 @@ class AssistedOperator:
 
 
 @contextmanager
-def operator_at(assist_url: str | None, tool: Callable[[], int]) -> Iterator[Operator]:
+def operator_at(
+    assist_url: str | None, tool: Callable[[], int], clock: "Clock"
+) -> Iterator[Operator]:
     """Yield the person at the terminal, or a simulator's stand-in for one.
 
     Args:
         assist_url: The simulator's assist URL, ``None`` for a real person.
         tool: Tells which tip the stand-in is to look at.
+        clock: The controller's, by which the stand-in thinks.
     """
     if assist_url is None:
         yield terminal()
@@ -200,12 +270,4 @@ def operator_at(assist_url: str | None, tool: Callable[[], int]) -> Iterator[Ope
     from robolink_simulators.assist.port import open_eyes
 
     with open_eyes(assist_url) as eyes:
-
-        def look() -> "XyzMm":
-            seen = eyes.look(tool())
-            return seen.dx_mm, seen.dy_mm, seen.dz_mm
-
-        def way(axis: "Axis") -> "XyzMm":
-            return eyes.way_along(axis, WAY_MM, tool())
-
-        yield AssistedOperator(look, note, way=way)
+        yield AssistedOperator.with_eyes(eyes, note, tool=tool, clock=clock)

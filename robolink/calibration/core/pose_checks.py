@@ -1,7 +1,7 @@
 """What makes poses and other numbers unfit, by name (docs/reference/calibration.md 3)."""
 
 import math
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 from robolink.errors import CalibrationError
@@ -66,21 +66,6 @@ def check_frames(
             ),
         )
     return ("mixed_hand",) if len(hands) > 1 else ()
-
-
-def require_base(poses: Iterable[Pose]) -> None:
-    """Refuse poses of a local, for methods that know a place in the base.
-
-    Raises:
-        CalibrationError: ``local_pose``.
-    """
-    found = next((pose.local for pose in poses if pose.local), 0)
-    if found:
-        raise CalibrationError(
-            "local_pose",
-            tr("These positions are given in local {local}, not in the base.", local=found),
-            remedy=tr("Say what local {local} is, or take them in local 0.", local=found),
-        )
 
 
 def _refuse_tools(tools: Collection[int]) -> None:

@@ -1,7 +1,10 @@
 """What a calibration proposes, and how much of it was measured."""
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
+from enum import Enum
+from typing import Final
 
 from robolink.calibration.core.budget import UncertaintyBudget
 from robolink.calibration.core.evidence import FitEvidence
@@ -19,7 +22,7 @@ class CalibrationResult:
     """A proposal for a tool offset. Nothing has been written.
 
     Attributes:
-        method: How it was measured, for example ``two_pose``.
+        method: Name of the calibration method, for example ``two-pose``.
         offset: The proposed offset: measured components, and the others as they were kept.
         measured: Names of the components that the measurement determines.
         kept: Names of the components that were not measured and are proposed unchanged.
@@ -109,17 +112,62 @@ class CalibrationResult:
         return tuple(math.hypot(*residual) for residual in self.residuals_mm)
 
 
+GUARD_FACTOR: Final = 1.65
+"""A one-sided error of 5 % on either side."""
+
+PERSON_U_DRIFT_MM: Final = 0.03
+PROBE_U_DRIFT_MM: Final = 0.01
+
+
+class DriftVerdict(Enum):
+    """What a drift says about the tip; the value is its code."""
+
+    PASSED = ""
+    UNDECIDED = "drift_undecided"
+    FAILED = "large_drift"
+
+
+def judge_drift(drift_mm: float, u_mm: float, tolerance_mm: float) -> DriftVerdict:
+    """Return whether one drift is inside a tolerance, with a guard band for what a touch scatters.
+
+    What passes is inside by the uncertainty, what fails outside by it, after ISO 14253-1
+    (docs/reference/evidence.md 1).
+
+    Args:
+        drift_mm: The drift that was found.
+        u_mm: Its standard uncertainty.
+        tolerance_mm: What is allowed.
+    """
+    guard_mm = GUARD_FACTOR * u_mm
+    if drift_mm + guard_mm <= tolerance_mm:
+        return DriftVerdict.PASSED
+    if drift_mm - guard_mm > tolerance_mm:
+        return DriftVerdict.FAILED
+    return DriftVerdict.UNDECIDED
+
+
+def worst_of(verdicts: Iterable[DriftVerdict]) -> DriftVerdict:
+    """Return what drifts at several angles say together."""
+    found = set(verdicts)
+    for verdict in (DriftVerdict.FAILED, DriftVerdict.UNDECIDED):
+        if verdict in found:
+            return verdict
+    return DriftVerdict.PASSED
+
+
 @dataclass(frozen=True, slots=True)
 class Drift:
     """How far the tip left the reference point when the tool stood at ``u_deg``.
 
-    ``dz_mm`` stays 0 where only the plane is judged.
+    ``dz_mm`` stays 0 where only the plane is judged. ``u_mm`` is the standard uncertainty of a
+    drift that a person showed by touching, 0 where none is counted.
     """
 
     u_deg: float
     dx_mm: float
     dy_mm: float
     dz_mm: float = 0.0
+    u_mm: float = 0.0
 
     @property
     def distance_mm(self) -> float:
@@ -132,13 +180,14 @@ class VerifyResult:
     """Drift of the tip about the reference point, one entry per angle.
 
     ``warnings`` are named doubts about the test itself; ``heights_only`` tells that a surface was
-    touched, which shows Z and nothing else.
+    touched, which shows Z and nothing else. ``codes`` name why its touches do not count.
     """
 
     drifts: tuple[Drift, ...]
     tolerance_mm: float
     warnings: tuple[str, ...] = ()
     heights_only: bool = False
+    codes: tuple[str, ...] = ()
 
     @property
     def max_drift_mm(self) -> float:
@@ -146,9 +195,16 @@ class VerifyResult:
         return max(drift.distance_mm for drift in self.drifts)
 
     @property
+    def verdict(self) -> DriftVerdict:
+        """What the drifts say, each with its guard band."""
+        return worst_of(
+            judge_drift(drift.distance_mm, drift.u_mm, self.tolerance_mm) for drift in self.drifts
+        )
+
+    @property
     def passed(self) -> bool:
-        """Whether every drift is inside the tolerance."""
-        return self.max_drift_mm <= self.tolerance_mm
+        """Whether every drift is inside the tolerance, and its touches count."""
+        return not self.codes and self.verdict is DriftVerdict.PASSED
 
 
 def offset_sigma_mm(result: CalibrationResult) -> float | None:

@@ -16,6 +16,8 @@ from robolink.calibration.core.pose_checks import keep_unmeasured
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.core.robust import Floats, Indices, Mask, Robust
 from robolink.calibration.core.rotations import checked_table, pose_table
+from robolink.calibration.evidence.pose_evidence import copies, with_evidence
+from robolink.calibration.evidence.robust_evidence import require_robust_poses, with_consensus
 from robolink.calibration.pin.planar import (
     UNKNOWNS,
     Complexes,
@@ -24,12 +26,6 @@ from robolink.calibration.pin.planar import (
     planar_consensus,
 )
 from robolink.calibration.quality.fit_quality import judged
-from robolink.calibration.quality.pose_evidence import (
-    copies,
-    require_robust_poses,
-    with_consensus,
-    with_evidence,
-)
 from robolink.calibration.quality.tolerances import PLANAR_TOLERANCE, Tolerance
 from robolink.errors import CalibrationError
 from robolink.messages import tr
@@ -103,7 +99,7 @@ def solve_n_angle(
     taken = ~kept
     taken[list(duplicates)] = False
     result = CalibrationResult(
-        method="n_angle",
+        method="n-angle",
         offset=keep_unmeasured(stored, x_mm=tip.real, y_mm=tip.imag),
         measured=("x_mm", "y_mm"),
         kept=_KEPT,

@@ -14,6 +14,8 @@ from robolink.calibration.core.pose_checks import keep_unmeasured
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.core.robust import Floats, Indices, Mask, Robust
 from robolink.calibration.core.rotations import checked_table, rotations
+from robolink.calibration.evidence.pose_evidence import copies, with_evidence
+from robolink.calibration.evidence.robust_evidence import require_robust_poses, with_consensus
 from robolink.calibration.pin.pivot_fit import (
     MINIMAL,
     UNKNOWNS,
@@ -23,12 +25,6 @@ from robolink.calibration.pin.pivot_fit import (
     pivot_design,
 )
 from robolink.calibration.quality.fit_quality import judged
-from robolink.calibration.quality.pose_evidence import (
-    copies,
-    require_robust_poses,
-    with_consensus,
-    with_evidence,
-)
 from robolink.calibration.quality.tolerances import TOUCH_TOLERANCE, Tolerance
 from robolink.errors import CalibrationError
 from robolink.messages import tr

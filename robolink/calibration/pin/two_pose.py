@@ -80,7 +80,7 @@ def solve_two_pose(
     if on_its_head((first, second)):
         t_y = -t_y
     result = CalibrationResult(
-        method="two_pose",
+        method="two-pose",
         offset=keep_unmeasured(stored, x_mm=t_x, y_mm=t_y),
         measured=MEASURED,
         kept=("z_mm", "u_deg", "v_deg", "w_deg"),

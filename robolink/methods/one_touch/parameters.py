@@ -6,8 +6,8 @@ from typing import Annotated, Literal
 from annotated_types import Ge, Le
 
 from robolink.messages import tr
-from robolink.methods.declaration import MM, Help, Option
-from robolink.methods.pin_parameters import PinParameters
+from robolink.methods.declaration.method import MM, Help, Option
+from robolink.methods.declaration.pin_parameters import PinParameters
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,6 +43,10 @@ class OneTouchParameters(PinParameters):
         ),
     ] = 5.0
 
+    def room_mm(self) -> float:
+        """Return how high the box has to be."""
+        return self.lift_mm
+
     def no_residual(self) -> str:
         """Return why residuals cannot be judged."""
-        return tr("cannot be judged: one touch leaves no residual; use interval_mm")
+        return tr("cannot be judged: one touch leaves no residual; limit the interval")

@@ -12,7 +12,7 @@ from robolink.calibration import (
     CalibrationResult,
     ToolFit,
     better_fit,
-    flange_pose,
+    flange_of,
     tilted_flange_pose,
     tool_fits,
 )
@@ -115,7 +115,7 @@ class PointsSource:
             return PosesFound(self._method.solve(flange, stored), (), None)
         for number, taught in tools.items():
             _require_upright(number, taught)
-        flange = [flange_pose(pose, tools[self._tool_of(pose)]) for pose in poses]
+        flange = [flange_of(pose, tools[self._tool_of(pose)]) for pose in poses]
         result = self._method.solve(flange, stored)
         if named != {self._taught_tool}:
             return PosesFound(result, (), None)

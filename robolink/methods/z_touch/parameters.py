@@ -9,7 +9,7 @@ from annotated_types import Ge, Le, MinLen
 from robolink.calibration import MIN_ROTATION_DEG
 from robolink.files.toml import Problem
 from robolink.messages import tr
-from robolink.methods.declaration import (
+from robolink.methods.declaration.method import (
     DEGREES,
     MM,
     MM_S,
@@ -20,7 +20,7 @@ from robolink.methods.declaration import (
     MethodParameters,
     Option,
 )
-from robolink.methods.pin_parameters import clearance_below_lift
+from robolink.methods.declaration.pin_parameters import clearance_below_lift
 from robolink.procedures import SamplingPolicy, may_end_early
 
 _SPEEDS_APART: Final = 1.5
@@ -44,7 +44,12 @@ class ZTouchParameters(MethodParameters):
         MinLen(2),
         MM_S,
         Option(metavar="2,1,.."),
-        Help(tr("Speed of each touch; two that differ tell the latency of the trigger.")),
+        Help(
+            tr(
+                "Speed of each touch; two that differ tell the latency of the trigger, three in "
+                "four touches or more also how far the robot runs on while it brakes."
+            )
+        ),
     ] = (2.0, 1.0, 2.0, 1.0)
     clearance_mm: Annotated[
         float,
@@ -132,13 +137,17 @@ class ZTouchParameters(MethodParameters):
             )
         yield from clearance_below_lift(self.clearance_mm, self.lift_mm, check)
 
+    def room_mm(self) -> float:
+        """Return how high the box has to be."""
+        return self.lift_mm
+
     def no_residual(self) -> str:
         """Return why residuals cannot be judged, empty when they can."""
         if len(self.speeds_mm_s) > 2:
             return ""
         return tr(
             "cannot be judged: two touches always agree, so they leave no residual; give four "
-            "speeds_mm_s, or interval_mm with sigma_mm"
+            "speeds, or limit the interval and state the standard deviation"
         )
 
 

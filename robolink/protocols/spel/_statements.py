@@ -1,8 +1,8 @@
 """Statements, built from typed values; nothing a person typed passes through unseen.
 
-A :data:`Statement` is made by a function of this package and nowhere else. All but
-:func:`raw` write strict ASCII numbers into a fixed form, so that no value can turn into
-another statement.
+A :data:`Statement` is made by a function of this package, which writes strict ASCII numbers into a
+fixed form, so that no value can turn into another statement. The one door past them is
+:meth:`robolink.controllers.epson.EpsonController.execute_raw`.
 """
 
 from typing import Final, NewType, TypeVar
@@ -10,7 +10,7 @@ from typing import Final, NewType, TypeVar
 from robolink.errors import LocalProtocolError
 from robolink.messages import tr
 from robolink.model import Hand, Pose, ToolOffset
-from robolink.protocols.spel._numbers import decimal
+from robolink.protocols.spel._values import decimal
 
 Statement = NewType("Statement", str)
 """One SPEL+ statement, fit for Execute."""

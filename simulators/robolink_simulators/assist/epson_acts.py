@@ -58,6 +58,7 @@ def _counters(simulator: EpsonSimulator, _request: Parameters) -> Answer:
         "exchanges": simulator.exchanges,
         "moves_started": simulator.machine.arm.moves_started,
         "flash_writes": simulator.machine.flash_writes,
+        "touches": simulator.world.operator.touches,
     }
 
 

@@ -47,6 +47,7 @@ def _counters(simulator: SoftMotionSimulator, _request: Parameters) -> Answer:
         "moves_started": simulator.plc.group.movements_started,
         "slot_writes": sum(slot.counter for slot in slots),
         "starts": simulator.plc.starts,
+        "touches": simulator.world.operator.touches,
     }
 
 

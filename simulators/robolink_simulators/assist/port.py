@@ -17,6 +17,7 @@ from robolink.errors import ConfigError, ConnectError, RobolinkError, TransportB
 from robolink.messages import tr
 from robolink_simulators.assist.acts import Assisted, perform
 from robolink_simulators.cell.clock import ScaledClock
+from robolink_simulators.cell.habits import PersonManner
 from robolink_simulators.cell.person import PersonLook
 from robolink_simulators.cell.places import Axis, XyzMm
 from robolink_simulators.epson.refusals import SpelRefusal
@@ -24,6 +25,10 @@ from robolink_simulators.hosting.in_process import epson as in_process
 from robolink_simulators.hosting.in_process import softmotion as plc_in_process
 from robolink_simulators.hosting.streams.tcp_host import TcpHost
 from robolink_simulators.softmotion.smc_errors import BlockRefused
+
+LEAST_THINKING_S: Final = 0.35
+"""However fast simulated time passes, a person who thinks at all really answers no sooner: a driver
+takes it for typed ahead when an answer comes before the question can have been read."""
 
 _MAX_LINE: Final = 65536
 _SCHEME: Final = "assist+tcp"
@@ -45,7 +50,7 @@ def serve_assist(simulator: Assisted, *, port: int = 0, clock: ScaledClock) -> T
         ConnectError: The port is taken.
     """
     return TcpHost(
-        _AssistDevice(simulator),
+        _AssistDevice(simulator, clock),
         _SCHEME,
         ("127.0.0.1", port),
         clock=clock,
@@ -56,11 +61,12 @@ def serve_assist(simulator: Assisted, *, port: int = 0, clock: ScaledClock) -> T
 class _AssistDevice:
     """Implements :class:`~robolink_simulators.hosting.seam.WireDevice`."""
 
-    def __init__(self, simulator: Assisted) -> None:
+    def __init__(self, simulator: Assisted, clock: ScaledClock) -> None:
         self._simulator = simulator
+        self._clock = clock
 
     def connect(self, now_ns: int) -> "_AssistLink":  # noqa: ARG002 - time plays no part
-        return _AssistLink(self._simulator)
+        return _AssistLink(self._simulator, self._clock)
 
     def advance(self, now_ns: int) -> None:
         """Nothing happens here by itself."""
@@ -72,8 +78,9 @@ class _AssistDevice:
 class _AssistLink:
     """Implements :class:`~robolink_simulators.hosting.seam.DeviceLink`."""
 
-    def __init__(self, simulator: Assisted) -> None:
+    def __init__(self, simulator: Assisted, clock: ScaledClock) -> None:
         self._simulator = simulator
+        self._clock = clock
         self._held = b""
         self._out = b""
         self.closed = False
@@ -100,10 +107,16 @@ class _AssistLink:
             self.closed = True
             return b""
         try:
-            answer = {"ok": True, **perform(self._simulator, request)}
+            answer: dict[str, Any] = {"ok": True, **perform(self._simulator, request)}
+            if "thinks_s" in answer:
+                answer["thinks_s"] = self._real_thinking_s(answer["thinks_s"])
         except (RobolinkError, SpelRefusal, BlockRefused) as error:
             answer = {"ok": False, "error": str(error)}
         return json.dumps(answer).encode() + b"\n"
+
+    def _real_thinking_s(self, thinks_s: float) -> float:
+        """Return how long they think by the clock that really passes, which whoever asks has."""
+        return max(self._clock.really_takes_s(thinks_s), min(thinks_s, LEAST_THINKING_S))
 
 
 class AssistClient(ClosedAtExit):
@@ -164,6 +177,15 @@ class AssistClient(ClosedAtExit):
         x_mm, y_mm, z_mm = answer["way_mm"]
         return x_mm, y_mm, z_mm
 
+    def be_asked(self, *, touch: bool, tool: int) -> PersonManner:
+        """Ask the operator something, and return how they take it.
+
+        Args:
+            touch: Whether they are to bring a tip onto the pin.
+            tool: Whose.
+        """
+        return PersonManner(**self.do("be_asked", touch=touch, tool=tool))
+
     def jog_onto_pin(self) -> dict[str, float]:
         """Jog the tip onto the pin on the pendant (Teach only); return the flange pose."""
         flange: dict[str, float] = self.do("jog_onto_pin")["flange"]
@@ -204,6 +226,12 @@ class InProcessEyes:
         """Return the way, in base axes, that the operator sees an axis of a tool lead."""
         with self._simulator.lock:
             return self._simulator.world.operator.way_along(axis, length_mm, tool)
+
+    def be_asked(self, *, touch: bool, tool: int) -> PersonManner:
+        """Ask the operator something, and return how they take it."""
+        with self._simulator.lock:
+            operator = self._simulator.world.operator
+            return operator.begin_touch(tool) if touch else operator.be_asked()
 
 
 def simulator_at(url: str) -> Assisted:

@@ -29,6 +29,12 @@ def _see(world: Furnished, request: Parameters) -> Answer:
     return {"seen": [list(pixel) for pixel in world.see(mark)]}
 
 
+def _be_asked(world: Furnished, request: Parameters) -> Answer:
+    operator = world.operator
+    touch = bool(request.get("touch", False))
+    return asdict(operator.begin_touch(tool_number(request)) if touch else operator.be_asked())
+
+
 def _way_along(world: Furnished, request: Parameters) -> Answer:
     axis: Axis
     match request.get("axis"):
@@ -82,6 +88,7 @@ def _as_text(value: object) -> str:
 
 WORLD_ACTS: Final[Mapping[str, Act]] = {
     "see": _see,
+    "be_asked": _be_asked,
     "way_along": _way_along,
     "set_world": _set_world,
     "mount_beam": _mount_beam,

@@ -79,3 +79,7 @@ class ScaledClock:
     def real_seconds(self, until_ns: int) -> float:
         """Return how long it really takes until the simulated instant, 0.0 when it passed."""
         return max(0, until_ns - self.now_ns()) / NS_PER_S / self._factor
+
+    def really_takes_s(self, seconds: float) -> float:
+        """Return how many seconds of the base clock so many simulated ones are."""
+        return seconds / self._factor

@@ -1,13 +1,22 @@
-"""The person at a simulated cell: looks at tool and tip, and jogs the tip onto the pin."""
+"""The person at a simulated cell: looks at tool and tip, and jogs the tip onto the pin.
+
+What they do otherwise than they should are their habits: :mod:`robolink_simulators.cell.habits`.
+"""
 
 import math
 import random
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass
+from typing import Final
 
 from robolink.model import Pose
+from robolink_simulators.cell.habits import PersonManner, TouchCourse
 from robolink_simulators.cell.places import Axis, XyzMm
 from robolink_simulators.cell.workplace import MOUNTED_TOOL, Workplace
+
+LAMP_MM: Final = 0.025
+"""So much below the first contact, and not above it, a person stops who watches the lamp of a
+contact input (assumed)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +37,7 @@ class SimulatedOperator:
     Args:
         workplace: What there is to see.
         require_jogging: Raises ConfigError where the person cannot jog.
-        seed: Seed of the eye's errors.
+        seed: Seed of the eye's errors and of the habits.
     """
 
     def __init__(
@@ -36,23 +45,60 @@ class SimulatedOperator:
     ) -> None:
         self._workplace = workplace
         self._require_jogging = require_jogging
+        self._seed = seed
         self._random = random.Random(f"operator {seed}")
         self._placement: tuple[Hashable, int] | None = None
         self._error = PersonLook(0.0, 0.0, 0.0)
+        self._habits = workplace.parameters.habits, workplace.parameters.bump
+        self._course = TouchCourse(self._habits[0], random.Random(f"habits {seed}"))
+        self._manner: PersonManner | None = None
+        self._left_at: tuple[Hashable, int] | None = None
+
+    @property
+    def touches(self) -> int:
+        """How many touches the person has begun since their habits were set."""
+        return self._present_course().touches
+
+    def begin_touch(self, tool: int | None = None) -> PersonManner:
+        """Be asked to bring the tip onto the pin, and return how the person takes it.
+
+        It is the next touch, unless the robot stands where the last one left it: then the same
+        is asked for again.
+
+        Args:
+            tool: Whose tip; the nozzle on the arm by default.
+        """
+        tool = MOUNTED_TOOL if tool is None else tool
+        course = self._present_course()
+        if course.touches and self._left_at == (self._workplace.robot.placement(), tool):
+            self._manner = course.resume()
+        else:
+            self._manner = self._begin_next(tool, asked=True)
+        return self._manner
+
+    def be_asked(self) -> PersonManner:
+        """Be asked something else, and return how the person takes it."""
+        return PersonManner(self._workplace.parameters.person_thinks_s)
 
     def look(self, tool: int | None = None) -> PersonLook:
-        """Return the vector from the tip to the pin, with the eye's error.
+        """Return the vector from the tip to where the person wants it, with the eye's error.
+
+        That is the pin, but for habits. Who only presses ENTER does not look, and sees no gap.
 
         Args:
             tool: Whose tip; the nozzle on the arm by default, whatever tool is selected.
         """
         tool = MOUNTED_TOOL if tool is None else tool
-        placement = (self._workplace.robot.placement(), tool)
+        self._present_course()
+        if self._manner is None:  # nobody asked, so this look begins the touch
+            self._manner = self._begin_next(tool, asked=False)
+        self._left_at = placement = (self._workplace.robot.placement(), tool)
         if placement != self._placement:
             self._placement = placement
             self._error = self._drawn_error()
-        dx, dy, dz = self._gap(tool)
-        return PersonLook(dx, dy, dz)
+        if self._manner.stays:
+            return PersonLook(0.0, 0.0, 0.0)
+        return PersonLook(*self._gap(tool))
 
     def way_along(self, axis: Axis, length_mm: float, tool: int | None = None) -> XyzMm:
         """Return, in base axes, a way along an axis of the tool, with the eye's error at its end.
@@ -71,7 +117,9 @@ class SimulatedOperator:
         )
 
     def jog_onto_pin(self, tool: int | None = None) -> Pose:
-        """Jog until the eye sees no gap; the orientation stays. Return the flange pose.
+        """Touch: jog until the eye sees no gap, and return the flange pose.
+
+        The orientation stays, and so does all of it for a person who only presses ENTER.
 
         Raises:
             ConfigError: The person cannot jog now.
@@ -79,17 +127,40 @@ class SimulatedOperator:
         self._require_jogging()
         tool = MOUNTED_TOOL if tool is None else tool
         robot = self._workplace.robot
-        self._error = self._drawn_error()
-        robot.carry(self._workplace.tips.get(tool), self._gap(tool))
-        self._placement = (robot.placement(), tool)
+        self._manner = manner = self._begin_next(tool, asked=False)
+        if not manner.stays:
+            robot.turn(manner.turn_deg)
+            self._error = self._drawn_error()
+            robot.carry(self._workplace.tips.get(tool), self._gap(tool))
+        self._placement = self._left_at = (robot.placement(), tool)
         return robot.flange()
 
+    def _begin_next(self, tool: int, *, asked: bool) -> PersonManner:
+        course, workplace = self._present_course(), self._workplace
+        workplace.touch_begins(course.touches)
+        self._left_at = (workplace.robot.placement(), tool)
+        return course.begin(workplace.gap_mm(tool), asked=asked)
+
+    def _present_course(self) -> TouchCourse:
+        """Return the touches under the present habits; others begin a new count."""
+        parameters = self._workplace.parameters
+        if self._habits != (parameters.habits, parameters.bump):
+            self._habits = parameters.habits, parameters.bump
+            rng = random.Random(f"habits {self._seed}")
+            self._course = TouchCourse(parameters.habits, rng)
+            self._manner = self._left_at = None
+        return self._course
+
     def _gap(self, tool: int) -> XyzMm:
-        pin, tip, error = self._workplace.pin_mm, self._workplace.tip_mm(tool), self._error
+        robot, error = self._workplace.robot, self._error
+        aim = self._course.aim_mm(robot.turned((1.0, 0.0, 0.0)), robot.turned((0.0, 1.0, 0.0)))
+        gap = self._workplace.gap_mm(tool)
+        wired = self._workplace.parameters.contact_input is not None and tool == MOUNTED_TOOL
+        dz_mm = -abs(error.dz_mm) - LAMP_MM if wired else error.dz_mm
         return (
-            pin[0] - tip[0] + error.dx_mm,
-            pin[1] - tip[1] + error.dy_mm,
-            pin[2] - tip[2] + error.dz_mm,
+            gap[0] + aim[0] + error.dx_mm,
+            gap[1] + aim[1] + error.dy_mm,
+            gap[2] + aim[2] + dz_mm,
         )
 
     def _drawn_error(self) -> PersonLook:

@@ -1,7 +1,8 @@
-"""What a nozzle can trip: a light beam, a touch plate. Fed with the true place of its tip."""
+"""What a nozzle can trip: a beam, a touch plate, the pin. Fed with the true place of its tip."""
 
 import math
 import random
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final, Protocol
 
@@ -87,3 +88,25 @@ class TouchPlate:
     def trips(self, tip_mm: XyzMm, lean: Lean = UPRIGHT) -> bool:  # noqa: ARG002 - the tip touches
         """Tell whether the tip touches it, or is below it."""
         return tip_mm[2] <= self.z_mm
+
+
+@dataclass(frozen=True, slots=True)
+class PinContact:
+    """Nozzle and pin as a switch: on while the tip touches the pin, an upright cylinder.
+
+    Assumed: the pin gives way, so a tip that is deeper than its top still touches it, and only
+    the tip conducts, not the shaft above it.
+
+    Attributes:
+        pin_mm: Tells where the middle of the pin's top is; it may be bumped.
+        radius_mm: Half the thickness of the pin.
+    """
+
+    pin_mm: Callable[[], XyzMm]
+    radius_mm: float
+
+    def trips(self, tip_mm: XyzMm, lean: Lean = UPRIGHT) -> bool:  # noqa: ARG002 - the tip touches
+        """Tell whether the tip is within the pin's radius, at its top or below."""
+        x, y, z = self.pin_mm()
+        beside_mm = math.hypot(tip_mm[0] - x, tip_mm[1] - y)
+        return tip_mm[2] <= z and beside_mm <= self.radius_mm

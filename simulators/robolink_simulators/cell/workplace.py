@@ -5,16 +5,19 @@ Ground truth. The controller knows none of it; only what it stores.
 
 import math
 import random
+from abc import ABC, abstractmethod
 from collections.abc import Hashable
 from dataclasses import asdict, replace
-from typing import Any, Final, Protocol
+from typing import Any, ClassVar, Final, Protocol
 
+from robolink.errors import ConfigError
+from robolink.messages import tr
 from robolink.model import TIP, Pose, ToolOffset
 from robolink_simulators.cell.camera import CameraTruth, Pixel
 from robolink_simulators.cell.held_board import SimulatedBoard
 from robolink_simulators.cell.places import Axis, Direction, axis_of
 from robolink_simulators.cell.places import XyzMm as XyzMm
-from robolink_simulators.cell.tip_switches import UPRIGHT, Lean
+from robolink_simulators.cell.tip_switches import UPRIGHT, Lean, PinContact, TipSwitch
 from robolink_simulators.cell.world_parameters import WorldParameters
 
 MOUNTED_TOOL: Final = 1
@@ -42,11 +45,14 @@ class Handled(Protocol):
         What it cannot reach it refuses with the error of its own controller.
         """
 
+    def turn(self, by_deg: float) -> None:
+        """Turn the flange about the base's Z where it stands; where it cannot, it stays."""
+
     def loosen(self, parameters: WorldParameters) -> None:
         """Give the axes the play that the parameters say."""
 
 
-class Workplace:
+class Workplace(ABC):
     """What is true around a robot.
 
     Args:
@@ -58,10 +64,13 @@ class Workplace:
         parameters: What goes wrong here; see :meth:`set_up`.
 
     Attributes:
+        inputs: How many inputs the controller has.
         leans: By how much the nozzle of a tool is bent; upright where none is named.
         camera: The up-looking camera.
         board: The board that the mounted nozzle holds, ``None`` for none.
     """
+
+    inputs: ClassVar[int]
 
     def __init__(
         self,
@@ -87,7 +96,12 @@ class Workplace:
         self.set_up(parameters)
 
     def set_up(self, parameters: WorldParameters) -> None:
-        """Give the cell other imperfections; tips, pin and camera stay where they are."""
+        """Give the cell other imperfections; tips, pin and camera stay where they are.
+
+        Raises:
+            ConfigError: The contact is to switch an input that the controller does not have.
+        """
+        self._wire_contact(parameters)
         if parameters.tool_turn != self.parameters.tool_turn:
             u_deg, v_deg, w_deg = parameters.tool_turn
             tip = self.tips.get(MOUNTED_TOOL, self._replaced)
@@ -101,6 +115,55 @@ class Workplace:
             self.board = None
         elif self.board is None:
             self.board = SimulatedBoard.grasped(random.Random(f"board {self._seed}"))
+
+    def gap_mm(self, tool: int = MOUNTED_TOOL) -> XyzMm:
+        """Return the way from a physical tip to the pin."""
+        tip = self.tip_mm(tool)
+        return self.pin_mm[0] - tip[0], self.pin_mm[1] - tip[1], self.pin_mm[2] - tip[2]
+
+    def touch_begins(self, done: int) -> None:
+        """Let happen what happens between two touches: somebody bumps the pin.
+
+        Args:
+            done: How many touches came before.
+        """
+        bump = self.parameters.bump
+        if done and done == bump.after_touch:
+            (dx, dy), (x_mm, y_mm, z_mm) = bump.by_mm, self.pin_mm
+            self.pin_mm = (x_mm + dx, y_mm + dy, z_mm)
+
+    @abstractmethod
+    def connect(
+        self, number: int, switch: TipSwitch, tool: int = MOUNTED_TOOL, *, noise_mm: float = 0.0
+    ) -> None:
+        """Let something that the tip meets switch an input of the controller.
+
+        Args:
+            number: The input.
+            switch: What the tip meets.
+            tool: Whose tip.
+            noise_mm: Standard deviation, per axis, of where it switches; drawn anew for each
+                movement.
+        """
+
+    @abstractmethod
+    def disconnect(self, number: int) -> None:
+        """Take off what an input is connected to; it is off then."""
+
+    def _wire_contact(self, parameters: WorldParameters) -> None:
+        number, radius_mm = parameters.contact
+        if number is not None and number >= self.inputs:
+            raise ConfigError(
+                tr("The simulated controller has no input {number}.", number=number),
+                remedy=tr("Give one from 0 to {last}.", last=self.inputs - 1),
+            )
+        before, _ = self.parameters.contact
+        if self.parameters.contact == parameters.contact:
+            return
+        if before is not None:
+            self.disconnect(before)
+        if number is not None:
+            self.connect(number, PinContact(lambda: self.pin_mm, radius_mm))
 
     def lean_of(self, tool: int) -> Lean:
         """Return by how much a nozzle is bent, in the flange's axes."""

@@ -12,6 +12,7 @@ from typing import Final
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_simulators.cell.camera import CameraOptics
+from robolink_simulators.cell.habits import BiasFrame, PersonHabits, PinBump
 from robolink_simulators.cell.tip_switches import Lean
 from robolink_simulators.option_values import values_from_text
 
@@ -39,6 +40,20 @@ class WorldParameters:
         camera_outlier_share, camera_outlier_px: Share and size of false finds.
         camera_miss_share: Share of the pictures in which nothing is found.
         board_held: Whether the nozzle holds a board, which hides its tip.
+        person_stays_share, person_stays_from_touch: Share of the touches for which the person
+            only presses ENTER, and the first one to which it applies.
+        person_bias_mm, person_bias_frame, person_bias_toward_deg: How far, and toward what, the
+            person always stops beside the pin.
+        person_tires_mm: Step from touch to touch, per axis, by which the person's aim wanders.
+        person_angle_error_deg: By how much the person turns U before a touch, to either side.
+        person_presses_mm: How much deeper than the contact the person goes.
+        person_types_ahead: Whether ENTER is pressed before each touch is asked for.
+        person_thinks_s: How long the person looks before the first answer to a question.
+        contact_input: Number of the input that is on while the mounted nozzle touches the pin;
+            none where they are not wired.
+        pin_radius_mm: Half the thickness of the pin, for that.
+        pin_bumped_after_touch, pin_bump_mm, pin_bump_toward_deg: After which touch the pin is
+            bumped, how far, and in which direction of the base.
     """
 
     eye_sigma_mm: float = 0.01
@@ -63,6 +78,21 @@ class WorldParameters:
     camera_outlier_px: float = 40.0
     camera_miss_share: float = 0.0
     board_held: bool = False
+    person_stays_share: float = 0.0
+    person_stays_from_touch: int = 1
+    person_bias_mm: float = 0.0
+    person_bias_frame: BiasFrame = "base"
+    person_bias_toward_deg: float = 0.0
+    person_tires_mm: float = 0.0
+    person_angle_error_deg: float = 0.0
+    person_presses_mm: float = 0.0
+    person_types_ahead: bool = False
+    person_thinks_s: float = 1.0
+    contact_input: int | None = None
+    pin_radius_mm: float = 0.25
+    pin_bumped_after_touch: int = 2
+    pin_bump_mm: float = 0.0
+    pin_bump_toward_deg: float = 0.0
 
     @property
     def lean(self) -> Lean:
@@ -80,6 +110,22 @@ class WorldParameters:
         """The camera."""
         names = [field.name for field in fields(CameraOptics) if field.name != "size_px"]
         return CameraOptics(**{name: getattr(self, f"camera_{name}") for name in names})
+
+    @property
+    def habits(self) -> PersonHabits:
+        """The person."""
+        names = [field.name for field in fields(PersonHabits)]
+        return PersonHabits(**{name: getattr(self, f"person_{name}") for name in names})
+
+    @property
+    def contact(self) -> tuple[int | None, float]:
+        """How nozzle and pin are wired: the input, and the pin's radius in mm."""
+        return self.contact_input, self.pin_radius_mm
+
+    @property
+    def bump(self) -> PinBump:
+        """What happens to the pin."""
+        return PinBump(self.pin_bumped_after_touch, self.pin_bump_mm, self.pin_bump_toward_deg)
 
 
 def parameter_names() -> tuple[str, ...]:
@@ -105,6 +151,11 @@ def parameters_from_text(pairs: Mapping[str, str]) -> dict[str, object]:
             raise ConfigError(
                 tr("A pixel cannot be 0 long."), remedy=tr("Give {name} above 0.", name=name)
             )
+    if values.get("person_stays_share", 0.0) > 1:
+        raise ConfigError(
+            tr("A share cannot be above 1."),
+            remedy=tr("Give {name} from 0 to 1.", name="person_stays_share"),
+        )
     return values
 
 

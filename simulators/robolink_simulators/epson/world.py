@@ -2,6 +2,7 @@
 
 import random
 from collections.abc import Callable, Hashable
+from contextlib import suppress
 from dataclasses import asdict, replace
 from typing import Any, Final
 
@@ -17,8 +18,10 @@ from robolink_simulators.cell.workplace import Workplace, XyzMm, exchanged, pin_
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.epson.arm.kinematics import Joints, inverse, tip_of
 from robolink_simulators.epson.machine import Machine
+from robolink_simulators.epson.memory.bits import IO_BITS
 from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.epson.memory.tip_input import Nozzle, TipInput
+from robolink_simulators.epson.refusals import OutOfReach
 
 STORED: Final = ToolOffset(12.0, -3.5, -20.0)
 """What the controller holds for tool 1 at first: the nozzle that was there before."""
@@ -40,6 +43,8 @@ class World(Workplace):
         operator: The person at the cell.
     """
 
+    inputs = IO_BITS
+
     def __init__(
         self,
         machine: Machine,
@@ -51,6 +56,7 @@ class World(Workplace):
         now_ns: Callable[[], int],
         parameters: WorldParameters | None = None,
     ) -> None:
+        self.machine = machine  # its inputs are wired by what follows
         super().__init__(
             _HandledArm(machine, now_ns),
             tips,
@@ -59,7 +65,6 @@ class World(Workplace):
             replaced=STORED,
             parameters=parameters or WorldParameters(),
         )
-        self.machine = machine
         self.operator = PendantOperator(self, pendant_live=pendant_live, now_ns=now_ns, seed=seed)
 
     @classmethod
@@ -126,6 +131,10 @@ class World(Workplace):
             rng=random.Random(f"input {number} {self._seed}"),
         )
         self.machine.inputs.connect(number, sense)
+
+    def disconnect(self, number: int) -> None:
+        """Take off what an input is connected to; it is off then."""
+        self.machine.inputs.set(number, on=False)
 
     def truth(self) -> dict[str, Any]:
         """Return all of it, ready for JSON."""
@@ -216,6 +225,12 @@ class _HandledArm:
             z_mm=flange.z_mm + by_mm[2],
         )
         arm.place(inverse(arm.model, target, arm.hand), self._now_ns())
+
+    def turn(self, by_deg: float) -> None:
+        arm = self._machine.arm
+        target = replace(arm.flange(), u_deg=arm.flange().u_deg + by_deg)
+        with suppress(OutOfReach):
+            arm.place(inverse(arm.model, target, arm.hand), self._now_ns())
 
     def loosen(self, parameters: WorldParameters) -> None:
         arm = self._machine.arm

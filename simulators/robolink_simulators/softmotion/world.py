@@ -2,6 +2,7 @@
 
 import random
 from collections.abc import Hashable
+from contextlib import suppress
 from typing import Final
 
 from robolink.errors import ConfigError
@@ -23,14 +24,18 @@ from robolink_simulators.softmotion.group.condition import SmcGroupState
 from robolink_simulators.softmotion.kinematics.frames import (
     NO_TURN,
     ORIGIN,
+    Z_AXIS,
     Frame,
+    about,
     add,
+    product,
     subtract,
     turned,
     zyx,
     zyx_angles,
 )
 from robolink_simulators.softmotion.kinematics.kinematics import AxisKind, AxisValues
+from robolink_simulators.softmotion.signals import SIGNALS
 from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind
 
 STORED: Final = ToolOffset(12.0, -3.5, -20.0)
@@ -60,6 +65,8 @@ class SoftMotionWorld(Workplace):
         stored: The nozzle that was there before.
     """
 
+    inputs = SIGNALS
+
     def __init__(
         self,
         group: AxisGroup,
@@ -70,6 +77,7 @@ class SoftMotionWorld(Workplace):
         stored: ToolOffset,
         parameters: WorldParameters | None = None,
     ) -> None:
+        self.group = group  # its inputs are wired by what follows
         super().__init__(
             _HandledGroup(group),
             tips,
@@ -78,7 +86,6 @@ class SoftMotionWorld(Workplace):
             replaced=stored,
             parameters=parameters or WorldParameters(),
         )
-        self.group = group
         self.stored = stored
         self.operator = SimulatedOperator(self, require_jogging=self._require_rest, seed=seed)
 
@@ -127,6 +134,10 @@ class SoftMotionWorld(Workplace):
 
         group.inputs.connect(number, sense)
 
+    def disconnect(self, number: int) -> None:
+        """Take off what an input is connected to; it is off then."""
+        self.group.inputs.switch(number, on=False)
+
     def _require_rest(self) -> None:
         if self.group.state not in (SmcGroupState.DISABLED, SmcGroupState.STANDBY):
             raise ConfigError(
@@ -154,6 +165,14 @@ class _HandledGroup:
 
     def turned(self, direction: Direction) -> Direction:
         return _turned_at(self._group, trailing(self._group, self._group.values), direction)
+
+    def turn(self, by_deg: float) -> None:
+        group, kinematics = self._group, self._group.kinematics
+        here = kinematics.flange(group.values)
+        wanted = Frame(here.shift_mm, product(about(Z_AXIS, by_deg), here.rotation))
+        with suppress(BlockRefused):
+            configuration = kinematics.configuration(group.values)
+            group.place(kinematics.axes_for(wanted, configuration, group.values))
 
     def loosen(self, parameters: WorldParameters) -> None:
         for axis in self._group.axes:

@@ -18,6 +18,8 @@ _HUGE: Final = 1e12
 
 _UNIT_WITHIN: Final = 0.01
 
+_FRAMES: Final = ("tools", "locals")
+
 
 @dataclass(frozen=True, slots=True)
 class KnownFrames:
@@ -62,6 +64,10 @@ class Node:
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._value)
+
+    def is_object(self, name: str) -> bool:
+        """Tell whether an object stands under ``name``; elsewhere the name may mean another."""
+        return isinstance(self._value.get(name), dict)
 
     def items(self, name: str) -> Iterator[tuple[object, str]]:
         """Yield what stands in the list under ``name``, each with its path."""
@@ -197,8 +203,7 @@ def read_pose(node: Node) -> Pose:
 def read_frames(node: Node) -> None:
     """Read the values of ``tools`` and ``locals`` that the poses of a case are given in."""
     node.frames = KnownFrames(
-        node.optional("tools", lambda name: _by_number(node.child(name))) or {},
-        node.optional("locals", lambda name: _by_number(node.child(name))) or {},
+        *(_by_number(node.child(name)) if node.is_object(name) else {} for name in _FRAMES)
     )
 
 

@@ -17,9 +17,19 @@ from robolink_cli.commands.measure.solve.case import (
 from robolink_cli.commands.measure.solve.methods import SEEING_METHODS
 from robolink_cli.commands.measure.solve.more_methods import MORE_METHODS
 from robolink_cli.commands.measure.solve.pose_methods import POSE_METHODS
+from robolink_cli.commands.measure.solve.station_methods import STATION_METHODS
+from robolink_cli.commands.measure.solve.study_methods import STUDY_METHODS
+from robolink_cli.commands.measure.solve.touch_methods import TOUCH_METHODS
 
 CASE_SCHEMA: Final = "robolink-calibration-vectors/1"
-METHODS: Final = {**POSE_METHODS, **SEEING_METHODS, **MORE_METHODS}
+METHODS: Final = {
+    **POSE_METHODS,
+    **SEEING_METHODS,
+    **MORE_METHODS,
+    **STATION_METHODS,
+    **STUDY_METHODS,
+    **TOUCH_METHODS,
+}
 
 BEYOND_TOLERANCE: Final = frozenset({"large_rms", "large_residual", "large_pixel_residual"})
 """Codes of a result that does not agree with itself: no offset to be written."""

@@ -1,0 +1,1 @@
+"""What touches of a pin prove, beside the tip that they lead to."""

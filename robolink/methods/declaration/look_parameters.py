@@ -1,0 +1,170 @@
+"""The parameters of all methods in which an up-looking camera takes part."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated
+
+from annotated_types import Ge, Le, MaxLen, MinLen
+
+from robolink.calibration import MIN_ROTATION_DEG, CameraModel, angle_spread_deg
+from robolink.errors import ConfigError
+from robolink.files.toml import Problem
+from robolink.messages import tr
+from robolink.methods.declaration.method import (
+    DEGREES,
+    MM,
+    Angle,
+    Check,
+    Help,
+    MethodParameters,
+    Option,
+    Pair,
+    Rows,
+)
+from robolink.procedures import HALF_ROUND_DEG, LookPlan
+from robolink.ways import Way, way
+
+if TYPE_CHECKING:
+    from robolink.methods.declaration.site import Site
+    from robolink.model import TipSensor
+    from robolink.stations import CameraStation
+
+Turns = Annotated[
+    tuple[Angle, ...],
+    MinLen(1),
+    MaxLen(24),
+    DEGREES,
+    Option(flag="--angles", metavar="0,60,.."),
+    Help(tr("U of each look, counted toward zero from where the tool stands.")),
+]
+
+PLACE = (
+    tr("where the camera looks"),
+    tr("the height in focus"),
+)
+"""What X and Y of the station are, and what Z is."""
+
+UNMEASURED_Z = tr('cannot be "measured" by a camera; write "typed" or "kept"')
+
+
+@dataclass(frozen=True, kw_only=True)
+class LookParameters(MethodParameters):
+    """How marks are brought before a camera and looked at."""
+
+    sensor: Annotated[
+        str | None,
+        MinLen(1),
+        Option(metavar="NAME|URL", moves=False),
+        Help(tr("The camera: a plug-in's name or URL, or a simulator's assist or sim URL.")),
+    ] = None
+    mm_per_px: Annotated[
+        Rows | None,
+        MM,
+        Option(flag="--mm-per-px", metavar="XX,XY,YX,YY", moves=False),
+        Help(
+            tr(
+                "What a pixel is in the base: X along the image's first and second axis, then Y; "
+                "as camera-affine found it. Not for a camera that answers in mm."
+            )
+        ),
+    ] = None
+    origin_mm: Annotated[
+        Pair | None,
+        MM,
+        Option(metavar="X,Y", moves=False),
+        Help(tr("Base point that is seen at pixel (0, 0); goes with what a pixel is.")),
+    ] = None
+    turns_deg: Turns = HALF_ROUND_DEG
+    pictures: Annotated[
+        int, Ge(1), Le(25), Help(tr("How many pictures are taken at each look; the median counts."))
+    ] = 3
+    lift_mm: Annotated[
+        float, Ge(1), Le(100), MM, Help(tr("How far the tip is lifted before it turns."))
+    ] = 10.0
+    beside_mm: Annotated[
+        float,
+        Ge(0),
+        Le(10),
+        MM,
+        Help(tr("From how far beside every place is approached, always from the same side.")),
+    ] = 1.0
+    retake: Annotated[
+        bool,
+        Option(flag="--retake/--no-retake", default=True),
+        Help(tr("Whether the look that fits worst is offered to be taken again.")),
+    ] = False
+
+    @property
+    def look(self) -> LookPlan:
+        """The same for a procedure."""
+        return LookPlan(
+            turns_deg=self.turns_deg,
+            pictures=self.pictures,
+            lift_mm=self.lift_mm,
+            beside_mm=self.beside_mm,
+        )
+
+    @property
+    def model(self) -> CameraModel | None:
+        """What its pixels mean, ``None`` where that is not said."""
+        if self.mm_per_px is None or self.origin_mm is None:
+            return None
+        return CameraModel(self.mm_per_px, self.origin_mm)
+
+    @property
+    def corners_deg(self) -> tuple[float, ...]:
+        """Angles of looks besides those of ``turns_deg``."""
+        return ()
+
+    def problems(self, check: Check) -> Iterator[Problem]:
+        """Check that pixels are explained whole, and that the tool turns."""
+        yield from self._of_pixels(check)
+        angles_deg = (*self.corners_deg, *self.turns_deg)
+        if len(angles_deg) > 1 and angle_spread_deg(angles_deg) < MIN_ROTATION_DEG:
+            yield Problem(
+                "turns_deg",
+                tr("must spread over at least {limit:g} degrees", limit=MIN_ROTATION_DEG),
+            )
+
+    def room_mm(self) -> float:
+        """Return how high the box has to be."""
+        return self.lift_mm
+
+    def _of_pixels(self, check: Check) -> Iterator[Problem]:
+        if (self.mm_per_px is None) != (self.origin_mm is None):
+            absent = "origin_mm" if self.origin_mm is None else "mm_per_px"
+            yield Problem(
+                absent,
+                tr(
+                    "is missing: give {scale} and {origin}, or neither",
+                    scale=check.spell("mm_per_px"),
+                    origin=check.spell("origin_mm"),
+                ),
+            )
+        elif self.model is not None and not self.model.determinant:
+            yield Problem("mm_per_px", tr("maps all pixels onto one line"))
+
+
+def camera_at(parameters: LookParameters, site: "Site") -> "tuple[str | TipSensor, CameraStation]":
+    """Return the camera, its name or URL, and where it looks.
+
+    Raises:
+        ConfigError: Nobody knows one of them.
+    """
+    from robolink.stations import camera_station, sensor_of  # what --help does without
+
+    sensor = site.sensor or parameters.sensor or sensor_of(site.station)
+    if not sensor:
+        raise ConfigError(
+            tr("Nobody knows through which sensor station {id} sees.", id=site.station.id),
+            remedy=tr(
+                "Give {sensor}, write source.sensor, or state it in the cell file.",
+                sensor=way(Way.SENSOR),
+            ),
+        )
+    stated = parameters.model is not None
+    station = site.stating(
+        mm_per_px=parameters.mm_per_px if stated else None,
+        origin_mm=parameters.origin_mm if stated else None,
+    )
+    return sensor, camera_station(station)

@@ -1,0 +1,262 @@
+"""What a calibration method declares: its parameters once, for commands, recipes, schema and docs.
+
+A method is one folder. Its parameters are one frozen dataclass; the annotation of each field says
+its limits (``annotated_types``), its unit and the sentence that help, schema and docs show. The
+command ``calibrate NAME``, the recipe's ``[source]`` and the page of all methods are made from it.
+"""
+
+from collections.abc import Callable, Collection, Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any, Final, Generic, Literal, TypeVar
+
+from annotated_types import Ge, Le
+
+from robolink.files.toml import Problem
+from robolink.stations import StationKind
+
+if TYPE_CHECKING:
+    from robolink.methods.declaration.site import Site
+    from robolink.procedures import PoseMethod, TipSource
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """The unit of a parameter, as people read it."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Help:
+    """What a parameter means; the sentence of help, recipe schema and docs."""
+
+    sentence: str
+
+
+_UNSET: Final = object()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Option:
+    """How a command offers a parameter, where that does not follow from its name.
+
+    Attributes:
+        flag: Its name on the command line; else the field's without its unit.
+        metavar: What stands for the value in the help.
+        default: What a command takes when nobody typed it, where that differs from what a recipe
+            that does not say it means.
+        moves: Whether it says how to move, and so means nothing for poses that exist already.
+        chooses: The value that the option, then a flag, stands for.
+        from_recipe: Key at the top of a recipe that says it, in place of one in ``[source]``.
+    """
+
+    flag: str = ""
+    metavar: str = ""
+    default: object = _UNSET
+    moves: bool = True
+    chooses: object = _UNSET
+    from_recipe: str = ""
+
+    def default_or(self, usual: object) -> object:
+        """Return what a command takes when nobody typed it."""
+        return usual if self.default is _UNSET else self.default
+
+    @property
+    def is_choice(self) -> bool:
+        """Whether the option is a flag that stands for one value."""
+        return self.chooses is not _UNSET
+
+
+MM: Final = Unit("mm")
+DEGREES: Final = Unit("degrees")
+MM_S: Final = Unit("mm/s")
+
+Length = Annotated[float, Ge(0.001), MM]
+"""A limit; none is finer than the last digit that a controller prints."""
+
+Angle = Annotated[float, Ge(-360), Le(360), DEGREES]
+InputNumber = Annotated[int, Ge(0), Le(0xFFFF)]
+Pair = tuple[float, float]
+Rows = tuple[Pair, Pair]
+
+
+LengthRule = Literal["ask", "difference", "keep"]
+"""What is done where a tip proves longer or shorter: ask, write Z by difference, keep Z."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StatedLimits:
+    """What somebody stated for this one measurement; ``None`` for what nobody did.
+
+    What a cell allows every method is not stated: a method that cannot be judged by it is not.
+
+    Attributes:
+        sigma_mm: Standard deviation of one coordinate of one measurement.
+        rms_mm: Largest root mean square of the residuals.
+        max_mm: Largest residual.
+        interval_mm: Largest half width of a 95 % interval.
+    """
+
+    sigma_mm: float | None = None
+    rms_mm: float | None = None
+    max_mm: float | None = None
+    interval_mm: float | None = None
+
+
+NOTHING_STATED: Final = StatedLimits()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Check:
+    """What is known when parameters are checked for going together.
+
+    Attributes:
+        given: The parameters that somebody wrote.
+        limits: What was stated besides; ``None`` where that cannot be told.
+        box_height_mm: Height of the box in which the flange may go, ``None`` where it is not known.
+        poses_exist: Whether the poses exist already, so that nothing is measured at set angles.
+        points: How many taught points were named, ``None`` where none are.
+        spell: Returns a parameter's name as whoever wrote it knows it: a key, or an option.
+    """
+
+    given: Collection[str] = ()
+    limits: StatedLimits | None = None
+    box_height_mm: float | None = None
+    poses_exist: bool = False
+    points: int | None = None
+    spell: Callable[[str], str] = str
+
+    @property
+    def sigma_stated(self) -> bool | None:
+        """Whether the standard deviation was stated; ``None`` where that cannot be told."""
+        return None if self.limits is None else self.limits.sigma_mm is not None
+
+
+@dataclass(frozen=True, kw_only=True)
+class MethodParameters:
+    """What the parameters of all methods have in common."""
+
+    def problems(self, check: Check) -> Iterator[Problem]:  # noqa: ARG002 - for overriding
+        """Yield what is wrong between parameters that are right in themselves.
+
+        The place of a problem is the name of a field, with ``#2`` for the second of a list.
+        """
+        yield from ()
+
+    def no_residual(self) -> str:
+        """Return why residuals cannot be judged, empty when they can."""
+        return ""
+
+    def sigma_gain(self) -> float | None:
+        """Return the tip's standard deviation as a multiple of a measurement's, where known."""
+        return None
+
+    def length_rule(self) -> LengthRule:
+        """Return what is done where the touches show that the tip is longer or shorter."""
+        return "ask"
+
+    def states_station(self) -> bool:
+        """Tell whether they say all about the station, so that it need not be known."""
+        return False
+
+    def height_mm(self) -> float:
+        """Return how much higher than the box the flange goes."""
+        return 0.0
+
+    def room_mm(self) -> float:
+        """Return how high the box has to be at least, for lifting the tip off and coming back."""
+        return 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Needs:
+    """What a method needs in the cell.
+
+    Attributes:
+        station: What it measures at.
+        named: Whether the station has to be named, because it must be known beforehand.
+        finds_pin: Whether it finds the pin itself; the place goes on record.
+        sensor: Whether a camera takes part.
+        tilt: Whether the robot has to tilt its tool, so that it also works on a tilted flange.
+        motion: Whether the robot moves.
+        place: What X and Y of the station are to the method, and what Z is, to tell a recipe in
+            which they are missing; empty where the place may be unknown.
+    """
+
+    station: StationKind
+    named: bool = True
+    finds_pin: bool = False
+    sensor: bool = False
+    tilt: bool = False
+    motion: bool = True
+    place: tuple[str, str] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class PoseHelp:
+    """What the help says about poses that exist already: taught, typed, in a file."""
+
+    points: str
+    typed: str
+    path: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Former:
+    """A kind of source by which recipes named the method before.
+
+    Attributes:
+        kind: The old ``source.kind``.
+        method: The old ``source.method`` that went with it, empty for none.
+        usual: Whether it was meant where no method was named.
+    """
+
+    kind: str
+    method: str = ""
+    usual: bool = False
+
+
+P = TypeVar("P", bound=MethodParameters)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Method(Generic[P]):
+    """A calibration method.
+
+    Attributes:
+        name: The one name: of the command, of the recipe's kind, in the docs.
+        summary: What it does, in one line.
+        description: What it does, for the help of the command.
+        parameters: Its parameters.
+        measures: The components of the offset that it tells.
+        needs: What it needs in the cell.
+        source: Makes what measures, from the parameters and where it is.
+        from_poses: Makes what solves poses that exist already, ``None`` where it needs the robot.
+        pose_help: What the help says about such poses.
+        tells_height: Whether the flange's height at the touch tells Z, beside what is solved.
+        by_reference: Whether basis "difference" compares with a reference that a run records.
+        unmeasured_z: Why ``z = "measured"`` is refused, empty where Z can be measured.
+        formerly: How recipes named it before.
+    """
+
+    name: str
+    summary: str
+    description: str
+    parameters: type[P]
+    measures: tuple[str, ...]
+    needs: Needs
+    source: "Callable[[P, Site], TipSource]"
+    from_poses: "Callable[[P, Site], PoseMethod] | None" = None
+    pose_help: PoseHelp | None = None
+    tells_height: bool = False
+    by_reference: bool = True
+    unmeasured_z: str = ""
+    formerly: tuple[Former, ...] = ()
+
+    @property
+    def only_z(self) -> bool:
+        """Whether it tells Z and nothing else."""
+        return self.measures == ("z_mm",)
+
+
+AnyMethod = Method[Any]

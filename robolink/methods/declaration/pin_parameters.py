@@ -1,0 +1,90 @@
+"""The parameters of all methods in which a person brings the tip onto a pin."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Annotated
+
+from annotated_types import Ge, Le
+
+from robolink.files.toml import Problem
+from robolink.messages import tr
+from robolink.methods.declaration.method import (
+    MM,
+    Check,
+    Help,
+    LengthRule,
+    MethodParameters,
+    Option,
+)
+from robolink.procedures import TouchPlan
+
+
+@dataclass(frozen=True, kw_only=True)
+class PinParameters(MethodParameters):
+    """How a tip is taken off a pin and brought back."""
+
+    lift_mm: Annotated[
+        float, Ge(1), Le(100), MM, Help(tr("How far the tip is lifted before it turns."))
+    ] = 10.0
+    clearance_mm: Annotated[
+        float,
+        Ge(0.5),
+        Le(50),
+        MM,
+        Help(tr("How far above the pin the tip stops; the rest is the person's.")),
+    ] = 2.0
+
+    @property
+    def touch(self) -> TouchPlan:
+        """The same for a procedure."""
+        return TouchPlan(lift_mm=self.lift_mm, clearance_mm=self.clearance_mm)
+
+    def problems(self, check: Check) -> Iterator[Problem]:
+        """Check that the tip stops on its way down to the pin."""
+        yield from clearance_below_lift(self.clearance_mm, self.lift_mm, check)
+
+    def room_mm(self) -> float:
+        """Return how high the box has to be."""
+        return self.lift_mm
+
+
+@dataclass(frozen=True, kw_only=True)
+class UprightPinParameters(PinParameters):
+    """How an upright tip is touched that keeps its Z: heights tell whether it may."""
+
+    if_length_changed: Annotated[
+        LengthRule,
+        Option(moves=False),
+        Help(
+            tr(
+                "Where the heights of the touches show that the tip is longer or shorter: ask a "
+                "person, write Z by the difference, or keep Z. Where nobody can be asked, ask "
+                "means that nothing is written."
+            )
+        ),
+    ] = "ask"
+
+    def length_rule(self) -> LengthRule:
+        """Return what is done where the length changed."""
+        return self.if_length_changed
+
+
+def clearance_below_lift(clearance_mm: float, lift_mm: float, check: Check) -> Iterator[Problem]:
+    """Check that something is left to come down."""
+    if clearance_mm >= lift_mm:
+        yield Problem(
+            "clearance_mm",
+            tr(
+                "must be smaller than {other}, which is {lift:g}",
+                other=check.spell("lift_mm"),
+                lift=lift_mm,
+            ),
+        )
+
+
+def two_poses_agree() -> str:
+    """Return why the residuals of two poses cannot be judged."""
+    return tr(
+        "cannot be judged: two poses always agree, so they leave no residual; "
+        "use n-angle, or limit the interval and state the standard deviation"
+    )

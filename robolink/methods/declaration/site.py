@@ -1,0 +1,39 @@
+"""Where and for what a method measures: what it is told besides its own parameters."""
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from robolink.model import Controller, TipSensor
+    from robolink.stations import Station  # what --help does without
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Site:
+    """Where and for what a method measures.
+
+    Attributes:
+        controller: The controller, connected.
+        tool: Number of the tool.
+        station: What is known of the station; its name is empty where nobody named one.
+        points: Numbers of the taught points that touch the pin, where they are measured with.
+        sigma_mm: Standard deviation of one coordinate of one measurement, where it is known.
+        max_change_mm: Largest change that is believed.
+        interval_mm: Largest half width of a 95 % interval that is believed, if one is judged.
+        sensor: The camera: open, or its name or URL; it goes before what parameters and station
+            say. ``None`` leaves it to them. One that is open is left open.
+    """
+
+    controller: "Controller"
+    tool: int
+    station: "Station"
+    points: tuple[int, ...] = ()
+    sigma_mm: float | None = None
+    max_change_mm: float = 2.0
+    interval_mm: float | None = None
+    sensor: "str | TipSensor | None" = None
+
+    def stating(self, **details: object) -> "Station":
+        """Return the station with what the parameters say of it; ``None`` says nothing."""
+        said = {name: value for name, value in details.items() if value is not None}
+        return replace(self.station, details={**self.station.details, **said})

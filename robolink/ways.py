@@ -29,7 +29,8 @@ class Way:
     FORGET_MARKER: Final = "recover(..., confirm=...)"
     GIVEN_POSES: Final = "PointsSource"
     HEIGHT: Final = "Answers(z_mm={{{tool}: MM}})"
-    LENGTH: Final = "length"
+    LENGTH: Final = 'ToolPlan(..., length="difference")'
+    LENGTH_UNIT: Final = "length"
     LENGTH_TOLERANCE: Final = "length_mm=0.05"
     LIST_CHANGES: Final = "outcomes.recorded(kinds=(EntryKind.DONE,))"
     LOT: Final = "Answers(lot=ID)"

@@ -82,7 +82,7 @@ def which_angle_unit(names: Sequence[str]) -> OpenQuestion:
 def which_length(why: str) -> OpenQuestion:
     """Ask for the unit of length."""
     return OpenQuestion(
-        "length", why, tr("Say the unit with {length}: mm, m or in.", length=way(Way.LENGTH))
+        "length", why, tr("Say the unit with {length}: mm, m or in.", length=way(Way.LENGTH_UNIT))
     )
 
 

@@ -287,6 +287,17 @@ MORE: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
         {"sightings": [{"flange": p, "tip": {"x": PIN[0], "y": PIN[1]}} for p in ROUND]},
         {"offset": [12.5, -3.25], "centre_mm": [0, 0]},
     ),
+    "gauge_rr": (
+        {
+            "values": [[[1.0, 1.2], [1.0, 1.2]], [[4.0, 4.2], [4.0, 4.2]]],
+            "axes": ["nozzle", "person", "repeat"],
+        },
+        {"interaction_p": 1, "reproducibility_mm": 0, "repeatability_mm": 0.1264911064067352},
+    ),
+    "control_chart": (
+        {"baseline": [1, 2] * 12, "values": [1, 2]},
+        {"centre": 1.5, "limits": [1.5 - 3 / 1.128, 1.5 + 3 / 1.128]},
+    ),
     "verify": ({"poses": ROUND, "offset": TIP}, {"max_drift_mm": 0, "passed": True}),
     "update_guard": ({"new": {"x": 12.5}, "stored": {"x": 12.2}}, {"correction_mm": 0.3}),
     "suggest_poses": (

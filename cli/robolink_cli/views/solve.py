@@ -38,6 +38,11 @@ def result_payload(result: CalibrationResult) -> dict[str, object]:
     }
 
 
+def space_payload(result: CalibrationResult) -> dict[str, object]:
+    """Return a result with X, Y and Z of the offset, measured or kept."""
+    return result_payload(result) | {"offset_xyz": list(result.offset.components()[:3])}
+
+
 def show_case(document: Mapping[str, object]) -> None:
     """Print one solved case."""
     codes = _words(document["codes"])
@@ -92,7 +97,13 @@ def _words(value: object) -> str:
     return ", ".join(map(str, value)) if isinstance(value, Sequence) else str(value)
 
 
-_DECIMALS = {"mm_per_px_matrix": 6, "rotation_matrix": 6, "direction": 5, "latency_s": 5}
+_DECIMALS = {
+    "mm_per_px_matrix": 6,
+    "rotation_matrix": 6,
+    "direction": 5,
+    "latency_s": 5,
+    "overshoot_s2_per_mm": 6,
+}
 
 _SHOWN = (
     ("offset", tr("offset mm")),
@@ -109,6 +120,7 @@ _SHOWN = (
     ("zyz", tr("A, B, C deg")),
     ("lag_mm", tr("lag mm")),
     ("latency_s", tr("latency s")),
+    ("overshoot_s2_per_mm", tr("overshoot s^2/mm")),
     ("chain", tr("chain")),
     ("full_calibration_due", tr("full calibration due")),
     ("beams", tr("beams")),
@@ -122,6 +134,17 @@ _SHOWN = (
     ("max_drift_mm", tr("largest drift mm")),
     ("passed", tr("passed")),
     ("correction_mm", tr("correction mm")),
+    ("repeatability_mm", tr("repeatability mm")),
+    ("reproducibility_mm", tr("reproducibility mm")),
+    ("grr_mm", tr("both together mm")),
+    ("part_mm", tr("between nozzles mm")),
+    ("percent_of_tolerance", tr("% of the tolerance")),
+    ("percent_of_total", tr("% of the whole spread")),
+    ("ndc", tr("kinds of nozzle told apart")),
+    ("centre", tr("centre mm")),
+    ("limits", tr("limits mm")),
+    ("points_out", tr("points outside (from 0)")),
+    ("ewma_first", tr("drift since point (from 0)")),
     ("poses", tr("poses")),
     ("sigma_gains", tr("gain of sigma after each pose")),
 )

@@ -12,7 +12,7 @@ from robolink.calibration import (
     CalibrationResult,
     ToolFit,
     better_fit,
-    flange_pose,
+    flange_of,
     tilted_flange_pose,
     tool_fits,
 )
@@ -113,7 +113,7 @@ class PointsSource:
             flange = [tilted_flange_pose(pose, taught) for pose in poses]
             return PosesFound(self._method.solve(flange, stored), (), None)
         _require_upright(self._taught_tool, taught)
-        result = self._method.solve([flange_pose(pose, taught) for pose in poses], stored)
+        result = self._method.solve([flange_of(pose, taught) for pose in poses], stored)
         # The listing may lack V and W; what is compared and written comes from single reads.
         listed = {number: o for number, o in controller.tools.read_all().items() if o is not None}
         fits = tool_fits(result, taught=self._taught_tool, stored=listed, calibrated=tool)

@@ -6,16 +6,17 @@ from typing import Final
 from robolink import calibration as cal
 from robolink.calibration import CalibrationResult
 from robolink.messages import tr
-from robolink.model import Pose
+from robolink.model import Pose, ToolOffset
 from robolink_cli.commands.measure.solve.case import (
     EULER,
     Node,
+    read_offset,
     read_point,
     read_pose,
     read_poses,
     unusable,
 )
-from robolink_cli.views.solve import result_payload
+from robolink_cli.views.solve import result_payload, space_payload
 
 Payload = dict[str, object]
 
@@ -67,14 +68,20 @@ def pivot_robust(node: Node) -> Payload:
 
 def up_camera(node: Node) -> Payload:
     """One look of a calibrated camera."""
-    return result_payload(cal.solve_up_camera(_sighting(node), sigma_mm=_sigma(node)))
+    sighting = _sighting(node)
+    known, height = known_tip(node)
+    result = cal.solve_up_camera(sighting, stored=known, height=height, sigma_mm=_sigma(node))
+    return space_payload(result) | {"r33": cal.FlangePlane.of(sighting.flange).r33}
 
 
 def camera_affine(node: Node) -> Payload:
     """Pictures of a camera whose place is unknown."""
     seen = [_pixel(child) for child in node.children("observations")]
     before = node.optional("before", lambda name: _camera(node.child(name)))
-    result = cal.solve_camera_affine(seen, sigma_mm=_sigma(node), before=before)
+    known, height = known_tip(node)
+    result = cal.solve_camera_affine(
+        seen, stored=known, height=height, sigma_mm=_sigma(node), before=before
+    )
     camera = result.camera
     return result_payload(result) | {
         "mm_per_px_matrix": [value for row in camera.mm_per_px for value in row],
@@ -92,8 +99,11 @@ def board(node: Node) -> Payload:
     seen = [_fiducial(child) for child in node.children("fiducials")]
     if len(seen) != 2:
         raise unusable(node.at("fiducials"), tr("two fiducials are wanted; board_fit takes more"))
+    known, height = known_tip(node)
     result = cal.solve_board(
         *seen,
+        stored=known,
+        height=height,
         spacing_mm=node.optional("spacing_mm", node.number),
         sigma_mm=_sigma(node),
         allow_mixed_hand=True,
@@ -107,7 +117,10 @@ def board_fit(node: Node) -> Payload:
     for child in node.children("fiducials"):
         drawing.append(read_point(child.child("drawing")))
         seen.append(_fiducial(child))
-    result = cal.solve_board_fit(seen, drawing, sigma_mm=_sigma(node), allow_mixed_hand=True)
+    known, height = known_tip(node)
+    result = cal.solve_board_fit(
+        seen, drawing, stored=known, height=height, sigma_mm=_sigma(node), allow_mixed_hand=True
+    )
     return result_payload(result)
 
 
@@ -147,7 +160,26 @@ def _euler(node: Node, name: str) -> None:
 
 
 def _sighting(node: Node) -> "cal.Sighting":
-    return cal.Sighting(read_pose(node.child("flange")), *read_point(node.child("tip")))
+    flange, tip = read_pose(node.child("flange")), node.child("tip")
+    place = (tip.number("x"), tip.number("y"), tip.optional("z", tip.number))
+    tip.finish()
+    return cal.Sighting(flange, *place)
+
+
+def known_tip(node: Node) -> "tuple[ToolOffset | None, cal.TipHeight | None]":
+    """Return what is stored of a tip, and its height where that is known.
+
+    A stored offset without Z says nothing about the height; ``stored_z_sigma_mm`` says how sure
+    the Z is.
+    """
+    sigma = node.optional("stored_z_sigma_mm", node.number)
+    if "stored" not in node:
+        return None, None
+    stored = node.child("stored")
+    height = cal.TipHeight(stored.number("z"), sigma) if "z" in stored else None
+    offset = read_offset(stored)
+    # Without a height only X and Y are kept, so that no Z of 0 is taken for one.
+    return (None, None) if height is None else (offset, height)
 
 
 def _fiducial(node: Node) -> "cal.Sighting":

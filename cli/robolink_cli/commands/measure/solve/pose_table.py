@@ -27,7 +27,7 @@ def table_case(
 
     Raises:
         AmbiguousPosesError: The file can be read in more than one way.
-        CalibrationError: ``non_finite``, or ``tool_pose`` for poses of another tool than the flange.
+        CalibrationError: ``non_finite``; ``tool_pose`` for poses of another tool.
         ConfigError: It cannot be read or is no list of poses.
     """
     entries = read_poses(path, choices).entries
@@ -38,9 +38,7 @@ def table_case(
             tr("The poses were taken with tool {other}, not {tool}.", other=other, tool=0),
             remedy=tr("Take them with the flange, Tool 0; offline nothing knows another tool."),
         )
-    given: dict[str, object] = {
-        "poses": [_as_case(one) for one in entries]
-    }
+    given: dict[str, object] = {"poses": [_as_case(one) for one in entries]}
     given |= {} if sigma_mm is None else {"sigma_mm": sigma_mm}
     given |= {} if threshold_mm is None else {"inlier_threshold": threshold_mm}
     return Node({"id": path.name, "method": method, "input": given}, "")

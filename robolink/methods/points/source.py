@@ -107,6 +107,7 @@ class PointsSource:
     def find(self, controller: Controller, tool: int, stored: ToolOffset | None) -> PosesFound:
         """Solve the poses and ask which tool they fit. Moves and writes nothing."""
         poses = self._poses()
+        _require_taught_with(self._taught_tool, poses)
         taught = _require_defined(controller, self._taught_tool)
         if not self._method.upright:
             flange = [tilted_flange_pose(pose, taught) for pose in poses]
@@ -136,6 +137,27 @@ class PointsSource:
             "Check that all poses touched the same point and with which tool they were taught "
             "({taught_tool}).",
             taught_tool=way(Way.TAUGHT_TOOL),
+        )
+
+
+def _require_taught_with(tool: int, poses: Sequence[Pose]) -> None:
+    """Refuse poses that say themselves that they are those of another tool.
+
+    Raises:
+        CalibrationError: ``tool_pose``.
+    """
+    other = next((pose.tool for pose in poses if pose.tool not in (None, tool)), None)
+    if other is not None:
+        raise CalibrationError(
+            "tool_pose",
+            tr(
+                "These poses are those of tool {other}, not of tool {tool}.", other=other, tool=tool
+            ),
+            remedy=tr(
+                "Name the tool that was selected with {taught_tool}; what its number holds on this "
+                "controller is used.",
+                taught_tool=way(Way.TAUGHT_TOOL),
+            ),
         )
 
 

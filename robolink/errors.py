@@ -314,12 +314,16 @@ class CalibrationError(RobolinkError):
     """The measurements do not support a result.
 
     Attributes:
-        code: The named reason, for example ``insufficient_rotation``.
+        code: The named reason, for example ``insufficient_rotation``; the most telling one.
+        others: Further reasons that hold as well.
     """
 
-    def __init__(self, code: str, what: str, *, remedy: str = "") -> None:
+    def __init__(
+        self, code: str, what: str, *, remedy: str = "", others: tuple[str, ...] = ()
+    ) -> None:
         super().__init__(what, remedy=remedy)
         self.code = code
+        self.others = others
 
 
 class VerifyError(RobolinkError):

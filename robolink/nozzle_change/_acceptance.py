@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from robolink.calibration import CalibrationResult, require_shrinking
+from robolink.calibration import CalibrationResult, require_shrinking, writes_refused_unattended
 from robolink.errors import CalibrationError
 from robolink.messages import tr
 from robolink.nozzle_change._proposal import LimitVerdict, Proposal
@@ -22,6 +22,8 @@ class AcceptanceCriteria:
         drift_tolerance_mm: Largest drift that passes the verification.
         accepted_change_mm: A larger change that an engineer accepts this time.
         accepted_with: The option that sets it, for whoever is refused; empty where there is none.
+        unattended: Nobody is asked before the write, so that a doubt which a person could weigh is
+            a refusal.
     """
 
     max_change_mm: float = 2.0
@@ -31,6 +33,7 @@ class AcceptanceCriteria:
     drift_tolerance_mm: float = 0.2
     accepted_change_mm: float | None = None
     accepted_with: str = ""
+    unattended: bool = False
 
     @property
     def limit_mm(self) -> float:
@@ -41,8 +44,17 @@ class AcceptanceCriteria:
         """Refuse a measurement that does not agree with itself.
 
         Raises:
-            CalibrationError: ``large_rms``, ``large_residual`` or ``large_interval``.
+            CalibrationError: ``large_rms``, ``large_residual`` or ``large_interval``; where
+                nobody is asked, ``step_in_run_order``, ``drift_in_run_order`` or
+                ``sigma_contradicted``.
         """
+        doubt = writes_refused_unattended(result) if self.unattended else ""
+        if doubt:
+            raise CalibrationError(
+                doubt,
+                tr("The touches do not belong together, and nobody is asked before the write."),
+                remedy=tr("Take the run again, or let a person look at it."),
+            )
         for verdict in self._of_fit(result):
             if not verdict.passed:
                 raise CalibrationError(

@@ -69,7 +69,7 @@ def _touch_sigma_mm(result: CalibrationResult) -> float | None:
     offset_mm = offset_sigma_mm(result)
     if offset_mm is None or result.sigma_mm is None:
         return None
-    if result.sigma_stated:
+    if result.sigma_stated and result.interval_from != "residuals":
         return result.sigma_mm
     largest = max(
         result.covariance[index][index]

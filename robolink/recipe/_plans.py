@@ -48,6 +48,7 @@ def plan_of(
         drift_tolerance_mm=tolerances.drift_mm,
         accepted_change_mm=accepted_change_mm,
         accepted_with=way(Way.ACCEPT_JUMP),
+        unattended=not ask_before_write,
     )
     safe = recipe.poses.safe
     return ChangePlan(

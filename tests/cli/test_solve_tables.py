@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 
 PIN, TIP = np.array([310.0, 95.0, -40.0]), np.array([4.2, -7.9, 131.6])
 ANGLES = [(0, 0, 0), (40, 12, -8), (-75, -15, 10), (120, 9, 20), (-160, -18, -14), (80, 20, 5)]
+ANGLES.append((20, -10, 16))
 FLAT = "x,y,u\n297.5,98.25,0\n322.5,91.75,180\n306.75,82.5,90\n"
 
 

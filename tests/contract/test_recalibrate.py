@@ -124,9 +124,10 @@ def test_a_file_of_poses_stands_for_the_points_of_a_tool(cell, recipe, tmp_path)
     assert cell.simulator.machine.arm.moves_started == 0
 
 
-def test_poses_that_say_another_tool_are_refused(cell, recipe, tmp_path):
+def test_poses_that_say_another_tool_than_the_recipe_are_refused(cell, recipe, tmp_path):
     (tmp_path / "touches.csv").write_text("x,y,u,tool\n287.5,103.25,0,3\n312.5,96.75,180,3\n")
     text = POINTS.replace("points = [901, 902]", 'poses = {{ file = "touches.csv" }}')
+    text = text.replace('kind = "points"', 'kind = "points"\ntaught_tool = 2')
     refused = cell.run("recalibrate", recipe(text), "--yes", "--json")
     assert refused.code == 7, refused.out
     assert json.loads(refused.out)["error"]["code"] == "tool_pose"

@@ -24,6 +24,11 @@ from robolink_cli.session.context import json_option
 @click.option(
     "--threshold", "threshold_mm", type=float, help="Residual that a robust method rejects, mm."
 )
+@click.option(
+    "--accept-residuals",
+    is_flag=True,
+    help="Large residuals are no reason for the exit code 7.",
+)
 @json_option
 def solve(
     file: Path,
@@ -31,12 +36,13 @@ def solve(
     choices: ReadingChoices,
     sigma_mm: float | None,
     threshold_mm: float | None,
+    accept_residuals: bool,
 ) -> int:
     """Calculate a tool offset from measurements in FILE, offline.
 
     FILE is JSON: one case with method, units and input, or many under "vectors"; lengths are mm,
     angles degrees. Or, with --method, it is any file of poses. The exit code is 7 when a case
-    gives no trustworthy result.
+    gives no trustworthy result, or one whose residuals are beyond tolerance.
     """
     from robolink_cli.commands.measure.solve.pose_table import table_case
     from robolink_cli.commands.measure.solve.solving import exit_code, load, solve_document
@@ -60,4 +66,4 @@ def solve(
         results = document.get("results")
         for result in results if isinstance(results, list) else [document]:
             show_case(result)
-    return exit_code(document)
+    return exit_code(document, accept_residuals=accept_residuals)

@@ -6,9 +6,18 @@ from typing import Annotated
 
 from annotated_types import Ge, Le
 
+from robolink.calibration import HIGHEST_MM
 from robolink.files.toml import Problem
 from robolink.messages import tr
-from robolink.methods.declaration import MM, Check, Help, MethodParameters
+from robolink.methods.declaration import (
+    MM,
+    Check,
+    Help,
+    InputNumber,
+    MethodParameters,
+    Option,
+)
+from robolink.model import InputEdge
 from robolink.procedures import TouchPlan
 
 
@@ -24,28 +33,46 @@ class PinParameters(MethodParameters):
         Ge(0.5),
         Le(50),
         MM,
-        Help(tr("How far above the pin the tip stops; the rest is the person's.")),
+        Help(tr("How far above the pin the tip stops at least; the rest is the person's.")),
     ] = 2.0
+    contact_input: Annotated[
+        InputNumber | None,
+        Option(metavar="N"),
+        Help(tr("Number of the input that shows contact of tip and pin, where there is one.")),
+    ] = None
+    off_in_contact: Annotated[
+        bool,
+        Help(tr("Whether that input goes off, not on, in contact.")),
+    ] = False
 
     @property
     def touch(self) -> TouchPlan:
         """The same for a procedure."""
-        return TouchPlan(lift_mm=self.lift_mm, clearance_mm=self.clearance_mm)
+        contact = None
+        if self.contact_input is not None:
+            contact = InputEdge(self.contact_input, falling=self.off_in_contact)
+        return TouchPlan(lift_mm=self.lift_mm, clearance_mm=self.clearance_mm, contact=contact)
 
     def problems(self, check: Check) -> Iterator[Problem]:
         """Check that the tip stops on its way down to the pin, and that the lift has room."""
         yield from clearance_below_lift(self.clearance_mm, self.lift_mm, check)
+        if self.off_in_contact and self.contact_input is None:
+            yield Problem(
+                "off_in_contact", tr("goes with {other}", other=check.spell("contact_input"))
+            )
         if check.box_height_mm is not None and self.lift_mm > check.box_height_mm:
             yield lift_beyond_box()
 
 
 def clearance_below_lift(clearance_mm: float, lift_mm: float, check: Check) -> Iterator[Problem]:
-    """Check that something is left to come down."""
-    if clearance_mm >= lift_mm:
+    """Check that something is left to come down, from wherever the tip stops above the pin."""
+    if clearance_mm + HIGHEST_MM >= lift_mm:
         yield Problem(
             "clearance_mm",
             tr(
-                "must be smaller than {other}, which is {lift:g}",
+                "must be {highest:g} mm and more below {other}, which is {lift:g}: the robot stops "
+                "up to {highest:g} mm higher",
+                highest=HIGHEST_MM,
                 other=check.spell("lift_mm"),
                 lift=lift_mm,
             ),

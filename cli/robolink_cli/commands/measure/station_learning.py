@@ -1,11 +1,13 @@
 """station learn: find a station with a tip that is known, show it, keep it."""
 
+from dataclasses import replace
+
 from robolink.errors import ConfigError, DeclinedError, UndefinedToolError
 from robolink.messages import tr
 from robolink.methods import learn_station
 from robolink.model import Controller, EntryKind, ToolOffset
 from robolink.nozzle_change import Limits, flange_now, foresee, require_inside
-from robolink.procedures import MeasurementContext
+from robolink.procedures import MeasurementContext, TouchPlan
 from robolink.stations import Found, Station, StationKind, find_stations, station_entry
 from robolink_cli.console.render import note, table
 from robolink_cli.prompts.operator import operator_at
@@ -25,6 +27,7 @@ def learn(
     tool: int,
     limits: Limits,
     sigma_mm: float | None,
+    touch: TouchPlan,
     assist: str | None,
     dry_run: bool,
     yes: bool,
@@ -41,7 +44,9 @@ def learn(
         known = _known(context, controller, name)
         tip = _tip(controller, tool)
         here = flange_now(controller)
-        course = learn_station(known, here=here, tool=tool, tip=tip)
+        course = learn_station(
+            known, here=here, tool=tool, tip=tip, plan=replace(touch, nominal=True)
+        )
         steps = foresee(course, here=here, settings=limits.settings(here, None))
         if dry_run:
             payload = {"dry_run": True, "tool": tool, "steps": steps_payload(controller, steps)}
@@ -62,7 +67,7 @@ def learn(
             start = controller.groups[0].pose()
             bench = MeasurementContext(controller, operator, start=start, settings=limits.settings)
             found = bench.run(
-                learn_station(known, here=start, tool=tool, tip=tip, sigma_mm=sigma_mm)
+                learn_station(known, here=start, tool=tool, tip=tip, sigma_mm=sigma_mm, plan=touch)
             )
             _show(known, found)
             if not yes and not bench.runner().confirm(tr("Keep this on record?")):

@@ -55,7 +55,7 @@ class PinParameters(MethodParameters):
 
     def problems(self, check: Check) -> Iterator[Problem]:
         """Check that the tip stops on its way down to the pin, and that the lift has room."""
-        yield from clearance_below_lift(self.clearance_mm, self.lift_mm, check)
+        yield from standoff_below_lift(self.clearance_mm, self.lift_mm, check)
         if self.off_in_contact and self.contact_input is None:
             yield Problem(
                 "off_in_contact", tr("goes with {other}", other=check.spell("contact_input"))
@@ -65,13 +65,26 @@ class PinParameters(MethodParameters):
 
 
 def clearance_below_lift(clearance_mm: float, lift_mm: float, check: Check) -> Iterator[Problem]:
-    """Check that something is left to come down, from wherever the tip stops above the pin."""
+    """Check that something is left to come down."""
+    if clearance_mm >= lift_mm:
+        yield Problem(
+            "clearance_mm",
+            tr(
+                "must be smaller than {other}, which is {lift:g}",
+                other=check.spell("lift_mm"),
+                lift=lift_mm,
+            ),
+        )
+
+
+def standoff_below_lift(clearance_mm: float, lift_mm: float, check: Check) -> Iterator[Problem]:
+    """Check that something is left to come down from the lift to the highest standoff."""
     if clearance_mm + HIGHEST_MM >= lift_mm:
         yield Problem(
             "clearance_mm",
             tr(
-                "must be {highest:g} mm and more below {other}, which is {lift:g}: the robot stops "
-                "up to {highest:g} mm higher",
+                "must be more than {highest:g} below {other}, which is {lift:g}: the robot stops "
+                "up to {highest:g} mm above the clearance",
                 highest=HIGHEST_MM,
                 other=check.spell("lift_mm"),
                 lift=lift_mm,

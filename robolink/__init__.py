@@ -11,6 +11,7 @@ Names are loaded when they are first used, so that importing the package costs n
 
 from typing import TYPE_CHECKING
 
+from robolink.lazy_exports import lazy_exports
 from robolink.version import VERSION
 
 __version__ = VERSION
@@ -44,30 +45,16 @@ __all__ = [
     "connect",
 ]
 
-_HOMES = {
-    "connect": "robolink.controllers",
-    "RobolinkError": "robolink.errors",
-    "ANY": "robolink.model",
-    "Controller": "robolink.model",
-    "Operator": "robolink.runner",
-    "Pose": "robolink.model",
-    "Question": "robolink.runner",
-    "Secret": "robolink.model",
-    "Spot": "robolink.model",
-    "SpotUnit": "robolink.model",
-    "TipSensor": "robolink.model",
-    "ToolOffset": "robolink.model",
-}
-
-
-def __getattr__(name: str) -> object:
-    """Load a public name from its home (PEP 562)."""
-    if name not in _HOMES:
-        raise AttributeError(f"module 'robolink' has no attribute {name!r}")
-    from importlib import import_module
-
-    return getattr(import_module(_HOMES[name]), name)
+__getattr__ = lazy_exports(
+    __name__,
+    {
+        "controllers": "connect",
+        "errors": "RobolinkError",
+        "model": "ANY Controller Pose Secret Spot SpotUnit TipSensor ToolOffset",
+        "runner": "Operator Question",
+    },
+)
 
 
 def __dir__() -> list[str]:
-    return sorted([*globals(), *_HOMES])
+    return sorted([*globals(), *__all__])

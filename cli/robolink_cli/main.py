@@ -13,9 +13,8 @@ from robolink.interrupts import Interrupted, one_ending
 from robolink.messages import tr
 from robolink.ways import speaking
 from robolink_cli.console.exit_codes import exit_code, report
-from robolink_cli.console.output import watched_output
+from robolink_cli.console.output import hand_over, watched_output
 from robolink_cli.console.render import dumps, note, print_document, say
-from robolink_cli.console.sink import hand_over
 from robolink_cli.console.tolerance import colour_wanted, help_width, tolerate_any_console
 from robolink_cli.console.ways import SHELL_WAYS
 from robolink_cli.lazy_group import LazyGroup

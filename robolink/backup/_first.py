@@ -1,5 +1,6 @@
 """The backup that is made by itself, before the first write to a controller."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 from robolink.backup._file import save
@@ -19,10 +20,16 @@ def first_backup_path(identity: str) -> Path:
     return state_folder("backups") / file_name(identity)
 
 
-def keep_first_backup(controller: ToolHolder) -> Path | None:
+def keep_first_backup(
+    controller: ToolHolder, *, tell: Callable[[str], None] = lambda _sentence: None
+) -> Path | None:
     """Save the tools of a controller that has no backup in the user's state folder yet.
 
     To be called before a tool is written. A simulator that dies with this process needs none.
+
+    Args:
+        controller: The controller, connected.
+        tell: Told where it was saved, in a sentence.
 
     Returns:
         Where it was saved, ``None`` when that was done before.
@@ -57,4 +64,10 @@ def keep_first_backup(controller: ToolHolder) -> Path | None:
             ),
             controller=controller.identity,
         ) from error
+    tell(
+        tr(
+            "Before the first write to this controller its tools were saved in {path}",
+            path=path,
+        )
+    )
     return path

@@ -109,6 +109,8 @@ if TYPE_CHECKING:
     from robolink.calibration.pin.six_point import solve_tool_axis as solve_tool_axis
     from robolink.calibration.pin.two_pose import solve_two_pose as solve_two_pose
     from robolink.calibration.pin.two_pose import two_of as two_of
+    from robolink.calibration.quality.doubts import doubt_sentence as doubt_sentence
+    from robolink.calibration.quality.doubts import known_doubts as known_doubts
     from robolink.calibration.quality.impact import Impact as Impact
     from robolink.calibration.quality.impact import PointImpact as PointImpact
     from robolink.calibration.quality.impact import impact_on as impact_on
@@ -182,6 +184,7 @@ __getattr__ = lazy_exports(
         "pin.pivot_fit": "PivotDesign PivotFit fit_pivot fit_pivot_robust pivot_design",
         "pin.six_point": "FAR_DEG SixPointResult ToolAxis solve_six_point solve_tool_axis",
         "pin.two_pose": "solve_two_pose two_of",
+        "quality.doubts": "doubt_sentence known_doubts",
         "quality.impact": "Impact PointImpact impact_on",
         "quality.moved_station": "StationShift TipShift judge_shifts",
         "quality.tolerances": "PLANAR_TOLERANCE TOUCH_TOLERANCE Tolerance",

@@ -72,7 +72,7 @@ def solve_crossed_beams(
         raise _too_few(len(a))
     lags = fit.x[2 : 2 + sum(two_ways)].tolist()
     result = BeamsResult(
-        method="crossed_beams",
+        method="beams",
         offset=keep_unmeasured(stored, x_mm=float(fit.x[0]), y_mm=float(fit.x[1])),
         measured=("x_mm", "y_mm"),
         kept=_KEPT,

@@ -88,7 +88,7 @@ def solve_z_touch(
     fit = _fit(touches, latency_s)
     flange_z = float(fit.x[0])
     result = ZTouchResult(
-        method="z_touch",
+        method="z-touch",
         offset=keep_unmeasured(stored, z_mm=surface_z_mm - flange_z),
         measured=("z_mm",),
         kept=_KEPT,

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 from robolink.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
-    from robolink.controllers.connection import connect as connect
     from robolink.controllers.controller_core import ControllerCore as ControllerCore
     from robolink.controllers.driver_link import DriverLink as DriverLink
     from robolink.controllers.driver_link import MarkedCommand as MarkedCommand
@@ -19,6 +18,7 @@ if TYPE_CHECKING:
     from robolink.controllers.registry import CONTROLLERS_GROUP as CONTROLLERS_GROUP
     from robolink.controllers.registry import ConnectionTerms as ConnectionTerms
     from robolink.controllers.registry import ControllerOpener as ControllerOpener
+    from robolink.controllers.registry import connect as connect
     from robolink.controllers.resolving import MarkerResolver as MarkerResolver
     from robolink.controllers.stopping import stop_now as stop_now
     from robolink.controllers.stopping import stop_requests as stop_requests
@@ -28,13 +28,12 @@ else:
     __getattr__ = lazy_exports(
         __name__,
         {
-            "connection": "connect",
             "controller_core": "ControllerCore",
             "driver_link": "DriverLink MarkedCommand advise_emergency_stop",
             "motion_group": "MotionGroupCore",
             "polled_motion": "PolledGroup",
             "preserving": "Preserver",
-            "registry": "CONTROLLERS_GROUP ConnectionTerms ControllerOpener",
+            "registry": "CONTROLLERS_GROUP ConnectionTerms ControllerOpener connect",
             "resolving": "MarkerResolver",
             "stopping": "stop_now stop_requests",
             "tool_table": "ToolTableCore",

@@ -26,9 +26,13 @@ if TYPE_CHECKING:
         measure_camera_affine as measure_camera_affine,
     )
     from robolink.methods.camera_affine.source import CameraAffineSource as CameraAffineSource
+    from robolink.methods.checking import order_of_residuals as order_of_residuals
+    from robolink.methods.checking import parameter_problems as parameter_problems
+    from robolink.methods.checking import source_of as source_of
     from robolink.methods.declaration import DEGREES as DEGREES
     from robolink.methods.declaration import MM as MM
     from robolink.methods.declaration import MM_S as MM_S
+    from robolink.methods.declaration import NOTHING_STATED as NOTHING_STATED
     from robolink.methods.declaration import Angle as Angle
     from robolink.methods.declaration import AnyMethod as AnyMethod
     from robolink.methods.declaration import Check as Check
@@ -42,6 +46,7 @@ if TYPE_CHECKING:
     from robolink.methods.declaration import Option as Option
     from robolink.methods.declaration import Pair as Pair
     from robolink.methods.declaration import PoseHelp as PoseHelp
+    from robolink.methods.declaration import StatedLimits as StatedLimits
     from robolink.methods.declaration import Unit as Unit
     from robolink.methods.fields import ParameterField as ParameterField
     from robolink.methods.fields import fields_of as fields_of
@@ -111,9 +116,11 @@ __getattr__ = lazy_exports(
         "camera_affine.parameters": "CameraAffineParameters LEAST_SPAN_MM",
         "camera_affine.procedure": "measure_camera_affine",
         "camera_affine.source": "CameraAffineSource",
+        "checking": "order_of_residuals parameter_problems source_of",
         "declaration": (
             "Angle AnyMethod Check DEGREES Former Help InputNumber Length "
-            "MM MM_S Method MethodParameters Needs Option Pair PoseHelp Unit"
+            "MM MM_S Method MethodParameters NOTHING_STATED Needs Option Pair "
+            "PoseHelp StatedLimits Unit"
         ),
         "fields": "ParameterField fields_of",
         "look_parameters": "LookParameters",

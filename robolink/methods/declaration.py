@@ -81,21 +81,51 @@ Rows = tuple[Pair, Pair]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class StatedLimits:
+    """What somebody stated for this one measurement; ``None`` for what nobody did.
+
+    What a cell allows every method is not stated: a method that cannot be judged by it is not.
+
+    Attributes:
+        sigma_mm: Standard deviation of one coordinate of one measurement.
+        rms_mm: Largest root mean square of the residuals.
+        max_mm: Largest residual.
+        interval_mm: Largest half width of a 95 % interval.
+    """
+
+    sigma_mm: float | None = None
+    rms_mm: float | None = None
+    max_mm: float | None = None
+    interval_mm: float | None = None
+
+
+NOTHING_STATED: Final = StatedLimits()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Check:
     """What is known when parameters are checked for going together.
 
     Attributes:
         given: The parameters that somebody wrote.
-        sigma_stated: Whether the standard deviation of a measurement was stated; ``None`` where
-            that cannot be told.
+        limits: What was stated besides; ``None`` where that cannot be told.
         box_height_mm: Height of the box in which the flange may go, ``None`` where it is not known.
+        poses_exist: Whether the poses exist already, so that nothing is measured at set angles.
+        points: How many taught points were named, ``None`` where none are.
         spell: Returns a parameter's name as whoever wrote it knows it: a key, or an option.
     """
 
     given: Collection[str] = ()
-    sigma_stated: bool | None = None
+    limits: StatedLimits | None = None
     box_height_mm: float | None = None
+    poses_exist: bool = False
+    points: int | None = None
     spell: Callable[[str], str] = str
+
+    @property
+    def sigma_stated(self) -> bool | None:
+        """Whether the standard deviation was stated; ``None`` where that cannot be told."""
+        return None if self.limits is None else self.limits.sigma_mm is not None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,6 +153,10 @@ class MethodParameters:
 
     def height_mm(self) -> float:
         """Return how much higher than the box the flange goes."""
+        return 0.0
+
+    def room_mm(self) -> float:
+        """Return how high the box has to be at least, for lifting the tip off and coming back."""
         return 0.0
 
 
@@ -195,7 +229,6 @@ class Method(Generic[P]):
         by_reference: Whether basis "difference" compares with a reference that a run records.
         unmeasured_z: Why ``z = "measured"`` is refused, empty where Z can be measured.
         formerly: How recipes named it before.
-        command: Whether ``calibrate`` has a command of this name.
     """
 
     name: str
@@ -211,7 +244,6 @@ class Method(Generic[P]):
     by_reference: bool = True
     unmeasured_z: str = ""
     formerly: tuple[Former, ...] = ()
-    command: bool = True
 
     @property
     def only_z(self) -> bool:

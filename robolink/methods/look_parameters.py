@@ -21,7 +21,6 @@ from robolink.methods.declaration import (
     Pair,
     Rows,
 )
-from robolink.methods.pin_parameters import lift_beyond_box
 from robolink.procedures import HALF_ROUND_DEG, LookPlan
 from robolink.ways import Way, way
 
@@ -117,7 +116,7 @@ class LookParameters(MethodParameters):
         return ()
 
     def problems(self, check: Check) -> Iterator[Problem]:
-        """Check that pixels are explained whole, that the tool turns, and that there is room."""
+        """Check that pixels are explained whole, and that the tool turns."""
         yield from self._of_pixels(check)
         angles_deg = (*self.corners_deg, *self.turns_deg)
         if len(angles_deg) > 1 and angle_spread_deg(angles_deg) < MIN_ROTATION_DEG:
@@ -125,8 +124,10 @@ class LookParameters(MethodParameters):
                 "turns_deg",
                 tr("must spread over at least {limit:g} degrees", limit=MIN_ROTATION_DEG),
             )
-        if check.box_height_mm is not None and self.lift_mm > check.box_height_mm:
-            yield lift_beyond_box()
+
+    def room_mm(self) -> float:
+        """Return how high the box has to be."""
+        return self.lift_mm
 
     def _of_pixels(self, check: Check) -> Iterator[Problem]:
         if (self.mm_per_px is None) != (self.origin_mm is None):

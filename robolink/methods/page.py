@@ -45,7 +45,7 @@ def _method(method: AnyMethod) -> Iterator[str]:
     yield "| option | key in a recipe | unit | default | limits | meaning |"
     yield "|---|---|---|---|---|---|"
     for field in fields_of(method.parameters):
-        yield _row(method, field)
+        yield _row(field)
     yield ""
 
 
@@ -65,9 +65,9 @@ def _needs(method: AnyMethod) -> str:
     return f"Measures {measured}{told}. Needs {what}."
 
 
-def _row(method: AnyMethod, field: ParameterField) -> str:
-    option = f"`{field.option.flag or field.flag}`" if method.command else ""
-    if field.option.metavar and option:
+def _row(field: ParameterField) -> str:
+    option = f"`{field.option.flag or field.flag}`"
+    if field.option.metavar:
         # A bar would end the cell.
         option = f"`{field.flag} {field.option.metavar}`".replace("|", "\\|")
     key = f"`{field.name}`" if field.in_recipe else f"`{field.option.from_recipe}` at the top"

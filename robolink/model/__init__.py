@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from robolink.model._tools import ANY as ANY
     from robolink.model._tools import Expect as Expect
     from robolink.model._tools import Expected as Expected
+    from robolink.model._tools import Jump as Jump
     from robolink.model._tools import ToolOffset as ToolOffset
     from robolink.model._tools import ToolReceipt as ToolReceipt
     from robolink.model._tools import ToolTable as ToolTable
@@ -60,6 +61,9 @@ if TYPE_CHECKING:
     from robolink.model.record.journal_entries import Signature as Signature
     from robolink.model.record.ledger import Account as Account
     from robolink.model.record.ledger import Ledger as Ledger
+    from robolink.model.record.method_names import finding_named_now as finding_named_now
+    from robolink.model.record.method_names import method_name_now as method_name_now
+    from robolink.model.record.method_names import with_method_name_now as with_method_name_now
     from robolink.model.record.outcomes import Marker as Marker
     from robolink.model.record.outcomes import MarkerKind as MarkerKind
     from robolink.model.record.outcomes import OutcomeLog as OutcomeLog
@@ -82,13 +86,14 @@ else:
             "_optional_parts": (
                 "AlarmList DigitalIo PointReader Value ValueReceipt ValueT VariableTable"
             ),
+            "record.method_names": "finding_named_now method_name_now with_method_name_now",
             "record.outcomes": "Marker MarkerKind OutcomeLog new_operation",
             "_people": "PersonRole require_engineer",
             "_secret": "Secret",
             "record.standing_words": "describe_standing",
             "motion.tip_sensor": "Spot SpotUnit TIP TipSensor",
             "_tools": (
-                "ANY Expect Expected ToolOffset ToolReceipt ToolTable describe_offset "
+                "ANY Expect Expected Jump ToolOffset ToolReceipt ToolTable describe_offset "
                 "plain_offset read_offset tool_changed"
             ),
             "motion.until_input": "InputEdge MotionUntilInput",

@@ -58,7 +58,7 @@ class Measuring:
         self._listener.moment(Moment.BEFORE_MEASURE, context, tool)
         before = context.controller.tools.read(tool)
         with self._watched(plan):
-            result = plan.source.measure(context, tool, before)
+            result = plan.named(plan.source.measure(context, tool, before))
             plan.criteria.judge_fit(result)
             proposal = self._listener.adjusted(Proposal(tool, before, result), context)
         entry = calibration_entry(proposal, plan.criteria, source=plan.source.sentence)

@@ -20,11 +20,7 @@ from robolink.stations import Found, StationKind
 
 def finds_pin(result: CalibrationResult) -> bool:
     """Tell whether a measurement found the pin itself, with the offset."""
-    # A result names the solver, which a method is called after.
-    return any(
-        method.needs.finds_pin and method.name.replace("-", "_") == result.method
-        for method in all_methods()
-    )
+    return any(method.needs.finds_pin and method.name == result.method for method in all_methods())
 
 
 def pin_mm(proposal: Proposal) -> tuple[float, float, float]:

@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass, field, replace
 
+from robolink.calibration import CalibrationResult
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.methods import TwoPoseSource
@@ -58,6 +59,7 @@ class ToolPlan:
         approach: Flange pose from which it is measured, ``None`` for wherever the robot is.
         retreat: Flange pose to which the robot goes afterwards.
         pin: Name of the station where a pin is touched; empty for none, or none that is kept.
+        method: Name of the calibration method, for the record; empty for what the result says.
     """
 
     tool: int
@@ -68,6 +70,11 @@ class ToolPlan:
     approach: Pose | None = None
     retreat: Pose | None = None
     pin: str = ""
+    method: str = ""
+
+    def named(self, result: CalibrationResult) -> CalibrationResult:
+        """Return a result under the name of the method, whichever solver it borrows."""
+        return replace(result, method=self.method) if self.method else result
 
     def details(self, proposal: Proposal) -> dict[str, object]:
         """Return what the journal keeps about the value beside it, plain JSON."""

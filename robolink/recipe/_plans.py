@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from robolink.methods import MethodParameters, Site, fields_of
+from robolink.methods import MethodParameters, Site, fields_of, source_of
 from robolink.model import Controller
 from robolink.nozzle_change import AcceptanceCriteria, ChangePlan, Limits, ToolPlan
 from robolink.procedures import TipSource
@@ -57,6 +57,7 @@ def plan_of(
                 approach=tool.approach.pose if tool.approach else None,
                 retreat=tool.retreat.pose if tool.retreat else None,
                 pin=_pin(recipe),
+                method=recipe.source.of_method.name,
             )
             for tool in recipe.tools
         ),
@@ -95,7 +96,7 @@ def _source(
         max_change_mm=tolerances.jump_mm,
         interval_mm=tolerances.interval_mm,
     )
-    return recipe.source.of_method.source(parameters, site)
+    return source_of(recipe.source.of_method, parameters, site)
 
 
 def _pin(recipe: Recipe) -> str:

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from robolink.calibration import CalibrationResult
-from robolink.model import Hand, Pose, ToolOffset, read_offset
+from robolink.model import Hand, Pose, ToolOffset, method_name_now, read_offset
 
 
 def recorded_fit(details: Mapping[str, Any]) -> CalibrationResult:
@@ -16,7 +16,7 @@ def recorded_fit(details: Mapping[str, Any]) -> CalibrationResult:
         ConfigError, KeyError, TypeError, ValueError: The entry cannot be understood.
     """
     return CalibrationResult(
-        method=details["method"],
+        method=method_name_now(details["method"]),
         offset=read_offset(details["proposed"]) or ToolOffset(),
         measured=tuple(details["measured"]),
         kept=tuple(details.get("kept", ())),

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
-from robolink.calibration import Drift, VerifyResult
+from robolink.calibration import Drift, VerifyResult, doubt_sentence
 from robolink.messages import tr
 from robolink.model import (
     ControllerFacts,
@@ -12,6 +12,7 @@ from robolink.model import (
     ToolOffset,
     describe_offset,
     read_offset,
+    with_method_name_now,
 )
 from robolink.report._recorded_fit import recorded_fit, recorded_pose
 from robolink.report._values import Attempt, Judgement, Outcome, Record, Report
@@ -40,7 +41,7 @@ def report_of_tool(
     """
     outcome, ending = _outcome(entries)
     measured = _last(entries, EntryKind.CALIBRATION)
-    calibration: Mapping[str, Any] = measured.details if measured else {}
+    calibration = with_method_name_now(measured.details) if measured else {}
     compared = _offsets(tool, entries, done=outcome in (Outcome.VERIFIED, Outcome.WRITTEN))
     return Report(
         made_at=made_at,
@@ -56,7 +57,10 @@ def report_of_tool(
         source=str(calibration.get("source", "")) or _undoing(entries),
         method=calibration.get("method"),
         determined=tuple(calibration.get("measured", ())),
-        warnings=(*calibration.get("notes", ()), *map(_doubt, calibration.get("warnings", ()))),
+        warnings=(
+            *calibration.get("notes", ()),
+            *map(doubt_sentence, calibration.get("warnings", ())),
+        ),
         poses=tuple(map(recorded_pose, calibration.get("poses", ()))),
         fit=None if measured is None else recorded_fit(calibration),
         attempts=tuple(_attempts(entries)),
@@ -133,15 +137,6 @@ def _of_several(tool: int, entry: Recorded) -> Mapping[str, Any]:
     tools: Any = entry.details.get("tools", {})
     said: Mapping[str, Any] = tools.get(str(tool), {})
     return said
-
-
-def _doubt(code: str) -> str:
-    """Return a sentence for the name of a doubt."""
-    known = {
-        "small_rotation": tr("The poses differ little in U; half a turn would be best."),
-        "few_poses": tr("There are few poses; more of them would show a bad one."),
-    }
-    return known.get(code, code.replace("_", " "))
 
 
 def _attempts(entries: Sequence[Recorded]) -> list[Attempt]:

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from robolink.messages import tr
-from robolink.model import EntryKind, NewEntry, Recorded
+from robolink.model import EntryKind, NewEntry, Recorded, finding_named_now
 from robolink.stations._station import Station, StationKind
 
 
@@ -76,7 +76,7 @@ def station_of(entry: Recorded) -> Station | None:
         y_mm=_number(details.get("y_mm")),
         z_mm=_number(details.get("z_mm")),
         sigma_mm=_number(details.get("sigma_mm")),
-        how=str(details.get("how", "")),
+        how=finding_named_now(str(details.get("how", ""))),
         gauge=str(details.get("gauge", "")),
         found_at=entry.at,
         entry=entry.number,

@@ -1,13 +1,13 @@
 """Tool changes that are done, or were never: all or none, put back once, recoverable."""
 
+from robolink.model import Jump as Jump
 from robolink.transaction._change import ToolChange as ToolChange
 from robolink.transaction._change import Wanted as Wanted
 from robolink.transaction._change import change_tools as change_tools
+from robolink.transaction._history import ChangedSince as ChangedSince
 from robolink.transaction._history import changed_since as changed_since
 from robolink.transaction._history import earlier_corrections as earlier_corrections
 from robolink.transaction._history import last_proof as last_proof
-from robolink.transaction._jump import Jump as Jump
-from robolink.transaction._last_known import ChangedSince as ChangedSince
 from robolink.transaction._put_back import PutBack as PutBack
 from robolink.transaction._put_back import Step as Step
 from robolink.transaction._recovery import Recovery as Recovery

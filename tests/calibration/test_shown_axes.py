@@ -77,7 +77,7 @@ def measured(guide, **more):
 def test_exact_poses_give_all_six_whichever_way_the_flange_points(start, second_is, ways):
     guide = Guide(start, sigma_mm=0.0, ways=ways)
     result = measured(guide, second_is=second_is)
-    assert result.method == "six_point"
+    assert result.method == "six-point"
     assert result.offset.components() == pytest.approx(TOOL.components(), abs=1e-8)
     assert guide.asked == [TeachPrompt.ROOM, TeachPrompt.ALONG_X, TeachPrompt.ALONG_Z]
     assert result.inputs[-1].u_deg == pytest.approx(start.u_deg)

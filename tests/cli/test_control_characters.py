@@ -9,7 +9,7 @@ import pytest
 import robolink_cli
 from robolink_cli import main
 from robolink_cli.console import exit_codes, render
-from robolink_cli.console.sink import visible
+from robolink_cli.console.output import visible
 
 from robolink.errors import RobolinkError
 from robolink.protocols.epson_text import VariableType
@@ -115,8 +115,8 @@ def test_lines_and_the_worlds_characters_are_left_alone():
 def test_there_is_one_door_to_the_console():
     """Whoever writes past it, writes raw."""
     allowed = {
-        "sink.py": {"echo"},
-        "render.py": {"print"},  # of rich, with cells that went through the sink
+        "output.py": {"echo"},
+        "render.py": {"print"},  # of rich, with cells that went through output.py
         "completion.py": {"echo"},  # a script for the shell, of our own words
     }
     folder = Path(robolink_cli.__file__).parent

@@ -155,6 +155,19 @@ def test_a_change_is_one_side_from_its_first_before_to_its_last_value(document, 
     assert tool["after"]["b"] is None
 
 
+def test_an_old_entry_names_its_method_as_it_is_named_now(document, run, recorded, tmp_path):
+    for change, method in (("dddd", "crossed_beams"), ("eeee", "beams")):
+        recorded.log(HERE).append(entry(EntryKind.CALIBRATION, change * 8, 1, method=method))
+    shown, _ = document("journal", "show", "5")["entries"], run("journal", "export", "as.jsonl")
+    assert [one["details"]["method"] for one in shown] == ["beams"]
+    assert "method: beams" in run("journal", "show", "5")[1]
+    differing = {field["name"] for field in document("journal", "diff", "5", "6")["fields"]}
+    assert "method" not in differing
+    # The hash counts every letter, so an export keeps them.
+    kept = [json.loads(line) for line in (tmp_path / "as.jsonl").read_text().splitlines()]
+    assert [one["details"].get("method") for one in kept[-2:]] == ["crossed_beams", "beams"]
+
+
 def test_a_tool_on_one_side_only_is_named(run, recorded):
     log = recorded.log(HERE)
     log.append(*(entry(EntryKind.DONE, "cccc" * 8, tool, before=OLD, value=NEW) for tool in (1, 5)))

@@ -89,6 +89,7 @@ BAD = {
     "calibrate board": (["--tool", "1", "--station", "C"], "say where the fiducials are"),
     "calibrate pivot": (["--tool", "1", "--pose", "1,2,3"], "does not state all"),
     "calibrate six-point": (["--tool", "0"], "never written"),
+    "calibrate points": (["--tool", "1", "--points", "9-1"], "is not a point"),
     "station list": (["all"], "unexpected extra argument"),
     "station show": (["B"], "no station 'B'"),
     "station learn": (["B", "--tool", "0"], "0 is not in the range"),

@@ -36,7 +36,7 @@ CALIBRATION = NewEntry(
         "source": "one pin touched",
         "before": OLD,
         "proposed": NEW,
-        "method": "two_pose",
+        "method": "two_pose",  # an entry of before
         "measured": ["x_mm", "y_mm"],
         "poses": [{"x_mm": 153.217, "y_mm": 501.272, "z_mm": -83.5, "u_deg": 0, "hand": "right"}],
         "residuals_mm": [[0.03, 0.04]],
@@ -133,7 +133,7 @@ def test_the_page_says_who_when_with_what_and_what_came_of_it(run, recorded, sim
         f"recipe tip.toml, SHA-256 {'ab' * 32}",
         "station pin-2",
         "new offset one pin touched",
-        "method two_pose",
+        "method two-pose",
         "before 12.000 -3.500 -20.000",
         "change 0.300 -0.200 0.000",
         "calibration change up to 2 mm measured: X 12.300; rms 0.050 mm",

@@ -8,6 +8,7 @@ from click.testing import CliRunner
 from robolink_cli.commands.measure.calibrate import calibrate
 
 from robolink.methods import find_method, method_names, register
+from robolink.model import EntryKind
 from robolink.recipe import json_schema, load_recipe
 from tests.contract._method_cell import KINDS, method_cell
 from tests.contract.plate_touch import METHOD
@@ -38,6 +39,7 @@ def cell(request, tmp_path, monkeypatch):
 def test_it_is_a_command_and_a_kind_of_a_recipe(cell, tmp_path):
     done = cell.calibrate("plate-touch", "--station", "PLATE")
     assert done.code == 0, done.err
+    assert done.document["method"] == "plate-touch"
     assert abs(cell.stored.z_mm - cell.truth.z_mm) < 0.02
     cell.lengthen(0.4)
     path = tmp_path / "plate.toml"
@@ -45,6 +47,8 @@ def test_it_is_a_command_and_a_kind_of_a_recipe(cell, tmp_path):
     assert load_recipe(path).recipe.source.parameters == PlateTouchParameters(slow_mm_s=0.5)
     done = cell.run("recalibrate", str(path), "--assist", cell.cell.url, "--yes")
     assert done.code == 0, done.err
+    assert cell.recorded(EntryKind.CALIBRATION)[0].details["method"] == "plate-touch"
+    assert cell.recorded(EntryKind.DONE)[0].details["method"] == "plate-touch"
     assert abs(cell.stored.z_mm - cell.truth.z_mm) < 0.02
 
 

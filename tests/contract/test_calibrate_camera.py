@@ -93,7 +93,7 @@ def test_a_camera_is_found_and_then_sees_the_next_nozzle(desk, kind):
         code, seen, messages = opened.run("calibrate", "camera", *usual)
         assert code == 0, messages
         assert miss_mm(seen, cell.truth) < 0.008
-        assert seen["method"] == "up_camera"
+        assert seen["method"] == "camera"
         assert max(map(abs, seen["camera_error_mm"])) < 0.02
         assert len(seen["fit"]["residuals_mm"]) == 4
 

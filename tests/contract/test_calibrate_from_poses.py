@@ -123,6 +123,43 @@ def test_the_document_has_the_shape_of_a_live_one_and_names_its_source(command):
     assert "measured" in err
 
 
+@pytest.mark.parametrize(
+    ("points", "more", "first", "tool"),
+    [
+        ("901,902", (), 12.3, 0),
+        ("901,902,951", ("--method", "n-angle"), 12.3, 0),
+        ("911,912", ("--taught-tool", "1"), 12.3, 1),
+    ],
+)
+def test_points_are_a_method_of_their_own(command, simulator, points, more, first, tool):
+    words = ("calibrate", "points", "--tool", "1", "--points", points, *more, "--yes", "--json")
+    code, out, err = command(*words)
+    assert code == 0, err
+    document = json.loads(out)
+    assert document["method"] == "points"
+    assert document["source"]["taught_tool"] == tool
+    assert document["proposed"]["x_mm"] == pytest.approx(first, abs=1e-3)
+    assert len(document["poses"]) == len(points.split(","))
+    assert stored(simulator).matches(ToolOffset(12.3, -3.9, -20.0), 0.002)
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "said"),
+    [
+        ((), 2, "Missing option '--points'"),
+        (("--points", "901,902", "--speed", "5"), 2, "--speed says how to move"),
+        (("--points", "901,902,951"), 2, "--points: must hold two points; more are for"),
+        (("--points", "901,902", "--method", "n-angle"), 2, "--points: must hold three points"),
+        (("--points", "901,902", "--pose", "1,2,3"), 2, "No such option"),
+    ],
+)
+def test_the_method_points_takes_points_and_nothing_else(command, simulator, words, code, said):
+    ended, _, err = command("calibrate", "points", "--tool", "1", *words, "--yes")
+    assert ended == code, err
+    assert said in err
+    assert stored(simulator) == STORED
+
+
 def test_off_a_terminal_nothing_is_written_without_yes(command, simulator):
     code, out, err = command(*calibrate("--points", "901,902"))
     assert code == 9

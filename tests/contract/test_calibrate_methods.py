@@ -40,7 +40,7 @@ def test_many_touches_end_early_and_one_touch_finds_the_next_needle(cell):
     done = cell.calibrate("n-angle", "--station", "PIN-07", "--until", "0.05", "--count", "8")
     assert done.code == 0, done.err
     document = done.document
-    assert document["method"] == "n_angle"
+    assert document["method"] == "n-angle"
     assert 4 <= len(document["poses"]) < 8
     assert max(document["fit"]["half_width95"].values()) <= 0.05
     assert within(document, cell.truth)
@@ -116,6 +116,7 @@ def test_a_sensor_measures_at_its_station_and_nobody_is_asked(cell, method, stat
     cell.mount()
     done = cell.calibrate(method, "--station", station)
     assert done.code == 0, done.err
+    assert done.document["method"] == method
     found = done.document["proposed"]
     for axis in axes:
         assert found[f"{axis}_mm"] == pytest.approx(getattr(cell.truth, f"{axis}_mm"), abs=0.02)

@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 import tomllib
+from typing import cast
 
 import pytest
 from annotated_types import Ge, Le
@@ -11,8 +12,12 @@ from click.testing import CliRunner
 from robolink_cli import main
 from robolink_cli.commands.measure.calibrate.method_command import command_of
 
-from robolink.methods import all_methods, fields_of
+from robolink.errors import ConfigError
+from robolink.methods import Site, StatedLimits, all_methods, fields_of, source_of
+from robolink.model import Controller
+from robolink.nozzle_change import usual_box
 from robolink.recipe._loading import _checked
+from robolink.stations import Station
 
 NOBODY = "epson+tcp://127.0.0.1:9"
 """Refused before anything is sent, nothing is asked for there."""
@@ -30,7 +35,6 @@ def beyond(field):
 LIMITS = [
     (method, field, value)
     for method in all_methods()
-    if method.command
     for field in fields_of(method.parameters)
     if field.kind in (float, int)
     for value in beyond(field)
@@ -68,7 +72,7 @@ def typed(method, values):
             yield f"{flags[name]}={','.join(texts)}"
 
 
-def in_recipe(method, values):
+def in_recipe(method, values, *tables):
     """Return what a recipe of that method is told."""
     z = "measured" if method.only_z else "kept"
     lines = [
@@ -81,16 +85,18 @@ def in_recipe(method, values):
         "[source]",
         f'kind = "{method.name}"',
         *(f"{name} = {json.dumps(value)}" for name, value in values.items()),
+        *tables,
         "[[tools]]",
         "number = 1",
     ]
     return {one.where: one.what for one in _checked(tomllib.loads("\n".join(lines)))[1]}
 
 
-def refused(method, values, capsys):
+def refused(method, values, capsys, *more):
     """Return what a command of that method says."""
     station = ("--station", "S") if method.needs.named else ()
-    words = ("calibrate", method.name, "--tool", "1", *station, *typed(method, values))
+    where = station if method.needs.motion else ("--points", "901,902")
+    words = ("calibrate", method.name, "--tool", "1", *where, *typed(method, values), *more)
     assert main.run(["-c", NOBODY, *words]) == 2
     return " ".join(capsys.readouterr().err.split())
 
@@ -117,6 +123,83 @@ def test_what_does_not_go_together_is_refused_in_the_same_words(name, values, wh
     assert f"{flags[where]}: {words}" in refused(method, values, capsys)
 
 
+HALVES = {"board": {"spacing_mm": 40.0, "turns_deg": (0.0,)}, "camera": {"turns_deg": (0.0,)}}
+HALVES |= {"z-touch": {"speeds_mm_s": (2.0, 1.0)}, "beams": {"repeats": 1, "turn_deg": 0.0}}
+"""With these a measurement leaves no residual; two-pose, points and one-touch never do."""
+
+NO_RESIDUAL = ("two-pose", "one-touch", "points", *HALVES)
+TYPED = {"rms_mm": "--max-rms", "max_mm": "--max-residual", "interval_mm": "--max-interval"}
+UNKNOWN_SIGMA = "is missing: the measurement leaves no residual"
+
+
+def of_the_library(method, values, **more):
+    """Return what a script is told that asks for the source of measurements."""
+    station = Station(id="S", kind=method.needs.station)
+    site = Site(controller=cast(Controller, None), tool=1, station=station)
+    with pytest.raises(ConfigError) as caught:
+        source_of(method, method.parameters(**values), site, **more)
+    return caught.value.what
+
+
+@pytest.mark.parametrize("limit", TYPED)
+@pytest.mark.parametrize("name", NO_RESIDUAL)
+def test_what_leaves_no_residual_is_judged_by_none_wherever_one_asks(name, limit, capsys):
+    method, values = method_of(name), HALVES.get(name, {})
+    where = "sigma_mm" if limit == "interval_mm" else limit
+    if where == "sigma_mm" and not method.by_reference:
+        pytest.skip("one touch may take its standard deviation from the calibration before")
+    what = in_recipe(method, values, "[tolerances]", f"{limit} = 0.1")[f"tolerances.{where}"]
+    assert what.startswith(UNKNOWN_SIGMA if where == "sigma_mm" else "cannot be judged: ")
+    option = {**TYPED, "sigma_mm": "--sigma"}[where]
+    said = refused(method, values, capsys, TYPED[limit], "0.1")
+    assert f"{option}: {what}." in said
+    said = of_the_library(method, values, limits=StatedLimits(**{limit: 0.1}))
+    assert f"{where}: {what}." in said
+
+
+def test_an_interval_that_is_never_met_is_refused_in_the_same_words(capsys):
+    method, tables = method_of("two-pose"), ("[tolerances]", "sigma_mm = 0.1", "interval_mm = 0.1")
+    what = in_recipe(method, {}, *tables)["tolerances.interval_mm"]
+    assert what.startswith("can never be met")
+    typed_too = ("--sigma", "0.1", "--max-interval", "0.1")
+    assert f"--max-interval: {what}." in refused(method, {}, capsys, *typed_too)
+    limits = StatedLimits(sigma_mm=0.1, interval_mm=0.1)
+    assert f"interval_mm: {what}." in of_the_library(method, {}, limits=limits)
+
+
+def test_what_a_cell_allows_every_method_is_no_reason_to_refuse_one(tmp_path, monkeypatch, capsys):
+    """A cell's limits stand for methods that can be judged by them; nobody typed them here."""
+    (tmp_path / "robolink.toml").write_text(
+        f'[cells.a]\nurl = "{NOBODY}"\nrms_tolerance_mm = 0.1\n', encoding="utf-8"
+    )
+    monkeypatch.setenv("ROBOLINK_CONFIG", str(tmp_path / "robolink.toml"))
+    code = main.run(["-c", "a", "calibrate", "two-pose", "--tool", "1", "--dry-run"])
+    assert code == 3, capsys.readouterr().err
+
+
+LIFTING = [
+    method
+    for method in all_methods()
+    if "lift_mm" in {field.name for field in fields_of(method.parameters)}
+]
+
+
+@pytest.mark.parametrize("method", LIFTING, ids=lambda method: method.name)
+def test_a_lift_that_the_box_has_no_room_for_is_refused_wherever_one_asks(method, capsys):
+    values = {"lift_mm": 81.0, **({"spacing_mm": 40.0} if method.name == "board" else {})}
+    what = in_recipe(method, values)["source.lift_mm"]
+    assert what.startswith("must leave room: ")
+    assert what.endswith("and the box is 80 mm high")
+    assert f"--lift: {what}." in refused(method, values, capsys)
+    assert f"lift_mm: {what}." in of_the_library(method, values, box=usual_box())
+
+
+def test_a_limit_is_refused_in_the_same_words_to_a_script(capsys):
+    method, values = method_of("two-pose"), {"turn_deg": 5}
+    what = in_recipe(method, values)["source.turn_deg"]
+    assert of_the_library(method, values) == f"turn_deg: {what}."
+
+
 def test_a_turn_that_tells_nothing_is_refused_before_the_robot_has_moved(capsys):
     assert "must be at least 30" in refused(method_of("two-pose"), {"turn_deg": 5}, capsys)
 
@@ -127,10 +210,9 @@ def test_every_parameter_is_an_option_and_a_key(method):
     given = tomllib.loads(f'source = {{ kind = "{method.name}", nothing = 1 }}')
     (what,) = (p.what for p in _checked(given)[1] if p.where == "source.nothing")
     assert keys <= {*what.partition("these are: ")[2].split(", ")}
-    if method.command:
-        shown = CliRunner().invoke(command_of(method), ["--help"]).output
-        for field in fields_of(method.parameters):
-            assert field.flag in shown
+    shown = CliRunner().invoke(command_of(method), ["--help"]).output
+    for field in fields_of(method.parameters):
+        assert field.flag in shown
 
 
 def test_help_asks_for_no_mathematics_and_no_recipes():
@@ -139,7 +221,7 @@ def test_help_asks_for_no_mathematics_and_no_recipes():
         "from click.testing import CliRunner\n"
         "from robolink_cli.commands.measure.calibrate import calibrate\n"
         "from robolink.methods import all_methods\n"
-        "commands = [[method.name] for method in all_methods() if method.command]\n"
+        "commands = [[method.name] for method in all_methods()]\n"
         "for words in [[], *commands]:\n"
         "    shown = CliRunner().invoke(calibrate, [*words, '--help'])\n"
         "    assert shown.exit_code == 0, shown.output\n"

@@ -64,7 +64,7 @@ def test_the_example_measures_writes_and_proves_a_needle(cell):
     log = open_journal().log(cell.url)
     (measured,) = log.recorded(kinds=[EntryKind.CALIBRATION])
     assert "two crossed beams" in str(measured.details["source"])
-    assert measured.details["method"] == "crossed_beams"
+    assert measured.details["method"] == "beams"
 
 
 def test_beams_that_stay_silent_are_tried_twice_and_nothing_is_written(cell):

@@ -99,7 +99,7 @@ def test_a_served_cell_lends_its_camera_through_the_assist_port(tmp_path, monkey
         cell.check_settings_are_those_of_before()
         (measured,) = open_journal().log(cell.url).recorded(kinds=[EntryKind.CALIBRATION])
         assert cell.assist_url in str(measured.details["source"])
-        assert measured.details["method"] == "up_camera"
+        assert measured.details["method"] == "camera"
         spots = measured.details["spots"]
         assert isinstance(spots, list)
         assert [len(spot) for spot in spots] == [2, 2, 2, 2]
@@ -107,7 +107,7 @@ def test_a_served_cell_lends_its_camera_through_the_assist_port(tmp_path, monkey
         page = tmp_path / "change.html"
         shown = cell.run("report", measured.change, str(page))
         assert shown.code == 0, shown.err
-        assert "up_camera" in page.read_text()
+        assert "camera" in page.read_text()
 
 
 def test_the_same_recipe_serves_a_plc(run, plc, tmp_path, capsys):

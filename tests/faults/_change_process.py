@@ -116,8 +116,7 @@ def _run(program: str, url: str, folder: str, kill_at: CommitStep | None) -> Non
 
 
 def _watch_commits(noted: Path, kill_at: CommitStep | None) -> None:
-    from robolink.journal.store.statements import Tables
-    from robolink.journal.store.store import Store
+    from robolink.journal.store.store import Store, Tables
 
     write = Store.write
     file = os.open(noted, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)

@@ -15,8 +15,7 @@ from typing import Final, Literal
 from robolink.controllers.epson.link.session import EpsonSession
 from robolink.controllers.softmotion.link.wire import MailboxWire
 from robolink.journal import JournalOutcomeLog
-from robolink.journal.store.statements import Tables
-from robolink.journal.store.store import Store
+from robolink.journal.store.store import Store, Tables
 from robolink.protocols.epson_text import Refusal, Reply
 from robolink.protocols.mailbox import COMMAND, Opcode
 from robolink.protocols.spel import Statement

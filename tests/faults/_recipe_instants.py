@@ -20,8 +20,7 @@ import pytest
 from robolink_cli.prompts import operator as _operator
 from robolink_simulators.cell.clock import ManualClock
 
-from robolink.journal.store.statements import Tables
-from robolink.journal.store.store import Store
+from robolink.journal.store.store import Store, Tables
 from robolink.runner import Question
 
 Kind = Literal["request", "answer", "wait", "question", "commit"]

@@ -15,8 +15,7 @@ import pytest
 from robolink_simulators.faults import Fault, FaultAction
 from robolink_simulators.softmotion.mailbox.faults import PlcFault, PlcFaultAction
 
-from robolink.journal.store.statements import Tables
-from robolink.journal.store.store import Store
+from robolink.journal.store.store import Store, Tables
 from robolink.model import EntryKind, MarkerKind
 from tests.faults._epson_recipe_cell import EpsonRecipeCell
 from tests.faults._recipe_cases import CASES, Case

@@ -243,7 +243,7 @@ ONE_LOOK = "turns_deg = [0]"
             "source.turns_deg",
             "must spread over at least 30 degrees",
         ),
-        (with_(CAMERA, "[box]", "down_mm = 4", "up_mm = 4"), "source.lift_mm", "must be at most"),
+        (with_(CAMERA, "[box]", "down_mm = 4", "up_mm = 4"), "source.lift_mm", "must leave room"),
         (
             with_(with_(CAMERA, "[source]", ONE_LOOK), "[tolerances]", "rms_mm = 0.1"),
             "tolerances.rms_mm",
@@ -300,7 +300,7 @@ def test_what_these_kinds_can_measure_is_accepted(text):
         (with_(AFFINE, "[source]", "span_mm = 0.1"), "source.span_mm", "must be at least 0.2"),
         (with_(AFFINE, "[source]", ONE_LOOK), "source.turns_deg", "must spread over at least 30"),
         (with_(CAMERA, "[source]", "span_mm = 3"), "source.span_mm", "is not known"),
-        (with_(AFFINE, "[box]", "down_mm = 4", "up_mm = 4"), "source.lift_mm", "must be at most"),
+        (with_(AFFINE, "[box]", "down_mm = 4", "up_mm = 4"), "source.lift_mm", "must leave room"),
         (BOARD.replace("spacing_mm = 40", ""), "source.fiducials_mm", "is missing: say where"),
         (BOARD.replace("= 40", "= 4"), "source.spacing_mm", "must be at least 5"),
         (

@@ -35,7 +35,7 @@ def report(points=None, *, new=NEW, **more):
         "after": new,
         "outcome": Outcome.VERIFIED,
         "source": "measured",
-        "method": "two_pose",
+        "method": "two-pose",
         "determined": ("x_mm", "y_mm"),
         "poses": (Pose(287.5, 103.25, 0, 0, hand=Hand.RIGHT), Pose(312.5, 96.75, 0, 180)),
         "impact": impact,

@@ -126,7 +126,7 @@ def test_a_cell_file_that_was_corrected_by_hand_is_not_passed_over_in_silence(fi
 
 def test_a_pin_may_be_known_from_the_journal_alone(record):
     pin = find_station(None, record(PIN), "PIN")
-    assert (pin.sigma_mm, pin.how, pin.declared) == (0.01, "n_angle with tool 1", False)
+    assert (pin.sigma_mm, pin.how, pin.declared) == (0.01, "n-angle with tool 1", False)
 
 
 def test_a_record_of_another_kind_does_not_replace_a_declaration(file, record):

@@ -10,8 +10,8 @@ from robolink import errors
 from robolink.interrupts import EndedBy, Interrupted, ended_by
 from robolink.messages import tr
 from robolink.standing import UNTOUCHED, standing_after
+from robolink_cli.console.output import hand_over, show
 from robolink_cli.console.render import dumps
-from robolink_cli.console.sink import hand_over, show
 from robolink_cli.console.standing import standing_payload, tell_standing
 
 DONE: Final = 0

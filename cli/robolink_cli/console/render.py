@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import click
 
-from robolink_cli.console.sink import hand_over, show, visible
+from robolink_cli.console.output import hand_over, show, visible
 
 _JSON = "robolink.json"
 _DOCUMENT = "robolink.document"

@@ -3,7 +3,7 @@
 from typing import Final
 
 from robolink.standing import UNTOUCHED, Components, Standing
-from robolink_cli.console.sink import show
+from robolink_cli.console.output import show
 
 _NAMES: Final = ("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
 

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Final
 import click
 
 from robolink.messages import tr
-from robolink_cli.console.sink import visible
+from robolink_cli.console.output import visible
 
 if TYPE_CHECKING:
     _ParamType = click.ParamType[str]

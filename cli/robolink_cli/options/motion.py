@@ -30,5 +30,5 @@ def refuse_motion_options(context: click.Context) -> None:
         if isinstance(parameter, MotionOption) and typed:
             raise ConfigError(
                 tr("{option} says how to move, and nothing moves here.", option=parameter.opts[0]),
-                remedy=tr("Leave it out, or measure without --points, --pose and --poses."),
+                remedy=tr("Leave it out; it belongs to a measurement by the robot."),
             )

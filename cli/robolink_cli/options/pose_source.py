@@ -125,6 +125,29 @@ def pose_source_options(
     return add
 
 
+def taught_points_option(points: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Add ``--points`` to a command that takes nothing else, passed on as ``poses``.
+
+    With which tool they were taught is a parameter of the method, ``taught_tool``.
+
+    Args:
+        points: What the help says about them.
+    """
+
+    def add(function: Callable[..., Any]) -> Callable[..., Any]:
+        @wraps(function)
+        def with_points(*args: object, points: str, taught_tool: int, **others: object) -> object:
+            numbers = point_numbers(points)
+            poses = PoseSource("points", points=numbers, taught_tool=taught_tool)
+            return function(*args, poses=poses, taught_tool=taught_tool, **others)
+
+        option = click.option("--points", metavar="N,N", required=True, help=points)
+        command: Callable[..., Any] = option(with_points)
+        return command
+
+    return add
+
+
 def pose_source(
     *, points: str | None, typed: tuple[str, ...], path: Path | None, taught_tool: int | None
 ) -> PoseSource | None:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
-from robolink.calibration import VerifyResult
+from robolink.calibration import VerifyResult, known_doubts
 from robolink.messages import tr
 from robolink.nozzle_change import LimitVerdict, PlannedStep, Proposal, ToolReport
 from robolink.runner import TeachPrompt
@@ -13,7 +13,6 @@ from robolink_cli.views.documents import (
     receipt_payload,
     verification_payload,
 )
-from robolink_cli.views.doubts import doubts as doubts
 from robolink_cli.views.fit import remarks, show_residuals
 from robolink_cli.views.tables import show_change
 
@@ -32,7 +31,7 @@ def show_proposal(proposal: Proposal) -> None:
         say(f"  {remark}")
     if result.residuals_mm:
         show_residuals(result)
-    for sentence in doubts(proposal):
+    for sentence in known_doubts(result.warnings):
         say(f"  ! {sentence}")
 
 

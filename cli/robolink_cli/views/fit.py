@@ -19,9 +19,9 @@ def remarks(result: CalibrationResult) -> Iterator[str]:
 def _fit(result: CalibrationResult) -> str:
     """Return how well the poses agree, in one sentence; empty where a sensor measured once."""
     if result.rms_mm is None:
-        if result.method == "one_touch":
+        if result.method == "one-touch":
             return tr("one touch leaves no residual")
-        if result.method == "two_pose":
+        if result.method == "two-pose":
             return tr(
                 "two poses leave no residual: each placement error counts {gain:.2f} times",
                 gain=result.sigma_gain,

@@ -6,7 +6,14 @@ from typing import Final
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink.model import EntryKind, Recorded, ToolOffset, describe_offset, read_offset
+from robolink.model import (
+    EntryKind,
+    Recorded,
+    ToolOffset,
+    describe_offset,
+    read_offset,
+    with_method_name_now,
+)
 from robolink.transaction import id_of_change
 from robolink_cli.console.render import say, table
 
@@ -27,15 +34,21 @@ _PLAIN: Final = (
 _LISTS: Final = ("poses", "drifts", "tools")
 
 
-def entry_payload(entry: Recorded) -> dict[str, object]:
-    """Return an entry with its units in the keys, and the details as they are stored."""
+def entry_payload(entry: Recorded, *, as_stored: bool = False) -> dict[str, object]:
+    """Return an entry with its units in the keys.
+
+    Args:
+        entry: The entry.
+        as_stored: Whether the details are wanted letter by letter, as the hash counts them; else
+            they name the method as it is named now.
+    """
     payload: dict[str, object] = {name: getattr(entry, name) for name in _PLAIN}
     payload["kind"] = str(entry.kind)
     for key, names in (("before", ("before",)), ("after", AFTER)):
         known, offset = first_offset(entry.details, names)
         if known:
             payload[key] = offset_payload(offset)
-    payload["details"] = dict(entry.details)
+    payload["details"] = dict(entry.details) if as_stored else with_method_name_now(entry.details)
     return payload | asdict(entry.signature) | {"previous": entry.previous, "hash": entry.hash}
 
 
@@ -103,7 +116,7 @@ def show_entry(entry: Recorded) -> None:
     for name, value in shown.items():
         if value != "":
             say(f"  {name}: {value}")
-    for name, value in entry.details.items():
+    for name, value in with_method_name_now(entry.details).items():
         if name not in (*_VALUES, *_LISTS) and value not in (None, [], "", {}):
             say(f"  {name.replace('_', ' ')}: {_plain(value)}")
     _show_values(entry)

@@ -5,7 +5,7 @@ from dataclasses import asdict
 from typing import Final, TypeAlias
 
 from robolink.messages import tr
-from robolink.model import Recorded, ToolOffset, angle_difference_deg
+from robolink.model import Recorded, ToolOffset, angle_difference_deg, with_method_name_now
 from robolink.transaction import id_of_change
 from robolink_cli.console.render import say, table
 from robolink_cli.views.journal import (
@@ -58,7 +58,7 @@ class _Side:
         if isinstance(poses, list) and poses:
             self.poses = poses
         said = {"kind": str(entry.kind), "tolerance": entry.tolerance, "verdict": entry.verdict}
-        method = entry.details.get("method")
+        method = with_method_name_now(entry.details).get("method")
         said |= {"method": str(method)} if method else {}
         self.facts |= {name: value for name, value in said.items() if value}
         self.facts |= {name: value for name, value in asdict(entry.signature).items() if value}

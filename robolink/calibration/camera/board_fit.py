@@ -65,7 +65,7 @@ def solve_board_fit(
     residuals = seen - origin - turn * drawing
     unit = _unit_covariance(turn, drawing)
     result = CalibrationResult(
-        method="board_fit",
+        method="board",
         offset=keep_unmeasured(
             stored,
             x_mm=origin.real,

@@ -110,7 +110,7 @@ def solve_camera_affine(
         require_same_camera(camera, before, limits)
     residuals = fit.residuals.reshape(-1, 2)
     result = CameraCalibration(
-        method="camera_affine",
+        method="camera-affine",
         offset=keep_unmeasured(stored, x_mm=float(fit.x[6]), y_mm=float(fit.x[7])),
         measured=("x_mm", "y_mm"),
         kept=_KEPT,

@@ -76,7 +76,7 @@ def solve_camera_round(
     result = solve_n_angle(on_one_point, stored=stored, sigma_mm=sigma_mm, tolerance=tolerance)
     x_mm, y_mm = result.reference_point_mm
     error_mm = (mean_x - x_mm, mean_y - y_mm)
-    result = replace(result, method="up_camera", inputs=inputs)
+    result = replace(result, method="camera", inputs=inputs)
     return as_round(result, camera_error_mm=error_mm)
 
 

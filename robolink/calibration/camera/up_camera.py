@@ -56,7 +56,7 @@ def solve_up_camera(
     scatter = Dispersion.of(0.0, 0, sigma_mm)
     covariance = ((scatter.sigma_mm**2, 0.0), (0.0, scatter.sigma_mm**2)) if scatter else ()
     return CalibrationResult(
-        method="up_camera",
+        method="camera",
         offset=keep_unmeasured(stored, x_mm=x_mm, y_mm=y_mm),
         measured=("x_mm", "y_mm"),
         kept=("z_mm", "u_deg", "v_deg", "w_deg"),

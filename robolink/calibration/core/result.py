@@ -22,7 +22,7 @@ class CalibrationResult:
     """A proposal for a tool offset. Nothing has been written.
 
     Attributes:
-        method: How it was measured, for example ``two_pose``.
+        method: Name of the calibration method, for example ``two-pose``.
         offset: The proposed offset: measured components, and the others as they were kept.
         measured: Names of the components that the measurement determines.
         kept: Names of the components that were not measured and are proposed unchanged.

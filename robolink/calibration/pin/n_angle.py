@@ -68,7 +68,7 @@ def solve_n_angle(
         fit, kept = fit_planar_robust(p, z, robust, sigma_mm=sigma_mm)
         _require_spread_of_kept(poses, kept, min_rotation_deg)
     result = CalibrationResult(
-        method="n_angle",
+        method="n-angle",
         offset=keep_unmeasured(stored, x_mm=fit.tip.real, y_mm=fit.tip.imag),
         measured=("x_mm", "y_mm"),
         kept=_KEPT,

@@ -70,7 +70,7 @@ def solve_one_touch(
         variance = scatter.sigma_mm**2 + pin.sigma_mm**2
         covariance = ((variance, 0.0, 0.0), (0.0, variance, 0.0), (0.0, 0.0, variance))
     return CalibrationResult(
-        method="one_touch",
+        method="one-touch",
         offset=keep_unmeasured(stored, x_mm=x, y_mm=y, z_mm=z),
         measured=("x_mm", "y_mm", "z_mm"),
         kept=("u_deg", "v_deg", "w_deg"),

@@ -130,7 +130,7 @@ def solve_six_point(
     touches = len(pivot_poses)
     unit = _unit_covariance(positions, turned, frame, touches=touches, square=second_is == "xz")
     result = SixPointResult(
-        method="six_point",
+        method="six-point",
         offset=keep_unmeasured(pivot.offset, u_deg=u, v_deg=v, w_deg=w),
         measured=_MEASURED,
         kept=(),

@@ -76,7 +76,7 @@ def solve_two_pose(
     variance = (scatter.sigma_mm * gain) ** 2 if scatter else 0.0
     covariance = ((variance, 0.0), (0.0, variance)) if scatter else ()
     return CalibrationResult(
-        method="two_pose",
+        method="two-pose",
         offset=keep_unmeasured(stored, x_mm=t_x, y_mm=t_y),
         measured=MEASURED,
         kept=("z_mm", "u_deg", "v_deg", "w_deg"),

@@ -6,14 +6,13 @@ from robolink.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from robolink.controllers.plc_map.controller import PlcMapController as PlcMapController
+    from robolink.controllers.plc_map.controller import open_plc_map as open_plc_map
     from robolink.controllers.plc_map.flange import FlangeReader as FlangeReader
-    from robolink.controllers.plc_map.opening import open_plc_map as open_plc_map
 
 __getattr__ = lazy_exports(
     __name__,
     {
-        "controller": "PlcMapController",
+        "controller": "PlcMapController open_plc_map",
         "flange": "FlangeReader",
-        "opening": "open_plc_map",
     },
 )

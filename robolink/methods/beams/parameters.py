@@ -151,7 +151,7 @@ class BeamsParameters(MethodParameters):
         return may_end_early(count * self.repeats, unknowns=unknowns, sigma_stated=sigma_stated)
 
     def problems(self, check: Check) -> Iterator[Problem]:
-        """Check that the beams cross, that one breaks at a time, and that there is room."""
+        """Check that the beams cross, and that one breaks at a time."""
         yield from self._of_sampling(check)
         yield from self._of_beams(check)
         if self.aside_mm <= self.search_mm:
@@ -164,15 +164,10 @@ class BeamsParameters(MethodParameters):
                     search=self.search_mm,
                 ),
             )
-        deep_mm = self.lift_mm + self.dip_mm + self.shaft_mm
-        if check.box_height_mm is not None and deep_mm > check.box_height_mm:
-            yield Problem(
-                "lift_mm",
-                tr(
-                    "must leave room: lift_mm, dip_mm and shaft_mm together are at most the height "
-                    "of the box, down_mm + up_mm"
-                ),
-            )
+
+    def room_mm(self) -> float:
+        """Return how high the box has to be: lift, dip and shaft together."""
+        return self.lift_mm + self.dip_mm + self.shaft_mm
 
     def no_residual(self) -> str:
         """Return why residuals cannot be judged, empty when they can."""
@@ -180,7 +175,7 @@ class BeamsParameters(MethodParameters):
             return ""
         return tr(
             "cannot be judged: crossings that are not repeated always agree, so they leave no "
-            "residual; use repeats = 2, or interval_mm with sigma_mm"
+            "residual; repeat them, or limit the interval and state the standard deviation"
         )
 
     def states_station(self) -> bool:

@@ -71,7 +71,7 @@ class BoardParameters(LookParameters):
             return ""
         return tr(
             "cannot be judged: two fiducials at one angle always agree, so they leave no residual; "
-            "give two turns_deg or more, or interval_mm with sigma_mm"
+            "look at two angles or more, or limit the interval and state the standard deviation"
         )
 
 

@@ -16,5 +16,5 @@ class CameraParameters(LookParameters):
             return ""
         return tr(
             "cannot be judged: looks at one or two angles always agree, so they leave no residual; "
-            "give three turns_deg or more, or interval_mm with sigma_mm"
+            "look at three angles or more, or limit the interval and state the standard deviation"
         )

@@ -43,6 +43,10 @@ class OneTouchParameters(PinParameters):
         ),
     ] = 5.0
 
+    def room_mm(self) -> float:
+        """Return how high the box has to be."""
+        return self.lift_mm
+
     def no_residual(self) -> str:
         """Return why residuals cannot be judged."""
-        return tr("cannot be judged: one touch leaves no residual; use interval_mm")
+        return tr("cannot be judged: one touch leaves no residual; limit the interval")

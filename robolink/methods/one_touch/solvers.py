@@ -65,7 +65,7 @@ class Difference:
             sigma_mm=self.sigma_mm,
             limits=self.limits,
         )
-        result = replace(found, method="one_touch")
+        result = replace(found, method="one-touch")
         if result.full_calibration_due or not self._one_more(result):
             return result
         return replace(result, warnings=("full_calibration_due",), full_calibration_due=True)

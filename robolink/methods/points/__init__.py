@@ -1,14 +1,13 @@
 """points: poses that exist already, taught on the pendant; nothing moves.
 
-On the command line every method that can do with such poses takes them with ``--points``,
-``--pose`` and ``--poses``, so there is no command of this name.
+Typed poses and those of a file are given to the method that solves them, such as two-pose.
 """
 
 from typing import TYPE_CHECKING
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink.methods.declaration import Method, Needs
+from robolink.methods.declaration import Method, Needs, PoseHelp
 from robolink.methods.points.parameters import PointsParameters
 from robolink.methods.site import Site
 from robolink.model import Pose
@@ -60,11 +59,20 @@ def _source(parameters: PointsParameters, site: Site) -> "TipSource":
 METHOD = Method(
     name="points",
     summary=tr("Take points that were taught on the pendant: X and Y; nothing moves."),
-    description=tr("Points taught on the pendant are read from the controller; nothing moves."),
+    description=tr(
+        "Take points that were taught on the pendant: X and Y; nothing moves.\n\n"
+        "The points touch one pin. They are read from the controller, and solved as two-pose or "
+        "n-angle would. No tool is selected, and nothing is proved by turning about the new tip."
+    ),
     parameters=PointsParameters,
     measures=("x_mm", "y_mm"),
-    needs=Needs(station=StationKind.PIN, named=False, motion=False),
+    needs=Needs(station=StationKind.PIN, named=False, finds_pin=True, motion=False),
     source=_source,
+    from_poses=_solver,
+    pose_help=PoseHelp(
+        points=tr("Numbers of the points that touch the pin, for example 901,902 or 901-904."),
+        typed="",
+        path="",
+    ),
     unmeasured_z=tr('cannot be "measured" from taught points; write "typed" or "kept"'),
-    command=False,
 )

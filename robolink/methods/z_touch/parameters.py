@@ -132,13 +132,17 @@ class ZTouchParameters(MethodParameters):
             )
         yield from clearance_below_lift(self.clearance_mm, self.lift_mm, check)
 
+    def room_mm(self) -> float:
+        """Return how high the box has to be."""
+        return self.lift_mm
+
     def no_residual(self) -> str:
         """Return why residuals cannot be judged, empty when they can."""
         if len(self.speeds_mm_s) > 2:
             return ""
         return tr(
             "cannot be judged: two touches always agree, so they leave no residual; give four "
-            "speeds_mm_s, or interval_mm with sigma_mm"
+            "speeds, or limit the interval and state the standard deviation"
         )
 
 

@@ -56,6 +56,11 @@ class WorkBox:
         """Return the box that reaches ``xy_mm`` sideways, down and up from ``pose``."""
         return cls.reaching(xy_mm, down_mm=below_mm, up_mm=above_mm).about(pose)
 
+    @property
+    def height_mm(self) -> float:
+        """How far it reaches from its lowest to its highest place."""
+        return self.z_max_mm - self.z_min_mm
+
     def about(self, pose: Pose) -> "WorkBox":
         """Return the same box about a place, which so far stood for nothing."""
         return WorkBox(

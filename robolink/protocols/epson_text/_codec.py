@@ -24,8 +24,14 @@ from robolink.protocols.epson_text._events import (
     Request,
 )
 from robolink.protocols.epson_text._framing import MessageBuffer
-from robolink.protocols.epson_text._reading import next_request, read_answer, read_request
-from robolink.protocols.epson_text._writing import write_refusal, write_reply, write_request
+from robolink.protocols.epson_text._messages import (
+    next_request,
+    read_answer,
+    read_request,
+    write_refusal,
+    write_reply,
+    write_request,
+)
 
 _TERMINATORS: Final = (b"\r\n", b"\r", b"\n")
 

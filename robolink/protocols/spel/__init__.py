@@ -5,25 +5,12 @@ from typing import TYPE_CHECKING
 from robolink.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
-    from robolink.protocols.spel._listing import Layout as Layout
-    from robolink.protocols.spel._listing import format_tool_listing as format_tool_listing
-    from robolink.protocols.spel._listing import parse_tool_listing as parse_tool_listing
-    from robolink.protocols.spel._numbers import decimal as decimal
-    from robolink.protocols.spel._numbers import parse_boolean as parse_boolean
-    from robolink.protocols.spel._numbers import parse_integer as parse_integer
-    from robolink.protocols.spel._numbers import parse_number as parse_number
-    from robolink.protocols.spel._points import PrintedPoint as PrintedPoint
-    from robolink.protocols.spel._points import format_point as format_point
-    from robolink.protocols.spel._points import parse_point as parse_point
-    from robolink.protocols.spel._probes import print_plain_point as print_plain_point
-    from robolink.protocols.spel._probes import print_tool_x as print_tool_x
-    from robolink.protocols.spel._probes import print_two_texts as print_two_texts
-    from robolink.protocols.spel._probes import wait_half_a_second as wait_half_a_second
     from robolink.protocols.spel._queries import list_tools as list_tools
     from robolink.protocols.spel._queries import print_here as print_here
     from robolink.protocols.spel._queries import print_joint_angle as print_joint_angle
     from robolink.protocols.spel._queries import print_motor as print_motor
     from robolink.protocols.spel._queries import print_output as print_output
+    from robolink.protocols.spel._queries import print_plain_point as print_plain_point
     from robolink.protocols.spel._queries import print_point as print_point
     from robolink.protocols.spel._queries import print_point_defined as print_point_defined
     from robolink.protocols.spel._queries import print_power as print_power
@@ -37,6 +24,9 @@ if TYPE_CHECKING:
     from robolink.protocols.spel._queries import print_speed_s as print_speed_s
     from robolink.protocols.spel._queries import print_tool as print_tool
     from robolink.protocols.spel._queries import print_tool_defined as print_tool_defined
+    from robolink.protocols.spel._queries import print_tool_x as print_tool_x
+    from robolink.protocols.spel._queries import print_two_texts as print_two_texts
+    from robolink.protocols.spel._queries import wait_half_a_second as wait_half_a_second
     from robolink.protocols.spel._queries import where as where
     from robolink.protocols.spel._statements import MAX_STATEMENT as MAX_STATEMENT
     from robolink.protocols.spel._statements import Statement as Statement
@@ -55,6 +45,16 @@ if TYPE_CHECKING:
     from robolink.protocols.spel._until import print_input as print_input
     from robolink.protocols.spel._until import print_position_found as print_position_found
     from robolink.protocols.spel._until import print_till_on as print_till_on
+    from robolink.protocols.spel._values import Layout as Layout
+    from robolink.protocols.spel._values import PrintedPoint as PrintedPoint
+    from robolink.protocols.spel._values import decimal as decimal
+    from robolink.protocols.spel._values import format_point as format_point
+    from robolink.protocols.spel._values import format_tool_listing as format_tool_listing
+    from robolink.protocols.spel._values import parse_boolean as parse_boolean
+    from robolink.protocols.spel._values import parse_integer as parse_integer
+    from robolink.protocols.spel._values import parse_number as parse_number
+    from robolink.protocols.spel._values import parse_point as parse_point
+    from robolink.protocols.spel._values import parse_tool_listing as parse_tool_listing
     from robolink.protocols.spel._where import PrintedWhere as PrintedWhere
     from robolink.protocols.spel._where import format_where as format_where
     from robolink.protocols.spel._where import parse_where as parse_where
@@ -62,16 +62,13 @@ else:
     __getattr__ = lazy_exports(
         __name__,
         {
-            "_listing": "Layout format_tool_listing parse_tool_listing",
-            "_numbers": "decimal parse_boolean parse_integer parse_number",
-            "_points": "PrintedPoint format_point parse_point",
-            "_probes": "print_plain_point print_tool_x print_two_texts wait_half_a_second",
             "_queries": (
                 "list_tools print_here print_joint_angle print_motor print_output "
                 "print_point print_point_defined print_power print_real_position "
                 "print_robot print_robot_model print_robot_serial print_robot_type "
                 "print_selected_tool print_speed print_speed_s print_tool "
-                "print_tool_defined where"
+                "print_plain_point print_tool_defined print_tool_x print_two_texts "
+                "wait_half_a_second where"
             ),
             "_statements": (
                 "MAX_STATEMENT Statement clear_tool go move power_high power_low "
@@ -80,6 +77,10 @@ else:
             "_until": (
                 "move_find move_till print_found_position print_input "
                 "print_position_found print_till_on"
+            ),
+            "_values": (
+                "Layout PrintedPoint decimal format_point format_tool_listing parse_boolean "
+                "parse_integer parse_number parse_point parse_tool_listing"
             ),
             "_where": "PrintedWhere format_where parse_where",
         },

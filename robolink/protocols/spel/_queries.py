@@ -1,4 +1,4 @@
-"""Statements that only print.
+"""Statements that only print, and a wait: they change nothing and move nothing.
 
 Source: docs/reference/epson.md 3.1, 3.3; docs/reference/spel.md 5.3, 6.1, 7.2, 9.
 
@@ -136,3 +136,30 @@ def _point(number: int) -> int:
 def _which(index: int) -> int:
     check_range(tr("A speed's number"), index, 1, _LAST_SPEED)
     return index
+
+
+def print_plain_point() -> Statement:
+    """A point that was given four coordinates.
+
+    Source: docs/reference/epson.md 3.3: four or six are printed.
+    """
+    return Statement("Print XY(1, 2, 3, 4)")
+
+
+def print_two_texts() -> Statement:
+    """Two texts with a comma between (docs/reference/spel.md 3.2: a blank, or none)."""
+    return Statement("Print Chr$(65), Chr$(66)")
+
+
+def print_tool_x(tool: int) -> Statement:
+    """One coordinate of a defined tool, without a format.
+
+    Source: docs/reference/epson.md 3.3: how many digits.
+    """
+    check_range(tr("A tool that can be defined"), tool, 1, LAST_TOOL)
+    return Statement(f"Print CX(TLSet({tool}))")
+
+
+def wait_half_a_second() -> Statement:
+    """Nothing, for half a second; legal in the command window (docs/reference/spel.md 4.6)."""
+    return Statement("Wait 0.5")

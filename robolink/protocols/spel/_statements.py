@@ -10,7 +10,7 @@ from typing import Final, NewType, TypeVar
 from robolink.errors import LocalProtocolError
 from robolink.messages import tr
 from robolink.model import Hand, Pose, ToolOffset
-from robolink.protocols.spel._numbers import decimal
+from robolink.protocols.spel._values import decimal
 
 Statement = NewType("Statement", str)
 """One SPEL+ statement, fit for Execute."""

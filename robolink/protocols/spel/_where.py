@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 from robolink.messages import tr
-from robolink.protocols.spel._numbers import NUMBER, decimal, unreadable
+from robolink.protocols.spel._values import NUMBER, decimal, unreadable
 
 _AXES: Final = ("X", "Y", "Z", "U", "V", "W")
 _LABELS: Final = ("WORLD:", "JOINT:", "PULSE:")

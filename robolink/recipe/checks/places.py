@@ -33,15 +33,9 @@ def points(draft: Draft) -> Iterator[Problem]:
         elif tool.points is None:
             yield Problem(where, tr("is missing: the numbers of the points that touch the pin"))
         else:
-            yield from _counted(where, len(tool.points), parameters.method)
+            if why := parameters.wrong_count(len(tool.points)):
+                yield Problem(where, why)
             yield from _owned(where, tool, owners)
-
-
-def _counted(where: str, count: int, method: str) -> Iterator[Problem]:
-    if method == "two-pose" and count != 2:
-        yield Problem(where, tr('must hold two points; more need method = "n-angle"'))
-    if method == "n-angle" and count < 3:
-        yield Problem(where, tr('must hold three points or more for method = "n-angle"'))
 
 
 def _owned(where: str, tool: Tool, owners: dict[int, int]) -> Iterator[Problem]:

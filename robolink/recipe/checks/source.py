@@ -1,29 +1,52 @@
 """Whether the method of a recipe, its station and the rules for basis and Z fit each other."""
 
 from collections.abc import Iterator
+from dataclasses import fields
+from typing import Final
 
 from robolink.config import Problem
 from robolink.messages import tr
-from robolink.methods import Check
+from robolink.methods import (
+    NOTHING_STATED,
+    Check,
+    StatedLimits,
+    order_of_residuals,
+    parameter_problems,
+)
 from robolink.recipe.checks.draft import Draft
+
+_LIMITS: Final = tuple(field.name for field in fields(StatedLimits))
+"""Keys of ``[tolerances]``; the other places are keys of ``[source]``."""
 
 
 def parameters(draft: Draft) -> Iterator[Problem]:
-    """Check what the method says about its parameters, in the words of the command."""
-    source, limits, box = draft.source, draft.tolerances, draft.box
+    """Check what the method says about its parameters and limits, in the words of the command."""
+    source, box = draft.source, draft.box
     if source is None:
+        yield from map(_placed, order_of_residuals(_stated(draft) or NOTHING_STATED))
         return
-    sigma_stated: bool | None = limits is not None and limits.sigma_mm is not None
-    if limits is None and "tolerances" in draft.given:
-        sigma_stated = None
     check = Check(
         given=source.model_fields_set,
-        sigma_stated=sigma_stated,
-        box_height_mm=None if box is None else box.down_mm + box.up_mm,
+        limits=_stated(draft),
+        box_height_mm=None if box is None else box.reach.height_mm,
+        poses_exist=not source.of_method.needs.motion,
         spell=lambda name: "tolerances.sigma_mm" if name == "sigma_mm" else name,
     )
-    for problem in source.parameters.problems(check):
-        yield Problem(f"source.{problem.where}", problem.what)
+    yield from map(_placed, parameter_problems(source.of_method, source.parameters, check))
+
+
+def _stated(draft: Draft) -> StatedLimits | None:
+    """Return by what it is judged, ``None`` where that cannot be told."""
+    table = draft.tolerances
+    if table is None:
+        return None if "tolerances" in draft.given else NOTHING_STATED
+    return StatedLimits(**{name: getattr(table, name) for name in _LIMITS})
+
+
+def _placed(problem: Problem) -> Problem:
+    """Return a problem under its place in the recipe."""
+    table = "tolerances" if problem.where in _LIMITS else "source"
+    return Problem(f"{table}.{problem.where}", problem.what)
 
 
 def place(draft: Draft) -> Iterator[Problem]:

@@ -14,7 +14,7 @@ from robolink.recipe.checks.places import (
     upright,
 )
 from robolink.recipe.checks.source import both_coordinates, height, orientation, parameters, place
-from robolink.recipe.checks.tolerances import intervals, refusals, residuals, verification
+from robolink.recipe.checks.tolerances import refusals, verification
 
 _CHECKS: Final[tuple[Callable[[Draft], Iterator[Problem]], ...]] = (
     parameters,
@@ -27,8 +27,6 @@ _CHECKS: Final[tuple[Callable[[Draft], Iterator[Problem]], ...]] = (
     standstill,
     upright,
     room,
-    residuals,
-    intervals,
     verification,
     refusals,
     moments,

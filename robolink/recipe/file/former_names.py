@@ -9,9 +9,7 @@ from typing import Any
 
 from robolink.messages import tr
 from robolink.methods import AnyMethod, Former, all_methods
-
-_SOLVERS = {"two_pose": "two-pose", "n_angle": "n-angle"}
-"""Names of ``method`` with ``kind = "points"``."""
+from robolink.model import method_name_now
 
 
 def with_names_of_now(document: Mapping[str, Any]) -> tuple[dict[str, Any], tuple[str, ...]]:
@@ -31,9 +29,9 @@ def with_names_of_now(document: Mapping[str, Any]) -> tuple[dict[str, Any], tupl
 
 def _points(source: Mapping[str, Any]) -> tuple[dict[str, Any], tuple[str, ...]]:
     method = source.get("method")
-    if not isinstance(method, str) or method not in _SOLVERS:
+    if not isinstance(method, str) or method_name_now(method) == method:
         return dict(source), ()
-    now = _SOLVERS[method]
+    now = method_name_now(method)
     return {**source, "method": now}, (_note("method", method, now),)
 
 

@@ -134,7 +134,7 @@ def _named(number: int, count: int, fit: CalibrationResult | None, *, left_out: 
     """Return what stands before a pose: its number from 1, and what it is beside a touch."""
     if left_out:
         return tr("{number} (left out)", number=number + 1)
-    if fit is None or fit.method != "six_point" or number < len(fit.residuals_mm):
+    if fit is None or fit.method != "six-point" or number < len(fit.residuals_mm):
         return str(number + 1)
     # The last two show the axes; the one before them, where it is no touch, is where they begin.
     part = (tr("where the ways begin"), tr("along X"), tr("second way"))[number - count]

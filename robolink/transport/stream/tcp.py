@@ -12,8 +12,11 @@ read that ends in an exception.
 """
 
 import contextlib
+import math
+import select
 import socket
 import struct
+from collections.abc import Callable
 from ipaddress import ip_address
 
 from robolink.errors import (
@@ -26,7 +29,6 @@ from robolink.messages import tr
 from robolink.timing import Clock, Deadline, SystemClock
 from robolink.transport._url import LinkUrl
 from robolink.transport.stream.dial import dial
-from robolink.transport.stream.readiness import looker, wait_ready
 
 _SLICE_S = 0.05
 _CHUNK_BYTES = 4096
@@ -195,3 +197,38 @@ def _peer(connection: socket.socket) -> str:
         # One machine: a name may lead to either, and the port is the same.
         address = address.ipv4_mapped or ip_address("127.0.0.1")
     return f"[{address}]:{port}" if address.version == 6 else f"{address}:{port}"
+
+
+def looker(connection: socket.socket) -> Callable[[], bool]:
+    """Return a function that tells at once whether ``connection`` can be read.
+
+    It is for one thread, and cheap: what it needs is made once.
+    """
+    if not hasattr(select, "poll"):
+        return lambda: wait_ready(connection, 0.0)
+    poller = select.poll()
+    poller.register(connection, select.POLLIN)
+    return lambda: bool(poller.poll(0))
+
+
+def wait_ready(connection: socket.socket, timeout_s: float, *, to_write: bool = False) -> bool:
+    """Wait until ``connection`` can be read (or written), or has ended.
+
+    Returns:
+        False when ``timeout_s`` passed first. True also for a socket that another thread
+        closed meanwhile: the next call on it says so.
+    """
+    try:
+        if hasattr(select, "poll"):
+            return _poll(connection, timeout_s, to_write=to_write)
+        # Windows has no poll; its select has no limit on descriptor numbers, unlike POSIX's.
+        reads, writes = ([], [connection]) if to_write else ([connection], [])
+        return any(select.select(reads, writes, [], timeout_s))
+    except (OSError, ValueError):
+        return True
+
+
+def _poll(connection: socket.socket, timeout_s: float, *, to_write: bool) -> bool:
+    poller = select.poll()
+    poller.register(connection, select.POLLOUT if to_write else select.POLLIN)
+    return bool(poller.poll(math.ceil(timeout_s * 1000)))

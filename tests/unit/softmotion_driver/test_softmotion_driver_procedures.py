@@ -3,7 +3,8 @@
 import pytest
 
 from robolink.controllers import connect
-from robolink.controllers.softmotion import SoftMotionController, opening
+from robolink.controllers.softmotion import SoftMotionController
+from robolink.controllers.softmotion import controller as softmotion
 from robolink.errors import (
     ConfigError,
     ConnectError,
@@ -93,7 +94,7 @@ def test_a_runner_moves_and_jogs_the_group(controller):
 
 
 def test_a_softmotion_url_leads_to_a_mailbox(cell, monkeypatch):
-    monkeypatch.setattr(opening, "open_mailbox_link", lambda *_args, **_options: cell.link)
+    monkeypatch.setattr(softmotion, "open_mailbox_link", lambda *_args, **_options: cell.link)
     with connect("softmotion+modbus-tcp://192.0.2.1") as controller:
         assert isinstance(controller, SoftMotionController)
         assert controller.identity == cell.link.identity
@@ -101,7 +102,7 @@ def test_a_softmotion_url_leads_to_a_mailbox(cell, monkeypatch):
 
 
 def test_a_mailbox_that_does_not_run_is_not_reached(cell, monkeypatch):
-    monkeypatch.setattr(opening, "open_mailbox_link", lambda *_args, **_options: cell.link)
+    monkeypatch.setattr(softmotion, "open_mailbox_link", lambda *_args, **_options: cell.link)
     cell.plc.frozen = True
     with pytest.raises(ConnectError):
         connect("softmotion+modbus-tcp://192.0.2.1")

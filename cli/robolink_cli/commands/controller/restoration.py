@@ -1,11 +1,10 @@
 """A restore on a terminal: what is shown, sent and reported."""
 
-from robolink.backup import RestorePlan
+from robolink.backup import RestorePlan, keep_first_backup
 from robolink.backup import restore as restore_tools
 from robolink.messages import tr
 from robolink.model import Controller, ToolReceipt, require_engineer
 from robolink_cli.console.render import note, say
-from robolink_cli.session.first_backup import back_up_first
 from robolink_cli.views.documents import offset_payload, receipt_payload
 from robolink_cli.views.tables import show_change
 
@@ -54,7 +53,7 @@ class Restoration:
         receipts: tuple[ToolReceipt, ...] = ()
         if not self._plan.empty:
             require_engineer(self._controller.outcomes, tr("restore tools from a backup"))
-            back_up_first(self._controller)
+            keep_first_backup(self._controller, tell=note)
             receipts = restore_tools(self._controller.tools, self._plan, tell=note)
         return {
             "restored": [receipt_payload(receipt) for receipt in receipts],

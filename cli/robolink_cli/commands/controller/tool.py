@@ -120,9 +120,9 @@ def set_tool(
     A change beyond the cell's max_change_mm or max_change_deg takes an engineer, who is asked
     with the figure, whatever --yes says.
     """
+    from robolink.backup import keep_first_backup
     from robolink.model import ToolOffset
     from robolink.transaction import Jump, Wanted, change_tools
-    from robolink_cli.session.first_backup import back_up_first
     from robolink_cli.views.documents import offset_payload, receipt_payload
     from robolink_cli.views.tables import show_change
 
@@ -158,7 +158,7 @@ def set_tool(
         )
         if not (accepted or context.json):
             agree(tr("Write this to tool {number}?", number=number), yes=yes)
-        back_up_first(controller)
+        keep_first_backup(controller, tell=note)
         (receipt,) = change_tools(controller, [Wanted(number, wanted, before)], tell=note)
     payload = receipt_payload(receipt) | {"kept": kept}
     done = (
@@ -185,9 +185,9 @@ def clear(
     The tool that is selected is cleared only with --then-select: the machine goes on with that
     one.
     """
+    from robolink.backup import keep_first_backup
     from robolink.model import PersonRole, require_engineer
     from robolink.transaction import Wanted, change_tools
-    from robolink_cli.session.first_backup import back_up_first
     from robolink_cli.views.documents import receipt_payload
 
     with open_controller(context, changes=not dry_run) as controller:
@@ -205,7 +205,7 @@ def clear(
             agree(_clear_question(number, then_select), yes=yes)
         if before is not None:
             require_engineer(outcomes, act)
-        back_up_first(controller)
+        keep_first_backup(controller, tell=note)
         wanted = Wanted(number, None, before, then_select=then_select)
         (receipt,) = change_tools(controller, [wanted], tell=note)
         selected = controller.tools.selected()

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+from robolink.backup import keep_first_backup
 from robolink.errors import DeclinedError
 from robolink.messages import tr
 from robolink.model import Controller
@@ -13,7 +14,6 @@ from robolink_cli.console.render import note, say
 from robolink_cli.prompts.operator import operator_at
 from robolink_cli.prompts.questions import asked, on_terminal
 from robolink_cli.session.context import CliContext
-from robolink_cli.session.first_backup import back_up_first
 from robolink_cli.session.motion_consent import agree_to_motion, motion_question
 from robolink_cli.session.opening import open_controller
 from robolink_cli.views.calibration import report_payload, show_report
@@ -116,7 +116,7 @@ class Recalibration:
         question = self._question(controller, run) if run.plan.moves else None
         if run.takes_reference and not self._take_reference:
             self._explain_reference()
-        back_up_first(controller)
+        keep_first_backup(controller, tell=note)
         if question is None:
             self._require_writer(run)
             return

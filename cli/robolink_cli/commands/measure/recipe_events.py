@@ -14,8 +14,8 @@ from robolink.nozzle_change import Listener, Moment, Proposal
 from robolink.procedures import MeasurementContext
 from robolink.runner import Ask, Confirm, Notify, Step, StepDone
 from robolink_cli.console.exit_codes import error_body, exit_code
+from robolink_cli.console.output import hand_over
 from robolink_cli.console.render import note, switch_json_on
-from robolink_cli.console.sink import hand_over
 from robolink_cli.views.documents import (
     pose_payload,
     proposal_payload,

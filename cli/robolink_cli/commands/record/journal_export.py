@@ -105,7 +105,7 @@ class Counted:
 
 
 def _json(entry: Recorded) -> bytes:
-    return json.dumps(entry_payload(entry), allow_nan=False).encode()
+    return json.dumps(entry_payload(entry, as_stored=True), allow_nan=False).encode()
 
 
 def _csv_row(entry: Recorded) -> dict[str, object]:

@@ -1,10 +1,10 @@
 """An undo on a terminal: what is shown, sent and reported."""
 
+from robolink.backup import keep_first_backup
 from robolink.messages import tr
 from robolink.model import Controller
 from robolink.transaction import Undone, UndoPlan, undo
 from robolink_cli.console.render import note, say
-from robolink_cli.session.first_backup import back_up_first
 from robolink_cli.views.documents import offset_payload, receipt_payload
 from robolink_cli.views.tables import show_change
 
@@ -55,7 +55,7 @@ class Undoing:
     def run(self) -> dict[str, object]:
         """Carry it out and return the document; nothing is sent when nothing differs."""
         if self._plan.steps:
-            back_up_first(self._controller)
+            keep_first_backup(self._controller, tell=note)
             self._done = undo(
                 self._controller, self._plan, then_select=self._then_select, tell=note
             )

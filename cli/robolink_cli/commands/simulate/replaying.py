@@ -9,8 +9,8 @@ from click.core import ParameterSource
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink_cli.console.output import hand_over, show
 from robolink_cli.console.render import json_is_on, note
-from robolink_cli.console.sink import hand_over, show
 
 _OF_A_REPLAY = frozenset({"address", "replay", "allow_remote"})
 

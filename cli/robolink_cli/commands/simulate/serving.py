@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink_cli.console.output import hand_over, show
 from robolink_cli.console.render import json_is_on
-from robolink_cli.console.sink import hand_over, show
 
 if TYPE_CHECKING:
     from robolink_simulators.cell.world_parameters import WorldParameters

@@ -2,9 +2,8 @@
 
 from robolink.controllers.driver_link import DriverLink
 from robolink.controllers.epson.link.answers import NOT_EXECUTED
+from robolink.controllers.epson.link.asked_once import Preferences, RobotFacts
 from robolink.controllers.epson.link.identity import IdentityReader
-from robolink.controllers.epson.link.preferences import Preferences
-from robolink.controllers.epson.link.robot import RobotFacts
 from robolink.controllers.epson.link.session import EpsonSession
 from robolink.controllers.epson.link.window import CommandWindow
 from robolink.errors import RejectedError

@@ -1,4 +1,4 @@
-"""What an unanswered or a refused login means."""
+"""What an unanswered or a refused login means; apart, since a stop needs none of the answers."""
 
 from typing import Final
 

@@ -8,7 +8,7 @@ command is made from what it declares (``_command``).
 import click
 
 from robolink.messages import tr
-from robolink.methods import all_methods, find_method, method_names
+from robolink.methods import find_method, method_names
 from robolink_cli.lazy_group import LazyGroup
 
 
@@ -16,12 +16,12 @@ class MethodGroup(LazyGroup):
     """The commands of all calibration methods, made when one is used."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - click's form
-        """Return the names of the methods that have a command."""
-        return [method.name for method in all_methods() if method.command]
+        """Return the names of the methods."""
+        return list(method_names())
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002 - click's form
         """Return the command of a method, or while listing its stand-in."""
-        if cmd_name not in method_names() or not find_method(cmd_name).command:
+        if cmd_name not in method_names():
             return None
         method = find_method(cmd_name)
         if self.listing:

@@ -3,7 +3,8 @@
 from collections.abc import Callable, Sequence
 from functools import partial
 
-from robolink.calibration import ToolFit
+from robolink.backup import keep_first_backup
+from robolink.calibration import ToolFit, known_doubts
 from robolink.errors import DeclinedError
 from robolink.messages import tr
 from robolink.methods import PointsSource
@@ -14,7 +15,6 @@ from robolink.nozzle_change import (
     Moment,
     NozzleChange,
     Proposal,
-    ToolPlan,
     ToolReport,
 )
 from robolink.procedures import MeasurementContext, PoseMethod
@@ -30,9 +30,8 @@ from robolink_cli.options.report import ReportDraft, reporting
 from robolink_cli.prompts.operator import terminal
 from robolink_cli.prompts.questions import agree, on_terminal
 from robolink_cli.session.context import CliContext
-from robolink_cli.session.first_backup import back_up_first
 from robolink_cli.session.opening import open_controller
-from robolink_cli.views.calibration import doubts, judged_payload, report_payload
+from robolink_cli.views.calibration import judged_payload, report_payload
 
 
 class _PosesListener(CalibrationListener):
@@ -75,10 +74,10 @@ class _PosesListener(CalibrationListener):
     def moment(self, moment: Moment, bench: MeasurementContext, tool: int | None = None) -> None:  # noqa: ARG002 - one tool only
         if moment is Moment.BEFORE_WRITE:
             _agree_to_write(self._frame.tool, yes=self._frame.yes)
-            back_up_first(bench.controller)
+            keep_first_backup(bench.controller, tell=note)
 
     def _doubts(self, proposal: Proposal) -> tuple[str, ...]:
-        known = doubts(proposal)
+        known = known_doubts(proposal.result.warnings)
         if self.better is None:
             return known
         other = tr(
@@ -152,7 +151,7 @@ def calibrate_from_poses(
 def _carry_out(
     controller: Controller, frame: CalibrationRequest, given: PointsSource, listener: Listener
 ) -> ToolReport:
-    one = ToolPlan(frame.tool, given, frame.criteria, verify=False, pin=frame.pin)
+    one = frame.tool_plan(given, verify=False)
     change = NozzleChange(
         controller,
         ChangePlan((one,), ask_before_write=False),
@@ -170,7 +169,8 @@ def _dry_run(
     """Propose and judge; return the document with what would be sent."""
     before = controller.tools.read(frame.tool)
     given.found = given.find(controller, frame.tool, before)
-    proposal = Proposal(frame.tool, before, given.found.result)
+    result = frame.tool_plan(given, verify=False).named(given.found.result)
+    proposal = Proposal(frame.tool, before, result)
     if not frame.context.json:
         listener.proposed([proposal])
     frame.criteria.judge_fit(proposal.result)

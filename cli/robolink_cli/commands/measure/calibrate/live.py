@@ -3,6 +3,8 @@
 from collections.abc import Callable, Sequence
 from functools import partial
 
+from robolink.backup import keep_first_backup
+from robolink.calibration import known_doubts
 from robolink.messages import tr
 from robolink.model import Controller
 from robolink.nozzle_change import (
@@ -20,14 +22,13 @@ from robolink_cli.access.warnings import note_change
 from robolink_cli.commands.measure.calibrate.listener import CalibrationListener
 from robolink_cli.commands.measure.calibrate.request import CalibrationRequest
 from robolink_cli.commands.measure.calibrate.stations import remark_on_pin
+from robolink_cli.console.render import note
 from robolink_cli.options.impact import ImpactRequest, impact_payload, show_impact
 from robolink_cli.options.report import ReportDraft, reporting
 from robolink_cli.prompts.operator import operator_at
-from robolink_cli.session.first_backup import back_up_first
 from robolink_cli.session.motion_consent import agree_to_motion, motion_question
 from robolink_cli.session.opening import open_controller
 from robolink_cli.views.calibration import (
-    doubts,
     report_payload,
     show_course,
     show_plan,
@@ -43,7 +44,9 @@ class _LiveListener(CalibrationListener):
 
     def proposed(self, proposals: Sequence[Proposal]) -> None:
         (proposal,) = proposals
-        self.propose(proposal, source=self._source.sentence, warnings=doubts(proposal))
+        self.propose(
+            proposal, source=self._source.sentence, warnings=known_doubts(proposal.result.warnings)
+        )
         if self.impact is not None:
             show_impact(proposal.tool, self.impact)
 
@@ -83,7 +86,7 @@ class LiveCalibration:
         self._controller.require_settled(tr("calibrate tool {tool}", tool=self.tool))
         require_ready(self._plan)
         note_change(self._controller, self.tool, self._controller.tools.read(self.tool))
-        back_up_first(self._controller)
+        keep_first_backup(self._controller, tell=note)
 
     def dry_run(self) -> dict[str, object]:
         """Return the foreseen steps with their requests and limit checks; reads only."""

@@ -7,7 +7,7 @@ import click
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink.methods import AnyMethod, MethodParameters, Site
+from robolink.methods import AnyMethod, MethodParameters, Site, source_of
 from robolink.model import Controller, EntryKind
 from robolink.stations import Station, StationKind, find_stations
 from robolink_cli.commands.measure.calibrate.given_poses import calibrate_from_poses
@@ -46,7 +46,7 @@ def calibrate_with(
         frame = frame.at(station or "")
     limits = frame.limits
     higher = replace(limits, box=limits.box.larger(up_mm=parameters.height_mm()))
-    frame = replace(frame, limits=higher)
+    frame = replace(frame, limits=higher, method=method.name)
     place_mm = None if at is None else _three(at)
 
     def site(controller: Controller) -> Site:
@@ -67,7 +67,7 @@ def calibrate_with(
         )
         return
     frame.require_something_to_show()
-    calibrate_live(frame, lambda controller: method.source(parameters, site(controller)))
+    calibrate_live(frame, lambda controller: source_of(method, parameters, site(controller)))
 
 
 def _station(

@@ -8,14 +8,21 @@ from click.core import ParameterSource
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink.methods import AnyMethod, Check, MethodParameters, ParameterField, fields_of
-from robolink.methods.fields import refusals
+from robolink.methods import (
+    AnyMethod,
+    Check,
+    MethodParameters,
+    ParameterField,
+    StatedLimits,
+    fields_of,
+    parameter_problems,
+)
 from robolink.stations import StationKind
 from robolink_cli.commands.measure.calibrate.options import calibration_options, sigma_option
 from robolink_cli.commands.measure.calibrate.request import CalibrationRequest
 from robolink_cli.commands.measure.calibrate.values import as_typed, is_repeated, type_of
-from robolink_cli.options.motion import motion_option
-from robolink_cli.options.pose_source import PoseSource, pose_source_options
+from robolink_cli.options.motion import MotionOption, motion_option
+from robolink_cli.options.pose_source import PoseSource, pose_source_options, taught_points_option
 
 _METAVARS: Final = {"mm": "MM", "degrees": "DEG", "mm/s": "MM_S"}
 
@@ -25,6 +32,14 @@ _STATIONS: Final = {
     StationKind.TOUCH: tr("Name of the surface."),
     StationKind.CAMERA: tr("Name of the camera's station."),
 }
+
+_LIMITS: Final = {
+    "sigma_mm": "--sigma",
+    "rms_mm": "--max-rms",
+    "max_mm": "--max-residual",
+    "interval_mm": "--max-interval",
+}
+"""The option of each of the limits that somebody may state."""
 
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
@@ -44,7 +59,8 @@ def command_of(method: AnyMethod) -> click.Command:
     ) -> None:
         from robolink_cli.commands.measure.calibrate.measuring import calibrate_with
 
-        chosen = _parameters(method, given, sigma_stated=sigma_mm is not None)
+        check = _check(method, frame, sigma_mm=sigma_mm, poses=poses)
+        chosen = _parameters(method, given, check)
         calibrate_with(
             method, chosen, frame, station=station, at=at, sigma_mm=sigma_mm, poses=poses
         )
@@ -52,7 +68,12 @@ def command_of(method: AnyMethod) -> click.Command:
     command: Callable[..., Any] = calibration_options(run)
     for add in reversed([*map(_option, parameters), *_of_the_place(method)]):
         command = add(command)
-    return click.command(method.name, help=method.description, short_help=method.summary)(command)
+    made = click.command(method.name, help=method.description, short_help=method.summary)(command)
+    if not method.needs.motion:
+        for option in made.params:
+            if isinstance(option, MotionOption):
+                option.hidden = True
+    return made
 
 
 def _of_the_place(method: AnyMethod) -> list[Decorator]:
@@ -68,7 +89,11 @@ def _of_the_place(method: AnyMethod) -> list[Decorator]:
         )
     if method.from_poses is not None and method.pose_help is not None:
         said = method.pose_help
-        options.append(pose_source_options(points=said.points, typed=said.typed, path=said.path))
+        if method.needs.motion:
+            added = pose_source_options(points=said.points, typed=said.typed, path=said.path)
+        else:
+            added = taught_points_option(said.points)
+        options.append(added)
     return options
 
 
@@ -106,9 +131,41 @@ def _is_choice(field: ParameterField) -> bool:
     return getattr(field.kind, "__origin__", None) is Literal
 
 
-def _parameters(
-    method: AnyMethod, given: Mapping[str, Any], *, sigma_stated: bool
-) -> MethodParameters:
+def _check(
+    method: AnyMethod,
+    frame: CalibrationRequest,
+    *,
+    sigma_mm: float | None,
+    poses: PoseSource | None,
+) -> Check:
+    """Return what is known beside the parameters: limits that were typed, not those of the cell."""
+    given, criteria = _typed(), frame.criteria
+    stated = StatedLimits(
+        sigma_mm=sigma_mm,
+        rms_mm=criteria.rms_mm if "rms_mm" in given else None,
+        max_mm=criteria.max_residual_mm if "residual_mm" in given else None,
+        interval_mm=criteria.interval_mm if "interval_mm" in given else None,
+    )
+    return Check(
+        given=given,
+        limits=stated,
+        box_height_mm=frame.limits.box.height_mm,
+        poses_exist=poses is not None,
+        points=len(poses.points) if poses is not None and poses.kind == "points" else None,
+        spell=_spelled(method).__getitem__,
+    )
+
+
+def _spelled(method: AnyMethod) -> dict[str, str]:
+    """Return the option of each parameter and of each limit."""
+    return {
+        "points": "--points",
+        **_LIMITS,
+        **{field.name: field.flag for field in fields_of(method.parameters)},
+    }
+
+
+def _parameters(method: AnyMethod, given: Mapping[str, Any], check: Check) -> MethodParameters:
     """Return the parameters of a method.
 
     Raises:
@@ -116,19 +173,11 @@ def _parameters(
     """
     fields = fields_of(method.parameters)
     values = {field.name: _value(field, given[field.name]) for field in fields}
-    spelled = {"sigma_mm": "--sigma", **{field.name: field.flag for field in fields}}
-    problems = [
-        (field.name, why)
-        for field in fields
-        if values[field.name] is not None
-        for why in refusals(values[field.name], field.kind, field.metadata)
-    ]
     parameters: MethodParameters = method.parameters(**values)
-    if not problems:
-        check = Check(given=_typed(fields), sigma_stated=sigma_stated, spell=spelled.__getitem__)
-        problems = [(one.where, one.what) for one in parameters.problems(check)]
+    problems = tuple(parameter_problems(method, parameters, check))
     if problems:
-        lines = [f"{spelled[where.partition('#')[0]]}: {what}" for where, what in problems]
+        spelled = _spelled(method)
+        lines = [f"{spelled[one.where.partition('#')[0]]}: {one.what}" for one in problems]
         raise ConfigError(
             "\n".join(f"{line}." for line in lines),
             remedy=tr(
@@ -145,8 +194,8 @@ def _value(field: ParameterField, typed: Any) -> object:  # noqa: ANN401 - what 
     return None if is_repeated(field) and not typed else typed
 
 
-def _typed(fields: tuple[ParameterField, ...]) -> frozenset[str]:
-    source = click.get_current_context().get_parameter_source
-    return frozenset(
-        field.name for field in fields if source(field.name) is ParameterSource.COMMANDLINE
-    )
+def _typed() -> frozenset[str]:
+    """Return the names of the options that stand on the command line."""
+    context = click.get_current_context()
+    source = context.get_parameter_source
+    return frozenset(name for name in context.params if source(name) is ParameterSource.COMMANDLINE)

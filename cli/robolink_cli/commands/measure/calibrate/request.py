@@ -12,7 +12,7 @@ from robolink_cli.prompts.jumps import jump_limit_mm
 from robolink_cli.session.context import CliContext
 
 if TYPE_CHECKING:
-    from robolink.nozzle_change import AcceptanceCriteria, ChangePlan, Limits
+    from robolink.nozzle_change import AcceptanceCriteria, ChangePlan, Limits, ToolPlan
     from robolink.procedures import TipSource
 
 
@@ -33,6 +33,7 @@ class CalibrationRequest:
         yes: Whether questions are answered beforehand.
         pin: Name of the pin that is touched; empty where nobody named one.
         finds_pin: Whether the method finds the pin itself, so that it need not be known.
+        method: Name of the method.
     """
 
     context: CliContext
@@ -47,6 +48,7 @@ class CalibrationRequest:
     yes: bool
     pin: str = ""
     finds_pin: bool = True
+    method: str = ""
 
     def at(self, station: str) -> "CalibrationRequest":
         """Return the same at a station of that name, which goes on record."""
@@ -72,10 +74,18 @@ class CalibrationRequest:
 
     def plan(self, source: "TipSource") -> "ChangePlan":
         """Return what is to be done with the measurements of ``source``."""
-        from robolink.nozzle_change import ChangePlan, ToolPlan
+        from robolink.nozzle_change import ChangePlan
 
-        one = ToolPlan(self.tool, source, self.criteria, verify=self.verify, pin=self.pin)
+        one = self.tool_plan(source, verify=self.verify)
         return ChangePlan((one,), limits=self.limits, ask_before_write=not self.yes)
+
+    def tool_plan(self, source: "TipSource", *, verify: bool) -> "ToolPlan":
+        """Return what is to be done about the tool."""
+        from robolink.nozzle_change import ToolPlan
+
+        return ToolPlan(
+            self.tool, source, self.criteria, verify=verify, pin=self.pin, method=self.method
+        )
 
 
 def request_from(

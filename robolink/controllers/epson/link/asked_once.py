@@ -1,15 +1,19 @@
-"""The preferences set in the controller, as far as its firmware tells them.
+"""What is asked once a connection: the robot in force, and what is set in the controller.
 
-Two of them make a measurement worthless and everything else look right: in a dry run the robot
-is not moved, and with virtual I/O no input is a real one, while each answer is as ever. Firmware
-that knows the query tells them (docs/reference/epson.md 1.11); older firmware answers 11, and then
-nothing is assumed and nothing is said. They are asked for at most once a connection, since a
-change restarts the controller.
+Neither changes meanwhile: one client at a time is served, and a change of the preferences restarts
+the controller.
+
+Two of the preferences make a measurement worthless and everything else look right: in a dry run
+the robot is not moved, and with virtual I/O no input is a real one, while each answer is as ever.
+Firmware that knows the query tells them (docs/reference/epson.md 1.11); older firmware answers 11,
+and then nothing is assumed and nothing is said.
 """
 
 from contextlib import suppress
+from dataclasses import dataclass
 
 from robolink.controllers.epson.link.session import EpsonSession
+from robolink.controllers.epson.link.window import CommandWindow
 from robolink.errors import (
     NotReadyError,
     NotReadyReason,
@@ -17,7 +21,52 @@ from robolink.errors import (
     RemoteProtocolError,
 )
 from robolink.messages import tr
+from robolink.protocols import spel
 from robolink.protocols.epson_text import Preference, parse_preferences
+
+_SIX_AXES = frozenset({5, 7})
+"""RobotType 5 is the six-axis arm, 7 the N series (docs/reference/spel.md 9)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Robot:
+    """The robot in force: its number on the controller and its type code."""
+
+    number: int
+    type_code: int
+
+    @property
+    def six_axes(self) -> bool:
+        """Whether V and W exist."""
+        return self.type_code in _SIX_AXES
+
+
+class RobotFacts:
+    """Reads which robot is in force, when that is needed first.
+
+    Execute acts on the robot chosen with SetCurRobot (docs/reference/epson.md 1.5); robolink never
+    changes that choice.
+    """
+
+    def __init__(self, window: CommandWindow) -> None:
+        self._window = window
+        self._robot: Robot | None = None
+
+    def read(self, request: str = "Print Robot") -> Robot:
+        """Return the robot in force.
+
+        Args:
+            request: What needs to know it.
+
+        Raises:
+            NotReadyError: The controller answers no question now.
+        """
+        if self._robot is None:
+            with self._window.proving_ready(request):
+                number = spel.parse_integer(self._window.printed(spel.print_robot()))
+                kind = spel.parse_integer(self._window.printed(spel.print_robot_type()))
+            self._robot = Robot(number, kind)
+        return self._robot
 
 
 class Preferences:

@@ -1,0 +1,112 @@
+"""The named doubts and notes of a measurement, as sentences.
+
+A code is for programs; what a person reads, on a screen or in a report, is the same sentence.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import Final
+
+from robolink.messages import tr
+
+
+def doubt_sentence(code: str) -> str:
+    """Return a sentence for the code of a doubt or a note; the code in words where none is known.
+
+    Args:
+        code: As it stands in ``CalibrationResult.warnings`` or ``notes``.
+    """
+    known = _SENTENCES.get(code)
+    return code.replace("_", " ") if known is None else known()
+
+
+def known_doubts(codes: Iterable[str]) -> tuple[str, ...]:
+    """Return the sentences of the codes that have one, each once, in their order.
+
+    Codes that a caller tells in other words have none.
+    """
+    known = (_SENTENCES.get(code) for code in dict.fromkeys(codes))
+    return tuple(sentence() for sentence in known if sentence is not None)
+
+
+# Called late, because the language is chosen when a command runs.
+_SENTENCES: Final[Mapping[str, Callable[[], str]]] = {
+    "small_rotation": lambda: tr("The poses differ little in U; half a turn would be best."),
+    "few_poses": lambda: tr("Few poses: four or more tell errors of placement from each other."),
+    "large_rms": lambda: tr("The residuals are large for this method."),
+    "large_residual": lambda: tr("One pose is far off; take it again."),
+    "sigma_too_small": lambda: tr(
+        "The poses scatter more than the stated standard deviation says."
+    ),
+    "camera_moved": lambda: tr(
+        "The camera sees things beside where they are: it was moved, or its calibration is old."
+    ),
+    "unequal_scale": lambda: tr("The camera's two axes differ much in scale."),
+    "large_shear": lambda: tr("The image is askew: the camera seems to lean."),
+    "large_pixel_residual": lambda: tr("The looks agree within more than half a pixel only."),
+    "turned_from_stored": lambda: tr(
+        "An axis lies more than 45 degrees from where it is stored: make sure that +X and +Z were "
+        "not taken for other axes. The proof by tilting does not show it."
+    ),
+    "ways_askew": lambda: tr(
+        "The ways are further off a right angle than the touches scatter: the orientation is less "
+        "sure than its interval says."
+    ),
+    "full_calibration_due": lambda: tr(
+        "A full calibration is due: the differences since the last one add up."
+    ),
+    "duplicate_poses": lambda: tr(
+        "Some poses are copies of others; a copy tells nothing new and counts once."
+    ),
+    "sigma_contradicted": lambda: tr(
+        "The poses scatter more than the stated standard deviation allows; the interval follows "
+        "the scatter."
+    ),
+    "residuals_too_small": lambda: tr(
+        "The poses agree far better than the stated standard deviation lets expect: they may be "
+        "copied or smoothed, or it was stated carelessly."
+    ),
+    "high_leverage": lambda: tr(
+        "All depends on a single pose; take one more near it, so that an error of it shows."
+    ),
+    "step_in_run_order": lambda: tr(
+        "Between two touches something moved: those before and those after do not agree. Take "
+        "them all again."
+    ),
+    "drift_in_run_order": lambda: tr(
+        "The touches drift from the first to the last: something warms up or gives way. Take them "
+        "all again."
+    ),
+    "approach_bias": lambda: tr(
+        "The touches are off toward the side from which the tip came; come from several sides."
+    ),
+    "wobble": lambda: tr("The tip wobbles when it turns: it is bent, or the camera leans."),
+    "wobble_not_identifiable": lambda: tr(
+        "These angles cannot tell an offset from a wobble; four or more that spread would."
+    ),
+    "overshoot": lambda: tr("The tip runs on after the trigger; that was taken out."),
+    "station_undecided": lambda: tr(
+        "Whether the station moved cannot be told from these tools; a shift that matters could "
+        "stay unseen."
+    ),
+    "drift_undecided": lambda: tr(
+        "The drift lies too near to its limit to be called good or bad; take more touches."
+    ),
+    "gauge_marginal": lambda: tr("The spread of the measurement is marginal for the tolerance."),
+    "gauge_unfit": lambda: tr("The spread of the measurement is too large for the tolerance."),
+    "chart_point_out": lambda: tr("A point lies beyond the limits of the chart."),
+    "chart_drift": lambda: tr("The chart shows a slow drift."),
+    "resolution_floor": lambda: tr(
+        "The poses agree better than their resolution; the interval follows the resolution."
+    ),
+    "order_not_testable": lambda: tr(
+        "Too few touches to see whether something moved meanwhile; from six on that shows."
+    ),
+    "touches_not_witnessed": lambda: tr(
+        "Nobody saw these touches being made: the poses were taught or came in a file."
+    ),
+    "length_changed": lambda: tr("The length of the tool has changed."),
+    "length_not_observable": lambda: tr(
+        "Whether the length of the tool has changed cannot be told from these touches."
+    ),
+}
+"""Doubts that a caller says in other words are left out."""

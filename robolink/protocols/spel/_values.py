@@ -1,0 +1,229 @@
+"""Values as SPEL+ writes and prints them: numbers, points, the listing of tools.
+
+Numbers are strict, ASCII, without a locale (docs/reference/spel.md 2.1, 3.2). A point as ``Print``
+shows it (docs/reference/epson.md 3.3, docs/reference/spel.md 5.6), a real capture::
+
+     X: -182.632 Y:  240.114 Z:  -20.002 U:  -36.156 V:    0.000 W:    0.000 /R /0
+
+The columns of the listing of ``TLSet`` are not documented (docs/reference/epson.md 3.1,
+docs/reference/spel.md 6.1). What Epson's own sample relies on: a line per defined tool, ``Tool``,
+the number, a colon, and numbers between commas with any blanks.
+"""
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final, Literal
+
+from robolink.errors import ConfigError, RemoteProtocolError
+from robolink.messages import tr
+from robolink.model import Hand, ToolOffset
+
+NUMBER: Final = r"[+-]?[0-9]{1,18}(?:\.[0-9]{1,18})?"
+"""A plain decimal, as a part of larger patterns."""
+
+_NUMBER: Final = re.compile(NUMBER + r"(?:E[+-][0-9]{2,3})?")
+_INTEGER: Final = re.compile(r"[+-]?[0-9]{1,18}")
+_BLANKS: Final = " \t\r\n"
+_TRUE: Final = frozenset({"-1", "1", "true"})
+_FALSE: Final = frozenset({"0", "false"})
+
+_AXES: Final = "XYZUVW"
+_FOUR: Final = r"\s+".join(rf"{axis}:\s*({NUMBER})" for axis in _AXES[:4])
+_TWO: Final = "".join(rf"\s+{axis}:\s*({NUMBER})" for axis in _AXES[4:])
+_FLAG: Final = rf"/[A-Z0-9]{{1,6}}(?:\({NUMBER}\))?"
+_POINT: Final = re.compile(rf"\s*{_FOUR}(?:{_TWO})?(?P<flags>(?:\s*{_FLAG})*)\s*", re.ASCII)
+_HANDS: Final = {"R": Hand.RIGHT, "L": Hand.LEFT}
+_MARKS: Final = {hand: mark for mark, hand in _HANDS.items()}
+_HIGHEST_LOCAL: Final = 15
+
+_LINE: Final = re.compile(
+    rf"\s*tool\s*([0-9]{{1,2}})\s*:\s*({NUMBER}(?:\s*,\s*{NUMBER}){{3}}(?:\s*,\s*{NUMBER}\s*,\s*{NUMBER})?)\s*",
+    re.ASCII | re.IGNORECASE,
+)
+_HIGHEST_TOOL: Final = 15
+
+Layout = Literal["plain", "padded", "four"]
+"""How a simulated controller lists tools; see :func:`format_tool_listing`."""
+
+
+def decimal(value: float, places: int = 3) -> str:
+    """Return ``value`` with ``places`` decimals, as a statement may carry it.
+
+    Three places is what controllers print (docs/reference/epson.md 3.3). Zero never carries a sign.
+
+    Raises:
+        ConfigError: ``value`` is not finite.
+    """
+    if not math.isfinite(value):
+        raise ConfigError(
+            tr("{value!r} cannot be written as a decimal number.", value=value),
+            remedy=tr("Give a finite number."),
+        )
+    text = f"{value:.{places}f}"
+    return text if text.strip("-0.") else text.lstrip("-")
+
+
+def parse_number(text: str) -> float:
+    """Read one printed number: ``-3.25`` or ``1.000000E+014``; blanks may surround it.
+
+    Raises:
+        RemoteProtocolError: It is anything else.
+    """
+    stripped = text.strip(_BLANKS)
+    if _NUMBER.fullmatch(stripped):
+        value = float(stripped)
+        if math.isfinite(value):
+            return value
+    raise unreadable(tr("a number"), text)
+
+
+def parse_integer(text: str) -> int:
+    """Read one printed whole number; blanks may surround it.
+
+    Raises:
+        RemoteProtocolError: It is anything else.
+    """
+    stripped = text.strip(_BLANKS)
+    if _INTEGER.fullmatch(stripped):
+        return int(stripped)
+    raise unreadable(tr("a whole number"), text)
+
+
+def parse_boolean(text: str) -> bool:
+    """Read a printed Boolean: -1 or 1, 0, or a word; the references disagree.
+
+    Source: docs/reference/spel.md 2.1.
+
+    Raises:
+        RemoteProtocolError: It is anything else.
+    """
+    stripped = text.strip(_BLANKS).lower()
+    if stripped in _TRUE:
+        return True
+    if stripped in _FALSE:
+        return False
+    raise unreadable(tr("True or False"), text)
+
+
+def unreadable(wanted: str, text: str) -> RemoteProtocolError:
+    """Return the error for a printed text that is not what was asked for."""
+    return RemoteProtocolError(
+        tr("The controller printed {text!r} instead of {wanted}.", text=text[:200], wanted=wanted),
+        remedy=tr("Keep this text and report it with the controller's firmware version."),
+        raw=text.encode("utf-8", "backslashreplace"),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class PrintedPoint:
+    """A point as printed.
+
+    Attributes:
+        coordinates: X Y Z in mm and U in degrees, or these and V W in degrees.
+        hand: ``/R`` or ``/L``, ``None`` when neither was printed.
+        flags: Every flag as printed, without the slash, for example ``("R", "0")``.
+        local: The local that the coordinates are in; 0 when none was printed.
+    """
+
+    coordinates: tuple[float, ...]
+    hand: Hand | None = None
+    flags: tuple[str, ...] = ()
+    local: int = 0
+
+    @classmethod
+    def of(
+        cls, coordinates: tuple[float, ...], *, hand: Hand | None = None, local: int = 0
+    ) -> "PrintedPoint":
+        """Return a point with the flags that a SCARA prints: hand, then local."""
+        marks = () if hand is None else (_MARKS[hand],)
+        return cls(coordinates, hand, (*marks, str(local)), local)
+
+
+def parse_point(text: str) -> PrintedPoint:
+    """Read a printed point, whatever the width of its columns.
+
+    Raises:
+        RemoteProtocolError: It is not a point, or its flags contradict each other.
+    """
+    match = _POINT.fullmatch(text)
+    if match is None:
+        raise unreadable(tr("a point"), text)
+    *numbers, tail = match.groups()
+    flags = tuple(flag.strip() for flag in tail.split("/")[1:])
+    hands = [_HANDS[flag] for flag in flags if flag in _HANDS]
+    local, *more = [int(flag) for flag in flags if flag.isdigit()] or [0]
+    if more or local > _HIGHEST_LOCAL or len(hands) > 1:
+        raise unreadable(tr("a point"), text)
+    return PrintedPoint(
+        coordinates=tuple(float(number) for number in numbers if number is not None),
+        hand=hands[0] if hands else None,
+        flags=flags,
+        local=local,
+    )
+
+
+def format_point(
+    point: PrintedPoint,
+    *,
+    coordinates: Literal["six", "four"] = "six",
+    width: Literal[9, 8] = 9,
+) -> str:
+    """Return ``point`` as a controller prints it; the twin of :func:`parse_point`.
+
+    Args:
+        point: What to print.
+        coordinates: ``six`` shows V and W, as zeros where the point has none; ``four`` leaves
+            them out.
+        width: Columns of a value: 9 in the real capture, 8 in one sample
+            (docs/reference/spel.md 5.6).
+    """
+    shown = (*point.coordinates, 0.0, 0.0)[: 6 if coordinates == "six" else 4]
+    values = zip(_AXES, shown, strict=False)
+    parts = [f"{axis}:{decimal(value).rjust(width)}" for axis, value in values]
+    return " " + " ".join([*parts, *(f"/{flag}" for flag in point.flags)])
+
+
+def parse_tool_listing(text: str) -> dict[int, ToolOffset]:
+    """Read the defined tools; a text without the word Tool lists none.
+
+    Four values are X Y Z in mm and U in degrees; six add V and W. Once a tool is listed,
+    every line must be one: a line skipped could be the rest of a value.
+
+    Raises:
+        RemoteProtocolError: A line cannot be read, or a tool is listed twice.
+    """
+    tools: dict[int, ToolOffset] = {}
+    if "tool" not in text.lower():
+        return tools
+    for line in text.replace("\r", "\n").split("\n"):
+        if not line.strip():
+            continue
+        match = _LINE.fullmatch(line)
+        number = int(match[1]) if match else -1
+        if match is None or number > _HIGHEST_TOOL or number in tools:
+            raise unreadable(tr("a list of tools"), text)
+        tools[number] = ToolOffset(*(float(value) for value in match[2].split(",")))
+    return tools
+
+
+def format_tool_listing(tools: Mapping[int, ToolOffset], *, layout: Layout = "plain") -> str:
+    """Return the listing of ``tools``; the twin of :func:`parse_tool_listing`.
+
+    Args:
+        tools: The defined tools by number.
+        layout: ``plain`` as ``Tool 1: 12.000, -3.250, ...`` (the likeliest,
+            docs/reference/spel.md 6.1), ``padded`` with values nine columns wide, ``four`` without
+            V and W, which such a controller cannot show.
+    """
+    return "\r\n".join(_line(tool, tools[tool], layout) for tool in sorted(tools))
+
+
+def _line(tool: int, offset: ToolOffset, layout: Layout) -> str:
+    values = [decimal(value) for value in offset.components()]
+    if layout == "four":
+        values = values[:4]
+    if layout == "padded":
+        values = [value.rjust(9) for value in values]
+    return f"Tool {tool}: " + ", ".join(values)

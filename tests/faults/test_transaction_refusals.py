@@ -36,7 +36,9 @@ class Cell:
             self.controller,
             ChangePlan((ToolPlan(1),), ask_before_write=False),
             operator=operator
-            or AssistedOperator.with_eyes(InProcessEyes(self.simulator), lambda _: None),
+            or AssistedOperator.with_eyes(
+                InProcessEyes(self.simulator), lambda _: None, clock=self.controller.clock
+            ),
             listener=listener,
             earlier=lambda tool: earlier_corrections(self.controller, tool),
         ).run()

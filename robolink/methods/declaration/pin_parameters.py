@@ -9,7 +9,7 @@ from annotated_types import Ge, Le
 from robolink.calibration import HIGHEST_MM
 from robolink.files.toml import Problem
 from robolink.messages import tr
-from robolink.methods.declaration import (
+from robolink.methods.declaration.method import (
     MM,
     Check,
     Help,

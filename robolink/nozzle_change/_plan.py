@@ -123,13 +123,15 @@ def _tip_about(flange: Pose, offset: ToolOffset) -> tuple[float, float]:
 def require_clearance(plan: ChangePlan) -> None:
     """Refuse a plan in which a new tip could meet the pin before the person takes over.
 
+    A jump that an engineer accepts was seen before, and is the engineer's to answer for.
+
     Raises:
         ConfigError: A clearance is below the largest change that is believed.
     """
     for one in plan.tools:
         source = one.source
         clearance_mm = source.clearance_mm if isinstance(source, StopsAbovePin) else None
-        if clearance_mm is None or clearance_mm >= one.criteria.limit_mm:
+        if clearance_mm is None or clearance_mm >= one.criteria.max_change_mm:
             continue
         raise ConfigError(
             tr(
@@ -137,11 +139,11 @@ def require_clearance(plan: ChangePlan) -> None:
                 "{tool} may be {limit:g} mm longer.",
                 clearance=clearance_mm,
                 tool=one.tool,
-                limit=one.criteria.limit_mm,
+                limit=one.criteria.max_change_mm,
             ),
             remedy=tr(
                 "Nothing was moved. Use a clearance of {limit:g} mm or more, or allow less change.",
-                limit=one.criteria.limit_mm,
+                limit=one.criteria.max_change_mm,
             ),
         )
 

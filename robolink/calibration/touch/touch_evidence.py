@@ -113,6 +113,19 @@ class TouchEvidence:
     gamma_upper99: float | None
     max_residual_mm: float | None
 
+    @property
+    def most_telling(self) -> str:
+        """The one ground to name; empty where there is none.
+
+        One touch that fits badly makes the share of the standoffs uncertain too; it is then that
+        touch that is to be named.
+        """
+        uncertain = self.gamma is not None and self.gamma <= MOST_LEFT
+        codes = self.codes
+        if uncertain and codes[:1] == ("touch_not_proven",) and "large_residual" in codes:
+            return "large_residual"
+        return codes[0] if codes else ""
+
 
 def judge_touches(
     touches: Sequence[WitnessedTouch],

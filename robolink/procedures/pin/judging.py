@@ -41,8 +41,8 @@ def require_touches(touches: Sequence[TouchedAt], *, sigma_z_mm: float) -> None:
     from robolink.calibration import judge_touches  # numpy, which a look does without
 
     evidence = judge_touches([witnessed_by(touch) for touch in touches], sigma_z_mm=sigma_z_mm)
-    if evidence.codes:
-        raise _refusal(evidence.codes[0], evidence.z_range_mm, evidence.max_residual_mm)
+    if code := evidence.most_telling:
+        raise _refusal(code, evidence.z_range_mm, evidence.max_residual_mm)
 
 
 def heights_agree(heights_mm: Sequence[float], sigma_z_mm: float) -> bool:

@@ -197,7 +197,7 @@ class PinTouches:
         if self._drawing is None:
             seed = self._plan.seed
             self._drawing = StandoffSeries(
-                secrets.randbits(_SEED_BITS) if seed is None else seed,
+                fresh_seed() if seed is None else seed,
                 self._low_mm,
                 sideways=self._plan.contact is None,
                 planar=self._planar,
@@ -241,6 +241,11 @@ class PinTouches:
             number=self._count,
             away=math.hypot(*touch.standoff_mm),
         )
+
+
+def fresh_seed() -> int:
+    """Return the seed of a run: nobody can know the standoffs of a run before it."""
+    return secrets.randbits(_SEED_BITS)
 
 
 def lift_off(plan: TouchPlan, touch: Pose) -> Move:

@@ -6,21 +6,22 @@ keep, or write the old values back once. Several tools are all measured before t
 written. Whatever happens, the tool, power mode and speed of before are put back at the end.
 """
 
-from collections.abc import Callable, Sequence
-from contextlib import nullcontext
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext
 
 from robolink.calibration import VerifyResult
-from robolink.errors import CalibrationError, DeclinedError, StoppedError
+from robolink.errors import CalibrationError, DeclinedError, StoppedError, VerifyError
 from robolink.messages import tr
 from robolink.model import Controller, ToolReceipt, new_operation, require_engineer
+from robolink.nozzle_change._acceptance import AcceptanceCriteria, require_proved
+from robolink.nozzle_change._length import settle_lengths
 from robolink.nozzle_change._listener import Listener, Moment
 from robolink.nozzle_change._measuring import Measuring
 from robolink.nozzle_change._plan import ChangePlan, ToolPlan, require_clearance
 from robolink.nozzle_change._proposal import ChangeReport, Proposal, ToolReport
-from robolink.nozzle_change._proving import require_proved, touches_count
 from robolink.nozzle_change._records import decision_entry, refusal_entry, verification_entry
 from robolink.nozzle_change._station_check import Proposals, check_stations, stations_found
-from robolink.procedures import MeasurementContext
+from robolink.procedures import TOUCH_CODES, MeasurementContext
 from robolink.runner import Operator
 from robolink.transaction import ToolChange, Wanted
 
@@ -100,7 +101,7 @@ class NozzleChange:
         measuring.go_to(plan.safe, tr("go to the safe pose"))
         listener.moment(Moment.START, context)
         proposals: Proposals = [(one, measuring.propose(one)) for one in plan.tools]
-        proposals = self._checked(proposals)
+        proposals = self._checked(context, proposals, write=write)
         listener.proposed([proposal for _, proposal in proposals])
         self._judge(proposals)
         if write:
@@ -130,10 +131,15 @@ class NozzleChange:
             offers=self._plan.ask_before_write,
         )
 
-    def _checked(self, proposals: Proposals) -> Proposals:
-        """Return the proposals with what the stations make doubtful; a refusal goes on record."""
+    def _checked(
+        self, context: MeasurementContext, proposals: Proposals, *, write: bool
+    ) -> Proposals:
+        """Return the proposals with what stations and heights say; a refusal goes on record."""
         try:
-            return check_stations(self._controller, proposals)
+            checked = check_stations(self._controller, proposals)
+            if not write:
+                return checked
+            return settle_lengths(context, checked, attended=self._plan.asks)
         except CalibrationError as error:
             for plan, _ in proposals:
                 self._controller.outcomes.append(refusal_entry(plan.tool, plan.criteria, error))
@@ -194,7 +200,7 @@ class NozzleChange:
                 for (plan, proposal), receipt in zip(proposals, receipts, strict=True)
             )
             change.keep(tr("verified") if verify else tr("not verified"))
-        self._controller.outcomes.append(*stations_found(proposals))
+        self._controller.outcomes.append(*stations_found(self._controller, proposals))
         return reports
 
     def _verify(
@@ -206,7 +212,7 @@ class NozzleChange:
         tool, criteria = receipt.tool, plan.criteria
         with (
             context.telling(lambda done: self._listener.step(tool, done)),
-            touches_count(self._controller, tool, criteria),
+            self._touches_counting(tool, criteria),
         ):
             result = source.verify(
                 context,
@@ -219,6 +225,22 @@ class NozzleChange:
         self._listener.verified(tool, result)
         require_proved(result, self._controller.identity)
         return result
+
+    @contextmanager
+    def _touches_counting(self, tool: int, criteria: AcceptanceCriteria) -> Iterator[None]:
+        """Let touches of a proof that were not made end it as a failed proof, on record."""
+        try:
+            yield
+        except CalibrationError as error:
+            if error.code not in TOUCH_CODES:
+                raise
+            self._controller.outcomes.append(refusal_entry(tool, criteria, error))
+            raise VerifyError(
+                tr("The new tip was not proved. {cause}", cause=error.what),
+                remedy=error.remedy,
+                code=error.code,
+                controller=self._controller.identity,
+            ) from error
 
     def _tell(self, sentence: str) -> None:
         self._operator.tell(sentence)

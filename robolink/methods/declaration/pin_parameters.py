@@ -14,6 +14,7 @@ from robolink.methods.declaration.method import (
     Check,
     Help,
     InputNumber,
+    LengthRule,
     MethodParameters,
     Option,
 )
@@ -64,6 +65,27 @@ class PinParameters(MethodParameters):
     def room_mm(self) -> float:
         """Return how high the box has to be."""
         return self.lift_mm
+
+
+@dataclass(frozen=True, kw_only=True)
+class UprightPinParameters(PinParameters):
+    """How an upright tip is touched that keeps its Z: heights tell whether it may."""
+
+    if_length_changed: Annotated[
+        LengthRule,
+        Option(moves=False),
+        Help(
+            tr(
+                "Where the heights of the touches show that the tip is longer or shorter: ask a "
+                "person, write Z by the difference, or keep Z. Where nobody can be asked, ask "
+                "means that nothing is written."
+            )
+        ),
+    ] = "ask"
+
+    def length_rule(self) -> LengthRule:
+        """Return what is done where the length changed."""
+        return self.if_length_changed
 
 
 def clearance_below_lift(clearance_mm: float, lift_mm: float, check: Check) -> Iterator[Problem]:

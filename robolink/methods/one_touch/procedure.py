@@ -3,10 +3,10 @@
 from collections.abc import Callable
 from dataclasses import replace
 
-from robolink.calibration import CalibrationResult
+from robolink.calibration import CalibrationResult, carrying
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink.model import Pose, ToolOffset, rotate_xy
+from robolink.model import Pose, ToolOffset
 from robolink.procedures import PinTouches, TouchPlan, approach_path, offset_z
 from robolink.runner import Procedure
 
@@ -35,14 +35,7 @@ def measure_one_touch(
         ConfigError: Nobody knows how long the tool is.
     """
     guess = require_known_length(stored)
-    dx, dy = rotate_xy(guess.x_mm, guess.y_mm, u_deg)
-    contact = replace(
-        here,
-        x_mm=pin_mm[0] - dx,
-        y_mm=pin_mm[1] - dy,
-        z_mm=pin_mm[2] - guess.z_mm,
-        u_deg=u_deg,
-    )
+    contact = carrying(replace(here, u_deg=u_deg), guess, pin_mm)
     touches = PinTouches(plan)
     yield from approach_path(
         offset_z(contact, plan.lift_mm), here=here, purpose=tr("go above the pin")

@@ -164,18 +164,18 @@ if TYPE_CHECKING:
     from robolink.calibration.touch.length import (
         length_not_observable as length_not_observable,
     )
-    from robolink.calibration.touch.standoff import FARTHEST_MM as FARTHEST_MM
-    from robolink.calibration.touch.standoff import HIGHEST_MM as HIGHEST_MM
     from robolink.calibration.touch.standoff import Standoff as Standoff
     from robolink.calibration.touch.standoff import StandoffSeries as StandoffSeries
-    from robolink.calibration.touch.touch_evidence import PERSON_SIGMA_Z_MM as PERSON_SIGMA_Z_MM
-    from robolink.calibration.touch.touch_evidence import PROBE_SIGMA_Z_MM as PROBE_SIGMA_Z_MM
     from robolink.calibration.touch.touch_evidence import TouchEvidence as TouchEvidence
     from robolink.calibration.touch.touch_evidence import WitnessedTouch as WitnessedTouch
     from robolink.calibration.touch.touch_evidence import height_limit_mm as height_limit_mm
     from robolink.calibration.touch.touch_evidence import judge_touches as judge_touches
     from robolink.calibration.touch.touch_evidence import least_jog_mm as least_jog_mm
     from robolink.calibration.touch.touch_evidence import stand_upright as stand_upright
+    from robolink.calibration.touch.touch_limits import FARTHEST_MM as FARTHEST_MM
+    from robolink.calibration.touch.touch_limits import HIGHEST_MM as HIGHEST_MM
+    from robolink.calibration.touch.touch_limits import PERSON_SIGMA_Z_MM as PERSON_SIGMA_Z_MM
+    from robolink.calibration.touch.touch_limits import PROBE_SIGMA_Z_MM as PROBE_SIGMA_Z_MM
     from robolink.calibration.z_touch import USUAL_DECELERATION_MM_S2 as USUAL_DECELERATION_MM_S2
     from robolink.calibration.z_touch import Touch as Touch
     from robolink.calibration.z_touch import ZTouchResult as ZTouchResult
@@ -234,9 +234,10 @@ __getattr__ = lazy_exports(
         "writes_refused_unattended",
         "quality.verify_drift": "PLACING_TOLERANCE_MM verify_drift",
         "touch.length": ("LengthChange LengthDecision length_change length_not_observable"),
-        "touch.standoff": "HIGHEST_MM FARTHEST_MM Standoff StandoffSeries",
-        "touch.touch_evidence": "PERSON_SIGMA_Z_MM PROBE_SIGMA_Z_MM TouchEvidence WitnessedTouch "
+        "touch.standoff": "Standoff StandoffSeries",
+        "touch.touch_evidence": "TouchEvidence WitnessedTouch "
         "height_limit_mm judge_touches least_jog_mm stand_upright",
+        "touch.touch_limits": "FARTHEST_MM HIGHEST_MM PERSON_SIGMA_Z_MM PROBE_SIGMA_Z_MM",
         "z_touch": "USUAL_DECELERATION_MM_S2 Touch ZTouchResult solve_z_touch touch_sigma_gain",
     },
 )

@@ -12,8 +12,7 @@ QUANTILES = ("limit", "upper99", "coverage_factor", "expanded", "detectable")
 
 
 def cases():
-    every = json.loads(SHARED.read_text())["vectors"] if SHARED.is_file() else []
-    return every
+    return json.loads(SHARED.read_text())["vectors"] if SHARED.is_file() else []
 
 
 def flat(value):

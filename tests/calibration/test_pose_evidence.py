@@ -131,6 +131,14 @@ def test_copies_of_one_pose_tell_nothing():
         solve_n_angle([*PLAIN[:5], *PLAIN[:5]], robust=Robust())
 
 
+def test_one_angle_is_degenerate_even_where_any_rotation_is_accepted():
+    shifted = [replace(PLAIN[0], x_mm=300.0 + k) for k in range(3)]
+    with refused("degenerate_angles"):
+        solve_n_angle(shifted, min_rotation_deg=0.0)
+    with refused("degenerate_angles"):
+        solve_two_pose(*shifted[:2], min_rotation_deg=0.0)
+
+
 def test_a_pose_that_decides_alone_is_named():
     lonely = [touching(TIP, angle) for angle in (0, 10, 20, 30, 180)]
     result = solve_n_angle(lonely)

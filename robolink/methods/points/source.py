@@ -107,7 +107,9 @@ class PointsSource:
     def find(self, controller: Controller, tool: int, stored: ToolOffset | None) -> PosesFound:
         """Solve the poses and ask which tool they fit. Moves and writes nothing."""
         poses = self._poses()
-        # A pose that names its tool knows better than whoever speaks for all of them.
+        if self._taught_tool:
+            _require_taught_with(self._taught_tool, poses)
+        # A pose that names its tool knows better than the usual one of all of them, the flange.
         named = {self._tool_of(pose) for pose in poses}
         tools = {number: _require_defined(controller, number) for number in sorted(named)}
         if not self._method.upright:
@@ -145,6 +147,27 @@ class PointsSource:
             "Check that all poses touched the same point and with which tool they were taught "
             "({taught_tool}).",
             taught_tool=way(Way.TAUGHT_TOOL),
+        )
+
+
+def _require_taught_with(tool: int, poses: Sequence[Pose]) -> None:
+    """Refuse poses that say themselves that they are those of another tool.
+
+    Raises:
+        CalibrationError: ``tool_pose``.
+    """
+    other = next((pose.tool for pose in poses if pose.tool not in (None, tool)), None)
+    if other is not None:
+        raise CalibrationError(
+            "tool_pose",
+            tr(
+                "These poses are those of tool {other}, not of tool {tool}.", other=other, tool=tool
+            ),
+            remedy=tr(
+                "Name the tool that was selected with {taught_tool}; what its number holds on this "
+                "controller is used.",
+                taught_tool=way(Way.TAUGHT_TOOL),
+            ),
         )
 
 

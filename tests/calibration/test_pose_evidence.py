@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import f as fisher
 
 from robolink.calibration import (
     RobotReach,
@@ -103,6 +104,13 @@ def test_exact_poses_show_no_order_and_five_touches_cannot():
         assert order_of(result).step_f == 0.0
     assert solve_n_angle(PLAIN[:5]).notes == ("order_not_testable",)
     assert told(solve_n_angle(PLAIN[:5])).run_order is None
+
+
+def test_the_limits_are_shared_among_the_splits():
+    found, spatial = order_of(solve_n_angle(PLAIN)), order_of(solve_pivot(SPATIAL))
+    assert found.step_f_limit == pytest.approx(fisher.ppf(1 - 0.01 / 7, 2, 10))
+    assert found.drift_f_limit == pytest.approx(fisher.ppf(0.99, 2, 10))
+    assert spatial.step_f_limit == pytest.approx(fisher.ppf(1 - 0.01 / 8, 3, 18))
 
 
 @pytest.mark.parametrize(("solve", "exact"), [(solve_n_angle, PLAIN), (solve_pivot, SPATIAL)])

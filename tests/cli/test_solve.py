@@ -314,6 +314,25 @@ MORE: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
         {"sightings": [{"flange": p, "tip": {"x": PIN[0], "y": PIN[1]}} for p in ROUND]},
         {"offset": [12.5, -3.25], "centre_mm": [0, 0]},
     ),
+    "length_change": (
+        {"before_z": [-60.0, -60.02], "after_z": [-60.01], "stored_z": -20, "sigma_z_mm": 0.02},
+        {"height_change_mm": 0, "limit_mm": 0.1, "offset_z": -20},
+    ),
+    "station_shift": (
+        {
+            "shifts": [{"tool": 1, "vector": [0.03, 0.04], "touch_sigma_mm": 0.05}],
+            "tolerance_mm": 0.5,
+        },
+        {"chi_square": 0.5, "common_mm": [0.03, 0.04]},
+    ),
+    "needle_chain": (
+        {"u0_mm": 0.02, "sigma_mm": 0.01, "changes": 6, "reference": "both_touched"},
+        {"u_mm": 0.04},
+    ),
+    "station_chain": (
+        {"u_station_mm": 0.03, "sigma_mm": 0.01, "tools": [1, 2, 3]},
+        {"correlation": 0.9},
+    ),
     "gauge_rr": (
         {
             "values": [[[1.0, 1.2], [1.0, 1.2]], [[4.0, 4.2], [4.0, 4.2]]],
@@ -432,6 +451,26 @@ def test_a_refusal_is_shown_to_a_person(tmp_path, capsys):
     path.write_text(json.dumps(REFUSED["degenerate_angles"]))
     assert main.run(["solve", str(path)]) == 7
     assert "n_angle: error (degenerate_angles)" in capsys.readouterr().out
+
+
+def test_a_length_waits_for_a_decision_and_shows_its_figures(solved):
+    heights = {"before_z": [-60.0] * 4, "after_z": [-59.5] * 4, "stored_z": -20.0}
+    code, undecided = solved(case("length_change", **heights))
+    assert (code, undecided["status"], undecided["codes"]) == (7, "error", ["length_changed"])
+    assert undecided["z_by_difference_mm"] == -20.5
+    for decision, z_mm in (("difference", -20.5), ("keep", -20.0), ("measure", None)):
+        code, decided = solved(case("length_change", **heights, decision=decision))
+        assert (code, decided["status"], decided["offset_z"]) == (0, "warn", z_mm)
+    code, moved = solved(case("length_change", **heights, pin_moved=True))
+    assert (code, moved["codes"]) == (7, ["length_not_observable"])
+
+
+def test_a_station_may_be_undecided(solved):
+    shift = {"tool": 1, "vector": [0.1, 0, 0], "touch_sigma_mm": 0.02, "seat_sigma_mm": [0.1] * 3}
+    code, answer = solved(case("station_shift", shifts=[shift], tolerance_mm=0.2))
+    assert (code, answer["status"], answer["codes"]) == (0, "warn", ["station_undecided"])
+    code, pooled = solved(case("station_shift", shifts=[shift], tolerance_mm=0.2, seat_changes=8))
+    assert pooled["chi_square_limit"] > answer["chi_square_limit"]
 
 
 def test_no_method_is_left_untried():

@@ -83,6 +83,9 @@ if TYPE_CHECKING:
     from robolink.calibration.crossed_beams import crossing_sigma_gain as crossing_sigma_gain
     from robolink.calibration.crossed_beams import solve_crossed_beams as solve_crossed_beams
     from robolink.calibration.crossed_beams import where_they_cross as where_they_cross
+    from robolink.calibration.evidence.approach_bias import (
+        with_approach_bias as with_approach_bias,
+    )
     from robolink.calibration.evidence.units import RobotReach as RobotReach
     from robolink.calibration.evidence.units import require_near as require_near
     from robolink.calibration.evidence.units import require_stored_scale as require_stored_scale
@@ -229,6 +232,7 @@ __getattr__ = lazy_exports(
         "quality.station_part": "SharedStation StationPart shared_station with_station",
         "quality.tolerances": "PLANAR_TOLERANCE TOUCH_TOLERANCE Tolerance",
         "quality.tool_fits": "ToolFit better_fit tool_fits",
+        "evidence.approach_bias": "with_approach_bias",
         "evidence.units": "RobotReach require_near require_stored_scale require_within_reach",
         "quality.update_guard": "Correction NEEDLE_LIMIT_MM require_shrinking update_guard "
         "writes_refused_unattended",

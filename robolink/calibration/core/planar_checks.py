@@ -49,7 +49,7 @@ def check_rotation(
     """
     if spread_deg < min_rotation_deg:
         refuse_radians(poses, spread_deg)
-        _require_rotation(poses, spread_deg, min_rotation_deg)
+    _require_rotation(poses, spread_deg, min_rotation_deg)
     return ("small_rotation",) if spread_deg < WARN_ROTATION_DEG else ()
 
 

@@ -28,6 +28,10 @@ if TYPE_CHECKING:
     from robolink.calibration.camera.camera_round import solve_camera_round as solve_camera_round
     from robolink.calibration.camera.runout import RunoutReport as RunoutReport
     from robolink.calibration.camera.runout import runout_report as runout_report
+    from robolink.calibration.camera.runout_table import RunoutRow as RunoutRow
+    from robolink.calibration.camera.runout_table import RunoutTable as RunoutTable
+    from robolink.calibration.camera.runout_table import RunoutTableResult as RunoutTableResult
+    from robolink.calibration.camera.runout_table import solve_runout_table as solve_runout_table
     from robolink.calibration.camera.up_camera import Sighting as Sighting
     from robolink.calibration.camera.up_camera import solve_up_camera as solve_up_camera
     from robolink.calibration.core.budget import BudgetRow as BudgetRow
@@ -172,6 +176,7 @@ __getattr__ = lazy_exports(
         "camera.camera_model": "CameraLimits CameraModel require_same_camera",
         "camera.camera_round": "CameraRound as_round solve_camera_round",
         "camera.runout": "RunoutReport runout_report",
+        "camera.runout_table": "RunoutRow RunoutTable RunoutTableResult solve_runout_table",
         "camera.up_camera": "Sighting solve_up_camera",
         "core.budget": "BudgetRow UncertaintyBudget",
         "core.evidence": "FitEvidence RunOrder",

@@ -62,6 +62,10 @@ class RunoutReport:
         rms_mm: Of what the constant offset leaves.
         peak_mm: The largest of it.
         rms_after_mm: Of what all harmonics together leave.
+        residuals_mm: What they leave of each sighting, base axes.
+        noise_mm2: The sum of the squares of that.
+        dof: Degrees of freedom behind it.
+        sigma_gain: Standard deviation of X or Y of the tip as a multiple of a sighting's.
         harmonics_matter: Whether they explain what the offset leaves, beyond the noise.
         distinct_angles: How many angles there are, modulo 360.
         rank: How many of the four terms they tell apart.
@@ -77,6 +81,10 @@ class RunoutReport:
     rms_mm: float
     peak_mm: float
     rms_after_mm: float | None
+    residuals_mm: tuple[tuple[float, ...], ...]
+    noise_mm2: float
+    dof: int
+    sigma_gain: float
     harmonics_matter: bool
     distinct_angles: int
     rank: int
@@ -157,6 +165,10 @@ def _report(
         rms_mm=math.sqrt(float((left**2).sum()) / left.shape[1]),
         peak_mm=float(np.hypot(*left).max()),
         rms_after_mm=math.sqrt(noise / left.shape[1]) if full else None,
+        residuals_mm=tuple(map(tuple, best.residuals.reshape(2, -1).T.tolist())),
+        noise_mm2=noise,
+        dof=dof,
+        sigma_gain=gain,
         harmonics_matter=matters,
         distinct_angles=distinct,
         rank=rank,

@@ -27,6 +27,7 @@ class Way:
     FORGET_MARKER: Final = "recover(..., confirm=...)"
     GIVEN_POSES: Final = "PointsSource"
     HEIGHT: Final = "Answers(z_mm={{{tool}: MM}})"
+    LENGTH: Final = 'ToolPlan(..., length="difference")'
     LENGTH_TOLERANCE: Final = "length_mm=0.05"
     LIST_CHANGES: Final = "outcomes.recorded(kinds=(EntryKind.DONE,))"
     LOT: Final = "Answers(lot=ID)"

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from robolink.calibration.camera.up_camera import solve_up_camera as solve_up_camera
     from robolink.calibration.core.budget import BudgetRow as BudgetRow
     from robolink.calibration.core.budget import UncertaintyBudget as UncertaintyBudget
+    from robolink.calibration.core.dispersion import require_positive as require_positive
     from robolink.calibration.core.evidence import FitEvidence as FitEvidence
     from robolink.calibration.core.evidence import RunOrder as RunOrder
     from robolink.calibration.core.frames import flange_of as flange_of
@@ -100,6 +101,7 @@ if TYPE_CHECKING:
     from robolink.calibration.pin.needle_chain import NeedleChain as NeedleChain
     from robolink.calibration.pin.needle_chain import NeedleLimits as NeedleLimits
     from robolink.calibration.pin.needle_chain import chain_of as chain_of
+    from robolink.calibration.pin.needle_chain import chain_sigma_mm as chain_sigma_mm
     from robolink.calibration.pin.needle_change import NeedleChangeResult as NeedleChangeResult
     from robolink.calibration.pin.needle_change import solve_needle_change as solve_needle_change
     from robolink.calibration.pin.one_touch import Pin as Pin
@@ -132,6 +134,10 @@ if TYPE_CHECKING:
     from robolink.calibration.quality.moved_station import StationShift as StationShift
     from robolink.calibration.quality.moved_station import TipShift as TipShift
     from robolink.calibration.quality.moved_station import judge_shifts as judge_shifts
+    from robolink.calibration.quality.station_part import SharedStation as SharedStation
+    from robolink.calibration.quality.station_part import StationPart as StationPart
+    from robolink.calibration.quality.station_part import shared_station as shared_station
+    from robolink.calibration.quality.station_part import with_station as with_station
     from robolink.calibration.quality.tolerances import PLANAR_TOLERANCE as PLANAR_TOLERANCE
     from robolink.calibration.quality.tolerances import TOUCH_TOLERANCE as TOUCH_TOLERANCE
     from robolink.calibration.quality.tolerances import Tolerance as Tolerance
@@ -146,6 +152,12 @@ if TYPE_CHECKING:
         PLACING_TOLERANCE_MM as PLACING_TOLERANCE_MM,
     )
     from robolink.calibration.quality.verify_drift import verify_drift as verify_drift
+    from robolink.calibration.touch.length import LengthChange as LengthChange
+    from robolink.calibration.touch.length import LengthDecision as LengthDecision
+    from robolink.calibration.touch.length import length_change as length_change
+    from robolink.calibration.touch.length import (
+        length_not_observable as length_not_observable,
+    )
     from robolink.calibration.touch.standoff import FARTHEST_MM as FARTHEST_MM
     from robolink.calibration.touch.standoff import HIGHEST_MM as HIGHEST_MM
     from robolink.calibration.touch.standoff import Standoff as Standoff
@@ -179,6 +191,7 @@ __getattr__ = lazy_exports(
         "camera.runout_table": "RunoutRow RunoutTable RunoutTableResult solve_runout_table",
         "camera.up_camera": "Sighting solve_up_camera",
         "core.budget": "BudgetRow UncertaintyBudget",
+        "core.dispersion": "require_positive",
         "core.evidence": "FitEvidence RunOrder",
         "core.frames": "flange_of flange_pose seen_from tilted_flange_pose tilted_from toward_zero",
         "core.planar_checks": "MIN_ROTATION_DEG angle_spread_deg planar_sigma_gain",
@@ -195,7 +208,7 @@ __getattr__ = lazy_exports(
         "pin.axis_displacement": "GOOD_WAY_MM axis_displacement between_deg require_unturned",
         "pin.joint": "JointResult JointTouch ToolDifference solve_joint",
         "pin.n_angle": "solve_n_angle",
-        "pin.needle_chain": "NeedleChain NeedleLimits chain_of",
+        "pin.needle_chain": "NeedleChain NeedleLimits chain_of chain_sigma_mm",
         "pin.needle_change": "NeedleChangeResult solve_needle_change",
         "pin.one_touch": "Pin pin_touched solve_one_touch",
         "pin.pivot": "solve_pivot",
@@ -207,10 +220,12 @@ __getattr__ = lazy_exports(
         "quality.doubts": "doubt_sentence known_doubts",
         "quality.impact": "Impact PointImpact impact_on",
         "quality.moved_station": "StationShift TipShift judge_shifts",
+        "quality.station_part": "SharedStation StationPart shared_station with_station",
         "quality.tolerances": "PLANAR_TOLERANCE TOUCH_TOLERANCE Tolerance",
         "quality.tool_fits": "ToolFit better_fit tool_fits",
         "quality.update_guard": "Correction NEEDLE_LIMIT_MM require_shrinking update_guard",
         "quality.verify_drift": "PLACING_TOLERANCE_MM verify_drift",
+        "touch.length": ("LengthChange LengthDecision length_change length_not_observable"),
         "touch.standoff": "HIGHEST_MM FARTHEST_MM Standoff StandoffSeries",
         "touch.touch_evidence": "PERSON_SIGMA_Z_MM PROBE_SIGMA_Z_MM TouchEvidence WitnessedTouch "
         "height_limit_mm judge_touches least_jog_mm stand_upright",

@@ -6,11 +6,12 @@ of the flange, which may lean or hang upside down (docs/reference/evidence.md 3)
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from robolink.calibration.beam_lines import Beam, Crossing, check_crossings, require_crossed
+from robolink.calibration.beam_uncertainty import beams_part
 from robolink.calibration.core.least_squares import LinearFit, linear_fit
 from robolink.calibration.core.planar_checks import MIN_ROTATION_DEG, angle_spread_deg
 from robolink.calibration.core.pose_checks import keep_unmeasured
@@ -25,6 +26,7 @@ from robolink.calibration.flange_plane import (
     solvable_planes,
 )
 from robolink.calibration.quality.fit_quality import judged
+from robolink.calibration.quality.station_part import with_station
 from robolink.calibration.quality.tolerances import PLANAR_TOLERANCE, Tolerance
 from robolink.errors import CalibrationError
 from robolink.messages import tr
@@ -40,9 +42,12 @@ class BeamsResult(CalibrationResult):
     Attributes:
         lag_mm: For each beam, by how much latency and backlash shift a crossing along its
             travel; ``None`` where only one direction was driven.
+        u_without_beams_mm: Standard uncertainty of X and of Y by the crossings alone; empty
+            without an interval.
     """
 
     lag_mm: tuple[float | None, float | None]
+    u_without_beams_mm: tuple[float, ...] = ()
 
 
 def solve_crossed_beams(
@@ -59,7 +64,8 @@ def solve_crossed_beams(
 
     Args:
         crossings: Travels through both beams, best in both directions.
-        beams: Where the beams are, from :func:`find_beams` with a reference pin.
+        beams: Where the beams are, from :func:`find_beams` with a reference pin; what is
+            uncertain about them goes into the interval.
         stored: The offset stored now; Z, U, V and W are kept from it, or 0 without one.
         height: Z of the tip, for a flange that leans; without it that of ``stored`` counts.
         sigma_mm: Standard deviation of one crossing's middle, across the beam.
@@ -70,7 +76,7 @@ def solve_crossed_beams(
     Raises:
         CalibrationError: ``too_few_poses``, ``insufficient_rotation``, ``parallel_beams``,
             ``no_crossing``, ``turned_in_crossing``, ``implausible_offset``, ``tool_pose``,
-            ``local_pose``, ``tilted_pose``, and those of :func:`check_poses`.
+            ``local_pose``, ``tilted_pose``, and those of ``pose_checks.check_poses``.
         ConfigError: ``sigma_mm`` is not positive.
     """
     warnings = check_crossings(crossings, minimum=1)
@@ -114,7 +120,10 @@ def solve_crossed_beams(
         tolerance=tolerance,
     )
     by_height = linear_fit(a, per_height).x[:2].tolist()
-    return with_height_error(result, (by_height[0], by_height[1]), height)
+    result = with_height_error(result, (by_height[0], by_height[1]), height)
+    alone = tuple(math.sqrt(row[index]) for index, row in enumerate(result.covariance))
+    result = replace(result, u_without_beams_mm=alone)
+    return with_station(result, beams_part(a, crossings, beams, result.offset))
 
 
 def crossing_sigma_gain(

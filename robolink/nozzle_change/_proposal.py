@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from robolink.calibration import CalibrationResult, VerifyResult
+from robolink.calibration import CalibrationResult, LengthChange, VerifyResult
 from robolink.model import ToolOffset, ToolReceipt
 
 
@@ -45,6 +45,7 @@ class Proposal:
         z_from: Where Z of the proposal comes from.
         record: More for the record of the measurement, plain JSON.
         kept_record: More for the record of the value, once it is kept.
+        length: What the heights of the touches tell about the length; ``None`` for nothing.
     """
 
     tool: int
@@ -55,6 +56,7 @@ class Proposal:
     z_from: Literal["measured", "typed", "kept"] = "kept"
     record: Mapping[str, object] = field(default_factory=dict)
     kept_record: Mapping[str, object] = field(default_factory=dict)
+    length: LengthChange | None = None
 
     @property
     def offset(self) -> ToolOffset:

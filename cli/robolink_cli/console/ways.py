@@ -16,6 +16,7 @@ SHELL_WAYS: Final = {
     Way.FORGET_MARKER: "'robolink recover --forget'",
     Way.GIVEN_POSES: "--pose",
     Way.HEIGHT: "--z {tool}=MM",
+    Way.LENGTH: "--if-length-changed; in a recipe if_length_changed",
     Way.LENGTH_TOLERANCE: "--tolerance 0.05",
     Way.LIST_CHANGES: "'robolink journal list --kind done'",
     Way.LOT: "--lot ID",

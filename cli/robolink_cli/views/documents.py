@@ -54,7 +54,24 @@ def proposal_payload(proposal: "Proposal") -> dict[str, object]:
         "warnings": list(result.warnings),
         "poses": [pose_payload(pose) for pose in result.inputs],
         "fit": fit_payload(result),
+        "length": length_payload(proposal),
         **result.details(),
+    }
+
+
+def length_payload(proposal: "Proposal") -> dict[str, object] | None:
+    """Return what the heights of the touches tell about the length, ``None`` for nothing."""
+    told = proposal.length
+    if told is None:
+        return None
+    return {
+        "changed": told.changed,
+        "height_change_mm": told.height_change_mm,
+        "u_mm": told.u_mm,
+        "limit_mm": told.limit_mm,
+        "stored_z_mm": told.stored_z_mm,
+        "z_by_difference_mm": told.z_by_difference_mm,
+        "written": "difference" if told.changed and proposal.z_from == "measured" else "keep",
     }
 
 

@@ -52,7 +52,8 @@ def solve_board_fit(
 
     Raises:
         CalibrationError: ``too_few_poses``, ``coincident_fiducials``, ``spacing_mismatch``,
-            ``tool_pose``, ``local_pose``, ``tilted_pose``, and those of :func:`check_poses`.
+            ``tool_pose``, ``local_pose``, ``tilted_pose``, and those of
+            ``pose_checks.check_poses``.
         ConfigError: ``sigma_mm`` is not positive.
         ValueError: The lists differ in length.
     """

@@ -21,7 +21,7 @@ from robolink.calibration.camera.camera_model import (
 from robolink.calibration.core.least_squares import LinearFit, linear_fit
 from robolink.calibration.core.planar_checks import require_poses
 from robolink.calibration.core.pose_checks import check_poses, keep_unmeasured, require_finite
-from robolink.calibration.core.result import CalibrationResult
+from robolink.calibration.core.result import CalibrationResult, offset_sigma_mm
 from robolink.calibration.core.robust import Floats
 from robolink.calibration.flange_checks import require_flange_in_base, with_height_error
 from robolink.calibration.flange_plane import TipHeight, height_of, known_z_mm, solvable_planes
@@ -144,7 +144,26 @@ def solve_camera_affine(
     result = with_height_error(result, (by_height[0], by_height[1]), height)
     rms_px = _rms_px(camera, residuals) if result.dof else None
     doubts = (*result.warnings, *limits.doubts(camera, rms_px))
-    return replace(result, rms_px=rms_px, warnings=doubts)
+    known = _with_spread(camera, fit, offset_sigma_mm(result), pixels.mean(axis=0).tolist())
+    return replace(result, rms_px=rms_px, warnings=doubts, camera=known)
+
+
+def _with_spread(
+    camera: CameraModel, fit: LinearFit, offset_mm: float | None, mean_pixel: Sequence[float]
+) -> CameraModel:
+    """Return the camera with how sure its place and its scale are; as it is without a scatter."""
+    if offset_mm is None:
+        return camera
+    variances = fit.unit_covariance.diagonal()
+    # What one look scatters, as wide as the few degrees of freedom made the interval.
+    sigma_mm = offset_mm / math.sqrt(float(variances[6:].max()))
+    px, py = mean_pixel
+    return replace(
+        camera,
+        centre_mm=camera.base_mm(px, py),
+        place_sigma_mm=sigma_mm * math.sqrt(float(variances[4:6].max())),
+        scale_sigma=sigma_mm * math.sqrt(float(variances[:4].max())) / min(camera.scale_mm_per_px),
+    )
 
 
 def _system(

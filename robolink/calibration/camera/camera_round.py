@@ -13,6 +13,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
+from robolink.calibration.camera.camera_model import CameraModel
 from robolink.calibration.camera.up_camera import Sighting, check_sightings, solve_up_camera
 from robolink.calibration.core.least_squares import linear_fit
 from robolink.calibration.core.planar_checks import MIN_ROTATION_DEG, check_planar, require_poses
@@ -62,6 +63,7 @@ def solve_camera_round(
     stored: ToolOffset | None = None,
     height: TipHeight | None = None,
     sigma_mm: float | None = None,
+    camera: CameraModel | None = None,
     tolerance: Tolerance = PLANAR_TOLERANCE,
 ) -> CameraRound:
     """Return the offset of a tip that a calibrated camera saw at one or several angles.
@@ -72,6 +74,8 @@ def solve_camera_round(
         stored: The offset stored now; Z, U, V and W are kept from it, or 0 without one.
         height: Z of the tip, for a flange that leans; without it that of ``stored`` counts.
         sigma_mm: Standard deviation of one coordinate of one look, where it is known.
+        camera: The camera; what is uncertain about it counts for a single look. Several looks find
+            what it is off by.
         tolerance: Residuals above which the result carries a warning.
 
     Raises:
@@ -83,7 +87,9 @@ def solve_camera_round(
     check_sightings(tuple(sightings))
     inputs = tuple(sighting.flange for sighting in sightings)
     if len(sightings) == 1:
-        found = solve_up_camera(sightings[0], stored=stored, height=height, sigma_mm=sigma_mm)
+        found = solve_up_camera(
+            sightings[0], stored=stored, height=height, sigma_mm=sigma_mm, camera=camera
+        )
         return as_round(found)
     if any((s.flange.v_deg, s.flange.w_deg) != (0.0, 0.0) for s in sightings):
         return _leaning(sightings, stored, height_of(stored, height), sigma_mm, tolerance)

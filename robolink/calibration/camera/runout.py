@@ -106,7 +106,7 @@ def runout_report(sightings: Sequence[Sighting], *, sigma_mm: float | None = Non
 
     Raises:
         CalibrationError: ``too_few_poses``, ``insufficient_rotation``, ``degenerate_angles``,
-            ``tilted_pose``, ``tool_pose``, ``local_pose`` and those of :func:`check_poses`.
+            ``tilted_pose``, ``tool_pose``, ``local_pose`` and those of ``pose_checks.check_poses``.
         ConfigError: ``sigma_mm`` is not positive.
     """
     check_sightings(tuple(sightings))

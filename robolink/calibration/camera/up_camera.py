@@ -10,6 +10,7 @@ is ``R' (tip - flange)``.
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from robolink.calibration.camera.camera_model import CameraModel
 from robolink.calibration.core.dispersion import Dispersion
 from robolink.calibration.core.pose_checks import check_poses, keep_unmeasured, require_finite
 from robolink.calibration.core.result import CalibrationResult
@@ -21,6 +22,8 @@ from robolink.calibration.flange_plane import (
     known_z_mm,
     solvable_planes,
 )
+from robolink.calibration.quality.station_part import StationPart, with_station
+from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
 
 
@@ -51,6 +54,7 @@ def solve_up_camera(
     stored: ToolOffset | None = None,
     height: TipHeight | None = None,
     sigma_mm: float | None = None,
+    camera: CameraModel | None = None,
 ) -> CalibrationResult:
     """Return the offset of a tip that a calibrated camera saw once.
 
@@ -61,6 +65,7 @@ def solve_up_camera(
         height: Z of the tip, for a flange that leans; without it that of ``stored`` counts.
         sigma_mm: Standard deviation of one coordinate of one sighting, robot and camera
             together. Without it the result has no interval: one look leaves no residual.
+        camera: The camera, whose place and scale are as uncertain as they say.
 
     An error of the camera's own calibration goes into the offset in full and shows in no
     residual. Several looks at different U tell it (:func:`solve_n_angle`).
@@ -72,12 +77,30 @@ def solve_up_camera(
     """
     check_sightings((sighting,))
     if sighting.z_mm is not None:
-        return _seen_in_space(sighting, sighting.z_mm, stored, sigma_mm)
+        in_space = _seen_in_space(sighting, sighting.z_mm, stored, sigma_mm)
+        return _with_camera(in_space, sighting, camera)
     height = height_of(stored, height)
     (plane,) = solvable_planes((sighting.flange,), height)
     x_mm, y_mm = sighting.in_flange_mm(known_z_mm(height))
     result = _one_look(sighting, {"x_mm": x_mm, "y_mm": y_mm}, stored, sigma_mm)
-    return with_height_error(result, plane.in_flange(0.0, 0.0, 1.0), height)
+    result = with_height_error(result, plane.in_flange(0.0, 0.0, 1.0), height)
+    return _with_camera(result, sighting, camera)
+
+
+def _with_camera(
+    result: CalibrationResult, sighting: Sighting, camera: CameraModel | None
+) -> CalibrationResult:
+    """Return a result with what its camera is unsure of: as much in every direction."""
+    if camera is None:
+        return result
+    variance = camera.sigma_at_mm(sighting.x_mm, sighting.y_mm) ** 2
+    axes = range(len(result.measured))
+    part = StationPart(
+        tr("place and scale of the camera"),
+        tuple(tuple(variance if i == j else 0.0 for j in axes) for i in axes),
+        origin=tr("record of the station"),
+    )
+    return with_station(result, part)
 
 
 def _seen_in_space(

@@ -54,6 +54,7 @@ def solve_needle_change(
     chain: NeedleChain,
     sigma_mm: float,
     limits: NeedleLimits = USUAL_LIMITS,
+    shared_touch: bool = False,
 ) -> NeedleChangeResult:
     """Return the offset of a new needle from where the old tip was and the new one is.
 
@@ -66,6 +67,8 @@ def solve_needle_change(
         chain: What has happened since the last full calibration.
         sigma_mm: Standard deviation of one coordinate of one look.
         limits: When a shift is not believed, and when a full calibration is due.
+        shared_touch: Whether the old tip's place is that of the change before, so that it was not
+            touched again; see :meth:`NeedleChain.after`.
 
     Raises:
         CalibrationError: ``implausible_change``, ``non_finite``, ``suspect_units``,
@@ -86,7 +89,7 @@ def solve_needle_change(
     }
     scatter = Dispersion.of(0.0, 0, sigma_mm)
     assert scatter is not None  # noqa: S101 - a sigma was given
-    now = chain.after(math.sqrt(2) * sigma_mm)
+    now = chain.after(math.sqrt(2) * sigma_mm, shared_touch=shared_touch)
     covariance = tuple(
         tuple(now.sigma_mm**2 if row == column else 0.0 for column in range(len(found)))
         for row in range(len(found))

@@ -21,7 +21,7 @@ from robolink.runner import Procedure
 
 @dataclass(slots=True)
 class CrossingSampler:
-    """Crossings at one angle of U, or at two; implements :class:`SequentialSampler`.
+    """Crossings at one angle of U, or at two; implements ``SequentialSampler``.
 
     Attributes:
         travel: Takes the frame from one to the next.

@@ -74,6 +74,7 @@ def trace_beams(
     *,
     here: Pose,
     tip: ToolOffset,
+    tip_sigma_mm: float = 0.0,
     asides_mm: Sequence[float] = REFERENCE_ASIDES_MM,
 ) -> Procedure[tuple[Beam, Beam]]:
     """Find where both beams are, with a reference pin whose tip is known. Runs in Tool 0.
@@ -83,6 +84,7 @@ def trace_beams(
         plan: How they are crossed.
         here: Where the flange is.
         tip: The pin's offset.
+        tip_sigma_mm: Standard deviation of each coordinate of that offset.
         asides_mm: Where along each beam it is crossed, both ways, from where they meet; two
             places or more, and none so near to it that the pin breaks both.
 
@@ -94,7 +96,7 @@ def trace_beams(
         drive = BeamDrive(guess, replace(plan, aside_mm=aside_mm), here, tip)
         crossings += yield from travel.through(drive.round())
         yield from travel.lifted()
-    return find_beams(crossings, (tip.x_mm, tip.y_mm))
+    return find_beams(crossings, (tip.x_mm, tip.y_mm), tip_sigma_mm=tip_sigma_mm)
 
 
 def verify_by_crossing(

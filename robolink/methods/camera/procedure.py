@@ -46,7 +46,7 @@ def measure_camera(
     """
 
     def solve(sightings: Sequence[Sighting]) -> CameraRound:
-        return solve_camera_round(sightings, stored=stored, sigma_mm=sigma_mm)
+        return solve_camera_round(sightings, stored=stored, sigma_mm=sigma_mm, camera=station.model)
 
     return (yield from look_round(station, plan, solve, here=here, stored=stored, retake=retake))
 

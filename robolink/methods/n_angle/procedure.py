@@ -47,7 +47,7 @@ def measure_n_angle(
 
 @dataclass(slots=True)
 class _NAngleSampler:
-    """Touches at angles of U; implements :class:`SequentialSampler`. Each ends lifted off the pin.
+    """Touches at angles of U; implements ``SequentialSampler``. Each ends lifted off the pin.
 
     Attributes:
         plan, stored, sigma_mm: As for :func:`measure_n_angle`.

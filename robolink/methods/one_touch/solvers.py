@@ -67,6 +67,8 @@ class Difference:
             chain=self.last.chain,
             sigma_mm=self.sigma_mm,
             limits=self.limits,
+            # The old tip is where its own touch left it; nobody touches it again.
+            shared_touch=True,
         )
         result = replace(found, method="one-touch")
         if result.full_calibration_due or not self._one_more(result):
@@ -75,7 +77,7 @@ class Difference:
 
     def _one_more(self, result: "NeedleChangeResult") -> bool:
         """Tell whether the next difference would already be one too many."""
-        later = result.chain.after(math.sqrt(2) * self.sigma_mm)
+        later = result.chain.after(math.sqrt(2) * self.sigma_mm, shared_touch=True)
         half95_mm = result.half_width95[0] * later.sigma_mm / result.chain.sigma_mm
         return half95_mm > self.limits.tolerance_mm
 

@@ -156,7 +156,7 @@ class _Swing:
 
 @dataclass(frozen=True, slots=True)
 class _PivotSampler:
-    """Tilted touches; implements :class:`SequentialSampler`. Each ends lifted off the pin."""
+    """Tilted touches; implements ``SequentialSampler``. Each ends lifted off the pin."""
 
     swing: _Swing
     stored: ToolOffset

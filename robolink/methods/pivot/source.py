@@ -129,7 +129,7 @@ class PivotTouches:
     sigma_mm: float | None = None
 
     def solve(self, flange: Sequence[Pose], stored: ToolOffset | None) -> CalibrationResult:
-        """Solve three poses and more; see :class:`PoseMethod`."""
+        """Solve three poses and more; see :class:`~robolink.procedures.PoseMethod`."""
         from robolink.calibration import solve_pivot  # numpy, which a look does without
 
         return solve_pivot(flange, stored=stored, sigma_mm=self.sigma_mm)

@@ -66,7 +66,10 @@ class SixPoints:
     sigma_mm: float | None = None
 
     def solve(self, flange: Sequence[Pose], stored: ToolOffset | None) -> CalibrationResult:
-        """Solve five poses and more, the last two away from the pin; see :class:`PoseMethod`."""
+        """Solve five poses and more, the last two away from the pin.
+
+        See :class:`~robolink.procedures.PoseMethod`.
+        """
         from robolink.calibration import solve_six_point  # numpy, which a look does without
 
         if len(flange) < LEAST_OF_SIX_POINTS:

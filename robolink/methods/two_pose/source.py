@@ -47,5 +47,5 @@ class TwoTouches:
     sigma_mm: float | None = None
 
     def solve(self, flange: Sequence[Pose], stored: ToolOffset | None) -> CalibrationResult:
-        """Solve exactly two poses; see :class:`PoseMethod`."""
+        """Solve exactly two poses; see :class:`~robolink.procedures.PoseMethod`."""
         return solve_two_pose(*two_of(flange), stored=stored, sigma_mm=self.sigma_mm)

@@ -94,7 +94,7 @@ def verify_by_touching(
 
 @dataclass(slots=True)
 class _ZTouchSampler:
-    """Touches of a surface, each at a speed; implements :class:`SequentialSampler`.
+    """Touches of a surface, each at a speed; implements ``SequentialSampler``.
 
     Attributes:
         station, plan: Where and how.

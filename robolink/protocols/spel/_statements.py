@@ -1,8 +1,8 @@
 """Statements, built from typed values; nothing a person typed passes through unseen.
 
-A :data:`Statement` is made by a function of this package and nowhere else. All but
-:func:`raw` write strict ASCII numbers into a fixed form, so that no value can turn into
-another statement.
+A :data:`Statement` is made by a function of this package, which writes strict ASCII numbers into a
+fixed form, so that no value can turn into another statement. The one door past them is
+:meth:`robolink.controllers.epson.EpsonController.execute_raw`.
 """
 
 from typing import Final, NewType, TypeVar

@@ -72,14 +72,37 @@ def crossed_beams(node: Node) -> Payload:
         sigma_mm=node.optional("sigma_mm", node.number),
         beams_may_have_moved=bool(node.optional("beams_may_have_moved", node.raw)),
     )
-    return result_payload(result) | {"lag_mm": list(result.lag_mm)}
+    covariance = result.covariance
+    return result_payload(result) | {
+        "lag_mm": list(result.lag_mm),
+        "u_mm": [row[index] ** 0.5 for index, row in enumerate(covariance)],
+        "u_without_beams_mm": list(result.u_without_beams_mm),
+        "half_width95": list(result.half_width95),
+    }
 
 
 def find_beams(node: Node) -> Payload:
     """Where two beams are, from a pin whose tip is known."""
     crossings = [_crossing(child) for child in node.children("crossings")]
-    beams = cal.find_beams(crossings, read_point(node.child("tip")))
-    return {"beams": [{"x": b.x_mm, "y": b.y_mm, "direction_deg": b.direction_deg} for b in beams]}
+    beams = cal.find_beams(
+        crossings,
+        read_point(node.child("tip")),
+        tip_sigma_mm=node.number_or("tip_sigma_mm", 0.0),
+        sigma_mm=node.optional("sigma_mm", node.number),
+    )
+    return {
+        "beams": [
+            {
+                "x": beam.x_mm,
+                "y": beam.y_mm,
+                "direction_deg": beam.direction_deg,
+                "sigma_mm": beam.sigma_mm,
+                "direction_sigma_deg": beam.direction_sigma_deg,
+                "correlation": beam.correlation,
+            }
+            for beam in beams
+        ]
+    }
 
 
 def z_touch(node: Node) -> Payload:
@@ -247,7 +270,14 @@ def _box(node: Node) -> WorkBox:
 
 
 def _beam(node: Node) -> "cal.Beam":
-    beam = cal.Beam(node.number("x"), node.number("y"), node.number("direction_deg"))
+    beam = cal.Beam(
+        node.number("x"),
+        node.number("y"),
+        node.number("direction_deg"),
+        sigma_mm=node.number_or("sigma_mm", 0.0),
+        direction_sigma_deg=node.number_or("direction_sigma_deg", 0.0),
+        correlation=node.number_or("correlation", 0.0),
+    )
     node.finish()
     return beam
 

@@ -10,11 +10,18 @@ from robolink.messages import tr
 from robolink_cli.commands.measure.solve.case import Node, read_poses, unusable
 from robolink_cli.commands.measure.solve.methods import FROM_POSES
 from robolink_cli.commands.measure.solve.more_methods import MORE_METHODS
+from robolink_cli.commands.measure.solve.station_methods import STATION_METHODS
 from robolink_cli.commands.measure.solve.study_methods import STUDY_METHODS
 from robolink_cli.commands.measure.solve.touch_methods import TOUCH_METHODS
 
 CASE_SCHEMA: Final = "robolink-calibration-vectors/1"
-METHODS: Final = {**FROM_POSES, **MORE_METHODS, **STUDY_METHODS, **TOUCH_METHODS}
+METHODS: Final = {
+    **FROM_POSES,
+    **MORE_METHODS,
+    **STATION_METHODS,
+    **STUDY_METHODS,
+    **TOUCH_METHODS,
+}
 
 _GAINS_OF: Final = ("two_pose", "two_pose_general", "n_angle", "n_angle_robust")
 _SEVERITY: Final = ("ok", "warn", "error")

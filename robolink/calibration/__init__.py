@@ -158,6 +158,11 @@ if TYPE_CHECKING:
     from robolink.calibration.touch.length import (
         length_not_observable as length_not_observable,
     )
+    from robolink.calibration.touch.plane_touch import PlaneTouchResult as PlaneTouchResult
+    from robolink.calibration.touch.plane_touch import TouchedPlane as TouchedPlane
+    from robolink.calibration.touch.plane_touch import solve_plane_touch as solve_plane_touch
+    from robolink.calibration.touch.sphere_touch import SphereTouchResult as SphereTouchResult
+    from robolink.calibration.touch.sphere_touch import solve_sphere_touch as solve_sphere_touch
     from robolink.calibration.touch.standoff import FARTHEST_MM as FARTHEST_MM
     from robolink.calibration.touch.standoff import HIGHEST_MM as HIGHEST_MM
     from robolink.calibration.touch.standoff import Standoff as Standoff
@@ -226,6 +231,8 @@ __getattr__ = lazy_exports(
         "quality.update_guard": "Correction NEEDLE_LIMIT_MM require_shrinking update_guard",
         "quality.verify_drift": "PLACING_TOLERANCE_MM verify_drift",
         "touch.length": ("LengthChange LengthDecision length_change length_not_observable"),
+        "touch.plane_touch": "TouchedPlane PlaneTouchResult solve_plane_touch",
+        "touch.sphere_touch": "SphereTouchResult solve_sphere_touch",
         "touch.standoff": "HIGHEST_MM FARTHEST_MM Standoff StandoffSeries",
         "touch.touch_evidence": "PERSON_SIGMA_Z_MM PROBE_SIGMA_Z_MM TouchEvidence WitnessedTouch "
         "height_limit_mm judge_touches least_jog_mm stand_upright",

@@ -6,6 +6,7 @@ import subprocess
 import sys
 from typing import Any
 
+import numpy as np
 import pytest
 from robolink_cli import main
 from robolink_cli.commands.measure.solve.solving import METHODS
@@ -13,6 +14,7 @@ from robolink_cli.commands.measure.solve.touch_methods import TOUCH_METHODS
 
 from robolink.calibration import Beam
 from robolink.model import rotate_xy
+from tests.calibration.test_surface_touches import on_plane, on_sphere
 
 UNITS = {"length": "mm", "angle": "deg"}
 PIN = (310.0, 95.0)
@@ -21,6 +23,12 @@ PIN = (310.0, 95.0)
 def on_pin(u, tip=(12.5, -3.25), **more):
     dx, dy = rotate_xy(tip[0], tip[1], u)
     return {"x": PIN[0] - dx, "y": PIN[1] - dy, "u": u, **more}
+
+
+def touching(surface):
+    """Return poses of a tip at (12, -5, 120) on a surface."""
+    poses = surface(np.random.default_rng(1))
+    return [dict(zip("xyzuvw", pose.coordinates(), strict=True)) for pose in poses]
 
 
 ROUND = [on_pin(u) for u in (0, 90, 180, 270)]
@@ -287,6 +295,11 @@ MORE: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
         {"sightings": [{"flange": p, "tip": {"x": PIN[0], "y": PIN[1]}} for p in ROUND]},
         {"offset": [12.5, -3.25], "centre_mm": [0, 0]},
     ),
+    "plane_touch": ({"poses": touching(on_plane)}, {"offset": [12, -5, 120]}),
+    "sphere_touch": (
+        {"poses": touching(on_sphere), "radius_mm": 12.7},
+        {"offset": [12, -5, 120], "reference_point": [400, 50, -80]},
+    ),
     "gauge_rr": (
         {
             "values": [[[1.0, 1.2], [1.0, 1.2]], [[4.0, 4.2], [4.0, 4.2]]],
@@ -425,7 +438,7 @@ def test_no_method_is_left_untried():
         "orientation_convert",
     }
     here = {"find_beams", "joint", "board_fit"}
-    touching = {*TOUCH_METHODS}  # tests/calibration/test_touch_evidence.py
+    touching = {*TOUCH_METHODS, *STATION_METHODS}  # tests/calibration
     assert set(METHODS) == set(MORE) | shared | here | touching
 
 

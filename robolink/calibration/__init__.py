@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from robolink.calibration.camera.runout_table import solve_runout_table as solve_runout_table
     from robolink.calibration.camera.up_camera import Sighting as Sighting
     from robolink.calibration.camera.up_camera import solve_up_camera as solve_up_camera
+    from robolink.calibration.core.budget import DIVISORS as DIVISORS
     from robolink.calibration.core.budget import BudgetRow as BudgetRow
     from robolink.calibration.core.budget import UncertaintyBudget as UncertaintyBudget
     from robolink.calibration.core.dispersion import require_positive as require_positive
@@ -41,6 +42,8 @@ if TYPE_CHECKING:
     from robolink.calibration.core.evidence import RunOrder as RunOrder
     from robolink.calibration.core.frames import flange_of as flange_of
     from robolink.calibration.core.frames import flange_pose as flange_pose
+    from robolink.calibration.core.frames import flange_poses as flange_poses
+    from robolink.calibration.core.frames import in_base as in_base
     from robolink.calibration.core.frames import seen_from as seen_from
     from robolink.calibration.core.frames import tilted_flange_pose as tilted_flange_pose
     from robolink.calibration.core.frames import tilted_from as tilted_from
@@ -84,6 +87,10 @@ if TYPE_CHECKING:
     from robolink.calibration.crossed_beams import crossing_sigma_gain as crossing_sigma_gain
     from robolink.calibration.crossed_beams import solve_crossed_beams as solve_crossed_beams
     from robolink.calibration.crossed_beams import where_they_cross as where_they_cross
+    from robolink.calibration.evidence.units import RobotReach as RobotReach
+    from robolink.calibration.evidence.units import require_near as require_near
+    from robolink.calibration.evidence.units import require_stored_scale as require_stored_scale
+    from robolink.calibration.evidence.units import require_within_reach as require_within_reach
     from robolink.calibration.flange_plane import FlangePlane as FlangePlane
     from robolink.calibration.flange_plane import TipHeight as TipHeight
     from robolink.calibration.flange_plane import carrying as carrying
@@ -148,6 +155,9 @@ if TYPE_CHECKING:
     from robolink.calibration.quality.update_guard import Correction as Correction
     from robolink.calibration.quality.update_guard import require_shrinking as require_shrinking
     from robolink.calibration.quality.update_guard import update_guard as update_guard
+    from robolink.calibration.quality.update_guard import (
+        writes_refused_unattended as writes_refused_unattended,
+    )
     from robolink.calibration.quality.verify_drift import (
         PLACING_TOLERANCE_MM as PLACING_TOLERANCE_MM,
     )
@@ -195,10 +205,11 @@ __getattr__ = lazy_exports(
         "camera.runout": "RunoutReport runout_report",
         "camera.runout_table": "RunoutRow RunoutTable RunoutTableResult solve_runout_table",
         "camera.up_camera": "Sighting solve_up_camera",
-        "core.budget": "BudgetRow UncertaintyBudget",
+        "core.budget": "BudgetRow DIVISORS UncertaintyBudget",
         "core.dispersion": "require_positive",
         "core.evidence": "FitEvidence RunOrder",
-        "core.frames": "flange_of flange_pose seen_from tilted_flange_pose tilted_from toward_zero",
+        "core.frames": "flange_of flange_pose flange_poses in_base seen_from tilted_flange_pose "
+        "tilted_from toward_zero",
         "core.planar_checks": "MIN_ROTATION_DEG angle_spread_deg planar_sigma_gain",
         "core.pose_suggestion": "PoseLimits PosePlan precise_enough select_poses sigma_gain "
         "suggest_poses",
@@ -228,7 +239,9 @@ __getattr__ = lazy_exports(
         "quality.station_part": "SharedStation StationPart shared_station with_station",
         "quality.tolerances": "PLANAR_TOLERANCE TOUCH_TOLERANCE Tolerance",
         "quality.tool_fits": "ToolFit better_fit tool_fits",
-        "quality.update_guard": "Correction NEEDLE_LIMIT_MM require_shrinking update_guard",
+        "evidence.units": "RobotReach require_near require_stored_scale require_within_reach",
+        "quality.update_guard": "Correction NEEDLE_LIMIT_MM require_shrinking update_guard "
+        "writes_refused_unattended",
         "quality.verify_drift": "PLACING_TOLERANCE_MM verify_drift",
         "touch.length": ("LengthChange LengthDecision length_change length_not_observable"),
         "touch.plane_touch": "TouchedPlane PlaneTouchResult solve_plane_touch",

@@ -155,7 +155,7 @@ def find_beams(
     dof = first.dof + second.dof
     scatter = Dispersion.of(total, dof, sigma_mm)
     spread = scatter.sigma_mm if scatter else 0.0
-    known = None if scatter is None or scatter.stated else dof
+    known = None if scatter is None or scatter.source != "residuals" else dof
     return first.with_spread(spread, known, tip_sigma_mm), second.with_spread(
         spread, known, tip_sigma_mm
     )
@@ -177,7 +177,8 @@ def check_crossings(crossings: Sequence[Crossing], *, minimum: int) -> tuple[str
                 remedy=tr("Cross each beam {minimum} times or more.", minimum=minimum),
             )
     poses = [pose for crossing in crossings for pose in (crossing.entry, crossing.exit)]
-    doubts = check_poses(poses, allow_mixed_hand=False)
+    # A proof lets a tip cross that the controller already knows.
+    doubts = check_poses(poses, allow_mixed_hand=False, of_one_tip=True)
     for crossing in crossings:
         angles = zip(crossing.exit.coordinates()[3:], crossing.entry.coordinates()[3:], strict=True)
         if any(abs(angle_difference_deg(after, before)) > 0.01 for after, before in angles):

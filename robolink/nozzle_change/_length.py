@@ -19,6 +19,7 @@ from robolink.nozzle_change._pin_record import tells_height, touch_details, touc
 from robolink.nozzle_change._plan import ToolPlan
 from robolink.nozzle_change._proposal import Proposal
 from robolink.nozzle_change._records import decision_entry
+from robolink.nozzle_change._seating import touch_sigma_z_mm
 from robolink.procedures import MeasurementContext
 from robolink.stations import Station, find_stations
 from robolink.ways import Way, way
@@ -148,6 +149,7 @@ def _told(controller: Controller, plan: ToolPlan, proposal: Proposal) -> _Told:
         stored_z_mm=proposal.offset.z_mm,
         v_deg=pose.v_deg,
         w_deg=pose.w_deg,
+        sigma_z_mm=touch_sigma_z_mm(controller, plan.pin),
         u_place_mm=known.sigma_mm,
     )
     return _Told(change, known)
@@ -222,7 +224,8 @@ def _decided(
     # A Z that the heights confirm, or that follows them, is as good as the one it goes back to.
     good = replace(proposal, kept_record={**proposal.kept_record, "z_from": known.z_from})
     if not told.changed:
-        return replace(good, length=told)
+        # The height of then stays what is compared with: small changes would else add up unseen.
+        return replace(good, length=told, pin_z_mm=known.place_mm[2], pin_touches=known.touches)
     decision = plan.length
     if decision == "ask":
         if not attended:

@@ -1,7 +1,7 @@
 """Where a calibration puts the pin, and what the journal keeps of it."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from statistics import fmean
 
 from robolink.calibration import (
@@ -69,7 +69,7 @@ def _touch_sigma_mm(result: CalibrationResult) -> float | None:
     offset_mm = offset_sigma_mm(result)
     if offset_mm is None or result.sigma_mm is None:
         return None
-    if result.sigma_stated:
+    if result.sigma_stated and result.interval_from != "residuals":
         return result.sigma_mm
     largest = max(
         result.covariance[index][index]
@@ -144,15 +144,28 @@ def touch_details(station: str, proposal: Proposal) -> dict[str, object]:
     touch = min(reversed(result.inputs), key=lambda pose: abs(pose.v_deg) + abs(pose.w_deg))
     # Where a difference was written, the value puts the pin elsewhere than the tip does.
     tip, value = _turned(touch, proposal.tip), _turned(touch, proposal.offset)
+    heights = touch_heights_mm(proposal)
+    height_mm = z_mm + value[2] - tip[2] if proposal.pin_z_mm is None else proposal.pin_z_mm
     return {
         "station": station,
         "x_mm": x_mm + value[0] - tip[0],
         "y_mm": y_mm + value[1] - tip[1],
-        "z_mm": z_mm + value[2] - tip[2],
+        "z_mm": height_mm,
         "u_deg": touch.u_deg,
         "sigma_mm": chain.sigma_mm,
         "changes": chain.changes,
         "full_sigma_mm": chain.full_sigma_mm,
         "touch_sigma_mm": _touch_sigma_mm(result),
-        "touches": len(result.inputs) - len(result.rejected),
+        # Tilted touches have Z from the fit, and their heights say nothing about it.
+        **({} if "z_mm" in result.measured else _scatter(heights)),
+        "touches": proposal.pin_touches or len(result.inputs) - len(result.rejected),
+    }
+
+
+def _scatter(heights_mm: Sequence[float]) -> dict[str, object]:
+    """Return how much the heights of one run differ, for those who pool it with others."""
+    mean = fmean(heights_mm)
+    return {
+        "heights_mm2": sum((height - mean) ** 2 for height in heights_mm),
+        "heights_dof": len(heights_mm) - 1,
     }

@@ -46,6 +46,8 @@ class Proposal:
         record: More for the record of the measurement, plain JSON.
         kept_record: More for the record of the value, once it is kept.
         length: What the heights of the touches tell about the length; ``None`` for nothing.
+        pin_z_mm: Height of the pin that Z goes back to, base; ``None`` for that of these touches.
+        pin_touches: How many touches that height rests on.
     """
 
     tool: int
@@ -57,6 +59,8 @@ class Proposal:
     record: Mapping[str, object] = field(default_factory=dict)
     kept_record: Mapping[str, object] = field(default_factory=dict)
     length: LengthChange | None = None
+    pin_z_mm: float | None = None
+    pin_touches: int = 0
 
     @property
     def offset(self) -> ToolOffset:

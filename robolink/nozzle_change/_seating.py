@@ -1,10 +1,11 @@
-"""How differently a new nozzle sits: from the changes that a cell has on record."""
+"""How nozzles sit and how well touches repeat in height: from what a cell has on record."""
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final
 
+from robolink.calibration import PERSON_SIGMA_Z_MM, PROBE_SIGMA_Z_MM
 from robolink.model import Controller, EntryKind, Recorded, ToolOffset, read_offset
 
 USUAL_SEAT_MM: Final = (0.1, 0.1, 0.05)
@@ -12,6 +13,9 @@ USUAL_SEAT_MM: Final = (0.1, 0.1, 0.05)
 
 LEAST_CHANGES: Final = 8
 """So many changes tell the scatter better than the usual value does."""
+
+LEAST_TOUCHES: Final = 10
+"""So many touches, less one a run, tell how well a cell touches in height."""
 
 MOST_CHANGES: Final = 50
 """Older changes say less about the nozzles of today."""
@@ -50,6 +54,25 @@ def seating_of(controller: Controller) -> Seating:
     least = USUAL_SEAT_MM[2] / 10
     sigma = (max(plane, least), max(plane, least), max(above, least))
     return Seating(sigma, pooled)
+
+
+def touch_sigma_z_mm(controller: Controller, pin: str) -> float:
+    """Return the standard deviation of the height of one touch of a pin.
+
+    It is pooled within the runs on record once ten touches tell it; until then it is that of a
+    person who touches usually well (docs/reference/evidence.md 1).
+    """
+    squares = freedom = 0.0
+    for entry in controller.outcomes.recorded(kinds=(EntryKind.DONE, EntryKind.DECISION)):
+        touch = entry.details.get("touch")
+        if not isinstance(touch, Mapping) or touch.get("station") != pin:
+            continue
+        scatter, dof = touch.get("heights_mm2"), touch.get("heights_dof")
+        if isinstance(scatter, (int, float)) and isinstance(dof, int) and dof > 0:
+            squares, freedom = squares + scatter, freedom + dof
+    if freedom < LEAST_TOUCHES:
+        return PERSON_SIGMA_Z_MM
+    return max(math.sqrt(squares / freedom), PROBE_SIGMA_Z_MM)
 
 
 def _changes(entries: Iterable[Recorded]) -> Iterator[tuple[float, float, float | None]]:

@@ -274,12 +274,13 @@ def test_who_declines_keeps_the_crossings_with_their_doubt():
 
 
 @pytest.mark.parametrize(
-    ("sigma_mm", "turn_deg", "least"), [(None, 0.0, 8), (0.003, 0.0, 5), (None, 180.0, 43)]
+    ("sigma_mm", "turn_deg", "until_mm", "least"),
+    [(None, 0.0, 0.03, 8), (0.003, 0.0, 0.3, 5), (None, 180.0, 0.03, 43)],
 )
-def test_crossings_end_when_the_interval_is_narrow_enough(sigma_mm, turn_deg, least):
+def test_crossings_end_when_the_interval_is_narrow_enough(sigma_mm, turn_deg, until_mm, least):
     """With two angles not before the tool has turned; the shaft is measured in any case."""
     cell = IdealCell(TIP, noise_mm=0.003)
-    plan = BeamsParameters(repeats=10, turn_deg=turn_deg, until_mm=0.03)
+    plan = BeamsParameters(repeats=10, turn_deg=turn_deg, until_mm=until_mm)
     found = cell.run(
         measure_beams(
             STATION,
@@ -370,10 +371,10 @@ def test_each_touch_tells_how_it_fits_and_the_worst_alone_is_made_again():
     assert found.offset.z_mm == pytest.approx(TIP.z_mm)
 
 
-@pytest.mark.parametrize(("sigma_mm", "least"), [(None, 6), (0.003, 3)])
-def test_touches_end_when_the_interval_is_narrow_enough(sigma_mm, least):
+@pytest.mark.parametrize(("sigma_mm", "until_mm", "least"), [(None, 0.1, 6), (0.003, 2.0, 3)])
+def test_touches_end_when_the_interval_is_narrow_enough(sigma_mm, until_mm, least):
     cell = IdealCell(TIP, noise_mm=0.003)
-    plan = ZTouchParameters(speeds_mm_s=(2.0, 1.0) * 6, until_mm=0.1)
+    plan = ZTouchParameters(speeds_mm_s=(2.0, 1.0) * 6, until_mm=until_mm)
     procedure = measure_z_touch(PLATE, plan, here=HERE, stored=STORED, sigma_mm=sigma_mm)
     found = cell.run(procedure)
     assert found.dof == least - 2

@@ -36,7 +36,7 @@ from robolink.calibration import (
 )
 from robolink.calibration.z_touch import Touch
 from robolink.model import Pose, ToolOffset
-from tests.calibration._simulated import LEAST, MOST, TRIALS, refused
+from tests.calibration._simulated import LEAST, TRIALS, refused
 
 TIP = ToolOffset(12.0, -5.0, 120.0)
 STORED = ToolOffset(12.3, -5.2, 120.0, 7.0)
@@ -297,6 +297,7 @@ def test_what_the_height_is_unsure_by_is_in_the_interval():
         height = TipHeight(120.0 + rng.normal(0, 0.1), 0.1)
         result = solve_camera_round(looks, height=height, sigma_mm=sigma)
         hits += np.abs(np.subtract(xy(result), (12, -5))) <= result.half_width95
-    assert all(LEAST <= share <= MOST for share in hits / TRIALS), hits / TRIALS
+    # A stated sigma holds in up to 98 %, because residuals may widen it and never narrow it.
+    assert all(LEAST <= share <= 0.99 for share in hits / TRIALS), hits / TRIALS
     unaware = solve_camera_round(exact, stored=STORED, sigma_mm=sigma)
     assert max(result.half_width95) > 3 * max(unaware.half_width95)

@@ -105,6 +105,12 @@ def test_intervals_hold_the_truth_although_the_beams_are_off():
     assert coverage(counted=True, runs=300) == pytest.approx(0.95, abs=0.05)
 
 
+@pytest.mark.soak
+def test_intervals_hold_the_truth_in_two_thousand_runs():
+    assert coverage(counted=False, runs=2000, seed=6) == pytest.approx(0.19, abs=0.04)
+    assert coverage(counted=True, runs=2000, seed=6) == pytest.approx(0.95, abs=0.02)
+
+
 def coverage(*, counted, runs, seed=2):
     """Return how often half_width95 of X holds the truth; beams found with 0.02, crossings 0.01."""
     rng = np.random.default_rng(seed)

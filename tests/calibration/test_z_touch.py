@@ -55,7 +55,8 @@ def test_the_interval_holds_the_truth(speeds, stated):
         coverage(
             lambda rng: solve_z_touch(touches(speeds, rng, 0.01), SURFACE, sigma_mm=stated),
             (LENGTH,),
-        )
+        ),
+        stated=stated is not None,
     )
 
 

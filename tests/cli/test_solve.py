@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 from robolink_cli import main
 from robolink_cli.commands.measure.solve.solving import METHODS
+from robolink_cli.commands.measure.solve.station_methods import STATION_METHODS
 from robolink_cli.commands.measure.solve.touch_methods import TOUCH_METHODS
 
 from robolink.calibration import Beam
 from robolink.model import rotate_xy
+from tests.calibration._simulated import pivoting
 from tests.calibration.test_surface_touches import on_plane, on_sphere
 
 UNITS = {"length": "mm", "angle": "deg"}
@@ -70,10 +72,10 @@ def case(method="two_pose", **given):
 def solved(tmp_path, capsys):
     """Run ``solve --json`` on a document; return exit code and JSON."""
 
-    def run(document, *, text=None):
+    def run(document, *more, text=None):
         path = tmp_path / "case.json"
         path.write_text(text if text is not None else json.dumps(document))
-        code = main.run(["solve", str(path), "--json"])
+        code = main.run(["solve", str(path), *more, "--json"])
         return code, json.loads(capsys.readouterr().out)
 
     return run
@@ -211,7 +213,6 @@ SLIPS = {
     "input": {"method": "two_pose", "input": []},
     "extra": {**case(), "extra": 1},
     "schema": {**case(), "schema": "something/9"},
-    "vectors[0].method": {"vectors": [{"method": "x", "input": {}}]},
     "input.euler": case("pivot", poses=PIVOT, euler="XYZ"),
     "input.fiducials": case("board_two_fiducials", fiducials=tips((310, 50))),
 }
@@ -235,6 +236,27 @@ def test_a_missing_file_is_a_usage_error(capsys, tmp_path):
     assert "none.json" in capsys.readouterr().err
 
 
+def test_a_case_that_is_no_case_is_refused_alone(solved):
+    good = case("n_angle", poses=ROUND)
+    bad = [{"id": "odd", "method": "x", "input": {}}, 7, {**good, "input": {"poses": [7]}}]
+    code, answer = solved({"vectors": [good, *bad, good]})
+    assert code == 7
+    assert [result["status"] for result in answer["results"]] == ["ok", *["error"] * 3, "ok"]
+    assert {tuple(result["codes"]) for result in answer["results"][1:4]} == {("invalid_input",)}
+    assert answer["results"][1]["id"] == "odd"
+    assert "vectors[3].input.poses[0]" not in answer["results"][1]["what"]
+    assert "input.poses[0]" in answer["results"][3]["what"]
+
+
+def test_residuals_beyond_tolerance_end_with_7_unless_they_are_accepted(solved):
+    poses = [{**ROUND[0], "x": ROUND[0]["x"] + 0.6}, *ROUND[1:]]
+    code, answer = solved(case("n_angle", poses=poses))
+    assert (code, answer["status"]) == (7, "warn")
+    assert {"large_rms", "large_residual"} & set(answer["codes"])
+    assert solved(case("n_angle", poses=poses), "--accept-residuals")[0] == 0
+    assert solved({"vectors": [case("n_angle", poses=poses)]})[0] == 7
+
+
 def crossings(tip):
     beams, found = (Beam(300, 80, 0), Beam(300, 80, 90)), []
     for number, beam in enumerate(beams):
@@ -249,6 +271,10 @@ def crossings(tip):
 
 
 BEAMS = [{"x": 300, "y": 80, "direction_deg": angle} for angle in (0, 90)]
+TILTS = (
+    *((0, 0, 0), (40, 12, -8), (-75, -15, 10), (120, 9, 20)),
+    *((-160, -18, -14), (80, 20, 5), (20, -10, 16)),
+)
 START = PIVOT[3]
 TIP = {"x": 12.5, "y": -3.25}
 MORE: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
@@ -331,15 +357,8 @@ MORE: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "pivot_robust": (
         {
             "poses": [
-                *PIVOT,
-                {
-                    "x": 307.8523881013354,
-                    "y": -109.61761245633667,
-                    "z": -39.55679363299589,
-                    "u": -160,
-                    "v": -18,
-                    "w": -14,
-                },
+                dict(zip("xyzuvw", pivoting((4.2, -7.9, 131.6), angles).coordinates(), strict=True))
+                for angles in TILTS
             ]
         },
         {"offset": [4.2, -7.9, 131.6], "plain_ls_offset": [4.2, -7.9, 131.6]},
@@ -437,9 +456,10 @@ def test_no_method_is_left_untried():
         "board_two_fiducials",
         "orientation_convert",
     }
-    here = {"find_beams", "joint", "board_fit"}
-    touching = {*TOUCH_METHODS, *STATION_METHODS}  # tests/calibration
-    assert set(METHODS) == set(MORE) | shared | here | touching
+    here = {"find_beams", "joint", "board_fit", "uncertainty_budget"}
+    touching = {*TOUCH_METHODS}  # tests/calibration/test_touch_evidence.py
+    lasting = {*STATION_METHODS}  # tests/calibration/test_station_part.py
+    assert set(METHODS) == set(MORE) | shared | here | touching | lasting
 
 
 def test_looking_at_a_controller_does_not_load_numpy():

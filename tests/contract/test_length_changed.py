@@ -7,18 +7,12 @@ from robolink_cli.prompts import operator as _operator
 
 from robolink.journal import EntryKind
 from robolink.model import ToolOffset
-from tests.contract._method_cell import KINDS, method_cell
+from tests.contract._method_cell import method_cell
 
 pytestmark = pytest.mark.simulator_only
 
 AT_PIN = ("--station", "PIN-07")
 FOUR = ("--count", "4", *AT_PIN)
-
-
-@pytest.fixture(params=KINDS)
-def cell(request, tmp_path, monkeypatch):
-    with method_cell(request.param, tmp_path, monkeypatch) as cell:
-        yield cell
 
 
 @pytest.fixture
@@ -31,8 +25,17 @@ def station_z(arm):
     return arm.recorded(EntryKind.STATION)[0].details["z_mm"]
 
 
-@pytest.mark.parametrize("method", [("two-pose", *AT_PIN), ("n-angle", *FOUR)])
-def test_half_a_millimetre_shorter_is_refused_where_nobody_decides(cell, method):
+@pytest.mark.parametrize(
+    ("kind", "method"), [("plc", ("two-pose", *AT_PIN)), ("epson", ("n-angle", *FOUR))]
+)
+def test_half_a_millimetre_shorter_is_refused_where_nobody_decides(
+    kind, method, tmp_path, monkeypatch
+):
+    with method_cell(kind, tmp_path, monkeypatch) as cell:
+        shorter_by_half_a_millimetre(cell, method)
+
+
+def shorter_by_half_a_millimetre(cell, method):
     first = cell.calibrate(*method)
     assert first.code == 0, first.err
     before = cell.stored
@@ -58,6 +61,16 @@ def test_half_a_millimetre_shorter_is_refused_where_nobody_decides(cell, method)
     assert again.code == 0, again.err
     assert not again.document["length"]["changed"]
     assert again.document["warnings"] == []
+
+
+def test_small_changes_do_not_add_up_unseen(arm):
+    """Each is below what touches tell; compared with the last run alone, none would ever show."""
+    codes = []
+    for _ in range(4):
+        codes.append(arm.calibrate("n-angle", *FOUR).code)
+        arm.lengthen(0.08)
+    assert codes[0] == 0
+    assert 7 in codes
 
 
 def test_z_that_is_kept_knowingly_stays_and_is_on_record(arm):

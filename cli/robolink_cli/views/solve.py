@@ -19,11 +19,19 @@ def result_payload(result: CalibrationResult) -> dict[str, object]:
         if name in result.measured:
             payload[name[0]] = getattr(result.offset, name)
     if result.reference_point_mm:
-        payload["reference_point"] = list(result.reference_point_mm)
+        in_local = any(pose.local for pose in result.inputs)
+        where = "reference_point_local" if in_local else "reference_point"
+        payload[where] = list(result.reference_point_mm)
+    payload |= result.evidence.as_json() if result.evidence is not None else {}
     return payload | {
+        "notes": list(result.notes),
         "measured": list(result.measured),
         "unobservable": list(result.unobservable),
         "interval95": {name: list(ends) for name, ends in result.interval95.items()},
+        "half_width95": list(result.half_width95) or None,
+        "interval_from": result.interval_from or None,
+        "region95_radius_mm": result.region95_radius_mm,
+        "budget": None if result.budget is None else result.budget.as_json(),
         "covariance": [list(row) for row in result.covariance],
         "sigma_mm": result.sigma_mm,
         "sigma_stated": result.sigma_stated,

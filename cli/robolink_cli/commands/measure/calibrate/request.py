@@ -138,6 +138,7 @@ def request_from(
         max_residual_mm=residual_mm,
         interval_mm=interval_mm,
         drift_tolerance_mm=tolerance_mm,
+        unattended=yes,
     )
     return CalibrationRequest(
         context.with_nozzle(nozzle, lot),

@@ -4,7 +4,6 @@ from collections.abc import Callable, Mapping
 from typing import Final
 
 from robolink import calibration as cal
-from robolink.calibration import CalibrationResult
 from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
 from robolink_cli.commands.measure.solve.case import (
@@ -13,57 +12,11 @@ from robolink_cli.commands.measure.solve.case import (
     read_offset,
     read_point,
     read_pose,
-    read_poses,
     unusable,
 )
 from robolink_cli.views.solve import result_payload, space_payload
 
 Payload = dict[str, object]
-
-
-def two_pose(node: Node) -> Payload:
-    """Two flange poses on one point."""
-    poses = read_poses(node)
-    least = _least_rotation(node)
-    sigma = _sigma(node)
-    if len(poses) > 2:
-        raise unusable(node.at("poses"), tr("two poses are wanted; n_angle takes more"))
-    if len(poses) < 2:
-        return _planar(poses, sigma_mm=sigma)
-    result = cal.solve_two_pose(
-        *poses, allow_mixed_hand=True, sigma_mm=sigma, min_rotation_deg=least
-    )
-    return result_payload(result)
-
-
-def n_angle(node: Node) -> Payload:
-    """Several flange poses of four axes on one point."""
-    node.ignore("nan_fields")
-    least = _least_rotation(node)
-    return _planar(read_poses(node), sigma_mm=_sigma(node), min_rotation_deg=least)
-
-
-def n_angle_robust(node: Node) -> Payload:
-    """The same, with a search for outliers."""
-    robust, sigma, poses = _robust(node), _sigma(node), read_poses(node)
-    found = _planar(poses, sigma_mm=sigma, robust=robust)
-    return found | {"plain_ls_offset": _planar(poses, sigma_mm=sigma)["offset"]}
-
-
-def pivot(node: Node) -> Payload:
-    """Flange poses of six axes on one point."""
-    _euler(node, "euler")
-    result = cal.solve_pivot(read_poses(node), sigma_mm=_sigma(node), allow_mixed_hand=True)
-    return result_payload(result)
-
-
-def pivot_robust(node: Node) -> Payload:
-    """The same, with a search for outliers."""
-    _euler(node, "euler")
-    robust, sigma, poses = _robust(node), _sigma(node), read_poses(node)
-    found = cal.solve_pivot(poses, sigma_mm=sigma, robust=robust, allow_mixed_hand=True)
-    plain = cal.solve_pivot(poses, sigma_mm=sigma, allow_mixed_hand=True)
-    return result_payload(found) | {"plain_ls_offset": list(plain.offset.components()[:3])}
 
 
 def up_camera(node: Node) -> Payload:
@@ -132,27 +85,8 @@ def orientation(node: Node) -> Payload:
     return {"rotation_matrix": matrix.ravel().tolist(), "zyz": list(cal.zyz_deg(matrix))}
 
 
-def _planar(poses: list[Pose], **options: object) -> Payload:
-    result: CalibrationResult = cal.solve_n_angle(
-        poses,
-        allow_mixed_hand=True,
-        **options,  # type: ignore[arg-type]
-    )
-    return result_payload(result)
-
-
-def _least_rotation(node: Node) -> float:
-    return node.number_or("min_delta_u_deg", cal.MIN_ROTATION_DEG)
-
-
 def _sigma(node: Node) -> float | None:
     return node.optional("sigma_mm", node.number)
-
-
-def _robust(node: Node) -> "cal.Robust":
-    threshold = node.optional("inlier_threshold", node.number)
-    seed = node.optional("seed", node.whole)
-    return cal.Robust(threshold, seed=1 if seed is None else seed)
 
 
 def _euler(node: Node, name: str) -> None:
@@ -202,13 +136,7 @@ def _camera(node: Node) -> "cal.CameraModel":
     return cal.CameraModel(((a, b), (c, d)), (origin[0], origin[1]))
 
 
-FROM_POSES: Final[Mapping[str, Callable[[Node], Payload]]] = {
-    "two_pose": two_pose,
-    "two_pose_general": two_pose,
-    "n_angle": n_angle,
-    "n_angle_robust": n_angle_robust,
-    "pivot": pivot,
-    "pivot_robust": pivot_robust,
+SEEING_METHODS: Final[Mapping[str, Callable[[Node], Payload]]] = {
     "up_camera_single": up_camera,
     "up_camera_affine": camera_affine,
     "board_two_fiducials": board,

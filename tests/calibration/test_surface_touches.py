@@ -133,7 +133,7 @@ def test_orientations_that_cannot_tell_are_refused():
     for code, poses in (
         ("rank_deficient", on_plane(rng, tilt_deg=0.0)),
         ("insufficient_rotation", on_plane(rng, tilt_deg=4.0)),
-        ("rank_deficient", on_plane(rng, spread_mm=0.0)[:1] * 8),
+        ("too_few_poses", on_plane(rng)[:1] * 8),
     ):
         with refused(code):
             solve_plane_touch(poses)
@@ -162,6 +162,13 @@ def test_a_diameter_for_a_radius_and_a_bump_on_the_plane_are_told():
     poses = on_plane(rng, count=16)
     bumped = [*poses[:-1], pose_of(np.add(poses[-1].coordinates(), (0, 0, 4, 0, 0, 0)))]
     assert "large_residual" in solve_plane_touch(bumped).warnings
+
+
+def test_a_copy_counts_once():
+    poses = on_plane(np.random.default_rng(9), count=14, sigma_mm=0.02)
+    once, twice = solve_plane_touch(poses), solve_plane_touch([*poses, *poses])
+    assert twice.warnings == (*once.warnings, "duplicate_poses")
+    assert (twice.dof, twice.half_width95) == (once.dof, once.half_width95)
 
 
 def test_what_is_kept_is_kept():

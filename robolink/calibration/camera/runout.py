@@ -27,9 +27,6 @@ from robolink.calibration.core.statistics import f_quantile
 from robolink.calibration.flange_plane import FlangePlane, standing_upright
 from robolink.calibration.pin.planar import Complexes
 
-HARMONICS_FROM = 8
-"""Sightings from which on ellipse and second harmonic are looked for."""
-
 WOBBLE_QUANTILE = 0.995
 """Of F, for each of two amplitudes: a round circle is said to wobble in 1 % of the cases."""
 
@@ -123,7 +120,8 @@ def runout_report(sightings: Sequence[Sighting], *, sigma_mm: float | None = Non
         warnings = (*warnings, "wobble_not_identifiable")
     plain = _harmonics(seen, [np.ones_like(z), z])
     full = None
-    if told_apart and len(seen) >= HARMONICS_FROM:
+    # With four sightings everything fits, and nothing is left to tell a wobble from noise.
+    if told_apart and len(seen) > _HARMONICS:
         full = _harmonics(seen, [np.ones_like(z), z, z.conj(), z**2])
     upside_down = FlangePlane.of(sightings[0].flange).r33 < 0
     return _report(

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields
 
 from robolink.calibration.camera.camera_round import CAMERA_MOVED_MM, CameraRound
-from robolink.calibration.camera.runout import HARMONICS_FROM, RunoutReport, runout_report
+from robolink.calibration.camera.runout import RunoutReport, runout_report
 from robolink.calibration.camera.up_camera import Sighting
 from robolink.calibration.core.dispersion import Dispersion
 from robolink.calibration.core.planar_checks import require_poses
@@ -25,6 +25,8 @@ from robolink.model import ToolOffset
 
 LARGEST_GAP_DEG = 60.0
 """Between neighbouring angles, round the circle; beyond it half of a wobble stays unseen."""
+
+LEAST_LOOKS = 8
 
 _SAME_ANGLE_DEG = 0.01
 
@@ -135,7 +137,7 @@ def solve_runout_table(
             :func:`runout_report`.
         ConfigError: ``sigma_mm`` is not positive.
     """
-    require_poses(len(sightings), HARMONICS_FROM)
+    require_poses(len(sightings), LEAST_LOOKS)
     report = runout_report(sightings, sigma_mm=sigma_mm)
     table = RunoutTable.of(_row(sighting, report) for sighting in sightings)
     if table.largest_gap_deg > LARGEST_GAP_DEG + _SAME_ANGLE_DEG:

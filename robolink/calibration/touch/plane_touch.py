@@ -16,12 +16,11 @@ from robolink.calibration.core.least_squares import LinearFit, linear_fit
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.core.robust import Floats
 from robolink.calibration.core.rotations import pose_arrays
-from robolink.calibration.flange_checks import require_flange_in_base
 from robolink.calibration.quality.fit_quality import judged
 from robolink.calibration.quality.tolerances import Tolerance
 from robolink.calibration.touch.surface_fit import (
     SURFACE_TOLERANCE,
-    check_touches,
+    distinct_touches,
     never_settled,
     refined,
     require_told_apart,
@@ -95,12 +94,11 @@ def solve_plane_touch(
 
     Raises:
         CalibrationError: ``too_few_poses``, ``rank_deficient``, ``insufficient_rotation``,
-            ``ambiguous_tip``, ``diverging``, ``implausible_offset``, ``tool_pose``, and those of
-            :func:`check_poses`; with a plane also ``local_pose``.
+            ``ambiguous_tip``, ``diverging``, ``implausible_offset``, ``tool_pose``,
+            ``local_pose``, and those of :func:`check_poses`.
         ConfigError: ``sigma_mm`` is not positive.
     """
-    warnings = check_touches(poses, LEAST_ON_A_KNOWN_PLANE if plane else LEAST_TOUCHES)
-    require_flange_in_base(poses)
+    poses, warnings = distinct_touches(poses, LEAST_ON_A_KNOWN_PLANE if plane else LEAST_TOUCHES)
     p, r = pose_arrays(poses)
     if plane is None:
         state, fit = _found(p, r)

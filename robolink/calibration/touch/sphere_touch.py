@@ -15,12 +15,11 @@ from robolink.calibration.core.least_squares import LinearFit, linear_fit
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.core.robust import Floats
 from robolink.calibration.core.rotations import pose_arrays
-from robolink.calibration.flange_checks import require_flange_in_base
 from robolink.calibration.quality.fit_quality import judged
 from robolink.calibration.quality.tolerances import Tolerance
 from robolink.calibration.touch.surface_fit import (
     SURFACE_TOLERANCE,
-    check_touches,
+    distinct_touches,
     never_settled,
     refined,
     require_told_apart,
@@ -82,8 +81,7 @@ def solve_sphere_touch(
     if radius_mm is not None:
         require_positive(radius_mm, "radius_mm")
     unknowns = _UNKNOWNS if radius_mm is None else _UNKNOWNS - 1
-    warnings = check_touches(poses, unknowns + 1)
-    require_flange_in_base(poses)
+    poses, warnings = distinct_touches(poses, unknowns + 1)
     p, r = pose_arrays(poses)
     state, fit = _found(p, r, stored, radius_mm)
     remedy = tr("Touch it from several sides, turned and tilted by 20 degrees or more.")

@@ -15,6 +15,7 @@ from robolink.calibration.core.least_squares import LinearFit, linear_fit
 from robolink.calibration.core.pose_checks import check_poses, keep_unmeasured
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.core.robust import Floats
+from robolink.calibration.flange_checks import require_flange_in_base
 from robolink.calibration.quality.tolerances import Tolerance
 from robolink.errors import CalibrationError
 from robolink.messages import tr
@@ -79,19 +80,25 @@ def require_told_apart(fit: LinearFit, unknowns: int, remedy: str) -> None:
     raise CalibrationError(code, what, remedy=remedy)
 
 
-def check_touches(poses: Sequence[Pose], least: int) -> tuple[str, ...]:
-    """Refuse touches that are too few or do not belong together; return lesser doubts.
+def distinct_touches(poses: Sequence[Pose], least: int) -> tuple[list[Pose], tuple[str, ...]]:
+    """Return the touches that are no copies of others, and lesser doubts.
 
     Raises:
-        CalibrationError: ``too_few_poses``, and those of :func:`check_poses`.
+        CalibrationError: ``too_few_poses``, ``tool_pose``, ``local_pose``, and those of
+            :func:`check_poses`.
     """
+    doubts = check_poses(poses, allow_mixed_hand=False)
+    require_flange_in_base(poses)
+    taken = list(dict.fromkeys(poses))
+    if len(taken) < len(poses):
+        doubts, poses = (*doubts, "duplicate_poses"), taken
     if len(poses) < least:
         raise CalibrationError(
             "too_few_poses",
             tr("{count} touches are too few; {least} are needed.", count=len(poses), least=least),
             remedy=tr("Touch it in more orientations: turned, and tilted to several sides."),
         )
-    return check_poses(poses, allow_mixed_hand=False)
+    return taken, doubts
 
 
 def never_settled() -> CalibrationError:

@@ -301,3 +301,9 @@ def test_what_the_height_is_unsure_by_is_in_the_interval():
     assert all(LEAST <= share <= 0.995 for share in hits / TRIALS), hits / TRIALS
     unaware = solve_camera_round(exact, stored=STORED, sigma_mm=sigma)
     assert max(result.half_width95) > 3 * max(unaware.half_width95)
+    assert ("height_not_assessed" in result.notes, "height_not_assessed" in unaware.notes) == (
+        False,
+        True,
+    )
+    upside_down = solve_up_camera(seen(flange(30.0, (0.0, 180.0))), stored=STORED)
+    assert upside_down.notes == ()

@@ -182,6 +182,8 @@ _SHOWN = (
     ("max_drift_mm", tr("largest drift mm")),
     ("passed", tr("passed")),
     ("correction_mm", tr("correction mm")),
+    ("plane", tr("plane")),
+    ("sphere", tr("sphere")),
     ("repeatability_mm", tr("repeatability mm")),
     ("reproducibility_mm", tr("reproducibility mm")),
     ("grr_mm", tr("both together mm")),

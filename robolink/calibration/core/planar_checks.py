@@ -30,7 +30,7 @@ def check_planar(
 
     Raises:
         CalibrationError: ``too_few_poses``, ``tilted_pose``, ``degenerate_angles``,
-            ``insufficient_rotation``, and those of :func:`check_poses`.
+            ``insufficient_rotation``, and those of ``pose_checks.check_poses``.
     """
     require_poses(len(poses), minimum)
     doubts = check_poses(poses, allow_mixed_hand=allow_mixed_hand)

@@ -64,7 +64,7 @@ def pose_table(poses: Sequence[Pose]) -> Floats:
 def checked_table(
     poses: Sequence[Pose], *, allow_mixed_hand: bool
 ) -> tuple[Floats, tuple[str, ...]]:
-    """Return the table of many poses and the names of doubts, quicker than ``pose_checks.check_poses``.
+    """Return the table of many poses and the names of doubts; quicker than one by one.
 
     Raises:
         CalibrationError: As ``pose_checks.check_poses``.

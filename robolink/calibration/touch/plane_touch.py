@@ -95,7 +95,7 @@ def solve_plane_touch(
     Raises:
         CalibrationError: ``too_few_poses``, ``rank_deficient``, ``insufficient_rotation``,
             ``ambiguous_tip``, ``diverging``, ``implausible_offset``, ``tool_pose``,
-            ``local_pose``, and those of :func:`check_poses`.
+            ``local_pose``, and those of ``pose_checks.check_poses``.
         ConfigError: ``sigma_mm`` is not positive.
     """
     poses, warnings = distinct_touches(poses, LEAST_ON_A_KNOWN_PLANE if plane else LEAST_TOUCHES)

@@ -75,7 +75,7 @@ def solve_sphere_touch(
     Raises:
         CalibrationError: ``too_few_poses``, ``rank_deficient``, ``insufficient_rotation``,
             ``radius_contradicted``, ``diverging``, ``implausible_offset``, ``tool_pose``,
-            ``local_pose``, and those of :func:`check_poses`.
+            ``local_pose``, and those of ``pose_checks.check_poses``.
         ConfigError: ``sigma_mm`` or ``radius_mm`` is not positive.
     """
     if radius_mm is not None:

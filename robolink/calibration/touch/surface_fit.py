@@ -85,7 +85,7 @@ def distinct_touches(poses: Sequence[Pose], least: int) -> tuple[list[Pose], tup
 
     Raises:
         CalibrationError: ``too_few_poses``, ``tool_pose``, ``local_pose``, and those of
-            :func:`check_poses`.
+            ``pose_checks.check_poses``.
     """
     doubts = check_poses(poses, allow_mixed_hand=False)
     require_flange_in_base(poses)

@@ -152,7 +152,7 @@ def require_clearance(plan: ChangePlan) -> None:
             continue
         raise ConfigError(
             tr(
-                "The robot would stop {clearance:g} mm above the pin, and the new tip of tool "
+                "The robot would stop {clearance:g} mm from contact, and the new tip of tool "
                 "{tool} may be {limit:g} mm longer.",
                 clearance=clearance_mm,
                 tool=one.tool,

@@ -178,6 +178,8 @@ if TYPE_CHECKING:
     from robolink.calibration.touch.plane_touch import solve_plane_touch as solve_plane_touch
     from robolink.calibration.touch.sphere_touch import SphereTouchResult as SphereTouchResult
     from robolink.calibration.touch.sphere_touch import solve_sphere_touch as solve_sphere_touch
+    from robolink.calibration.touch.sphere_touch import sphere_columns as sphere_columns
+    from robolink.calibration.touch.sphere_touch import sphere_through as sphere_through
     from robolink.calibration.touch.standoff import Standoff as Standoff
     from robolink.calibration.touch.standoff import StandoffSeries as StandoffSeries
     from robolink.calibration.touch.surface_evidence import SurfaceEvidence as SurfaceEvidence
@@ -258,7 +260,7 @@ __getattr__ = lazy_exports(
         "quality.verify_drift": "PLACING_TOLERANCE_MM verify_drift",
         "touch.length": ("LengthChange LengthDecision length_change length_not_observable"),
         "touch.plane_touch": "TouchedPlane PlaneTouchResult plane_columns solve_plane_touch",
-        "touch.sphere_touch": "SphereTouchResult solve_sphere_touch",
+        "touch.sphere_touch": "SphereTouchResult solve_sphere_touch sphere_columns sphere_through",
         "touch.standoff": "Standoff StandoffSeries",
         "touch.surface_evidence": "SurfaceEvidence judge_surface_touches",
         "touch.surface_fit": "tip_is_told",

@@ -113,6 +113,15 @@ if TYPE_CHECKING:
     from robolink.methods.six_point.procedure import measure_six_point as measure_six_point
     from robolink.methods.six_point.source import SixPoints as SixPoints
     from robolink.methods.six_point.source import SixPointSource as SixPointSource
+    from robolink.methods.sphere_touch.parameters import (
+        SphereTouchParameters as SphereTouchParameters,
+    )
+    from robolink.methods.sphere_touch.procedure import (
+        measure_sphere_touch as measure_sphere_touch,
+    )
+    from robolink.methods.sphere_touch.source import SphereTouches as SphereTouches
+    from robolink.methods.sphere_touch.source import SphereTouchSource as SphereTouchSource
+    from robolink.methods.sphere_touch.survey import SphereSurvey as SphereSurvey
     from robolink.methods.station_learning import learn_station as learn_station
     from robolink.methods.two_pose.parameters import TwoPoseParameters as TwoPoseParameters
     from robolink.methods.two_pose.procedure import measure_two_pose as measure_two_pose
@@ -174,6 +183,10 @@ __getattr__ = lazy_exports(
         "six_point.parameters": "SixPointParameters",
         "six_point.procedure": "AxisTeachPlan measure_six_point",
         "six_point.source": "SixPointSource SixPoints",
+        "sphere_touch.parameters": "SphereTouchParameters",
+        "sphere_touch.procedure": "measure_sphere_touch",
+        "sphere_touch.source": "SphereTouchSource SphereTouches",
+        "sphere_touch.survey": "SphereSurvey",
         "station_learning": "learn_station",
         "two_pose.parameters": "TwoPoseParameters",
         "two_pose.procedure": "measure_two_pose",

@@ -10,7 +10,7 @@ from robolink.calibration import VerifyResult, rotation_of
 from robolink.messages import tr
 from robolink.methods.pivot.swing import tilt_in_air
 from robolink.methods.pivot.tilts import UPRIGHT, OverPin, Tilt
-from robolink.model import Pose
+from robolink.model import Pose, ToolOffset
 from robolink.procedures import MOST_MORE, SurfaceProof, SurfaceTouches, TouchPlan
 from robolink.runner import Notify, Procedure, TouchedAt
 
@@ -95,6 +95,17 @@ class SurfaceDrive:
         )
         self._over = self._over.moved_to(found)
         return found
+
+
+def places_of(touches: Sequence[Pose], tip: ToolOffset) -> list[Vector]:
+    """Return where a tip was at touches, base."""
+    places = []
+    for touch in touches:
+        x, y, z = (
+            np.array(touch.coordinates()[:3]) + rotation_of(touch) @ tip.components()[:3]
+        ).tolist()
+        places.append((x, y, z))
+    return places
 
 
 def proving_spots(over: OverPin, possible: Sequence[SurfaceSpot]) -> tuple[SurfaceSpot, ...]:

@@ -115,3 +115,19 @@ def touches_of(surface, tip, *, down=False, count=12, seed=3):
         rise = -surface.height(place) / surface.normal[2]
         poses.append(replace(at, z_mm=rise))
     return poses
+
+
+def touches_of_ball(ball, tip, *, down=False, count=14, seed=3):
+    """Return flange poses, tilted to all sides, with a tip all over the upper half of a sphere."""
+    rng = random.Random(seed)
+    poses = []
+    for _ in range(count):
+        toward, u, lean = rng.uniform(0.0, math.tau), rng.uniform(-180.0, 180.0), 30.0
+        v, w = lean * math.cos(toward), lean * math.sin(toward) + (180.0 if down else 0.0)
+        at = Pose(0.0, 0.0, 0.0, u, v, w, tool=0)
+        polar, way = rng.uniform(0.0, 1.0), rng.uniform(0.0, math.tau)
+        side = [math.sin(polar) * math.cos(way), math.sin(polar) * math.sin(way), math.cos(polar)]
+        place = ball.centre + ball.radius * np.array(side)
+        x, y, z = (place - rotation_of(at) @ tip.components()[:3]).tolist()
+        poses.append(replace(at, x_mm=x, y_mm=y, z_mm=z))
+    return poses

@@ -1,4 +1,4 @@
-"""``calibrate plane-touch`` live, on a PLC whose flange leaves the vertical."""
+"""``plane-touch`` and ``sphere-touch`` live, on a PLC whose flange leaves the vertical."""
 
 import contextlib
 import io
@@ -17,11 +17,12 @@ from robolink_simulators.hosting.in_process import epson, softmotion
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 from robolink.nozzle_change import Limits
-from tests.calibration._surface_person import Plate, touches_of
+from tests.calibration._surface_person import Ball, Plate, touches_of, touches_of_ball
 
 pytestmark = pytest.mark.simulator_only
 
 PLATE = Path(__file__).parents[2] / "examples" / "recipes" / "leaning-plate.toml"
+BALL = PLATE.with_name("sphere.toml")
 STORED = (12.0, -3.5, -20.0)
 LEANING = WorldParameters(person_touches="plane", plane_lean_deg=20.0, plane_lean_toward_deg=30.0)
 
@@ -72,16 +73,40 @@ def inside(simulator, tool):
     return all(abs(value - true) <= width for value, true, width in found)
 
 
-def test_the_example_finds_the_whole_tip_on_a_leaning_plate_and_proves_it(plc):
+def recalibrate(simulator, example, folder):
+    """Run an example, at full speed, which changes nothing but how long a test takes."""
+    path, text = folder / example.name, example.read_text(encoding="utf-8")
+    fast = text.replace("percent = 30", "percent = 100").replace("mm_s = 40", "mm_s = 100")
+    path.write_text(fast, encoding="utf-8")
+    words = ("recalibrate", str(path), "--assist", simulator.url, "--yes", "--nozzle", "N-1")
+    return run(simulator, *words)
+
+
+def test_the_example_finds_the_whole_tip_on_a_leaning_plate_and_proves_it(plc, tmp_path):
     simulator = plc()
-    words = ("recalibrate", str(PLATE), "--assist", simulator.url, "--yes", "--nozzle", "N-1")
-    code, document, said = run(simulator, *words)
+    code, document, said = recalibrate(simulator, PLATE, tmp_path)
     assert code == 0, said
     (tool,) = document["tools"]
     assert list(tool["fit"]["half_width95"]) == ["x_mm", "y_mm", "z_mm"]
     assert inside(simulator, tool)
     assert tool["verification"]["passed"]
     assert simulator.plc.group.values[4] == pytest.approx(0.0, abs=1e-6), "upright as before"
+
+
+def test_the_example_finds_the_whole_tip_on_a_ball_and_proves_it(plc, tmp_path):
+    simulator = plc(WorldParameters(person_touches="sphere"))
+    code, document, said = recalibrate(simulator, BALL, tmp_path)
+    assert code == 0, said
+    (tool,) = document["tools"]
+    assert inside(simulator, tool)
+    assert tool["verification"]["passed"]
+
+
+def test_who_begins_beside_the_top_of_a_ball_is_told_so(plc):
+    simulator = plc(WorldParameters(person_touches="sphere"))
+    code, document, _ = calibrate(simulator, "sphere-touch")
+    assert (code, document["error"]["code"]) == (7, "off_top")
+    assert slot(simulator) == STORED
 
 
 def test_a_person_who_only_presses_enter_is_refused_and_nothing_is_proposed(plc):
@@ -122,13 +147,16 @@ def test_a_look_before_shows_each_touch_and_moves_nothing(plc):
     assert simulator.plc.group.movements_started == 0
 
 
-def test_poses_of_a_file_give_the_tip_with_a_flange_that_points_down_and_leans(plc, tmp_path):
+@pytest.mark.parametrize("method", ["plane-touch", "sphere-touch"])
+def test_poses_of_a_file_give_the_tip_of_a_flange_that_points_down_and_leans(plc, tmp_path, method):
     simulator, path = plc(), tmp_path / "touches.csv"
     tip = simulator.world.tips[1]
     poses = touches_of(Plate(10.0, 40.0), tip, down=True)
+    if method == "sphere-touch":
+        poses = touches_of_ball(Ball(8.0), tip, down=True)
     rows = [",".join(f"{value:.4f}" for value in pose.coordinates()) for pose in poses]
     path.write_text("x_mm,y_mm,z_mm,u_deg,v_deg,w_deg\n" + "\n".join(rows) + "\n")
-    words = ("calibrate", "plane-touch", "--tool", "1", "--poses", str(path), "--dry-run")
+    words = ("calibrate", method, "--tool", "1", "--poses", str(path), "--dry-run")
     code, document, said = run(simulator, *words)
     assert code == 0, said
     found = [document["proposed"][name] for name in ("x_mm", "y_mm", "z_mm")]

@@ -39,7 +39,7 @@ from robolink.recipe._loading import _checked
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples" / "recipes").iterdir())
 KINDS = (
     'must be one of "beams", "board", "camera", "camera-affine", "n-angle", "one-touch", "pivot", '
-    '"plane-touch", "points", "runout-table", "six-point", "two-pose", "z-touch"'
+    '"plane-touch", "points", "runout-table", "six-point", "sphere-touch", "two-pose", "z-touch"'
 )
 LEAST = """\
 schema = "robolink/recipe/1"
@@ -94,9 +94,10 @@ def test_the_examples_are_those_that_the_page_describes():
         "pendant-points.toml",
         "pick-nozzle-camera.toml",
         "scara-pin.toml",
+        "sphere.toml",
         "two-nozzles.toml",
     ]
-    pivot, gantry, board, _plate, beams, one_touch, affine, points, camera, pin, nozzles = (
+    pivot, gantry, board, _plate, beams, one_touch, affine, points, camera, pin, _ball, nozzles = (
         load_recipe(path).recipe for path in EXAMPLES
     )
     source = pivot.source.parameters

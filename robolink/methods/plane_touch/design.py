@@ -7,11 +7,12 @@ with a robot that leans about one axis of its flange only.
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from robolink.calibration import Floats, linear_fit, plane_columns, tip_is_told
+from robolink.calibration import Floats, linear_fit, plane_columns, rotation_of, tip_is_told
 from robolink.errors import CalibrationError
 from robolink.messages import tr
 from robolink.methods.pivot.tilts import TURNS_DEG, Tilt
@@ -116,21 +117,37 @@ def informative_spots(
         choice: The tilts that may be taken.
         guess: About where the tip is.
     """
-    spots, first, scale = list(uprights), uprights[0], np.ones(_SIX)
-    scale[3:5] = 1 / survey.spread_mm
+    first, leans = uprights[0], _leans(drive, uprights[0], choice)
+    upright = _leans(drive, first, [first.tilt])[0]
+    normal = _FAINT * np.eye(_SIX)
+    for number in range(len(uprights)):
+        row = _row(upright, survey, number)
+        normal = normal + np.outer(row, row)
+    further = []
     for number in range(len(uprights), survey.count):
+        rows = np.array([_row(lean, survey, number) for lean in leans])
+        with_each = np.linalg.inv(normal + rows[:, :, None] * rows[:, None, :])
+        best = int(np.einsum("nii->n", with_each[:, :3, :3]).argmin())
+        normal = normal + np.outer(rows[best], rows[best])
         place = on_plane(first.place_mm, first.normal, survey.beside_mm(number))
-        possible = [SurfaceSpot(tilt, place, first.normal) for tilt in choice]
+        further.append(SurfaceSpot(choice[best], place, first.normal))
+    further.sort(key=lambda one: (one.tilt.turn_deg, one.tilt.lean_deg, one.tilt.roll_deg))
+    spots = (*uprights, *further)
+    poses = [drive.pose(spot) for spot in spots]
+    return spots, plane_columns(poses, guess, first.normal)
 
-        def doubt(spot: SurfaceSpot) -> float:
-            rows = _columns(drive, [*spots, spot], guess) * scale
-            known = np.linalg.inv(rows.T @ rows + _FAINT * np.eye(_SIX))
-            return float(np.trace(known[:3, :3]))
 
-        spots.append(min(possible, key=doubt))
-    known = len(uprights)
-    spots[known:] = sorted(spots[known:], key=lambda one: (one.tilt.turn_deg, one.tilt.lean_deg))
-    return tuple(spots), _columns(drive, spots, guess)
+def _leans(drive: "SurfaceDrive", spot: SurfaceSpot, tilts: Sequence[Tilt]) -> Floats:
+    """Return how the plane's normal lies on the flange in each tilt, one a row."""
+    turned = [rotation_of(drive.pose(replace(spot, tilt=tilt))) for tilt in tilts]
+    leans: Floats = np.array(turned).transpose(0, 2, 1) @ np.array(spot.normal)
+    return leans
+
+
+def _row(lean: Floats, survey: PlaneSurvey, number: int) -> Floats:
+    """Return the derivatives at one touch: the tip, how the plane leans, its distance."""
+    beside = np.array(survey.beside_mm(number)) / survey.spread_mm
+    return np.concatenate((lean, beside, [-1.0]))
 
 
 def require_observable(columns: Floats) -> None:
@@ -162,7 +179,3 @@ def require_observable(columns: Floats) -> None:
             "'calibrate sphere-touch' or 'calibrate pivot'."
         ),
     )
-
-
-def _columns(drive: "SurfaceDrive", spots: Sequence[SurfaceSpot], guess: ToolOffset) -> Floats:
-    return plane_columns([drive.pose(spot) for spot in spots], guess, spots[0].normal)

@@ -4,15 +4,12 @@ The first three touches are made in one orientation and tell how the plane lies.
 chosen that tell most about the tip, and touched at places round the first one.
 """
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from robolink.calibration import (
     Floats,
     PlaneTouchResult,
     plane_columns,
-    rotation_of,
     solve_plane_touch,
 )
 from robolink.messages import tr
@@ -26,8 +23,8 @@ from robolink.methods.plane_touch.design import (
     require_observable,
 )
 from robolink.methods.plane_touch.survey import UPRIGHTS, PlaneSurvey
-from robolink.methods.surface_drive import SurfaceDrive, SurfaceSpot, Vector
-from robolink.model import Pose, ToolOffset
+from robolink.methods.surface_drive import SurfaceDrive, SurfaceSpot, Vector, places_of
+from robolink.model import ToolOffset
 from robolink.procedures import SurfaceTouches, TouchPlan
 from robolink.runner import Notify, Procedure
 
@@ -63,7 +60,7 @@ def measure_plane_touch(
     over = OverPin.touched((yield from touches.first(0)), stored)
     drive = SurfaceDrive(plan, over, touches)
     normal = yield from _upright(plan, drive, touches, over.pin_mm, survey, stored)
-    uprights = [SurfaceSpot(UPRIGHT, place, normal) for place in _places(touches.taken, stored)]
+    uprights = [SurfaceSpot(UPRIGHT, place, normal) for place in places_of(touches.taken, stored)]
     choice = candidates(survey.tilt_deg, axes)
     spots, columns = informative_spots(drive, uprights, survey, choice, stored)
     if not plan.nominal:
@@ -90,20 +87,9 @@ def _upright(
         yield from drive.touch(spot, key=number, further_mm=survey.rise_mm)
     if plan.nominal:
         return _LEVEL
-    normal = normal_of(_places(touches.taken, stored))
+    normal = normal_of(places_of(touches.taken, stored))
     require_lean(normal, survey)
     return normal
-
-
-def _places(touches: Sequence[Pose], tip: ToolOffset) -> list[Vector]:
-    """Return where a tip was at touches, base."""
-    places = []
-    for touch in touches:
-        x, y, z = (
-            np.array(touch.coordinates()[:3]) + rotation_of(touch) @ tip.components()[:3]
-        ).tolist()
-        places.append((x, y, z))
-    return places
 
 
 def _solved(
@@ -112,7 +98,7 @@ def _solved(
     result = solve_plane_touch(touches.taken, stored=stored, sigma_mm=sigma_mm)
     plane = result.plane
     columns = plane_columns(touches.taken, result.offset, plane.normal)
-    places: Floats = np.array(_places(touches.taken, result.offset))
+    places: Floats = np.array(places_of(touches.taken, result.offset))
     touches.require_made(columns, _upward(places @ plane.normal - plane.distance_mm, plane.normal))
     return result
 

@@ -3,17 +3,14 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Literal
 
-from robolink_simulators.cell.frames import add, dot, subtract
+from robolink_simulators.cell.frames import add, dot, scale, subtract
 from robolink_simulators.cell.places import Direction, XyzMm
 from robolink_simulators.cell.tip_switches import STANDING
 
 Touched = Literal["pin", "plane", "sphere"]
 """What the person brings the tip onto."""
-
-_OVER: Final = 0.97
-"""Of the radius: further out a tip slides off a sphere rather than being put onto it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,16 +64,12 @@ class RoundBall:
         return math.dist(tip_mm, self.centre_mm) - self.radius_mm
 
     def way_mm(self, tip_mm: XyzMm) -> XyzMm:
-        """Return the way from a tip onto it: straight down; from beside it level, and to its axis.
-
-        So goes a person who jogs along the axes and keeps the tip where it is sideways.
-        """
-        x_mm, y_mm, z_mm = subtract(tip_mm, self.centre_mm)
-        beside_mm = math.hypot(x_mm, y_mm)
-        if beside_mm < _OVER * self.radius_mm:
-            return (0.0, 0.0, math.sqrt(self.radius_mm**2 - beside_mm**2) - z_mm)
-        inward = _OVER * self.radius_mm / beside_mm - 1.0
-        return (inward * x_mm, inward * y_mm, 0.0)
+        """Return the shortest way from a tip onto it."""
+        out = subtract(tip_mm, self.centre_mm)
+        apart_mm = math.hypot(*out)
+        if not apart_mm:
+            return (0.0, 0.0, self.radius_mm)
+        return scale(out, self.radius_mm / apart_mm - 1.0)
 
 
 Surface = FlatPlate | RoundBall

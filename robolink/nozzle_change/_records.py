@@ -2,18 +2,32 @@
 
 from collections.abc import Sequence
 from dataclasses import asdict, fields
+from datetime import datetime
 
 from robolink.calibration import CalibrationResult, VerifyResult
 from robolink.errors import CalibrationError, RobolinkError
 from robolink.messages import tr
-from robolink.model import EntryKind, NewEntry, Pose, describe_offset, plain_offset
+from robolink.model import ControllerFacts, EntryKind, NewEntry, Pose, describe_offset, plain_offset
 from robolink.nozzle_change._acceptance import AcceptanceCriteria
 from robolink.nozzle_change._proposal import Proposal
 from robolink.runner import SeenAt
 
 
-def calibration_entry(proposal: Proposal, criteria: AcceptanceCriteria, *, source: str) -> NewEntry:
-    """Return the record of a measurement that was believed, with all that it rests on."""
+def calibration_entry(
+    proposal: Proposal,
+    criteria: AcceptanceCriteria,
+    *,
+    source: str,
+    facts: ControllerFacts | None = None,
+) -> NewEntry:
+    """Return the record of a measurement that was believed, with all that it rests on.
+
+    Args:
+        proposal: What was measured.
+        criteria: What was allowed.
+        source: How it was measured, one sentence.
+        facts: Which machine it was, where it was asked.
+    """
     result = proposal.result
     details: dict[str, object] = {
         "source": source,
@@ -21,6 +35,9 @@ def calibration_entry(proposal: Proposal, criteria: AcceptanceCriteria, *, sourc
         "proposed": plain_offset(result.offset),
         "tip": plain_offset(proposal.tip),
         "notes": list(proposal.notes),
+        # Entries are labelled in UTC; whoever stood there knows it by the clock on the wall.
+        "local_time": datetime.now().astimezone().isoformat(timespec="seconds"),
+        **({} if facts is None else {"facts": asdict(facts)}),
         **_result(result),
         **proposal.record,
     }

@@ -15,7 +15,7 @@ from robolink.model import (
     with_method_name_now,
 )
 from robolink.report._recorded_fit import recorded_fit, recorded_pose
-from robolink.report._values import Attempt, Judgement, Outcome, Record, Report
+from robolink.report._values import Attempt, GaugeOnRecord, Judgement, Outcome, Record, Report
 
 _ENDS: Final = {
     EntryKind.NOT_APPLIED: Outcome.NOT_APPLIED,
@@ -47,7 +47,7 @@ def report_of_tool(
         made_at=made_at,
         robolink_version=robolink_version,
         controller=entries[0].controller,
-        facts=ControllerFacts(),
+        facts=_facts(calibration.get("facts")),
         tool=tool,
         before=compared.get("before"),
         after=compared.get("after"),
@@ -67,7 +67,17 @@ def report_of_tool(
         verification=_verification(_last(entries, EntryKind.VERIFY)),
         judgements=judgements,
         record=record,
+        local_time=str(calibration.get("local_time", "")),
+        gauges=tuple(GaugeOnRecord(**gauge) for gauge in calibration.get("gauges", ())),
     )
+
+
+def _facts(said: Mapping[str, Any] | None) -> ControllerFacts:
+    """Return what the controller said of itself when it was measured; nothing in old entries."""
+    if said is None:
+        return ControllerFacts()
+    lists = ("robot_models", "robot_serials")
+    return ControllerFacts(**{n: tuple(v) if n in lists else v for n, v in said.items()})
 
 
 def _outcome(entries: Sequence[Recorded]) -> tuple[Outcome, str]:
@@ -152,7 +162,12 @@ def _verification(entry: Recorded | None) -> VerifyResult | None:
         return None
     details: Mapping[str, Any] = entry.details
     drifts = tuple(Drift(**drift) for drift in details["drifts"])
-    return VerifyResult(drifts, details["tolerance_mm"], tuple(details["warnings"]))
+    return VerifyResult(
+        drifts,
+        details["tolerance_mm"],
+        tuple(details["warnings"]),
+        codes=tuple(details.get("codes", ())),
+    )
 
 
 def _list(value: object) -> list[Any]:

@@ -39,6 +39,23 @@ class Judgement:
 
 
 @dataclass(frozen=True, slots=True)
+class GaugeOnRecord:
+    """A gauge that was measured against.
+
+    Attributes:
+        id: As on its certificate.
+        station: The station at which it stands.
+        due: Until when its calibration holds, ISO 8601; empty where nobody stated it.
+        overdue: Whether that was over when it was measured.
+    """
+
+    id: str
+    station: str
+    due: str = ""
+    overdue: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class Attempt:
     """A measurement that was refused.
 
@@ -99,6 +116,9 @@ class Report:
         attempts: Measurements that were refused.
         judgements: What was judged on the way.
         record: What the journal adds, ``None`` for a report that is made on the way.
+        local_time: When it was measured by the clock of the place, ISO 8601 with its distance
+            from UTC; empty where that is not on record.
+        gauges: The gauges that were measured against.
     """
 
     made_at: str
@@ -122,3 +142,5 @@ class Report:
     attempts: tuple[Attempt, ...] = ()
     judgements: tuple[Judgement, ...] = ()
     record: Record | None = None
+    local_time: str = ""
+    gauges: tuple[GaugeOnRecord, ...] = ()

@@ -132,9 +132,8 @@ def test_the_numbers_of_the_points_are_whole_and_shown_with_three_digits():
         at = next(i for i in range(len(page.values)) if page.values[i : i + len(row)] == row)
         assert at > 0
     assert "-0.000" not in page.text
-    assert "before 12.000 -3.500 -20.000 0.000 0.000 0.000" in page.text
-    assert "change 0.300 -0.400 0.000 0.000 0.000 0.000" in page.text
-    assert "where from measured measured kept kept kept kept" in page.text
+    assert "X mm 12.000 12.300 0.300 Y mm -3.500 -3.900 -0.400" in page.text
+    assert "Kept, not measured Z mm U deg V deg W deg before -20.000 0.000 0.000" in page.text
 
 
 def test_the_largest_is_marked_once_in_the_table_and_once_in_the_picture():

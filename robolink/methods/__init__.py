@@ -26,31 +26,33 @@ if TYPE_CHECKING:
         measure_camera_affine as measure_camera_affine,
     )
     from robolink.methods.camera_affine.source import CameraAffineSource as CameraAffineSource
-    from robolink.methods.checking import order_of_residuals as order_of_residuals
-    from robolink.methods.checking import parameter_problems as parameter_problems
-    from robolink.methods.checking import source_of as source_of
-    from robolink.methods.declaration import DEGREES as DEGREES
-    from robolink.methods.declaration import MM as MM
-    from robolink.methods.declaration import MM_S as MM_S
-    from robolink.methods.declaration import NOTHING_STATED as NOTHING_STATED
-    from robolink.methods.declaration import Angle as Angle
-    from robolink.methods.declaration import AnyMethod as AnyMethod
-    from robolink.methods.declaration import Check as Check
-    from robolink.methods.declaration import Former as Former
-    from robolink.methods.declaration import Help as Help
-    from robolink.methods.declaration import InputNumber as InputNumber
-    from robolink.methods.declaration import Length as Length
-    from robolink.methods.declaration import Method as Method
-    from robolink.methods.declaration import MethodParameters as MethodParameters
-    from robolink.methods.declaration import Needs as Needs
-    from robolink.methods.declaration import Option as Option
-    from robolink.methods.declaration import Pair as Pair
-    from robolink.methods.declaration import PoseHelp as PoseHelp
-    from robolink.methods.declaration import StatedLimits as StatedLimits
-    from robolink.methods.declaration import Unit as Unit
-    from robolink.methods.fields import ParameterField as ParameterField
-    from robolink.methods.fields import fields_of as fields_of
-    from robolink.methods.look_parameters import LookParameters as LookParameters
+    from robolink.methods.declaration.checking import order_of_residuals as order_of_residuals
+    from robolink.methods.declaration.checking import parameter_problems as parameter_problems
+    from robolink.methods.declaration.checking import source_of as source_of
+    from robolink.methods.declaration.fields import ParameterField as ParameterField
+    from robolink.methods.declaration.fields import fields_of as fields_of
+    from robolink.methods.declaration.look_parameters import LookParameters as LookParameters
+    from robolink.methods.declaration.method import DEGREES as DEGREES
+    from robolink.methods.declaration.method import MM as MM
+    from robolink.methods.declaration.method import MM_S as MM_S
+    from robolink.methods.declaration.method import NOTHING_STATED as NOTHING_STATED
+    from robolink.methods.declaration.method import Angle as Angle
+    from robolink.methods.declaration.method import AnyMethod as AnyMethod
+    from robolink.methods.declaration.method import Check as Check
+    from robolink.methods.declaration.method import Former as Former
+    from robolink.methods.declaration.method import Help as Help
+    from robolink.methods.declaration.method import InputNumber as InputNumber
+    from robolink.methods.declaration.method import Length as Length
+    from robolink.methods.declaration.method import Method as Method
+    from robolink.methods.declaration.method import MethodParameters as MethodParameters
+    from robolink.methods.declaration.method import Needs as Needs
+    from robolink.methods.declaration.method import Option as Option
+    from robolink.methods.declaration.method import Pair as Pair
+    from robolink.methods.declaration.method import PoseHelp as PoseHelp
+    from robolink.methods.declaration.method import StatedLimits as StatedLimits
+    from robolink.methods.declaration.method import Unit as Unit
+    from robolink.methods.declaration.pin_parameters import PinParameters as PinParameters
+    from robolink.methods.declaration.site import Site as Site
     from robolink.methods.n_angle.parameters import NAngleParameters as NAngleParameters
     from robolink.methods.n_angle.parameters import most_informative_order as most_informative_order
     from robolink.methods.n_angle.procedure import measure_n_angle as measure_n_angle
@@ -65,13 +67,12 @@ if TYPE_CHECKING:
     from robolink.methods.one_touch.solvers import Difference as Difference
     from robolink.methods.one_touch.solvers import difference_from_last as difference_from_last
     from robolink.methods.one_touch.source import OneTouchSource as OneTouchSource
-    from robolink.methods.pin_parameters import PinParameters as PinParameters
-    from robolink.methods.pivot.axes import require_tilting as require_tilting
     from robolink.methods.pivot.parameters import PivotParameters as PivotParameters
     from robolink.methods.pivot.procedure import measure_pivot as measure_pivot
     from robolink.methods.pivot.procedure import verify_by_tilting as verify_by_tilting
     from robolink.methods.pivot.source import PivotSource as PivotSource
     from robolink.methods.pivot.source import PivotTouches as PivotTouches
+    from robolink.methods.pivot.source import require_tilting as require_tilting
     from robolink.methods.pivot.tilts import OverPin as OverPin
     from robolink.methods.pivot.tilts import Tilt as Tilt
     from robolink.methods.pivot.tilts import informative_tilts as informative_tilts
@@ -85,7 +86,6 @@ if TYPE_CHECKING:
     from robolink.methods.registry import find_method as find_method
     from robolink.methods.registry import method_names as method_names
     from robolink.methods.registry import register as register
-    from robolink.methods.site import Site as Site
     from robolink.methods.six_point.parameters import SixPointParameters as SixPointParameters
     from robolink.methods.six_point.procedure import AxisTeachPlan as AxisTeachPlan
     from robolink.methods.six_point.procedure import measure_six_point as measure_six_point
@@ -116,14 +116,14 @@ __getattr__ = lazy_exports(
         "camera_affine.parameters": "CameraAffineParameters LEAST_SPAN_MM",
         "camera_affine.procedure": "measure_camera_affine",
         "camera_affine.source": "CameraAffineSource",
-        "checking": "order_of_residuals parameter_problems source_of",
-        "declaration": (
+        "declaration.checking": "order_of_residuals parameter_problems source_of",
+        "declaration.method": (
             "Angle AnyMethod Check DEGREES Former Help InputNumber Length "
             "MM MM_S Method MethodParameters NOTHING_STATED Needs Option Pair "
             "PoseHelp StatedLimits Unit"
         ),
-        "fields": "ParameterField fields_of",
-        "look_parameters": "LookParameters",
+        "declaration.fields": "ParameterField fields_of",
+        "declaration.look_parameters": "LookParameters",
         "n_angle.parameters": "NAngleParameters most_informative_order",
         "n_angle.procedure": "measure_n_angle",
         "n_angle.source": "ManyTouches NAngleSource",
@@ -132,16 +132,15 @@ __getattr__ = lazy_exports(
         "one_touch.procedure": "measure_one_touch",
         "one_touch.solvers": "Absolute Difference difference_from_last",
         "one_touch.source": "OneTouchSource",
-        "pin_parameters": "PinParameters",
-        "pivot.axes": "require_tilting",
+        "declaration.pin_parameters": "PinParameters",
         "pivot.parameters": "PivotParameters",
         "pivot.procedure": "measure_pivot verify_by_tilting",
-        "pivot.source": "PivotSource PivotTouches",
+        "pivot.source": "PivotSource PivotTouches require_tilting",
         "pivot.tilts": "OverPin Tilt informative_tilts proving_tilts",
         "points.parameters": "PointsParameters",
         "points.source": "PointsSource PosesFound taught_poses",
         "registry": "METHODS_GROUP all_methods find_method method_names register",
-        "site": "Site",
+        "declaration.site": "Site",
         "six_point.parameters": "SixPointParameters",
         "six_point.procedure": "AxisTeachPlan measure_six_point",
         "six_point.source": "SixPointSource SixPoints",

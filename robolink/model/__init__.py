@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from robolink.model._controller import Controller as Controller
     from robolink.model._controller import ControllerState as ControllerState
     from robolink.model._controller import ControllerStatus as ControllerStatus
-    from robolink.model._facts import ControllerFacts as ControllerFacts
+    from robolink.model._identity import ControllerFacts as ControllerFacts
     from robolink.model._identity import Identity as Identity
     from robolink.model._identity import Who as Who
     from robolink.model._identity import is_own_name as is_own_name
@@ -74,10 +74,9 @@ else:
         __name__,
         {
             "_controller": "Act Capabilities Controller ControllerState ControllerStatus",
-            "_facts": "ControllerFacts",
             "record.findings": "Finding Resolver Verdict",
             "motion.geometry": "Hand Pose angle_difference_deg rotate_xy",
-            "_identity": "Identity Who is_own_name",
+            "_identity": "ControllerFacts Identity Who is_own_name",
             "record.journal_entries": "EntryKind NewEntry Recorded Signature",
             "record.ledger": "Account Ledger",
             "motion.movement": (

@@ -7,7 +7,7 @@ from enum import StrEnum
 from types import TracebackType
 from typing import Protocol, Self
 
-from robolink.model._facts import ControllerFacts
+from robolink.model._identity import ControllerFacts
 from robolink.model._optional_parts import AlarmList, DigitalIo, PointReader, VariableTable
 from robolink.model._tools import ToolTable
 from robolink.model.motion.movement import MotionGroup

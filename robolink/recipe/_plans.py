@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from robolink.methods import MethodParameters, Site, fields_of, source_of
-from robolink.model import Controller
+from robolink.model import Controller, TipSensor
 from robolink.nozzle_change import AcceptanceCriteria, ChangePlan, Limits, ToolPlan
 from robolink.procedures import TipSource
 from robolink.recipe.file.recipe import Recipe
@@ -19,7 +19,7 @@ def plan_of(
     *,
     ask_before_write: bool = True,
     accepted_change_mm: float | None = None,
-    sensor: str | None = None,
+    sensor: str | TipSensor | None = None,
 ) -> ChangePlan:
     """Return what a recipe asks for, on one controller.
 
@@ -29,13 +29,13 @@ def plan_of(
         controller: The controller; only read, and only where the robot has to tilt.
         ask_before_write: Whether a person accepts the proposals.
         accepted_change_mm: A larger jump than the recipe's that an engineer accepts this time.
-        sensor: The camera, in place of the recipe's.
+        sensor: The camera, or its name or URL, in place of the recipe's.
 
     Raises:
         CalibrationError: ``rank_deficient``: this robot cannot tilt its tool.
         ConfigError: This kind of controller has no taught points, or no camera is named.
     """
-    tolerances, parameters = recipe.tolerances, _parameters(recipe, sensor)
+    tolerances, parameters = recipe.tolerances, _parameters(recipe)
     criteria = AcceptanceCriteria(
         max_change_mm=tolerances.jump_mm,
         rms_mm=tolerances.rms_mm,
@@ -50,7 +50,7 @@ def plan_of(
         tuple(
             ToolPlan(
                 tool.number,
-                _source(recipe, parameters, station, controller, tool),
+                _source(recipe, parameters, station, controller, tool, sensor),
                 criteria,
                 verify=recipe.verifies,
                 attempts=recipe.attempts,
@@ -67,15 +67,13 @@ def plan_of(
     )
 
 
-def _parameters(recipe: Recipe, sensor: str | None) -> MethodParameters:
-    """Return the parameters, with what stands at the top of the recipe or came with the command."""
+def _parameters(recipe: Recipe) -> MethodParameters:
+    """Return the parameters, with what stands at the top of the recipe."""
     parameters = recipe.source.parameters
     for one in fields_of(type(parameters)):
         if one.option.from_recipe:
             value = getattr(recipe, one.option.from_recipe)
             parameters = replace(parameters, **{one.name: value})
-        elif one.name == "sensor" and sensor is not None:
-            parameters = replace(parameters, **{one.name: sensor})
     return parameters
 
 
@@ -85,6 +83,7 @@ def _source(
     station: Station,
     controller: Controller,
     tool: Tool,
+    sensor: str | TipSensor | None,
 ) -> TipSource:
     tolerances = recipe.tolerances
     site = Site(
@@ -95,6 +94,7 @@ def _source(
         sigma_mm=tolerances.sigma_mm,
         max_change_mm=tolerances.jump_mm,
         interval_mm=tolerances.interval_mm,
+        sensor=sensor,
     )
     return source_of(recipe.source.of_method, parameters, site)
 

@@ -7,7 +7,7 @@ from functools import partial
 from robolink.config import Cell
 from robolink.errors import ConfigError, NotAllowedError, RobolinkError
 from robolink.messages import tr
-from robolink.model import Controller, EntryKind, PersonRole
+from robolink.model import Controller, EntryKind, PersonRole, TipSensor
 from robolink.nozzle_change import (
     ChangePlan,
     ChangeReport,
@@ -43,12 +43,13 @@ class RecipeRun:
         controller: The controller, connected.
         loaded: The recipe.
         operator: Who is asked, and brings the tip onto the pin.
-        answers: What was answered beforehand.
-        audience: Told of everything that happens.
+        answers: What was answered beforehand; nothing by default.
+        audience: Told of everything that happens; nobody by default.
         take_reference: Whether to take a new reference in any case.
         accepted_change_mm: A larger jump than the recipe's that an engineer accepts this time.
         ask_before_write: Whether a person accepts the proposals.
-        sensor: The camera, in place of the recipe's.
+        sensor: The camera in place of the recipe's: an open one, which is left open, or its name
+            or URL.
         cell: The cell, whose file may say where stations are.
 
     Raises:
@@ -63,19 +64,19 @@ class RecipeRun:
         loaded: LoadedRecipe,
         *,
         operator: Operator,
-        answers: Answers,
-        audience: Listener,
+        answers: Answers | None = None,
+        audience: Listener | None = None,
         take_reference: bool = False,
         accepted_change_mm: float | None = None,
         ask_before_write: bool = True,
-        sensor: str | None = None,
+        sensor: str | TipSensor | None = None,
         cell: Cell | None = None,
     ) -> None:
         self._controller = controller
         self._loaded, station, self._remark = _located(loaded, controller, cell)
         self._operator = operator
-        self._answers = answers
-        self._audience = audience
+        self._answers = answers or Answers()
+        self._audience = audience or Listener()
         self._references: dict[int, Reference] = {}
         self.plan: ChangePlan = plan_of(
             self._loaded.recipe,

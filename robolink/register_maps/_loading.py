@@ -1,13 +1,18 @@
 """From a file to a map, or to everything that is wrong in it."""
 
 import hashlib
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Any, Final
 
+from robolink.files.key_problems import is_not_known, sentence
 from robolink.files.toml import FileKind, Problem
 from robolink.messages import tr
 from robolink.register_maps._map import RegisterMap
-from robolink.register_maps._problems import problems_of
+
+if TYPE_CHECKING:
+    from pydantic import ValidationError
+
 
 MAP_FILE: Final = FileKind(
     named=lambda path: tr("The PLC map {path}", path=path),
@@ -55,3 +60,41 @@ def _checked(path: Path) -> tuple[RegisterMap | None, list[Problem]]:
     if register_map is None:
         return None, resolving.problems
     return register_map, problems_together(file, register_map)
+
+
+_COMMIT_DEPTH: Final = 2
+"""How deep pydantic's location goes before the kind of commit stands in it."""
+
+
+def problems_of(error: "ValidationError") -> list[Problem]:
+    """Return everything that pydantic objects to."""
+    return [
+        Problem(_path(detail["loc"]), _sentence(detail))
+        for detail in error.errors(include_url=False, include_input=False)
+    ]
+
+
+def _path(location: Sequence[int | str]) -> str:
+    steps = list(location)
+    if len(steps) > _COMMIT_DEPTH and steps[0] == "commit":
+        del steps[1]  # the kind of commit, which pydantic puts in and no file has
+    path = ""
+    for step in steps:
+        joint = "." if path else ""
+        path += f"#{step + 1}" if isinstance(step, int) else f"{joint}{step}"
+    return path
+
+
+def _sentence(detail: Any) -> str:  # noqa: ANN401 - pydantic's own form
+    match detail["type"]:
+        case "extra_forbidden":
+            from robolink.register_maps._tables import KEYS
+
+            return is_not_known(str(detail["loc"][-1]), sorted(KEYS))
+        case "union_tag_invalid" | "union_tag_not_found":
+            return tr("needs a kind: {kinds}", kinds="commit_bit, level, none")
+        case "list_type":
+            return tr("must be a list of tables")
+        case "too_short":
+            return tr("must not be empty")
+    return sentence(detail)

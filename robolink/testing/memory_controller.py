@@ -39,6 +39,10 @@ _TOLERANCE: Final = 1e-6
 class MemoryMachine:
     """A machine of four axes: what is left of it when nobody is connected.
 
+    All that :class:`MemoryController` asks of it are ``read``, ``store``, ``in_force``, ``select``,
+    ``pose``, ``go``, ``moving`` and ``halt``. A machine that overrides them is a kind of its own,
+    with everything that robolink does for all kinds.
+
     Attributes:
         tools: The tools that are defined, by number.
         selected: The tool in force, 0 for the flange.
@@ -48,6 +52,36 @@ class MemoryMachine:
     tools: dict[int, ToolOffset] = field(default_factory=dict)
     selected: int = 0
     flange: Pose = field(default_factory=lambda: Pose(300.0, 0.0, 100.0, 0.0, hand=Hand.RIGHT))
+
+    def read(self, tool: int) -> ToolOffset | None:
+        """Return what a tool holds, ``None`` where it is not defined."""
+        return self.tools.get(tool)
+
+    def store(self, tool: int, offset: ToolOffset | None) -> None:
+        """Give a tool an offset, or take its definition away."""
+        if offset is None:
+            self.tools.pop(tool, None)
+        else:
+            self.tools[tool] = offset
+
+    def in_force(self) -> int:
+        """Return the number of the tool in force, 0 for the flange."""
+        return self.selected
+
+    def select(self, tool: int) -> None:
+        """Put a tool in force."""
+        self.selected = tool
+
+    def pose(self) -> Pose:
+        """Return where the tip of the tool in force is, mm and degrees in the base."""
+        return self.tip(self.tool)
+
+    def moving(self) -> bool:
+        """Tell whether the last movement goes on; here it ended when it began."""
+        return False
+
+    def halt(self) -> None:
+        """Bring everything to rest."""
 
     @property
     def tool(self) -> ToolOffset:
@@ -202,18 +236,18 @@ class _MemoryTools(ToolTableCore):
 
     def _stored(self, tool: int) -> ToolOffset | None:
         with self._link.exchange(f"tool {tool}") as machine:
-            return machine.tools.get(tool)
+            return machine.read(tool)
 
     def _selected(self) -> int:
         with self._link.exchange("selected") as machine:
-            return machine.selected
+            return machine.in_force()
 
     def _select_request(self, tool: int) -> str:
         return f"select {tool}"
 
     def _send_selection(self, tool: int) -> None:
         with self._link.exchange(self._select_request(tool), CommandClass.RESTORE) as machine:
-            machine.selected = tool
+            machine.select(tool)
 
 
 class _MemoryWrite(ToolWrite):
@@ -224,14 +258,11 @@ class _MemoryWrite(ToolWrite):
 
     def send(self) -> None:
         with self._link.exchange(self.request, CommandClass.WRITE) as machine:
-            if self.requested is None:
-                machine.tools.pop(self.tool, None)
-            else:
-                machine.tools[self.tool] = self.requested
+            machine.store(self.tool, self.requested)
 
     def read_back(self) -> ToolOffset | None:
         with self._link.exchange(f"tool {self.tool}") as machine:
-            return machine.tools.get(self.tool)
+            return machine.read(self.tool)
 
 
 class _MemoryGroup(PolledGroup):
@@ -245,13 +276,14 @@ class _MemoryGroup(PolledGroup):
 
     def pose(self) -> Pose:
         with self._link.exchange("pose") as machine:
-            return replace(machine.tip(machine.tool), tool=machine.selected)
+            return replace(machine.pose(), tool=machine.in_force())
 
     def requests_for(self, target: Pose, profile: MotionProfile) -> tuple[str, ...]:
         return (f"{profile.path} to {target}",)
 
     def moving(self) -> bool:
-        return False
+        with self._link.exchange("moving") as machine:
+            return machine.moving()
 
     def _send_move(self, target: Pose, profile: MotionProfile) -> None:
         request, *_ = self.requests_for(target, profile)
@@ -259,5 +291,5 @@ class _MemoryGroup(PolledGroup):
             machine.go(target)
 
     def _send_stop(self) -> None:
-        with self._link.exchange("stop", CommandClass.CALM):
-            pass
+        with self._link.exchange("stop", CommandClass.CALM) as machine:
+            machine.halt()

@@ -28,6 +28,7 @@ from robolink.model import TIP, Hand, Pose, Secret, Spot, SpotUnit, WorkBox, rot
 from robolink.protocols.epson_text import VariableType
 from robolink.runner import RunSettings, ask_yes_no
 from robolink.sensing import open_sensor, seen_once
+from robolink.testing import MemoryMachine
 
 pytest_plugins = ["pytester"]
 
@@ -57,8 +58,8 @@ BLOCKS = blocks()
 
 
 @contextmanager
-def epson(**given: Any) -> Iterator[EpsonSimulator]:
-    simulator = EpsonSimulator(seed=3, **given)
+def epson(seed: int = 3, **given: Any) -> Iterator[EpsonSimulator]:
+    simulator = EpsonSimulator(seed=seed, **given)
     in_process.register("documented", simulator)
     try:
         yield simulator
@@ -195,6 +196,36 @@ def an_acme_camera(stack: ExitStack) -> dict[str, Any]:
     return given
 
 
+def a_camera_for_a_recipe(stack: ExitStack) -> dict[str, Any]:
+    shutil.copy(ROOT / "examples" / "recipes" / "pick-nozzle-camera.toml", Path.cwd())
+    simulator = stack.enter_context(epson(seed=1))  # the cell of the example
+    simulator.machine.motors_on = True
+    inner = stack.enter_context(open_sensor("epson+sim://documented"))
+    asked, ended = list[int](), list[str]()
+
+    class Counted:
+        """The cell's camera, which nobody could have opened by a name."""
+
+        identity, unit = "acme-camera 00123", inner.unit
+        resolution_px, settle_s = inner.resolution_px, inner.settle_s
+
+        def see(self, mark: int = TIP) -> Any:
+            asked.append(mark)
+            return inner.see(mark)
+
+        def close(self) -> None:
+            ended.append("closed")
+
+    def found() -> bool:
+        stored, tip = simulator.machine.tools.get(1), simulator.world.tips[1]
+        assert stored is not None
+        assert tip is not None
+        near = abs(stored.x_mm - tip.x_mm) < 0.02 and abs(stored.y_mm - tip.y_mm) < 0.02
+        return near and len(asked) > 6 and not ended
+
+    return {"operator": Agrees(), "camera": Counted(), "then": found}
+
+
 def a_panel(stack: ExitStack) -> dict[str, Any]:
     given = dict[str, Any]()
     shown: list[str] = []
@@ -207,6 +238,39 @@ def a_panel(stack: ExitStack) -> dict[str, Any]:
 
     given |= {"panel": panel, "then": answered}
     return given
+
+
+def an_acme_arm(stack: ExitStack) -> dict[str, Any]:
+    """An arm on which a movement lasts until it was asked for three times."""
+    inner, left = MemoryMachine(tools={1: ToolOffset(12.0, -3.5, -20.0)}), [0]
+    done = list[str]()
+
+    def start_to(target: Pose) -> None:
+        left[0] = 3
+        done.append("go")
+        inner.go(target)
+
+    def busy() -> bool:
+        left[0] = max(0, left[0] - 1)
+        return left[0] > 0
+
+    def stop() -> None:
+        left[0] = 0
+        done.append("stop")
+
+    return {
+        "acme": SimpleNamespace(
+            tool=inner.read,
+            set_tool=inner.store,
+            tool_number=inner.in_force,
+            use_tool=inner.select,
+            where_the_tip_is=inner.pose,
+            start_to=start_to,
+            busy=busy,
+            stop=stop,
+        ),
+        "then": lambda: {"go", "stop"} == {*done} and inner.tools[1] == ToolOffset(12, -3.5, -20),
+    }
 
 
 def nothing(stack: ExitStack) -> dict[str, Any]:
@@ -222,8 +286,9 @@ MAKERS = {
     "beams-and-probe.md 2": nothing,
     "camera-and-board.md 1": lambda stack: {"SpotUnit": SpotUnit, "Spot": Spot, "TIP": TIP},
     "extending.md 1": an_acme_camera,
-    "extending.md 2": a_panel,
-    "extending.md 3": nothing,
+    "extending.md 2": a_camera_for_a_recipe,
+    "extending.md 3": a_panel,
+    "extending.md 4": an_acme_arm,
     "io-and-variables.md 1": with_variables,
     "journal.md 1": a_journal,
     "plc-maps.md 1": a_map,

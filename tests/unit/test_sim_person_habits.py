@@ -8,7 +8,12 @@ from statistics import fmean
 import pytest
 import robolink_cli.prompts.operator as _operator
 from robolink_simulators.assist.acts import perform
-from robolink_simulators.assist.port import AssistClient, InProcessEyes, serve_assist
+from robolink_simulators.assist.port import (
+    LEAST_THINKING_S,
+    AssistClient,
+    InProcessEyes,
+    serve_assist,
+)
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.epson import EpsonSimulator
@@ -249,16 +254,19 @@ def test_a_mistaken_angle_is_jogged_before_the_steps_to_the_pin(make):
 
 
 def test_a_served_person_has_the_same_habits_and_thinks_at_the_pace_of_the_simulation(make):
-    simulator = make(person_stays_share=1.0, person_thinks_s=2.0)
+    simulator = make(person_stays_share=1.0, person_thinks_s=20.0)
     with (
         serve_assist(simulator, clock=ScaledClock(20.0)) as host,
         AssistClient(host.url) as eyes,
     ):
         manner = eyes.be_asked(touch=True, tool=1)
         assert (manner.touch, manner.stays) == (1, True)
-        assert manner.thinks_s == pytest.approx(0.1)
+        assert manner.thinks_s == pytest.approx(1.0)
         assert eyes.be_asked(touch=False, tool=1).touch == 0
         assert eyes.do("counters")["touches"] == 1
+        for thinks_s, really_s in ((1.0, LEAST_THINKING_S), (0.1, 0.1), (0.0, 0.0)):
+            eyes.do("set_world", person_thinks_s=thinks_s)
+            assert eyes.be_asked(touch=False, tool=1).thinks_s == really_s
 
 
 def test_other_questions_are_answered_whatever_the_habit_and_begin_no_touch(make):

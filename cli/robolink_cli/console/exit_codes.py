@@ -9,10 +9,9 @@ import click
 from robolink import errors
 from robolink.interrupts import EndedBy, Interrupted, ended_by
 from robolink.messages import tr
-from robolink.standing import UNTOUCHED, standing_after
+from robolink.standing import UNTOUCHED, Components, Standing, standing_after
 from robolink_cli.console.output import hand_over, show
 from robolink_cli.console.render import dumps
-from robolink_cli.console.standing import standing_payload, tell_standing
 
 DONE: Final = 0
 DIFFERENT: Final = 1
@@ -174,3 +173,43 @@ def _sentences(error: BaseException) -> tuple[str, str]:
         ),
         tr("Set ROBOLINK_DEBUG=1 to see where, and report it with that text."),
     )
+
+
+_NAMES: Final = ("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
+
+
+def tell_standing(standing: Standing) -> None:
+    """Say on stderr what stands; nothing of a command that had no controller, or only looked."""
+    if standing is not UNTOUCHED:
+        from robolink.model import describe_standing  # here, because --help needs none
+
+        show(describe_standing(standing), beside=True)
+
+
+def standing_payload(standing: Standing) -> dict[str, object]:
+    """Return what stands, as plain JSON with units in the keys.
+
+    What a tool holds is ``null`` where it is undefined, and where ``known`` is false.
+    """
+    return {
+        "tools": {
+            str(number): {
+                "before": _named(tool.before),
+                "requested": _named(tool.requested),
+                "holds": _named(tool.holds) if tool.known else None,
+                "known": tool.known,
+            }
+            for number, tool in standing.tools.items()
+        },
+        "selected_tool": standing.selected if standing.selection_known else None,
+        "selected_before": standing.selected_before,
+        "carried_out": list(standing.carried_out),
+        "doubtful": list(standing.doubtful),
+        "moving": list(standing.moving),
+        "settled": standing.settled,
+        "left_open": standing.left_open,
+    }
+
+
+def _named(components: Components) -> dict[str, float] | None:
+    return None if components is None else dict(zip(_NAMES, components, strict=True))

@@ -1,6 +1,6 @@
 """One controller for one command: connected, what others left said, closed in order."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 import robolink
-from robolink.errors import ConfigError, RobolinkError
+from robolink.errors import ConfigError, ControllerError, RobolinkError
 from robolink.interrupts import EndedBy, ended_by
 from robolink.messages import tr
 from robolink.standing import UNTOUCHED, Standing, note_standing, standing_after
@@ -18,20 +18,18 @@ from robolink_cli.access.cell import (
 from robolink_cli.access.recording import recording
 from robolink_cli.access.warnings import note_at_work, note_unsettled
 from robolink_cli.console.exit_codes import is_cut_off
-from robolink_cli.console.render import note
+from robolink_cli.console.render import json_is_on, note
 from robolink_cli.options.shared import json_option as json_option
 from robolink_cli.options.shared import origin_of as origin_of
+from robolink_cli.prompts.questions import WATCHED, asked, on_terminal
+from robolink_cli.session.context import CliContext
+from robolink_cli.session.motion_consent import CELL, REACHED
 from robolink_cli.session.operator_identity import signature_of
 from robolink_cli.session.stop_listening import listening_for_stop, remember_address
 
 if TYPE_CHECKING:
     from robolink.config import Expected
     from robolink.model import Controller, Marker, Secret
-
-
-from robolink_cli.prompts.questions import WATCHED
-from robolink_cli.session.context import CliContext
-from robolink_cli.session.motion_consent import CELL, REACHED
 
 
 @contextmanager
@@ -124,9 +122,7 @@ def _saying_what_is_left(
     if context.expected and not calms:
         _check_robot(controller, context.expected, looks=looks)
     if found and not (quiet or calms or beside):
-        from robolink_cli.session.restore_offer import offer_to_restore
-
-        offer_to_restore(controller, found)
+        _offer_to_restore(controller, found)
     try:
         yield
     except KeyboardInterrupt:
@@ -219,3 +215,23 @@ def _open_markers(controller: "Controller", *, lenient: bool) -> "tuple[Marker, 
             raise
         note(error.what)
         return ()
+
+
+def _offer_to_restore(controller: "Controller", markers: "Iterable[Marker]") -> None:
+    """Ask whether a tool that an unfinished procedure left selected is to be changed back.
+
+    That comes before anything else is done. A no changes nothing and the command goes on. Nothing
+    is asked of a script, nor where the controller is not in a state to be told anything.
+    """
+    if json_is_on() or not on_terminal():
+        return
+    from robolink.model import MarkerKind
+
+    for marker in markers:
+        if marker.kind is not MarkerKind.SELECTION:
+            continue
+        with suppress(ControllerError):
+            finding = controller.resolver.examine(marker)
+            if finding.action and asked(tr("Do it now: {action}?", action=finding.action)):
+                controller.resolver.settle(finding)
+                note(tr("Done, and read back."))

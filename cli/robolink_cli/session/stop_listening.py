@@ -1,11 +1,12 @@
 """A command that has a controller lets a second terminal stop it, and leaves its address."""
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
 import click
 
+from robolink.errors import RobolinkError
 from robolink.messages import tr
 from robolink_cli.console.render import note
 
@@ -31,9 +32,9 @@ def listening_for_stop(
         return
     name = ""
     if not looks:
-        from robolink_cli.stopping.notes import own_name_of
-
-        name = own_name_of(controller)
+        # A broken journal, or a link that is gone, is told of by what needs it next.
+        with suppress(RobolinkError):
+            name = controller.outcomes.identity
     try:
         listener = StopListener(controller, url, who=_who(context), name=name, heard=_say_who)
     except OSError as error:

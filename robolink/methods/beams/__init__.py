@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING
 
 from robolink.messages import tr
 from robolink.methods.beams.parameters import BeamsParameters
-from robolink.methods.declaration import Method, Needs
-from robolink.methods.site import Site
+from robolink.methods.declaration.method import Method, Needs
+from robolink.methods.declaration.site import Site
 from robolink.stations import StationKind
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from annotated_types import Ge, Le, Len
 from robolink.calibration import MIN_ROTATION_DEG
 from robolink.files.toml import Problem
 from robolink.messages import tr
-from robolink.methods.declaration import (
+from robolink.methods.declaration.method import (
     DEGREES,
     MM,
     MM_S,

@@ -4,9 +4,9 @@ from typing import TYPE_CHECKING
 
 from robolink.messages import tr
 from robolink.methods.board.parameters import BoardParameters
-from robolink.methods.declaration import Method, Needs
-from robolink.methods.look_parameters import PLACE, UNMEASURED_Z, camera_at
-from robolink.methods.site import Site
+from robolink.methods.declaration.look_parameters import PLACE, UNMEASURED_Z, camera_at
+from robolink.methods.declaration.method import Method, Needs
+from robolink.methods.declaration.site import Site
 from robolink.stations import StationKind
 
 if TYPE_CHECKING:

@@ -11,8 +11,8 @@ from annotated_types import Ge, Len
 from robolink.calibration import LEAST_SPACING_MM, BoardDrawing
 from robolink.files.toml import Problem
 from robolink.messages import tr
-from robolink.methods.declaration import MM, Check, Help, Option, Pair
-from robolink.methods.look_parameters import LookParameters, Turns
+from robolink.methods.declaration.look_parameters import LookParameters, Turns
+from robolink.methods.declaration.method import MM, Check, Help, Option, Pair
 from robolink.procedures import TWO_ANGLES_DEG
 
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from robolink.messages import tr
-from robolink.methods.look_parameters import LookParameters
+from robolink.methods.declaration.look_parameters import LookParameters
 
 
 @dataclass(frozen=True, kw_only=True)

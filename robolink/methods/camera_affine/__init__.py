@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING
 
 from robolink.messages import tr
 from robolink.methods.camera_affine.parameters import CameraAffineParameters
-from robolink.methods.declaration import Former, Method, Needs
-from robolink.methods.look_parameters import PLACE, UNMEASURED_Z, camera_at
-from robolink.methods.site import Site
+from robolink.methods.declaration.look_parameters import PLACE, UNMEASURED_Z, camera_at
+from robolink.methods.declaration.method import Former, Method, Needs
+from robolink.methods.declaration.site import Site
 from robolink.stations import StationKind
 
 if TYPE_CHECKING:

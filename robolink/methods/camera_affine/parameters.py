@@ -6,8 +6,8 @@ from typing import Annotated, Final
 from annotated_types import Ge, Le
 
 from robolink.messages import tr
-from robolink.methods.declaration import MM, Help, Option, Pair, Rows
-from robolink.methods.look_parameters import LookParameters
+from robolink.methods.declaration.look_parameters import LookParameters
+from robolink.methods.declaration.method import MM, Help, Option, Pair, Rows
 
 LEAST_SPAN_MM: Final = 0.2
 """A smaller pattern does not tell what a pixel is."""

@@ -10,8 +10,8 @@ from annotated_types import Ge, Le, MaxLen, MinLen
 from robolink.calibration import MIN_ROTATION_DEG, planar_sigma_gain
 from robolink.files.toml import Problem
 from robolink.messages import tr
-from robolink.methods.declaration import DEGREES, Angle, Check, Help, Length, Option
-from robolink.methods.pin_parameters import PinParameters
+from robolink.methods.declaration.method import DEGREES, Angle, Check, Help, Length, Option
+from robolink.methods.declaration.pin_parameters import PinParameters
 from robolink.model import Pose, angle_difference_deg
 from robolink.procedures import SamplingPolicy
 

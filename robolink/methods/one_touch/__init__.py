@@ -3,9 +3,9 @@
 from typing import TYPE_CHECKING
 
 from robolink.messages import tr
-from robolink.methods.declaration import Former, Method, Needs, PoseHelp
+from robolink.methods.declaration.method import Former, Method, Needs, PoseHelp
+from robolink.methods.declaration.site import Site
 from robolink.methods.one_touch.parameters import OneTouchParameters
-from robolink.methods.site import Site
 from robolink.stations import StationKind
 
 if TYPE_CHECKING:

@@ -6,8 +6,8 @@ from typing import Annotated, Literal
 from annotated_types import Ge, Le
 
 from robolink.messages import tr
-from robolink.methods.declaration import MM, Help, Option
-from robolink.methods.pin_parameters import PinParameters
+from robolink.methods.declaration.method import MM, Help, Option
+from robolink.methods.declaration.pin_parameters import PinParameters
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -3,9 +3,9 @@
 from typing import TYPE_CHECKING
 
 from robolink.messages import tr
-from robolink.methods.declaration import Method, Needs, PoseHelp
+from robolink.methods.declaration.method import Method, Needs, PoseHelp
+from robolink.methods.declaration.site import Site
 from robolink.methods.pivot.parameters import PivotParameters
-from robolink.methods.site import Site
 from robolink.stations import StationKind
 
 if TYPE_CHECKING:
@@ -13,8 +13,7 @@ if TYPE_CHECKING:
 
 
 def _source(parameters: PivotParameters, site: Site) -> "TipSource":
-    from robolink.methods.pivot.axes import require_tilting
-    from robolink.methods.pivot.source import PivotSource
+    from robolink.methods.pivot.source import PivotSource, require_tilting
     from robolink.methods.pivot.tilts import informative_tilts  # numpy, for this robot alone
 
     require_tilting(site.controller, METHOD.name)

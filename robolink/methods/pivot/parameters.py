@@ -6,8 +6,8 @@ from typing import Annotated
 from annotated_types import Ge, Le
 
 from robolink.messages import tr
-from robolink.methods.declaration import DEGREES, MM, Help, Length, Option
-from robolink.methods.pin_parameters import PinParameters
+from robolink.methods.declaration.method import DEGREES, MM, Help, Length, Option
+from robolink.methods.declaration.pin_parameters import PinParameters
 from robolink.procedures import SamplingPolicy
 
 

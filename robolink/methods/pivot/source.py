@@ -2,17 +2,20 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, Final
 
 from robolink.calibration import CalibrationResult, VerifyResult, tilted_from
-from robolink.errors import ConfigError
+from robolink.errors import CalibrationError, ConfigError
 from robolink.messages import tr
-from robolink.model import Pose, ToolOffset
+from robolink.model import Controller, Pose, ToolOffset
 from robolink.procedures import TAKE_ALL, MeasurementContext, PinSource, SamplingPolicy, TouchPlan
 from robolink.runner import Procedure
 
 if TYPE_CHECKING:
     from robolink.methods.pivot.tilts import Tilt
+
+_LEAST_AXES: Final = 5
+"""X, Y, Z and a turn take four; whatever tilts needs another one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,3 +133,36 @@ class PivotTouches:
         from robolink.calibration import solve_pivot  # numpy, which a look does without
 
         return solve_pivot(flange, stored=stored, sigma_mm=self.sigma_mm)
+
+
+def require_tilting(controller: Controller, method: str) -> None:
+    """Refuse a method with tilted poses on a robot of four axes; reads only.
+
+    A machine that does not tell its axes is not refused here: what it cannot take up shows when it
+    has moved.
+
+    Raises:
+        CalibrationError: ``rank_deficient``.
+    """
+    axes = _axes(controller)
+    if not 0 < axes < _LEAST_AXES:
+        return
+    raise CalibrationError(
+        "rank_deficient",
+        tr(
+            "{robot} has {axes} axes and turns its tool about Z only, so {method} cannot be "
+            "measured with it: nothing shows Z and the tilt of the tool.",
+            robot=", ".join(controller.facts().robot_models) or controller.identity,
+            axes=axes,
+            method=method,
+        ),
+        remedy=tr(
+            "Measure X and Y with 'calibrate n-angle' and Z with 'calibrate z-touch' or "
+            "'calibrate one-touch'."
+        ),
+    )
+
+
+def _axes(controller: Controller) -> int:
+    counted = controller.groups[0].axes() if controller.groups else {}
+    return max((len(values) for name, values in counted.items() if name != "pulses"), default=0)

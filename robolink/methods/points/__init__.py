@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink.methods.declaration import Method, Needs, PoseHelp
+from robolink.methods.declaration.method import Method, Needs, PoseHelp
+from robolink.methods.declaration.site import Site
 from robolink.methods.points.parameters import PointsParameters
-from robolink.methods.site import Site
 from robolink.model import Pose
 from robolink.stations import StationKind
 

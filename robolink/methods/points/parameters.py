@@ -8,8 +8,8 @@ from annotated_types import Ge, Le
 
 from robolink.files.toml import Problem
 from robolink.messages import tr
-from robolink.methods.declaration import Check, Help, MethodParameters, Option
-from robolink.methods.pin_parameters import two_poses_agree
+from robolink.methods.declaration.method import Check, Help, MethodParameters, Option
+from robolink.methods.declaration.pin_parameters import two_poses_agree
 
 
 @dataclass(frozen=True, kw_only=True)

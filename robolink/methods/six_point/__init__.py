@@ -3,8 +3,8 @@
 from typing import TYPE_CHECKING
 
 from robolink.messages import tr
-from robolink.methods.declaration import Method, Needs, PoseHelp
-from robolink.methods.site import Site
+from robolink.methods.declaration.method import Method, Needs, PoseHelp
+from robolink.methods.declaration.site import Site
 from robolink.methods.six_point.parameters import SixPointParameters
 from robolink.stations import StationKind
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def _source(parameters: SixPointParameters, site: Site) -> "TipSource":
-    from robolink.methods.pivot.axes import require_tilting
+    from robolink.methods.pivot.source import require_tilting
     from robolink.methods.pivot.tilts import informative_tilts  # numpy, for this robot alone
     from robolink.methods.six_point.procedure import AxisTeachPlan
     from robolink.methods.six_point.source import SixPointSource

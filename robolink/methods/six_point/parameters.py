@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 from annotated_types import Ge, Le
 
 from robolink.messages import tr
-from robolink.methods.declaration import MM, Help, Option
+from robolink.methods.declaration.method import MM, Help, Option
 from robolink.methods.pivot.parameters import PivotParameters
 
 

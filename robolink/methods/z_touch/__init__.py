@@ -3,8 +3,8 @@
 from typing import TYPE_CHECKING
 
 from robolink.messages import tr
-from robolink.methods.declaration import Former, Method, Needs
-from robolink.methods.site import Site
+from robolink.methods.declaration.method import Former, Method, Needs
+from robolink.methods.declaration.site import Site
 from robolink.methods.z_touch.parameters import ZTouchParameters
 from robolink.stations import StationKind
 

@@ -9,7 +9,7 @@ from annotated_types import Ge, Le, MinLen
 from robolink.calibration import MIN_ROTATION_DEG
 from robolink.files.toml import Problem
 from robolink.messages import tr
-from robolink.methods.declaration import (
+from robolink.methods.declaration.method import (
     DEGREES,
     MM,
     MM_S,
@@ -20,7 +20,7 @@ from robolink.methods.declaration import (
     MethodParameters,
     Option,
 )
-from robolink.methods.pin_parameters import clearance_below_lift
+from robolink.methods.declaration.pin_parameters import clearance_below_lift
 from robolink.procedures import SamplingPolicy, may_end_early
 
 _SPEEDS_APART: Final = 1.5

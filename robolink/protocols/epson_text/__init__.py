@@ -8,14 +8,15 @@ from robolink.protocols._role import Role as Role
 
 if TYPE_CHECKING:
     from robolink.protocols.epson_text._codec import EpsonTextCodec as EpsonTextCodec
-    from robolink.protocols.epson_text._codes import ErrorCode as ErrorCode
     from robolink.protocols.epson_text._commands import COMMANDS as COMMANDS
     from robolink.protocols.epson_text._commands import ParameterForm as ParameterForm
     from robolink.protocols.epson_text._commands import RemoteCommand as RemoteCommand
     from robolink.protocols.epson_text._commands import ReplyShape as ReplyShape
+    from robolink.protocols.epson_text._commands import VariableType as VariableType
     from robolink.protocols.epson_text._commands import find_command as find_command
     from robolink.protocols.epson_text._events import BadRequest as BadRequest
     from robolink.protocols.epson_text._events import EndOfStream as EndOfStream
+    from robolink.protocols.epson_text._events import ErrorCode as ErrorCode
     from robolink.protocols.epson_text._events import Event as Event
     from robolink.protocols.epson_text._events import Refusal as Refusal
     from robolink.protocols.epson_text._events import Reply as Reply
@@ -26,17 +27,16 @@ if TYPE_CHECKING:
     from robolink.protocols.epson_text._status import StatusFlags as StatusFlags
     from robolink.protocols.epson_text._status import parse_status as parse_status
     from robolink.protocols.epson_text._status import status_fields as status_fields
-    from robolink.protocols.epson_text._variable_types import VariableType as VariableType
 else:
     __getattr__ = lazy_exports(
         __name__,
         {
             "_codec": "EpsonTextCodec",
-            "_codes": "ErrorCode",
-            "_commands": "COMMANDS RemoteCommand ParameterForm ReplyShape find_command",
-            "_events": "BadRequest EndOfStream Event Refusal Reply Request",
+            "_commands": (
+                "COMMANDS RemoteCommand ParameterForm ReplyShape VariableType find_command"
+            ),
+            "_events": "BadRequest EndOfStream ErrorCode Event Refusal Reply Request",
             "_preferences": "Preference parse_preferences preferences_field",
             "_status": "StatusFlags parse_status status_fields",
-            "_variable_types": "VariableType",
         },
     )

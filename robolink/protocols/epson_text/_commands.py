@@ -7,9 +7,21 @@ by the state before that Execute began.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import Enum, auto
+from enum import Enum, StrEnum, auto
 from types import MappingProxyType
 from typing import Final
+
+
+class VariableType(StrEnum):
+    """The types that Remote Ethernet knows, as they are written on the wire."""
+
+    BOOLEAN = "Boolean"
+    BYTE = "Byte"
+    DOUBLE = "Double"
+    INTEGER = "Integer"
+    LONG = "Long"
+    REAL = "Real"
+    STRING = "String"
 
 
 class ParameterForm(Enum):

@@ -12,7 +12,6 @@ from typing import Final
 
 from robolink.errors import LocalProtocolError, RemoteProtocolError
 from robolink.messages import tr
-from robolink.protocols.epson_text._codes import ErrorCode
 from robolink.protocols.epson_text._commands import (
     COMMANDS,
     ParameterForm,
@@ -20,7 +19,7 @@ from robolink.protocols.epson_text._commands import (
     ReplyShape,
     find_command,
 )
-from robolink.protocols.epson_text._events import BadRequest, Refusal, Reply, Request
+from robolink.protocols.epson_text._events import BadRequest, ErrorCode, Refusal, Reply, Request
 
 _MAX_TEXT: Final = 4060
 """Most bytes of a statement, and of what it prints (docs/reference/epson.md 1.5)."""

@@ -8,8 +8,8 @@ from pydantic import BaseModel, Field, GetCoreSchemaHandler, create_model
 from pydantic_core import CoreSchema
 
 from robolink.methods import AnyMethod, Help, MethodParameters, Unit, all_methods, fields_of
-from robolink.methods.fields import ParameterField as Parameter
-from robolink.methods.fields import bare
+from robolink.methods.declaration.fields import ParameterField as Parameter
+from robolink.methods.declaration.fields import bare
 from robolink.recipe.file.tables import Table
 
 

@@ -26,6 +26,10 @@ from robolink_simulators.hosting.in_process import softmotion as plc_in_process
 from robolink_simulators.hosting.streams.tcp_host import TcpHost
 from robolink_simulators.softmotion.smc_errors import BlockRefused
 
+LEAST_THINKING_S: Final = 0.35
+"""However fast simulated time passes, a person who thinks at all really answers no sooner: a driver
+takes it for typed ahead when an answer comes before the question can have been read."""
+
 _MAX_LINE: Final = 65536
 _SCHEME: Final = "assist+tcp"
 _IN_PROCESS: Final[Mapping[str, Callable[[str], Assisted]]] = {
@@ -104,11 +108,15 @@ class _AssistLink:
             return b""
         try:
             answer: dict[str, Any] = {"ok": True, **perform(self._simulator, request)}
-            if "thinks_s" in answer:  # whoever asks waits by the clock that really passes
-                answer["thinks_s"] = self._clock.really_takes_s(answer["thinks_s"])
+            if "thinks_s" in answer:
+                answer["thinks_s"] = self._real_thinking_s(answer["thinks_s"])
         except (RobolinkError, SpelRefusal, BlockRefused) as error:
             answer = {"ok": False, "error": str(error)}
         return json.dumps(answer).encode() + b"\n"
+
+    def _real_thinking_s(self, thinks_s: float) -> float:
+        """Return how long they think by the clock that really passes, which whoever asks has."""
+        return max(self._clock.really_takes_s(thinks_s), min(thinks_s, LEAST_THINKING_S))
 
 
 class AssistClient(ClosedAtExit):

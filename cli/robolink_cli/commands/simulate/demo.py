@@ -14,13 +14,20 @@ from robolink_cli.session.context import json_option
     show_default=True,
     help="How many times faster than real the simulated time passes.",
 )
+@click.option(
+    "--operator",
+    type=click.Choice(["careful", "careless"]),
+    default="careful",
+    show_default=True,
+    help="Who touches the pin; a careless person only presses ENTER, and must not be believed.",
+)
 @json_option
-def demo(seed: int, speed: float) -> None:
+def demo(seed: int, speed: float, operator: str) -> None:
     """Change the nozzle of a simulated EPSON SCARA, then of a simulated SoftMotion PLC.
 
     The SCARA is reached over a TCP connection on this machine's loopback, the PLC through its
     mailbox inside this process. No machine is touched.
     """
-    from robolink_cli.commands.simulate.demonstration import demonstrate
+    from robolink_cli.commands.simulate.demonstration import DemoOperator, demonstrate
 
-    demonstrate(seed=seed, speed=speed)
+    demonstrate(seed=seed, speed=speed, operator=DemoOperator(operator))

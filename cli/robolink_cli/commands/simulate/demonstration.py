@@ -1,20 +1,22 @@
 """The demonstration: serve a simulator, connect to it, change a nozzle, compare with truth."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 
-from robolink_simulators.assist.port import InProcessEyes
+from robolink_simulators.assist.port import LEAST_THINKING_S, InProcessEyes
 from robolink_simulators.cell.clock import ScaledClock
+from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.in_process.softmotion import simulator_named
 from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 
 import robolink
-from robolink.errors import VerifyError
+from robolink.errors import CalibrationError, VerifyError
 from robolink.journal import memory_journal
 from robolink.messages import tr
-from robolink.model import Controller, ToolOffset
+from robolink.model import Controller
 from robolink.nozzle_change import (
     ChangePlan,
     Listener,
@@ -23,16 +25,29 @@ from robolink.nozzle_change import (
     ToolPlan,
     ToolReport,
 )
+from robolink_cli.commands.simulate.demonstrated import (
+    TOOL,
+    AcceptedChange,
+    DemonstratedChange,
+    RefusedChange,
+)
 from robolink_cli.console.render import emit_json, json_is_on, say
 from robolink_cli.prompts.operator import AssistedOperator
-from robolink_cli.views.calibration import report_payload, show_proposal, show_report
-from robolink_cli.views.documents import offset_payload
-
-TOOL = 1
+from robolink_cli.views.calibration import show_proposal
 
 _KINEMATICS = "Kin_Scara3_Z"
 
 _OF_INTEREST = tuple(f'> $Execute,"{word} ' for word in ("Tool", "TLSet", "Move", "Go"))
+
+
+class DemoOperator(StrEnum):
+    """Who stands at the demonstrated cells."""
+
+    CAREFUL = "careful"
+    """Jogs the tip onto the pin whenever asked to."""
+
+    CARELESS = "careless"
+    """Only presses ENTER."""
 
 
 class WireLog:
@@ -62,87 +77,54 @@ class WireLog:
         return shown
 
 
-@dataclass(frozen=True, slots=True)
-class Demonstrated:
-    """A nozzle change on one simulated controller, next to the truth.
+def demonstrate(*, seed: int, speed: float, operator: DemoOperator) -> None:
+    """Run the demonstration and show it, or hand over its document.
 
-    Attributes:
-        kind: Kind of controller.
-        robot: What moves.
-        report: What was measured, written and verified.
-        truth: Where the tip really is.
-        exchanges: Requests that it took.
+    Raises:
+        CalibrationError, VerifyError: A careful person was refused.
+        RuntimeError: A careless one was believed, which is a defect, or a refusal left another tool
+            in force.
     """
-
-    kind: str
-    robot: str
-    report: ToolReport
-    truth: ToolOffset
-    exchanges: int
-
-    @property
-    def error_mm(self) -> float:
-        """How far from the truth the tip was found, in the plane."""
-        found, true = self.report.proposal.offset, self.truth
-        return math.dist(found.components()[:2], true.components()[:2])
-
-    @property
-    def drift_mm(self) -> float:
-        """The largest drift about the new tip."""
-        if self.report.verification is None:
-            raise VerifyError(tr("The demonstration was not verified."))
-        return self.report.verification.max_drift_mm
-
-    def payload(self) -> dict[str, object]:
-        """Return it as plain JSON."""
-        return {
-            "kind": self.kind,
-            "robot": self.robot,
-            "recovered": offset_payload(self.report.proposal.offset),
-            "truth": offset_payload(self.truth),
-            "error_mm": self.error_mm,
-            "drift_mm": self.drift_mm,
-            "exchanges": self.exchanges,
-            **report_payload(self.report),
+    epson = _on_epson(seed, speed, operator)
+    say()
+    plc = _on_plc(seed, operator)
+    both = (epson, plc)
+    if operator is DemoOperator.CARELESS:
+        require_refused(both)
+    if json_is_on():
+        document = {
+            "simulated": True,
+            "operator": operator.value,
+            "controllers": [one.payload() for one in both],
         }
+        emit_json("robolink/demo/2", document)
 
-    def show(self) -> None:
-        """Say how it ended, and how far off it was."""
-        say()
-        show_report(self.report)
-        say(
-            tr(
-                "The true tip is at X {x:.3f} Y {y:.3f}: found with an error of {error:.3f} mm, "
-                "by {exchanges} exchanges. Checked against the simulator, not a robot.",
-                x=self.truth.x_mm,
-                y=self.truth.y_mm,
-                error=self.error_mm,
-                exchanges=self.exchanges,
-            )
+
+def require_refused(changes: Sequence[DemonstratedChange]) -> None:
+    """Raise unless every one of some changes by a careless person was refused.
+
+    Raises:
+        RuntimeError: Names where the person was believed.
+    """
+    believed = [one.robot for one in changes if isinstance(one, AcceptedChange)]
+    if believed:
+        raise RuntimeError(
+            tr("The careless person was believed, on {robots}.", robots=", ".join(believed))
         )
 
 
-def demonstrate(*, seed: int, speed: float) -> None:
-    """Run the demonstration and show it, or hand over its document."""
-    epson = _on_epson(seed, speed)
-    say()
-    plc = _on_plc(seed)
-    if json_is_on():
-        both = [epson.payload(), plc.payload()]
-        emit_json("robolink/demo/2", {"simulated": True, "controllers": both})
-
-
-def _on_epson(seed: int, speed: float) -> Demonstrated:
+def _on_epson(seed: int, speed: float, operator: DemoOperator) -> DemonstratedChange:
     """Change a nozzle on a simulated EPSON SCARA, over a real TCP connection."""
-    simulator = EpsonSimulator("T6-602S", seed=seed)
+    # The driver has the clock that really passes, and so has the person whom it asks.
+    share, thinks_s = _stays_share(operator), LEAST_THINKING_S
+    world = WorldParameters(person_stays_share=share, person_thinks_s=thinks_s)
+    simulator = EpsonSimulator("T6-602S", seed=seed, world=world)
     wire = WireLog()
     with serve_tcp(simulator, clock=ScaledClock(speed)) as host:
-        _announce(tr("SIMULATED EPSON T6-602S, served at {url}", url=host.url))
+        _announce(tr("SIMULATED EPSON T6-602S, served at {url}", url=host.url), operator)
         outcomes = memory_journal(host.url).log(host.url)
         with robolink.connect(host.url, outcomes=outcomes, trace=wire) as controller:
-            report = _change(controller, InProcessEyes(simulator))
-            exchanges = controller.exchanges
-    done = Demonstrated("epson", "T6-602S", report, simulator.world.tips[TOOL], exchanges)
+            done = _Cell("epson", "T6-602S", simulator, operator).change(controller)
     done.show()
     say()
     say(tr("sent on the wire (left out: reads, and low power and speed before each move):"))
@@ -151,35 +133,70 @@ def _on_epson(seed: int, speed: float) -> Demonstrated:
     return done
 
 
-def _on_plc(seed: int) -> Demonstrated:
+def _on_plc(seed: int, operator: DemoOperator) -> DemonstratedChange:
     """Change a nozzle on a simulated SoftMotion PLC, in this process and in simulated time."""
-    url = f"softmotion+sim://demo-{seed}?kinematics={_KINEMATICS}&seed={seed}"
-    _announce(tr("SIMULATED CODESYS SoftMotion PLC, {url}", url=url))
+    name = f"demo-{seed}-{operator}"
+    url = f"softmotion+sim://{name}?kinematics={_KINEMATICS}&seed={seed}"
+    if operator is DemoOperator.CARELESS:
+        url += f"&world.person_stays_share={_stays_share(operator):g}"
+    _announce(tr("SIMULATED CODESYS SoftMotion PLC, {url}", url=url), operator)
     with robolink.connect(url) as controller:
-        simulator = simulator_named(f"demo-{seed}")
-        report = _change(controller, InProcessEyes(simulator))
-        exchanges = controller.exchanges
-    done = Demonstrated("softmotion", _KINEMATICS, report, simulator.world.tips[TOOL], exchanges)
+        cell = _Cell("softmotion", _KINEMATICS, simulator_named(name), operator)
+        done = cell.change(controller)
     done.show()
     return done
 
 
-def _announce(simulated: str) -> None:
+def _stays_share(operator: DemoOperator) -> float:
+    return 1.0 if operator is DemoOperator.CARELESS else 0.0
+
+
+def _announce(simulated: str, operator: DemoOperator) -> None:
     say(simulated)
     say(tr("The nozzle was changed; tool {tool} still holds the old tip.", tool=TOOL))
+    if operator is DemoOperator.CARELESS:
+        say(tr("The person at this cell only presses ENTER: the tip never comes onto the pin."))
     say()
 
 
-def _change(controller: Controller, eyes: InProcessEyes) -> ToolReport:
-    controller.motors(True)
-    change = NozzleChange(
-        controller,
-        ChangePlan((ToolPlan(TOOL),), ask_before_write=False),
-        operator=AssistedOperator.with_eyes(eyes, lambda text: say(f"  {text}"), tool=lambda: TOOL),
-        listener=_Shown(),
-    )
-    (report,) = change.run().tools
-    return report
+@dataclass(frozen=True, slots=True)
+class _Cell:
+    """A simulated cell, with the person at it."""
+
+    kind: str
+    robot: str
+    simulator: EpsonSimulator | SoftMotionSimulator
+    operator: DemoOperator
+
+    def change(self, controller: Controller) -> DemonstratedChange:
+        """Change the nozzle, and return how it ended; a careless person may be refused."""
+        before = controller.tools.read(TOOL)
+        truth = self.simulator.world.tips[TOOL]
+        try:
+            report = self._report(controller)
+        except (CalibrationError, VerifyError) as error:
+            if self.operator is not DemoOperator.CARELESS:
+                raise
+            held = controller.tools.read(TOOL)
+            if held is None or not controller.tools.same(held, before):
+                raise RuntimeError(tr("The refusal left another tool in force.")) from error
+            return RefusedChange(
+                self.kind, self.robot, truth, controller.exchanges, error, in_force=held
+            )
+        return AcceptedChange(self.kind, self.robot, truth, controller.exchanges, report)
+
+    def _report(self, controller: Controller) -> ToolReport:
+        controller.motors(True)
+        person = AssistedOperator.with_eyes(
+            InProcessEyes(self.simulator),
+            lambda text: say(f"  {text}"),
+            tool=lambda: TOOL,
+            clock=controller.clock,
+        )
+        plan = ChangePlan((ToolPlan(TOOL),), ask_before_write=False)
+        change = NozzleChange(controller, plan, operator=person, listener=_Shown())
+        (report,) = change.run().tools
+        return report
 
 
 class _Shown(Listener):

@@ -9,7 +9,7 @@ from annotated_types import Ge, Gt, Le
 
 from robolink.messages import tr
 from robolink.methods import ParameterField, fields_of
-from robolink.methods.fields import bare, refusals
+from robolink.methods.declaration.fields import bare, refusals
 
 _NUMBERS = (float, int)
 

@@ -6,17 +6,17 @@ from typing import TYPE_CHECKING
 from robolink.errors import ConfigError
 from robolink.files.toml import Problem
 from robolink.messages import tr
-from robolink.methods.declaration import (
+from robolink.methods.declaration.fields import fields_of, refusals
+from robolink.methods.declaration.method import (
     NOTHING_STATED,
     AnyMethod,
     Check,
     MethodParameters,
     StatedLimits,
 )
-from robolink.methods.fields import fields_of, refusals
 
 if TYPE_CHECKING:
-    from robolink.methods.site import Site
+    from robolink.methods.declaration.site import Site
     from robolink.model import WorkBox
     from robolink.procedures import TipSource
 

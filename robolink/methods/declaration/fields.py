@@ -9,7 +9,7 @@ from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 from annotated_types import Ge, Gt, Le, Len, MaxLen, MinLen
 
 from robolink.files.key_problems import at_least, at_most, holds_at_least, holds_at_most, more_than
-from robolink.methods.declaration import Help, Option, Unit
+from robolink.methods.declaration.method import Help, Option, Unit
 
 _NOTES = "__annotations__"
 _UNITS = ("_mm_s", "_mm_per_px", "_mm", "_deg")

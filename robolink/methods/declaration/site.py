@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from robolink.model import Controller
+    from robolink.model import Controller, TipSensor
     from robolink.stations import Station  # what --help does without
 
 
@@ -20,6 +20,8 @@ class Site:
         sigma_mm: Standard deviation of one coordinate of one measurement, where it is known.
         max_change_mm: Largest change that is believed.
         interval_mm: Largest half width of a 95 % interval that is believed, if one is judged.
+        sensor: The camera: open, or its name or URL; it goes before what parameters and station
+            say. ``None`` leaves it to them. One that is open is left open.
     """
 
     controller: "Controller"
@@ -29,6 +31,7 @@ class Site:
     sigma_mm: float | None = None
     max_change_mm: float = 2.0
     interval_mm: float | None = None
+    sensor: "str | TipSensor | None" = None
 
     def stating(self, **details: object) -> "Station":
         """Return the station with what the parameters say of it; ``None`` says nothing."""

@@ -10,7 +10,7 @@ from robolink.calibration import MIN_ROTATION_DEG, CameraModel, angle_spread_deg
 from robolink.errors import ConfigError
 from robolink.files.toml import Problem
 from robolink.messages import tr
-from robolink.methods.declaration import (
+from robolink.methods.declaration.method import (
     DEGREES,
     MM,
     Angle,
@@ -25,7 +25,8 @@ from robolink.procedures import HALF_ROUND_DEG, LookPlan
 from robolink.ways import Way, way
 
 if TYPE_CHECKING:
-    from robolink.methods.site import Site
+    from robolink.methods.declaration.site import Site
+    from robolink.model import TipSensor
     from robolink.stations import CameraStation
 
 Turns = Annotated[
@@ -144,15 +145,15 @@ class LookParameters(MethodParameters):
             yield Problem("mm_per_px", tr("maps all pixels onto one line"))
 
 
-def camera_at(parameters: LookParameters, site: "Site") -> "tuple[str, CameraStation]":
-    """Return the camera's name or URL, and where it looks.
+def camera_at(parameters: LookParameters, site: "Site") -> "tuple[str | TipSensor, CameraStation]":
+    """Return the camera, its name or URL, and where it looks.
 
     Raises:
         ConfigError: Nobody knows one of them.
     """
     from robolink.stations import camera_station, sensor_of  # what --help does without
 
-    sensor = parameters.sensor or sensor_of(site.station)
+    sensor = site.sensor or parameters.sensor or sensor_of(site.station)
     if not sensor:
         raise ConfigError(
             tr("Nobody knows through which sensor station {id} sees.", id=site.station.id),

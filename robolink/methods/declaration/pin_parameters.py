@@ -8,7 +8,7 @@ from annotated_types import Ge, Le
 
 from robolink.files.toml import Problem
 from robolink.messages import tr
-from robolink.methods.declaration import MM, Check, Help, MethodParameters
+from robolink.methods.declaration.method import MM, Check, Help, MethodParameters
 from robolink.procedures import TouchPlan
 
 

@@ -15,7 +15,7 @@ from robolink.files.toml import Problem
 from robolink.stations import StationKind
 
 if TYPE_CHECKING:
-    from robolink.methods.site import Site
+    from robolink.methods.declaration.site import Site
     from robolink.procedures import PoseMethod, TipSource
 
 

@@ -34,16 +34,20 @@ def render(report: Report, *others: Report) -> str:
     reports = (report, *others)
     style = files("robolink.report").joinpath("style.css").read_text(encoding="utf-8")
     numbers = ", ".join(str(one.tool) for one in reports)
-    return _environment().get_template("page.html").render(
-        title=tr("Tool {tool} of {controller}", tool=numbers, controller=report.controller),
-        policy=_POLICY,
-        # The style is the one text that is not escaped: a page takes it as it stands.
-        style=Markup(style),  # noqa: S704 - a file of this package
-        heading=summary.heading(reports),
-        facts=summary.facts(reports),
-        reports=reports,
-        record=report.record,
-        report=report,
+    return (
+        _environment()
+        .get_template("page.html")
+        .render(
+            title=tr("Tool {tool} of {controller}", tool=numbers, controller=report.controller),
+            policy=_POLICY,
+            # The style is the one text that is not escaped: a page takes it as it stands.
+            style=Markup(style),
+            heading=summary.heading(reports),
+            facts=summary.facts(reports),
+            reports=reports,
+            record=report.record,
+            report=report,
+        )
     )
 
 
@@ -82,7 +86,7 @@ def figure(value: float, digits: int = 3) -> Markup:
 
 def drawn(one: Drawing) -> Markup:
     """Return a drawing as it stands in the page."""
-    return Markup(drawing(one.svg))  # noqa: S704 - made of elements, whose text is escaped
+    return Markup(drawing(one.svg))
 
 
 def drawings(report: Report) -> list[Drawing]:

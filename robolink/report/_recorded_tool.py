@@ -76,8 +76,8 @@ def _facts(said: Mapping[str, Any] | None) -> ControllerFacts:
     """Return what the controller said of itself when it was measured; nothing in old entries."""
     if said is None:
         return ControllerFacts()
-    lists = ("robot_models", "robot_serials")
-    return ControllerFacts(**{n: tuple(v) if n in lists else v for n, v in said.items()})
+    lists = {name: tuple(said.get(name, ())) for name in ("robot_models", "robot_serials")}
+    return ControllerFacts(**{**said, **lists})
 
 
 def _outcome(entries: Sequence[Recorded]) -> tuple[Outcome, str]:

@@ -11,7 +11,6 @@ from robolink.model import ControllerFacts, Pose, ToolOffset
 from robolink.report import Outcome, Report, render
 from robolink.report.pictures.fit import fit_drawings, interval_ellipse
 from robolink.report.pictures.pose_plan import pose_drawings
-from robolink.report.pictures.run_order import order_drawings
 
 TIP = ToolOffset(12.0, -3.5, -20.0)
 ERRORS = ((0.012, -0.004), (-0.009, 0.011), (0.003, 0.007), (-0.006, -0.010), (0.004, 0.002))

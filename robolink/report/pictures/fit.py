@@ -82,7 +82,8 @@ def _interval(result: CalibrationResult, axes: Axes) -> Drawing:
         )
     ]
     said = tr(
-        "Tip on the flange: X \u00b1 {x:.4f} mm, Y \u00b1 {y:.4f} mm, each 95 % for its axis alone.",
+        "Tip on the flange: X \u00b1 {x:.4f} mm, Y \u00b1 {y:.4f} mm, "
+        "each 95 % for its axis alone.",
         x=halves[0],
         y=halves[1],
     )

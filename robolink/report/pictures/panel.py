@@ -89,6 +89,6 @@ def dot_names(places: Sequence[Place], texts: Sequence[str]) -> Iterator[Element
     for place in places:
         paper.take_line(place, place)
     for place, text in zip(places, texts, strict=True):
-        corner = paper.place(place, 5.6 * len(text), 9.0, gap=5.0)
+        corner = paper.place(place, 6.4 * len(text), 10.5, gap=5.0)
         if corner is not None:
-            yield words(text, corner[0], corner[1] + 8.0, class_="name")
+            yield words(text, corner[0], corner[1] + 9.0, class_="name")

@@ -55,9 +55,9 @@ def _stands(panel: PlotPanel, poses: Sequence[Pose], rejected: Sequence[int]) ->
         kind = "largest" if number in rejected else "point"
         yield element("g", *arrow(start, end), circle(start, 3.0), class_=kind)
         text = str(number + 1)
-        corner = paper.place(start, 5.6 * len(text), 9.0, gap=5.0)
+        corner = paper.place(start, 6.4 * len(text), 10.5, gap=5.0)
         if corner is not None:
-            yield words(text, corner[0], corner[1] + 8.0, class_="name")
+            yield words(text, corner[0], corner[1] + 9.0, class_="name")
 
 
 def _turned(panel: PlotPanel, pose: Pose) -> tuple[Place, Place]:

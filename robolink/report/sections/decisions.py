@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from robolink.calibration import DriftVerdict, GUARD_FACTOR, VerifyResult
+from robolink.calibration import GUARD_FACTOR, DriftVerdict, VerifyResult
 from robolink.messages import tr
 from robolink.report._values import Outcome, Report
 

@@ -13,7 +13,7 @@ AXES: Final = ("X mm", "Y mm", "Z mm", "U deg", "V deg", "W deg")
 
 
 @dataclass(frozen=True, slots=True)
-class Component:
+class OffsetComponent:
     """One component of the offset; ``None`` stands for what is not known.
 
     Attributes:
@@ -42,9 +42,9 @@ class OffsetTables:
         kept_title: What they are.
     """
 
-    own: tuple[Component, ...]
+    own: tuple[OffsetComponent, ...]
     own_title: str
-    kept: tuple[Component, ...]
+    kept: tuple[OffsetComponent, ...]
     kept_title: str
 
     @property
@@ -70,7 +70,7 @@ def offsets(report: Report) -> OffsetTables | None:
     return OffsetTables(own, tr("Measured"), kept, tr("Kept, not measured"))
 
 
-def _components(report: Report) -> Iterator[Component]:
+def _components(report: Report) -> Iterator[OffsetComponent]:
     before = [None] * 6 if report.before is None else report.before.components()
     after = [None] * 6 if report.after is None else report.after.components()
     fit = report.fit
@@ -79,4 +79,4 @@ def _components(report: Report) -> Iterator[Component]:
         change = None
         if old is not None and new is not None:
             change = angle_difference_deg(new, old) if name.endswith("deg") else new - old
-        yield Component(axis, old, new, change, halves.get(name))
+        yield OffsetComponent(axis, old, new, change, halves.get(name))

@@ -55,9 +55,7 @@ def heading(reports: Sequence[Report]) -> Heading:
     endings = dict.fromkeys(report.ending for report in reports if report.ending)
     record = worst.record
     suspicion = record.check if record is not None and record.problems else ""
-    return Heading(
-        title, _verdict(worst.outcome), _TONES[worst.outcome], tuple(endings), suspicion
-    )
+    return Heading(title, _verdict(worst.outcome), _TONES[worst.outcome], tuple(endings), suspicion)
 
 
 def facts(reports: Sequence[Report]) -> list[tuple[str, str]]:

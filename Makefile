@@ -30,7 +30,7 @@ test: check ## Install everything, check the sources and run the tests.
 # What takes many minutes or asks a package index; docs/contributing.md says what stands for it
 # in `make test`.
 .PHONY: soak
-soak: $(VENV)/.installed-dev ## Run the tests that make test leaves out for their length.
+soak: $(VENV)/.installed-dev docs ## Run the tests that make test leaves out for their length; build the pages.
 	$(BIN)/python -m pytest -n 2 -m soak
 
 # Their files are called judge_*.py: a plain pytest, which takes test_*.py, leaves them out.

@@ -37,7 +37,7 @@ class ToolWrite(MarkedCommand[ToolOffset | None]):
     Attributes:
         tool: Number of the tool.
         requested: The new value as the controller can hold it; ``None`` clears the tool.
-        before: What it held, once :meth:`compare` has read it.
+        before: What it held, once :meth:`change` has read it.
 
     Args:
         link: The controller.

@@ -68,7 +68,7 @@ def _environment() -> Environment:
         "figure": figure,
         "drawn": drawn,
         "drawings": drawings,
-        "order": lambda report: list(order_drawings(report.fit)),
+        "order": lambda report: list(order_drawings(report.fit, report.evidence)),
         "offsets": offsets,
         "poses": pose_tables,
         "map_of": draw,

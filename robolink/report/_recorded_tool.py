@@ -15,7 +15,15 @@ from robolink.model import (
     with_method_name_now,
 )
 from robolink.report._recorded_fit import recorded_fit, recorded_pose
-from robolink.report._values import Attempt, GaugeOnRecord, Judgement, Outcome, Record, Report
+from robolink.report._values import (
+    Attempt,
+    GaugeOnRecord,
+    Judgement,
+    Outcome,
+    Record,
+    Report,
+    TouchOnRecord,
+)
 
 _ENDS: Final = {
     EntryKind.NOT_APPLIED: Outcome.NOT_APPLIED,
@@ -69,6 +77,8 @@ def report_of_tool(
         record=record,
         local_time=str(calibration.get("local_time", "")),
         gauges=tuple(GaugeOnRecord(**gauge) for gauge in calibration.get("gauges", ())),
+        touches=tuple(_touch(said) for said in calibration.get("touches", ()) if said),
+        evidence=calibration.get("evidence") or {},
     )
 
 
@@ -78,6 +88,17 @@ def _facts(said: Mapping[str, Any] | None) -> ControllerFacts:
         return ControllerFacts()
     lists = {name: tuple(said.get(name, ())) for name in ("robot_models", "robot_serials")}
     return ControllerFacts(**{**said, **lists})
+
+
+def _touch(said: Mapping[str, Any]) -> TouchOnRecord:
+    """Return how a touch was made; the robot stopped beside the pin or the person brought it."""
+    brought = said.get("arrival") is None
+    return TouchOnRecord(
+        standoff_mm=None if brought else tuple(said["standoff_mm"]),
+        jog_mm=None if brought else said["jog_mm"],
+        seconds=said["seconds"],
+        contact=said["contact"],
+    )
 
 
 def _outcome(entries: Sequence[Recorded]) -> tuple[Outcome, str]:

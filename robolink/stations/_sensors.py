@@ -19,7 +19,7 @@ class BeamStation:
     """Two crossed light beams.
 
     Attributes:
-        beams: Where they are, from the reference record (:func:`find_beams`).
+        beams: Where they are, from the reference record (:func:`robolink.calibration.find_beams`).
         z_mm: Their height in the base, where they cross.
         inputs: The input that each of them switches; the same one twice where both act on it.
         off_when_broken: Whether an input goes off, not on, while its beam is broken.
@@ -65,7 +65,7 @@ class CameraStation:
     Attributes:
         x_mm, y_mm: Point of the base to which marks are brought, near the middle of the image.
         z_mm: Height in the base at which it is in focus.
-        model: What its pixels mean, from :func:`measure_camera_affine`; ``None`` where it is
+        model: What its pixels mean, from ``calibrate camera-affine``; ``None`` where it is
             unknown, or where the camera answers in millimetres itself.
     """
 

@@ -316,7 +316,11 @@ def test_what_these_kinds_can_measure_is_accepted(text):
         ),
         (with_(PIVOT, "[source]", "count = 3"), "source.count", "must be at least 4"),
         (with_(PIVOT, "[source]", "tilt_deg = 50"), "source.tilt_deg", "must be at most 45"),
-        (with_(PIVOT, "[source]", "lift_mm = 2"), "source.clearance_mm", "must be smaller than"),
+        (
+            with_(PIVOT, "[source]", "lift_mm = 2"),
+            "source.clearance_mm",
+            "must be more than 1.8 below lift_mm",
+        ),
         (
             PIN.replace("number = 3", f"number = 3\nretreat = {at(1, 2)[:-1]}, v_deg = 5 }}"),
             "tools#1.retreat.v_deg",
@@ -355,8 +359,10 @@ def test_angles_that_spread_are_accepted(angles):
 
 
 def test_the_clearance_stays_below_the_lift():
-    found = problems(with_(PIN, "[source]", "lift_mm = 2"))
-    assert found == {"source.clearance_mm": "must be smaller than lift_mm, which is 2"}
+    found = problems(with_(PIN, "[source]", "lift_mm = 3.8"))
+    assert list(found) == ["source.clearance_mm"]
+    assert found["source.clearance_mm"].startswith("must be more than 1.8 below lift_mm")
+    assert problems(with_(PIN, "[source]", "lift_mm = 3.9")) == {}
 
 
 def test_the_lift_has_room_in_the_box():
@@ -403,6 +409,17 @@ def test_each_tool_stands_there_once():
 def test_each_tool_has_its_own_points_as_many_as_the_method_needs(method, points, where):
     text = with_(POINTS, "[source]", f'method = "{method}"').replace("points = [1, 2]", points)
     assert list(problems(text)) == ([where] if where else [])
+
+
+def test_a_file_of_poses_stands_in_place_of_points():
+    file = 'poses = { file = "a.csv", euler = "kuka" }'
+    assert problems(POINTS.replace("points = [1, 2]", file)) == {}
+    assert list(problems(f"{POINTS}{file}\n")) == ["tools#1.points"]
+    assert list(problems(f"{PIN}{file}\n")) == ["tools#1.poses"]
+    assert list(problems(POINTS.replace("points = [1, 2]", 'poses = { length = "ft" }'))) == [
+        "tools#1.poses.file",
+        "tools#1.poses.length",
+    ]
 
 
 def test_points_mean_nothing_where_a_person_measures():

@@ -46,6 +46,17 @@ def test_there_are_fifteen_slots(slot, opcode):
     assert client.refused(opcode, slot, pose=TOOL) == ErrorClass.SLOT_OUT_OF_RANGE
 
 
+@pytest.mark.parametrize(("unit_um", "longest"), [(1000.0, 10_000.0), (1_000_000.0, 10.0)])
+def test_a_tool_is_no_longer_than_ten_metres_whatever_the_unit(unit_um, longest):
+    client, _ = owning(options=PlcOptions(mailbox=MailboxOptions(unit_um=unit_um)))
+    client.done(Opcode.WRITE_TOOL, 7, pose=shifted(NO_TOOL, z=longest))
+    before = client.slot(7)
+    for axis in "xyz":
+        tool = shifted(NO_TOOL, **{axis: -1.01 * longest})
+        assert client.refused(Opcode.WRITE_TOOL, 7, pose=tool) == ErrorClass.OPERAND
+    assert client.slot(7) == before
+
+
 def test_selecting_sets_the_tool_and_answers_with_it():
     client, _ = owning()
     client.done(Opcode.WRITE_TOOL, 7, pose=TOOL)

@@ -30,7 +30,8 @@ class TerminalOperator:
     """Asks on the terminal, with a prompt that can be polled.
 
     The caller can look after the controller while the person takes their time; ``input()`` could
-    not be left. What was typed before something was shown is no answer to it: see :mod:`._lines`.
+    not be left. What was typed before something was shown is no answer to it: see
+    :mod:`robolink_cli.prompts.lines`.
     """
 
     def __init__(self, show: Callable[[str], None]) -> None:

@@ -141,7 +141,7 @@ def show_plan(payload: Mapping[str, object]) -> None:
 
 
 def show_steps(steps: object) -> None:
-    """Show the steps of :func:`planned_steps`."""
+    """Show the steps of :mod:`robolink_cli.views.planned_steps`."""
     assert isinstance(steps, list)  # noqa: S101 - made by planned_steps
     for number, step in enumerate(steps, start=1):
         say(f"{number:3}. {step['text']}")

@@ -34,9 +34,6 @@ _SENTENCES: Final[Mapping[str, Callable[[], str]]] = {
     "few_poses": lambda: tr("Few poses: four or more tell errors of placement from each other."),
     "large_rms": lambda: tr("The residuals are large for this method."),
     "large_residual": lambda: tr("One pose is far off; take it again."),
-    "sigma_too_small": lambda: tr(
-        "The poses scatter more than the stated standard deviation says."
-    ),
     "camera_moved": lambda: tr(
         "The camera sees things beside where they are: it was moved, or its calibration is old."
     ),
@@ -97,6 +94,10 @@ _SENTENCES: Final[Mapping[str, Callable[[], str]]] = {
     "chart_drift": lambda: tr("The chart shows a slow drift."),
     "resolution_floor": lambda: tr(
         "The poses agree better than their resolution; the interval follows the resolution."
+    ),
+    "height_not_assessed": lambda: tr(
+        "The flange leans, so an error of the tool's Z is in X and Y; nobody said how sure Z is, "
+        "and the interval leaves it out."
     ),
     "order_not_testable": lambda: tr(
         "Too few touches to see whether something moved meanwhile; from six on that shows."

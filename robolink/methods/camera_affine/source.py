@@ -67,11 +67,17 @@ class CameraAffineSource:
                 "seen_by": sensor_name(self.sensor),
                 "mm_per_px": [list(row) for row in model.mm_per_px],
                 "origin_mm": list(model.origin_mm),
+                "centre_mm": None if model.centre_mm is None else list(model.centre_mm),
+                "place_sigma_mm": model.place_sigma_mm,
+                "scale_sigma": model.scale_sigma,
             },
         )
 
     def require_ready(self) -> None:
-        """Find out whether the camera is there; see :class:`RequiresSensor`."""
+        """Find out whether the camera is there.
+
+        See :class:`~robolink.procedures.RequiresSensor`.
+        """
         with pixel_camera(self.sensor):
             pass
 

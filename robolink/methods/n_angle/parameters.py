@@ -11,7 +11,7 @@ from robolink.calibration import MIN_ROTATION_DEG, planar_sigma_gain
 from robolink.files.toml import Problem
 from robolink.messages import tr
 from robolink.methods.declaration.method import DEGREES, Angle, Check, Help, Length, Option
-from robolink.methods.declaration.pin_parameters import PinParameters
+from robolink.methods.declaration.pin_parameters import UprightPinParameters
 from robolink.model import Pose, angle_difference_deg
 from robolink.procedures import SamplingPolicy
 
@@ -19,7 +19,7 @@ _SAME_ANGLE_DEG: Final = 1e-9
 
 
 @dataclass(frozen=True, kw_only=True)
-class NAngleParameters(PinParameters):
+class NAngleParameters(UprightPinParameters):
     """How one pin is touched at several angles of U."""
 
     count: Annotated[
@@ -58,12 +58,12 @@ class NAngleParameters(PinParameters):
     def turns_deg(self) -> tuple[float, ...]:
         """U of the touches after the first, counted from it, in the order in which they are taken.
 
-        Angles that the person wrote are taken in the person's order.
+        Angles that the person wrote are taken in the person's order. Others never ascend: what
+        drifts from touch to touch would else look like a part of the tip
+        (docs/reference/evidence.md 8).
         """
         turns = self.touches_deg[1:]
-        if self.angles_deg is not None or not self.until_mm:
-            return turns
-        return most_informative_order(turns)
+        return turns if self.angles_deg is not None else most_informative_order(turns)
 
     @property
     def sampling(self) -> SamplingPolicy:

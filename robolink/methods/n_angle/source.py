@@ -38,7 +38,7 @@ class NAngleSource(ManualPinSource):
 
     def _steps(self, stored: ToolOffset | None, *, live: bool) -> Procedure[CalibrationResult]:
         return measure_n_angle(
-            self.touch,
+            self._touching(live=live),
             turns_deg=self.turns_deg,
             stored=stored,
             sigma_mm=self.sigma_mm,
@@ -60,7 +60,7 @@ class ManyTouches:
     sigma_mm: float | None = None
 
     def solve(self, flange: Sequence[Pose], stored: ToolOffset | None) -> CalibrationResult:
-        """Solve three poses and more; see :class:`PoseMethod`."""
+        """Solve three poses and more; see :class:`~robolink.procedures.PoseMethod`."""
         from robolink.calibration import solve_n_angle  # numpy, which a look does without
 
         return solve_n_angle(flange, stored=stored, sigma_mm=self.sigma_mm)

@@ -46,7 +46,11 @@ def _source(parameters: OneTouchParameters, site: Site) -> "TipSource":
 
         return OneTouchSource(_solver(parameters, site), parameters.touch)
 
-    return LazySource(make, sentence=tr("measured on the robot: one pin touched once"))
+    return LazySource(
+        make,
+        sentence=tr("measured on the robot: one pin touched once"),
+        clearance_mm=parameters.clearance_mm,
+    )
 
 
 def _from_poses(parameters: OneTouchParameters, site: Site) -> "PoseMethod":
@@ -70,7 +74,7 @@ METHOD = Method(
     pose_help=PoseHelp(
         points=tr("The one point taught on the pendant with the tip on the pin."),
         typed=tr("The pose X,Y,Z,U in mm and degrees with the tip on the pin."),
-        path=tr("A .json or .csv file with the one pose."),
+        path=tr("A file with the one pose."),
     ),
     by_reference=False,
     formerly=(Former(kind="one_touch"),),

@@ -41,7 +41,7 @@ class SixPointSource(PivotSource):
         from robolink.methods.six_point.procedure import measure_six_point  # numpy, as in the pivot
 
         return measure_six_point(
-            self.touch,
+            self._touching(live=live),
             self.ways,
             tilts=self.tilts,
             stored=require_known_tip(stored),
@@ -66,7 +66,10 @@ class SixPoints:
     sigma_mm: float | None = None
 
     def solve(self, flange: Sequence[Pose], stored: ToolOffset | None) -> CalibrationResult:
-        """Solve five poses and more, the last two away from the pin; see :class:`PoseMethod`."""
+        """Solve five poses and more, the last two away from the pin.
+
+        See :class:`~robolink.procedures.PoseMethod`.
+        """
         from robolink.calibration import solve_six_point  # numpy, which a look does without
 
         if len(flange) < LEAST_OF_SIX_POINTS:

@@ -8,13 +8,13 @@ from annotated_types import Ge, Le
 from robolink.calibration import MIN_ROTATION_DEG, planar_sigma_gain
 from robolink.messages import tr
 from robolink.methods.declaration.method import DEGREES, Help, Option
-from robolink.methods.declaration.pin_parameters import PinParameters, two_poses_agree
+from robolink.methods.declaration.pin_parameters import UprightPinParameters, two_poses_agree
 from robolink.model import Pose
 from robolink.procedures import TouchPlan
 
 
 @dataclass(frozen=True, kw_only=True)
-class TwoPoseParameters(PinParameters):
+class TwoPoseParameters(UprightPinParameters):
     """How one pin is touched at two angles of U."""
 
     turn_deg: Annotated[
@@ -29,9 +29,7 @@ class TwoPoseParameters(PinParameters):
     @property
     def touch(self) -> TouchPlan:
         """The same for a procedure."""
-        return replace(
-            TouchPlan(lift_mm=self.lift_mm, clearance_mm=self.clearance_mm), turn_deg=self.turn_deg
-        )
+        return replace(super().touch, turn_deg=self.turn_deg)
 
     def no_residual(self) -> str:
         """Return why residuals cannot be judged."""

@@ -1,7 +1,7 @@
 """The residuals in the order in which the poses were taken: what moved meanwhile shows here."""
 
-from collections.abc import Iterator, Sequence
-from typing import Final
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, Final
 from xml.etree.ElementTree import Element
 
 from robolink.calibration import CalibrationResult
@@ -19,8 +19,15 @@ _LOWEST_MM: Final = 0.005
 _KINDS: Final = ("x", "y", "z")
 
 
-def order_drawings(result: CalibrationResult | None) -> Iterator[Drawing]:
-    """Yield the plot of a measurement of several poses that leave residuals."""
+def order_drawings(
+    result: CalibrationResult | None, evidence: Mapping[str, Any]
+) -> Iterator[Drawing]:
+    """Yield the plot of a measurement of several poses that leave residuals.
+
+    Args:
+        result: The measurement.
+        evidence: Figures of its checks, those of the order among them where it could be tested.
+    """
     if result is None or len(result.residuals_mm) < _LEAST:
         return
     if not any(any(residual) for residual in result.residuals_mm):
@@ -44,7 +51,7 @@ def order_drawings(result: CalibrationResult | None) -> Iterator[Drawing]:
         viewBox=f"0 0 {WIDTH:g} {_HEIGHT + _TOP + _BELOW:g}",
         role="img",
     )
-    yield Drawing(svg, _said(result))
+    yield Drawing(svg, _said(result, evidence))
 
 
 def _axes(residuals: Sequence[Sequence[float]]) -> list[tuple[int, str, str]]:
@@ -54,17 +61,26 @@ def _axes(residuals: Sequence[Sequence[float]]) -> list[tuple[int, str, str]]:
     return [(axis, _KINDS[axis].upper(), _KINDS[axis]) for axis in range(len(residuals[0]))]
 
 
-def _said(result: CalibrationResult) -> str:
-    plot = tr("Residuals in the order in which the poses were taken, base.")
+def _said(result: CalibrationResult, evidence: Mapping[str, Any]) -> str:
+    said = [tr("Residuals in the order in which the poses were taken, base.")]
     if "step_in_run_order" in result.warnings:
-        told = tr("A step shows: something moved between two of them.")
-    elif "drift_in_run_order" in result.warnings:
-        told = tr("A drift shows from the first to the last.")
-    elif "order_not_testable" in result.notes:
-        told = tr("So few cannot show whether something moved meanwhile.")
-    else:
-        return plot
-    return f"{plot} {told}"
+        said.append(tr("A step shows: something moved between two of them."))
+    if "drift_in_run_order" in result.warnings:
+        said.append(tr("A drift shows from the first to the last."))
+    if "order_not_testable" in result.notes:
+        said.append(tr("So few cannot show whether something moved meanwhile."))
+    if evidence.get("step_f") is not None:
+        said.append(
+            tr(
+                "Test for a step: F {step:.1f}, beyond {step_limit:.1f} it counts; for a drift: "
+                "F {drift:.1f}, beyond {drift_limit:.1f}.",
+                step=evidence["step_f"],
+                step_limit=evidence["step_f_limit"],
+                drift=evidence["drift_f"],
+                drift_limit=evidence["drift_f_limit"],
+            )
+        )
+    return " ".join(said)
 
 
 class _Plot:

@@ -27,10 +27,13 @@ def interval_sentences(fit: CalibrationResult) -> tuple[str, ...]:
 
 
 def _what_it_rests_on(fit: CalibrationResult) -> str:
-    if fit.interval_from == "resolution":
-        return tr("The interval rests on the resolution of the poses, which scatter less than it.")
-    stated = fit.interval_from == "stated" or (fit.sigma_stated and not fit.interval_from)
-    if stated and fit.sigma_mm is not None:
+    if fit.interval_from == "resolution" and fit.sigma_mm is not None:
+        return tr(
+            "The interval rests on the step of the jogs, {step:g} mm.",
+            step=fit.sigma_mm * math.sqrt(12),
+        )
+    from_residuals = fit.interval_from == "residuals"
+    if fit.sigma_stated and fit.sigma_mm is not None and not from_residuals:
         return tr(
             "The interval rests on a stated standard deviation of {sigma:g} mm of one placement.",
             sigma=fit.sigma_mm,

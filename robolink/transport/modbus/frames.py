@@ -46,11 +46,11 @@ class TcpFraming:
         self._framer = FramerSocket(DecodePDU(is_server=False))
 
     def pack(self, request: ModbusRequest, transaction: int) -> bytes:
-        """See :meth:`Framing.pack`."""
+        """See ``Framing.pack``."""
         return self._framer.encode(_payload(request), request.unit, transaction)
 
     def take(self, buffer: bytearray) -> ModbusReply | None:
-        """See :meth:`Framing.take`."""
+        """See ``Framing.take``."""
         if len(buffer) < FramerSocket.MIN_SIZE:
             return None
         counted = int.from_bytes(buffer[4:6], "big")
@@ -74,11 +74,11 @@ class RtuFraming:
         self._framer = FramerRTU(DecodePDU(is_server=False))
 
     def pack(self, request: ModbusRequest, transaction: int) -> bytes:  # noqa: ARG002 - not numbered
-        """See :meth:`Framing.pack`."""
+        """See ``Framing.pack``."""
         return self._framer.encode(_payload(request), request.unit, 0)
 
     def take(self, buffer: bytearray) -> ModbusReply | None:
-        """See :meth:`Framing.take`."""
+        """See ``Framing.take``."""
         if len(buffer) < FramerRTU.MIN_SIZE:
             return None
         kind = self._framer.decoder.lookupPduClass(bytes(buffer))

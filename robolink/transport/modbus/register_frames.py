@@ -18,15 +18,15 @@ _MOST_BYTES_COUNTED: Final = 254  # unit and PDU, in the header of a TCP frame
 
 
 class RegisterTcpFraming:
-    """See :class:`._modbus_frames.TcpFraming`."""
+    """See ``TcpFraming``."""
 
     def pack(self, request: ModbusRequest, transaction: int) -> bytes:
-        """See :meth:`Framing.pack`."""
+        """See ``Framing.pack``."""
         payload = _payload(request)
         return _HEADER.pack(transaction, 0, len(payload) + 1, request.unit) + payload
 
     def take(self, buffer: bytearray) -> ModbusReply | None:
-        """See :meth:`Framing.take`."""
+        """See ``Framing.take``."""
         if len(buffer) < _HEADER.size + 1:
             return None
         transaction, protocol, counted, unit = _HEADER.unpack_from(buffer)
@@ -41,15 +41,15 @@ class RegisterTcpFraming:
 
 
 class RegisterRtuFraming:
-    """See :class:`._modbus_frames.RtuFraming`."""
+    """See ``RtuFraming``."""
 
     def pack(self, request: ModbusRequest, transaction: int) -> bytes:  # noqa: ARG002 - not numbered
-        """See :meth:`Framing.pack`."""
+        """See ``Framing.pack``."""
         frame = bytes([request.unit]) + _payload(request)
         return frame + _crc(frame)
 
     def take(self, buffer: bytearray) -> ModbusReply | None:
-        """See :meth:`Framing.take`."""
+        """See ``Framing.take``."""
         if len(buffer) < 5:
             return None
         function = buffer[1]

@@ -46,7 +46,7 @@ class Flash:
                 raise ValueError(state["robot"])
             self._machine.tools.restore(state["tools"])
             serial = state.get("serial")
-        except (OSError, KeyError, TypeError, ValueError) as error:
+        except (OSError, KeyError, RecursionError, TypeError, ValueError) as error:
             raise ConfigError(
                 tr(
                     "{path} is no saved state of a simulated {robot}.", path=self._path, robot=robot
@@ -89,5 +89,8 @@ def forget_volatile(machine: Machine, now_ns: int) -> None:
     machine.outputs.clear()
     machine.memory.clear()
     machine.timed_bits.clear()
-    machine.settings = RobotSettings(home_pulses=machine.settings.home_pulses)
-    machine.points, machine.locals = PointTable(), LocalTable()
+    home = machine.settings.home_pulses
+    machine.settings = RobotSettings.of(machine.model.axes)
+    machine.settings.home_pulses = home
+    machine.points = PointTable()
+    machine.locals = LocalTable(tilting=machine.model.six_axes)

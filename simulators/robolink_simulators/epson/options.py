@@ -36,6 +36,7 @@ class SpelNumbers:
     guard_open: int = 4026
     joint_free: int = 4027
     other_robot: int = 4028
+    joint_too_fast: int = 4242  # docs/reference/spel.md 10
     arm_undefined: int = 4012
     ecp_undefined: int = 4013
     pallet_undefined: int = 4014
@@ -196,7 +197,7 @@ def read_profile(path: Path) -> Mapping[str, str]:
         if document["schema"] != PROFILE_SCHEMA:
             raise ValueError(document["schema"])
         return {str(name): str(value) for name, value in document["options"].items()}
-    except (OSError, AttributeError, KeyError, TypeError, ValueError) as error:
+    except (OSError, AttributeError, KeyError, RecursionError, TypeError, ValueError) as error:
         raise ConfigError(
             tr("{path} is not a cell profile.", path=path),
             remedy=tr("Give a file that 'robolink verify-controller --profile' has written."),

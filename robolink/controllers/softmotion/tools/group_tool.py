@@ -19,7 +19,7 @@ class GroupTool:
         self._mailbox = mailbox
 
     def read(self, mode: ReadMode = ReadMode.SET) -> ToolOffset | None:
-        """Read it; see :meth:`SoftMotionToolTable.read_mode`."""
+        """Read it; see ``SoftMotionToolTable.read_mode``."""
         draft = Command(0, Opcode.READ_TOOL, operands=(mode, 0, 0, 0))
         try:
             now = self._mailbox.commands.carry_out(draft)

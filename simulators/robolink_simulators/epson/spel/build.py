@@ -1,4 +1,4 @@
-"""The parser's reductions turned into the values of :mod:`_tree`, bottom up."""
+"""The parser's reductions turned into values of ``epson.spel.tree``, bottom up."""
 
 from typing import Any, cast
 

@@ -35,8 +35,8 @@ def open_epson(
             the tools), ``split`` (1 cuts what arrives into random pieces), ``world.NAME`` (see
             ``WorldParameters``) and any field of ``EpsonOptions`` as options.
         timeout_s: Not needed; part of the contract of an opener.
-        clock: A :class:`ManualClock` becomes the clock of a new simulator. Any other clock
-            is left aside: simulated time is the simulator's own.
+        clock: A :class:`~robolink_simulators.cell.clock.ManualClock` becomes the clock of a new
+            simulator. Any other clock is left aside: simulated time is the simulator's own.
 
     Raises:
         ConfigError: An option is unknown, does not fit, or contradicts how the simulator of

@@ -34,8 +34,8 @@ def open_softmotion(
             parameter of the kinematics, ``world.NAME`` (see ``WorldParameters``), and any field
             of ``GroupOptions`` and ``MailboxOptions`` as options.
         timeout_s: Longest wait for an answer, in simulated time.
-        clock: A :class:`ManualClock` becomes the clock of a new simulator. Any other clock
-            is left aside: simulated time is the simulator's own.
+        clock: A :class:`~robolink_simulators.cell.clock.ManualClock` becomes the clock of a new
+            simulator. Any other clock is left aside: simulated time is the simulator's own.
 
     Raises:
         ConfigError: An option is unknown, does not fit, or contradicts how the simulator of

@@ -34,7 +34,7 @@ _LENGTH: Final = click.FloatRange(min=0, min_open=True)
 
 
 def calibration_options(function: Callable[..., None]) -> Callable[..., int | None]:
-    """Add the options of the frame; the method is passed a :class:`Frame` and its own options.
+    """Add the options of the frame; the method gets a ``CalibrationRequest`` and its own.
 
     Limits that nobody typed are taken from the cell, for the method's own options too.
     """

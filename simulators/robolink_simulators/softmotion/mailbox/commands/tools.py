@@ -36,6 +36,8 @@ from robolink_simulators.softmotion.smc_errors import BlockRefused
 
 _NO_TOOL: Final[Six] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 _COUPLING: Final = "+"
+_LONGEST_MM: Final = 10_000.0
+"""What is longer is no tool but a mistake (docs/mailbox.md, "Tools")."""
 
 
 class ToolDesk:
@@ -104,7 +106,9 @@ class ToolDesk:
     def _write(self, command: Command) -> Told:
         number = require_slot(command.operands[0])
         require_finite(command.pose)
-        if not (command.name.isascii() and command.name.isprintable()):
+        lengths_mm = self._units.pose(command.pose)[:3]
+        named = command.name.isascii() and command.name.isprintable()
+        if not named or max(map(abs, lengths_mm)) > _LONGEST_MM:
             raise Rejected(ErrorClass.OPERAND)
         told = done()
         if number == self.selected:

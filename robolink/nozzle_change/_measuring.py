@@ -63,7 +63,11 @@ class Measuring:
             plan.criteria.judge_fit(result)
             proposal = self._listener.adjusted(Proposal(tool, before, result), context)
         entry = calibration_entry(
-            proposal, plan.criteria, source=plan.source.sentence, facts=self._facts
+            proposal,
+            plan.criteria,
+            source=plan.source.sentence,
+            facts=self._facts,
+            gauge=plan.gauge,
         )
         context.controller.outcomes.append(entry)
         self._listener.moment(Moment.AFTER_MEASURE, context, tool)

@@ -12,6 +12,7 @@ from robolink.nozzle_change._acceptance import AcceptanceCriteria
 from robolink.nozzle_change._proposal import Proposal
 from robolink.procedures import jog_mm
 from robolink.runner import SeenAt, TouchedAt
+from robolink.stations import Gauge
 
 
 def calibration_entry(
@@ -20,6 +21,7 @@ def calibration_entry(
     *,
     source: str,
     facts: ControllerFacts | None = None,
+    gauge: Gauge | None = None,
 ) -> NewEntry:
     """Return the record of a measurement that was believed, with all that it rests on.
 
@@ -28,6 +30,7 @@ def calibration_entry(
         criteria: What was allowed.
         source: How it was measured, one sentence.
         facts: Which machine it was, where it was asked.
+        gauge: The gauge that was measured against, where one is known.
     """
     result = proposal.result
     details: dict[str, object] = {
@@ -39,6 +42,7 @@ def calibration_entry(
         # Entries are labelled in UTC; whoever stood there knows it by the clock on the wall.
         "local_time": datetime.now().astimezone().isoformat(timespec="seconds"),
         **({} if facts is None else {"facts": asdict(facts)}),
+        "gauges": [] if gauge is None else [asdict(gauge)],
         **_result(result),
         **proposal.record,
     }

@@ -123,7 +123,10 @@ def test_the_page_says_who_when_with_what_and_what_came_of_it(run, recorded, sim
     code, out, _ = run("report", change[:4], "page.html", "--json")
     document = json.loads(out)
     assert (code, document["change"], document["problems"]) == (0, change, [])
-    assert document["tools"] == [{"tool": 1, "outcome": "verified"}]
+    (tool,) = document["tools"]
+    assert (tool["tool"], tool["outcome"], tool["method"]) == (1, "verified", "two-pose")
+    assert tool["measured"] == ["x_mm", "y_mm"]
+    assert tool["local_time"] is None  # an entry of before does not say it
     text = text_of(tmp_path / "page.html")
     for words in (
         f"controller {simulator.url}",

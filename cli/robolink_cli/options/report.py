@@ -177,7 +177,7 @@ class ReportDraft:
 
 def _touches(poses: "Sequence[Pose]") -> "Iterator[TouchOnRecord]":
     """Yield how a person made each touch."""
-    from robolink.procedures.pin.judging import jog_mm
+    from robolink.procedures import jog_mm
     from robolink.report import TouchOnRecord
     from robolink.runner import TouchedAt
 

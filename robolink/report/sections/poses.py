@@ -33,7 +33,7 @@ class PoseRow:
 
 
 @dataclass(frozen=True, slots=True)
-class PoseTable:
+class PoseRows:
     """A table of poses.
 
     Attributes:
@@ -51,7 +51,7 @@ class PoseTable:
     residuals: bool
 
 
-def pose_tables(report: Report) -> list[PoseTable]:
+def pose_tables(report: Report) -> list[PoseRows]:
     """Return the poses that went in, and those of measurements that were refused."""
     tables = []
     if report.poses:
@@ -68,7 +68,7 @@ def pose_tables(report: Report) -> list[PoseTable]:
 
 def _table(
     title: str, why: str, poses: Sequence[Pose], fit: CalibrationResult | None, *, heights: bool
-) -> PoseTable:
+) -> PoseRows:
     names = ["x_mm", "y_mm", *(["z_mm"] if heights else []), "u_deg"]
     names += [name for name in ("v_deg", "w_deg") if any(getattr(pose, name) for pose in poses)]
     handed = any(pose.hand for pose in poses)
@@ -91,7 +91,7 @@ def _table(
                 left_out=left_out,
             )
         )
-    return PoseTable(title, why, tuple(columns), tuple(rows), bool(residuals))
+    return PoseRows(title, why, tuple(columns), tuple(rows), bool(residuals))
 
 
 def _named(number: int, count: int, fit: CalibrationResult | None, *, left_out: bool) -> str:

@@ -359,7 +359,7 @@ def test_each_touch_tells_how_it_fits_and_the_worst_alone_is_made_again():
     assert [text.partition(" agree")[0] for text in cell.told] == [
         f"{count} touches" for count in (3, 4, 5, 6, 6)
     ]
-    assert "; Z is known to +-" in cell.told[0]
+    assert "; Z is known to ±" in cell.told[0]
     assert "One more, at 1 mm/s, leaves 75 % of that." in cell.told[0]
     (question, when), *_ = cell.offers
     assert question.startswith("Touch 3, at 2 mm/s, fits worst: it is 0.2")

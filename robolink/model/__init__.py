@@ -35,8 +35,11 @@ if TYPE_CHECKING:
     from robolink.model._tools import plain_offset as plain_offset
     from robolink.model._tools import read_offset as read_offset
     from robolink.model._tools import tool_changed as tool_changed
+    from robolink.model.motion.geometry import Elbow as Elbow
     from robolink.model.motion.geometry import Hand as Hand
     from robolink.model.motion.geometry import Pose as Pose
+    from robolink.model.motion.geometry import Posture as Posture
+    from robolink.model.motion.geometry import Wrist as Wrist
     from robolink.model.motion.geometry import angle_difference_deg as angle_difference_deg
     from robolink.model.motion.geometry import rotate_xy as rotate_xy
     from robolink.model.motion.movement import Motion as Motion
@@ -75,7 +78,7 @@ else:
         {
             "_controller": "Act Capabilities Controller ControllerState ControllerStatus",
             "record.findings": "Finding Resolver Verdict",
-            "motion.geometry": "Hand Pose angle_difference_deg rotate_xy",
+            "motion.geometry": "Elbow Hand Pose Posture Wrist angle_difference_deg rotate_xy",
             "_identity": "ControllerFacts Identity Who is_own_name",
             "record.journal_entries": "EntryKind NewEntry Recorded Signature",
             "record.ledger": "Account Ledger",

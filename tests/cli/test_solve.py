@@ -6,6 +6,7 @@ import subprocess
 import sys
 from typing import Any
 
+import numpy as np
 import pytest
 from robolink_cli import main
 from robolink_cli.commands.measure.solve.solving import METHODS
@@ -15,6 +16,7 @@ from robolink_cli.commands.measure.solve.touch_methods import TOUCH_METHODS
 from robolink.calibration import Beam
 from robolink.model import rotate_xy
 from tests.calibration._simulated import pivoting
+from tests.calibration.test_surface_touches import on_plane, on_sphere
 
 UNITS = {"length": "mm", "angle": "deg"}
 PIN = (310.0, 95.0)
@@ -23,6 +25,12 @@ PIN = (310.0, 95.0)
 def on_pin(u, tip=(12.5, -3.25), **more):
     dx, dy = rotate_xy(tip[0], tip[1], u)
     return {"x": PIN[0] - dx, "y": PIN[1] - dy, "u": u, **more}
+
+
+def touching(surface):
+    """Return poses of a tip at (12, -5, 120) on a surface."""
+    poses = surface(np.random.default_rng(1))
+    return [dict(zip("xyzuvw", pose.coordinates(), strict=True)) for pose in poses]
 
 
 ROUND = [on_pin(u) for u in (0, 90, 180, 270)]
@@ -89,7 +97,8 @@ def test_a_person_reads_lines(tmp_path, capsys):
     shown = capsys.readouterr().out
     assert "two_pose: ok" in shown
     assert "offset mm: 12.500  -3.250" in shown
-    assert "95 %: x_mm 12.4723 to 12.5277" in shown
+    assert "95 %, alone: x_mm 12.4723 to 12.5277" in shown
+    assert "type B 0.0141 mm" in shown
     assert "not measured: z_mm" in shown
 
 
@@ -313,6 +322,30 @@ MORE: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
         {"sightings": [{"flange": p, "tip": {"x": PIN[0], "y": PIN[1]}} for p in ROUND]},
         {"offset": [12.5, -3.25], "centre_mm": [0, 0]},
     ),
+    "length_change": (
+        {"before_z": [-60.0, -60.02], "after_z": [-60.01], "stored_z": -20, "sigma_z_mm": 0.02},
+        {"height_change_mm": 0, "limit_mm": 0.1, "offset_z": -20},
+    ),
+    "station_shift": (
+        {
+            "shifts": [{"tool": 1, "vector": [0.03, 0.04], "touch_sigma_mm": 0.05}],
+            "tolerance_mm": 0.5,
+        },
+        {"chi_square": 0.5, "common_mm": [0.03, 0.04]},
+    ),
+    "needle_chain": (
+        {"u0_mm": 0.02, "sigma_mm": 0.01, "changes": 6, "reference": "both_touched"},
+        {"u_mm": 0.04},
+    ),
+    "station_chain": (
+        {"u_station_mm": 0.03, "sigma_mm": 0.01, "tools": [1, 2, 3]},
+        {"correlation": 0.9},
+    ),
+    "plane_touch": ({"poses": touching(on_plane)}, {"offset": [12, -5, 120]}),
+    "sphere_touch": (
+        {"poses": touching(on_sphere), "radius_mm": 12.7},
+        {"offset": [12, -5, 120], "reference_point": [400, 50, -80]},
+    ),
     "gauge_rr": (
         {
             "values": [[[1.0, 1.2], [1.0, 1.2]], [[4.0, 4.2], [4.0, 4.2]]],
@@ -431,6 +464,26 @@ def test_a_refusal_is_shown_to_a_person(tmp_path, capsys):
     path.write_text(json.dumps(REFUSED["degenerate_angles"]))
     assert main.run(["solve", str(path)]) == 7
     assert "n_angle: error (degenerate_angles)" in capsys.readouterr().out
+
+
+def test_a_length_waits_for_a_decision_and_shows_its_figures(solved):
+    heights = {"before_z": [-60.0] * 4, "after_z": [-59.5] * 4, "stored_z": -20.0}
+    code, undecided = solved(case("length_change", **heights))
+    assert (code, undecided["status"], undecided["codes"]) == (7, "error", ["length_changed"])
+    assert undecided["z_by_difference_mm"] == -20.5
+    for decision, z_mm in (("difference", -20.5), ("keep", -20.0), ("measure", None)):
+        code, decided = solved(case("length_change", **heights, decision=decision))
+        assert (code, decided["status"], decided["offset_z"]) == (0, "warn", z_mm)
+    code, moved = solved(case("length_change", **heights, pin_moved=True))
+    assert (code, moved["codes"]) == (7, ["length_not_observable"])
+
+
+def test_a_station_may_be_undecided(solved):
+    shift = {"tool": 1, "vector": [0.1, 0, 0], "touch_sigma_mm": 0.02, "seat_sigma_mm": [0.1] * 3}
+    code, answer = solved(case("station_shift", shifts=[shift], tolerance_mm=0.2))
+    assert (code, answer["status"], answer["codes"]) == (0, "warn", ["station_undecided"])
+    code, pooled = solved(case("station_shift", shifts=[shift], tolerance_mm=0.2, seat_changes=8))
+    assert pooled["chi_square_limit"] > answer["chi_square_limit"]
 
 
 def test_no_method_is_left_untried():

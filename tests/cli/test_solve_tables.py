@@ -89,6 +89,19 @@ def test_a_file_that_is_no_text_is_a_usage_error(solved):
     assert (code, answer["error"]["kind"]) == (2, "ConfigError")
 
 
+def test_two_poses_of_a_program_of_another_maker_are_solved(solved):
+    text = "DECL POS XA={X 287.5,Y 103.25,Z -50,A 0,B 0,C 0}\n"
+    text += "DECL POS XB={X 312.5,Y 96.75,Z -50,A 180,B 0,C 0}\n"
+    _, answer = solved(text, "--method", "two_pose")
+    assert answer["offset"][:2] == pytest.approx([12.5, -3.25])
+
+
+def test_poses_of_another_tool_are_refused(solved):
+    text = "x,y,u,tool\n287.5,103.25,0,3\n312.5,96.75,180,3\n"
+    code, answer = solved(text, "--method", "two_pose")
+    assert (code, answer["error"]["code"]) == (7, "tool_pose")
+
+
 def test_the_options_of_a_table_need_a_method(solved):
     code, answer = solved("{}", "--sigma", "0.1")
     assert code == 2

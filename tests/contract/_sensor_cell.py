@@ -8,7 +8,7 @@ from itertools import count
 from typing import Any
 
 from robolink_simulators.cell.clock import ManualClock
-from robolink_simulators.cell.tip_switches import UPRIGHT, LightBeam, TipSwitch, TouchPlate
+from robolink_simulators.cell.tip_switches import STANDING, LightBeam, TipSwitch, TouchPlate
 from robolink_simulators.cell.workplace import XyzMm
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.in_process import softmotion
@@ -60,9 +60,9 @@ class EitherOf:
 
     switches: tuple[TipSwitch, ...]
 
-    def trips(self, tip_mm: XyzMm, lean: tuple[float, float] = UPRIGHT) -> bool:
+    def trips(self, tip_mm: XyzMm, shaft: tuple[float, float, float] = STANDING) -> bool:
         """Tell whether any of them trips."""
-        return any(switch.trips(tip_mm, lean) for switch in self.switches)
+        return any(switch.trips(tip_mm, shaft) for switch in self.switches)
 
 
 @dataclass(frozen=True)
@@ -71,9 +71,9 @@ class Inverted:
 
     switch: TipSwitch
 
-    def trips(self, tip_mm: XyzMm, lean: tuple[float, float] = UPRIGHT) -> bool:
+    def trips(self, tip_mm: XyzMm, shaft: tuple[float, float, float] = STANDING) -> bool:
         """Tell whether it does not trip."""
-        return not self.switch.trips(tip_mm, lean)
+        return not self.switch.trips(tip_mm, shaft)
 
 
 @dataclass(frozen=True)

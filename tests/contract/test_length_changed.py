@@ -7,7 +7,7 @@ from robolink_cli.prompts import operator as _operator
 
 from robolink.journal import EntryKind
 from robolink.model import ToolOffset
-from tests.contract._method_cell import method_cell
+from tests.contract._method_cell import KINDS, method_cell
 
 pytestmark = pytest.mark.simulator_only
 
@@ -25,17 +25,14 @@ def station_z(arm):
     return arm.recorded(EntryKind.STATION)[0].details["z_mm"]
 
 
-@pytest.mark.parametrize(
-    ("kind", "method"), [("plc", ("two-pose", *AT_PIN)), ("epson", ("n-angle", *FOUR))]
-)
-def test_half_a_millimetre_shorter_is_refused_where_nobody_decides(
-    kind, method, tmp_path, monkeypatch
-):
-    with method_cell(kind, tmp_path, monkeypatch) as cell:
-        shorter_by_half_a_millimetre(cell, method)
+@pytest.fixture(params=KINDS)
+def cell(request, tmp_path, monkeypatch):
+    with method_cell(request.param, tmp_path, monkeypatch) as cell:
+        yield cell
 
 
-def shorter_by_half_a_millimetre(cell, method):
+def test_half_a_millimetre_shorter_is_refused_where_nobody_decides(cell):
+    method = ("two-pose", *AT_PIN)
     first = cell.calibrate(*method)
     assert first.code == 0, first.err
     before = cell.stored
@@ -49,15 +46,24 @@ def shorter_by_half_a_millimetre(cell, method):
     assert "--if-length-changed" in error["remedy"]
     assert cell.stored == before
     assert cell.recorded(EntryKind.REFUSED)[0].details["code"] == "length_changed"
-    followed = cell.calibrate(*method, "--if-length-changed", "difference")
+    assert cell.recorded(EntryKind.DONE)[0].details["touch"]["touches"] == len(
+        first.document["poses"]
+    )
+
+
+def test_z_follows_the_heights_where_that_was_decided(arm):
+    assert arm.calibrate("n-angle", *FOUR).code == 0
+    before = arm.stored
+    arm.lengthen(-0.5)
+    followed = arm.calibrate("n-angle", *FOUR, "--if-length-changed", "difference")
     assert followed.code == 0, followed.err
-    assert cell.stored.z_mm - before.z_mm == pytest.approx(0.5, abs=0.12)
+    assert arm.stored.z_mm - before.z_mm == pytest.approx(0.5, abs=0.12)
     told = followed.document["length"]
     assert told["changed"]
     assert told["written"] == "difference"
     assert "length_changed" in followed.document["warnings"]
     # Now Z is right for this tip, and there is nothing to say.
-    again = cell.calibrate(*method)
+    again = arm.calibrate("n-angle", *FOUR)
     assert again.code == 0, again.err
     assert not again.document["length"]["changed"]
     assert again.document["warnings"] == []
@@ -183,7 +189,7 @@ z = "kept"
 
 [source]
 kind = "n-angle"
-count = 4
+count = 3
 {more}
 
 [station]

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import pytest
 from robolink_simulators.cell.clock import ManualClock, ScaledClock
+from robolink_simulators.cell.frames import axis_and_angle, zyz
 from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_tcp
-from robolink_simulators.softmotion.kinematics.frames import axis_and_angle, zyz
 from robolink_simulators.softmotion.mailbox import (
     MailboxOptions,
     PlcOptions,

@@ -39,7 +39,7 @@ from robolink.recipe._loading import _checked
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples" / "recipes").iterdir())
 KINDS = (
     'must be one of "beams", "board", "camera", "camera-affine", "n-angle", "one-touch", "pivot", '
-    '"points", "six-point", "two-pose", "z-touch"'
+    '"points", "runout-table", "six-point", "two-pose", "z-touch"'
 )
 LEAST = """\
 schema = "robolink/recipe/1"

@@ -3,9 +3,7 @@ import math
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from robolink_simulators.softmotion import BlockRefused, CoordRef, CoordSystem, ErrorKind
-from robolink_simulators.softmotion.kinematics.coordinates import CoordinateTransforms
-from robolink_simulators.softmotion.kinematics.frames import (
+from robolink_simulators.cell.frames import (
     NO_TURN,
     ORIGIN,
     X_AXIS,
@@ -18,6 +16,8 @@ from robolink_simulators.softmotion.kinematics.frames import (
     zyz,
     zyz_angles,
 )
+from robolink_simulators.softmotion import BlockRefused, CoordRef, CoordSystem, ErrorKind
+from robolink_simulators.softmotion.kinematics.coordinates import CoordinateTransforms
 from robolink_simulators.softmotion.kinematics.orientation import about_z, yaw_deg
 
 angles = st.floats(-360, 360)

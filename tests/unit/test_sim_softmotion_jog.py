@@ -5,16 +5,7 @@ from itertools import pairwise
 from math import atan2, degrees, hypot
 
 import pytest
-from robolink_simulators.softmotion import (
-    AxisGroup,
-    CoordRef,
-    CoordSystem,
-    Dynamics,
-    ErrorKind,
-    JogCommand,
-    SmcGroupState,
-)
-from robolink_simulators.softmotion.kinematics.frames import (
+from robolink_simulators.cell.frames import (
     NO_TURN,
     X_AXIS,
     Y_AXIS,
@@ -23,6 +14,15 @@ from robolink_simulators.softmotion.kinematics.frames import (
     about,
     axis_and_angle,
     product,
+)
+from robolink_simulators.softmotion import (
+    AxisGroup,
+    CoordRef,
+    CoordSystem,
+    Dynamics,
+    ErrorKind,
+    JogCommand,
+    SmcGroupState,
 )
 from robolink_simulators.softmotion.kinematics.kinematics import ANY_CONFIGURATION, AxisKind
 from robolink_simulators.softmotion.kinematics.orientation import OrientationSpace

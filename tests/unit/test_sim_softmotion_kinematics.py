@@ -1,11 +1,7 @@
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from robolink_simulators.softmotion import BlockRefused, CoordRef, ErrorKind, machine_named
-from robolink_simulators.softmotion.catalogue import NAMES, parameter_names
-from robolink_simulators.softmotion.kinematics.coupled import CAxis, Coupled, scara3_z
-from robolink_simulators.softmotion.kinematics.five_axes import FiveAxes
-from robolink_simulators.softmotion.kinematics.frames import (
+from robolink_simulators.cell.frames import (
     NO_TURN,
     ORIGIN,
     X_AXIS,
@@ -17,6 +13,10 @@ from robolink_simulators.softmotion.kinematics.frames import (
     transposed,
     zyz,
 )
+from robolink_simulators.softmotion import BlockRefused, CoordRef, ErrorKind, machine_named
+from robolink_simulators.softmotion.catalogue import NAMES, parameter_names
+from robolink_simulators.softmotion.kinematics.coupled import CAxis, Coupled, scara3_z
+from robolink_simulators.softmotion.kinematics.five_axes import FiveAxes
 from robolink_simulators.softmotion.kinematics.kinematics import ANY_CONFIGURATION, Configuration
 from robolink_simulators.softmotion.kinematics.orientation import (
     Freedom,

@@ -6,6 +6,7 @@ from itertools import pairwise
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from robolink_simulators.cell.frames import Z_AXIS, turned
 from robolink_simulators.softmotion import (
     CoordRef,
     CoordSystem,
@@ -16,7 +17,6 @@ from robolink_simulators.softmotion import (
     machine_named,
 )
 from robolink_simulators.softmotion.catalogue import NAMES
-from robolink_simulators.softmotion.kinematics.frames import Z_AXIS, turned
 from robolink_simulators.softmotion.kinematics.kinematics import Configuration
 
 from tests.unit._softmotion_machine import (

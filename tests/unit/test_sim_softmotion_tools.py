@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import pytest
+from robolink_simulators.cell.frames import zyz
 from robolink_simulators.softmotion import (
     AxisGroup,
     BlockRefused,
@@ -16,7 +17,6 @@ from robolink_simulators.softmotion import (
     machine_named,
 )
 from robolink_simulators.softmotion.catalogue import NAMES
-from robolink_simulators.softmotion.kinematics.frames import zyz
 from robolink_simulators.softmotion.kinematics.positions import Gantry3
 
 from tests.unit._softmotion_machine import (

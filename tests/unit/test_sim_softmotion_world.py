@@ -3,6 +3,7 @@
 import math
 
 import pytest
+from robolink_simulators.cell.frames import zyx_angles
 from robolink_simulators.cell.tip_switches import LightBeam, TouchPlate
 from robolink_simulators.softmotion import (
     AxisGroup,
@@ -16,7 +17,6 @@ from robolink_simulators.softmotion import (
     machine_named,
 )
 from robolink_simulators.softmotion.catalogue import NAMES
-from robolink_simulators.softmotion.kinematics.frames import zyx_angles
 
 from robolink.errors import ConfigError
 from robolink.model import ToolOffset

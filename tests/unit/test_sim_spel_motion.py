@@ -3,7 +3,7 @@
 import random
 
 import pytest
-from robolink_simulators.epson.arm.kinematics import Joints
+from robolink_simulators.epson.arm.joints import Joints
 from robolink_simulators.epson.arm.robots import find_robot
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.options import EpsonOptions, SpelNumbers
@@ -124,7 +124,7 @@ def test_a_jump_rises_to_limz_before_it_travels_and_comes_down_at_the_end(cell):
     assert execution.done
     assert max(joints.j3_mm for joints in path) == pytest.approx(-20)
     for joints in path:
-        turning = joints.j1_deg not in (pytest.approx(start.j1_deg), pytest.approx(path[-1].j1_deg))
+        turning = joints[0] not in (pytest.approx(start[0]), pytest.approx(path[-1][0]))
         assert not turning or joints.j3_mm == pytest.approx(-20)
     assert cell.tip() == pytest.approx((200, 420, -70, 0), abs=1e-9)
     assert cell.machine.arm.moves_started == 1

@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robolink.errors import RemoteProtocolError
-from robolink.model import Hand
+from robolink.model import Hand, Posture
 from robolink.protocols.spel import PrintedPoint, format_point, parse_point
 
 CAPTURE = " X: -182.632 Y:  240.114 Z:  -20.002 U:  -36.156 V:    0.000 W:    0.000 /R /0"
@@ -46,6 +46,7 @@ def test_the_real_capture_is_read_and_written_again():
                 Hand.RIGHT,
                 ("R", "A", "NF", "J4F0", "J1A(-12.5)", "0"),
                 0,
+                Posture(),
             ),
         ),
         ("X:1 Y:2 Z:3 U:4/L/15", PrintedPoint((1.0, 2.0, 3.0, 4.0), Hand.LEFT, ("L", "15"), 15)),

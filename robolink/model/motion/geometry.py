@@ -11,17 +11,60 @@ from enum import StrEnum
 
 
 class Hand(StrEnum):
-    """Arm configuration of a SCARA: which way the elbow points."""
+    """Arm configuration: which way a SCARA's elbow points, or a six-axis arm reaches.
+
+    Of six axes the right hand has its wrist before the axis of joint 1, the left hand reaches
+    over backwards (docs/reference/epson-robots.md, "Flags").
+    """
 
     RIGHT = "right"
     LEFT = "left"
+
+
+class Elbow(StrEnum):
+    """Whether a six-axis arm bends above or below the line from joint 2 to its wrist."""
+
+    ABOVE = "above"
+    BELOW = "below"
+
+
+class Wrist(StrEnum):
+    """To which side joint 5 of a six-axis arm is bent."""
+
+    NO_FLIP = "no_flip"
+    FLIP = "flip"
+
+
+@dataclass(frozen=True, slots=True)
+class Posture:
+    """What, beside the hand, tells apart the ways in which an arm reaches one pose.
+
+    Elbow and wrist are a six-axis arm's; the joint flags say in which turn a joint stands
+    (docs/reference/epson-robots.md, "Flags"). Robots without such a joint have 0.
+
+    Attributes:
+        elbow: Above or below.
+        wrist: Flipped or not.
+        j1_flag: 0, or 1 beyond the first turn of joint 1.
+        j2_flag: The same of joint 2, of an arm that folds under itself.
+        j4_flag: 1 where joint 4 stands beyond half a turn.
+        j6_flag: How many half turns joint 6 stands beyond the first.
+    """
+
+    elbow: Elbow = Elbow.ABOVE
+    wrist: Wrist = Wrist.NO_FLIP
+    j1_flag: int = 0
+    j2_flag: int = 0
+    j4_flag: int = 0
+    j6_flag: int = 0
 
 
 @dataclass(frozen=True, slots=True)
 class Pose:
     """Where a frame carried by the robot is, seen from the base.
 
-    ``tool`` says which frame: 0 is the flange, 1 to 15 a tool's tip, ``None`` unknown.
+    ``tool`` says which frame: 0 is the flange, 1 to 15 a tool's tip, ``None`` unknown. ``posture``
+    is ``None`` where the controller tells none, as of a SCARA.
     """
 
     x_mm: float
@@ -33,6 +76,7 @@ class Pose:
     hand: Hand | None = None
     local: int = 0
     tool: int | None = None
+    posture: Posture | None = None
 
     def coordinates(self) -> tuple[float, float, float, float, float, float]:
         """Return x, y, z in mm and u, v, w in degrees."""

@@ -10,7 +10,7 @@ from typing import Final, NewType, TypeVar
 from robolink.errors import LocalProtocolError
 from robolink.messages import tr
 from robolink.model import Hand, Pose, ToolOffset
-from robolink.protocols.spel._values import decimal
+from robolink.protocols.spel._values import decimal, posture_marks
 
 Statement = NewType("Statement", str)
 """One SPEL+ statement, fit for Execute."""
@@ -122,8 +122,11 @@ def _point(target: Pose, *, six_axes: bool) -> str:
             tr("A target in local {local} cannot be moved to.", local=target.local),
             remedy=tr("Give the target in local 0, the robot's base."),
         )
-    hand = "" if target.hand is None else _HANDS[target.hand]
-    return f"{_xy(target.coordinates(), six_axes=six_axes)}{hand} /0"
+    flags = "" if target.hand is None else _HANDS[target.hand]
+    if target.posture is not None:
+        marks = posture_marks(target.posture, six_axes=six_axes)
+        flags += "".join(f" /{mark}" for mark in marks)
+    return f"{_xy(target.coordinates(), six_axes=six_axes)}{flags} /0"
 
 
 def _xy(values: tuple[float, ...], *, six_axes: bool) -> str:

@@ -18,7 +18,7 @@ from typing import Final, Literal
 
 from robolink.errors import ConfigError, RemoteProtocolError
 from robolink.messages import tr
-from robolink.model import Hand, ToolOffset
+from robolink.model import Elbow, Hand, Posture, ToolOffset, Wrist
 
 NUMBER: Final = r"[+-]?[0-9]{1,18}(?:\.[0-9]{1,18})?"
 """A plain decimal, as a part of larger patterns."""
@@ -36,6 +36,9 @@ _FLAG: Final = rf"/[A-Z0-9]{{1,6}}(?:\({NUMBER}\))?"
 _POINT: Final = re.compile(rf"\s*{_FOUR}(?:{_TWO})?(?P<flags>(?:\s*{_FLAG})*)\s*", re.ASCII)
 _HANDS: Final = {"R": Hand.RIGHT, "L": Hand.LEFT}
 _MARKS: Final = {hand: mark for mark, hand in _HANDS.items()}
+_ELBOWS: Final = {"A": Elbow.ABOVE, "B": Elbow.BELOW}
+_WRISTS: Final = {"NF": Wrist.NO_FLIP, "F": Wrist.FLIP}
+_JOINT_FLAG: Final = re.compile(r"J([1246])F([0-9]{1,3})", re.ASCII)
 _HIGHEST_LOCAL: Final = 15
 
 _LINE: Final = re.compile(
@@ -125,20 +128,70 @@ class PrintedPoint:
         hand: ``/R`` or ``/L``, ``None`` when neither was printed.
         flags: Every flag as printed, without the slash, for example ``("R", "0")``.
         local: The local that the coordinates are in; 0 when none was printed.
+        posture: Elbow, wrist and joint flags, ``None`` when none of them was printed.
     """
 
     coordinates: tuple[float, ...]
     hand: Hand | None = None
     flags: tuple[str, ...] = ()
     local: int = 0
+    posture: Posture | None = None
 
     @classmethod
     def of(
-        cls, coordinates: tuple[float, ...], *, hand: Hand | None = None, local: int = 0
+        cls,
+        coordinates: tuple[float, ...],
+        *,
+        hand: Hand | None = None,
+        local: int = 0,
+        posture: Posture | None = None,
+        six_axes: bool = False,
     ) -> "PrintedPoint":
-        """Return a point with the flags that a SCARA prints: hand, then local."""
-        marks = () if hand is None else (_MARKS[hand],)
-        return cls(coordinates, hand, (*marks, str(local)), local)
+        """Return a point with its flags: hand, those of the posture, then local.
+
+        What a six-axis robot prints besides the hand was seen nowhere (assumed).
+        """
+        marks: tuple[str, ...] = () if hand is None else (_MARKS[hand],)
+        if posture is not None:
+            marks += posture_marks(posture, six_axes=six_axes)
+        return cls(coordinates, hand, (*marks, str(local)), local, posture)
+
+
+def posture_marks(posture: Posture, *, six_axes: bool) -> tuple[str, ...]:
+    """Return the flags of a posture without their slashes, ``A NF J4F0 J6F0`` for instance.
+
+    Source: docs/reference/spel.md 5.1; J1F is written where it is not 0, and J2F on an arm without
+    elbow and wrist only.
+    """
+    first = (f"J1F{posture.j1_flag}",) if posture.j1_flag else ()
+    if not six_axes:
+        return (*first, f"J2F{posture.j2_flag}") if posture.j2_flag else first
+    elbow = "A" if posture.elbow is Elbow.ABOVE else "B"
+    wrist = "NF" if posture.wrist is Wrist.NO_FLIP else "F"
+    return (elbow, wrist, *first, f"J4F{posture.j4_flag}", f"J6F{posture.j6_flag}")
+
+
+def _posture(flags: tuple[str, ...]) -> Posture | None:
+    """Return the posture that flags name; what they leave out is that of a point without flags.
+
+    Raises:
+        ValueError: They contradict each other.
+    """
+    named: dict[str, Elbow | Wrist | int] = {}
+    for flag in flags:
+        entry: tuple[str, Elbow | Wrist | int]
+        joint = _JOINT_FLAG.fullmatch(flag)
+        if joint is not None:
+            entry = f"j{joint[1]}_flag", int(joint[2])
+        elif flag in _ELBOWS:
+            entry = "elbow", _ELBOWS[flag]
+        elif flag in _WRISTS:
+            entry = "wrist", _WRISTS[flag]
+        else:
+            continue
+        if named.setdefault(*entry) != entry[1]:
+            raise ValueError(flag)
+    return Posture(**named) if named else None  # type: ignore[arg-type]
 
 
 def parse_point(text: str) -> PrintedPoint:
@@ -156,11 +209,16 @@ def parse_point(text: str) -> PrintedPoint:
     local, *more = [int(flag) for flag in flags if flag.isdigit()] or [0]
     if more or local > _HIGHEST_LOCAL or len(hands) > 1:
         raise unreadable(tr("a point"), text)
+    try:
+        posture = _posture(flags)
+    except ValueError as error:
+        raise unreadable(tr("a point"), text) from error
     return PrintedPoint(
         coordinates=tuple(float(number) for number in numbers if number is not None),
         hand=hands[0] if hands else None,
         flags=flags,
         local=local,
+        posture=posture,
     )
 
 

@@ -5,6 +5,8 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from robolink.model import ToolOffset, rotate_xy
+from robolink_simulators.cell.frames import Frame, printed_angles, zyx
+from robolink_simulators.cell.places import XyzMm
 
 DRAWING_MM: Final = ((20.0, 12.5), (-20.0, 12.5), (-20.0, -12.5), (20.0, -12.5))
 """Fiducials of the simulated board: a rectangle about its middle."""
@@ -32,13 +34,19 @@ class SimulatedBoard:
 
     def frame(self, tip: ToolOffset) -> ToolOffset:
         """Return the board's frame on the flange, for a nozzle with its tip there."""
-        dx, dy = rotate_xy(*self.shift_mm, tip.u_deg)
-        return replace(tip, x_mm=tip.x_mm + dx, y_mm=tip.y_mm + dy, u_deg=tip.u_deg + self.turn_deg)
+        return _moved(tip, (*self.shift_mm, 0.0), self.turn_deg)
 
     def fiducials(self, tip: ToolOffset) -> tuple[ToolOffset, ...]:
         """Return where the fiducials are on the flange."""
         frame = self.frame(tip)
-        turned = [rotate_xy(x, y, frame.u_deg) for x, y in self.drawing_mm]
-        return tuple(
-            replace(frame, x_mm=frame.x_mm + dx, y_mm=frame.y_mm + dy) for dx, dy in turned
-        )
+        return tuple(_moved(frame, (x, y, 0.0), 0.0) for x, y in self.drawing_mm)
+
+
+def _moved(tip: ToolOffset, by_mm: XyzMm, turn_deg: float) -> ToolOffset:
+    """Return the frame that is shifted in a tool's own axes and turned about its Z."""
+    if not tip.v_deg and not tip.w_deg:
+        dx, dy = rotate_xy(*by_mm[:2], tip.u_deg)
+        return replace(tip, x_mm=tip.x_mm + dx, y_mm=tip.y_mm + dy, u_deg=tip.u_deg + turn_deg)
+    x_mm, y_mm, z_mm, u_deg, v_deg, w_deg = tip.components()
+    there = Frame((x_mm, y_mm, z_mm), zyx(u_deg, v_deg, w_deg)) @ Frame(by_mm, zyx(turn_deg, 0, 0))
+    return ToolOffset(*there.shift_mm, *printed_angles(there.rotation))

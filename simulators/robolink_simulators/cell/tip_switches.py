@@ -6,12 +6,18 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final, Protocol
 
-from robolink_simulators.cell.places import XyzMm
+from robolink_simulators.cell.frames import cross, dot, subtract
+from robolink_simulators.cell.places import Direction, XyzMm
 
 Lean = tuple[float, float]
 """By how much a bent nozzle's shaft lies beside its tip, X and Y in mm per mm above the tip."""
 
 UPRIGHT: Final[Lean] = (0.0, 0.0)
+
+STANDING: Final[Direction] = (0.0, 0.0, 1.0)
+"""From its tip, the shaft of an upright nozzle goes straight up."""
+
+_PARALLEL = 1e-12
 
 
 class Shake:
@@ -40,13 +46,18 @@ class Shake:
 class TipSwitch(Protocol):
     """Something that is on or off, depending on where a tip is."""
 
-    def trips(self, tip_mm: XyzMm, lean: Lean = UPRIGHT) -> bool:
-        """Tell whether a nozzle with its tip there switches it on."""
+    def trips(self, tip_mm: XyzMm, shaft: Direction = STANDING) -> bool:
+        """Tell whether a nozzle switches it on.
+
+        Args:
+            tip_mm: Where its tip is.
+            shaft: Which way its shaft goes from there, in base axes; of any length.
+        """
 
 
 @dataclass(frozen=True, slots=True)
 class LightBeam:
-    """A light beam, level or nearly so, that the nozzle's shaft breaks.
+    """A light beam that the nozzle's shaft breaks, in whatever direction either runs.
 
     Attributes:
         through_mm: A point of the beam.
@@ -62,17 +73,20 @@ class LightBeam:
     radius_mm: float = 0.0
     tilt_deg: float = 0.0
 
-    def trips(self, tip_mm: XyzMm, lean: Lean = UPRIGHT) -> bool:
-        """Tell whether the nozzle breaks the beam."""
-        x, y, z = self.through_mm
-        heading = math.radians(self.heading_deg)
-        along_x, along_y = math.cos(heading), math.sin(heading)
-        dx, dy = tip_mm[0] - x, tip_mm[1] - y
-        above_mm = z + (dx * along_x + dy * along_y) * math.tan(math.radians(self.tilt_deg))
-        above_mm -= tip_mm[2]
-        dx, dy = dx + lean[0] * above_mm, dy + lean[1] * above_mm
-        beside_mm = abs(dy * along_x - dx * along_y)
-        return above_mm >= 0 and beside_mm <= self.nozzle_radius_mm + self.radius_mm
+    def trips(self, tip_mm: XyzMm, shaft: Direction = STANDING) -> bool:
+        """Tell whether the nozzle breaks the beam: two lines that pass each other closely."""
+        heading, tilt = math.radians(self.heading_deg), math.radians(self.tilt_deg)
+        level = math.cos(tilt)
+        beam = (level * math.cos(heading), level * math.sin(heading), math.sin(tilt))
+        to_beam, across = subtract(self.through_mm, tip_mm), cross(shaft, beam)
+        area = dot(across, across)
+        if area < _PARALLEL * dot(shaft, shaft):
+            return False  # a shaft along the beam hides its own tip only
+        # Where along the shaft the two are closest: behind the tip there is no shaft.
+        if dot(cross(to_beam, beam), across) < 0:
+            return False
+        beside_mm = abs(dot(to_beam, across)) / math.sqrt(area)
+        return beside_mm <= self.nozzle_radius_mm + self.radius_mm
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +99,7 @@ class TouchPlate:
 
     z_mm: float
 
-    def trips(self, tip_mm: XyzMm, lean: Lean = UPRIGHT) -> bool:  # noqa: ARG002 - the tip touches
+    def trips(self, tip_mm: XyzMm, shaft: Direction = STANDING) -> bool:  # noqa: ARG002 - the tip touches
         """Tell whether the tip touches it, or is below it."""
         return tip_mm[2] <= self.z_mm
 
@@ -105,7 +119,7 @@ class PinContact:
     pin_mm: Callable[[], XyzMm]
     radius_mm: float
 
-    def trips(self, tip_mm: XyzMm, lean: Lean = UPRIGHT) -> bool:  # noqa: ARG002 - the tip touches
+    def trips(self, tip_mm: XyzMm, shaft: Direction = STANDING) -> bool:  # noqa: ARG002 - the tip touches
         """Tell whether the tip is within the pin's radius, at its top or below."""
         x, y, z = self.pin_mm()
         beside_mm = math.hypot(tip_mm[0] - x, tip_mm[1] - y)

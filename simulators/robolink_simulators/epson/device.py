@@ -50,7 +50,7 @@ class EpsonSimulator:
     """Implements ``hosting.seam.WireDevice``.
 
     Args:
-        robot: Name of a SCARA model.
+        robot: Name of a model, as in docs/reference/epson-robots.md, "Families".
         seed: Decides the world and every scatter; the same seed gives the same run, but for
             the serial number.
         password: Of Remote Ethernet; none means an empty one.

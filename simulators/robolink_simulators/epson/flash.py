@@ -89,5 +89,8 @@ def forget_volatile(machine: Machine, now_ns: int) -> None:
     machine.outputs.clear()
     machine.memory.clear()
     machine.timed_bits.clear()
-    machine.settings = RobotSettings(home_pulses=machine.settings.home_pulses)
-    machine.points, machine.locals = PointTable(), LocalTable()
+    home = machine.settings.home_pulses
+    machine.settings = RobotSettings.of(machine.model.axes)
+    machine.settings.home_pulses = home
+    machine.points = PointTable()
+    machine.locals = LocalTable(tilting=machine.model.six_axes)

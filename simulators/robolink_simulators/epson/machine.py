@@ -1,13 +1,22 @@
 """What SPEL+ statements touch: one robot, its tools, points, bits and settings."""
 
 import random
+from dataclasses import replace
 
 from robolink.model import Pose, ToolOffset
-from robolink_simulators.epson.arm.arm import REST, Arm
-from robolink_simulators.epson.arm.kinematics import Joints, flange_of, inverse, tip_of
+from robolink_simulators.epson.arm.arm import Arm
+from robolink_simulators.epson.arm.joints import Joints, check_ranges
+from robolink_simulators.epson.arm.kinematics import (
+    flange_of,
+    forward,
+    hand_of,
+    posture_of,
+    solve,
+    tip_of,
+)
 from robolink_simulators.epson.arm.motion_parameters import MotionParameters
 from robolink_simulators.epson.arm.robot_settings import RobotSettings
-from robolink_simulators.epson.arm.robots import ScaraModel
+from robolink_simulators.epson.arm.robots import RobotModel
 from robolink_simulators.epson.memory.bits import IO_BITS, MEMORY_BITS, BitBank
 from robolink_simulators.epson.memory.input_bits import InputBits
 from robolink_simulators.epson.memory.pallets import PalletTable
@@ -20,11 +29,11 @@ REMOTE_ETHERNET = 26
 
 
 class Machine:
-    """A SCARA controller's memory and its arm. No wire, no clock of its own.
+    """A controller's memory and its arm. No wire, no clock of its own.
 
     Args:
         model: Which robot.
-        joints: Where the arm stands.
+        joints: Where the arm stands; see :class:`Arm`.
         backlash_deg: See :class:`Arm`.
         serial: What RobotSerial$ gives; the controller's own number follows from it.
 
@@ -51,9 +60,9 @@ class Machine:
 
     def __init__(
         self,
-        model: ScaraModel,
+        model: RobotModel,
         *,
-        joints: Joints = REST,
+        joints: Joints | None = None,
         backlash_deg: float = 0.0,
         serial: str = "SIM00001",
     ) -> None:
@@ -62,12 +71,12 @@ class Machine:
         self.arm = Arm(model, joints, backlash_deg=backlash_deg)
         self.tools = ToolMemory()
         self.points = PointTable()
-        self.locals = LocalTable()
+        self.locals = LocalTable(tilting=model.six_axes)
         self.inputs = InputBits(IO_BITS)
         self.outputs = BitBank(IO_BITS)
         self.memory = BitBank(MEMORY_BITS)
         self.parameters = MotionParameters()
-        self.settings = RobotSettings()
+        self.settings = RobotSettings.of(model.axes)
         self.pallets = PalletTable()
         self.timed_bits = TimedBits()
         self.sensed = False
@@ -107,10 +116,44 @@ class Machine:
         Raises:
             Refusal: Its local is not defined, or the arm cannot take it up.
         """
+        joints = self.solved(target)
+        check_ranges(self.model, joints)
+        return joints
+
+    def solved(self, target: Point) -> Joints:
+        """Return the joints of :meth:`joints_for`, whatever their ranges.
+
+        Raises:
+            Refusal: Its local is not defined, or the arm is too short.
+        """
+        flange = flange_of(self.model, self.pose_of(target), self.offset)
+        return solve(self.model, flange, target.hand, target.posture)
+
+    def flagged(self, target: Point, joints: Joints) -> Point:
+        """Return a point with the flags of the joints that take it up."""
+        hand, posture = hand_of(self.model, joints), posture_of(self.model, joints)
+        return replace(target, hand=hand, posture=posture)
+
+    def pose_of(self, target: Point) -> Pose:
+        """Return where a point is in the base frame; on four axes without V and W.
+
+        Raises:
+            Refusal: Its local is not defined.
+        """
         base = self.locals.to_base(target)
-        x, y, z, u, _, _ = base.coordinates
-        flange = flange_of(Pose(x, y, z, u), self.offset)
-        return inverse(self.model, flange, base.hand)
+        x, y, z, u, v, w = base.coordinates
+        if not self.model.six_axes:
+            v = w = 0.0
+        return Pose(x, y, z, u, v, w, hand=base.hand, posture=base.posture)
+
+    def tip_at(self, joints: Joints) -> Pose:
+        """Return where the selected tool's tip would be with other joints.
+
+        Raises:
+            OutOfReach: A joint would leave its range.
+        """
+        check_ranges(self.model, joints)
+        return self._tip_of(forward(self.model, joints))
 
     def switch_motors(self, on: bool) -> None:
         """Switch the motors; on also resets the motion parameters (docs/reference/spel.md 6.3)."""
@@ -133,4 +176,4 @@ class Machine:
         self.settings.reset()
 
     def _tip_of(self, flange: Pose) -> Pose:
-        return tip_of(flange, self.offset, tool=self.tools.selected)
+        return tip_of(self.model, flange, self.offset, tool=self.tools.selected)

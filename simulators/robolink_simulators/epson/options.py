@@ -36,6 +36,7 @@ class SpelNumbers:
     guard_open: int = 4026
     joint_free: int = 4027
     other_robot: int = 4028
+    joint_too_fast: int = 4242  # docs/reference/spel.md 10
     arm_undefined: int = 4012
     ecp_undefined: int = 4013
     pallet_undefined: int = 4014

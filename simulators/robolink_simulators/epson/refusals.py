@@ -28,6 +28,7 @@ class RefusalKind(StrEnum):
     HOME_UNDEFINED = "home_undefined"
     WAIT_TIMED_OUT = "wait_timed_out"
     JOINT_FREE = "joint_free"
+    JOINT_TOO_FAST = "joint_too_fast"
     OTHER_ROBOT = "other_robot"
     FUNCTION_ONLY = "function_only"
     NOT_SIMULATED = "not_simulated"

@@ -8,7 +8,8 @@ from typing import Any, Final
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink.model import Pose, ToolOffset, rotate_xy
+from robolink.model import Pose, ToolOffset
+from robolink_simulators.cell.frames import Z_AXIS, Frame, about, product, turned
 from robolink_simulators.cell.person import PersonLook as PersonLook
 from robolink_simulators.cell.person import SimulatedOperator
 from robolink_simulators.cell.places import Direction
@@ -16,7 +17,9 @@ from robolink_simulators.cell.tip_switches import TipSwitch
 from robolink_simulators.cell.workplace import MOUNTED_TOOL as MOUNTED_TOOL
 from robolink_simulators.cell.workplace import Workplace, XyzMm, exchanged, pin_beside
 from robolink_simulators.cell.world_parameters import WorldParameters
-from robolink_simulators.epson.arm.kinematics import Joints, inverse, tip_of
+from robolink_simulators.epson.arm.arm import rest_of
+from robolink_simulators.epson.arm.kinematics import continued, frame_of, pose_of_frame, tip_of
+from robolink_simulators.epson.arm.robots import RobotModel
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.bits import IO_BITS
 from robolink_simulators.epson.memory.points import Point
@@ -25,6 +28,14 @@ from robolink_simulators.epson.refusals import OutOfReach
 
 STORED: Final = ToolOffset(12.0, -3.5, -20.0)
 """What the controller holds for tool 1 at first: the nozzle that was there before."""
+
+STORED_ON_SIX_AXES: Final = ToolOffset(12.0, -3.5, 120.0)
+"""The same where the Z axis of Tool 0 looks out of the flange."""
+
+
+def stored_on(model: RobotModel) -> ToolOffset:
+    """Return what the controller of a robot holds for tool 1 at first."""
+    return STORED_ON_SIX_AXES if model.six_axes else STORED
 
 
 class World(Workplace):
@@ -62,7 +73,7 @@ class World(Workplace):
             tips,
             pin_mm,
             seed=seed,
-            replaced=STORED,
+            replaced=stored_on(machine.model),
             parameters=parameters or WorldParameters(),
         )
         self.operator = PendantOperator(self, pendant_live=pendant_live, now_ns=now_ns, seed=seed)
@@ -82,17 +93,20 @@ class World(Workplace):
         The arm is put where the physical tip stands some mm beside the pin and above it.
         """
         rng = random.Random(f"world {seed}")
-        tips = {MOUNTED_TOOL: exchanged(STORED, rng)}
-        stroke_mm = -machine.model.ranges[2].low
-        machine.arm.place(Joints(45.0, 60.0, -0.4 * stroke_mm, -105.0), 0)
+        model, stored = machine.model, stored_on(machine.model)
+        tips = {MOUNTED_TOOL: exchanged(stored, rng)}
+        joints = rest_of(model)
+        if not model.six_axes:
+            joints = joints.at_height(0.4 * model.ranges[2].low)
+        machine.arm.place(joints, 0)
         machine.tools.restore(
             {
                 "selected": MOUNTED_TOOL,
-                "offsets": {str(MOUNTED_TOOL): list(STORED.components())},
+                "offsets": {str(MOUNTED_TOOL): list(stored.components())},
                 "flash_writes": 0,
             }
         )
-        tip = tip_of(machine.arm.flange(), tips[MOUNTED_TOOL])
+        tip = tip_of(model, machine.arm.flange(), tips[MOUNTED_TOOL])
         pin_mm = pin_beside((tip.x_mm, tip.y_mm, tip.z_mm), rng)
         return cls(
             machine,
@@ -180,8 +194,8 @@ class PendantOperator(SimulatedOperator):
         """
         self._require_pendant()
         arm = self._machine.arm
-        turned = replace(arm.flange(), u_deg=u_deg)
-        arm.place(inverse(arm.model, turned, arm.hand), self._now_ns())
+        there = replace(arm.flange(), u_deg=u_deg)
+        arm.place(continued(arm.model, there, arm.joints), self._now_ns())
         flange = self.jog_onto_pin()
         self._machine.points.store(number, Point.at(flange))
         return flange
@@ -208,14 +222,14 @@ class _HandledArm:
         return self._machine.arm.flange()
 
     def tip_mm(self, tip: ToolOffset | None) -> XyzMm:
-        met = tip_of(self._machine.arm.true_flange(), tip)
+        arm = self._machine.arm
+        met = tip_of(arm.model, arm.true_flange(), tip)
         return (met.x_mm, met.y_mm, met.z_mm)
 
     def turned(self, direction: Direction) -> Direction:
-        x, y, z = direction
-        return (*rotate_xy(x, y, self._machine.arm.true_flange().u_deg), z)
+        return turned(frame_of(self._machine.arm.true_flange()).rotation, direction)
 
-    def carry(self, tip: ToolOffset | None, by_mm: XyzMm) -> None:  # noqa: ARG002 - U stays, so the flange goes as far as the tip
+    def carry(self, tip: ToolOffset | None, by_mm: XyzMm) -> None:  # noqa: ARG002 - the orientation stays, so the flange goes as far as the tip
         arm = self._machine.arm
         flange = arm.flange()
         target = replace(
@@ -224,13 +238,19 @@ class _HandledArm:
             y_mm=flange.y_mm + by_mm[1],
             z_mm=flange.z_mm + by_mm[2],
         )
-        arm.place(inverse(arm.model, target, arm.hand), self._now_ns())
+        arm.place(continued(arm.model, target, arm.joints), self._now_ns())
 
     def turn(self, by_deg: float) -> None:
         arm = self._machine.arm
-        target = replace(arm.flange(), u_deg=arm.flange().u_deg + by_deg)
+        flange = arm.flange()
+        if arm.model.six_axes:
+            frame = frame_of(flange)
+            there = Frame(frame.shift_mm, product(about(Z_AXIS, by_deg), frame.rotation))
+            target = pose_of_frame(there, flange, tool=0)
+        else:
+            target = replace(flange, u_deg=flange.u_deg + by_deg)
         with suppress(OutOfReach):
-            arm.place(inverse(arm.model, target, arm.hand), self._now_ns())
+            arm.place(continued(arm.model, target, arm.joints), self._now_ns())
 
     def loosen(self, parameters: WorldParameters) -> None:
         arm = self._machine.arm

@@ -8,6 +8,19 @@ from typing import Final
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
+from robolink_simulators.cell.frames import (
+    NO_TURN,
+    ORIGIN,
+    Z_AXIS,
+    Frame,
+    about,
+    add,
+    product,
+    subtract,
+    turned,
+    zyx,
+    zyx_angles,
+)
 from robolink_simulators.cell.person import SimulatedOperator
 from robolink_simulators.cell.places import Direction
 from robolink_simulators.cell.tip_switches import Lean, Shake, TipSwitch
@@ -21,19 +34,6 @@ from robolink_simulators.cell.workplace import (
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.softmotion.group.axis_group import AxisGroup
 from robolink_simulators.softmotion.group.condition import SmcGroupState
-from robolink_simulators.softmotion.kinematics.frames import (
-    NO_TURN,
-    ORIGIN,
-    Z_AXIS,
-    Frame,
-    about,
-    add,
-    product,
-    subtract,
-    turned,
-    zyx,
-    zyx_angles,
-)
 from robolink_simulators.softmotion.kinematics.kinematics import AxisKind, AxisValues
 from robolink_simulators.softmotion.signals import SIGNALS
 from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind
@@ -130,7 +130,7 @@ class SoftMotionWorld(Workplace):
             place = add(
                 _tip_at(group, true_axes, self.tips.get(tool)), shake.of(group.movements_started)
             )
-            return switch.trips(place, _lean_at(group, true_axes, self.lean_of(tool)))
+            return switch.trips(place, (*_lean_at(group, true_axes, self.lean_of(tool)), 1.0))
 
         group.inputs.connect(number, sense)
 

@@ -10,6 +10,13 @@ from robolink_cli.options.simulation import simulation_options
 from robolink_cli.session.context import json_option
 
 
+def _complete_robot(_: click.Context, __: click.Parameter, start: str) -> list[str]:
+    """Return the models whose names begin so, for TAB."""
+    from robolink_simulators.epson.arm.robots import robot_names
+
+    return [name for name in robot_names() if name.casefold().startswith(start.casefold())]
+
+
 @click.group()
 @json_option
 def sim() -> None:
@@ -29,7 +36,13 @@ sim.add_command(softmotion)
     show_default=True,
     help="Where to listen; port 0 takes a free one.",
 )
-@click.option("--robot", default="T6-602S", show_default=True, help="Model of the robot.")
+@click.option(
+    "--robot",
+    default="T6-602S",
+    show_default=True,
+    shell_complete=_complete_robot,
+    help="Model of the robot, for example GX4-C351S, RS4-C351S or C8-C901S.",
+)
 @click.option(
     "--password-env",
     metavar="VAR",

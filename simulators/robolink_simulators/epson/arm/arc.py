@@ -4,11 +4,12 @@ import cmath
 import math
 from dataclasses import dataclass, replace
 
-from robolink.model import Hand, Pose, ToolOffset
+from robolink.model import Hand, Pose, Posture, ToolOffset
 from robolink.timing import NS_PER_S
-from robolink_simulators.epson.arm.kinematics import Joints, check_ranges, flange_of, solve
+from robolink_simulators.epson.arm.joints import Joints, check_ranges
+from robolink_simulators.epson.arm.kinematics import flange_of, hand_of, posture_of, solve
 from robolink_simulators.epson.arm.ramps import BrakedRamp, Ramp, TimeLaw
-from robolink_simulators.epson.arm.robots import ScaraModel
+from robolink_simulators.epson.arm.robots import RobotModel
 from robolink_simulators.epson.arm.trajectory import LinePace
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 
@@ -20,13 +21,14 @@ _CHECKS = 90
 class ArcLeg:
     """The tip on a circle in X and Y; Z and U run evenly, the mid point's do not count."""
 
-    model: ScaraModel
+    model: RobotModel
     start: Pose
     end: Pose
     centre: complex
     sweep_rad: float
     offset: ToolOffset | None
     hand: Hand
+    posture: Posture | None
     ramp: TimeLaw
 
     @property
@@ -50,7 +52,7 @@ class ArcLeg:
 
     def joints_after(self, share: float) -> Joints:
         """Return the joints after a share of the arc."""
-        return solve(self.model, self._flange_after(share), self.hand)
+        return solve(self.model, self._flange_after(share), self.hand, self.posture)
 
     def _share_at(self, elapsed_ns: int) -> float:
         return self.ramp.share_at(min(elapsed_ns, self.duration_ns) / NS_PER_S)
@@ -61,18 +63,18 @@ class ArcLeg:
         at = self.centre + spoke * cmath.exp(1j * self.sweep_rad * share)
         z_mm = a.z_mm + (b.z_mm - a.z_mm) * share
         tip = Pose(at.real, at.imag, z_mm, a.u_deg + (b.u_deg - a.u_deg) * share)
-        return flange_of(b if share >= 1 else tip, self.offset)
+        return flange_of(self.model, b if share >= 1 else tip, self.offset)
 
 
 def plan_arc(
-    model: ScaraModel,
+    model: RobotModel,
     points: tuple[Pose, Pose, Pose],
     pace: LinePace,
     *,
     offset: ToolOffset | None,
-    hand: Hand,
+    near: Joints,
 ) -> ArcLeg:
-    """Plan an arc of the tip from the first pose through the second to the third.
+    """Plan an arc of a SCARA's tip from the first pose through the second to the third.
 
     Raises:
         Refusal: The three stand in a line, or the hand would have to change (documented,
@@ -80,9 +82,27 @@ def plan_arc(
         OutOfReach: The arc leaves the envelope.
     """
     start, mid, end = points
+    hand = hand_of(model, near)
     if any(pose.hand not in (None, hand) for pose in (mid, end)):
         raise SpelRefusal(RefusalKind.OUT_OF_REACH, "An arc cannot change the hand")
     a, b, c = (complex(pose.x_mm, pose.y_mm) for pose in points)
+    centre, sweep_rad = circle_through(a, b, c)
+    length_mm = math.hypot(abs(sweep_rad) * abs(a - centre), end.z_mm - start.z_mm)
+    rate = pace.speed_mm_s / length_mm
+    ramp = Ramp.fastest(rate, pace.accel_mm_s2 / length_mm, pace.decel_mm_s2 / length_mm)
+    posture = posture_of(model, near)
+    leg = ArcLeg(model, start, end, centre, sweep_rad, offset, hand, posture, ramp)
+    for step in range(1, _CHECKS + 1):
+        check_ranges(model, leg.joints_after(step / _CHECKS))
+    return leg
+
+
+def circle_through(a: complex, b: complex, c: complex) -> tuple[complex, float]:
+    """Return the centre of the circle and the angle in radians from ``a`` through ``b`` to ``c``.
+
+    Raises:
+        Refusal: The three stand in a line.
+    """
     bent = ((b - a) * (c - a).conjugate()).imag
     if abs(bent) < _STRAIGHT:
         raise SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, "The points of the arc stand in a line")
@@ -91,13 +111,7 @@ def plan_arc(
     through = cmath.phase((b - centre) / (a - centre))
     if sweep_rad * through <= 0 or abs(through) > abs(sweep_rad):
         sweep_rad -= math.copysign(2 * math.pi, sweep_rad)
-    length_mm = math.hypot(abs(sweep_rad) * abs(a - centre), end.z_mm - start.z_mm)
-    rate = pace.speed_mm_s / length_mm
-    ramp = Ramp.fastest(rate, pace.accel_mm_s2 / length_mm, pace.decel_mm_s2 / length_mm)
-    leg = ArcLeg(model, start, end, centre, sweep_rad, offset, hand, ramp)
-    for step in range(1, _CHECKS + 1):
-        check_ranges(model, leg.joints_after(step / _CHECKS))
-    return leg
+    return centre, sweep_rad
 
 
 def _centre(a: complex, b: complex, c: complex) -> complex:

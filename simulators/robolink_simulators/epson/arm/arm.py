@@ -9,27 +9,32 @@ import random
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import accumulate
+from typing import Final
 
-from robolink.model import Hand, Pose, ToolOffset
-from robolink_simulators.epson.arm.kinematics import Joints, check_ranges, forward, tip_of
-from robolink_simulators.epson.arm.robots import ScaraModel
+from robolink.model import Hand, Pose, Posture, ToolOffset
+from robolink_simulators.epson.arm.joints import Joints, check_ranges
+from robolink_simulators.epson.arm.kinematics import forward, hand_of, posture_of, tip_of
+from robolink_simulators.epson.arm.robots import Mechanism, RobotModel
+from robolink_simulators.epson.arm.tilted_legs import plan_line
 from robolink_simulators.epson.arm.trajectory import (
     JointLeg,
     JointPace,
     Leg,
-    LineLeg,
     LinePace,
     plan_go,
-    plan_move,
 )
 
-REST = Joints(45.0, 60.0, 0.0, -105.0)
-"""Where a new arm stands (assumed): bent to the right, fully up, U 0."""
+_REST: Final = {
+    Mechanism.SCARA: Joints(45.0, 60.0, 0.0, -105.0),
+    Mechanism.FOLDED_SCARA: Joints(45.0, -120.0, 0.0, 75.0),
+}
+_ON_A_TABLE: Final = Joints(0.0, -35.0, 5.0, 0.0, -60.0, 0.0)
+_UNDER_A_CEILING: Final = Joints(0.0, 10.0, 0.0, 0.0, 80.0, 0.0)
 
 _LOOK_BACK_NS = 1_000_000
 _STILL = 1e-9
 
-_Ways = tuple[float, float, float, float]
+_Ways = tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,23 +80,35 @@ class _Travel:
         return self.legs[-1], elapsed_ns
 
 
+def rest_of(model: RobotModel) -> Joints:
+    """Return where a new arm stands (assumed).
+
+    A SCARA is bent to the right, fully up, with U 0; six axes hold the tool straight down in front
+    of the base, away from every singularity.
+    """
+    if model.six_axes:
+        return _UNDER_A_CEILING if model.hangs else _ON_A_TABLE
+    return _REST[model.mechanism]
+
+
 class Arm:
-    """One SCARA arm in simulated time.
+    """One arm in simulated time.
 
     Args:
         model: Which robot.
-        joints: Where it stands.
-        backlash_deg: Play of joints 1, 2 and 4 behind the encoder: the true joint trails the
+        joints: Where it stands; by default as :func:`rest_of` says.
+        backlash_deg: Play of every turning joint behind the encoder: the true joint trails the
             commanded one by half of it, against the way it last turned (assumed model).
 
     Attributes:
         moves_started: Motions begun since the arm was made; a repeated command shows here.
-        backlash_mm: Play of joint 3, likewise; none at first.
+        backlash_mm: Play of a SCARA's joint 3, likewise; none at first.
     """
 
     def __init__(
-        self, model: ScaraModel, joints: Joints = REST, *, backlash_deg: float = 0.0
+        self, model: RobotModel, joints: Joints | None = None, *, backlash_deg: float = 0.0
     ) -> None:
+        joints = rest_of(model) if joints is None else joints
         check_ranges(model, joints)
         self.model = model
         self.moves_started = 0
@@ -100,7 +117,7 @@ class Arm:
         self._joints = joints
         self._now_ns = 0
         self._travel: _Travel | None = None
-        self._turned = (0.0, 0.0, 0.0, 0.0)
+        self._turned: _Ways = (0.0,) * model.axes
 
     @property
     def joints(self) -> Joints:
@@ -153,17 +170,20 @@ class Arm:
         """Plan a joint-space motion from here; see :func:`trajectory.plan_go`."""
         return plan_go(self.model, self._joints, target, pace, radius_mm=radius_mm)
 
-    def plan_move(
-        self, target: Pose, pace: LinePace, *, offset: ToolOffset | None = None
-    ) -> LineLeg:
-        """Plan a straight motion of the tip from here; see :func:`trajectory.plan_move`."""
-        ends = (tip_of(self.flange(), offset), target)
-        return plan_move(self.model, ends, pace, offset=offset, hand=self.hand)
+    def plan_move(self, target: Pose, pace: LinePace, *, offset: ToolOffset | None = None) -> Leg:
+        """Plan a straight motion of the tip from here; see :func:`tilted_legs.plan_line`."""
+        ends = (tip_of(self.model, self.flange(), offset), target)
+        return plan_line(self.model, ends, pace, offset=offset, near=self._joints)
 
     @property
     def hand(self) -> Hand:
-        """The arm's present configuration."""
-        return self._joints.hand
+        """The arm's present hand."""
+        return hand_of(self.model, self._joints)
+
+    @property
+    def posture(self) -> Posture | None:
+        """The arm's present elbow, wrist and joint flags, ``None`` where it has none."""
+        return posture_of(self.model, self._joints)
 
     def start(self, legs: Sequence[Leg], now_ns: int) -> int:
         """Begin one motion made of ``legs`` and return the instant at which it ends."""
@@ -218,14 +238,14 @@ class Arm:
 
     def _ways(self, before: Joints, after: Joints) -> _Ways:
         """Return which way each joint has turned last, having gone from one to the other."""
-        changes = zip(before.values(), after.values(), self._turned, strict=True)
-        j1, j2, j3, j4 = (_sign(new - old) or way for old, new, way in changes)
-        return j1, j2, j3, j4
+        changes = zip(before, after, self._turned, strict=True)
+        return tuple(_sign(new - old) or way for old, new, way in changes)
 
     def _trailing(self, joints: Joints, ways: _Ways) -> Joints:
-        half = self.backlash_deg / 2
-        plays = (half, half, self.backlash_mm / 2, half)
-        trails = zip(joints.values(), plays, ways, strict=True)
+        plays = [self.backlash_deg / 2] * len(joints)
+        for number in self.model.linear_joints:
+            plays[number - 1] = self.backlash_mm / 2
+        trails = zip(joints, plays, ways, strict=True)
         return Joints(*(value - play * way for value, play, way in trails))
 
 

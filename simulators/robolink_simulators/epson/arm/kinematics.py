@@ -1,138 +1,133 @@
-"""Forward and inverse kinematics of a SCARA, and where a tool's tip is.
+"""From joints to the pose of the flange and back, of whichever robot, and a tool's tip.
 
-Conventions: joint 1 at 0 has the arm along the robot's +X, counter-clockwise is positive
-(documented, docs/reference/epson.md 4). With all joints at 0 the flange axes are parallel to the
-robot axes and turn with joint 4 (documented, docs/reference/epson.md 3.1), hence ``U = J1 + J2 +
-J4``; that U is printed and taken literally, not brought into -180..180, is assumed (a SCARA has no
-flag that could tell 270 from -90). Z is joint 3's travel, 0 at the top, negative downwards
-(documented). Righty is the solution whose joint 2 is not negative (assumed: the elbow lies to
-the right of the line from base to flange, as a person's right elbow does).
+How each kind of robot is built stands in :mod:`~robolink_simulators.epson.arm.scara` and
+:mod:`~robolink_simulators.epson.arm.six_axes`.
 """
 
-import math
-from dataclasses import dataclass, replace
+from typing import Final
 
-from robolink.model import Hand, Pose, ToolOffset, rotate_xy
-from robolink_simulators.epson.arm.robots import ScaraModel
-from robolink_simulators.epson.refusals import OutOfReach
+from robolink.model import Hand, Pose, Posture, ToolOffset, rotate_xy
+from robolink_simulators.cell.frames import ORIGIN, Frame, printed_angles, zyx
+from robolink_simulators.epson.arm import scara, six_axes
+from robolink_simulators.epson.arm.joints import Joints, check_ranges
+from robolink_simulators.epson.arm.robots import RobotModel
 
-_ROUNDING = 1e-9
-
-
-@dataclass(frozen=True, slots=True)
-class Joints:
-    """Joint values of a SCARA."""
-
-    j1_deg: float
-    j2_deg: float
-    j3_mm: float
-    j4_deg: float
-
-    def values(self) -> tuple[float, float, float, float]:
-        """Return the four in order: degrees, degrees, mm, degrees."""
-        return (self.j1_deg, self.j2_deg, self.j3_mm, self.j4_deg)
-
-    @property
-    def hand(self) -> Hand:
-        """The configuration; a stretched arm counts as right."""
-        return Hand.RIGHT if self.j2_deg >= 0 else Hand.LEFT
+PLAIN: Final = Posture()
+"""The posture of a point without flags (inferred): elbow above, wrist not flipped, first turns."""
 
 
-def forward(model: ScaraModel, joints: Joints) -> Pose:
+def forward(model: RobotModel, joints: Joints) -> Pose:
     """Return the pose of the flange (Tool 0) in the robot's base frame."""
-    inner = math.radians(joints.j1_deg)
-    outer = math.radians(joints.j1_deg + joints.j2_deg)
-    return Pose(
-        x_mm=model.a1_mm * math.cos(inner) + model.a2_mm * math.cos(outer),
-        y_mm=model.a1_mm * math.sin(inner) + model.a2_mm * math.sin(outer),
-        z_mm=joints.j3_mm,
-        u_deg=joints.j1_deg + joints.j2_deg + joints.j4_deg,
-        hand=joints.hand,
-        tool=0,
-    )
+    return six_axes.forward(model, joints) if model.six_axes else scara.forward(model, joints)
 
 
-def solve(model: ScaraModel, flange: Pose, hand: Hand) -> Joints:
+def hand_of(model: RobotModel, joints: Joints) -> Hand:
+    """Return the hand of an arm that stands so."""
+    return six_axes.hand_of(model, joints) if model.six_axes else scara.hand_of(model, joints)
+
+
+def posture_of(model: RobotModel, joints: Joints) -> Posture | None:
+    """Return elbow, wrist and joint flags, ``None`` for a robot that has none of them."""
+    if model.six_axes:
+        return six_axes.posture_of(model, joints)
+    return scara.posture_of(model, joints)
+
+
+def solve(model: RobotModel, flange: Pose, hand: Hand, posture: Posture | None = None) -> Joints:
     """Return the joints that put the flange at ``flange``, whatever their ranges.
 
-    Joint 1 is taken within half a turn of the middle of its range.
+    Args:
+        model: The robot.
+        flange: Where.
+        hand: Which hand.
+        posture: Which of the other ways; by default that of a point without flags.
 
     Raises:
-        OutOfReach: The position is too far out or too far in for the two links.
+        OutOfReach: The arms are too short, or cannot fold far enough.
     """
-    distance_sq = flange.x_mm * flange.x_mm + flange.y_mm * flange.y_mm
-    cosine = (distance_sq - model.a1_mm**2 - model.a2_mm**2) / (2 * model.a1_mm * model.a2_mm)
-    if not abs(cosine) <= 1 + _ROUNDING:
-        raise OutOfReach(
-            f"Point outside the arm's reach: {math.sqrt(distance_sq):.3f} mm from joint 1"
-        )
-    bend = math.acos(max(-1.0, min(1.0, cosine)))
-    if hand is Hand.LEFT:
-        bend = -bend
-    across = model.a2_mm * math.sin(bend)
-    along = model.a1_mm + model.a2_mm * math.cos(bend)
-    j1_deg = math.degrees(math.atan2(flange.y_mm, flange.x_mm) - math.atan2(across, along))
-    low, high = model.ranges[0]
-    middle = (low + high) / 2
-    j1_deg = middle + math.remainder(j1_deg - middle, 360.0)
-    j2_deg = math.degrees(bend)
-    return Joints(j1_deg, j2_deg, flange.z_mm, flange.u_deg - j1_deg - j2_deg)
+    posture = posture or PLAIN
+    if model.six_axes:
+        return six_axes.solve(model, flange, hand, posture)
+    return scara.solve(model, flange, hand, posture)
 
 
-def check_ranges(model: ScaraModel, joints: Joints) -> None:
-    """Refuse joint values outside the model's ranges.
+def inverse(model: RobotModel, flange: Pose, hand: Hand, posture: Posture | None = None) -> Joints:
+    """Return the joints for a flange pose, inside their ranges; see :func:`solve`.
 
     Raises:
-        OutOfReach: Names the joint, the value and the range.
+        OutOfReach: The arms or a joint's range do not allow it.
     """
-    pairs = zip(joints.values(), model.ranges, strict=True)
-    for number, (value, travel) in enumerate(pairs, start=1):
-        if not travel.holds(value):
-            raise OutOfReach(
-                f"Joint {number} outside its range: {value:.3f}, "
-                f"allowed {travel.low:.3f} to {travel.high:.3f}"
-            )
-
-
-def inverse(model: ScaraModel, flange: Pose, hand: Hand) -> Joints:
-    """Return the joints for a flange pose, inside their ranges.
-
-    Raises:
-        OutOfReach: The links or a joint's range do not allow it.
-    """
-    joints = solve(model, flange, hand)
+    joints = solve(model, flange, hand, posture)
     check_ranges(model, joints)
     return joints
 
 
-def tip_of(flange: Pose, offset: ToolOffset | None, *, tool: int = 0) -> Pose:
-    """Return the pose of a tool's tip: flange + Rz(U) (tx, ty), reported U = U + tu.
+def continued(model: RobotModel, flange: Pose, near: Joints) -> Joints:
+    """Return the joints for a flange pose that go on from where the joints are.
 
-    Seen in a client that computes the flange back the same way (docs/reference/epson.md 3.1). V and
-    W of the offset cannot be reached by a SCARA and are not part of its pose (assumed).
+    Hand, elbow and wrist stay; each joint of six axes takes its nearest turn.
+
+    Raises:
+        OutOfReach: The arms or a joint's range do not allow it.
     """
+    if model.six_axes:
+        joints = six_axes.solve_near(model, frame_of(flange), near)
+        check_ranges(model, joints)
+        return joints
+    return inverse(model, flange, hand_of(model, near), posture_of(model, near))
+
+
+def frame_of(pose: Pose) -> Frame:
+    """Return the frame of a pose in the base."""
+    return Frame((pose.x_mm, pose.y_mm, pose.z_mm), zyx(pose.u_deg, pose.v_deg, pose.w_deg))
+
+
+def tool_frame(offset: ToolOffset | None) -> Frame:
+    """Return the frame of a tool on the flange."""
     if offset is None:
-        return replace(flange, tool=tool)
-    dx_mm, dy_mm = rotate_xy(offset.x_mm, offset.y_mm, flange.u_deg)
-    return _carried(
-        flange,
-        flange.x_mm + dx_mm,
-        flange.y_mm + dy_mm,
-        flange.z_mm + offset.z_mm,
-        flange.u_deg + offset.u_deg,
-        tool=tool,
+        return ORIGIN
+    x_mm, y_mm, z_mm, u_deg, v_deg, w_deg = offset.components()
+    return Frame((x_mm, y_mm, z_mm), zyx(u_deg, v_deg, w_deg))
+
+
+def pose_of_frame(frame: Frame, like: Pose, *, tool: int) -> Pose:
+    """Return the pose of a frame, with the flags of another pose."""
+    return Pose(
+        *frame.shift_mm, *printed_angles(frame.rotation), like.hand, like.local, tool, like.posture
     )
 
 
-def flange_of(tip: Pose, offset: ToolOffset | None) -> Pose:
+def tip_of(model: RobotModel, flange: Pose, offset: ToolOffset | None, *, tool: int = 0) -> Pose:
+    """Return the pose of a tool's tip.
+
+    Of six axes the frame of the flange times that of the tool. Of a SCARA flange + Rz(U) (tx, ty),
+    reported U = U + tu, taken literally: seen in a client that computes the flange back the same
+    way (docs/reference/epson.md 3.1). V and W of the offset cannot be reached by a SCARA and are
+    not part of its pose (assumed).
+    """
+    if offset is None:
+        return _carried(flange, flange.coordinates(), tool=tool)
+    if model.six_axes:
+        return pose_of_frame(frame_of(flange) @ tool_frame(offset), flange, tool=tool)
+    dx_mm, dy_mm = rotate_xy(offset.x_mm, offset.y_mm, flange.u_deg)
+    x, y, z, u, v, w = flange.coordinates()
+    at = (x + dx_mm, y + dy_mm, z + offset.z_mm, u + offset.u_deg, v, w)
+    return _carried(flange, at, tool=tool)
+
+
+def flange_of(model: RobotModel, tip: Pose, offset: ToolOffset | None) -> Pose:
     """Return the flange pose that puts the tool's tip at ``tip``; undoes :func:`tip_of`."""
     if offset is None:
-        return replace(tip, tool=0)
-    u_deg = tip.u_deg - offset.u_deg
-    dx_mm, dy_mm = rotate_xy(offset.x_mm, offset.y_mm, u_deg)
-    return _carried(tip, tip.x_mm - dx_mm, tip.y_mm - dy_mm, tip.z_mm - offset.z_mm, u_deg, tool=0)
+        return _carried(tip, tip.coordinates(), tool=0)
+    if model.six_axes:
+        return pose_of_frame(frame_of(tip) @ tool_frame(offset).inverse(), tip, tool=0)
+    x, y, z, u, v, w = tip.coordinates()
+    u -= offset.u_deg
+    dx_mm, dy_mm = rotate_xy(offset.x_mm, offset.y_mm, u)
+    return _carried(tip, (x - dx_mm, y - dy_mm, z - offset.z_mm, u, v, w), tool=0)
 
 
-def _carried(pose: Pose, x_mm: float, y_mm: float, z_mm: float, u_deg: float, *, tool: int) -> Pose:
+def _carried(pose: Pose, at: tuple[float, ...], *, tool: int) -> Pose:
     """Return ``pose`` elsewhere; asked each millisecond of a search, where ``replace`` is slow."""
-    return Pose(x_mm, y_mm, z_mm, u_deg, pose.v_deg, pose.w_deg, pose.hand, pose.local, tool)
+    x, y, z, u, v, w = at
+    return Pose(x, y, z, u, v, w, pose.hand, pose.local, tool, pose.posture)

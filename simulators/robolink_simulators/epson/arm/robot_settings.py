@@ -6,7 +6,7 @@ Source: docs/reference/spel.md 6.2, 6.3, 7.2.
 from dataclasses import dataclass, field
 from typing import Final
 
-FINE_PULSES: Final = (10, 10, 10, 10)
+FINE_PULSES: Final = 10
 """Default of Fine; per model in the reference, 10 in its sample (docs/reference/spel.md 7.3)."""
 
 
@@ -22,23 +22,31 @@ class RobotSettings:
         weight_at_mm: Weight: distance of its centre from joint 2.
         inertia_kg_m2: Inertia of the load.
         eccentricity_mm: Inertia: distance of its centre from joint 4.
-        fine_pulses: Fine of joints 1 to 4.
+        fine_pulses: Fine of each joint.
         continuous_path: CP.
         speed_factor: SpeedFactor in percent; it scales speeds and accelerations.
         free_joints: Joints that SFree has released.
-        home_pulses: HomeSet of joints 1 to 4, ``None`` before one was given.
+        home_pulses: HomeSet of each joint, ``None`` before one was given.
+        avoid_singularity: AvoidSingularity, 0 to 4.
     """
 
+    fine_pulses: tuple[int, ...]
     weight_kg: float = 2.0
     weight_at_mm: float = 200.0
     inertia_kg_m2: float = 0.01
     eccentricity_mm: float = 0.0
-    fine_pulses: tuple[int, int, int, int] = FINE_PULSES
     continuous_path: bool = False
     speed_factor: int = 100
     free_joints: set[int] = field(default_factory=set)
-    home_pulses: tuple[int, int, int, int] | None = None
+    home_pulses: tuple[int, ...] | None = None
+    avoid_singularity: int = 1
+
+    @classmethod
+    def of(cls, axes: int) -> "RobotSettings":
+        """Return the settings of a new robot with so many joints."""
+        return cls((FINE_PULSES,) * axes)
 
     def reset(self) -> None:
         """Set what start-up, Motor On, SFree, SLock and Reset set back."""
-        self.fine_pulses, self.continuous_path = FINE_PULSES, False
+        self.fine_pulses = (FINE_PULSES,) * len(self.fine_pulses)
+        self.continuous_path = False

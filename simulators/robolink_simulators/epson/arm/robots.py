@@ -1,7 +1,15 @@
-"""The SCARA models that can be simulated, with the evidence for each row."""
+"""The EPSON robots that can be simulated, with the evidence for each row.
 
+The rows stand in ``robots.csv`` beside this module; docs/reference/epson-robots.md, "Families"
+says where they come from.
+"""
+
+import csv
 from dataclasses import dataclass
+from difflib import get_close_matches
 from enum import StrEnum
+from functools import cache
+from importlib.resources import files
 from typing import Final, NamedTuple
 
 from robolink.errors import ConfigError
@@ -9,14 +17,35 @@ from robolink.messages import tr
 
 
 class Evidence(StrEnum):
-    """How far a row can be trusted."""
+    """How far the geometry of a row can be trusted."""
 
-    DOCUMENTED = "documented"
-    PARTLY_ASSUMED = "partly assumed"
+    VENDOR = "vendor file"
+    SECOND_HAND = "second-hand"
+
+
+class Mechanism(StrEnum):
+    """How the joints of a robot follow each other."""
+
+    SCARA = "scara"
+    FOLDED_SCARA = "folded_scara"
+    SIX_AXIS = "six_axis"
+
+
+class Mount(StrEnum):
+    """What a robot is fixed to; MULTIPLE is a bracket for wall or ceiling."""
+
+    TABLE = "table"
+    CEILING = "ceiling"
+    MULTIPLE = "multiple"
+
+
+_ROBOT_TYPES: Final = {Mechanism.SCARA: 3, Mechanism.SIX_AXIS: 5, Mechanism.FOLDED_SCARA: 6}
+_TURN: Final = 360.0
+_ON_A_WALL: Final = "w"
 
 
 class Range(NamedTuple):
-    """Travel of one joint, ends included: degrees, mm for joint 3."""
+    """Travel of one joint, ends included: degrees, mm for joint 3 of a SCARA."""
 
     low: float
     high: float
@@ -27,112 +56,125 @@ class Range(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class ScaraModel:
-    """Geometry and drives of one robot (docs/reference/epson.md 4).
-
-    Joints 1, 2 and 4 count degrees, joint 3 mm downwards from 0.
+class RobotModel:
+    """Geometry and drives of one robot (docs/reference/epson-robots.md, "Families").
 
     Attributes:
         name: As on the type plate.
-        a1_mm: Length of the first link.
-        a2_mm: Length of the second link.
-        ranges: Travel of joints 1 to 4.
-        pulses_per_unit: Encoder pulses per degree, per mm for joint 3.
-        top_speed: Joint speeds at Speed 100, in degrees/s, mm/s for joint 3.
-        source: Where the row comes from.
-        assumed: What in the row no document gives.
+        mechanism: How its joints follow each other.
+        mount: What it is fixed to.
+        lengths_mm: Both arms of a SCARA; of six axes the six lengths of ArmSet: base to joint 2
+            upwards, joint 1 to joint 2 forwards, joint 2 to 3, joint 3 to 5 upwards, joint 3 to 5
+            forwards, joint 5 to the flange.
+        ranges: Travel of each joint.
+        pulses_per_unit: Encoder pulses per degree, or per mm.
+        top_speed: Joint speeds at Speed 100, in degrees/s, or mm/s.
+        payload_kg: Heaviest load.
+        source: Where the row comes from, by the keys of docs/reference/epson-robots.md, "Sources".
+        assumed: What in the row no source gives.
     """
 
     name: str
-    a1_mm: float
-    a2_mm: float
-    ranges: tuple[Range, Range, Range, Range]
-    pulses_per_unit: tuple[float, float, float, float]
-    top_speed: tuple[float, float, float, float]
+    mechanism: Mechanism
+    mount: Mount
+    lengths_mm: tuple[float, ...]
+    ranges: tuple[Range, ...]
+    pulses_per_unit: tuple[float, ...]
+    top_speed: tuple[float, ...]
+    payload_kg: float
     source: str
     assumed: str
 
     @property
     def evidence(self) -> Evidence:
-        """The mark of the whole row."""
-        return Evidence.PARTLY_ASSUMED if self.assumed else Evidence.DOCUMENTED
+        """Whether the lengths are the vendor's."""
+        return Evidence.VENDOR if self.source.startswith("ROS2") else Evidence.SECOND_HAND
+
+    @property
+    def axes(self) -> int:
+        """How many joints it has."""
+        return len(self.ranges)
+
+    @property
+    def six_axes(self) -> bool:
+        """Whether it can tilt its tool."""
+        return self.mechanism is Mechanism.SIX_AXIS
+
+    @property
+    def hangs(self) -> bool:
+        """Whether the base of a six-axis robot is turned over."""
+        return self.six_axes and self.mount is Mount.CEILING
+
+    @property
+    def linear_joints(self) -> tuple[int, ...]:
+        """Numbers of the joints that count mm."""
+        return () if self.six_axes else (3,)
+
+    @property
+    def robot_type(self) -> int:
+        """What RobotType gives (docs/reference/spel.md 9)."""
+        return _ROBOT_TYPES[self.mechanism]
+
+    @property
+    def reach_mm(self) -> float:
+        """No flange comes farther from the axis of joint 2, or of joint 1 of a SCARA."""
+        return sum(self.lengths_mm[2:] if self.six_axes else self.lengths_mm)
 
 
-_TURN = 360.0
-
-# docs/reference/epson.md 4: measured on a G3, the only SCARA whose joint 3 and 4 scales are known.
-_J3_PULSES_PER_MM = 1706667 / 150.0
-_J4_PULSES_PER_DEG = 1494221 / _TURN
-
-# No readable document gives joint speeds: order of magnitude of a small SCARA.
-_TOP_SPEED = (360.0, 540.0, 1000.0, 1500.0)
-
-
-def _t_series(
-    name: str, links_mm: tuple[float, float], j1_pulses: int, j2_deg: float, stroke_mm: float
-) -> ScaraModel:
-    return ScaraModel(
-        name,
-        *links_mm,
-        ranges=(Range(-42, 222), Range(-j2_deg, j2_deg), Range(-stroke_mm, 0), Range(-360, 360)),
-        pulses_per_unit=(
-            j1_pulses / _TURN,
-            819200 / _TURN,
-            _J3_PULSES_PER_MM,
-            _J4_PULSES_PER_DEG,
-        ),
-        top_speed=_TOP_SPEED,
-        source="docs/reference/epson.md 4 (TB): reach, joint ranges, pulses of joints 1 and 2",
-        assumed="link split, stroke of T6, pulses of joints 3 and 4 (G3's), joint speeds",
+def _model(row: dict[str, str]) -> RobotModel:
+    mechanism = Mechanism(row["kind"])
+    ends = [travel.split("..") for travel in row["ranges"].split()]
+    pulses = [float(count) for count in row["pulses"].split()]
+    linear = () if mechanism is Mechanism.SIX_AXIS else (2,)
+    return RobotModel(
+        name=row["name"],
+        mechanism=mechanism,
+        mount=Mount(row["mount"]),
+        lengths_mm=tuple(map(float, row["lengths_mm"].split())),
+        ranges=tuple(Range(float(low), float(high)) for low, high in ends),
+        pulses_per_unit=tuple(n if i in linear else n / _TURN for i, n in enumerate(pulses)),
+        top_speed=tuple(map(float, row["top_speed"].split())),
+        payload_kg=float(row["payload_kg"]),
+        source=row["source"],
+        assumed=row["assumed"],
     )
 
 
-def _gx_series(
-    name: str,
-    links_mm: tuple[float, float],
-    *,
-    j1_deg: tuple[float, float],
-    j2_deg: float,
-    stroke_mm: float,
-) -> ScaraModel:
-    return ScaraModel(
-        name,
-        *links_mm,
-        ranges=(Range(*j1_deg), Range(-j2_deg, j2_deg), Range(-stroke_mm, 0), Range(-360, 360)),
-        pulses_per_unit=(
-            10485760 / _TURN,
-            10485760 / _TURN,
-            _J3_PULSES_PER_MM,
-            _J4_PULSES_PER_DEG,
-        ),
-        top_speed=_TOP_SPEED,
-        source="docs/reference/epson.md 4 (ROS2, GX): links, joint ranges; pulses of GX4 joint 1",
-        assumed="pulses of joint 1 of GX8, of joint 2, of joints 3 and 4 (G3's), joint speeds",
-    )
+@cache
+def robots() -> tuple[RobotModel, ...]:
+    """Return every model: the vendor's rows first, then those with second-hand lengths."""
+    text = files(__package__).joinpath("robots.csv").read_text(encoding="utf-8")
+    return tuple(_model(row) for row in csv.DictReader(text.splitlines()))
 
 
-ROBOTS: Final[tuple[ScaraModel, ...]] = (
-    _t_series("T3-401S", (225, 175), 819200, 141, 150),
-    _t_series("T6-602S", (325, 275), 1310720, 150, 200),
-    _gx_series("GX4-C251S", (124, 126), j1_deg=(-50, 230), j2_deg=141, stroke_mm=150),
-    _gx_series("GX4-C301S", (170, 130), j1_deg=(-50, 230), j2_deg=142, stroke_mm=150),
-    _gx_series("GX4-C351S", (220, 130), j1_deg=(-50, 230), j2_deg=142, stroke_mm=150),
-    _gx_series("GX8-C452S", (200, 250), j1_deg=(-62, 242), j2_deg=147.25, stroke_mm=200),
-    _gx_series("GX8-C552S", (300, 250), j1_deg=(-62, 242), j2_deg=147.25, stroke_mm=200),
-    _gx_series("GX8-C652S", (400, 250), j1_deg=(-62, 242), j2_deg=147.25, stroke_mm=200),
-)
+def robot_names() -> tuple[str, ...]:
+    """Return the names of all models."""
+    return tuple(model.name for model in robots())
 
 
-def find_robot(name: str) -> ScaraModel:
+def find_robot(name: str) -> RobotModel:
     """Return the model called ``name``, in any case.
 
     Raises:
-        ConfigError: There is no such row.
+        ConfigError: There is no such row, or it would be a six-axis robot on a wall, whose Tool 0
+            no readable source defines (docs/reference/epson-robots.md, "Frames").
     """
-    for model in ROBOTS:
-        if model.name.casefold() == name.casefold():
-            return model
-    raise ConfigError(
-        tr("There is no simulated robot {name!r}.", name=name),
-        remedy=tr("Choose one of {names}.", names=", ".join(model.name for model in ROBOTS)),
-    )
+    wanted = name.casefold()
+    by_name = {model.name.casefold(): model for model in robots()}
+    if wanted in by_name:
+        return by_name[wanted]
+    upright = by_name.get(wanted.removesuffix(_ON_A_WALL))
+    if upright is not None and upright.six_axes:
+        raise ConfigError(
+            tr("A six-axis robot on a wall cannot be simulated: {name!r}.", name=name),
+            remedy=tr(
+                "How its Tool 0 lies is not known. Choose {name}, on a table, or one of a ceiling.",
+                name=upright.name,
+            ),
+        )
+    close = get_close_matches(wanted, by_name, n=1)
+    if close:
+        remedy = tr("Is {name} meant?", name=by_name[close[0]].name)
+    else:
+        remedy = tr("Choose one of {names}.", names=", ".join(robot_names()))
+    raise ConfigError(tr("There is no simulated robot {name!r}.", name=name), remedy=remedy)

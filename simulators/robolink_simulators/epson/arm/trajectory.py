@@ -9,11 +9,12 @@ import math
 from dataclasses import dataclass, replace
 from typing import Final, Protocol
 
-from robolink.model import Hand, Pose, ToolOffset
+from robolink.model import Hand, Pose, Posture, ToolOffset
 from robolink.timing import NS_PER_S
-from robolink_simulators.epson.arm.kinematics import Joints, check_ranges, flange_of, forward, solve
+from robolink_simulators.epson.arm.joints import Joints, check_ranges
+from robolink_simulators.epson.arm.kinematics import flange_of, forward, hand_of, posture_of, solve
 from robolink_simulators.epson.arm.ramps import BrakedRamp, Ramp, TimeLaw
-from robolink_simulators.epson.arm.robots import ScaraModel
+from robolink_simulators.epson.arm.robots import RobotModel
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 
 FULL_SPEED_AFTER_S: Final = 0.2
@@ -79,7 +80,7 @@ def _braked(ramp: TimeLaw | None, elapsed_ns: int) -> TimeLaw | None:
 class JointLeg:
     """Straight in joint space; all joints start and stop together."""
 
-    model: ScaraModel
+    model: RobotModel
     start: Joints
     end: Joints
     ramp: TimeLaw | None
@@ -98,7 +99,7 @@ class JointLeg:
         share = _share(self.ramp, elapsed_ns)
         if share >= 1:
             return self.end
-        pairs = zip(self.start.values(), self.end.values(), strict=True)
+        pairs = zip(self.start, self.end, strict=True)
         return Joints(*(a + (b - a) * share for a, b in pairs))
 
     def braked(self, elapsed_ns: int) -> "JointLeg":
@@ -110,11 +111,12 @@ class JointLeg:
 class LineLeg:
     """The tool's tip on a straight line, U turning evenly along it."""
 
-    model: ScaraModel
+    model: RobotModel
     start: Pose
     end: Pose
     offset: ToolOffset | None
     hand: Hand
+    posture: Posture | None
     ramp: TimeLaw | None
 
     @property
@@ -136,23 +138,23 @@ class LineLeg:
 
     def joints_after(self, share: float) -> Joints:
         """Return the joints after a share of the line."""
-        return solve(self.model, self._flange_after(share), self.hand)
+        return solve(self.model, self._flange_after(share), self.hand, self.posture)
 
     def _flange_after(self, share: float) -> Pose:
         a, b = self.start, self.end
         if share >= 1:
-            return flange_of(b, self.offset)
+            return flange_of(self.model, b, self.offset)
         tip = Pose(
             a.x_mm + (b.x_mm - a.x_mm) * share,
             a.y_mm + (b.y_mm - a.y_mm) * share,
             a.z_mm + (b.z_mm - a.z_mm) * share,
             a.u_deg + (b.u_deg - a.u_deg) * share,
         )
-        return flange_of(tip, self.offset)
+        return flange_of(self.model, tip, self.offset)
 
 
 def plan_go(
-    model: ScaraModel, start: Joints, end: Joints, pace: JointPace, *, radius_mm: float
+    model: RobotModel, start: Joints, end: Joints, pace: JointPace, *, radius_mm: float
 ) -> JointLeg:
     """Plan a joint-space leg.
 
@@ -161,13 +163,13 @@ def plan_go(
         start: Where the arm is.
         end: Where it goes.
         pace: How fast it may be.
-        radius_mm: Distance of the tip from joint 4, for the low-power limit.
+        radius_mm: Distance of the tip from the last joint, for the low-power limit.
 
     Raises:
         OutOfReach: ``end`` lies outside a joint's range.
     """
     check_ranges(model, end)
-    deltas = [b - a for a, b in zip(start.values(), end.values(), strict=True)]
+    deltas = [b - a for a, b in zip(start, end, strict=True)]
     shares = [abs(d) / top for d, top in zip(deltas, model.top_speed, strict=True)]
     longest = max(shares)
     if longest < _STILL:
@@ -180,22 +182,33 @@ def plan_go(
     return JointLeg(model, start, end, Ramp.fastest(rate, rise, fall))
 
 
-def _tip_travel_bound(model: ScaraModel, deltas: list[float], radius_mm: float) -> float:
+def _tip_travel_bound(model: RobotModel, deltas: list[float], radius_mm: float) -> float:
     """Bound the tip's path length per whole leg: each link as if it alone carried the tip."""
+    if model.six_axes:
+        return max(_six_axes_bound(model, deltas, radius_mm), _STILL)
+    a1_mm, a2_mm = model.lengths_mm
     j1, j2, j4 = (math.radians(deltas[joint]) for joint in (0, 1, 3))
-    level = model.a1_mm * abs(j1) + model.a2_mm * abs(j1 + j2) + radius_mm * abs(j1 + j2 + j4)
+    level = a1_mm * abs(j1) + a2_mm * abs(j1 + j2) + radius_mm * abs(j1 + j2 + j4)
     return max(math.hypot(level, deltas[2]), _STILL)
 
 
+def _six_axes_bound(model: RobotModel, deltas: list[float], radius_mm: float) -> float:
+    _, l2, l3, l4, l5, l6 = model.lengths_mm
+    wrist_mm = l6 + radius_mm
+    forearm_mm = math.hypot(l4, l5) + wrist_mm
+    arms_mm = (l2 + l3 + forearm_mm, l3 + forearm_mm, forearm_mm, wrist_mm, wrist_mm, radius_mm)
+    return sum(abs(math.radians(d)) * arm for d, arm in zip(deltas, arms_mm, strict=True))
+
+
 def plan_move(
-    model: ScaraModel,
+    model: RobotModel,
     ends: tuple[Pose, Pose],
     pace: LinePace,
     *,
     offset: ToolOffset | None,
-    hand: Hand,
+    near: Joints,
 ) -> LineLeg:
-    """Plan a straight leg of the tip between two tip poses.
+    """Plan a straight leg of a SCARA's tip between two tip poses; ``near`` is where it stands.
 
     The whole line is checked before anything moves (assumed: a real controller may notice a
     line that leaves the envelope only on the way).
@@ -204,6 +217,7 @@ def plan_move(
         OutOfReach: The line leaves the envelope or the hand would have to change.
     """
     start, end = ends
+    hand = hand_of(model, near)
     if end.hand is not None and end.hand is not hand:
         raise SpelRefusal(RefusalKind.OUT_OF_REACH, "A straight motion cannot change the hand")
     length_mm = math.dist(start.coordinates()[:3], end.coordinates()[:3])
@@ -215,7 +229,7 @@ def plan_move(
     elif turn_deg > _STILL:
         accel = pace.turn_deg_s2 / turn_deg
         ramp = Ramp.fastest(pace.turn_deg_s / turn_deg, accel, accel)
-    leg = LineLeg(model, start, end, offset, hand, ramp)
+    leg = LineLeg(model, start, end, offset, hand, posture_of(model, near), ramp)
     steps = math.ceil(min(length_mm / _CHECK_EVERY_MM + turn_deg / _CHECK_EVERY_DEG, _MOST_CHECKS))
     check_ranges(model, leg.joints_after(1.0))
     for step in range(1, steps):

@@ -1,9 +1,10 @@
-"""SPEL+ point values, planar locals and the point memory P0 to P999 (docs/reference/spel.md 5)."""
+"""SPEL+ point values, locals and the point memory P0 to P999 (docs/reference/spel.md 5)."""
 
 from dataclasses import dataclass, replace
 from typing import Final
 
-from robolink.model import Hand, Pose, rotate_xy
+from robolink.model import Hand, Pose, Posture, rotate_xy
+from robolink_simulators.cell.frames import Frame, printed_angles, zyx
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 
 AXES: Final = "XYZUVW"
@@ -23,6 +24,7 @@ class Point:
     Attributes:
         coordinates: X, Y, Z in mm, U, V, W in degrees, as seen from ``local``.
         hand: Right unless stated (seen in transcripts: ``/R``).
+        posture: Elbow, wrist and joint flags, ``None`` where none was named.
         local: The local coordinate system of the coordinates, 0 for the base.
         given: How many coordinates the statement that made it named.
     """
@@ -31,11 +33,12 @@ class Point:
     hand: Hand = Hand.RIGHT
     local: int = 0
     given: int = 6
+    posture: Posture | None = None
 
     @classmethod
     def at(cls, pose: Pose) -> "Point":
         """Return the point of a pose in the base frame."""
-        return cls(pose.coordinates(), hand=pose.hand or Hand.RIGHT)
+        return cls(pose.coordinates(), hand=pose.hand or Hand.RIGHT, posture=pose.posture)
 
     def with_axis(self, axis: str, value: float) -> "Point":
         """Return the point with one coordinate (a letter of :data:`AXES`) replaced."""
@@ -48,7 +51,7 @@ class Point:
         return self.with_axis(axis, self.coordinates[AXES.index(axis)] + by)
 
     def plus(self, other: "Point", sign: int = 1) -> "Point":
-        """Add coordinate by coordinate; hand and local stay this point's (inferred)."""
+        """Add coordinate by coordinate; flags and local stay this point's (inferred)."""
         x, y, z, u, v, w = (
             a + sign * b for a, b in zip(self.coordinates, other.coordinates, strict=True)
         )
@@ -57,30 +60,53 @@ class Point:
 
 @dataclass(frozen=True, slots=True)
 class Local:
-    """A planar local coordinate system, seen from the base (V and W are 0 on a SCARA)."""
+    """A local coordinate system, seen from the base (V and W are 0 on a SCARA)."""
 
     x_mm: float = 0.0
     y_mm: float = 0.0
     z_mm: float = 0.0
     u_deg: float = 0.0
+    v_deg: float = 0.0
+    w_deg: float = 0.0
+
+    @property
+    def frame(self) -> Frame:
+        """Where it stands in the base."""
+        return frame_at((self.x_mm, self.y_mm, self.z_mm, self.u_deg, self.v_deg, self.w_deg))
 
     def to_base(self, coordinates: Coordinates) -> Coordinates:
-        """Express coordinates of this local in the base frame."""
+        """Express coordinates of this planar local in the base frame, U taken literally."""
         x, y, z, u, v, w = coordinates
         dx_mm, dy_mm = rotate_xy(x, y, self.u_deg)
         return (self.x_mm + dx_mm, self.y_mm + dy_mm, self.z_mm + z, u + self.u_deg, v, w)
 
     def from_base(self, coordinates: Coordinates) -> Coordinates:
-        """Express base coordinates in this local."""
+        """Express base coordinates in this planar local."""
         x, y, z, u, v, w = coordinates
         in_x, in_y = rotate_xy(x - self.x_mm, y - self.y_mm, -self.u_deg)
         return (in_x, in_y, z - self.z_mm, u - self.u_deg, v, w)
 
 
-class LocalTable:
-    """Locals 1 to 15; local 0 is the base and always there."""
+def frame_at(coordinates: Coordinates) -> Frame:
+    """Return the frame of X, Y, Z in mm and U, V, W in degrees."""
+    x, y, z, u, v, w = coordinates
+    return Frame((x, y, z), zyx(u, v, w))
 
-    def __init__(self) -> None:
+
+def coordinates_of_frame(frame: Frame) -> Coordinates:
+    """Return X, Y, Z in mm and U, V, W in degrees of a frame, as they are printed."""
+    return (*frame.shift_mm, *printed_angles(frame.rotation))
+
+
+class LocalTable:
+    """Locals 1 to 15; local 0 is the base and always there.
+
+    Args:
+        tilting: Whether the robot tilts its tool, so that locals may lean.
+    """
+
+    def __init__(self, *, tilting: bool = False) -> None:
+        self.tilting = tilting
         self._locals: dict[int, Local] = {0: Local()}
 
     def get(self, number: int) -> Local:
@@ -107,15 +133,26 @@ class LocalTable:
 
     def to_base(self, point: Point) -> Point:
         """Express a point in the base frame."""
-        coordinates = self.get(point.local).to_base(point.coordinates)
+        local = self.get(point.local)
+        if point.local == 0:
+            return point
+        if self.tilting:
+            coordinates = coordinates_of_frame(local.frame @ frame_at(point.coordinates))
+        else:
+            coordinates = local.to_base(point.coordinates)
         return replace(point, coordinates=coordinates, local=0)
 
     def convert(self, point: Point, number: int) -> Point:
         """Express a point in another local (the modifier ``@n``, docs/reference/spel.md 5.2)."""
         if number == point.local:
             return point
-        base = self.to_base(point)
-        return replace(base, coordinates=self.get(number).from_base(base.coordinates), local=number)
+        base, local = self.to_base(point), self.get(number)
+        if number == 0:
+            return base
+        if self.tilting:
+            seen = local.frame.inverse() @ frame_at(base.coordinates)
+            return replace(base, coordinates=coordinates_of_frame(seen), local=number)
+        return replace(base, coordinates=local.from_base(base.coordinates), local=number)
 
 
 class PointTable:

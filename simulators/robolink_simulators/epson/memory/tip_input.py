@@ -4,11 +4,14 @@ import random
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from robolink.model import ToolOffset, rotate_xy
+from robolink.model import Pose, ToolOffset, rotate_xy
 from robolink.timing import NS_PER_S
+from robolink_simulators.cell.frames import turned
+from robolink_simulators.cell.places import Direction, axis_of
 from robolink_simulators.cell.tip_switches import Lean, Shake, TipSwitch
 from robolink_simulators.epson.arm.arm import Arm
-from robolink_simulators.epson.arm.kinematics import tip_of
+from robolink_simulators.epson.arm.kinematics import frame_of, tip_of
+from robolink_simulators.epson.arm.robots import RobotModel
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +63,20 @@ class TipInput:
             flange = arm.true_flange()
         else:
             flange = arm.true_flange_at(instant_ns - self._latency_ns)
-        tip, (dx_mm, dy_mm, dz_mm) = tip_of(flange, nozzle.tip), self._shake.of(arm.moves_started)
+        tip = tip_of(arm.model, flange, nozzle.tip)
+        dx_mm, dy_mm, dz_mm = self._shake.of(arm.moves_started)
         place = (tip.x_mm + dx_mm, tip.y_mm + dy_mm, tip.z_mm + dz_mm)
-        return self._switch.trips(place, rotate_xy(*nozzle.lean, flange.u_deg))
+        return self._switch.trips(place, _shaft(arm.model, flange, nozzle))
+
+
+def _shaft(model: RobotModel, flange: Pose, nozzle: Nozzle) -> Direction:
+    """Return which way the shaft goes from the tip, in base axes.
+
+    A SCARA's flange looks up with its Z axis, so the shaft goes along it, less its lean; six axes
+    look out of the flange, and the shaft comes back along the tool's own Z.
+    """
+    if not model.six_axes:
+        return (*rotate_xy(*nozzle.lean, flange.u_deg), 1.0)
+    x, y, z = axis_of(nozzle.tip or ToolOffset(), "z")
+    lean_x, lean_y = nozzle.lean
+    return turned(frame_of(flange).rotation, (lean_x - x, lean_y - y, -z))

@@ -228,7 +228,9 @@ class StatementExecution:
             case Print(items, newline):
                 values = [evaluator.shown(item) for item in items]
                 end = CRLF if newline else ""
-                return StatementOutcome(joined(values, evaluator.session.options) + end)
+                session = evaluator.session
+                text = joined(values, session.options, session.machine.model)
+                return StatementOutcome(text + end)
             case KeywordStatement("wait"):
                 return self._wait(statement)
             case If():

@@ -25,8 +25,8 @@ PROGRAM_ONLY: Final = frozenset(_PROGRAM_WORDS.split())
 """Statements that exist in programs only (docs/reference/spel.md 13, class E)."""
 
 _WORDS_OF_OTHER_ROBOTS = """
-    brake jumptlz avoidsingularity singularityangle singularityspeed singularitydist
-    j1angle j4angle hand elbow wrist j1flag j2flag j4flag j6flag vsd
+    brake jumptlz singularityangle singularityspeed singularitydist
+    j1angle j4angle vsd
 """
 
 OF_OTHER_ROBOTS: Final = frozenset(_WORDS_OF_OTHER_ROBOTS.split())

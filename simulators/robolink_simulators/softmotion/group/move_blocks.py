@@ -1,9 +1,9 @@
 """The blocks that move an axis group (docs/reference/softmotion.md 2.3, 2.4)."""
 
+from robolink_simulators.cell.frames import ORIGIN, Frame
 from robolink_simulators.softmotion.function_blocks import BlockExecution
 from robolink_simulators.softmotion.group.condition import SmcGroupState
 from robolink_simulators.softmotion.group.core import GroupCore, block
-from robolink_simulators.softmotion.kinematics.frames import ORIGIN, Frame
 from robolink_simulators.softmotion.kinematics.kinematics import AxisValues
 from robolink_simulators.softmotion.motion.jog import JogCommand, JogMotion
 from robolink_simulators.softmotion.motion.movement import EdgeWatch, Movement, SmcBufferMode

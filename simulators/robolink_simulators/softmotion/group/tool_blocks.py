@@ -1,5 +1,6 @@
 """The blocks about tool, kinematics and position (docs/reference/softmotion.md 1, 2.3)."""
 
+from robolink_simulators.cell.frames import NO_TURN, Frame
 from robolink_simulators.softmotion.function_blocks import BlockExecution
 from robolink_simulators.softmotion.group.condition import (
     ActualPosition,
@@ -8,7 +9,6 @@ from robolink_simulators.softmotion.group.condition import (
 )
 from robolink_simulators.softmotion.group.core import GroupCore, block
 from robolink_simulators.softmotion.kinematics.coordinates import CoordRef, CoordSystem
-from robolink_simulators.softmotion.kinematics.frames import NO_TURN, Frame
 from robolink_simulators.softmotion.kinematics.kinematics import KinematicsModel
 from robolink_simulators.softmotion.motion.movement import ToolInForce
 from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind

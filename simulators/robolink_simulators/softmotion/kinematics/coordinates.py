@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import Self
 
-from robolink_simulators.softmotion.kinematics.frames import ORIGIN, Frame, zyz, zyz_angles
+from robolink_simulators.cell.frames import ORIGIN, Frame, zyz, zyz_angles
 from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind
 
 

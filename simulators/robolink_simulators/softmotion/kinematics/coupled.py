@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from robolink_simulators.softmotion.kinematics.frames import Frame, Matrix, subtract, turned
+from robolink_simulators.cell.frames import Frame, Matrix, subtract, turned
 from robolink_simulators.softmotion.kinematics.kinematics import (
     AxisKind,
     AxisValues,

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from robolink_simulators.softmotion.kinematics.frames import Y_AXIS, Frame, Matrix, about, product
+from robolink_simulators.cell.frames import Y_AXIS, Frame, Matrix, about, product
 from robolink_simulators.softmotion.kinematics.kinematics import (
     ANY_CONFIGURATION,
     AxisKind,

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final, Protocol
 
-from robolink_simulators.softmotion.kinematics.frames import Frame, Matrix
+from robolink_simulators.cell.frames import Frame, Matrix
 from robolink_simulators.softmotion.kinematics.orientation import OrientationSpace
 
 AxisValues = tuple[float, ...]

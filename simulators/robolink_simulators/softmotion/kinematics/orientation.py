@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Final, Self
 
-from robolink_simulators.softmotion.kinematics.frames import (
+from robolink_simulators.cell.frames import (
     NO_TURN,
     Z_AXIS,
     Matrix,

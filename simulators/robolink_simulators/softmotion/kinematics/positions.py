@@ -6,7 +6,7 @@ Geometry as in docs/reference/softmotion.md 3.3; the evidence of each stands at 
 import math
 from dataclasses import dataclass
 
-from robolink_simulators.softmotion.kinematics.frames import NO_TURN, Frame, Matrix
+from robolink_simulators.cell.frames import NO_TURN, Frame, Matrix
 from robolink_simulators.softmotion.kinematics.kinematics import (
     ANY_CONFIGURATION,
     AxisKind,

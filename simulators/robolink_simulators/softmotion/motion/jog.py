@@ -4,9 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from robolink.timing import NS_PER_S
-from robolink_simulators.softmotion.function_blocks import BlockExecution
-from robolink_simulators.softmotion.kinematics.coordinates import CoordinateTransforms, CoordSystem
-from robolink_simulators.softmotion.kinematics.frames import (
+from robolink_simulators.cell.frames import (
     Frame,
     Matrix,
     Vector,
@@ -17,6 +15,8 @@ from robolink_simulators.softmotion.kinematics.frames import (
     scale,
     turned,
 )
+from robolink_simulators.softmotion.function_blocks import BlockExecution
+from robolink_simulators.softmotion.kinematics.coordinates import CoordinateTransforms, CoordSystem
 from robolink_simulators.softmotion.kinematics.kinematics import (
     AxisKind,
     AxisValues,

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 from robolink.timing import NS_PER_S
+from robolink_simulators.cell.frames import ORIGIN, Frame
 from robolink_simulators.softmotion.function_blocks import BlockExecution
 from robolink_simulators.softmotion.kinematics.coordinates import CoordRef
-from robolink_simulators.softmotion.kinematics.frames import ORIGIN, Frame
 from robolink_simulators.softmotion.kinematics.kinematics import AxisValues
 from robolink_simulators.softmotion.motion.paths import JointPath, LinePath, Path
 from robolink_simulators.softmotion.motion.profile import Pace, SpeedProfile

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import NamedTuple
 
-from robolink_simulators.softmotion.kinematics.frames import (
+from robolink_simulators.cell.frames import (
     Frame,
     Matrix,
     Vector,

@@ -4,12 +4,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from robolink_simulators.cell.frames import ORIGIN, Frame
 from robolink_simulators.softmotion.kinematics.coordinates import (
     CoordinateTransforms,
     CoordRef,
     CoordSystem,
 )
-from robolink_simulators.softmotion.kinematics.frames import ORIGIN, Frame
 from robolink_simulators.softmotion.kinematics.kinematics import (
     ANY_CONFIGURATION,
     AxisKind,

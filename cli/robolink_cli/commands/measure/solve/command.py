@@ -16,7 +16,7 @@ from robolink_cli.session.context import json_option
 @click.argument("file", type=click.Path(dir_okay=False, path_type=Path))
 @click.option(
     "--method",
-    type=click.Choice(["n_angle", "n_angle_robust", "pivot", "pivot_robust"]),
+    type=click.Choice(["two_pose", "n_angle", "n_angle_robust", "pivot", "pivot_robust"]),
     help="FILE holds poses only, of any kind that 'robolink poses show' reads.",
 )
 @reading_options

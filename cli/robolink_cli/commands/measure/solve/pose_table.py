@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+from robolink.errors import CalibrationError
+from robolink.messages import tr
 from robolink.pose_tables import ReadingChoices, TabledPose, read_poses
 from robolink_cli.commands.measure.solve.case import Node
 
@@ -25,12 +27,18 @@ def table_case(
 
     Raises:
         AmbiguousPosesError: The file can be read in more than one way.
-        CalibrationError: ``non_finite``.
+        CalibrationError: ``non_finite``; ``tool_pose`` for poses of another tool.
         ConfigError: It cannot be read or is no list of poses.
     """
-    given: dict[str, object] = {
-        "poses": [_as_case(one) for one in read_poses(path, choices).entries]
-    }
+    entries = read_poses(path, choices).entries
+    other = next((one.pose.tool for one in entries if one.pose.tool), None)
+    if other is not None:
+        raise CalibrationError(
+            "tool_pose",
+            tr("The poses were taken with tool {other}, not {tool}.", other=other, tool=0),
+            remedy=tr("Take them with the flange, Tool 0; offline nothing knows another tool."),
+        )
+    given: dict[str, object] = {"poses": [_as_case(one) for one in entries]}
     given |= {} if sigma_mm is None else {"sigma_mm": sigma_mm}
     given |= {} if threshold_mm is None else {"inlier_threshold": threshold_mm}
     return Node({"id": path.name, "method": method, "input": given}, "")

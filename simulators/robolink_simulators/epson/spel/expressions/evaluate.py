@@ -1,20 +1,26 @@
 """Expressions to values."""
 
 from dataclasses import replace
-from typing import Final
+from typing import Any, Final
 
-from robolink.model import Hand, rotate_xy
-from robolink_simulators.epson.memory.points import AXES, HIGHEST_LOCAL, Point
+from robolink.model import Elbow, Hand, Wrist, rotate_xy
+from robolink_simulators.cell.frames import X_AXIS, Y_AXIS, Z_AXIS, Frame, about, product
+from robolink_simulators.epson.arm.kinematics import PLAIN
+from robolink_simulators.epson.memory.points import (
+    AXES,
+    HIGHEST_LOCAL,
+    Point,
+    coordinates_of_frame,
+    frame_at,
+)
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.request_refusals import RequestRefused
 from robolink_simulators.epson.spel.expressions.functions import PLAIN_FUNCTIONS
+from robolink_simulators.epson.spel.expressions.joint_functions import printed_pulses
 from robolink_simulators.epson.spel.expressions.machine_functions import (
     MACHINE_FUNCTIONS,
-    OF_JOINTS,
     POINT_FUNCTIONS,
-    SIX_JOINTS,
     coordinates_of,
-    printed_pulses,
 )
 from robolink_simulators.epson.spel.expressions.operators import binary, unary
 from robolink_simulators.epson.spel.expressions.state_functions import STATE_FUNCTIONS
@@ -61,6 +67,8 @@ CONSTANTS: Final[dict[str, Value]] = {
     "j2": 2,
     "j3": 4,
     "j4": 8,
+    "j5": 16,
+    "j6": 32,
     "cr": "\r",
     "lf": "\n",
     "crlf": "\r\n",
@@ -71,6 +79,8 @@ FARTHEST: Final = 1e9
 """Largest coordinate that a point may have (assumed), in mm or degrees."""
 
 _HANDS = {"R": Hand.RIGHT, "L": Hand.LEFT}
+_ELBOWS = {"A": Elbow.ABOVE, "B": Elbow.BELOW}
+_WRISTS = {"NF": Wrist.NO_FLIP, "F": Wrist.FLIP}
 
 
 class Evaluator:
@@ -191,8 +201,6 @@ class Evaluator:
         if isinstance(base, LabelledPoint):
             return as_point(self._named(base.name, None))
         counts, function = POINT_FUNCTIONS[base.name]
-        if base.name in OF_JOINTS and len(base.arguments) == SIX_JOINTS:
-            raise SpelRefusal(RefusalKind.OTHER_ROBOT, "This robot has four joints")
         _check_count(base.name, base.arguments, counts)
         return function(self.session, [self.value(argument) for argument in base.arguments])
 
@@ -212,7 +220,8 @@ class Evaluator:
         amount = 0.0 if modifier.value is None else float(self.number(modifier.value))
         if modifier.kind is ModifierKind.REPLACE:
             return point.with_axis(modifier.word, amount)
-        return _shifted(point, modifier.word, amount)
+        tilts = self.session.machine.model.six_axes
+        return (_tilted if tilts else _shifted)(point, modifier.word, amount)
 
 
 def _check_count(name: str, arguments: tuple[Expression, ...], counts: range) -> None:
@@ -238,12 +247,42 @@ def _flagged(point: Point, word: str) -> Point:
         return replace(point, hand=_HANDS[word])
     if word.isdigit():
         return replace(point, local=_local_number(word))
-    # Elbow, wrist and joint flags: a SCARA has neither; accepted without effect (assumed).
-    return point
+    # On a SCARA, which has none of them, they are kept without effect (assumed).
+    posture = point.posture or PLAIN
+    if word in _ELBOWS:
+        return replace(point, posture=replace(posture, elbow=_ELBOWS[word]))
+    if word in _WRISTS:
+        return replace(point, posture=replace(posture, wrist=_WRISTS[word]))
+    joint, _, turn = word.lower().partition("f")
+    changed: dict[str, Any] = {f"{joint}_flag": int(turn)}
+    return replace(point, posture=replace(posture, **changed))
+
+
+_TILTING: Final = {"TLX": 0, "TLY": 1, "TLZ": 2, "TLU": 3, "TLV": 4, "TLW": 5}
+_ABOUT: Final = {"RX": X_AXIS, "RY": Y_AXIS, "RZ": Z_AXIS}
+
+
+def _tilted(point: Point, word: str, amount: float) -> Point:
+    """Apply a shift to a point of a six-axis robot.
+
+    RX, RY and RZ turn about the axes of the point's local, through the point (the reference leaves
+    it open, docs/reference/spel.md 5.2).
+    """
+    if word in AXES:
+        return point.shifted(word, amount)
+    at = frame_at(point.coordinates)
+    if word in _ABOUT:
+        moved = Frame(at.shift_mm, product(about(_ABOUT[word], amount), at.rotation))
+    else:
+        by = [0.0] * len(AXES)
+        by[_TILTING[word]] = amount
+        x, y, z, u, v, w = by
+        moved = at @ frame_at((x, y, z, u, v, w))
+    return replace(point, coordinates=coordinates_of_frame(moved))
 
 
 def _shifted(point: Point, word: str, amount: float) -> Point:
-    """Apply ``+X(..)``, ``+TLX(..)`` or ``+RZ(..)``.
+    """Apply ``+X(..)``, ``+TLX(..)`` or ``+RZ(..)`` to a point of a SCARA.
 
     TL shifts follow the axes that the tool has at that point (the reference leaves it open);
     a SCARA turns about Z only.

@@ -2,13 +2,23 @@
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import astuple
 from typing import Final
 
-from robolink.model import Hand, ToolOffset
-from robolink_simulators.epson.arm.kinematics import Joints, check_ranges, forward, tip_of
+from robolink.model import ToolOffset
 from robolink_simulators.epson.memory.bits import BitBank
 from robolink_simulators.epson.memory.points import AXES, Point
 from robolink_simulators.epson.refusals import OutOfReach, RefusalKind, SpelRefusal
+from robolink_simulators.epson.spel.expressions.joint_functions import (
+    FLAG_FUNCTIONS,
+    angles_to_pulses,
+    joint_of_point,
+    of_angles,
+    of_pulses,
+    pulses_of,
+    pulses_of_point,
+    with_least_motion,
+)
 from robolink_simulators.epson.spel.expressions.values import (
     Value,
     as_integer,
@@ -21,17 +31,6 @@ from robolink_simulators.epson.spel.session import Session
 Arguments = Sequence[Value]
 MachineFunction = Callable[[Session, Arguments], Value]
 PointFunction = Callable[[Session, Arguments], Point]
-
-SCARA: Final = 3
-"""RobotType (docs/reference/spel.md 9)."""
-
-OF_JOINTS: Final = frozenset({"ja", "pulse"})
-"""Functions of one value for each joint."""
-
-SIX_JOINTS: Final = 6
-_JOINTS: Final = 4
-
-_HAND_NUMBERS = {Hand.RIGHT: 1, Hand.LEFT: 2}
 
 
 def _coordinate(axis: str) -> MachineFunction:
@@ -46,11 +45,6 @@ def _item(values: Sequence[int | float], arguments: Arguments) -> Value:
     if not 1 <= number <= len(values):
         raise out_of_range(f"There is no value {number}, only 1 to {len(values)}")
     return values[number - 1]
-
-
-def _hand(session: Session, arguments: Arguments) -> Value:
-    hand = as_point(arguments[0]).hand if arguments else session.machine.arm.hand
-    return _HAND_NUMBERS[hand]
 
 
 def _tool_defined(session: Session, arguments: Arguments) -> Value:
@@ -79,7 +73,8 @@ def _distance(_: Session, arguments: Arguments) -> Value:
 
 def _at_home(session: Session, _: Arguments) -> Value:
     home = session.machine.settings.home_pulses
-    return home is not None and list(home) == pulses_of(session, session.machine.arm.joints)
+    machine = session.machine
+    return home is not None and list(home) == pulses_of(machine, machine.arm.joints)
 
 
 def _home(session: Session, arguments: Arguments) -> Value:
@@ -89,27 +84,16 @@ def _home(session: Session, arguments: Arguments) -> Value:
     return _item(home, arguments)
 
 
-def _of_a_scara(value: int) -> MachineFunction:
-    """A robot without elbow, wrist and joint flags (assumed: what a flag is unless stated)."""
-    return lambda *_: value
-
-
 def _pulses(session: Session, arguments: Arguments) -> Value:
-    return _item(pulses_of(session, session.machine.arm.joints), arguments)
-
-
-def pulses_of(session: Session, joints: Joints) -> list[int]:
-    """Return encoder pulses, 0 where the joint value is 0.
-
-    Source: docs/reference/epson.md 4: pulse ranges.
-    """
-    scales = session.machine.model.pulses_per_unit
-    return [round(v * scale) for v, scale in zip(joints.values(), scales, strict=True)]
+    return _item(pulses_of(session.machine, session.machine.arm.joints), arguments)
 
 
 MACHINE_FUNCTIONS: Final[dict[str, tuple[range, MachineFunction]]] = {
     **{f"c{axis.lower()}": (range(1, 2), _coordinate(axis)) for axis in AXES},
-    "hand": (range(2), _hand),
+    **{name: (range(2), function) for name, function in FLAG_FUNCTIONS.items()},
+    "pagl": (range(2, 3), joint_of_point),
+    "ppls": (range(2, 3), pulses_of_point),
+    "avoidsingularity": (range(1), lambda s, _: s.machine.settings.avoid_singularity),
     "plocal": (range(1, 2), lambda _, a: as_point(a[0]).local),
     "tool": (range(1), lambda s, _: s.machine.tools.selected),
     "tldef": (range(1, 2), _tool_defined),
@@ -122,12 +106,6 @@ MACHINE_FUNCTIONS: Final[dict[str, tuple[range, MachineFunction]]] = {
     "outw": (range(1, 2), lambda s, a: _word(s.machine.outputs, a)),
     "memin": (range(1, 2), lambda s, a: s.machine.memory.get_byte(as_integer(a[0]))),
     "meminw": (range(1, 2), lambda s, a: _word(s.machine.memory, a)),
-    "elbow": (range(2), _of_a_scara(1)),
-    "wrist": (range(2), _of_a_scara(1)),
-    "j1flag": (range(2), _of_a_scara(0)),
-    "j2flag": (range(2), _of_a_scara(0)),
-    "j4flag": (range(2), _of_a_scara(0)),
-    "j6flag": (range(2), _of_a_scara(0)),
     "realpls": (range(1, 2), _pulses),
     "targetok": (range(1, 2), _reachable),
     "dist": (range(2, 3), _distance),
@@ -146,7 +124,7 @@ MACHINE_FUNCTIONS: Final[dict[str, tuple[range, MachineFunction]]] = {
     "armdef": (range(1, 2), lambda _, a: as_integer(a[0]) == 0),
     "ecp": (range(1), lambda *_: 0),
     "ecpdef": (range(1, 2), lambda *_: False),
-    "agl": (range(1, 2), lambda s, a: _item(s.machine.arm.joints.values(), a)),
+    "agl": (range(1, 2), lambda s, a: _item(s.machine.arm.joints, a)),
     "pls": (range(1, 2), _pulses),
     "tillon": (range(1), lambda s, _: s.machine.till_met),
     "posfound": (range(1), lambda s, _: s.machine.found is not None),
@@ -160,7 +138,7 @@ MACHINE_FUNCTIONS: Final[dict[str, tuple[range, MachineFunction]]] = {
     "accels": (range(1, 2), lambda s, a: _item(s.machine.parameters.accel_s, a)),
     "limz": (range(1), lambda s, _: s.machine.parameters.limz_mm),
     "robot": (range(1), lambda s, _: s.machine.robot_number),
-    "robottype": (range(1), lambda *_: SCARA),
+    "robottype": (range(1), lambda s, _: s.machine.model.robot_type),
     "robotmodel$": (range(1), lambda s, _: s.machine.model.name),
     "robotserial$": (range(1), lambda s, _: s.machine.serial),
     "ctrldev": (range(1), lambda s, _: s.machine.control_device),
@@ -199,38 +177,6 @@ def _xy(_: Session, arguments: Arguments) -> Point:
     return coordinates_of([as_number(argument) for argument in arguments])
 
 
-def _joint_point(session: Session, values: Sequence[float]) -> Point:
-    machine = session.machine
-    joints = Joints(*values)
-    check_ranges(machine.model, joints)
-    return Point.at(tip_of(forward(machine.model, joints), machine.offset))
-
-
-def _ja(session: Session, arguments: Arguments) -> Point:
-    return _joint_point(session, [float(as_number(argument)) for argument in arguments])
-
-
-def _angles_to_pulses(session: Session, arguments: Arguments) -> Point:
-    # EPSON's own jog panel gives a SCARA six angles too; what there is no joint for is dropped.
-    return _ja(session, arguments[:_JOINTS])
-
-
-def printed_pulses(session: Session, arguments: Arguments) -> str:
-    """Return what Print shows of AglToPls.
-
-    A label and a whole number for each joint with blanks between: EPSON's own jog panel takes
-    every second word for pulses. What the label is, is not known.
-    """
-    joints = Joints(*(float(as_number(argument)) for argument in arguments[:_JOINTS]))
-    return " ".join(f"{i}: {n}" for i, n in enumerate(pulses_of(session, joints), start=1))
-
-
-def _pulse(session: Session, arguments: Arguments) -> Point:
-    scales = session.machine.model.pulses_per_unit
-    pairs = zip(arguments, scales, strict=True)
-    return _joint_point(session, [as_integer(count) / scale for count, scale in pairs])
-
-
 def _on_pallet(session: Session, arguments: Arguments) -> Point:
     number, *place = (as_integer(argument) for argument in arguments)
     return session.machine.pallets.get(number).place(*place)
@@ -262,14 +208,15 @@ def _tool_point(session: Session, arguments: Arguments) -> Point:
 
 def _local_point(session: Session, arguments: Arguments) -> Point:
     local = session.machine.locals.get(as_integer(arguments[0]))
-    return Point((local.x_mm, local.y_mm, local.z_mm, local.u_deg, 0.0, 0.0))
+    return Point(astuple(local))
 
 
 POINT_FUNCTIONS: Final[dict[str, tuple[range, PointFunction]]] = {
     "xy": (range(4, 7), _xy),
-    "ja": (range(4, 5), _ja),
-    "agltopls": (range(4, 7), _angles_to_pulses),
-    "pulse": (range(4, 5), _pulse),
+    "ja": (range(4, 7), of_angles),
+    "agltopls": (range(4, 7), angles_to_pulses),
+    "pulse": (range(4, 7), of_pulses),
+    "ljm": (range(1, 4), with_least_motion),
     "pallet": (range(2, 4), _on_pallet),
     "here": (range(1), _here),
     "curpos": (range(1), _here),

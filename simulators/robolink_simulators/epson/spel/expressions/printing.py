@@ -8,6 +8,8 @@ from collections.abc import Sequence
 from typing import Final, Literal
 
 from robolink.protocols.spel import PrintedPoint, decimal, format_point
+from robolink_simulators.epson.arm.kinematics import PLAIN
+from robolink_simulators.epson.arm.robots import Mechanism, RobotModel
 from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.epson.options import EpsonOptions
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
@@ -41,30 +43,40 @@ def number_text(value: Number) -> str:
     return f"{value:.14g}"
 
 
-def point_text(point: Point, options: EpsonOptions) -> str:
+def _printed(point: Point, model: RobotModel) -> PrintedPoint:
+    posture = None if model.mechanism is Mechanism.SCARA else point.posture or PLAIN
+    return PrintedPoint.of(
+        point.coordinates,
+        hand=point.hand,
+        local=point.local,
+        posture=posture,
+        six_axes=model.six_axes,
+    )
+
+
+def point_text(point: Point, options: EpsonOptions, model: RobotModel) -> str:
     """Return a point as Print shows it: ``X: -182.632 Y: ... /R /0`` after a blank.
 
     Six coordinates even on a SCARA (seen in a transcript); option ``point_coordinates`` shows
     four for a point that was given four.
     """
-    four = options.point_coordinates == "given" and point.given <= 4
+    four = options.point_coordinates == "given" and point.given <= 4 and not model.six_axes
     coordinates: Literal["six", "four"] = "four" if four else "six"
-    printed = PrintedPoint.of(point.coordinates, hand=point.hand, local=point.local)
-    return format_point(printed, coordinates=coordinates)
+    return format_point(_printed(point, model), coordinates=coordinates)
 
 
-def point_line(number: int, point: Point) -> str:
-    """Return a line of PList on a SCARA: ``P1   = XY(  200.000, ... ) /R /0``.
+def point_line(number: int, point: Point, model: RobotModel) -> str:
+    """Return a line of PList: ``P1   = XY(  200.000, ... ) /R /0``.
 
-    Source: docs/reference/epson.md 3.3.
+    Four values on a SCARA (docs/reference/epson.md 3.3), six on a six-axis robot (assumed).
     """
-    values = ",".join(decimal(value).rjust(9) for value in point.coordinates[:4])
-    printed = PrintedPoint.of(point.coordinates, hand=point.hand, local=point.local)
-    flags = " ".join(f"/{flag}" for flag in printed.flags)
+    shown = point.coordinates if model.six_axes else point.coordinates[:4]
+    values = ",".join(decimal(value).rjust(9) for value in shown)
+    flags = " ".join(f"/{flag}" for flag in _printed(point, model).flags)
     return f"P{number:<3} = XY({values} ) {flags}"
 
 
-def joined(values: Sequence[Value], options: EpsonOptions) -> str:
+def joined(values: Sequence[Value], options: EpsonOptions, model: RobotModel) -> str:
     """Return what Print shows for its items.
 
     Raises:
@@ -77,13 +89,13 @@ def joined(values: Sequence[Value], options: EpsonOptions) -> str:
             text += " "
         if position and (is_number or options.comma_blank == "always"):
             text += " "
-        text += value_text(value, options)
+        text += value_text(value, options, model)
     if len(text) > LONGEST_PRINT:
         raise out_of_range(f"Print of more than {LONGEST_PRINT} bytes")
     return text
 
 
-def value_text(value: Value, options: EpsonOptions) -> str:
+def value_text(value: Value, options: EpsonOptions, model: RobotModel) -> str:
     """Return one item as Print shows it."""
     match value:
         case bool():
@@ -91,7 +103,7 @@ def value_text(value: Value, options: EpsonOptions) -> str:
         case str():
             return value
         case Point():
-            return point_text(value, options)
+            return point_text(value, options, model)
         case _:
             return number_text(value)
 

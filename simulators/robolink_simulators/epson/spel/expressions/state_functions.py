@@ -64,6 +64,11 @@ def _controller(session: Session, arguments: Arguments) -> Value:
     return told.get(index, 0)
 
 
+def _engaged_bits(axes: int) -> int:
+    """Return the bits of Stat(1) for motors that are on: J4 to J1 from bit 8, J6, J5 after them."""
+    return 0b1111 << 8 if axes == 4 else 0b111111 << 8
+
+
 def _stat(session: Session, arguments: Arguments) -> Value:
     """Return Stat(0) and Stat(1); further tasks are not simulated."""
     condition, machine = session.condition, session.machine
@@ -83,7 +88,7 @@ def _stat(session: Session, arguments: Arguments) -> Value:
         | machine.till_met << 1
         | machine.motors_on << 4
         | (not machine.power_high) << 6
-        | (0b1111 << 8 if machine.motors_on else 0),
+        | (_engaged_bits(machine.model.axes) if machine.motors_on else 0),
         2: 0,
     }
     index = as_integer(arguments[0])
@@ -99,7 +104,7 @@ def _robot(session: Session, arguments: Arguments) -> Value:
         0: machine.motors_on << 3 | machine.power_high << 4 | 1 << 8 | machine.till_met << 14,
         1: 0,
         2: 0,
-        3: 0b1111 if machine.motors_on else 0,
+        3: (1 << machine.model.axes) - 1 if machine.motors_on else 0,
         4: 0,
         5: 0,
     }

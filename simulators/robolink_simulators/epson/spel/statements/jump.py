@@ -1,15 +1,14 @@
 """Jump and Jump3: up, across, down (docs/reference/spel.md 7.1)."""
 
-from dataclasses import replace
-
 from robolink.model import Pose
-from robolink_simulators.epson.arm.kinematics import Joints, flange_of, solve
+from robolink_simulators.epson.arm.joints import Joints
+from robolink_simulators.epson.arm.kinematics import flange_of, solve
 from robolink_simulators.epson.arm.motion_parameters import LIMZ_MARGIN_MM, MotionPhase
 from robolink_simulators.epson.arm.trajectory import Leg
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
-from robolink_simulators.epson.spel.statements.legs import go_leg, line_leg, pose_of
+from robolink_simulators.epson.spel.statements.legs import go_leg, line_leg
 
 DESCENT = 2
 """Which leg of a Jump is the descent; Sense is looked at just before it (documented)."""
@@ -25,6 +24,8 @@ def jump(machine: Machine, point: Point, limz_mm: float | None) -> list[Leg]:
     Raises:
         Refusal: Start or target lie above LimZ; the start's number is documented (4005).
     """
+    if machine.model.six_axes:
+        raise SpelRefusal(RefusalKind.OTHER_ROBOT, "Jump is not for six axes; Jump3 is")
     height_mm = machine.parameters.limz_mm
     if limz_mm is not None:
         height_mm = limz_mm + machine.locals.get(point.local).z_mm
@@ -32,8 +33,8 @@ def jump(machine: Machine, point: Point, limz_mm: float | None) -> list[Leg]:
     for joints, what in ((start, "The motion starts"), (end, "The target lies")):
         if joints.j3_mm > height_mm + LIMZ_MARGIN_MM:
             raise SpelRefusal(RefusalKind.ABOVE_LIMZ, f"{what} above LimZ")
-    up = replace(start, j3_mm=max(start.j3_mm, height_mm))
-    across = replace(end, j3_mm=max(end.j3_mm, height_mm))
+    up = start.at_height(max(start.j3_mm, height_mm))
+    across = end.at_height(max(end.j3_mm, height_mm))
     return [
         go_leg(machine, start, up, phase=MotionPhase.DEPART),
         go_leg(machine, up, across),
@@ -49,13 +50,16 @@ def jump3(machine: Machine, points: tuple[Point, Point, Point]) -> list[Leg]:
     Raises:
         Refusal: A point is out of reach.
     """
-    depart, approach, end = (pose_of(machine, point) for point in points)
+    depart, approach, end = (machine.pose_of(point) for point in points)
+    there = _joints(machine, approach)
+    first = line_leg(machine, machine.tip(), depart, near=machine.arm.joints)
     return [
-        line_leg(machine, machine.tip(), depart),
-        go_leg(machine, _joints(machine, depart), _joints(machine, approach)),
-        line_leg(machine, approach, end),
+        first,
+        go_leg(machine, first.joints_at(first.duration_ns), there),
+        line_leg(machine, approach, end, near=there),
     ]
 
 
 def _joints(machine: Machine, tip: Pose) -> Joints:
-    return solve(machine.model, flange_of(tip, machine.offset), tip.hand or machine.arm.hand)
+    flange = flange_of(machine.model, tip, machine.offset)
+    return solve(machine.model, flange, tip.hand or machine.arm.hand, tip.posture)

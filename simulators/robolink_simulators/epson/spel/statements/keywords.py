@@ -9,14 +9,18 @@ from typing import Final, NamedTuple
 from robolink.model import ToolOffset
 from robolink.protocols.spel import PrintedWhere, format_tool_listing, format_where
 from robolink.timing import NS_PER_S
-from robolink_simulators.epson.arm.kinematics import Joints
 from robolink_simulators.epson.arm.trajectory import Leg
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.bits import BitBank
 from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
-from robolink_simulators.epson.spel.expressions.machine_functions import SIX_JOINTS, pulses_of
+from robolink_simulators.epson.spel.expressions.joint_functions import (
+    JOINT_COUNTS,
+    another_robot,
+    joints_at_pulses,
+    pulses_of,
+)
 from robolink_simulators.epson.spel.expressions.printing import CRLF, number_text
 from robolink_simulators.epson.spel.expressions.values import out_of_range
 from robolink_simulators.epson.spel.statements.legs import go_leg
@@ -129,8 +133,10 @@ def _where(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
     local = evaluator.integer(arguments[0]) if arguments else 0
     here = machine.locals.convert(Point.at(machine.tip()), local)
     joints = machine.arm.joints
-    printed = PrintedWhere(here.coordinates, joints.values(), tuple(pulses_of(session, joints)))
-    return StatementOutcome(format_where(printed, width=session.options.where_width) + CRLF)
+    printed = PrintedWhere(here.coordinates, tuple(joints), tuple(pulses_of(machine, joints)))
+    linear = machine.model.linear_joints
+    text = format_where(printed, width=session.options.where_width, linear_joints=linear)
+    return StatementOutcome(text + CRLF)
 
 
 def _switch(command: KeywordStatement, evaluator: Evaluator, *, on: bool) -> StatementOutcome:
@@ -199,9 +205,10 @@ def _keep_condition(evaluator: Evaluator, command: KeywordStatement) -> Statemen
 
 def _pulse(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
     """Show the pulses, or go point to point to pulses."""
-    if len(command.arguments) == SIX_JOINTS:
-        raise SpelRefusal(RefusalKind.OTHER_ROBOT, "This robot has four joints")
-    arguments = _expect(command, 0, 4)
+    model = evaluator.session.machine.model
+    if len(command.arguments) in JOINT_COUNTS - {model.axes}:
+        raise another_robot(model)
+    arguments = _expect(command, 0, model.axes)
     if not arguments:
         return StatementOutcome(_line_of_where(evaluator, 2))
     machine = evaluator.session.machine
@@ -222,8 +229,7 @@ def _home(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
 
 
 def _leg_to_pulses(machine: Machine, counts: Sequence[int]) -> Leg:
-    scales = zip(counts, machine.model.pulses_per_unit, strict=True)
-    return go_leg(machine, machine.arm.joints, Joints(*(count / scale for count, scale in scales)))
+    return go_leg(machine, machine.arm.joints, joints_at_pulses(machine, counts))
 
 
 def _joint(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:

@@ -4,25 +4,13 @@ import math
 from dataclasses import replace
 
 from robolink.model import Pose
-from robolink_simulators.epson.arm.arc import ArcLeg, plan_arc
-from robolink_simulators.epson.arm.kinematics import Joints
+from robolink_simulators.epson.arm.joints import Joints
 from robolink_simulators.epson.arm.motion_parameters import MotionPhase
-from robolink_simulators.epson.arm.trajectory import JointLeg, LineLeg, LinePace, plan_go, plan_move
+from robolink_simulators.epson.arm.tilted_legs import plan_circle, plan_line
+from robolink_simulators.epson.arm.trajectory import JointLeg, Leg, LinePace, plan_go
 from robolink_simulators.epson.machine import Machine
-from robolink_simulators.epson.memory.points import Point
 
 _PERCENT = 100
-
-
-def pose_of(machine: Machine, point: Point) -> Pose:
-    """Return where a point is in the base frame.
-
-    Raises:
-        Refusal: Its local is not defined.
-    """
-    base = machine.locals.to_base(point)
-    x, y, z, u, _, _ = base.coordinates
-    return Pose(x, y, z, u, hand=base.hand)
 
 
 def go_leg(
@@ -42,29 +30,43 @@ def go_leg(
         decel_percent=pace.decel_percent * factor,
     )
     offset = machine.offset
-    radius_mm = 0.0 if offset is None else math.hypot(offset.x_mm, offset.y_mm)
+    radius_mm = 0.0
+    if offset is not None:
+        along_mm = offset.z_mm if machine.model.six_axes else 0.0
+        radius_mm = math.hypot(offset.x_mm, offset.y_mm, along_mm)
     return plan_go(machine.model, start, end, pace, radius_mm=radius_mm)
 
 
-def line_leg(machine: Machine, start: Pose, end: Pose) -> LineLeg:
-    """Plan a straight leg of the selected tip.
+def line_leg(machine: Machine, start: Pose, end: Pose, *, near: Joints) -> Leg:
+    """Plan a straight leg of the selected tip; ``near`` are the joints at its start.
 
     Raises:
-        Refusal: The line leaves the envelope, or the hand would have to change.
+        Refusal: The line leaves the envelope, or hand, elbow or wrist would have to change.
     """
-    pace, hand = line_pace(machine), start.hand or machine.arm.hand
-    return plan_move(machine.model, (start, end), pace, offset=machine.offset, hand=hand)
+    return plan_line(
+        machine.model,
+        (start, end),
+        line_pace(machine),
+        offset=machine.offset,
+        near=near,
+        avoiding=bool(machine.settings.avoid_singularity),
+    )
 
 
-def arc_leg(machine: Machine, mid: Pose, end: Pose) -> ArcLeg:
+def arc_leg(machine: Machine, mid: Pose, end: Pose) -> Leg:
     """Plan an arc of the selected tip from where it is.
 
     Raises:
         Refusal: The three points make no arc, or it leaves the envelope.
     """
-    points = (machine.tip(), mid, end)
-    pace, hand = line_pace(machine), machine.arm.hand
-    return plan_arc(machine.model, points, pace, offset=machine.offset, hand=hand)
+    return plan_circle(
+        machine.model,
+        (machine.tip(), mid, end),
+        line_pace(machine),
+        offset=machine.offset,
+        near=machine.arm.joints,
+        avoiding=bool(machine.settings.avoid_singularity),
+    )
 
 
 def line_pace(machine: Machine) -> LinePace:

@@ -6,22 +6,31 @@ from dataclasses import replace
 from itertools import pairwise
 from typing import Final
 
-from robolink.model import rotate_xy
+from robolink.model import Pose, rotate_xy
+from robolink_simulators.cell.frames import Frame, add, axis_and_angle, product, transposed
+from robolink_simulators.epson.arm.kinematics import frame_of
 from robolink_simulators.epson.arm.trajectory import Leg
 from robolink_simulators.epson.machine import Machine
-from robolink_simulators.epson.memory.points import Coordinates, Point
+from robolink_simulators.epson.memory.points import (
+    Coordinates,
+    Point,
+    coordinates_of_frame,
+    frame_at,
+)
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
+from robolink_simulators.epson.spel.expressions.joint_functions import least_motion
 from robolink_simulators.epson.spel.expressions.values import out_of_range
 from robolink_simulators.epson.spel.statements.jump import jump, jump3
-from robolink_simulators.epson.spel.statements.legs import arc_leg, go_leg, line_leg, pose_of
+from robolink_simulators.epson.spel.statements.legs import arc_leg, go_leg, line_leg
 from robolink_simulators.epson.spel.tree import MotionStatement
 
 _SAME_MM = 0.001
 _SAME_DEG = 0.001
 
 # CP blends into the next motion; here every motion ends at rest (assumed simplification).
-# LJM leaves a SCARA's point unchanged (documented). C0 to C7 all rise to LimZ, as C7 does.
+# LJM leaves a SCARA's point unchanged (documented); TGo and BGo move six axes
+# the least. C0 to C7 all rise to LimZ, as C7 does.
 _UNTIL_WORDS: Final = frozenset({"till", "find"})
 _LINE_WORDS: Final = frozenset({"cp", "rot"}) | _UNTIL_WORDS
 _GATE_WORDS: Final = frozenset({"cp", "sense", *(f"c{n}" for n in range(8))}) | _UNTIL_WORDS
@@ -67,14 +76,16 @@ def plan(evaluator: Evaluator, motion: MotionStatement) -> list[Leg]:
         case "jump3" | "jump3cp":
             return jump3(machine, (points[0], points[1], points[2]))
         case "arc":
-            return [arc_leg(machine, *(pose_of(machine, point) for point in points))]
+            return [arc_leg(machine, *(machine.pose_of(point) for point in points))]
         case "pass":
             return _passing(machine, points)
         case verb:
             target = _TARGETS[verb](machine, points[0])
             if verb.endswith("move"):
                 return [_line(machine, target, rot="rot" in motion.options.words)]
-            return [go_leg(machine, machine.arm.joints, machine.joints_for(target))]
+            least = machine.model.six_axes and (verb != "go" or "ljm" in motion.options.words)
+            joints = least_motion(machine, target) if least else machine.joints_for(target)
+            return [go_leg(machine, machine.arm.joints, joints)]
 
 
 def require_drives(machine: Machine) -> None:
@@ -104,6 +115,9 @@ def _absolute(_: Machine, point: Point) -> Point:
 def _in_tool(machine: Machine, point: Point) -> Point:
     """Shift along the axes of the selected tool; the hand stays (documented)."""
     tip = Point.at(machine.tip())
+    if machine.model.six_axes:
+        there = frame_at(tip.coordinates) @ frame_at(point.coordinates)
+        return replace(tip, coordinates=coordinates_of_frame(there))
     dx_mm, dy_mm = rotate_xy(*point.coordinates[:2], tip.coordinates[3])
     x, y, z, u, v, w = tip.coordinates
     _, _, dz_mm, du_deg, _, _ = point.coordinates
@@ -112,8 +126,16 @@ def _in_tool(machine: Machine, point: Point) -> Point:
 
 
 def _in_local(machine: Machine, point: Point) -> Point:
-    """Shift along the axes of the local named in the point, 0 for the base (documented)."""
-    return machine.locals.convert(Point.at(machine.tip()), point.local).plus(point)
+    """Shift along the axes of the local named in the point, 0 for the base (documented).
+
+    That six axes turn about the axes of that local is assumed.
+    """
+    here = machine.locals.convert(Point.at(machine.tip()), point.local)
+    if not machine.model.six_axes:
+        return here.plus(point)
+    seen, by = frame_at(here.coordinates), frame_at(point.coordinates)
+    moved = Frame(add(seen.shift_mm, by.shift_mm), product(by.rotation, seen.rotation))
+    return replace(here, coordinates=coordinates_of_frame(moved))
 
 
 _TARGETS: Final[dict[str, Callable[[Machine, Point], Point]]] = {
@@ -134,11 +156,18 @@ def _line(machine: Machine, target: Point, *, rot: bool) -> Leg:
             turns over a distance (both documented, docs/reference/spel.md 7.1; their numbers are
             not).
     """
-    end, tip = pose_of(machine, target), machine.tip()
+    end, tip = machine.pose_of(target), machine.tip()
     travels = math.dist(end.coordinates()[:3], tip.coordinates()[:3]) > _SAME_MM
-    turns = abs(end.u_deg - tip.u_deg) > _SAME_DEG
+    turns = _turn_deg(machine, tip, end) > _SAME_DEG
     if turns and not travels and not rot:
         raise out_of_range("The motion only turns the tool: ROT is needed")
     if rot and travels and not turns:
         raise out_of_range("ROT, but the tool does not turn")
-    return line_leg(machine, tip, end)
+    return line_leg(machine, tip, end, near=machine.arm.joints)
+
+
+def _turn_deg(machine: Machine, start: Pose, end: Pose) -> float:
+    if not machine.model.six_axes:
+        return abs(end.u_deg - start.u_deg)
+    before, after = frame_of(start).rotation, frame_of(end).rotation
+    return axis_and_angle(product(after, transposed(before)))[1]

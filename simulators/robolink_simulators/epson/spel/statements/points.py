@@ -4,14 +4,16 @@ Source: docs/reference/spel.md 5.
 """
 
 from collections.abc import Callable
+from dataclasses import astuple
 from typing import Final
 
 from robolink_simulators.epson.memory.points import HIGHEST_POINT, Local, Point
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
+from robolink_simulators.epson.spel.expressions.joint_functions import FLAG_FUNCTIONS, with_flag
 from robolink_simulators.epson.spel.expressions.machine_functions import coordinates_of
-from robolink_simulators.epson.spel.expressions.printing import CRLF, point_line
-from robolink_simulators.epson.spel.expressions.values import as_text, out_of_range
+from robolink_simulators.epson.spel.expressions.printing import CRLF, number_text, point_line
+from robolink_simulators.epson.spel.expressions.values import as_number, as_text, out_of_range
 from robolink_simulators.epson.spel.tree import Expression, KeywordStatement
 
 
@@ -52,7 +54,8 @@ def _plist(evaluator: Evaluator, command: KeywordStatement) -> str:
     if len(numbers) == 2:
         last = numbers[1]
     points = evaluator.session.machine.points
-    lines = [point_line(n, points.get(n)) + CRLF for n in points.numbers(first, last)]
+    model = evaluator.session.machine.model
+    lines = [point_line(n, points.get(n), model) + CRLF for n in points.numbers(first, last)]
     return "".join(lines)
 
 
@@ -68,12 +71,12 @@ def _local(evaluator: Evaluator, command: KeywordStatement) -> str:
     if len(arguments) == 1:
         # The layout is not shown anywhere: as ArmSet prints (assumed).
         local = locals_.get(number)
-        values = (local.x_mm, local.y_mm, local.z_mm, local.u_deg, 0.0, 0.0)
+        values = astuple(local)
         return f"Local {number}: " + ", ".join(f"{v:.3f}" for v in values) + CRLF
     x, y, z, u, v, w = point_argument(evaluator, arguments[1:]).coordinates
-    if v != 0 or w != 0:
+    if (v != 0 or w != 0) and not locals_.tilting:
         raise out_of_range("V and W of a local are 0 on a SCARA")
-    locals_.define(number, Local(x, y, z, u))
+    locals_.define(number, Local(x, y, z, u, v, w))
     return ""
 
 
@@ -93,6 +96,21 @@ def _pallet(evaluator: Evaluator, command: KeywordStatement) -> str:
     return ""
 
 
+def _flag(evaluator: Evaluator, command: KeywordStatement) -> str:
+    """Set or show a flag of a stored point, or show the arm's.
+
+    That a number alone is shown is assumed; a sample is missing (docs/reference/spel.md 5.1).
+    """
+    arguments, session = _expect(command, 0, 1, 2), evaluator.session
+    if len(arguments) < 2:
+        values = [evaluator.point_of(argument) for argument in arguments]
+        return number_text(as_number(FLAG_FUNCTIONS[command.name](session, values))) + CRLF
+    number, value = evaluator.stored_number(arguments[0]), evaluator.integer(arguments[1])
+    points = session.machine.points
+    points.store(number, with_flag(points.get(number), command.name, value))
+    return ""
+
+
 POINT_STATEMENTS: Final[dict[str, Callable[[Evaluator, KeywordStatement], str]]] = {
     "here": _here,
     "plist": _plist,
@@ -100,5 +118,6 @@ POINT_STATEMENTS: Final[dict[str, Callable[[Evaluator, KeywordStatement], str]]]
     "plabel": _label,
     "pallet": _pallet,
     "local": _local,
+    **dict.fromkeys(FLAG_FUNCTIONS, _flag),
 }
 """Keyword to what carries it out."""

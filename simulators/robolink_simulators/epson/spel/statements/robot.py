@@ -6,15 +6,16 @@ Source: docs/reference/spel.md 6.2, 7.2, 7.3.
 from collections.abc import Callable, Sequence
 from typing import Final
 
+from robolink_simulators.epson.arm.robots import Mechanism
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
+from robolink_simulators.epson.spel.expressions.joint_functions import JOINT_COUNTS, another_robot
 from robolink_simulators.epson.spel.expressions.printing import CRLF, number_text
 from robolink_simulators.epson.spel.expressions.values import Number, out_of_range
 
 Numbers = Sequence[Number]
 Setting = Callable[[Machine, Numbers], str]
 
-_JOINTS: Final = 4
 _HIGHEST_FINE: Final = 65535
 _HEAVIEST_KG: Final = 20.0
 """Assumed; per model in the reference, where too much is an error."""
@@ -54,11 +55,10 @@ def _inertia(machine: Machine, values: Numbers) -> str:
 
 
 def _fine(machine: Machine, values: Numbers) -> str:
-    _expect(values, 0, _JOINTS)
+    _expect(values, 0, machine.model.axes)
     if not values:
         return ", ".join(map(str, machine.settings.fine_pulses)) + CRLF
-    a, b, c, d = (int(_within(value, 0, _HIGHEST_FINE)) for value in values)
-    machine.settings.fine_pulses = (a, b, c, d)
+    machine.settings.fine_pulses = tuple(int(_within(value, 0, _HIGHEST_FINE)) for value in values)
     return ""
 
 
@@ -94,38 +94,51 @@ def _numbered(kind: RefusalKind) -> Setting:
     return choose
 
 
-def _joints(values: Numbers) -> set[int]:
-    return {int(_within(value, 1, _JOINTS)) for value in values}
+def _joints(machine: Machine, values: Numbers) -> set[int]:
+    if machine.model.six_axes:
+        raise SpelRefusal(RefusalKind.OTHER_ROBOT, "Joints of a six-axis robot cannot be freed")
+    return {int(_within(value, 1, machine.model.axes)) for value in values}
 
 
 def _free(machine: Machine, values: Numbers) -> str:
     if not values:
         raise SpelRefusal(RefusalKind.SYNTAX, "SFree needs a joint")
-    machine.settings.free_joints |= _joints(values)
+    machine.settings.free_joints |= _joints(machine, values)
     machine.reset_motion_parameters()
     return ""
 
 
 def _lock(machine: Machine, values: Numbers) -> str:
+    joints = _joints(machine, values) or set(range(1, machine.model.axes + 1))
     if not machine.motors_on:
         raise SpelRefusal(RefusalKind.MOTORS_OFF, "Motors are off")
-    machine.settings.free_joints -= _joints(values) or set(range(1, _JOINTS + 1))
+    machine.settings.free_joints -= joints
     machine.reset_motion_parameters()
     return ""
 
 
 def _home_set(machine: Machine, values: Numbers) -> str:
-    if len(values) > _JOINTS:
-        raise SpelRefusal(RefusalKind.OTHER_ROBOT, "This robot has four joints")
-    _expect(values, 0, _JOINTS)
+    if len(values) in JOINT_COUNTS - {machine.model.axes}:
+        raise another_robot(machine.model)
+    _expect(values, 0, machine.model.axes)
     home = machine.settings.home_pulses
     if values:
-        a, b, c, d = map(int, values)
-        machine.settings.home_pulses = (a, b, c, d)
+        machine.settings.home_pulses = tuple(map(int, values))
         return ""
     if home is None:
         raise SpelRefusal(RefusalKind.HOME_UNDEFINED, "No home position is set")
-    return f"{home[0]} {home[1]}{CRLF}{home[2]} {home[3]}{CRLF}"
+    return "".join(f"{a} {b}{CRLF}" for a, b in zip(home[::2], home[1::2], strict=True))
+
+
+def _avoid_singularity(machine: Machine, values: Numbers) -> str:
+    """Set or show AvoidSingularity; 5 is for another kind of robot (documented: 4002)."""
+    if machine.model.mechanism is Mechanism.SCARA:
+        raise another_robot(machine.model)
+    _expect(values, 0, 1)
+    if not values:
+        return number_text(machine.settings.avoid_singularity) + CRLF
+    machine.settings.avoid_singularity = int(_within(values[0], 0, 4))
+    return ""
 
 
 def _range(machine: Machine, values: Numbers) -> str:
@@ -148,5 +161,6 @@ ROBOT_SETTINGS: Final[dict[str, Setting]] = {
     "slock": _lock,
     "homeset": _home_set,
     "range": _range,
+    "avoidsingularity": _avoid_singularity,
 }
 """Keyword to what sets or shows it; what is shown comes back as text."""

@@ -116,6 +116,8 @@ def _accel_r(machine: Machine, values: Numbers) -> str:
 
 
 def _limz(machine: Machine, values: Numbers) -> str:
+    if machine.model.six_axes:
+        raise SpelRefusal(RefusalKind.OTHER_ROBOT, "A six-axis robot has no LimZ")
     _expect(values, 0, 1)
     if not values:
         return _shown(machine.parameters.limz_mm)

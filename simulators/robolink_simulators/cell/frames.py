@@ -1,7 +1,8 @@
 """Frames and rotations as plain values: exact to compare, safe to share.
 
 A rotation is a tuple of rows. SoftMotion's angles are A, B, C in degrees with
-``R = Rz(A) Ry(B) Rz(C)`` (documented, docs/reference/softmotion.md 1.3).
+``R = Rz(A) Ry(B) Rz(C)`` (documented, docs/reference/softmotion.md 1.3); EPSON's are U, V, W with
+``R = Rz(U) Ry(V) Rx(W)`` (documented, docs/reference/epson.md 3.1).
 """
 
 import math
@@ -94,7 +95,20 @@ def zyz(a_deg: float, b_deg: float, c_deg: float) -> Matrix:
 
 def zyx(u_deg: float, v_deg: float, w_deg: float) -> Matrix:
     """Return ``Rz(U) Ry(V) Rx(W)``, EPSON's angles, which the world's tips are given in."""
-    return product(product(about(Z_AXIS, u_deg), about(Y_AXIS, v_deg)), about(X_AXIS, w_deg))
+    u, v, w = math.radians(u_deg), math.radians(v_deg), math.radians(w_deg)
+    cu, su, cv, sv, cw, sw = (
+        math.cos(u),
+        math.sin(u),
+        math.cos(v),
+        math.sin(v),
+        math.cos(w),
+        math.sin(w),
+    )
+    return (
+        (cu * cv, cu * sv * sw - su * cw, cu * sv * cw + su * sw),
+        (su * cv, su * sv * sw + cu * cw, su * sv * cw - cu * sw),
+        (-sv, cv * sw, cv * cw),
+    )
 
 
 def zyz_angles(rotation: Matrix) -> Vector:
@@ -125,6 +139,27 @@ def zyx_angles(rotation: Matrix) -> Vector:
         u = math.atan2(-rotation[0][1], rotation[1][1])
         w = 0.0
     return (math.degrees(u), math.degrees(v), math.degrees(w))
+
+
+def printed_angles(rotation: Matrix) -> Vector:
+    """Return U, V, W in degrees as an EPSON controller prints them: U and W in (-180, 180].
+
+    Where V is -90 or 90 it prints U as 0 and everything in W (documented,
+    docs/reference/epson-robots.md, "Frames").
+    """
+    level = math.hypot(rotation[0][0], rotation[1][0])
+    v = math.atan2(-rotation[2][0], level)
+    if level > _STRAIGHT:
+        u = math.atan2(rotation[1][0], rotation[0][0])
+        w = math.atan2(rotation[2][1], rotation[2][2])
+    else:
+        u = 0.0
+        w = math.atan2(-rotation[1][2], rotation[1][1])
+    return (_half_open(math.degrees(u)), math.degrees(v), _half_open(math.degrees(w)))
+
+
+def _half_open(angle_deg: float) -> float:
+    return 180.0 if angle_deg < _STRAIGHT - 180.0 else angle_deg
 
 
 def axis_and_angle(rotation: Matrix) -> tuple[Vector, float]:

@@ -1,0 +1,240 @@
+"""Straight and circular legs of a tool that can be tilted, and of any robot's tool.
+
+The tip goes its way while the tool turns evenly about one axis from the first orientation to the
+last (assumed). Hand, elbow and wrist stay, every joint turns on from where it was, and the turns
+that the flags of the target name are not looked at (assumed).
+
+Near a singularity the joints would have to be faster than they can. A controller that avoids it
+leaves the way and comes back (documented, docs/reference/epson-robots.md, "Singularities"); here it
+keeps to the way and is slower (assumed simplification). One that does not avoid it stops with the
+error for joint speed, here before anything moves (assumed).
+"""
+
+import cmath
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+from robolink.model import Pose, ToolOffset
+from robolink.timing import NS_PER_S
+from robolink_simulators.cell.frames import (
+    Frame,
+    Matrix,
+    Vector,
+    about,
+    axis_and_angle,
+    product,
+    transposed,
+)
+from robolink_simulators.epson.arm.arc import circle_through, plan_arc
+from robolink_simulators.epson.arm.joints import Joints, check_ranges
+from robolink_simulators.epson.arm.kinematics import (
+    frame_of,
+    hand_of,
+    pose_of_frame,
+    posture_of,
+    tool_frame,
+)
+from robolink_simulators.epson.arm.ramps import BrakedRamp, Ramp, TimeLaw
+from robolink_simulators.epson.arm.robots import RobotModel
+from robolink_simulators.epson.arm.six_axes import solve_near
+from robolink_simulators.epson.arm.trajectory import Leg, LinePace, plan_move
+from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
+
+_STILL = 1e-9
+_CHECK_EVERY_MM = 2.0
+_CHECK_EVERY_DEG = 2.0
+_MOST_CHECKS = 2000
+
+Way = Callable[[float], Vector]
+"""Where the tip is after a share of its way."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Course:
+    """The tip's way and the turn of the tool along it, for the flange that carries it."""
+
+    model: RobotModel
+    way: Way
+    first: Pose
+    start: Matrix
+    axis: Vector
+    angle_deg: float
+    to_flange: Frame
+
+    def flange(self, share: float) -> Frame:
+        """Return the frame of the flange after a share of the way."""
+        turn = about(self.axis, self.angle_deg * share)
+        return Frame(self.way(share), product(turn, self.start)) @ self.to_flange
+
+
+@dataclass(frozen=True, slots=True)
+class TiltedLeg:
+    """A leg of six axes along a course.
+
+    Attributes:
+        course: Where the flange goes.
+        knots: The joints at even shares of it, both ends included.
+        ramp: How the share grows with time, ``None`` for a leg that stays.
+    """
+
+    course: _Course
+    knots: tuple[Joints, ...]
+    ramp: TimeLaw | None
+
+    @property
+    def duration_ns(self) -> int:
+        """How long it takes."""
+        return 0 if self.ramp is None else math.ceil(self.ramp.duration_s * NS_PER_S)
+
+    def joints_at(self, elapsed_ns: int) -> Joints:
+        """Return the joints that long after the start."""
+        share = self._share_at(elapsed_ns)
+        if share >= 1:
+            return self.knots[-1]
+        near = self.knots[int(share * (len(self.knots) - 1))]
+        return solve_near(self.course.model, self.course.flange(share), near)
+
+    def flange_at(self, elapsed_ns: int) -> Pose:
+        """Return the pose of the flange that long after the start."""
+        course = self.course
+        return pose_of_frame(course.flange(self._share_at(elapsed_ns)), course.first, tool=0)
+
+    def braked(self, elapsed_ns: int) -> "TiltedLeg":
+        """Return the same leg, left to come to rest."""
+        if not isinstance(self.ramp, Ramp):
+            return self
+        return replace(self, ramp=BrakedRamp(self.ramp, elapsed_ns / NS_PER_S))
+
+    def _share_at(self, elapsed_ns: int) -> float:
+        if self.ramp is None:
+            return 1.0
+        return self.ramp.share_at(min(elapsed_ns, self.duration_ns) / NS_PER_S)
+
+
+def plan_line(
+    model: RobotModel,
+    ends: tuple[Pose, Pose],
+    pace: LinePace,
+    *,
+    offset: ToolOffset | None,
+    near: Joints,
+    avoiding: bool = True,
+) -> Leg:
+    """Plan a straight leg of the tip between two tip poses, of whichever robot.
+
+    Args:
+        model: The robot.
+        ends: Where the tip is and where it goes.
+        pace: How fast it may be.
+        offset: The tool in force.
+        near: The joints at the start.
+        avoiding: Whether singularities are avoided.
+
+    Raises:
+        Refusal: The line leaves the envelope, hand, elbow or wrist would have to change, or a
+            joint would be too fast.
+    """
+    if not model.six_axes:
+        return plan_move(model, ends, pace, offset=offset, near=near)
+    start, end = (pose.coordinates()[:3] for pose in ends)
+    length_mm = math.dist(start, end)
+
+    def way(share: float) -> Vector:
+        x, y, z = (a + (b - a) * share for a, b in zip(start, end, strict=True))
+        return (x, y, z)
+
+    _require_same_posture(model, near, ends[1])
+    course = _course(model, way, ends, offset)
+    return _leg(course, length_mm, pace, near=near, avoiding=avoiding)
+
+
+def plan_circle(
+    model: RobotModel,
+    points: tuple[Pose, Pose, Pose],
+    pace: LinePace,
+    *,
+    offset: ToolOffset | None,
+    near: Joints,
+    avoiding: bool = True,
+) -> Leg:
+    """Plan an arc of the tip in X and Y from the first pose through the second to the third.
+
+    Z and the orientation run evenly, the mid point's do not count (documented,
+    docs/reference/spel.md 7.1). Arguments as in :func:`plan_line`.
+
+    Raises:
+        Refusal: As :func:`plan_line`, or the three stand in a line.
+    """
+    if not model.six_axes:
+        return plan_arc(model, points, pace, offset=offset, near=near)
+    a, b, c = (complex(pose.x_mm, pose.y_mm) for pose in points)
+    first, mid, last = points
+    centre, sweep_rad = circle_through(a, b, c)
+
+    def way(share: float) -> Vector:
+        at = centre + (a - centre) * cmath.exp(1j * sweep_rad * share)
+        return (at.real, at.imag, first.z_mm + (last.z_mm - first.z_mm) * share)
+
+    for pose in (mid, last):
+        _require_same_posture(model, near, pose)
+    length_mm = math.hypot(abs(sweep_rad) * abs(a - centre), last.z_mm - first.z_mm)
+    course = _course(model, way, (first, last), offset)
+    return _leg(course, length_mm, pace, near=near, avoiding=avoiding)
+
+
+def _require_same_posture(model: RobotModel, near: Joints, end: Pose) -> None:
+    now, wanted = posture_of(model, near), end.posture
+    changed = end.hand is not None and end.hand is not hand_of(model, near)
+    if now is not None and wanted is not None:
+        changed |= (now.elbow, now.wrist) != (wanted.elbow, wanted.wrist)
+    if changed:
+        raise SpelRefusal(
+            RefusalKind.OUT_OF_REACH, "A straight motion cannot change hand, elbow or wrist"
+        )
+
+
+def _course(
+    model: RobotModel, way: Way, ends: tuple[Pose, Pose], offset: ToolOffset | None
+) -> _Course:
+    start, end = (frame_of(pose).rotation for pose in ends)
+    axis, angle_deg = axis_and_angle(product(end, transposed(start)))
+    return _Course(model, way, ends[0], start, axis, angle_deg, tool_frame(offset).inverse())
+
+
+def _leg(
+    course: _Course, length_mm: float, pace: LinePace, *, near: Joints, avoiding: bool
+) -> TiltedLeg:
+    """Look at the whole way before anything moves, as for a SCARA (assumed)."""
+    model, angle_deg = course.model, course.angle_deg
+    steps = math.ceil(min(length_mm / _CHECK_EVERY_MM + angle_deg / _CHECK_EVERY_DEG, _MOST_CHECKS))
+    knots = [near]
+    for step in range(1, steps + 1):
+        knots.append(solve_near(model, course.flange(step / steps), knots[-1]))
+        check_ranges(model, knots[-1])
+    if length_mm > _STILL:
+        rate, accel = pace.speed_mm_s / length_mm, pace.accel_mm_s2 / length_mm
+        decel = pace.decel_mm_s2 / length_mm
+    elif angle_deg > _STILL:
+        rate, accel = pace.turn_deg_s / angle_deg, pace.turn_deg_s2 / angle_deg
+        decel = accel
+    else:
+        return TiltedLeg(course, (near,), None)
+    fastest = _fastest(model, knots)
+    if rate > fastest and not avoiding:
+        raise SpelRefusal(
+            RefusalKind.JOINT_TOO_FAST, "A joint would be too fast near a singularity"
+        )
+    return TiltedLeg(course, tuple(knots), Ramp.fastest(min(rate, fastest), accel, decel))
+
+
+def _fastest(model: RobotModel, knots: list[Joints]) -> float:
+    """Return how much of the way a second may hold, for the joint that is hardest pressed."""
+    steps = len(knots) - 1
+    hardest = max(
+        abs(b - a) / top
+        for before, after in pairwise(knots)
+        for a, b, top in zip(before, after, model.top_speed, strict=True)
+    )
+    return 1 / max(hardest * steps, _STILL)

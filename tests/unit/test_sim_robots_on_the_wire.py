@@ -1,0 +1,168 @@
+"""What robots of every kind print and take over Remote Ethernet."""
+
+import json
+from collections import defaultdict
+from pathlib import Path
+
+import pytest
+from robolink_simulators.cell.frames import zyx
+from robolink_simulators.epson import EpsonSimulator
+
+from robolink.model import Elbow, Posture, Wrist
+from robolink.protocols.spel import parse_point, parse_where
+
+VECTORS = Path(__file__).parents[2].parent / "shared" / "vectors" / "epson_fk.json"
+
+
+class Window:
+    """Sends statements to a robot and waits for their end."""
+
+    def __init__(self, client):
+        self.client = client
+
+    def __call__(self, statement):
+        """Return what a statement printed, ``0`` for nothing, or the refusal."""
+        reply = self.client.ask(f'$Execute,"{statement}"')
+        while not reply:
+            reply = self.client.wait(1.0)
+        return reply.removeprefix("#Execute,").strip('"\r\n ')
+
+
+@pytest.fixture
+def robot(login):
+    """Return a function from a model's name to its command window."""
+    return lambda name: Window(login(EpsonSimulator(name)))
+
+
+@pytest.mark.skipif(not VECTORS.exists(), reason="the vendor's poses are not beside this folder")
+def test_every_pose_of_the_vendors_own_geometry_is_printed(robot):
+    by_model = defaultdict(list)
+    for case in json.loads(VECTORS.read_text(encoding="utf-8"))["cases"]:
+        by_model[case["model"]].append(case)
+    for name, cases in by_model.items():
+        run = robot(name)
+        run("Tool 0")
+        for case in cases[::3]:
+            angles = ", ".join(str(value) for value in case["joints"])
+            assert run(f"P1 = AglToPls({angles})") == "0"
+            point = parse_point(run("Print P1"))
+            assert point.coordinates[:3] == pytest.approx(case["xyz_mm"], abs=5.1e-4), case
+            seen = zyx(*point.coordinates[3:])
+            for row, other in zip(seen, case["rotation"], strict=True):
+                assert row == pytest.approx(other, abs=2e-5), case
+
+
+def test_six_axes_print_six_joints_and_their_flags(robot):
+    run = robot("C8-C901S")
+    assert run("Tool 0; Go JA(30, 0, 0, 0, -90, 0)") == "0"
+    assert run("Print Here") == (
+        "X: -250.000 Y:  433.013 Z:  822.000 U:  120.000 V:    0.000 W:  180.000"
+        " /R /A /NF /J4F0 /J6F0 /0"
+    )
+    where = parse_where(run("Where"))
+    assert where.joints == (30, 0, 0, 0, -90, 0)
+    assert len(where.pulses) == 6
+    assert run("P1 = Here; PList 1").startswith(
+        "P1   = XY( -250.000,  433.013,  822.000,  120.000,"
+    )
+    assert [run(f"Print {word}") for word in ("RobotType", "RobotModel$")] == ["5", "C8-C901S"]
+    assert run("Print Hex$(RobotInfo(3))") == "3F"
+
+
+def test_flags_of_a_point_choose_the_way(robot):
+    run = robot("CX4-A601S")
+    run("Tool 0; Go JA(0, -35, 5, 20, -60, 30)")
+    run("P1 = Here; P2 = P1 /F; P3 = P1; Wrist P3, Flip")
+    wanted = parse_point(run("Print P1")).coordinates
+    for point in ("P2", "P3"):
+        assert run(f"Go {point}") == "0"
+        here = parse_point(run("Print Here"))
+        assert here.coordinates == pytest.approx(wanted, abs=1.1e-3)
+        assert here.posture == Posture(Elbow.ABOVE, Wrist.FLIP)
+        assert float(run("Print Agl(5)")) > 0
+    assert run("Move P1") == "!Execute,99"  # a straight motion cannot turn the wrist over
+
+
+@pytest.mark.parametrize("name", ["C8-C901S", "C8-C1401CR"])
+def test_a_straight_line_is_straight_and_turns_evenly(robot, name):
+    run = robot(name)
+    run("Tool 1")
+    start = parse_point(run("Print Here")).coordinates
+    assert run("Move Here +X(40) +Y(-30) +TLW(20)") == "0"
+    end = parse_point(run("Print Here")).coordinates
+    assert end[0] - start[0] == pytest.approx(40, abs=2e-3)
+    assert end[1] - start[1] == pytest.approx(-30, abs=2e-3)
+
+
+def test_tools_take_six_values_and_locals_lean(robot):
+    run = robot("CX7-A901S")
+    assert run("TLSet 2, XY(10, 20, 100, 30, 40, 50)") == "0"
+    assert run("TLSet 2") == "Tool 2: 10.000, 20.000, 100.000, 30.000, 40.000, 50.000"
+    run("Tool 0; P5 = Here; Tool 2")
+    tip = run("Print Here")
+    assert run("Go Here +X(5); Go Here -X(5)") == "0"
+    assert run("Print Here") == tip
+    # The tool's point seen from the flange's own local is the tool.
+    assert run("Tool 0; Local 1, P5; Tool 2") == "0"
+    seen = parse_point(run("Print Here @1"))
+    assert seen.coordinates == pytest.approx((10, 20, 100, 30, 40, 50), abs=2e-3)
+    assert seen.local == 1
+    assert run("TGo XY(0, 0, 0, 0, 10, 0)") == "0"
+    assert parse_point(run("Print Here @1")).coordinates[:3] == pytest.approx(
+        (10, 20, 100), abs=2e-3
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "statement", "code"),
+    [
+        ("C8-C901S", "Jump Here +X(5)", 4028),
+        ("C8-C901S", "SFree 1", 4028),
+        ("C8-C901S", "LimZ -10", 4028),
+        ("C8-C901S", "Go JA(0, 0, 0, 0)", 4028),
+        ("C8-C901S", "Go JA(0, 90, 0, 0, -90, 0)", 4001),
+        ("C8-C901S", "Go XY(0, 1500, 500, 90, 0, 180)", 4001),
+        ("C8-C901S", "AvoidSingularity 5", 4002),
+        ("T6-602S", "AvoidSingularity 1", 4028),
+        ("T6-602S", "Go JA(0, 0, 0, 0, 0, 0)", 4028),
+    ],
+)
+def test_what_a_robot_cannot_do_is_refused(robot, name, statement, code):
+    run = robot(name)
+    assert run(statement) == "!Execute,99"
+    assert run.client.code() == code
+
+
+def test_near_the_singular_wrist_a_line_is_slow_or_refused(robot):
+    run = robot("C8-C901S")
+    run("Tool 0; SpeedS 250; P2 = JA(0, -35, 5, -80, -2, 160); Go JA(0, -35, 5, 80, -2, 0)")
+    assert run("Power High; AvoidSingularity 0; Print AvoidSingularity") == "0"
+    assert run("Move P2") == "!Execute,99"
+    assert run.client.code() == 4242
+    run.client.ask("$Reset")
+    # As it is at start-up, the controller gets through; joint 4 swings round.
+    assert run("Power High; AvoidSingularity 1; P1 = Here; Move P2") == "0"
+    assert float(run("Print Agl(4)")) == pytest.approx(-80, abs=1e-3)
+    assert run("Move P1") == "0"
+    assert float(run("Print Agl(4)")) == pytest.approx(80, abs=1e-3)
+
+
+def test_a_folded_arm_uses_the_flags_of_its_first_joints(robot):
+    run = robot("RS4-C351S")
+    assert run("Tool 0; Go JA(300, 200, -5, 0)") == "0"
+    here = parse_point(run("Print Here"))
+    assert here.posture == Posture(j1_flag=1, j2_flag=1)
+    assert run("P1 = Here; Go JA(0, -90, 0, 0); Go P1") == "0"
+    assert parse_where(run("Where")).joints == (300, 200, -5, 0)
+    assert run("Print RobotType") == "6"
+
+
+def test_ljm_takes_the_short_way_round(robot):
+    run = robot("C8-C901S")
+    run("Tool 0; Go JA(0, -35, 5, 0, -60, 170)")
+    run("P1 = Here +TLU(20)")  # joint 6 beyond half a turn
+    assert run("Go LJM(P1)") == "0"
+    assert float(run("Print Agl(6)")) == pytest.approx(190, abs=1e-3) or float(
+        run("Print Agl(6)")
+    ) == pytest.approx(150, abs=1e-3)
+    assert float(run("Print PAgl(Here, 5)")) == pytest.approx(-60, abs=1e-3)

@@ -100,9 +100,8 @@ def test_enter_alone_is_refused_by_one_touch(cell):
     assert cell.stored == known
 
 
-@pytest.mark.parametrize("true_touches", [0, 1])
-def test_enter_alone_teaches_no_station(cell, true_touches):
-    has_habit(cell, person_stays_share=1, person_stays_from_touch=1 + true_touches)
+def test_enter_alone_teaches_no_station(cell):
+    has_habit(cell, person_stays_share=1)
     words = ("--tool", "1", "--assist", cell.cell.url, "--yes", "--json")
     done = cell.run("station", "learn", "PIN-07", *words)
     assert (done.code, done.document["error"]["code"]) == (7, "not_touched")
@@ -149,22 +148,22 @@ def test_an_answer_typed_ahead_is_asked_again_and_the_tip_is_the_true_one(cell):
     assert cell.stored.y_mm == pytest.approx(cell.truth.y_mm, abs=0.05)
 
 
-def test_who_always_answers_too_early_is_refused_with_the_tip_drawn_back(cell):
-    has_habit(cell, person_thinks_s=0)
-    done = cell.calibrate("n-angle")
-    check_refused(cell, done, "typed_ahead")
+def test_who_always_answers_too_early_is_refused(arm):
+    has_habit(arm, person_thinks_s=0)
+    done = arm.calibrate("n-angle")
+    check_refused(arm, done, "typed_ahead")
 
 
-def test_a_pin_that_is_bumped_half_way_is_refused_before_the_proposal(cell):
-    has_habit(cell, pin_bumped_after_touch=3, pin_bump_mm=0.6)
-    check_refused(cell, cell.calibrate("n-angle", "--count", "5"), "large_residual")
+def test_a_pin_that_is_bumped_half_way_is_refused_before_the_proposal(arm):
+    has_habit(arm, pin_bumped_after_touch=3, pin_bump_mm=0.6)
+    check_refused(arm, arm.calibrate("n-angle", "--count", "5"), "large_residual")
 
 
-def test_a_pin_that_is_bumped_between_two_touches_shows_in_the_proof(cell):
-    has_habit(cell, pin_bumped_after_touch=1, pin_bump_mm=0.6)
-    done = cell.calibrate("two-pose")
+def test_a_pin_that_is_bumped_between_two_touches_shows_in_the_proof(arm):
+    has_habit(arm, pin_bumped_after_touch=1, pin_bump_mm=0.6)
+    done = arm.calibrate("two-pose")
     assert (done.code, done.document["error"]["code"]) == (8, "large_drift")
-    assert (cell.stored.x_mm, cell.stored.y_mm) == (12.0, -3.5)
+    assert (arm.stored.x_mm, arm.stored.y_mm) == (12.0, -3.5)
 
 
 class SameJog:
@@ -197,10 +196,9 @@ class SameJog:
     ("source", "jog"),
     [
         (TwoPoseSource(), "z-2"),
-        (TwoPoseSource(), "z-2.6 y-0.2"),
         (NAngleSource((180.0, 90.0, -90.0)), "x+0.1 z-2"),
     ],
-    ids=["two-pose", "two-pose, beside", "n-angle"],
+    ids=["two-pose", "n-angle"],
 )
 def test_the_same_jog_each_time_is_refused_from_the_python_api(cell, source, jog):
     with robolink.connect(cell.cell.url) as controller:
@@ -211,6 +209,7 @@ def test_the_same_jog_each_time_is_refused_from_the_python_api(cell, source, jog
         # The one height drawn for a second touch may be the one that was jogged: then the proof
         # tells.
         assert "touch_heights_differ" in vars(refused.value).values()
+        assert isinstance(refused.value, CalibrationError) or isinstance(source, TwoPoseSource)
     assert (cell.stored.x_mm, cell.stored.y_mm) == (12.0, -3.5)
 
 
@@ -265,10 +264,10 @@ def test_a_contact_input_counts_and_takes_the_sideways_part_away(cell):
     ],
     ids=["enter only", "never on", "stuck in contact"],
 )
-def test_an_input_that_does_not_go_over_is_no_contact(cell, wired, words):
-    has_habit(cell, **wired)
-    done = cell.calibrate("n-angle", *words)
-    check_refused(cell, done, "not_touched")
+def test_an_input_that_does_not_go_over_is_no_contact(arm, wired, words):
+    has_habit(arm, **wired)
+    done = arm.calibrate("n-angle", *words)
+    check_refused(arm, done, "not_touched")
     assert f"input {CONTACT} did not go over to contact" in done.err
 
 

@@ -23,6 +23,8 @@ from robolink.calibration import (
     fit_pivot_robust,
     pivot_design,
     quaternion_rotations,
+    rotations,
+    solve_n_angle,
     solve_pivot,
     uvw_deg,
 )
@@ -66,11 +68,28 @@ def _plain(count: int) -> Iterator[Figure]:
     yield Figure(f"{name} robolink over scipy with method lm", f"{quick:.0f} us", ours / quick)
     yield Figure(f"{name} robolink over numpy lstsq alone", f"{floor:.0f} us", ours / floor)
     yield Figure(f"{name} robolink from poses, with every check", f"{whole:.0f} us", whole / scipy)
+    if count >= 1_000:
+        yield from _from_poses(name, whole, _median_us(lambda: with_covariance(positions, turned)))
+        level = [Pose(p.x_mm, p.y_mm, p.z_mm, 360.0 * k / count) for k, p in enumerate(poses)]
+        flat = rotations(np.array([pose.coordinates()[3:] for pose in level]))
+        name = f"n_angle of {count} poses,"
+        whole = _median_us(lambda: solve_n_angle(level))
+        yield from _from_poses(name, whole, _median_us(lambda: in_the_plane(positions, flat)))
+
+
+def _from_poses(name: str, whole_us: float, floor_us: float) -> Iterator[Figure]:
+    yield Figure(
+        f"{name} every check ({whole_us:.0f} us), over lstsq with covariance",
+        f"{floor_us:.0f} us",
+        whole_us / floor_us,
+        3.0,
+    )
 
 
 def _robust(count: int, peer: bool) -> Iterator[Figure]:
     positions, turned = _data(count, outliers=0.2)
-    robust = Robust(threshold_mm=THRESHOLD_MM)
+    # One set of draws, as the others make; a calibration makes five.
+    robust = Robust(threshold_mm=THRESHOLD_MM, seeds=(1,))
     fit, kept = fit_pivot_robust(positions, turned, robust, sigma_mm=None)
     wrong = float(np.linalg.norm(fit.tip - TIP))
     ours = _median_us(lambda: fit_pivot_robust(positions, turned, robust, sigma_mm=None))
@@ -121,6 +140,21 @@ def by_lstsq(positions: Floats, turned: Floats) -> Floats:
     """Return tip and point by lstsq of the whole system, without any uncertainty."""
     whole = np.hstack((turned.reshape(-1, 3), np.tile(-np.eye(3), (len(positions), 1))))
     return np.linalg.lstsq(whole, -positions.ravel(), rcond=None)[0].astype(float)
+
+
+def with_covariance(positions: Floats, turned: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return tip and point by lstsq, their covariance and the residuals."""
+    size = positions.shape[1]
+    whole = np.hstack((turned.reshape(-1, size), np.tile(-np.eye(size), (len(positions), 1))))
+    found = np.linalg.lstsq(whole, -positions.ravel(), rcond=None)[0].astype(float)
+    residuals = whole @ found + positions.ravel()
+    variance = float(residuals @ residuals) / (residuals.size - 2 * size)
+    return found, variance * np.linalg.inv(whole.T @ whole), residuals
+
+
+def in_the_plane(positions: Floats, turned: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return the same of X and Y."""
+    return with_covariance(positions[:, :2], turned[:, :2, :2])
 
 
 def _data(count: int, *, outliers: float) -> tuple[Floats, Floats]:

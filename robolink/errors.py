@@ -5,6 +5,7 @@
     RobolinkError
     ├── ConfigError (ValueError)           a URL, an option or a file is wrong; nothing was sent
     │   ├── LimitError                     a target or a change lies outside the stated limits
+    │   ├── AmbiguousPosesError            a file of poses does not say everything (.asks)
     │   └── JournalError                   the record cannot be kept or read
     ├── TransportError                     the wire
     │   ├── ConnectError (ConnectionError) no link
@@ -92,6 +93,20 @@ class ConfigError(RobolinkError, ValueError):
 
 class LimitError(ConfigError):
     """A target, a step or a change lies outside the limits in force. Nothing was sent."""
+
+
+class AmbiguousPosesError(ConfigError):
+    """A file of poses can be read in more than one way. Nothing was guessed, nothing was sent.
+
+    Attributes:
+        asks: What the file does not say: ``columns``, ``length``, ``euler``.
+        reason: The same as one text, with commas.
+    """
+
+    def __init__(self, what: str, *, asks: tuple[str, ...], remedy: str = "") -> None:
+        super().__init__(what, remedy=remedy)
+        self.asks = asks
+        self.reason = ",".join(asks)
 
 
 class JournalError(ConfigError):
@@ -299,12 +314,16 @@ class CalibrationError(RobolinkError):
     """The measurements do not support a result.
 
     Attributes:
-        code: The named reason, for example ``insufficient_rotation``.
+        code: The named reason, for example ``insufficient_rotation``; the most telling one.
+        others: Further reasons that hold as well.
     """
 
-    def __init__(self, code: str, what: str, *, remedy: str = "") -> None:
+    def __init__(
+        self, code: str, what: str, *, remedy: str = "", others: tuple[str, ...] = ()
+    ) -> None:
         super().__init__(what, remedy=remedy)
         self.code = code
+        self.others = others
 
 
 class VerifyError(RobolinkError):

@@ -121,6 +121,10 @@ COMMANDS: Final = {
         "robolink_cli.commands.measure.solve.command:solve",
         tr("Calculate a tool offset from a file, offline."),
     ),
+    "poses": (
+        "robolink_cli.commands.measure.poses:poses",
+        tr("What robolink understands of a file of poses."),
+    ),
     "doctor": (
         "robolink_cli.commands.computer.doctor:doctor",
         tr("What could get in the way on this computer."),

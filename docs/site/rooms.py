@@ -34,7 +34,7 @@ WORDS = {
     "stopping": "from another process",
     "controllers": "epson, softmotion, plc_map",
     "calibration": "mathematics, no I/O",
-    "pose_files": "poses of others",
+    "pose_tables": "files of poses",
     "sensing": "cameras",
     "transport": "moves bytes: TCP, serial, Modbus, CAN",
     "protocols": "codecs for both ends, no I/O",

@@ -30,12 +30,16 @@ if TYPE_CHECKING:
     from robolink.calibration.camera.runout import runout_report as runout_report
     from robolink.calibration.camera.up_camera import Sighting as Sighting
     from robolink.calibration.camera.up_camera import solve_up_camera as solve_up_camera
+    from robolink.calibration.core.budget import DIVISORS as DIVISORS
     from robolink.calibration.core.budget import BudgetRow as BudgetRow
     from robolink.calibration.core.budget import UncertaintyBudget as UncertaintyBudget
+    from robolink.calibration.core.dispersion import require_positive as require_positive
     from robolink.calibration.core.evidence import FitEvidence as FitEvidence
     from robolink.calibration.core.evidence import RunOrder as RunOrder
     from robolink.calibration.core.frames import flange_of as flange_of
     from robolink.calibration.core.frames import flange_pose as flange_pose
+    from robolink.calibration.core.frames import flange_poses as flange_poses
+    from robolink.calibration.core.frames import in_base as in_base
     from robolink.calibration.core.frames import seen_from as seen_from
     from robolink.calibration.core.frames import tilted_flange_pose as tilted_flange_pose
     from robolink.calibration.core.frames import tilted_from as tilted_from
@@ -79,6 +83,15 @@ if TYPE_CHECKING:
     from robolink.calibration.crossed_beams import crossing_sigma_gain as crossing_sigma_gain
     from robolink.calibration.crossed_beams import solve_crossed_beams as solve_crossed_beams
     from robolink.calibration.crossed_beams import where_they_cross as where_they_cross
+    from robolink.calibration.evidence.units import RobotReach as RobotReach
+    from robolink.calibration.evidence.units import require_near as require_near
+    from robolink.calibration.evidence.units import require_stored_scale as require_stored_scale
+    from robolink.calibration.evidence.units import require_within_reach as require_within_reach
+    from robolink.calibration.flange_plane import FlangePlane as FlangePlane
+    from robolink.calibration.flange_plane import TipHeight as TipHeight
+    from robolink.calibration.flange_plane import carrying as carrying
+    from robolink.calibration.flange_plane import height_of as height_of
+    from robolink.calibration.flange_plane import solvable_planes as solvable_planes
     from robolink.calibration.pin.axis_displacement import GOOD_WAY_MM as GOOD_WAY_MM
     from robolink.calibration.pin.axis_displacement import axis_displacement as axis_displacement
     from robolink.calibration.pin.axis_displacement import between_deg as between_deg
@@ -91,6 +104,7 @@ if TYPE_CHECKING:
     from robolink.calibration.pin.needle_chain import NeedleChain as NeedleChain
     from robolink.calibration.pin.needle_chain import NeedleLimits as NeedleLimits
     from robolink.calibration.pin.needle_chain import chain_of as chain_of
+    from robolink.calibration.pin.needle_chain import chain_sigma_mm as chain_sigma_mm
     from robolink.calibration.pin.needle_change import NeedleChangeResult as NeedleChangeResult
     from robolink.calibration.pin.needle_change import solve_needle_change as solve_needle_change
     from robolink.calibration.pin.one_touch import Pin as Pin
@@ -109,14 +123,24 @@ if TYPE_CHECKING:
     from robolink.calibration.pin.six_point import solve_tool_axis as solve_tool_axis
     from robolink.calibration.pin.two_pose import solve_two_pose as solve_two_pose
     from robolink.calibration.pin.two_pose import two_of as two_of
+    from robolink.calibration.quality.control_chart import USUAL_LAMBDA as USUAL_LAMBDA
+    from robolink.calibration.quality.control_chart import USUAL_WIDTH as USUAL_WIDTH
+    from robolink.calibration.quality.control_chart import ControlChart as ControlChart
+    from robolink.calibration.quality.control_chart import control_chart as control_chart
     from robolink.calibration.quality.doubts import doubt_sentence as doubt_sentence
     from robolink.calibration.quality.doubts import known_doubts as known_doubts
+    from robolink.calibration.quality.gauge_study import GaugeStudy as GaugeStudy
+    from robolink.calibration.quality.gauge_study import gauge_study as gauge_study
     from robolink.calibration.quality.impact import Impact as Impact
     from robolink.calibration.quality.impact import PointImpact as PointImpact
     from robolink.calibration.quality.impact import impact_on as impact_on
     from robolink.calibration.quality.moved_station import StationShift as StationShift
     from robolink.calibration.quality.moved_station import TipShift as TipShift
     from robolink.calibration.quality.moved_station import judge_shifts as judge_shifts
+    from robolink.calibration.quality.station_part import SharedStation as SharedStation
+    from robolink.calibration.quality.station_part import StationPart as StationPart
+    from robolink.calibration.quality.station_part import shared_station as shared_station
+    from robolink.calibration.quality.station_part import with_station as with_station
     from robolink.calibration.quality.tolerances import PLANAR_TOLERANCE as PLANAR_TOLERANCE
     from robolink.calibration.quality.tolerances import TOUCH_TOLERANCE as TOUCH_TOLERANCE
     from robolink.calibration.quality.tolerances import Tolerance as Tolerance
@@ -127,10 +151,19 @@ if TYPE_CHECKING:
     from robolink.calibration.quality.update_guard import Correction as Correction
     from robolink.calibration.quality.update_guard import require_shrinking as require_shrinking
     from robolink.calibration.quality.update_guard import update_guard as update_guard
+    from robolink.calibration.quality.update_guard import (
+        writes_refused_unattended as writes_refused_unattended,
+    )
     from robolink.calibration.quality.verify_drift import (
         PLACING_TOLERANCE_MM as PLACING_TOLERANCE_MM,
     )
     from robolink.calibration.quality.verify_drift import verify_drift as verify_drift
+    from robolink.calibration.touch.length import LengthChange as LengthChange
+    from robolink.calibration.touch.length import LengthDecision as LengthDecision
+    from robolink.calibration.touch.length import length_change as length_change
+    from robolink.calibration.touch.length import (
+        length_not_observable as length_not_observable,
+    )
     from robolink.calibration.touch.standoff import FARTHEST_MM as FARTHEST_MM
     from robolink.calibration.touch.standoff import HIGHEST_MM as HIGHEST_MM
     from robolink.calibration.touch.standoff import Standoff as Standoff
@@ -143,6 +176,7 @@ if TYPE_CHECKING:
     from robolink.calibration.touch.touch_evidence import judge_touches as judge_touches
     from robolink.calibration.touch.touch_evidence import least_jog_mm as least_jog_mm
     from robolink.calibration.touch.touch_evidence import stand_upright as stand_upright
+    from robolink.calibration.z_touch import USUAL_DECELERATION_MM_S2 as USUAL_DECELERATION_MM_S2
     from robolink.calibration.z_touch import Touch as Touch
     from robolink.calibration.z_touch import ZTouchResult as ZTouchResult
     from robolink.calibration.z_touch import solve_z_touch as solve_z_touch
@@ -161,9 +195,11 @@ __getattr__ = lazy_exports(
         "camera.camera_round": "CameraRound as_round solve_camera_round",
         "camera.runout": "RunoutReport runout_report",
         "camera.up_camera": "Sighting solve_up_camera",
-        "core.budget": "BudgetRow UncertaintyBudget",
+        "core.budget": "BudgetRow DIVISORS UncertaintyBudget",
+        "core.dispersion": "require_positive",
         "core.evidence": "FitEvidence RunOrder",
-        "core.frames": "flange_of flange_pose seen_from tilted_flange_pose tilted_from toward_zero",
+        "core.frames": "flange_of flange_pose flange_poses in_base seen_from tilted_flange_pose "
+        "tilted_from toward_zero",
         "core.planar_checks": "MIN_ROTATION_DEG angle_spread_deg planar_sigma_gain",
         "core.pose_suggestion": "PoseLimits PosePlan precise_enough select_poses sigma_gain "
         "suggest_poses",
@@ -174,26 +210,33 @@ __getattr__ = lazy_exports(
         "core.statistics": "NORMAL_95 chi_square_quantile f_quantile normal_quantile student_t "
         "studentized_range_0999",
         "crossed_beams": "BeamsResult crossing_sigma_gain solve_crossed_beams where_they_cross",
+        "flange_plane": "FlangePlane TipHeight carrying height_of solvable_planes",
         "pin.axis_displacement": "GOOD_WAY_MM axis_displacement between_deg require_unturned",
         "pin.joint": "JointResult JointTouch ToolDifference solve_joint",
         "pin.n_angle": "solve_n_angle",
-        "pin.needle_chain": "NeedleChain NeedleLimits chain_of",
+        "pin.needle_chain": "NeedleChain NeedleLimits chain_of chain_sigma_mm",
         "pin.needle_change": "NeedleChangeResult solve_needle_change",
         "pin.one_touch": "Pin pin_touched solve_one_touch",
         "pin.pivot": "solve_pivot",
         "pin.pivot_fit": "PivotDesign PivotFit fit_pivot fit_pivot_robust pivot_design",
         "pin.six_point": "FAR_DEG SixPointResult ToolAxis solve_six_point solve_tool_axis",
         "pin.two_pose": "solve_two_pose two_of",
+        "quality.control_chart": "USUAL_LAMBDA USUAL_WIDTH ControlChart control_chart",
+        "quality.gauge_study": "GaugeStudy gauge_study",
         "quality.doubts": "doubt_sentence known_doubts",
         "quality.impact": "Impact PointImpact impact_on",
         "quality.moved_station": "StationShift TipShift judge_shifts",
+        "quality.station_part": "SharedStation StationPart shared_station with_station",
         "quality.tolerances": "PLANAR_TOLERANCE TOUCH_TOLERANCE Tolerance",
         "quality.tool_fits": "ToolFit better_fit tool_fits",
-        "quality.update_guard": "Correction NEEDLE_LIMIT_MM require_shrinking update_guard",
+        "evidence.units": "RobotReach require_near require_stored_scale require_within_reach",
+        "quality.update_guard": "Correction NEEDLE_LIMIT_MM require_shrinking update_guard "
+        "writes_refused_unattended",
         "quality.verify_drift": "PLACING_TOLERANCE_MM verify_drift",
+        "touch.length": ("LengthChange LengthDecision length_change length_not_observable"),
         "touch.standoff": "HIGHEST_MM FARTHEST_MM Standoff StandoffSeries",
         "touch.touch_evidence": "PERSON_SIGMA_Z_MM PROBE_SIGMA_Z_MM TouchEvidence WitnessedTouch "
         "height_limit_mm judge_touches least_jog_mm stand_upright",
-        "z_touch": "Touch ZTouchResult solve_z_touch touch_sigma_gain",
+        "z_touch": "USUAL_DECELERATION_MM_S2 Touch ZTouchResult solve_z_touch touch_sigma_gain",
     },
 )

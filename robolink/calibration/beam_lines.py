@@ -8,16 +8,19 @@ they are an unknown of their own that both directions show (docs/reference/calib
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from robolink.calibration.core.least_squares import linear_fit
+from robolink.calibration.core.dispersion import Dispersion
+from robolink.calibration.core.least_squares import LinearFit, linear_fit
 from robolink.calibration.core.pose_checks import check_poses
 from robolink.calibration.core.robust import Floats
+from robolink.calibration.flange_checks import require_flange_in_base
+from robolink.calibration.flange_plane import FlangePlane, solvable_planes
 from robolink.errors import CalibrationError
 from robolink.messages import tr
-from robolink.model import Pose, angle_difference_deg, rotate_xy
+from robolink.model import Pose, angle_difference_deg
 
 LEAST_ANGLE_DEG = 20.0
 """Beams that cross at less than this leave one direction badly known."""
@@ -31,11 +34,37 @@ _REFINEMENTS = 5
 
 @dataclass(frozen=True, slots=True)
 class Beam:
-    """A light beam: a point on it, mm, and its direction in the base."""
+    """A light beam: a point on it, its direction in the base, and how sure both are.
+
+    Attributes:
+        x_mm, y_mm: A point on it, base: the one at which its distance is stated.
+        direction_deg: Its direction, counter-clockwise from X.
+        sigma_mm: Standard deviation of its distance there, across it.
+        direction_sigma_deg: Standard deviation of its direction.
+        correlation: Between the two, -1 to 1; a shift to the left of the beam and a turn
+            counter-clockwise count as positive.
+        dof: Degrees of freedom of both deviations, ``None`` where they were stated.
+    """
 
     x_mm: float
     y_mm: float
     direction_deg: float
+    sigma_mm: float = 0.0
+    direction_sigma_deg: float = 0.0
+    correlation: float = 0.0
+    dof: int | None = None
+
+    @property
+    def covariance(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Covariance of distance, mm, and direction, radians."""
+        turn = math.radians(self.direction_sigma_deg)
+        both = self.correlation * self.sigma_mm * turn
+        return (self.sigma_mm**2, both), (both, turn**2)
+
+    def along_mm(self, x_mm: float, y_mm: float) -> float:
+        """Return how far along the beam a place is from where its distance is stated."""
+        angle = math.radians(self.direction_deg)
+        return (x_mm - self.x_mm) * math.cos(angle) + (y_mm - self.y_mm) * math.sin(angle)
 
     @property
     def normal(self) -> tuple[float, float]:
@@ -87,25 +116,49 @@ class Crossing:
         return math.copysign(1.0, across)
 
 
-def find_beams(crossings: Sequence[Crossing], tip_mm: tuple[float, float]) -> tuple[Beam, Beam]:
-    """Return where both beams are, from a reference pin whose tip is known.
+def find_beams(
+    crossings: Sequence[Crossing],
+    tip_mm: tuple[float, float],
+    *,
+    tip_sigma_mm: float = 0.0,
+    sigma_mm: float | None = None,
+) -> tuple[Beam, Beam]:
+    """Return where both beams are and how sure that is, from a reference pin whose tip is known.
 
     Args:
         crossings: Travels of the pin through both beams at several places along each, four
             or more, in both directions.
         tip_mm: The pin's offset in the flange's axes.
+        tip_sigma_mm: Standard deviation of each of its coordinates. It shifts all crossings
+            alike, so it is added to that of the distance and shows in no residual.
+        sigma_mm: Standard deviation of one crossing's middle, across the beam; else the residuals
+            of both beams tell it together.
+
+    Covariance of (distance, direction): s^2 (A'A)^-1 of the straight line, at the middle of its
+    crossings (docs/reference/evidence.md 12).
 
     Raises:
         CalibrationError: ``too_few_poses``, ``short_beam``, ``parallel_beams``,
-            ``no_crossing``, or those of :func:`check_crossings`.
+            ``no_crossing``, ``tool_pose``, ``local_pose``, ``tilted_pose``, or those of
+            :func:`check_crossings`.
     """
     check_crossings(crossings, minimum=4)
+    entries = [crossing.entry for crossing in crossings]
+    require_flange_in_base(entries)
+    solvable_planes(entries, None)
     first, second = (
         _fit_beam([crossing for crossing in crossings if crossing.beam == beam], tip_mm)
         for beam in (0, 1)
     )
-    require_crossed((first, second))
-    return first, second
+    require_crossed((first.beam, second.beam))
+    total = first.sum_of_squares + second.sum_of_squares
+    dof = first.dof + second.dof
+    scatter = Dispersion.of(total, dof, sigma_mm)
+    spread = scatter.sigma_mm if scatter else 0.0
+    known = None if scatter is None or scatter.source != "residuals" else dof
+    return first.with_spread(spread, known, tip_sigma_mm), second.with_spread(
+        spread, known, tip_sigma_mm
+    )
 
 
 def check_crossings(crossings: Sequence[Crossing], *, minimum: int) -> tuple[str, ...]:
@@ -124,9 +177,11 @@ def check_crossings(crossings: Sequence[Crossing], *, minimum: int) -> tuple[str
                 remedy=tr("Cross each beam {minimum} times or more.", minimum=minimum),
             )
     poses = [pose for crossing in crossings for pose in (crossing.entry, crossing.exit)]
-    doubts = check_poses(poses, allow_mixed_hand=False)
+    # A proof lets a tip cross that the controller already knows.
+    doubts = check_poses(poses, allow_mixed_hand=False, of_one_tip=True)
     for crossing in crossings:
-        if abs(angle_difference_deg(crossing.exit.u_deg, crossing.entry.u_deg)) > 0.01:
+        angles = zip(crossing.exit.coordinates()[3:], crossing.entry.coordinates()[3:], strict=True)
+        if any(abs(angle_difference_deg(after, before)) > 0.01 for after, before in angles):
             raise CalibrationError(
                 "turned_in_crossing",
                 tr("The tool turned while it crossed beam {beam}.", beam=crossing.beam + 1),
@@ -151,13 +206,37 @@ def require_crossed(beams: tuple[Beam, Beam]) -> None:
         )
 
 
-def _fit_beam(crossings: Sequence[Crossing], tip_mm: tuple[float, float]) -> Beam:
+@dataclass(frozen=True, slots=True)
+class _BeamFit:
+    """A beam, with what the fit of its line leaves over."""
+
+    beam: Beam
+    unit_covariance: Floats
+    sum_of_squares: float
+    dof: int
+
+    def with_spread(self, sigma_mm: float, dof: int | None, tip_sigma_mm: float) -> Beam:
+        """Return the beam and how sure it is, for crossings of standard deviation ``sigma_mm``."""
+        (turn, both), (_, shift) = (self.unit_covariance * sigma_mm**2).tolist()
+        distance = math.sqrt(shift + tip_sigma_mm**2)
+        spread = distance * math.sqrt(turn)
+        return replace(
+            self.beam,
+            sigma_mm=distance,
+            direction_sigma_deg=math.degrees(math.sqrt(turn)),
+            correlation=both / spread if spread else 0.0,
+            dof=dof,
+        )
+
+
+def _fit_beam(crossings: Sequence[Crossing], tip_mm: tuple[float, float]) -> _BeamFit:
     points = np.array([_tip_at(crossing, tip_mm) for crossing in crossings])
     middle = points.mean(axis=0)
     beam = _first_line(points, middle)
     for _ in range(_REFINEMENTS):
-        beam = _straightened(beam, points, [c.direction_over(beam) for c in crossings])
-    return beam
+        beam, fit = _straightened(beam, points, [c.direction_over(beam) for c in crossings])
+    rest = float(fit.residuals @ fit.residuals)
+    return _BeamFit(beam, fit.unit_covariance[:2, :2], rest, len(points) - len(fit.x))
 
 
 def _first_line(points: Floats, middle: Floats) -> Beam:
@@ -172,7 +251,9 @@ def _first_line(points: Floats, middle: Floats) -> Beam:
     return Beam(x, y, math.degrees(math.atan2(axes[0, 1], axes[0, 0])))
 
 
-def _straightened(beam: Beam, points: Floats, directions: Sequence[float]) -> Beam:
+def _straightened(
+    beam: Beam, points: Floats, directions: Sequence[float]
+) -> tuple[Beam, LinearFit]:
     """Return the beam after one fit of its tilt, its place and the shift by the travel."""
     nx, ny = beam.normal
     away = points - (beam.x_mm, beam.y_mm)
@@ -180,12 +261,13 @@ def _straightened(beam: Beam, points: Floats, directions: Sequence[float]) -> Be
     columns = [along, np.ones(len(points))]
     if len(set(directions)) == 2:
         columns.append(np.array(directions))
-    tilt, shift = linear_fit(np.column_stack(columns), across).x[:2].tolist()
+    fit = linear_fit(np.column_stack(columns), across)
+    tilt, shift = fit.x[:2].tolist()
     direction = beam.direction_deg + math.degrees(math.atan(tilt))
-    return Beam(beam.x_mm + shift * nx, beam.y_mm + shift * ny, direction)
+    return Beam(beam.x_mm + shift * nx, beam.y_mm + shift * ny, direction), fit
 
 
 def _tip_at(crossing: Crossing, tip_mm: tuple[float, float]) -> tuple[float, float]:
     x, y = crossing.middle_mm
-    dx, dy = rotate_xy(tip_mm[0], tip_mm[1], crossing.entry.u_deg)
+    dx, dy = FlangePlane.of(crossing.entry).in_base(*tip_mm)
     return x + dx, y + dy

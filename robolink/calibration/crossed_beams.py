@@ -1,18 +1,32 @@
-"""Tool offset from travels through two crossed beams."""
+"""Tool offset from travels through two crossed beams.
+
+Half way through a beam with normal n, ``n (middle + A t + c t_z) = distance``; A and c are those
+of the flange, which may lean or hang upside down (docs/reference/evidence.md 3).
+"""
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from robolink.calibration.beam_lines import Beam, Crossing, check_crossings, require_crossed
+from robolink.calibration.beam_uncertainty import beams_part
 from robolink.calibration.core.least_squares import LinearFit, linear_fit
 from robolink.calibration.core.planar_checks import MIN_ROTATION_DEG, angle_spread_deg
 from robolink.calibration.core.pose_checks import keep_unmeasured
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.core.robust import Floats
+from robolink.calibration.flange_checks import require_flange_in_base, with_height_error
+from robolink.calibration.flange_plane import (
+    FlangePlane,
+    TipHeight,
+    height_of,
+    known_z_mm,
+    solvable_planes,
+)
 from robolink.calibration.quality.fit_quality import judged
+from robolink.calibration.quality.station_part import with_station
 from robolink.calibration.quality.tolerances import PLANAR_TOLERANCE, Tolerance
 from robolink.errors import CalibrationError
 from robolink.messages import tr
@@ -28,9 +42,12 @@ class BeamsResult(CalibrationResult):
     Attributes:
         lag_mm: For each beam, by how much latency and backlash shift a crossing along its
             travel; ``None`` where only one direction was driven.
+        u_without_beams_mm: Standard uncertainty of X and of Y by the crossings alone; empty
+            without an interval.
     """
 
     lag_mm: tuple[float | None, float | None]
+    u_without_beams_mm: tuple[float, ...] = ()
 
 
 def solve_crossed_beams(
@@ -38,6 +55,7 @@ def solve_crossed_beams(
     beams: tuple[Beam, Beam],
     *,
     stored: ToolOffset | None = None,
+    height: TipHeight | None = None,
     sigma_mm: float | None = None,
     beams_may_have_moved: bool = False,
     tolerance: Tolerance = PLANAR_TOLERANCE,
@@ -46,8 +64,10 @@ def solve_crossed_beams(
 
     Args:
         crossings: Travels through both beams, best in both directions.
-        beams: Where the beams are, from :func:`find_beams` with a reference pin.
+        beams: Where the beams are, from :func:`find_beams` with a reference pin; what is
+            uncertain about them goes into the interval.
         stored: The offset stored now; Z, U, V and W are kept from it, or 0 without one.
+        height: Z of the tip, for a flange that leans; without it that of ``stored`` counts.
         sigma_mm: Standard deviation of one crossing's middle, across the beam.
         beams_may_have_moved: Take only the directions of the beams as known. Needs crossings
             at two angles of U, best half a turn apart; the offset is then absolute.
@@ -55,18 +75,20 @@ def solve_crossed_beams(
 
     Raises:
         CalibrationError: ``too_few_poses``, ``insufficient_rotation``, ``parallel_beams``,
-            ``no_crossing``, ``turned_in_crossing``, ``implausible_offset``, and those of
-            ``pose_checks.check_poses``.
+            ``no_crossing``, ``turned_in_crossing``, ``implausible_offset``, ``tool_pose``,
+            ``local_pose``, ``tilted_pose``, and those of ``pose_checks.check_poses``.
         ConfigError: ``sigma_mm`` is not positive.
     """
     warnings = check_crossings(crossings, minimum=1)
+    require_flange_in_base([crossing.entry for crossing in crossings])
     require_crossed(beams)
     if beams_may_have_moved:
         _require_turned(crossings)
     two_ways = _two_ways(crossings, beams)
     if not all(two_ways):
         warnings = (*warnings, "one_direction")
-    a, b = _system(crossings, beams, two_ways, beams_may_have_moved)
+    height = height_of(stored, height)
+    a, b, per_height = _system(crossings, beams, two_ways, beams_may_have_moved, height)
     fit = linear_fit(a, b) if len(a) >= a.shape[1] else None
     if fit is None or fit.rank < a.shape[1]:
         raise _too_few(len(a))
@@ -89,7 +111,7 @@ def solve_crossed_beams(
             lags.pop(0) if two_ways[1] else None,
         ),
     )
-    return judged(
+    result = judged(
         result,
         fit.residuals[:, None],
         fit.unit_covariance[:2, :2],
@@ -97,6 +119,11 @@ def solve_crossed_beams(
         sigma_mm=sigma_mm,
         tolerance=tolerance,
     )
+    by_height = linear_fit(a, per_height).x[:2].tolist()
+    result = with_height_error(result, (by_height[0], by_height[1]), height)
+    alone = tuple(math.sqrt(row[index]) for index, row in enumerate(result.covariance))
+    result = replace(result, u_without_beams_mm=alone)
+    return with_station(result, beams_part(a, crossings, beams, result.offset))
 
 
 def crossing_sigma_gain(
@@ -109,7 +136,10 @@ def crossing_sigma_gain(
 
     Only the directions and angles of the crossings count; see :func:`solve_crossed_beams`.
     """
-    a, b = _system(crossings, beams, _two_ways(crossings, beams), beams_may_have_moved)
+    # Height 0 will do: the gain depends on no right side.
+    a, b, _ = _system(
+        crossings, beams, _two_ways(crossings, beams), beams_may_have_moved, TipHeight(0.0)
+    )
     return _gain(linear_fit(a, b))
 
 
@@ -127,28 +157,31 @@ def _system(
     beams: tuple[Beam, Beam],
     two_ways: tuple[bool, bool],
     moved: bool,
-) -> tuple[Floats, Floats]:
-    """Return one equation a crossing: n (middle + Rz(U) t) + direction lag = distance.
+    height: TipHeight | None,
+) -> tuple[Floats, Floats, Floats]:
+    """Return one equation a crossing: n (middle + A t + c t_z) + direction lag = distance.
 
     Columns: t (2), a lag for each beam driven both ways, and with ``moved`` by how far each
-    beam lies from where it was.
+    beam lies from where it was. The last is by how much the right side changes for 1 mm of t_z.
     """
+    planes = solvable_planes([crossing.entry for crossing in crossings], height)
     lag_column = {beam: 2 + sum(two_ways[:beam]) for beam in (0, 1) if two_ways[beam]}
     width = 2 + sum(two_ways) + (2 if moved else 0)
     a, b = np.zeros((len(crossings), width)), np.zeros(len(crossings))
+    per_height = np.zeros(len(crossings))
     for row, crossing in enumerate(crossings):
         beam = beams[crossing.beam]
         nx, ny = beam.normal
-        u = math.radians(crossing.entry.u_deg)
-        a[row, 0] = nx * math.cos(u) + ny * math.sin(u)
-        a[row, 1] = -nx * math.sin(u) + ny * math.cos(u)
+        (xx, yx), (xy, yy) = planes[row].columns
+        a[row, 0], a[row, 1] = nx * xx + ny * yx, nx * xy + ny * yy
+        per_height[row] = -nx * planes[row].axis[0] - ny * planes[row].axis[1]
         if crossing.beam in lag_column:
             a[row, lag_column[crossing.beam]] = -crossing.direction_over(beam)
         if moved:
             a[row, width - 2 + crossing.beam] = -1.0
         x, y = crossing.middle_mm
         b[row] = beam.distance_mm - nx * x - ny * y
-    return a, b
+    return a, b + per_height * known_z_mm(height), per_height
 
 
 def _vectors(
@@ -176,7 +209,8 @@ def _too_few(count: int) -> CalibrationError:
 
 
 def _require_turned(crossings: Sequence[Crossing]) -> None:
-    spread_deg = angle_spread_deg([crossing.entry.u_deg for crossing in crossings])
+    headings_deg = [FlangePlane.of(crossing.entry).heading_deg for crossing in crossings]
+    spread_deg = angle_spread_deg(headings_deg)
     if spread_deg < MIN_ROTATION_DEG:
         raise CalibrationError(
             "insufficient_rotation",

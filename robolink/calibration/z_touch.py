@@ -1,28 +1,35 @@
 """Length of a tool from touching a surface, with the latency of the trigger taken out.
 
-The faster the tip comes down, the further it is when the trigger is read:
-``z = z_read + v latency`` (docs/reference/calibration.md 2.7). Two speeds tell z and latency.
+The faster the tip comes down, the further it is when the trigger is read, and the further again
+when the robot brakes before its position is read:
+
+    z = z_read + latency v + overshoot v^2,   overshoot = 1 / (2 a) for a deceleration a
+
+(docs/reference/calibration.md 2.7). Two speeds tell z and latency, three the overshoot as well,
+which is believed when an F test says that it is there (docs/reference/evidence.md 13).
 """
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-import numpy as np
-
-from robolink.calibration.core.least_squares import LinearFit, linear_fit
+from robolink.calibration.core.budget import DIVISORS, BudgetRow, UncertaintyBudget
 from robolink.calibration.core.planar_checks import require_poses
 from robolink.calibration.core.pose_checks import keep_unmeasured, require_finite
 from robolink.calibration.core.result import CalibrationResult
+from robolink.calibration.flange_plane import FlangePlane, TipHeight, solvable_planes
 from robolink.calibration.quality.fit_quality import judged
 from robolink.calibration.quality.tolerances import Tolerance
+from robolink.calibration.touch_latency import TouchFit, fit_touches, require_plausible
 from robolink.errors import CalibrationError
 from robolink.messages import tr
-from robolink.model import ToolOffset
+from robolink.model import Pose, ToolOffset
 
 PROBE_TOLERANCE = Tolerance(rms_mm=0.05, max_residual_mm=0.15)
 
 RECOMMENDED_TOUCHES = 3
+
+USUAL_DECELERATION_MM_S2 = 500.0
+"""How a robot brakes where nobody knows it; see docs/reference/evidence.md 13."""
 
 _SPEEDS_APART = 1.5
 """Speeds that differ by less than this factor do not tell the latency."""
@@ -50,10 +57,16 @@ class ZTouchResult(CalibrationResult):
     Attributes:
         latency_s: Of the trigger, as it was found or given.
         flange_z_mm: Height of the flange when the tip really touched.
+        overshoot_s2_per_mm: Of the braking, ``None`` where it was not found or not looked for.
+        f_quadratic: How much better the touches fit with an overshoot, ``None`` without a test.
+        f_limit: What that would have to exceed, likewise.
     """
 
     latency_s: float
     flange_z_mm: float
+    overshoot_s2_per_mm: float | None = None
+    f_quadratic: float | None = None
+    f_limit: float | None = None
 
 
 def solve_z_touch(
@@ -61,74 +74,125 @@ def solve_z_touch(
     surface_z_mm: float,
     *,
     stored: ToolOffset | None = None,
+    flange: Pose | None = None,
     latency_s: float | None = None,
+    deceleration_mm_s2: float = USUAL_DECELERATION_MM_S2,
     sigma_mm: float | None = None,
     tolerance: Tolerance = PROBE_TOLERANCE,
 ) -> ZTouchResult:
-    """Return Z of a tip that touched a surface, tool axis straight down.
+    """Return Z of a tip that touched a surface.
 
     Args:
-        touches: Repeated from the same side; at two speeds unless ``latency_s`` is given.
+        touches: Repeated from the same side; at two speeds unless ``latency_s`` is given. Three
+            speeds in four touches show whether the robot overshoots.
         surface_z_mm: Height of the surface in the base.
         stored: The offset stored now; all but Z is kept from it, or 0 without one.
+        flange: A pose with the angles of all touches; upright without one. Where it leans, X and
+            Y of the tip reach its height and are taken from ``stored``.
         latency_s: Of the trigger, when an earlier measurement found it.
+        deceleration_mm_s2: How the robot brakes. What that shifts Z by, where the speeds cannot
+            show it, is a row of the budget.
         sigma_mm: Standard deviation of one reading, when it is known.
         tolerance: Residuals above which the result carries a warning.
 
     Raises:
-        CalibrationError: ``too_few_poses``, ``one_speed``, ``non_finite`` or
-            ``implausible_offset``.
+        CalibrationError: ``too_few_poses``, ``one_speed``, ``implausible_latency``,
+            ``tilted_pose``, ``non_finite`` or ``implausible_offset``.
         ConfigError: ``sigma_mm`` is not positive.
     """
     require_poses(len(touches), 1 if latency_s is not None else 2)
-    require_finite(surface_z_mm=surface_z_mm)
+    require_finite(surface_z_mm=surface_z_mm, latency_s=latency_s or 0.0)
     _check_touches(touches)
     if latency_s is None:
         _require_two_speeds(touches)
-    fit = _fit(touches, latency_s)
-    flange_z = float(fit.x[0])
-    result = ZTouchResult(
+    plane = _plane(flange, stored)
+    speeds = [touch.speed_mm_s for touch in touches]
+    found = fit_touches([touch.z_mm for touch in touches], speeds, latency_s)
+    require_plausible(found, sigma_mm)
+    result = _result(found, len(touches), _length(plane, surface_z_mm, found.flange_z_mm, stored))
+    result = judged(
+        replace(result, offset=keep_unmeasured(stored, z_mm=result.offset.z_mm)),
+        found.fit.residuals[:, None],
+        found.fit.unit_covariance[:1, :1] / plane.r33**2,
+        unknowns=found.fit.rank,
+        sigma_mm=sigma_mm,
+        tolerance=tolerance,
+    )
+    return replace(result, budget=_budget(result, found, speeds, deceleration_mm_s2))
+
+
+def _result(found: TouchFit, count: int, z_mm: float) -> ZTouchResult:
+    warnings = ("few_poses",) if count < RECOMMENDED_TOUCHES else ()
+    return ZTouchResult(
         method="z-touch",
-        offset=keep_unmeasured(stored, z_mm=surface_z_mm - flange_z),
+        offset=ToolOffset(z_mm=z_mm),
         measured=("z_mm",),
         kept=_KEPT,
         reference_point_mm=(),
-        sigma_gain=_gain(fit),
-        warnings=("few_poses",) if len(touches) < RECOMMENDED_TOUCHES else (),
+        sigma_gain=found.gain,
+        warnings=(*warnings, "overshoot") if found.overshoot_s2_per_mm is not None else warnings,
         inputs=(),
-        residuals_mm=tuple((0.0, 0.0, residual) for residual in fit.residuals.tolist()),
-        condition_number=fit.condition_number,
-        rank=fit.rank,
+        residuals_mm=tuple((0.0, 0.0, residual) for residual in found.fit.residuals.tolist()),
+        condition_number=found.fit.condition_number,
+        rank=found.fit.rank,
         unobservable=_KEPT,
-        latency_s=float(fit.x[1]) if latency_s is None else latency_s,
-        flange_z_mm=flange_z,
-    )
-    return judged(
-        result,
-        fit.residuals[:, None],
-        fit.unit_covariance[:1, :1],
-        unknowns=fit.rank,
-        sigma_mm=sigma_mm,
-        tolerance=tolerance,
+        latency_s=found.latency_s,
+        flange_z_mm=found.flange_z_mm,
+        overshoot_s2_per_mm=found.overshoot_s2_per_mm,
+        f_quadratic=found.f_quadratic,
+        f_limit=found.f_limit,
     )
 
 
 def touch_sigma_gain(touches: Sequence[Touch]) -> float:
     """Return the standard deviation of Z as a multiple of one touch's; only the speeds count."""
-    return _gain(_fit(touches, None))
+    return fit_touches([0.0] * len(touches), [touch.speed_mm_s for touch in touches], None).gain
 
 
-def _fit(touches: Sequence[Touch], latency_s: float | None) -> LinearFit:
-    z = np.array([touch.z_mm for touch in touches], dtype=float)
-    speeds = np.array([touch.speed_mm_s for touch in touches], dtype=float)
-    ones = np.ones(len(z))
-    if latency_s is None:
-        return linear_fit(np.column_stack([ones, -speeds]), z)
-    return linear_fit(ones[:, None], z + speeds * latency_s)
+def _plane(flange: Pose | None, stored: ToolOffset | None) -> FlangePlane:
+    """Return how the flange hangs; X and Y of the tip have to be known where it leans."""
+    pose = Pose(0.0, 0.0, 0.0, 0.0) if flange is None else flange
+    known = None if stored is None else TipHeight(0.0)
+    (plane,) = solvable_planes((pose,), known)
+    return plane
 
 
-def _gain(fit: LinearFit) -> float:
-    return math.sqrt(float(fit.unit_covariance[0, 0]))
+def _length(
+    plane: FlangePlane, surface_z_mm: float, flange_z_mm: float, stored: ToolOffset | None
+) -> float:
+    aside = 0.0
+    if stored is not None:
+        aside = plane.level[0] * stored.x_mm + plane.level[1] * stored.y_mm
+    return (surface_z_mm - flange_z_mm - aside) / plane.r33
+
+
+def _budget(
+    result: ZTouchResult, found: TouchFit, speeds: Sequence[float], deceleration_mm_s2: float
+) -> UncertaintyBudget:
+    """Return scatter, and the braking where no speed could show it."""
+    rows = []
+    if result.sigma_mm is not None:
+        nu = float("inf") if result.sigma_stated else float(result.dof or 1)
+        origin = tr("stated") if result.sigma_stated else tr("residuals")
+        rows.append(
+            BudgetRow(tr("scatter"), result.sigma_mm, nu, result.sigma_gain, origin, kind="A")
+        )
+    if found.f_quadratic is None:
+        half = _braking_mm(speeds, deceleration_mm_s2, given=found.fit.rank == 1)
+        rows.append(
+            BudgetRow(
+                tr("braking"),
+                half / DIVISORS["rectangular"],
+                origin=tr("{deceleration:g} mm/s^2, not measured", deceleration=deceleration_mm_s2),
+            )
+        )
+    return UncertaintyBudget.of(rows, not_assessed=(tr("height of the surface"),))
+
+
+def _braking_mm(speeds: Sequence[float], deceleration_mm_s2: float, *, given: bool) -> float:
+    """Return by how much braking shifts Z: v1 v2 / (2 a) for a line through two speeds."""
+    slow, fast = min(speeds), max(speeds)
+    return (fast * fast if given else slow * fast) / (2 * deceleration_mm_s2)
 
 
 def _check_touches(touches: Sequence[Touch]) -> None:

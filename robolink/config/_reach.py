@@ -183,7 +183,7 @@ def _copy_of(name: str, origin: Path) -> Path:
 def _read(path: Path) -> dict[str, object] | None:
     try:
         kept = json.loads(path.read_bytes())
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):
         return None
     return kept if isinstance(kept, dict) else None
 

@@ -4,14 +4,32 @@ Cell files, recipes and PLC maps differ in their keys. How one is read, how a pr
 key and how all problems of a file are told is the same for them.
 """
 
+import re
 import tomllib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
 from robolink.errors import ConfigError
 from robolink.files.named import read_named
 from robolink.messages import tr
+
+MOST_BYTES: Final = 250_000
+"""A recipe of a hundred tools takes 60 kB, as does a cell file of a hundred cells."""
+
+MOST_SHOWN: Final = 40
+"""Problems of one file that are told at once; a file in another form has one in each line."""
+
+_MOST_PARTS: Final = 32
+_PART: Final = r"""(?:[A-Za-z0-9_-]++|"[^"\n]*+"|'[^'\n]*+')"""
+_LONG_KEY: Final = re.compile(
+    rf"^[ \t]*+\[*+[ \t]*+{_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{_MOST_PARTS}}}"
+    rf"|[{{,][ \t]*+{_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{_MOST_PARTS}}}",
+    re.MULTILINE,
+)
+"""A key of very many parts, for which the parser of Python takes time by the square of them: one
+of 60000 parts, 120 kB, took minutes. The keys that we know have four."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,10 +68,10 @@ class FileKind:
         """Return what is in a file.
 
         Raises:
-            ConfigError: It cannot be read.
+            ConfigError: It cannot be read, or is longer than :data:`MOST_BYTES`.
         """
         try:
-            return read_named(path)
+            return read_named(path, most_bytes=MOST_BYTES)
         except OSError as error:
             raise self._unreadable(path, error.strerror or str(error)) from error
 
@@ -65,7 +83,12 @@ class FileKind:
         """
         try:
             # Editors on Windows put a byte order mark in front, which TOML does not know.
-            return tomllib.loads(content.decode("utf-8-sig"))
+            text = content.decode("utf-8-sig")
+            if _LONG_KEY.search(text):
+                raise self._unreadable(
+                    path, tr("a key has more than {most} parts", most=_MOST_PARTS)
+                )
+            return tomllib.loads(text)
         except UnicodeError as error:
             raise self._unreadable(path, tr("it is not UTF-8 text")) from error
         except RecursionError as error:
@@ -74,8 +97,11 @@ class FileKind:
             raise self._unreadable(path, str(error)) from error
 
     def refusal(self, path: Path, problems: Sequence[Problem]) -> ConfigError:
-        """Return the error that tells all problems of one file at once."""
-        lines = "\n".join(f"    {problem}" for problem in problems)
+        """Return the error that tells the problems of one file at once, the first forty of them."""
+        shown = [f"    {problem}" for problem in problems[:MOST_SHOWN]]
+        if len(problems) > MOST_SHOWN:
+            shown.append("    " + tr("and {more} more", more=len(problems) - MOST_SHOWN))
+        lines = "\n".join(shown)
         named = self.named(path)
         return ConfigError(
             tr(

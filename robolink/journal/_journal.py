@@ -242,7 +242,7 @@ def _entry(row: Mapping[str, Any]) -> Recorded:
 def _details(text: str) -> Mapping[str, object]:
     try:
         found = json.loads(text)
-    except ValueError:
+    except (ValueError, RecursionError):
         found = None
     return found if isinstance(found, dict) else {"damaged": text}
 

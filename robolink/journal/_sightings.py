@@ -42,7 +42,7 @@ class LeaseSighting:
         """Return the holder, nobody known when the record of him is damaged."""
         try:
             return LeaseHolder(**json.loads(self.holder))
-        except (ValueError, TypeError):
+        except (ValueError, TypeError, RecursionError):
             return LeaseHolder()
 
     def held_error(self, controller: str, last_sign: str) -> LeaseHeldError:

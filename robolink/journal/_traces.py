@@ -67,7 +67,7 @@ def traces_of(names: tuple[str, ...]) -> Traces | None:
         try:
             known = json.loads(_path(name).read_bytes())
             return Traces(str(known["since"]), str(known["journal"]), backup)
-        except (OSError, ValueError, KeyError, TypeError):
+        except (OSError, ValueError, KeyError, TypeError, RecursionError):
             continue
     return None if backup is None else Traces("", "", backup)
 

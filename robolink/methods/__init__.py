@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from robolink.methods.declaration.method import Help as Help
     from robolink.methods.declaration.method import InputNumber as InputNumber
     from robolink.methods.declaration.method import Length as Length
+    from robolink.methods.declaration.method import LengthRule as LengthRule
     from robolink.methods.declaration.method import Method as Method
     from robolink.methods.declaration.method import MethodParameters as MethodParameters
     from robolink.methods.declaration.method import Needs as Needs
@@ -52,6 +53,9 @@ if TYPE_CHECKING:
     from robolink.methods.declaration.method import StatedLimits as StatedLimits
     from robolink.methods.declaration.method import Unit as Unit
     from robolink.methods.declaration.pin_parameters import PinParameters as PinParameters
+    from robolink.methods.declaration.pin_parameters import (
+        UprightPinParameters as UprightPinParameters,
+    )
     from robolink.methods.declaration.site import Site as Site
     from robolink.methods.n_angle.parameters import NAngleParameters as NAngleParameters
     from robolink.methods.n_angle.parameters import most_informative_order as most_informative_order
@@ -118,7 +122,7 @@ __getattr__ = lazy_exports(
         "camera_affine.source": "CameraAffineSource",
         "declaration.checking": "order_of_residuals parameter_problems source_of",
         "declaration.method": (
-            "Angle AnyMethod Check DEGREES Former Help InputNumber Length "
+            "Angle AnyMethod Check DEGREES Former Help InputNumber Length LengthRule "
             "MM MM_S Method MethodParameters NOTHING_STATED Needs Option Pair "
             "PoseHelp StatedLimits Unit"
         ),
@@ -132,7 +136,7 @@ __getattr__ = lazy_exports(
         "one_touch.procedure": "measure_one_touch",
         "one_touch.solvers": "Absolute Difference difference_from_last",
         "one_touch.source": "OneTouchSource",
-        "declaration.pin_parameters": "PinParameters",
+        "declaration.pin_parameters": "PinParameters UprightPinParameters",
         "pivot.parameters": "PivotParameters",
         "pivot.procedure": "measure_pivot verify_by_tilting",
         "pivot.source": "PivotSource PivotTouches require_tilting",

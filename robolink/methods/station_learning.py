@@ -1,5 +1,6 @@
 """Finding a station with a tip that is known: the reverse of finding a tip at a known station."""
 
+import math
 from collections.abc import Callable
 from dataclasses import asdict
 from typing import Final
@@ -25,6 +26,7 @@ def learn_station(
     tool: int,
     tip: ToolOffset,
     sigma_mm: float | None = None,
+    tip_sigma_mm: float = 0.0,
 ) -> Procedure[Found]:
     """Find where a station is. Runs in Tool 0, from above it.
 
@@ -34,6 +36,8 @@ def learn_station(
         tool: The tool whose tip is used.
         tip: Its offset, which is taken for right: what is wrong with it shifts the station.
         sigma_mm: Standard deviation of one coordinate of one touch, where it is known.
+        tip_sigma_mm: Standard deviation of the tip's own offset. It puts the station as far off
+            and shows in no touch, so it is added to what the station is unsure of.
 
     Raises:
         CalibrationError: ``no_edge``, ``edge_passed``, and those of the solvers.
@@ -49,11 +53,16 @@ def learn_station(
             ),
         )
     courses: dict[StationKind, Callable[[], Procedure[Found]]] = {
-        StationKind.PIN: lambda: _pin(station, tool, tip, sigma_mm),
-        StationKind.BEAMS: lambda: _beams(station, here, tool, tip),
+        StationKind.PIN: lambda: _pin(station, tool, tip, _with_tip(sigma_mm, tip_sigma_mm)),
+        StationKind.BEAMS: lambda: _beams(station, here, tool, tip, tip_sigma_mm),
         StationKind.TOUCH: lambda: _surface(station, here, tool, tip, sigma_mm),
     }
     return courses[station.kind]()
+
+
+def _with_tip(sigma_mm: float | None, tip_sigma_mm: float) -> float | None:
+    """Return how uncertain a touched place is; unknown where the touch is."""
+    return None if sigma_mm is None else math.hypot(sigma_mm, tip_sigma_mm)
 
 
 def _pin(station: Station, tool: int, tip: ToolOffset, sigma_mm: float | None) -> Procedure[Found]:
@@ -72,14 +81,19 @@ def _pin(station: Station, tool: int, tip: ToolOffset, sigma_mm: float | None) -
         how=tr("touched with tool {tool}", tool=tool),
         gauge=station.gauge,
         tool=tool,
+        details={"z_from": "touched"},
     )
 
 
-def _beams(station: Station, here: Pose, tool: int, tip: ToolOffset) -> Procedure[Found]:
+def _beams(
+    station: Station, here: Pose, tool: int, tip: ToolOffset, tip_sigma_mm: float
+) -> Procedure[Found]:
     from robolink.methods.beams.procedure import trace_beams  # numpy, which a look does without
 
     guess = beam_station(station)
-    beams = yield from trace_beams(guess, BeamsParameters(), here=here, tip=tip)
+    beams = yield from trace_beams(
+        guess, BeamsParameters(), here=here, tip=tip, tip_sigma_mm=tip_sigma_mm
+    )
     lines = [
         {"input": number, **asdict(beam)} for number, beam in zip(guess.inputs, beams, strict=True)
     ]

@@ -8,6 +8,9 @@ if TYPE_CHECKING:
     from robolink.nozzle_change._acceptance import AcceptanceCriteria as AcceptanceCriteria
     from robolink.nozzle_change._change import Earlier as Earlier
     from robolink.nozzle_change._change import NozzleChange as NozzleChange
+    from robolink.nozzle_change._length import height_is_known as height_is_known
+    from robolink.nozzle_change._length import known_height as known_height
+    from robolink.nozzle_change._length import tip_sigma_mm as tip_sigma_mm
     from robolink.nozzle_change._listener import Listener as Listener
     from robolink.nozzle_change._listener import Moment as Moment
     from robolink.nozzle_change._plan import ChangePlan as ChangePlan
@@ -30,6 +33,7 @@ __getattr__ = lazy_exports(
     {
         "_acceptance": "AcceptanceCriteria",
         "_change": "Earlier NozzleChange",
+        "_length": "height_is_known known_height tip_sigma_mm",
         "_listener": "Listener Moment",
         "_plan": "ChangePlan Limits ToolPlan require_ready usual_box",
         "_preview": "PlannedStep flange_now foresee preview require_inside",

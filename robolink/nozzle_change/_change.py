@@ -13,6 +13,7 @@ from robolink.calibration import VerifyResult
 from robolink.errors import CalibrationError, DeclinedError, StoppedError, VerifyError
 from robolink.messages import tr
 from robolink.model import Controller, ToolReceipt, new_operation, require_engineer
+from robolink.nozzle_change._length import settle_lengths
 from robolink.nozzle_change._listener import Listener, Moment
 from robolink.nozzle_change._measuring import Measuring
 from robolink.nozzle_change._plan import ChangePlan, ToolPlan
@@ -96,7 +97,7 @@ class NozzleChange:
         measuring.go_to(plan.safe, tr("go to the safe pose"))
         listener.moment(Moment.START, context)
         proposals: Proposals = [(one, measuring.propose(one)) for one in plan.tools]
-        proposals = self._checked(proposals)
+        proposals = self._checked(context, proposals, write=write)
         listener.proposed([proposal for _, proposal in proposals])
         self._judge(proposals)
         if write:
@@ -126,10 +127,15 @@ class NozzleChange:
             offers=self._plan.ask_before_write,
         )
 
-    def _checked(self, proposals: Proposals) -> Proposals:
-        """Return the proposals with what the stations make doubtful; a refusal goes on record."""
+    def _checked(
+        self, context: MeasurementContext, proposals: Proposals, *, write: bool
+    ) -> Proposals:
+        """Return the proposals with what stations and heights say; a refusal goes on record."""
         try:
-            return check_stations(self._controller, proposals)
+            checked = check_stations(self._controller, proposals)
+            if not write:
+                return checked
+            return settle_lengths(context, checked, attended=self._plan.asks)
         except CalibrationError as error:
             for plan, _ in proposals:
                 self._controller.outcomes.append(refusal_entry(plan.tool, plan.criteria, error))
@@ -190,7 +196,7 @@ class NozzleChange:
                 for (plan, proposal), receipt in zip(proposals, receipts, strict=True)
             )
             change.keep(tr("verified") if verify else tr("not verified"))
-        self._controller.outcomes.append(*stations_found(proposals))
+        self._controller.outcomes.append(*stations_found(self._controller, proposals))
         return reports
 
     def _verify(

@@ -1,10 +1,10 @@
 """What a nozzle change is to do, and within which limits."""
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 
 from robolink.calibration import CalibrationResult
-from robolink.methods import TwoPoseSource
+from robolink.methods import LengthRule, TwoPoseSource
 from robolink.model import Pose, ToolOffset, WorkBox, plain_offset
 from robolink.nozzle_change._acceptance import AcceptanceCriteria
 from robolink.nozzle_change._pin_record import touch_details
@@ -57,6 +57,8 @@ class ToolPlan:
         approach: Flange pose from which it is measured, ``None`` for wherever the robot is.
         retreat: Flange pose to which the robot goes afterwards.
         pin: Name of the station where a pin is touched; empty for none, or none that is kept.
+        length: What is done where the heights of the touches show that the tip is longer or
+            shorter: ``ask``, write Z by ``difference``, or ``keep`` it.
         method: Name of the calibration method, for the record; empty for what the result says.
     """
 
@@ -68,6 +70,7 @@ class ToolPlan:
     approach: Pose | None = None
     retreat: Pose | None = None
     pin: str = ""
+    length: LengthRule = "ask"
     method: str = ""
 
     def named(self, result: CalibrationResult) -> CalibrationResult:
@@ -76,9 +79,15 @@ class ToolPlan:
 
     def details(self, proposal: Proposal) -> dict[str, object]:
         """Return what the journal keeps about the value beside it, plain JSON."""
-        own = {"tip": plain_offset(proposal.tip), "method": proposal.result.method}
+        own = {
+            "tip": plain_offset(proposal.tip),
+            "method": proposal.result.method,
+            "z_from": "measured" if "z_mm" in proposal.result.measured else proposal.z_from,
+        }
         touch = {"touch": touch_details(self.pin, proposal)} if self.pin else {}
-        return {**own, **touch, **proposal.kept_record}
+        told = proposal.length
+        length = {"length": asdict(told)} if told is not None and told.changed else {}
+        return {**own, **touch, **length, **proposal.kept_record}
 
     @property
     def moving(self) -> MovingSource | None:
@@ -96,12 +105,20 @@ class ChangePlan:
         ask_before_write: Whether a person accepts the proposals before anything is written, and
             is asked about what a measurement offers, such as a pose to be taken again.
         safe: Flange pose to which the robot goes first and last.
+        attended: Whether a person may be asked what a measurement leaves open; ``None`` for where
+            the write is asked too.
     """
 
     tools: tuple[ToolPlan, ...]
     limits: Limits = field(default_factory=Limits)
     ask_before_write: bool = True
     safe: Pose | None = None
+    attended: bool | None = None
+
+    @property
+    def asks(self) -> bool:
+        """Whether a person may be asked what a measurement leaves open."""
+        return self.ask_before_write if self.attended is None else self.attended
 
     @property
     def moves(self) -> bool:

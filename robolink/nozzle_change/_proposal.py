@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from robolink.calibration import CalibrationResult, VerifyResult
+from robolink.calibration import CalibrationResult, LengthChange, VerifyResult
 from robolink.model import ToolOffset, ToolReceipt
 
 
@@ -45,6 +45,9 @@ class Proposal:
         z_from: Where Z of the proposal comes from.
         record: More for the record of the measurement, plain JSON.
         kept_record: More for the record of the value, once it is kept.
+        length: What the heights of the touches tell about the length; ``None`` for nothing.
+        pin_z_mm: Height of the pin that Z goes back to, base; ``None`` for that of these touches.
+        pin_touches: How many touches that height rests on.
     """
 
     tool: int
@@ -55,6 +58,9 @@ class Proposal:
     z_from: Literal["measured", "typed", "kept"] = "kept"
     record: Mapping[str, object] = field(default_factory=dict)
     kept_record: Mapping[str, object] = field(default_factory=dict)
+    length: LengthChange | None = None
+    pin_z_mm: float | None = None
+    pin_touches: int = 0
 
     @property
     def offset(self) -> ToolOffset:

@@ -100,6 +100,11 @@ def _result(result: CalibrationResult) -> dict[str, object]:
         "sigma_gain": result.sigma_gain,
         "condition_number": result.condition_number,
         "warnings": list(result.warnings),
+        "notes": list(result.notes),
+        "interval_from": result.interval_from,
+        "region95_radius_mm": result.region95_radius_mm,
+        "budget": result.budget.as_json() if result.budget else None,
+        "evidence": result.evidence.as_json() if result.evidence else None,
         **result.details(),
     }
 

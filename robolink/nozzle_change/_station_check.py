@@ -1,17 +1,18 @@
-"""Whether the pin is where it was: a pin that was bumped is told from tips that moved."""
+"""Whether the pin is where it was: a pin that was bumped is told from new nozzles."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from robolink.calibration import StationShift, TipShift, judge_shifts
 from robolink.errors import CalibrationError
 from robolink.messages import tr
 from robolink.methods import KEPT
-from robolink.model import Controller, EntryKind, NewEntry, rotate_xy
+from robolink.model import Controller, EntryKind, NewEntry
 from robolink.nozzle_change._pin_record import finds_pin, found_pin
 from robolink.nozzle_change._plan import ToolPlan
 from robolink.nozzle_change._proposal import Proposal
+from robolink.nozzle_change._seating import Seating, nozzle_in, seating_of
 from robolink.procedures import FindsStation
 from robolink.stations import Station, find_stations, station_entry
 from robolink.ways import Way, way
@@ -23,7 +24,9 @@ def check_stations(controller: Controller, proposals: Proposals) -> Proposals:
     """Return the proposals, doubted where the pin moved since it was found.
 
     A full calibration finds the pin anew, so its tip is right wherever the pin is now. One touch
-    relies on the pin: where several tips moved by the same vector, nothing is proposed.
+    relies on the pin: where several tips say together that it moved, nothing is proposed. A single
+    one is doubted, because its nozzle may sit otherwise than any before; the proof about the new
+    tip, half a turn on, shows an error twofold.
 
     Raises:
         CalibrationError: ``station_moved``.
@@ -31,26 +34,29 @@ def check_stations(controller: Controller, proposals: Proposals) -> Proposals:
     if not any(plan.pin for plan, _ in proposals):
         return proposals
     known = find_stations(None, controller.outcomes.recorded(kinds=(EntryKind.STATION,)))
+    seating = seating_of(controller)
     judged = list(proposals)
     for name in dict.fromkeys(plan.pin for plan, _ in proposals if plan.pin):
         there = [proposal for plan, proposal in proposals if plan.pin == name]
-        shift = judge_shifts(list(_shifts(controller, known.get(name), there)))
-        if shift is None or not shift.moved:
+        shifts = list(_shifts(controller, known.get(name), there, seating))
+        shift = judge_shifts(shifts, seat_changes=seating.changes)
+        if shift is None:
             continue
         relying = [one.tool for one in there if not finds_pin(one.result)]
-        if len(relying) > 1:
+        if shift.moved and len(relying) > 1:
             raise _refusal(name, shift)
         judged = [
-            (plan, _doubted(proposal, name, shift) if plan.pin == name else proposal)
+            (plan, _judged(plan, proposal, shift) if plan.pin == name else proposal)
             for plan, proposal in judged
         ]
     return judged
 
 
-def stations_found(proposals: Proposals) -> Iterator[NewEntry]:
+def stations_found(controller: Controller, proposals: Proposals) -> Iterator[NewEntry]:
     """Yield what calibrations that were kept say about where pins are, and how cameras see."""
+    known = find_stations(None, controller.outcomes.recorded(kinds=(EntryKind.STATION,)))
     for plan, proposal in proposals:
-        found = found_pin(plan.pin, proposal) if plan.pin else None
+        found = found_pin(plan.pin, proposal, known.get(plan.pin)) if plan.pin else None
         if isinstance(plan.source, FindsStation):
             found = plan.source.found_station(proposal.result, proposal.tool)
         if found is not None:
@@ -58,13 +64,21 @@ def stations_found(proposals: Proposals) -> Iterator[NewEntry]:
 
 
 def _shifts(
-    controller: Controller, station: Station | None, proposals: Sequence[Proposal]
+    controller: Controller,
+    station: Station | None,
+    proposals: Sequence[Proposal],
+    seating: Seating,
 ) -> Iterator[TipShift]:
+    several = len(proposals) > 1
     for proposal in proposals:
         if finds_pin(proposal.result):
             shift = _measured_shift(station, proposal)
         else:
-            shift = _supposed_shift(controller, proposal)
+            seat = () if _same_nozzle(controller, proposal) else seating.sigma_mm
+            shift = _supposed_shift(proposal, seat)
+            if shift is not None and seat and not several:
+                # One tool cannot tell a lower pin from a longer tip.
+                shift = replace(shift, vector_mm=shift.vector_mm[:2], seat_sigma_mm=seat[:2])
         if shift is not None:
             yield shift
 
@@ -77,22 +91,22 @@ def _measured_shift(station: Station | None, proposal: Proposal) -> TipShift | N
     if found.x_mm is None or found.y_mm is None or not found.sigma_mm or not station.sigma_mm:
         return None
     vector = (found.x_mm - station.x_mm, found.y_mm - station.y_mm)
-    sigma_mm = math.hypot(found.sigma_mm, station.sigma_mm)
-    return TipShift(proposal.tool, vector, sigma_mm, same_tip=True)
+    # The two places are as uncertain as they say; a shift has the variance of two touches.
+    sigma_mm = math.hypot(found.sigma_mm, station.sigma_mm) / math.sqrt(2)
+    return TipShift(proposal.tool, vector, sigma_mm)
 
 
-def _supposed_shift(controller: Controller, proposal: Proposal) -> TipShift | None:
+def _supposed_shift(proposal: Proposal, seat_mm: tuple[float, ...]) -> TipShift | None:
     """Return by how much the pin would have moved if the tip had not."""
+    from robolink.calibration import rotation_of  # numpy, late
+
     before, after, result = proposal.before, proposal.tip, proposal.result
     if before is None or not result.sigma_mm:
         return None
-    dx, dy = rotate_xy(after.x_mm - before.x_mm, after.y_mm - before.y_mm, result.inputs[0].u_deg)
-    return TipShift(
-        proposal.tool,
-        (-dx, -dy, before.z_mm - after.z_mm),
-        math.sqrt(2) * result.sigma_mm,
-        same_tip=_same_nozzle(controller, proposal),
-    )
+    rows = rotation_of(result.inputs[0]).tolist()
+    moved = [b - a for a, b in zip(after.components()[:3], before.components()[:3], strict=True)]
+    vector = tuple(sum(r * m for r, m in zip(row, moved, strict=True)) for row in rows)
+    return TipShift(proposal.tool, vector, result.sigma_mm, seat_mm)
 
 
 def _same_nozzle(controller: Controller, proposal: Proposal) -> bool:
@@ -103,22 +117,39 @@ def _same_nozzle(controller: Controller, proposal: Proposal) -> bool:
     last = next((entry for entry in kept if "value" in entry.details), None)
     if last is None:
         return False
-    now = _nozzle(proposal.kept_record, outcomes.signature.nozzle)
-    return bool(now) and now == _nozzle(last.details, last.signature.nozzle)
+    now = nozzle_in(proposal.kept_record, outcomes.signature.nozzle)
+    return bool(now) and now == nozzle_in(last.details, last.signature.nozzle)
 
 
-def _nozzle(details: Mapping[str, object], of_the_run: str) -> str:
-    own = details.get("nozzle")
-    return own if isinstance(own, str) and own else of_the_run
+def _judged(plan: ToolPlan, proposal: Proposal, shift: StationShift) -> Proposal:
+    """Return a proposal with what the shift makes doubtful about it."""
+    if shift.moved:
+        record = {**proposal.record, "station_shift_mm": list(shift.vector_mm)}
+        doubted = _with(proposal, _sentence(plan.pin, shift), doubt="station_moved")
+        return replace(doubted, record=record)
+    if finds_pin(proposal.result) or not shift.undecided(plan.criteria.drift_tolerance_mm):
+        return proposal
+    said = tr(
+        "Station {station} may have moved by up to {detectable:.2f} mm: with so many new nozzles "
+        "less would not show.",
+        station=plan.pin,
+        detectable=shift.detectable_mm,
+    )
+    if plan.verify and plan.moving:
+        # The proof about the new tip decides it, so there is nothing to doubt yet.
+        return replace(
+            proposal,
+            result=replace(proposal.result, notes=(*proposal.result.notes, "station_undecided")),
+        )
+    return _with(proposal, said, doubt="station_undecided")
 
 
-def _doubted(proposal: Proposal, station: str, shift: StationShift) -> Proposal:
+def _with(proposal: Proposal, sentence: str, *, doubt: str) -> Proposal:
     result = proposal.result
     return replace(
         proposal,
-        result=replace(result, warnings=(*result.warnings, "station_moved")),
-        notes=(*proposal.notes, _sentence(station, shift)),
-        record={**proposal.record, "station_shift_mm": list(shift.vector_mm)},
+        result=replace(result, warnings=(*result.warnings, doubt)),
+        notes=(*proposal.notes, sentence),
     )
 
 
@@ -138,8 +169,8 @@ def _sentence(station: str, shift: StationShift) -> str:
     dx, dy = shift.vector_mm[:2]
     if len(shift.tools) > 1:
         said = tr(
-            "Tools {tools} all shifted by X {dx:+.3f} Y {dy:+.3f} mm at station {station}: the "
-            "station moved, not the tips",
+            "Tools {tools} shifted together by X {dx:+.3f} Y {dy:+.3f} mm at station {station}, "
+            "more than new nozzles explain: the station moved",
             tools=", ".join(map(str, shift.tools)),
             dx=dx,
             dy=dy,
@@ -155,8 +186,8 @@ def _sentence(station: str, shift: StationShift) -> str:
             tool=shift.tools[0],
         )
     sure = tr(
-        "(chi-square {together:.0f}; chance stays below {limit:.0f})",
-        together=shift.together,
-        limit=shift.together_limit,
+        "(chi-square {found:.0f}; chance stays below {limit:.0f})",
+        found=shift.chi_square,
+        limit=shift.chi_square_limit,
     )
     return f"{said} {sure}."

@@ -5,9 +5,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Generic
 
+from robolink.calibration import carrying
 from robolink.errors import CalibrationError
 from robolink.messages import tr
-from robolink.model import TIP, Path, Pose, SpotUnit, ToolOffset, rotate_xy
+from robolink.model import TIP, Path, Pose, SpotUnit, ToolOffset
 from robolink.procedures.camera_plan import LookPlan
 from robolink.procedures.sequential_sampling import ResultT, finalize_samples
 from robolink.runner import Look, Move, Notify, Procedure, SeenAt
@@ -37,7 +38,7 @@ class CameraDrive:
 
     Attributes:
         station, plan: Where and how.
-        frame: A pose of the frame: its hand, local and tool.
+        frame: A pose of the frame: its V and W, hand, local and tool.
     """
 
     station: CameraStation
@@ -120,15 +121,8 @@ class CameraDrive:
 
     def pose(self, place: Place) -> Pose:
         """Return where the frame is with a mark before the camera, as far as that is known."""
-        x_mm, y_mm = self._middle(place)
-        dx, dy = rotate_xy(place.at.x_mm, place.at.y_mm, place.u_deg)
-        return replace(
-            self.frame,
-            x_mm=x_mm - dx,
-            y_mm=y_mm - dy,
-            z_mm=self.station.z_mm - place.at.z_mm,
-            u_deg=place.u_deg,
-        )
+        frame = replace(self.frame, u_deg=place.u_deg)
+        return carrying(frame, place.at, (*self._middle(place), self.station.z_mm))
 
     def _turn_to(self, place: Place, here: Pose) -> Procedure[None]:
         """Lift, go over and turn, come down beside the place."""

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from typing import Final
 
-from robolink.calibration import Drift, VerifyResult
-from robolink.model import Pose, ToolOffset, rotate_xy
+from robolink.calibration import Drift, FlangePlane, VerifyResult
+from robolink.model import Pose, ToolOffset
 from robolink.procedures.approach import NO_OFFSET
 from robolink.procedures.camera_plan import LookPlan
 from robolink.procedures.camera_samples import CameraDrive, Place
@@ -62,7 +62,7 @@ def seen_drift(
 ) -> Drift:
     """Return how far from where the controller puts it a mark was seen."""
     sighting, (error_x, error_y) = station.sighting(look), camera_error_mm
-    dx, dy = rotate_xy(place.at.x_mm, place.at.y_mm, look.u_deg)
+    dx, dy = FlangePlane.of(look).in_base(place.at.x_mm, place.at.y_mm, place.at.z_mm)
     return Drift(
         look.u_deg,
         sighting.x_mm - error_x - look.x_mm - dx,

@@ -8,7 +8,7 @@ from robolink.calibration import VerifyResult
 from robolink.errors import CalibrationError, ConfigError
 from robolink.messages import tr
 from robolink.model import Controller, EntryKind, NewEntry, Signature, ToolReceipt
-from robolink.nozzle_change import Listener, Moment, Proposal
+from robolink.nozzle_change import Listener, Moment, Proposal, known_height
 from robolink.procedures import MeasurementContext
 from robolink.recipe._answers import Answers, ask_height, ask_prompt, confirm_height
 from robolink.recipe._proposing import proposed
@@ -119,9 +119,19 @@ class RecipeListener(Listener):
         if self._recipe.z == "typed":
             given = self._answers.z_mm.get(tool)
             return ask_height(context, tool, name) if given is None else given
-        if self._recipe.z == "kept" and not self._answers.yes:
+        if self._recipe.z == "kept" and not self._answers.yes and not self._told_by_touches(tool):
             confirm_height(context, tool, name)
         return None
+
+    def _told_by_touches(self, tool: int) -> bool:
+        """Tell whether the heights of the touches will show whether the tip is as long as before.
+
+        Then that is asked once, with what they show, and only where the length changed.
+        """
+        recipe = self._recipe
+        if not recipe.source.of_method.tells_height:
+            return False
+        return known_height(self._controller, tool, recipe.station.id) is not None
 
     def _ask(
         self, context: MeasurementContext, number: int, prompt: Prompt, tool: int | None

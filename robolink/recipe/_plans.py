@@ -1,10 +1,12 @@
 """From a recipe to the plan of a nozzle change."""
 
 from dataclasses import replace
+from pathlib import Path
 
 from robolink.methods import MethodParameters, Site, fields_of, source_of
 from robolink.model import Controller, TipSensor
 from robolink.nozzle_change import AcceptanceCriteria, ChangePlan, Limits, ToolPlan
+from robolink.pose_tables import ReadingChoices
 from robolink.procedures import TipSource
 from robolink.recipe.file.recipe import Recipe
 from robolink.recipe.file.tables import Tool
@@ -17,6 +19,7 @@ def plan_of(
     station: Station,
     controller: Controller,
     *,
+    folder: Path,
     ask_before_write: bool = True,
     accepted_change_mm: float | None = None,
     sensor: str | TipSensor | None = None,
@@ -27,6 +30,7 @@ def plan_of(
         recipe: The recipe.
         station: Its station, with what its record adds.
         controller: The controller; only read, and only where the robot has to tilt.
+        folder: Where the recipe lies: files that it names are looked for there.
         ask_before_write: Whether a person accepts the proposals.
         accepted_change_mm: A larger jump than the recipe's that an engineer accepts this time.
         sensor: The camera, or its name or URL, in place of the recipe's.
@@ -44,19 +48,21 @@ def plan_of(
         drift_tolerance_mm=tolerances.drift_mm,
         accepted_change_mm=accepted_change_mm,
         accepted_with=way(Way.ACCEPT_JUMP),
+        unattended=not ask_before_write,
     )
     safe = recipe.poses.safe
     return ChangePlan(
         tuple(
             ToolPlan(
                 tool.number,
-                _source(recipe, parameters, station, controller, tool, sensor),
+                _source(recipe, parameters, station, controller, tool, sensor, folder),
                 criteria,
                 verify=recipe.verifies,
                 attempts=recipe.attempts,
                 approach=tool.approach.pose if tool.approach else None,
                 retreat=tool.retreat.pose if tool.retreat else None,
                 pin=_pin(recipe),
+                length=parameters.length_rule(),
                 method=recipe.source.of_method.name,
             )
             for tool in recipe.tools
@@ -84,6 +90,7 @@ def _source(
     controller: Controller,
     tool: Tool,
     sensor: str | TipSensor | None,
+    folder: Path,
 ) -> TipSource:
     tolerances = recipe.tolerances
     site = Site(
@@ -91,12 +98,20 @@ def _source(
         tool=tool.number,
         station=station,
         points=tool.points or (),
+        pose_file=_pose_file(tool, folder),
         sigma_mm=tolerances.sigma_mm,
         max_change_mm=tolerances.jump_mm,
         interval_mm=tolerances.interval_mm,
         sensor=sensor,
     )
     return source_of(recipe.source.of_method, parameters, site)
+
+
+def _pose_file(tool: Tool, folder: Path) -> tuple[Path, ReadingChoices] | None:
+    given = tool.poses
+    if given is None:
+        return None
+    return folder / given.file, ReadingChoices(given.columns, given.length, given.euler)
 
 
 def _pin(recipe: Recipe) -> str:

@@ -141,6 +141,9 @@ def _height(
 
 def _record(recipe: Recipe, reference: Reference | None) -> dict[str, object]:
     record: dict[str, object] = {"basis": recipe.basis, "z": recipe.z}
+    if recipe.basis == "difference":
+        # Whatever was wrong with Z stays wrong by as much: no pin's height is learnt from it.
+        record["z_from"] = "kept"
     if reference is not None:
         record["reference_entry"] = reference.number
     return record

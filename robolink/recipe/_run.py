@@ -82,6 +82,7 @@ class RecipeRun:
             self._loaded.recipe,
             station,
             controller,
+            folder=loaded.path.parent,
             ask_before_write=ask_before_write,
             accepted_change_mm=accepted_change_mm,
             sensor=sensor,

@@ -49,7 +49,7 @@ def confirmation_of(identity: str, register_map: RegisterMap) -> Confirmation | 
         if (document["schema"], document["controller"]) != (_FORMAT, identity):
             return None
         return Confirmation(document["by"], document["at"], document["compared"])
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, RecursionError, TypeError):
         return None
 
 

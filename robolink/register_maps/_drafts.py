@@ -48,6 +48,7 @@ _TYPES: Final = {
 }
 _UNITS: Final = frozenset({"mm", "um", "m", "inch", "deg", "rad"})
 _MOST_BYTES: Final = 1_000_000
+_DIGITS: Final = len(str(LAST_ADDRESS))
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,13 +131,16 @@ def _rows(path: Path) -> Iterator[tuple[int, dict[str, str]]]:
     lines = text.splitlines()
     header = lines[0] if lines else ""
     reader = csv.reader(lines, delimiter=";" if header.count(";") > header.count(",") else ",")
-    names = [name.strip().lower() for name in next(reader, [])]
-    if "name" not in names or not {"address", "register"} & set(names):
-        raise _unusable(path, tr("its first line must name the columns name and address"))
-    for cells in reader:
-        row = dict(zip(names, (cell.strip() for cell in cells), strict=False))
-        if row.get("name"):
-            yield reader.line_num, row
+    try:
+        names = [name.strip().lower() for name in next(reader, [])]
+        if "name" not in names or not {"address", "register"} & set(names):
+            raise _unusable(path, tr("its first line must name the columns name and address"))
+        for cells in reader:
+            row = dict(zip(names, (cell.strip() for cell in cells), strict=False))
+            if row.get("name"):
+                yield reader.line_num, row
+    except csv.Error as error:  # a cell of more than 131072 characters: a quote that is left open
+        raise _unusable(path, str(error)) from error
 
 
 def _are_references(addresses: Iterable[str]) -> bool:
@@ -155,7 +159,7 @@ def _place(row: Mapping[str, str], *, references: bool) -> str:
     register = _REGISTER.fullmatch(text)
     if register is not None and 1 <= int(register[2]) <= LAST_ADDRESS + 1:
         return f'table = "{_TABLES[register[1]]}", address = {int(register[2]) - 1}'
-    counted = not references and address.isascii() and address.isdigit()
+    counted = not references and address.isascii() and address.isdigit() and len(address) <= _DIGITS
     if counted and int(address) <= LAST_ADDRESS:
         return f"address = {int(address)}"
     raise _BadRowError(

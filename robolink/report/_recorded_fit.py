@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from robolink.calibration import CalibrationResult
+from robolink.calibration import CalibrationResult, UncertaintyBudget
 from robolink.model import Hand, Pose, ToolOffset, method_name_now, read_offset
 
 
@@ -34,6 +34,10 @@ def recorded_fit(details: Mapping[str, Any]) -> CalibrationResult:
         rejected=tuple(details.get("rejected", ())),
         condition_number=details.get("condition_number"),
         dof=details.get("dof"),
+        notes=tuple(details.get("notes", ())),
+        interval_from=details.get("interval_from", ""),
+        region95_radius_mm=details.get("region95_radius_mm"),
+        budget=UncertaintyBudget.from_json(budget) if (budget := details.get("budget")) else None,
     )
 
 

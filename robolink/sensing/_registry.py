@@ -36,8 +36,8 @@ def open_sensor(url: str | TipSensor) -> Iterator[TipSensor]:
     """Open a camera, and let go of it at the end of the block.
 
     Args:
-        url: For example ``assist+tcp://127.0.0.1:40001`` or the name of a plug-in. A camera that is
-            open already is used as it is, and left open for whoever opened it.
+        url: For example ``assist+tcp://TOKEN@127.0.0.1:40001`` or the name of a plug-in. A
+            camera that is open already is used as it is, and left open for whoever opened it.
 
     Raises:
         CalibrationError: ``sensor_not_found``: nothing of that name is installed.
@@ -55,8 +55,14 @@ def open_sensor(url: str | TipSensor) -> Iterator[TipSensor]:
 
 
 def sensor_name(sensor: str | TipSensor) -> str:
-    """Return what a camera is called in a sentence or a record: its name, or who it says it is."""
-    return sensor if isinstance(sensor, str) else sensor.identity
+    """Return what a camera is called in a sentence or a record: its name, or who it says it is.
+
+    Of a URL that part is left out that stands before ``@``: a user, a password or a token.
+    """
+    name = sensor if isinstance(sensor, str) else sensor.identity
+    scheme, separator, rest = name.partition("://")
+    place, slash, path = rest.partition("/")
+    return f"{scheme}{separator}{place.rpartition('@')[2]}{slash}{path}"
 
 
 def _opener(url: str) -> SensorOpener:
@@ -66,7 +72,11 @@ def _opener(url: str) -> SensorOpener:
     except PlugInError as error:
         raise CalibrationError(
             "sensor_not_found",
-            tr("The sensor {url!r} cannot be loaded: {cause}.", url=url, cause=error),
+            tr(
+                "The sensor {url!r} cannot be loaded: {cause}.",
+                url=sensor_name(url),
+                cause=error,
+            ),
             remedy=tr("Install the package that brings it again."),
         ) from error.origin
     if found is None:
@@ -75,7 +85,7 @@ def _opener(url: str) -> SensorOpener:
         known = sorted(metadata.entry_points(group=SENSORS_GROUP).names)
         raise CalibrationError(
             "sensor_not_found",
-            tr("No sensor is called {url!r}.", url=url),
+            tr("No sensor is called {url!r}.", url=sensor_name(url)),
             remedy=tr(
                 "Name it in the cell file under sensors, or install the package that brings it. "
                 "Known are: {known}.",

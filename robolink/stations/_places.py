@@ -11,7 +11,7 @@ from robolink.stations._station import Station
 from robolink.ways import Way, way
 
 if TYPE_CHECKING:
-    from robolink.calibration import Pin
+    from robolink.calibration import Beam, Pin
 
 
 def pin_of(station: Station) -> "Pin":
@@ -23,7 +23,25 @@ def pin_of(station: Station) -> "Pin":
     from robolink.calibration import Pin  # numpy, which a look does without
 
     x_mm, y_mm, z_mm = _place(station)
-    return Pin(x_mm, y_mm, z_mm, station.sigma_mm or 0.0)
+    sigma_mm = station.sigma_mm or 0.0
+    return Pin(
+        x_mm,
+        y_mm,
+        z_mm,
+        sigma_mm,
+        covariance_mm2=_three_axes(station.details.get("covariance_mm2"), sigma_mm),
+    )
+
+
+def _three_axes(rows: object, sigma_mm: float) -> tuple[tuple[float, ...], ...]:
+    """Return the covariance of a pin; of an axis that was not measured what is known of all."""
+    if not isinstance(rows, Sequence) or len(rows) not in (2, 3):
+        return ()
+    place = [[sigma_mm**2 if i == j else 0.0 for j in range(3)] for i in range(3)]
+    for i, row in enumerate(rows):
+        for j, value in enumerate(row):
+            place[i][j] = float(value)
+    return tuple(map(tuple, place))
 
 
 def touch_station(station: Station) -> TouchStation:
@@ -45,22 +63,34 @@ def beam_station(station: Station) -> BeamStation:
     Raises:
         ConfigError: Nobody knows.
     """
-    from robolink.calibration import Beam  # numpy, which a look does without
-
     lines = station.details.get("beams")
     if not isinstance(lines, Sequence) or len(lines) != 2:
         raise _unknown(station, tr("its two beams"))
     if station.z_mm is None:
         raise _unknown(station, tr("its height"))
     first, second = (cast(Mapping[str, float], line) for line in lines)
+    spread = station.sigma_mm or 0.0
     return BeamStation(
-        (
-            Beam(first["x_mm"], first["y_mm"], first["direction_deg"]),
-            Beam(second["x_mm"], second["y_mm"], second["direction_deg"]),
-        ),
+        (_beam(first, spread), _beam(second, spread)),
         station.z_mm,
         (int(first["input"]), int(second["input"])),
         off_when_broken=bool(station.details.get("off_when_broken", False)),
+    )
+
+
+def _beam(line: Mapping[str, float], sigma_mm: float) -> "Beam":
+    """Return a beam as it is on record; one of before says nothing of how sure it is."""
+    from robolink.calibration import Beam  # numpy, which a look does without
+
+    dof = line.get("dof")
+    return Beam(
+        line["x_mm"],
+        line["y_mm"],
+        line["direction_deg"],
+        sigma_mm=line.get("sigma_mm", sigma_mm),
+        direction_sigma_deg=line.get("direction_sigma_deg", 0.0),
+        correlation=line.get("correlation", 0.0),
+        dof=None if dof is None else int(dof),
     )
 
 
@@ -74,7 +104,15 @@ def camera_station(station: Station) -> CameraStation:
     model = None
     if isinstance(rows, Sequence) and isinstance(origin, Sequence):
         ((a, b), (c, d)), (x_mm, y_mm) = rows, origin
-        model = CameraModel(((a, b), (c, d)), (x_mm, y_mm))
+        centre, scale = station.details.get("centre_mm"), station.details.get("scale_sigma")
+        place = station.details.get("place_sigma_mm", station.sigma_mm)
+        model = CameraModel(
+            ((a, b), (c, d)),
+            (x_mm, y_mm),
+            centre_mm=(centre[0], centre[1]) if isinstance(centre, Sequence) else None,
+            place_sigma_mm=float(place) if isinstance(place, (int, float)) else 0.0,
+            scale_sigma=float(scale) if isinstance(scale, (int, float)) else 0.0,
+        )
     return CameraStation(*_place(station), model)
 
 

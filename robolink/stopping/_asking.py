@@ -155,7 +155,7 @@ def _read(card: Path, keys: Set[str]) -> ControllerHolder | None:
         where = place if isinstance(place, str) else (str(place[0]), int(place[1]))
         controller = str(said.get("controller", ""))
         return ControllerHolder(where, str(said["token"]), pid, str(said["who"]), controller, card)
-    except (OSError, ValueError, TypeError, KeyError, IndexError):
+    except (OSError, ValueError, TypeError, KeyError, IndexError, RecursionError):
         return None
 
 
@@ -180,6 +180,6 @@ def _age(card: Path) -> float:
 def _answer(line: bytes) -> dict[str, object]:
     try:
         told = json.loads(line)
-    except ValueError:
+    except (ValueError, RecursionError):
         return {}
     return told if isinstance(told, dict) else {}

@@ -15,6 +15,7 @@ import os
 import select
 import socket
 import threading
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -138,7 +139,9 @@ class StopListener(ClosedAtExit):
         asked = _read_line(caller)
         from hmac import compare_digest  # here, because nobody knocks on most commands
 
-        if not compare_digest(str(asked.get("token", "")), self._token):
+        # As bytes: it refuses to compare text that is not ASCII, with an error that would end us.
+        shown = str(asked.get("token", "")).encode("utf-8", "surrogatepass")
+        if not compare_digest(shown, self._token.encode()):
             return
         _tell(caller, {"taken": True})
         if self._heard:
@@ -176,14 +179,17 @@ def _listening(path: Path) -> tuple[socket.socket, str]:
 
 def _read_line(caller: socket.socket) -> dict[str, object]:
     data = b""
+    # One deadline for the whole line: whoever drips bytes must not keep the next one waiting.
+    until = time.monotonic() + _HEARD_S
     while not data.endswith(b"\n") and len(data) < MOST_BYTES:
+        caller.settimeout(max(until - time.monotonic(), 0.001))
         piece = caller.recv(MOST_BYTES - len(data))
         if not piece:
             break
         data += piece
     try:
         asked = json.loads(data)
-    except ValueError:
+    except (ValueError, RecursionError):
         return {}
     return asked if isinstance(asked, dict) else {}
 

@@ -162,5 +162,5 @@ def _note(data: bytes) -> StopNote:
             str(kept.get("controller", "")),
             tuple(map(str, kept.get("keys", ()))),
         )
-    except (ValueError, TypeError, KeyError, AttributeError):
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
         return StopNote("", "", "", confirmed=False)

@@ -8,6 +8,8 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 
 _TRUTH: Final = {"1": True, "true": True, "yes": True, "0": False, "false": False, "no": False}
+_MOST: Final = 1e12
+"""More than any length, time, share or device number; less than what overflows in a product."""
 
 
 def require_known(given: Iterable[str], known: Sequence[str], *, kind: str) -> None:
@@ -65,7 +67,7 @@ def _value(name: str, text: str, hint: Any) -> object:  # noqa: ANN401 - a type 
         value = hint(text)
     except ValueError:
         value = -1
-    if not 0 <= value < float("inf"):
+    if not 0 <= value <= _MOST:
         raise _refused(name, text, tr("a number from 0 up"))
     return value
 

@@ -34,7 +34,7 @@ class ServedEpson:
     Attributes:
         url: Where to connect to: ``epson+sim://NAME``, or ``epson+tcp://127.0.0.1:PORT``.
         simulator: The device; hold its ``lock`` while touching it.
-        assist: ``assist+tcp://127.0.0.1:PORT``; ``None`` without a port.
+        assist: ``assist+tcp://TOKEN@127.0.0.1:PORT``; ``None`` without a port.
     """
 
     url: str

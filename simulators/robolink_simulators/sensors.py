@@ -1,7 +1,8 @@
 """The cameras of simulated cells, as plug-ins of the group ``robolink.sensors``.
 
 ``epson+sim://NAME`` and ``softmotion+sim://NAME`` look into a simulator of this process,
-``assist+tcp://127.0.0.1:PORT`` into a served one, through its assist port. All answer in pixels.
+``assist+tcp://TOKEN@127.0.0.1:PORT`` into a served one, through its assist port. All answer in
+pixels.
 """
 
 from collections.abc import Callable, Sequence
@@ -101,4 +102,5 @@ def open_served(url: str) -> SimulatedCamera:
 
 def _identity(url: str) -> str:
     parts = urlsplit(url)
-    return f"{parts.scheme}://{parts.netloc}"
+    # Not what lets one in at the assist port: this goes into sentences and records.
+    return f"{parts.scheme}://{parts.netloc.rpartition('@')[2]}"

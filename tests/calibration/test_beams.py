@@ -149,4 +149,4 @@ def test_the_interval_holds_the_truth(angles, stated):
         seen = travels(TIP, angles=angles, repeats=2, rng=rng, sigma_mm=0.02)
         return solve_crossed_beams(seen, TRUE, sigma_mm=stated, beams_may_have_moved=moved)
 
-    assert_honest(coverage(measure, TIP))
+    assert_honest(coverage(measure, TIP), stated=stated is not None)

@@ -160,4 +160,4 @@ def test_the_intervals_of_a_fit_hold_the_truth(count, stated):
         sights = fiducials(count, rng.normal(0, 0.02, (4, 2)))
         return solve_board_fit(sights, DRAWING[:count], sigma_mm=stated)
 
-    assert_honest(coverage(measure, BOARD))
+    assert_honest(coverage(measure, BOARD), stated=stated is not None)

@@ -20,6 +20,7 @@ def test_rows_add_as_squares_and_degrees_of_freedom_after_welch_and_satterthwait
     assert budget.k == pytest.approx(stats.t.ppf(0.975, 11), rel=1e-9)
     assert (budget.type_a_mm, budget.type_b_mm) == pytest.approx((0.01, 0.02))
     document = budget.as_json()
+    assert UncertaintyBudget.from_json(document) == budget
     assert document["not_assessed"] == ["linearity"]
     rows = document["rows"]
     assert isinstance(rows, list)

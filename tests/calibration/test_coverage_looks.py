@@ -36,7 +36,10 @@ def shaken(sightings, random):
 def test_a_tip(angles_deg, stated):
     exact, sigma = [seen(TIP, u_deg) for u_deg in angles_deg], SIGMA_MM if stated else None
     assert_honest(
-        coverage(lambda r: solve_camera_round(shaken(exact, r), sigma_mm=sigma), TIP, trials=TRIALS)
+        coverage(
+            lambda r: solve_camera_round(shaken(exact, r), sigma_mm=sigma), TIP, trials=TRIALS
+        ),
+        stated=stated,
     )
 
 
@@ -53,7 +56,8 @@ def test_a_board_at_two_angles_that_do_not_balance(stated):
             lambda r: solve_board_round(shaken(exact, r), DRAWING * 2, sigma_mm=sigma),
             truth,
             trials=TRIALS,
-        )
+        ),
+        stated=stated,
     )
 
 

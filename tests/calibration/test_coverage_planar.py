@@ -20,7 +20,8 @@ def poses(count, arc_deg=360.0):
 def test_n_angle(count, arc_deg, stated):
     exact, sigma = poses(count, arc_deg), SIGMA_MM if stated else None
     assert_honest(
-        coverage(lambda r: solve_n_angle(shaken(exact, r, SIGMA_MM), sigma_mm=sigma), TIP)
+        coverage(lambda r: solve_n_angle(shaken(exact, r, SIGMA_MM), sigma_mm=sigma), TIP),
+        stated=stated,
     )
 
 
@@ -38,4 +39,4 @@ def test_a_robust_fit_is_less_honest_refuses_nothing_good_and_that_is_known(coun
     exact = poses(count)
     shares = coverage(lambda r: solve_n_angle(shaken(exact, r, SIGMA_MM), robust=Robust()), TIP)
     sys.stdout.write(f"robust n_angle, {count} poses, no outlier: {shares}\n")
-    assert all(0.90 <= share <= MOST for share in shares)
+    assert all(0.92 <= share <= MOST for share in shares)

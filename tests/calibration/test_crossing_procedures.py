@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from robolink.calibration import Beam, toward_zero
+from robolink.calibration import Beam, rotation_of, toward_zero
 from robolink.errors import CalibrationError
 from robolink.methods import (
     BeamsParameters,
@@ -14,6 +14,7 @@ from robolink.methods import (
     measure_z_touch,
     verify_by_crossing,
 )
+from robolink.methods.z_touch.procedure import verify_by_touching
 from robolink.model import Path, Pose, ToolOffset, rotate_xy
 from robolink.runner import Confirm, Move, Notify, Seek
 from robolink.stations import BeamStation, TouchStation
@@ -84,7 +85,8 @@ class IdealCell:
         if step.edge.number == PLATE.input:
             self._slip_mm = SLIP_MM if len(self.seeks) in self._slips else 0.0
             off_mm = self._slip_mm + self._random.gauss(0, self._noise_mm)
-            return replace(step.target, z_mm=PLATE.z_mm - self.tip.z_mm + off_mm)
+            _, _, below_mm = rotation_of(self.frame) @ self.tip.components()[:3]
+            return replace(step.target, z_mm=PLATE.z_mm - below_mm + off_mm)
         crossing = (len(self.seeks) + 1) // 2
         self._slip_mm = SLIP_MM if crossing in self._slips else 0.0
         beam = STATION.beams[STATION.inputs.index(step.edge.number)]
@@ -99,7 +101,11 @@ class IdealCell:
 
     def _across(self, beam, frame):
         nx, ny = beam.normal
-        dx, dy = rotate_xy(self.tip.x_mm, self.tip.y_mm, frame.u_deg)
+        turned = rotation_of(frame)
+        dx, dy, dz = turned @ self.tip.components()[:3]
+        # The beam sees the shaft, which runs along the axis of the frame, where it is that high.
+        up_mm = (STATION.z_mm - frame.z_mm - dz) / turned[2, 2]
+        dx, dy = dx + up_mm * turned[0, 2], dy + up_mm * turned[1, 2]
         return nx * (frame.x_mm + dx) + ny * (frame.y_mm + dy) - beam.distance_mm
 
 
@@ -115,6 +121,61 @@ def test_an_ideal_tip_is_found_exactly_and_the_rest_is_kept(turn_deg):
     found = cell.run(procedure).offset
     assert (found.x_mm, found.y_mm) == pytest.approx((TIP.x_mm, TIP.y_mm), abs=1e-9)
     assert (found.z_mm, found.u_deg) == (STORED.z_mm, STORED.u_deg)
+
+
+HANGING = [(0.0, 180.0), (180.0, 0.0), (5.0, -4.0), (3.0, 176.0)]
+"""V and W of a flange that hangs otherwise than upright."""
+TRUE_Z = replace(STORED, z_mm=TIP.z_mm)
+TRUE_XY = replace(TIP, z_mm=STORED.z_mm)
+
+
+@pytest.mark.parametrize(("v_deg", "w_deg"), HANGING)
+def test_a_flange_that_hangs_otherwise_is_led_and_solved_as_it_hangs(v_deg, w_deg):
+    here = replace(HERE, v_deg=v_deg, w_deg=w_deg)
+    for turn_deg in (0.0, 180.0):
+        plan = BeamsParameters(turn_deg=turn_deg)
+        cell = IdealCell(TIP, here=here)
+        found = cell.run(measure_beams(STATION, plan, here=here, stored=TRUE_Z)).offset
+        # A tip that is 0.2 mm beside where it is stored dips otherwise: 0.2 sin(7) tan(7) at most.
+        assert (found.x_mm, found.y_mm) == pytest.approx((TIP.x_mm, TIP.y_mm), abs=0.006)
+    touching = measure_z_touch(PLATE, ZTouchParameters(), here=here, stored=TRUE_XY)
+    assert IdealCell(TIP, here=here).run(touching).offset.z_mm == pytest.approx(TIP.z_mm)
+
+
+def proofs(here, true, told):
+    """Return the drift of a proof by beams and of one by touching, mm."""
+    crossing = verify_by_crossing(
+        STATION, BeamsParameters(), here=here, angles_deg=(100.0,), tolerance_mm=0.1, aside=told
+    )
+    touching = verify_by_touching(
+        PLATE, ZTouchParameters(), here=here, angles_deg=(100.0,), tolerance_mm=0.1, aside=told
+    )
+    crossed, touched = (IdealCell(true, here=here).run(way) for way in (crossing, touching))
+    return crossed.max_drift_mm, touched.max_drift_mm
+
+
+@pytest.mark.parametrize(("v_deg", "w_deg"), [*HANGING, (30.0, 20.0)])
+def test_the_proof_of_a_frame_that_hangs_otherwise_shows_an_error_and_nothing_else(v_deg, w_deg):
+    here, true = replace(HERE, v_deg=v_deg, w_deg=w_deg, tool=1), ToolOffset(2.0, -1.0, 0.5)
+    assert proofs(here, true, true) == pytest.approx((0, 0), abs=1e-9)
+    rise = abs(rotation_of(here)[2, 2])
+    aside, _ = proofs(here, true, replace(true, y_mm=-0.7))
+    _, longer = proofs(here, true, replace(true, z_mm=0.8))
+    assert 0.2 < aside < 0.4
+    assert longer == pytest.approx(0.3 * rise, abs=1e-9)
+
+
+@pytest.mark.parametrize("stored", [STORED, None])
+def test_a_flange_that_leans_too_much_is_refused_before_anything_moves(stored):
+    here = replace(HERE, w_deg=-12.0 if stored else 1.0)
+    for procedure in (
+        measure_beams(STATION, BeamsParameters(), here=here, stored=stored),
+        measure_z_touch(PLATE, ZTouchParameters(), here=here, stored=stored),
+    ):
+        cell = IdealCell(TIP, here=here)
+        with refused("tilted_pose"):
+            cell.run(procedure)
+        assert cell.steps == []
 
 
 def test_nothing_turns_and_no_joint_moves_while_the_tip_is_among_the_beams():
@@ -213,12 +274,13 @@ def test_who_declines_keeps_the_crossings_with_their_doubt():
 
 
 @pytest.mark.parametrize(
-    ("sigma_mm", "turn_deg", "least"), [(None, 0.0, 8), (0.003, 0.0, 5), (None, 180.0, 43)]
+    ("sigma_mm", "turn_deg", "until_mm", "least"),
+    [(None, 0.0, 0.03, 8), (0.003, 0.0, 0.3, 5), (None, 180.0, 0.03, 43)],
 )
-def test_crossings_end_when_the_interval_is_narrow_enough(sigma_mm, turn_deg, least):
+def test_crossings_end_when_the_interval_is_narrow_enough(sigma_mm, turn_deg, until_mm, least):
     """With two angles not before the tool has turned; the shaft is measured in any case."""
     cell = IdealCell(TIP, noise_mm=0.003)
-    plan = BeamsParameters(repeats=10, turn_deg=turn_deg, until_mm=0.03)
+    plan = BeamsParameters(repeats=10, turn_deg=turn_deg, until_mm=until_mm)
     found = cell.run(
         measure_beams(
             STATION,
@@ -309,10 +371,10 @@ def test_each_touch_tells_how_it_fits_and_the_worst_alone_is_made_again():
     assert found.offset.z_mm == pytest.approx(TIP.z_mm)
 
 
-@pytest.mark.parametrize(("sigma_mm", "least"), [(None, 6), (0.003, 3)])
-def test_touches_end_when_the_interval_is_narrow_enough(sigma_mm, least):
+@pytest.mark.parametrize(("sigma_mm", "until_mm", "least"), [(None, 0.1, 6), (0.003, 2.0, 3)])
+def test_touches_end_when_the_interval_is_narrow_enough(sigma_mm, until_mm, least):
     cell = IdealCell(TIP, noise_mm=0.003)
-    plan = ZTouchParameters(speeds_mm_s=(2.0, 1.0) * 6, until_mm=0.1)
+    plan = ZTouchParameters(speeds_mm_s=(2.0, 1.0) * 6, until_mm=until_mm)
     procedure = measure_z_touch(PLATE, plan, here=HERE, stored=STORED, sigma_mm=sigma_mm)
     found = cell.run(procedure)
     assert found.dof == least - 2

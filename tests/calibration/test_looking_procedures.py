@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from robolink.calibration import BoardDrawing, CameraModel
+from robolink.calibration import BoardDrawing, CameraModel, rotation_of
 from robolink.errors import CalibrationError
 from robolink.methods import (
     CameraAffineParameters,
@@ -14,7 +14,7 @@ from robolink.methods import (
     measure_camera_affine,
     verify_board,
 )
-from robolink.model import Pose, Spot, SpotUnit, ToolOffset, rotate_xy
+from robolink.model import Pose, Spot, SpotUnit, ToolOffset
 from robolink.procedures import LookPlan, verify_by_looking
 from robolink.runner import Confirm, Look, Move, Notify, SeenAt
 from robolink.stations import CameraStation
@@ -44,7 +44,7 @@ class IdealCell:
     def __init__(self, marks, *, here=HERE, off_mm=OFF_MM, blind=None, unit=SpotUnit.PIXEL):
         self.marks, self.frame, self.off_mm = marks, here, off_mm
         self.blind, self.unit, self.steps = blind, unit, []
-        self.told, self.offers, self.wrong = [], [], {}
+        self.told, self.offers, self.wrong, self.focus = [], [], {}, True
 
     def run(self, procedure):
         try:
@@ -83,7 +83,9 @@ class IdealCell:
         return SeenAt.of(self.frame, spot, self.unit)
 
     def _spot(self, mark):
-        dx, dy = rotate_xy(mark.x_mm, mark.y_mm, self.frame.u_deg)
+        dx, dy, dz = rotation_of(self.frame) @ mark.components()[:3]
+        high_mm = self.frame.z_mm + dz - STATION.z_mm
+        assert not self.focus or abs(high_mm) < 0.1, "out of focus"
         x, y = self.frame.x_mm + dx + self.off_mm[0], self.frame.y_mm + dy + self.off_mm[1]
         if self.unit is SpotUnit.BASE_MM:
             return Spot(x, y)
@@ -114,6 +116,53 @@ def test_a_tip_and_what_the_camera_is_off_by_are_told_apart(unit):
     assert "camera_moved" in result.warnings
     assert result.dof == 4
     assert isinstance(result.inputs[0], SeenAt)
+
+
+HANGING = [(0.0, 180.0), (180.0, 0.0), (5.0, -4.0), (3.0, 176.0)]
+"""V and W of a flange that hangs otherwise than upright."""
+
+
+@pytest.mark.parametrize(("v_deg", "w_deg"), HANGING)
+def test_a_flange_that_hangs_otherwise_is_led_and_solved_as_it_hangs(v_deg, w_deg):
+    here = replace(HERE, v_deg=v_deg, w_deg=w_deg)
+    found = tip_cell(here=here).run(measure_camera(STATION, LookPlan(), here=here, stored=STORED))
+    assert miss(found.offset, TIP) < 1e-9
+    assert found.camera_error_mm == pytest.approx(OFF_MM)
+    plan = CameraAffineParameters()
+    unknown = CameraStation(STATION.x_mm, STATION.y_mm, STATION.z_mm)
+    pixels = measure_camera_affine(unknown, plan, here=here, stored=STORED)
+    assert miss(tip_cell(here=here).run(pixels).offset, TIP) < 1e-6
+    drive = measure_board(STATION, LookPlan(turns_deg=(0.0, 120.0)), BOARD, here=here, stored=HELD)
+    held = IdealCell(fiducials(HELD), here=here).run(drive).offset
+    assert (miss(held, HELD), held.u_deg) == pytest.approx((0, HELD.u_deg), abs=1e-6)
+
+
+@pytest.mark.parametrize(("v_deg", "w_deg"), HANGING)
+def test_the_proof_of_a_frame_that_hangs_otherwise_shows_an_error_and_nothing_else(v_deg, w_deg):
+    here, aside = replace(HERE, v_deg=v_deg, w_deg=w_deg, tool=1), ToolOffset(2.0, -1.0, 0.5)
+    for at, drift_mm in ((aside, 0.0), (replace(aside, x_mm=2.3), 0.3)):
+        cell = IdealCell({0: aside}, here=here, off_mm=(0.0, 0.0))
+        cell.focus = False
+        result = cell.run(
+            verify_by_looking(
+                STATION, LookPlan(), here=here, angles_deg=(0, 90), tolerance_mm=0.1, aside=at
+            )
+        )
+        assert result.max_drift_mm == pytest.approx(drift_mm, abs=2e-3)
+
+
+@pytest.mark.parametrize("stored", [STORED, None])
+def test_a_flange_that_leans_too_much_is_refused_before_anything_moves(stored):
+    here = replace(HERE, v_deg=12.0 if stored else 1.0)
+    for procedure in (
+        measure_camera(STATION, LookPlan(), here=here, stored=stored),
+        measure_camera_affine(STATION, CameraAffineParameters(), here=here, stored=stored),
+        measure_board(STATION, LookPlan(), BOARD, here=here, stored=stored),
+    ):
+        cell = tip_cell(here=here)
+        with refused("tilted_pose"):
+            cell.run(procedure)
+        assert cell.steps == []
 
 
 def test_a_single_look_believes_the_camera_and_says_so():

@@ -92,8 +92,8 @@ def test_it_ends_when_the_interval_is_narrow_enough_but_not_on_a_lucky_three():
 
 def test_with_a_stated_sigma_three_touches_may_do():
     person = Person()
-    assert len(course(person, until_mm=0.02, sigma_mm=0.01).inputs) == 3
-    assert len(course(Person(), until_mm=0.01, sigma_mm=0.01).inputs) == 4
+    assert len(course(person, until_mm=0.2, sigma_mm=0.01).inputs) == 3
+    assert len(course(Person(), until_mm=0.02, sigma_mm=0.01).inputs) == 4
 
 
 def test_an_interval_that_is_never_reached_takes_all_touches():

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
+from scipy.stats import f as fisher
 from scipy.stats import t as student
 
 from robolink.calibration import Robust, Tolerance, solve_n_angle, solve_two_pose
@@ -76,14 +77,17 @@ def test_balanced_angles_gain_the_square_root_of_their_number(count):
     assert result.condition_number == pytest.approx(1.0)
 
 
-def test_the_interval_is_student_s_and_shrinks_when_sigma_is_stated():
+def test_the_interval_is_student_s_and_a_stated_sigma_only_widens_it():
     poses = noisy()
     free = solve_n_angle(poses)
     assert free.sigma_mm
     spread = free.sigma_mm * free.sigma_gain
     assert free.half_width95 == pytest.approx([student.ppf(0.975, 4) * spread] * 2)
-    stated = solve_n_angle(poses, sigma_mm=0.05)
-    assert stated.half_width95 == pytest.approx([1.95996 * 0.05 * 0.5] * 2, rel=1e-5)
+    assert solve_n_angle(poses, sigma_mm=0.05).half_width95 == free.half_width95
+    assert free.region95_radius_mm == pytest.approx(math.sqrt(2 * fisher.ppf(0.95, 2, 4)) * spread)
+    stated = solve_n_angle(poses, sigma_mm=0.5)
+    assert stated.half_width95 == pytest.approx([1.95996 * 0.5 * 0.5] * 2, rel=1e-5)
+    assert (stated.interval_from, free.interval_from) == ("stated", "residuals")
     assert (stated.sigma_stated, free.sigma_stated) == (True, False)
     low, high = stated.interval95["x_mm"]
     assert (high - low) / 2 == pytest.approx(stated.half_width95[0])
@@ -126,12 +130,12 @@ def test_a_stated_sigma_sets_the_threshold():
 
 def test_the_same_seed_gives_the_same_result_on_many_poses():
     poses = noisy([3.0 * k for k in range(100)])
-    first = solve_n_angle(poses, robust=Robust(seed=4))
-    assert solve_n_angle(poses, robust=Robust(seed=4)) == first
+    first = solve_n_angle(poses, robust=Robust(seeds=(4,)))
+    assert solve_n_angle(poses, robust=Robust(seeds=(4,))) == first
 
 
 def test_exact_poses_are_not_rejected_by_each_other():
-    assert solve_n_angle(around((0, 60, 120, 180, 240)), robust=Robust()).rejected == ()
+    assert solve_n_angle(around((0, 60, 120, 180, 240, 300)), robust=Robust()).rejected == ()
 
 
 def test_more_than_a_third_of_outliers_is_refused():
@@ -143,8 +147,8 @@ def test_more_than_a_third_of_outliers_is_refused():
 
 
 def test_two_poses_cannot_outvote_a_third():
-    with refused("too_few_poses"):
-        solve_n_angle(around((0, 120, 240)), robust=Robust())
+    with refused("robust_too_few"):
+        solve_n_angle(around((0, 72, 144, 216, 288)), robust=Robust())
 
 
 def test_what_was_not_measured_is_kept():
@@ -155,8 +159,8 @@ def test_what_was_not_measured_is_kept():
 
 def test_a_sigma_that_the_residuals_contradict_is_doubted():
     poses = noisy([30.0 * k for k in range(12)])
-    assert "sigma_too_small" in solve_n_angle(poses, sigma_mm=0.005).warnings
-    assert "sigma_too_small" not in solve_n_angle(poses, sigma_mm=0.05).warnings
+    assert "sigma_contradicted" in solve_n_angle(poses, sigma_mm=0.005).warnings
+    assert "sigma_contradicted" not in solve_n_angle(poses, sigma_mm=0.05).warnings
 
 
 @pytest.mark.parametrize("sigma", [0.0, -1.0, math.nan])

@@ -173,8 +173,8 @@ def test_more_than_a_third_of_outliers_is_refused():
         poses[index] = replace(poses[index], x_mm=poses[index].x_mm + 10 * (index + 1))
     with refused("too_many_outliers"):
         solve_pivot(poses, robust=Robust(threshold_mm=0.2))
-    with refused("too_few_poses"):
-        solve_pivot(poses_on(4), robust=Robust())
+    with refused("robust_too_few"):
+        solve_pivot(poses_on(6), robust=Robust())
 
 
 @pytest.mark.parametrize("stated", [None, 0.1])
@@ -182,7 +182,8 @@ def test_more_than_a_third_of_outliers_is_refused():
 def test_the_interval_holds_the_truth(count, stated):
     exact = poses_on(count)
     assert_honest(
-        coverage(lambda rng: solve_pivot(shaken(exact, rng, 0.1, axes=3), sigma_mm=stated), TIP)
+        coverage(lambda rng: solve_pivot(shaken(exact, rng, 0.1, axes=3), sigma_mm=stated), TIP),
+        stated=stated is not None,
     )
 
 

@@ -1,8 +1,10 @@
 """A tool's length, with the trigger's latency taken out."""
 
+import numpy as np
 import pytest
 
 from robolink.calibration import Touch, solve_z_touch
+from robolink.errors import CalibrationError
 from robolink.model import ToolOffset
 from tests.calibration._simulated import assert_honest, coverage, refused
 
@@ -10,11 +12,12 @@ SURFACE, LENGTH, LATENCY = -50.0, -23.4, 0.004
 SPEEDS = (2.0, 2.0, 8.0, 8.0)
 
 
-def touches(speeds=SPEEDS, rng=None, sigma_mm=0.0):
+def touches(speeds=SPEEDS, rng=None, sigma_mm=0.0, *, latency_s=LATENCY, overshoot=0.0):
     """The flange is lower than where the tip touched when the trigger is read."""
     noise = rng.normal(0, sigma_mm, len(speeds)) if rng else [0.0] * len(speeds)
     return [
-        Touch(SURFACE - LENGTH - v * LATENCY + e, v) for v, e in zip(speeds, noise, strict=True)
+        Touch(SURFACE - LENGTH - v * latency_s - v * v * overshoot + e, v)
+        for v, e in zip(speeds, noise, strict=True)
     ]
 
 
@@ -52,5 +55,89 @@ def test_the_interval_holds_the_truth(speeds, stated):
         coverage(
             lambda rng: solve_z_touch(touches(speeds, rng, 0.01), SURFACE, sigma_mm=stated),
             (LENGTH,),
-        )
+        ),
+        stated=stated is not None,
     )
+
+
+THREE = (2.0, 10.0, 20.0) * 3
+
+
+@pytest.mark.parametrize("latency_s", [4.0, 0.3, -0.05])
+def test_a_latency_that_no_trigger_has_is_refused(latency_s):
+    with refused("implausible_latency"):
+        solve_z_touch(touches(latency_s=latency_s), SURFACE)
+    with refused("implausible_latency"):
+        solve_z_touch(touches(), SURFACE, latency_s=latency_s)
+
+
+@pytest.mark.parametrize("latency_s", [0.0, 0.001, 0.195])
+def test_a_latency_that_a_slow_network_has_is_none(latency_s):
+    rng = np.random.default_rng(3)
+    result = solve_z_touch(touches(rng=rng, sigma_mm=0.01, latency_s=latency_s), SURFACE)
+    assert result.offset.z_mm == pytest.approx(LENGTH, abs=0.05)
+
+
+def test_scatter_alone_makes_no_latency_implausible():
+    # Around zero the estimate is often below -0.002 s; within three sigma that says nothing.
+    rng = np.random.default_rng(5)
+    for _ in range(150):
+        solve_z_touch(touches((1.0, 2.0) * 4, rng, 0.01, latency_s=0.0), SURFACE, sigma_mm=0.01)
+
+
+def test_three_speeds_take_the_braking_out():
+    rng = np.random.default_rng(1)
+    result = solve_z_touch(touches(THREE, rng, 0.002, overshoot=0.001), SURFACE)
+    assert "overshoot" in result.warnings
+    assert result.overshoot_s2_per_mm == pytest.approx(0.001, rel=0.1)
+    assert result.offset.z_mm == pytest.approx(LENGTH, abs=0.01)
+    assert result.f_limit == pytest.approx(13.745, rel=1e-3)
+    assert result.f_quadratic is not None
+    assert result.f_quadratic > 100
+    assert (result.rank, result.dof) == (3, 6)
+    # A line through the same touches is off by more than ten times that.
+    only = [touch for touch in touches(THREE, overshoot=0.001) if touch.speed_mm_s > 2]
+    assert abs(solve_z_touch(only, SURFACE).offset.z_mm - LENGTH) > 0.1
+
+
+def test_an_overshoot_is_seen_with_a_latency_that_is_known_too():
+    result = solve_z_touch(touches(THREE, overshoot=0.001), SURFACE, latency_s=LATENCY)
+    assert result.overshoot_s2_per_mm == pytest.approx(0.001)
+    assert result.offset.z_mm == pytest.approx(LENGTH)
+
+
+@pytest.mark.parametrize("overshoot", [0.01, -0.001])
+def test_braking_that_no_robot_has_is_refused(overshoot):
+    with refused("implausible_latency"):
+        solve_z_touch(touches(THREE, overshoot=overshoot), SURFACE)
+
+
+def test_an_overshoot_is_claimed_as_rarely_as_is_stated():
+    # One in a hundred; half of these come out negative and are refused as beyond belief.
+    rng, claimed, refusals = np.random.default_rng(2), 0, 0
+    for _ in range(400):
+        try:
+            found = solve_z_touch(touches(THREE, rng, 0.01, latency_s=0.02), SURFACE)
+            claimed += "overshoot" in found.warnings
+        except CalibrationError:
+            refusals += 1
+    assert 1 <= claimed + refusals <= 12
+
+
+def test_touches_on_a_line_to_the_last_digit_show_no_overshoot():
+    result = solve_z_touch(touches(THREE), SURFACE)
+    assert (result.warnings, result.overshoot_s2_per_mm) == ((), None)
+
+
+def budget_rows(speeds):
+    budget = solve_z_touch(touches(speeds), SURFACE, sigma_mm=0.001).budget
+    assert budget is not None
+    return budget.rows
+
+
+def test_what_two_speeds_cannot_see_is_a_row_of_the_budget():
+    rows = {row.name: row for row in budget_rows((2.0, 20.0) * 2)}
+    assert rows["braking"].u_mm == pytest.approx(2 * 20 / 1000 / 3**0.5)
+    assert rows["scatter"].kind == "A"
+    assert budget_rows((1.0, 2.0) * 2)[-1].u_mm < 0.0012
+    assert [row.name for row in budget_rows(THREE)] == ["scatter"]

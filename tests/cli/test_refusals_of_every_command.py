@@ -121,6 +121,7 @@ BAD = {
     "sim plc": (["--map", "missing.toml"], "missing.toml"),
     "sim assist": (["http://127.0.0.1:1", "look"], ""),
     "solve": (["missing.json"], "missing.json"),
+    "poses show": (["missing.csv"], "missing.csv"),
     "doctor": (["--fix"], "No such option"),
     "ports": (["COM1"], "unexpected extra argument"),
     "scan": (["localhost"], "no range of addresses"),

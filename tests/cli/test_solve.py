@@ -9,10 +9,12 @@ from typing import Any
 import pytest
 from robolink_cli import main
 from robolink_cli.commands.measure.solve.solving import METHODS
+from robolink_cli.commands.measure.solve.station_methods import STATION_METHODS
 from robolink_cli.commands.measure.solve.touch_methods import TOUCH_METHODS
 
 from robolink.calibration import Beam
 from robolink.model import rotate_xy
+from tests.calibration._simulated import pivoting
 
 UNITS = {"length": "mm", "angle": "deg"}
 PIN = (310.0, 95.0)
@@ -62,10 +64,10 @@ def case(method="two_pose", **given):
 def solved(tmp_path, capsys):
     """Run ``solve --json`` on a document; return exit code and JSON."""
 
-    def run(document, *, text=None):
+    def run(document, *more, text=None):
         path = tmp_path / "case.json"
         path.write_text(text if text is not None else json.dumps(document))
-        code = main.run(["solve", str(path), "--json"])
+        code = main.run(["solve", str(path), *more, "--json"])
         return code, json.loads(capsys.readouterr().out)
 
     return run
@@ -203,7 +205,6 @@ SLIPS = {
     "input": {"method": "two_pose", "input": []},
     "extra": {**case(), "extra": 1},
     "schema": {**case(), "schema": "something/9"},
-    "vectors[0].method": {"vectors": [{"method": "x", "input": {}}]},
     "input.euler": case("pivot", poses=PIVOT, euler="XYZ"),
     "input.fiducials": case("board_two_fiducials", fiducials=tips((310, 50))),
 }
@@ -227,6 +228,27 @@ def test_a_missing_file_is_a_usage_error(capsys, tmp_path):
     assert "none.json" in capsys.readouterr().err
 
 
+def test_a_case_that_is_no_case_is_refused_alone(solved):
+    good = case("n_angle", poses=ROUND)
+    bad = [{"id": "odd", "method": "x", "input": {}}, 7, {**good, "input": {"poses": [7]}}]
+    code, answer = solved({"vectors": [good, *bad, good]})
+    assert code == 7
+    assert [result["status"] for result in answer["results"]] == ["ok", *["error"] * 3, "ok"]
+    assert {tuple(result["codes"]) for result in answer["results"][1:4]} == {("invalid_input",)}
+    assert answer["results"][1]["id"] == "odd"
+    assert "vectors[3].input.poses[0]" not in answer["results"][1]["what"]
+    assert "input.poses[0]" in answer["results"][3]["what"]
+
+
+def test_residuals_beyond_tolerance_end_with_7_unless_they_are_accepted(solved):
+    poses = [{**ROUND[0], "x": ROUND[0]["x"] + 0.6}, *ROUND[1:]]
+    code, answer = solved(case("n_angle", poses=poses))
+    assert (code, answer["status"]) == (7, "warn")
+    assert {"large_rms", "large_residual"} & set(answer["codes"])
+    assert solved(case("n_angle", poses=poses), "--accept-residuals")[0] == 0
+    assert solved({"vectors": [case("n_angle", poses=poses)]})[0] == 7
+
+
 def crossings(tip):
     beams, found = (Beam(300, 80, 0), Beam(300, 80, 90)), []
     for number, beam in enumerate(beams):
@@ -241,6 +263,10 @@ def crossings(tip):
 
 
 BEAMS = [{"x": 300, "y": 80, "direction_deg": angle} for angle in (0, 90)]
+TILTS = (
+    *((0, 0, 0), (40, 12, -8), (-75, -15, 10), (120, 9, 20)),
+    *((-160, -18, -14), (80, 20, 5), (20, -10, 16)),
+)
 START = PIVOT[3]
 TIP = {"x": 12.5, "y": -3.25}
 MORE: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
@@ -287,6 +313,36 @@ MORE: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
         {"sightings": [{"flange": p, "tip": {"x": PIN[0], "y": PIN[1]}} for p in ROUND]},
         {"offset": [12.5, -3.25], "centre_mm": [0, 0]},
     ),
+    "length_change": (
+        {"before_z": [-60.0, -60.02], "after_z": [-60.01], "stored_z": -20, "sigma_z_mm": 0.02},
+        {"height_change_mm": 0, "limit_mm": 0.1, "offset_z": -20},
+    ),
+    "station_shift": (
+        {
+            "shifts": [{"tool": 1, "vector": [0.03, 0.04], "touch_sigma_mm": 0.05}],
+            "tolerance_mm": 0.5,
+        },
+        {"chi_square": 0.5, "common_mm": [0.03, 0.04]},
+    ),
+    "needle_chain": (
+        {"u0_mm": 0.02, "sigma_mm": 0.01, "changes": 6, "reference": "both_touched"},
+        {"u_mm": 0.04},
+    ),
+    "station_chain": (
+        {"u_station_mm": 0.03, "sigma_mm": 0.01, "tools": [1, 2, 3]},
+        {"correlation": 0.9},
+    ),
+    "gauge_rr": (
+        {
+            "values": [[[1.0, 1.2], [1.0, 1.2]], [[4.0, 4.2], [4.0, 4.2]]],
+            "axes": ["nozzle", "person", "repeat"],
+        },
+        {"interaction_p": 1, "reproducibility_mm": 0, "repeatability_mm": 0.1264911064067352},
+    ),
+    "control_chart": (
+        {"baseline": [1, 2] * 12, "values": [1, 2]},
+        {"centre": 1.5, "limits": [1.5 - 3 / 1.128, 1.5 + 3 / 1.128]},
+    ),
     "verify": ({"poses": ROUND, "offset": TIP}, {"max_drift_mm": 0, "passed": True}),
     "update_guard": ({"new": {"x": 12.5}, "stored": {"x": 12.2}}, {"correction_mm": 0.3}),
     "suggest_poses": (
@@ -307,15 +363,8 @@ MORE: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "pivot_robust": (
         {
             "poses": [
-                *PIVOT,
-                {
-                    "x": 307.8523881013354,
-                    "y": -109.61761245633667,
-                    "z": -39.55679363299589,
-                    "u": -160,
-                    "v": -18,
-                    "w": -14,
-                },
+                dict(zip("xyzuvw", pivoting((4.2, -7.9, 131.6), angles).coordinates(), strict=True))
+                for angles in TILTS
             ]
         },
         {"offset": [4.2, -7.9, 131.6], "plain_ls_offset": [4.2, -7.9, 131.6]},
@@ -403,6 +452,26 @@ def test_a_refusal_is_shown_to_a_person(tmp_path, capsys):
     assert "n_angle: error (degenerate_angles)" in capsys.readouterr().out
 
 
+def test_a_length_waits_for_a_decision_and_shows_its_figures(solved):
+    heights = {"before_z": [-60.0] * 4, "after_z": [-59.5] * 4, "stored_z": -20.0}
+    code, undecided = solved(case("length_change", **heights))
+    assert (code, undecided["status"], undecided["codes"]) == (7, "error", ["length_changed"])
+    assert undecided["z_by_difference_mm"] == -20.5
+    for decision, z_mm in (("difference", -20.5), ("keep", -20.0), ("measure", None)):
+        code, decided = solved(case("length_change", **heights, decision=decision))
+        assert (code, decided["status"], decided["offset_z"]) == (0, "warn", z_mm)
+    code, moved = solved(case("length_change", **heights, pin_moved=True))
+    assert (code, moved["codes"]) == (7, ["length_not_observable"])
+
+
+def test_a_station_may_be_undecided(solved):
+    shift = {"tool": 1, "vector": [0.1, 0, 0], "touch_sigma_mm": 0.02, "seat_sigma_mm": [0.1] * 3}
+    code, answer = solved(case("station_shift", shifts=[shift], tolerance_mm=0.2))
+    assert (code, answer["status"], answer["codes"]) == (0, "warn", ["station_undecided"])
+    code, pooled = solved(case("station_shift", shifts=[shift], tolerance_mm=0.2, seat_changes=8))
+    assert pooled["chi_square_limit"] > answer["chi_square_limit"]
+
+
 def test_no_method_is_left_untried():
     shared = {
         "two_pose",
@@ -413,9 +482,10 @@ def test_no_method_is_left_untried():
         "board_two_fiducials",
         "orientation_convert",
     }
-    here = {"find_beams", "joint", "board_fit"}
+    here = {"find_beams", "joint", "board_fit", "uncertainty_budget"}
     touching = {*TOUCH_METHODS}  # tests/calibration/test_touch_evidence.py
-    assert set(METHODS) == set(MORE) | shared | here | touching
+    lasting = {*STATION_METHODS}  # tests/calibration/test_station_part.py
+    assert set(METHODS) == set(MORE) | shared | here | touching | lasting
 
 
 def test_looking_at_a_controller_does_not_load_numpy():

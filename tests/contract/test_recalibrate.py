@@ -107,6 +107,33 @@ def test_a_scara_with_a_pin_and_a_person(cell):
     assert open_journal().verify().problems == ()
 
 
+def test_a_file_of_poses_stands_for_the_points_of_a_tool(cell, recipe, tmp_path):
+    rows = []
+    for u_deg in (10.0, -170.0):
+        x, y = rotate_xy(12.3, -3.4, u_deg)
+        rows.append(f"{(PIN[0] - x) / 1000:.7f};{(PIN[1] - y) / 1000:.7f};{u_deg};0;0")
+    (tmp_path / "touches.csv").write_text("\n".join(["X;Y;A;B;C", *rows]).replace(".", ","))
+    text = POINTS.replace("points = [901, 902]", 'poses = {{ file = "touches.csv"{more} }}')
+    asked = cell.run("recalibrate", recipe(text), "--yes", "--json")
+    assert asked.code == 2, asked.out
+    assert json.loads(asked.out)["error"]["reason"] == "euler,length"
+    path = recipe(text, more=', length = "m", euler = "kuka"')
+    done = cell.run("recalibrate", path, "--yes")
+    assert done.code == 0, done.err
+    assert cell.tool_1.components()[:2] == pytest.approx((12.3, -3.4), abs=2e-3)
+    assert cell.simulator.machine.arm.moves_started == 0
+
+
+def test_poses_that_say_another_tool_than_the_recipe_are_refused(cell, recipe, tmp_path):
+    (tmp_path / "touches.csv").write_text("x,y,u,tool\n287.5,103.25,0,3\n312.5,96.75,180,3\n")
+    text = POINTS.replace("points = [901, 902]", 'poses = {{ file = "touches.csv" }}')
+    text = text.replace('kind = "points"', 'kind = "points"\ntaught_tool = 2')
+    refused = cell.run("recalibrate", recipe(text), "--yes", "--json")
+    assert refused.code == 7, refused.out
+    assert json.loads(refused.out)["error"]["code"] == "tool_pose"
+    assert cell.tool_1 == OLD_TIP
+
+
 def test_pendant_points_only_and_nothing_moves(cell):
     path = str(EXAMPLES / "pendant-points.toml")
     teach(cell, ToolOffset(12.3, -3.4, -20))

@@ -3,15 +3,19 @@
 import json
 import math
 import socket
-from contextlib import closing
+from contextlib import ExitStack, closing, suppress
+from dataclasses import asdict
 
 import pytest
-from robolink_simulators.assist.port import AssistClient, serve_assist
+from robolink_simulators.assist.acts import _acts_at
+from robolink_simulators.assist.port import LONGEST_LINE, MOST_CLIENTS, AssistClient, serve_assist
 from robolink_simulators.cell.clock import ScaledClock
+from robolink_simulators.cell.world_parameters import parameter_names
 from robolink_simulators.epson import EpsonSimulator
 from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 
-from robolink.errors import ConfigError, ConnectError
+from robolink.errors import ConfigError, ConnectError, TransportBrokenError
 from robolink.timing import Deadline
 from robolink.transport import open_transport, parse_url
 
@@ -31,7 +35,10 @@ def exchange(transport, request):
 @pytest.fixture
 def assisted():
     simulator, clock = EpsonSimulator(seed=3), ScaledClock(50)
-    with serve_tcp(simulator, clock=clock) as host, serve_assist(simulator, clock=clock) as port:
+    with (
+        serve_tcp(simulator, clock=clock) as host,
+        serve_assist(simulator, clock=clock, token="the-token") as port,
+    ):
         with AssistClient(port.url) as assist:
             yield host, assist, simulator
 
@@ -101,13 +108,135 @@ def test_what_the_assist_port_cannot_do_is_said(assisted, act, parameters, words
     assert assist.do("counters")["exchanges"] == 0
 
 
+# 400 digits are legal JSON and no float: math.isfinite raises at them.
+HUGE = 10**400
+HOSTILE = [HUGE, -HUGE, 1e308, -1e308, math.nan, math.inf, "x" * 900, [[]], {}, None, True, "1e300"]
+
+
+@pytest.mark.parametrize("simulated", [EpsonSimulator, SoftMotionSimulator])
+def test_no_value_of_any_act_stops_the_assist_port(simulated):
+    simulator, clock = simulated(seed=3), ScaledClock(50)
+    buttons = ("number", "bit", "tool", "mark", "u_deg", "x_mm", "y_mm", "z_mm", "length_mm")
+    places = ("heading_deg", "noise_mm", "radius_mm", "tilt_deg", "axis", "on", "touch")
+    parameters = [*buttons, *places]
+    usual = dict.fromkeys(parameters, 1) | {"axis": "z"}
+    acts = ["look", *_acts_at(simulator)]
+    with serve_assist(simulator, clock=clock) as port, AssistClient(port.url) as assist:
+        for value in HOSTILE:
+            for act in acts:
+                for name in parameters:
+                    with suppress(ConfigError):
+                        assist.do(act, **{**usual, name: value})
+            for name in parameter_names():
+                with suppress(ConfigError):
+                    assist.do("set_world", **{name: value})
+        assert all(math.isfinite(value) for value in asdict(assist.look()).values())
+        assert assist.do("counters")["touches"] >= 0
+
+
+def door(assist):
+    """Open a bare connection to the port that a client talks to."""
+    link = parse_url(assist._url)
+    return socket.create_connection((link.host, link.port), timeout=5)
+
+
+def end_of(connection):
+    """Return what still comes; the end of a connection may be a reset, when it held bytes."""
+    heard = b""
+    try:
+        while piece := connection.recv(65536):
+            heard += piece
+    except ConnectionResetError:
+        pass
+    return heard
+
+
 def test_a_web_page_gets_nothing_done_at_the_assist_port(assisted):
     _, assist, simulator = assisted
-    link = parse_url(assist._url)
-    with socket.create_connection((link.host, link.port), timeout=5) as browser:
+    with door(assist) as browser:
         browser.sendall(b'POST / HTTP/1.1\r\nHost: x\r\n\r\n{"do": "press_estop"}\n')
-        assert browser.recv(100) == b""
+        assert end_of(browser) == b""
     assert not simulator.condition.estop_pressed
+
+
+@pytest.mark.parametrize(
+    "first",
+    [
+        {"do": "press_estop"},
+        {"token": "guessed", "do": "press_estop"},
+        {"token": None},
+        {"token": ""},
+        {"token": ["a", "list"]},
+        {"token": "\ud800"},
+    ],
+    ids=["none", "wrong", "null", "empty", "list", "surrogate"],
+)
+def test_nobody_gets_in_at_the_assist_port_without_its_token(assisted, first):
+    _, assist, simulator = assisted
+    with door(assist) as stranger:
+        stranger.sendall(json.dumps(first).encode() + b'\n{"do": "press_estop"}\n')
+        refused = end_of(stranger)
+    assert refused.count(b"\n") <= 1
+    assert b"not the token" in refused or refused == b""
+    assert not simulator.condition.estop_pressed
+    assert assist.do("counters")["exchanges"] == 0
+
+
+def test_a_wrong_or_missing_token_is_refused_in_plain_words(assisted):
+    _, assist, _ = assisted
+    bare = assist._url
+    for url in (bare, bare.replace("://", "://guessed@")):
+        with pytest.raises(ConfigError, match="does not know the token") as refused:
+            AssistClient(url)
+        assert "guessed" not in str(refused.value)
+        assert "'robolink sim' prints" in refused.value.remedy
+
+
+def test_each_assist_port_draws_its_own_token():
+    simulator, clock = EpsonSimulator(seed=3), ScaledClock()
+    with serve_assist(simulator, clock=clock) as one, serve_assist(simulator, clock=clock) as two:
+        tokens = {host.url.partition("@")[0] for host in (one, two)}
+    assert len(tokens) == 2
+    assert all(len(token) == len("assist+tcp://") + 22 for token in tokens)
+    assert "drawn" not in "".join(tokens)
+    with serve_assist(simulator, clock=clock, token="given") as port:
+        assert "//given@" in port.url
+
+
+def test_who_keeps_silent_at_the_assist_port_keeps_nobody_out(assisted):
+    _, assist, _ = assisted
+    with ExitStack() as stack:
+        silent = [stack.enter_context(door(assist)) for _ in range(3 * MOST_CLIENTS)]
+        assert assist.do("counters")["exchanges"] == 0
+        url = assist._url.replace("://", "://the-token@")
+        with AssistClient(url) as other:
+            assert other.do("counters")["exchanges"] == 0
+        assert end_of(silent[0]) == b""
+
+
+def test_a_full_assist_port_sends_the_newcomer_away(assisted):
+    _, assist, _ = assisted
+    url = assist._url.replace("://", "://the-token@")
+    with ExitStack() as stack:
+        for _ in range(MOST_CLIENTS - 1):
+            stack.enter_context(AssistClient(url))
+        with pytest.raises(TransportBrokenError):
+            AssistClient(url)
+        assert assist.do("counters")["exchanges"] == 0
+    # Places are free again as soon as the port has seen them go, which it does before the next.
+    assert assist.do("counters")["exchanges"] == 0
+    with AssistClient(url) as again:
+        assert again.do("counters")["exchanges"] == 0
+
+
+@pytest.mark.parametrize("ends", [b"", b"\n"], ids=["endless", "ended"])
+def test_a_line_beyond_the_limit_ends_the_connection_and_nothing_else(assisted, ends):
+    _, assist, _ = assisted
+    with door(assist) as flood:
+        with suppress(ConnectionError):
+            flood.sendall(b'{"token": "' + b"x" * (2 * LONGEST_LINE) + b'"}' + ends)
+            assert end_of(flood) == b""
+    assert assist.do("counters")["exchanges"] == 0
 
 
 def test_an_assist_url_is_checked():

@@ -5,6 +5,7 @@ import subprocess
 import sys
 
 THEIRS = """
+import re
 import socket
 
 def test_the_served_one_answers(epson_tcp):
@@ -13,7 +14,7 @@ def test_the_served_one_answers(epson_tcp):
         client.sendall(b"$Login,\\r\\n")
         assert client.recv(100) == b"#Login,0\\r\\n"
     assert epson_tcp.simulator.seed == 7
-    assert epson_tcp.assist.startswith("assist+tcp://127.0.0.1:")
+    assert re.fullmatch(r"assist\\+tcp://[\\w-]{22}@127\\.0\\.0\\.1:\\d+", epson_tcp.assist)
 
 def test_the_one_in_process_has_a_url(epson_sim):
     from robolink.transport import open_transport

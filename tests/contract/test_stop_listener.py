@@ -60,7 +60,21 @@ def test_only_the_user_himself_may_read_where_to_knock(controller):
             assert stat.S_IMODE(os.stat(holder.place).st_mode) == 0o600
 
 
-@pytest.mark.parametrize("said", [b'{"token": "wrong"}\n', b"{}\n", b"\xff\n", b"[1]\n", b""])
+@pytest.mark.parametrize(
+    "said",
+    [
+        b'{"token": "wrong"}\n',
+        b"{}\n",
+        b"\xff\n",
+        b"[1]\n",
+        b"",
+        '{"token": "sch\u00f6n"}\n'.encode(),
+        b'{"token": "\\ud800"}\n',
+        b"[" * 4000 + b"\n",
+        b"1" * 4090 + b"\n",
+    ],
+    ids=["wrong", "none", "bytes", "list", "nothing", "umlaut", "surrogate", "deep", "digits"],
+)
 def test_without_the_token_nothing_is_stopped(controller, said):
     with StopListener(controller, url_of(controller)):
         holder = holder_of(controller)

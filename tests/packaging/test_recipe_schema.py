@@ -26,6 +26,7 @@ HEADINGS = {
     "Poses": "`[poses]`",
     "FlangePose": "`[poses]`",
     "Tool": "`[[tools]]`",
+    "PoseFile": "`[tools.poses]`",
     "Speeds": "`[speeds]`",
     "Box": "`[box]`",
     "Tolerances": "`[tolerances]`",

@@ -405,6 +405,17 @@ def test_each_tool_has_its_own_points_as_many_as_the_method_needs(method, points
     assert list(problems(text)) == ([where] if where else [])
 
 
+def test_a_file_of_poses_stands_in_place_of_points():
+    file = 'poses = { file = "a.csv", euler = "kuka" }'
+    assert problems(POINTS.replace("points = [1, 2]", file)) == {}
+    assert list(problems(f"{POINTS}{file}\n")) == ["tools#1.points"]
+    assert list(problems(f"{PIN}{file}\n")) == ["tools#1.poses"]
+    assert list(problems(POINTS.replace("points = [1, 2]", 'poses = { length = "ft" }'))) == [
+        "tools#1.poses.file",
+        "tools#1.poses.length",
+    ]
+
+
 def test_points_mean_nothing_where_a_person_measures():
     assert list(problems(PIN + "points = [1, 2]\n")) == ["tools#1.points"]
 

@@ -9,7 +9,7 @@ from robolink_simulators.sensors import open_in_process
 from robolink.errors import CalibrationError, ConfigError, ConnectError, TransportBrokenError
 from robolink.methods import CameraAffineSource, CameraSource
 from robolink.model import TIP, Spot, SpotUnit, TipSensor
-from robolink.sensing import SENSORS_GROUP, open_sensor, seen_once
+from robolink.sensing import SENSORS_GROUP, open_sensor, seen_once, sensor_name
 from tests.contract._camera_cell import camera_model, camera_station, cell_of, run_source
 from tests.contract._sensor_cell import miss_mm
 
@@ -201,3 +201,16 @@ def test_numbers_that_are_none_are_refused(plug_in):
             run_source(cell, CameraSource("broken", camera_station(cell)))
         assert refusal.value.code == "non_finite"
         assert cell.tip_z_mm > cell.simulator.world.camera.middle_mm[2] + 8.0
+
+
+@pytest.mark.parametrize(
+    ("given", "shown"),
+    [
+        ("up-looking", "up-looking"),
+        ("assist+tcp://s3cret@127.0.0.1:40001", "assist+tcp://127.0.0.1:40001"),
+        ("rtsp://user:s3cret@cam.local:554/tip?x=1", "rtsp://cam.local:554/tip?x=1"),
+        ("rtsp://cam.local/a@b", "rtsp://cam.local/a@b"),
+    ],
+)
+def test_what_lets_one_in_at_a_camera_is_no_part_of_its_name(given, shown):
+    assert sensor_name(given) == shown

@@ -31,7 +31,7 @@ class ImpactRequest:
         """Return the points by number, ``None`` for one that is not taught."""
         if self.path is None:
             return dict(points_of(controller).read_all(self.numbers))
-        from robolink.pose_files import read_pts
+        from robolink.pose_tables import read_pts
 
         return read_pts(self.path)
 

@@ -11,6 +11,8 @@ import click
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink.pose_tables import NOTHING_SAID, ReadingChoices
+from robolink_cli.options.pose_reading import reading_options
 
 if TYPE_CHECKING:
     from robolink.model import Controller, Pose
@@ -31,6 +33,7 @@ class PoseSource:
         typed: Three numbers each, X, Y, U; or four, X, Y, Z, U; or six, X, Y, Z, U, V, W.
         path: A file of poses.
         taught_tool: The tool whose tip the poses describe; 0 when they are flange poses.
+        choices: What the file does not say.
     """
 
     kind: Literal["points", "typed", "file"]
@@ -38,6 +41,7 @@ class PoseSource:
     typed: tuple[tuple[float, ...], ...] = ()
     path: Path | None = None
     taught_tool: int = 0
+    choices: ReadingChoices = NOTHING_SAID
 
     def payload(self) -> dict[str, object]:
         """Return what the document of a calibration says about it."""
@@ -72,20 +76,22 @@ class PoseSource:
             ConfigError: The file cannot be used, or a pose does not state what is needed.
         """
         from robolink.methods import taught_poses
-        from robolink.pose_files import read_poses
+        from robolink.pose_tables import read_poses
         from robolink_cli.access.capabilities import points_of
 
         if self.kind == "points":
             return taught_poses(points_of(controller), self.points)
         if self.path is not None:
-            return read_poses(self.path, needs=needs)
+            return read_poses(self.path, self.choices, needs=needs).poses
         return tuple(_typed_as_pose(numbers, needs) for numbers in self.typed)
 
 
 def pose_source_options(
     *, points: str, typed: str, path: str
 ) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Add ``--points``, ``--pose``, ``--poses`` and ``--taught-tool``, passed on as ``poses``.
+    """Add what says where poses come from, passed on as ``poses``.
+
+    These are ``--points``, ``--pose``, ``--poses``, ``--taught-tool`` and how a file is read.
 
     Args:
         points: What the help says about taught points.
@@ -112,12 +118,15 @@ def pose_source_options(
             typed: tuple[str, ...],
             path: Path | None,
             taught_tool: int | None,
+            choices: ReadingChoices,
             **others: object,
         ) -> object:
-            poses = pose_source(points=points, typed=typed, path=path, taught_tool=taught_tool)
+            poses = pose_source(
+                points=points, typed=typed, path=path, taught_tool=taught_tool, choices=choices
+            )
             return function(*args, poses=poses, **others)
 
-        command: Callable[..., Any] = with_poses
+        command = reading_options(with_poses)
         for option in reversed(options):
             command = option(command)
         return command
@@ -149,12 +158,18 @@ def taught_points_option(points: str) -> Callable[[Callable[..., Any]], Callable
 
 
 def pose_source(
-    *, points: str | None, typed: tuple[str, ...], path: Path | None, taught_tool: int | None
+    *,
+    points: str | None,
+    typed: tuple[str, ...],
+    path: Path | None,
+    taught_tool: int | None,
+    choices: ReadingChoices,
 ) -> PoseSource | None:
     """Return what the options name, ``None`` when the robot is to measure.
 
     Raises:
-        ConfigError: More than one source, or none to which ``--taught-tool`` belongs.
+        ConfigError: More than one source, or none to which ``--taught-tool`` or what is said about
+            a file belongs.
     """
     given = {"--points": points, "--pose": typed, "--poses": path}
     named = [name for name, value in given.items() if value]
@@ -163,6 +178,11 @@ def pose_source(
             tr("{names} exclude each other.", names=", ".join(named)),
             remedy=tr("Give the poses in one way only."),
         )
+    if path is None and choices != NOTHING_SAID:
+        raise ConfigError(
+            tr("--columns, --length and --euler belong to a file of poses."),
+            remedy=tr("Give it with --poses."),
+        )
     tool = taught_tool or 0
     if points:
         return PoseSource("points", points=point_numbers(points), taught_tool=tool)
@@ -170,7 +190,7 @@ def pose_source(
         poses = tuple(_typed_pose(text) for text in typed)
         return PoseSource("typed", typed=poses, taught_tool=tool)
     if path is not None:
-        return PoseSource("file", path=path, taught_tool=tool)
+        return PoseSource("file", path=path, taught_tool=tool, choices=choices)
     if taught_tool is not None:
         raise ConfigError(
             tr("--taught-tool belongs to poses that exist already."),

@@ -54,7 +54,24 @@ def proposal_payload(proposal: "Proposal") -> dict[str, object]:
         "warnings": list(result.warnings),
         "poses": [pose_payload(pose) for pose in result.inputs],
         "fit": fit_payload(result),
+        "length": length_payload(proposal),
         **result.details(),
+    }
+
+
+def length_payload(proposal: "Proposal") -> dict[str, object] | None:
+    """Return what the heights of the touches tell about the length, ``None`` for nothing."""
+    told = proposal.length
+    if told is None:
+        return None
+    return {
+        "changed": told.changed,
+        "height_change_mm": told.height_change_mm,
+        "u_mm": told.u_mm,
+        "limit_mm": told.limit_mm,
+        "stored_z_mm": told.stored_z_mm,
+        "z_by_difference_mm": told.z_by_difference_mm,
+        "written": "difference" if told.changed and proposal.z_from == "measured" else "keep",
     }
 
 
@@ -67,6 +84,11 @@ def fit_payload(result: "CalibrationResult") -> dict[str, object]:
         "half_width95": dict(zip(result.measured, result.half_width95, strict=False)),
         "sigma_mm": result.sigma_mm,
         "sigma_stated": result.sigma_stated,
+        "interval_from": result.interval_from or None,
+        "region95_radius_mm": result.region95_radius_mm,
+        "notes": list(result.notes),
+        "budget": result.budget.as_json() if result.budget else None,
+        "evidence": result.evidence.as_json() if result.evidence else None,
         "rms_mm": result.rms_mm,
         "max_residual_mm": result.max_residual_mm,
         "residuals_mm": [list(residual) for residual in result.residuals_mm],

@@ -10,7 +10,7 @@ from robolink_cli.views.documents import number
 
 def remarks(result: CalibrationResult) -> Iterator[str]:
     """Yield what there is to say about a measurement beside its numbers, a sentence each."""
-    for said in (_fit, _interval, _ways, _camera, _chain):
+    for said in (_fit, _interval, _region, _parts, _ways, _camera, _chain):
         sentence = said(result)
         if sentence:
             yield sentence
@@ -43,11 +43,39 @@ def _interval(result: CalibrationResult) -> str:
         f"{name[0].upper()} +-{half:.3f}"
         for name, half in zip(result.measured, result.half_width95, strict=True)
     )
-    if result.sigma_stated:
+    if result.interval_from == "resolution":
+        basis = tr("from the step of the jogs")
+    elif result.sigma_stated and result.interval_from != "residuals":
         basis = tr("from a given standard deviation")
     else:
         basis = tr("from the residuals")
-    return tr("95 % interval: {parts}, {basis}", parts="  ".join(parts), basis=basis)
+    return tr("95 % interval, each alone: {parts}, {basis}", parts="  ".join(parts), basis=basis)
+
+
+def _region(result: CalibrationResult) -> str:
+    """Return in which distance the tip lies, its lengths together; empty when nothing tells it."""
+    names = [name[0].upper() for name in result.measured if name.endswith("_mm")]
+    if result.region95_radius_mm is None or len(names) < 2:
+        return ""
+    return tr(
+        "tip within {radius:.3f} mm of ({names}) in 95 %",
+        radius=result.region95_radius_mm,
+        names=", ".join(names),
+    )
+
+
+def _parts(result: CalibrationResult) -> str:
+    """Return type A, type B and both together; empty without a budget."""
+    budget = result.budget
+    if budget is None:
+        return ""
+    return tr(
+        "standard uncertainty: from these touches {a:.4f} mm (type A), known otherwise "
+        "{b:.4f} mm (type B), together {c:.4f} mm",
+        a=budget.type_a_mm,
+        b=budget.type_b_mm,
+        c=budget.u_c_mm,
+    )
 
 
 def _ways(result: CalibrationResult) -> str:

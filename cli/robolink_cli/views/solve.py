@@ -19,11 +19,19 @@ def result_payload(result: CalibrationResult) -> dict[str, object]:
         if name in result.measured:
             payload[name[0]] = getattr(result.offset, name)
     if result.reference_point_mm:
-        payload["reference_point"] = list(result.reference_point_mm)
+        in_local = any(pose.local for pose in result.inputs)
+        where = "reference_point_local" if in_local else "reference_point"
+        payload[where] = list(result.reference_point_mm)
+    payload |= result.evidence.as_json() if result.evidence is not None else {}
     return payload | {
+        "notes": list(result.notes),
         "measured": list(result.measured),
         "unobservable": list(result.unobservable),
         "interval95": {name: list(ends) for name, ends in result.interval95.items()},
+        "half_width95": list(result.half_width95) or None,
+        "interval_from": result.interval_from or None,
+        "region95_radius_mm": result.region95_radius_mm,
+        "budget": None if result.budget is None else result.budget.as_json(),
         "covariance": [list(row) for row in result.covariance],
         "sigma_mm": result.sigma_mm,
         "sigma_stated": result.sigma_stated,
@@ -36,6 +44,11 @@ def result_payload(result: CalibrationResult) -> dict[str, object]:
         "rank": result.rank,
         "dof": result.dof,
     }
+
+
+def space_payload(result: CalibrationResult) -> dict[str, object]:
+    """Return a result with X, Y and Z of the offset, measured or kept."""
+    return result_payload(result) | {"offset_xyz": list(result.offset.components()[:3])}
 
 
 def show_case(document: Mapping[str, object]) -> None:
@@ -92,7 +105,13 @@ def _words(value: object) -> str:
     return ", ".join(map(str, value)) if isinstance(value, Sequence) else str(value)
 
 
-_DECIMALS = {"mm_per_px_matrix": 6, "rotation_matrix": 6, "direction": 5, "latency_s": 5}
+_DECIMALS = {
+    "mm_per_px_matrix": 6,
+    "rotation_matrix": 6,
+    "direction": 5,
+    "latency_s": 5,
+    "overshoot_s2_per_mm": 6,
+}
 
 _SHOWN = (
     ("offset", tr("offset mm")),
@@ -109,6 +128,7 @@ _SHOWN = (
     ("zyz", tr("A, B, C deg")),
     ("lag_mm", tr("lag mm")),
     ("latency_s", tr("latency s")),
+    ("overshoot_s2_per_mm", tr("overshoot s^2/mm")),
     ("chain", tr("chain")),
     ("full_calibration_due", tr("full calibration due")),
     ("beams", tr("beams")),
@@ -119,9 +139,30 @@ _SHOWN = (
     ("second_mm", tr("second harmonic mm")),
     ("tools", tr("tools")),
     ("pins", tr("pins mm")),
+    ("height_change_mm", tr("change of height mm")),
+    ("z_by_difference_mm", tr("Z by difference mm")),
+    ("offset_z", tr("Z to write mm")),
+    ("common_mm", tr("common shift mm")),
+    ("chi_square", tr("chi-square")),
+    ("chi_square_limit", tr("chi-square by chance, at most")),
+    ("detectable_mm", tr("detectable shift mm")),
+    ("u_mm", tr("standard uncertainty mm")),
+    ("correlation", tr("correlation")),
+    ("u_difference_mm", tr("standard uncertainty of a difference mm")),
     ("max_drift_mm", tr("largest drift mm")),
     ("passed", tr("passed")),
     ("correction_mm", tr("correction mm")),
+    ("repeatability_mm", tr("repeatability mm")),
+    ("reproducibility_mm", tr("reproducibility mm")),
+    ("grr_mm", tr("both together mm")),
+    ("part_mm", tr("between nozzles mm")),
+    ("percent_of_tolerance", tr("% of the tolerance")),
+    ("percent_of_total", tr("% of the whole spread")),
+    ("ndc", tr("kinds of nozzle told apart")),
+    ("centre", tr("centre mm")),
+    ("limits", tr("limits mm")),
+    ("points_out", tr("points outside (from 0)")),
+    ("ewma_first", tr("drift since point (from 0)")),
     ("poses", tr("poses")),
     ("sigma_gains", tr("gain of sigma after each pose")),
 )

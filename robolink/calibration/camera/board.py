@@ -2,15 +2,19 @@
 
 Two fiducials (EPSON's CalcBoardTool): the origin is the middle between them and the
 direction runs from the second to the first. A drawing that runs from 1 to 2 is off by
-180 degrees (docs/reference/calibration.md 1.3).
+180 degrees (docs/reference/calibration.md 1.3). Both are seen from the flange's own axes, so its
+lean and which way up it hangs go in first (docs/reference/evidence.md 3).
 """
 
 import math
+from collections.abc import Sequence
 
-from robolink.calibration.camera.up_camera import Sighting, check_sightings
+from robolink.calibration.camera.up_camera import Sighting, check_sightings, seen_in_flange
 from robolink.calibration.core.dispersion import Dispersion
 from robolink.calibration.core.pose_checks import keep_unmeasured
 from robolink.calibration.core.result import CalibrationResult
+from robolink.calibration.flange_checks import with_height_error
+from robolink.calibration.flange_plane import FlangePlane, TipHeight, height_of
 from robolink.errors import CalibrationError
 from robolink.messages import tr
 from robolink.model import ToolOffset
@@ -26,6 +30,7 @@ def solve_board(
     second: Sighting,
     *,
     stored: ToolOffset | None = None,
+    height: TipHeight | None = None,
     spacing_mm: float | None = None,
     sigma_mm: float | None = None,
     allow_mixed_hand: bool = False,
@@ -36,18 +41,20 @@ def solve_board(
         first: Fiducial 1, with the actual flange pose at its picture.
         second: Fiducial 2, likewise; each may have a pose of its own.
         stored: The offset stored now; Z, V and W are kept from it, or 0 without one.
+        height: Z of the board, for a flange that leans; without it that of ``stored`` counts.
         spacing_mm: Nominal distance between the fiducials, checked when it is given.
         sigma_mm: Standard deviation of one coordinate of one sighting.
         allow_mixed_hand: Warn instead of refusing when the arm was configured differently.
 
     Raises:
         CalibrationError: ``coincident_fiducials``, ``spacing_mismatch``, ``non_finite``,
-            ``suspect_units``, ``mixed_hand``, ``mixed_local``, ``mixed_tool`` or
-            ``implausible_offset``.
+            ``suspect_units``, ``mixed_hand``, ``mixed_local``, ``mixed_tool``, ``tool_pose``,
+            ``local_pose``, ``tilted_pose`` or ``implausible_offset``.
         ConfigError: ``sigma_mm`` is not positive.
     """
     warnings = check_sightings((first, second), allow_mixed_hand=allow_mixed_hand)
-    (x1, y1), (x2, y2) = first.in_flange_mm(), second.in_flange_mm()
+    height = height_of(stored, height)
+    (x1, y1), (x2, y2) = seen_in_flange((first, second), height)
     spacing = math.hypot(x1 - x2, y1 - y2)
     check_spacing(spacing, spacing_mm)
     scatter = Dispersion.of(0.0, 0, sigma_mm)
@@ -56,7 +63,7 @@ def solve_board(
         half = scatter.sigma_mm**2 / 2
         angle = 2 * (math.degrees(scatter.sigma_mm) / spacing) ** 2
         covariance = ((half, 0.0, 0.0), (0.0, half, 0.0), (0.0, 0.0, angle))
-    return CalibrationResult(
+    result = CalibrationResult(
         method="board",
         offset=keep_unmeasured(
             stored,
@@ -79,6 +86,13 @@ def solve_board(
         dof=0,
         unobservable=("z_mm", "v_deg", "w_deg"),
     )
+    return with_height_error(result, mean_by_height((first, second)), height)
+
+
+def mean_by_height(sightings: Sequence[Sighting]) -> tuple[float, float]:
+    """Return how far the middle of what was seen moves, in the flange, for 1 mm of its height."""
+    moved = [FlangePlane.of(s.flange).in_flange(0.0, 0.0, 1.0) for s in sightings]
+    return sum(x for x, _ in moved) / len(moved), sum(y for _, y in moved) / len(moved)
 
 
 def check_spacing(spacing_mm: float, nominal_mm: float | None) -> None:

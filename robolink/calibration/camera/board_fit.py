@@ -9,18 +9,20 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from robolink.calibration.camera.board import SPACING_TOLERANCE, check_spacing
-from robolink.calibration.camera.up_camera import Sighting, check_sightings
+from robolink.calibration.camera.board import SPACING_TOLERANCE, check_spacing, mean_by_height
+from robolink.calibration.camera.up_camera import Sighting, check_sightings, seen_in_flange
 from robolink.calibration.core.planar_checks import require_poses
 from robolink.calibration.core.pose_checks import keep_unmeasured, require_finite
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.core.robust import Floats
+from robolink.calibration.flange_checks import with_height_error
+from robolink.calibration.flange_plane import FlangePlane, TipHeight, height_of
 from robolink.calibration.pin.planar import Complexes
 from robolink.calibration.quality.fit_quality import judged
 from robolink.calibration.quality.tolerances import PLANAR_TOLERANCE, Tolerance
 from robolink.errors import CalibrationError
 from robolink.messages import tr
-from robolink.model import ToolOffset, rotate_xy
+from robolink.model import ToolOffset
 
 UNKNOWNS = 3
 
@@ -32,6 +34,7 @@ def solve_board_fit(
     drawing_mm: Sequence[tuple[float, float]],
     *,
     stored: ToolOffset | None = None,
+    height: TipHeight | None = None,
     sigma_mm: float | None = None,
     allow_mixed_hand: bool = False,
     tolerance: Tolerance = PLANAR_TOLERANCE,
@@ -42,13 +45,15 @@ def solve_board_fit(
         sightings: Fiducials as they were seen, with the flange pose of each picture.
         drawing_mm: Where the same fiducials are in the drawing, in the same order.
         stored: The offset stored now; Z, V and W are kept from it, or 0 without one.
+        height: Z of the board, for a flange that leans; without it that of ``stored`` counts.
         sigma_mm: Standard deviation of one coordinate of one sighting, when it is known.
         allow_mixed_hand: Warn instead of refusing when the arm was configured differently.
         tolerance: Residuals above which the result carries a warning.
 
     Raises:
         CalibrationError: ``too_few_poses``, ``coincident_fiducials``, ``spacing_mismatch``,
-            and those of ``pose_checks.check_poses``.
+            ``tool_pose``, ``local_pose``, ``tilted_pose``, and those of
+            ``pose_checks.check_poses``.
         ConfigError: ``sigma_mm`` is not positive.
         ValueError: The lists differ in length.
     """
@@ -58,7 +63,8 @@ def solve_board_fit(
     for number, (x, y) in enumerate(drawing_mm, start=1):
         require_finite(**{f"x of drawing {number}": x, f"y of drawing {number}": y})
     warnings = check_sightings(tuple(sightings), allow_mixed_hand=allow_mixed_hand)
-    seen = np.array([complex(*sighting.in_flange_mm()) for sighting in sightings])
+    height = height_of(stored, height)
+    seen = np.array([complex(*place) for place in seen_in_flange(sightings, height)])
     drawing = np.array([complex(*place) for place in drawing_mm])
     turn = _turn(seen, drawing)
     origin = complex(seen.mean() - turn * drawing.mean())
@@ -82,7 +88,7 @@ def solve_board_fit(
         rank=UNKNOWNS,
         unobservable=_KEPT,
     )
-    return judged(
+    result = judged(
         result,
         residuals.view(float).reshape(-1, 2),
         unit,
@@ -90,6 +96,7 @@ def solve_board_fit(
         sigma_mm=sigma_mm,
         tolerance=tolerance,
     )
+    return with_height_error(result, mean_by_height(sightings), height)
 
 
 def _turn(seen: Complexes, drawing: Complexes) -> complex:
@@ -124,6 +131,6 @@ def _in_base(
     residuals: Complexes, sightings: Sequence[Sighting]
 ) -> tuple[tuple[float, float], ...]:
     return tuple(
-        rotate_xy(residual.real, residual.imag, sighting.flange.u_deg)
+        FlangePlane.of(sighting.flange).in_base(residual.real, residual.imag)
         for residual, sighting in zip(residuals.tolist(), sightings, strict=True)
     )

@@ -3,6 +3,8 @@
 A fiducial at d in the drawing is seen from the flange at ``conj(z) (s - p) = o + turn d +
 conj(z) b``, with z = exp(iU), the board's origin o and direction turn, and the camera's error b.
 All but the direction is linear, and that is known well enough after the plain fit for one step.
+Under a flange that leans or hangs upside down the inverse of its A stands in place of conj(z)
+(docs/reference/evidence.md 3).
 """
 
 import math
@@ -17,7 +19,9 @@ from robolink.calibration.camera.up_camera import Sighting
 from robolink.calibration.core.least_squares import LinearFit, linear_fit
 from robolink.calibration.core.planar_checks import MIN_ROTATION_DEG, angle_spread_deg
 from robolink.calibration.core.pose_checks import keep_unmeasured
-from robolink.calibration.pin.n_angle import planar_arrays
+from robolink.calibration.core.robust import Floats
+from robolink.calibration.flange_checks import with_height_error
+from robolink.calibration.flange_plane import FlangePlane, TipHeight, height_of, known_z_mm
 from robolink.calibration.pin.planar import Complexes
 from robolink.calibration.quality.fit_quality import judged
 from robolink.calibration.quality.tolerances import PLANAR_TOLERANCE, Tolerance
@@ -31,6 +35,7 @@ def solve_board_round(
     drawing_mm: Sequence[tuple[float, float]],
     *,
     stored: ToolOffset | None = None,
+    height: TipHeight | None = None,
     sigma_mm: float | None = None,
     tolerance: Tolerance = PLANAR_TOLERANCE,
 ) -> CameraRound:
@@ -41,6 +46,7 @@ def solve_board_round(
             30 degrees of U the camera's error cannot be told and is taken for none.
         drawing_mm: Where the same fiducials are in the drawing, in the same order.
         stored: The offset stored now; Z, V and W are kept from it, or 0 without one.
+        height: Z of the board, for a flange that leans; without it that of ``stored`` counts.
         sigma_mm: Standard deviation of one coordinate of one look, where it is known.
         tolerance: Residuals above which the result carries a warning.
 
@@ -48,21 +54,23 @@ def solve_board_round(
         CalibrationError: As :func:`solve_board_fit`.
         ConfigError: ``sigma_mm`` is not positive.
     """
+    height = height_of(stored, height)
     plain = solve_board_fit(
-        sightings, drawing_mm, stored=stored, sigma_mm=sigma_mm, tolerance=tolerance
+        sightings, drawing_mm, stored=stored, height=height, sigma_mm=sigma_mm, tolerance=tolerance
     )
-    if angle_spread_deg([sighting.flange.u_deg for sighting in sightings]) < MIN_ROTATION_DEG:
+    planes = [FlangePlane.of(sighting.flange) for sighting in sightings]
+    if angle_spread_deg([plane.heading_deg for plane in planes]) < MIN_ROTATION_DEG:
         return as_round(plain)
-    p, z = planar_arrays([sighting.flange for sighting in sightings])
-    seen = (np.array([complex(s.x_mm, s.y_mm) for s in sightings]) - p) / z
+    z_mm, columns = known_z_mm(height), np.array([plane.columns for plane in planes])
+    seen = np.array([complex(*sighting.in_flange_mm(z_mm)) for sighting in sightings])
     drawn = np.array([complex(*place) for place in drawing_mm])
     turn_rad = math.radians(plain.offset.u_deg)
     for _ in range(2):
-        fit = _step(seen, z, drawn * np.exp(1j * turn_rad))
+        fit = _step(seen, columns, drawn * np.exp(1j * turn_rad))
         turn_rad += float(fit.x[2])
     x_mm, y_mm, _, error_x, error_y = fit.x.tolist()
-    residuals = (fit.residuals.reshape(2, -1).T @ (1, 1j)) * z
-    vectors = np.column_stack((residuals.real, residuals.imag))
+    # A row of residuals times the transposed A leads from the flange's axes to the base's.
+    vectors = (fit.residuals.reshape(2, -1).T[:, None, :] @ columns)[:, 0, :]
     in_degrees = np.diag((1.0, 1.0, math.degrees(1.0)))
     unit = in_degrees @ fit.unit_covariance[:3, :3] @ in_degrees
     u_deg = math.degrees(math.remainder(turn_rad, math.tau))
@@ -77,16 +85,20 @@ def solve_board_round(
         warnings=(),
     )
     result = judged(fresh, vectors, unit, unknowns=UNKNOWNS, sigma_mm=sigma_mm, tolerance=tolerance)
-    return as_round(result, camera_error_mm=(error_x, error_y))
+    by_height = planes[0].in_flange(0.0, 0.0, 1.0)
+    return as_round(
+        with_height_error(result, by_height, height), camera_error_mm=(error_x, error_y)
+    )
 
 
-def _step(seen: Complexes, z: Complexes, turned: Complexes) -> LinearFit:
+def _step(seen: Complexes, columns: Floats, turned: Complexes) -> LinearFit:
     """Return the fit of origin, small turn in radians, and camera error."""
-    ones, zeros = np.ones(len(z)), np.zeros(len(z))
+    ones, zeros = np.ones(len(seen)), np.zeros(len(seen))
+    inverse = np.linalg.inv(columns.transpose(0, 2, 1))
     a = np.vstack(
         (
-            np.column_stack((ones, zeros, -turned.imag, z.real, z.imag)),
-            np.column_stack((zeros, ones, turned.real, -z.imag, z.real)),
+            np.column_stack((ones, zeros, -turned.imag, inverse[:, 0])),
+            np.column_stack((zeros, ones, turned.real, inverse[:, 1])),
         )
     )
     missing = seen - turned

@@ -2,7 +2,8 @@
 
 Every picture says ``M px + b = p + Rz(U) t``: linear in the matrix M, the origin b and the
 offset t, eight unknowns in all (docs/reference/calibration.md 2.5). Moving without turning shows M,
-turning shows t; without turning, t and b cannot be told apart.
+turning shows t; without turning, t and b cannot be told apart. A flange that leans or hangs upside
+down has ``A t + c t_z`` in place of Rz(U) t (docs/reference/evidence.md 3).
 """
 
 import math
@@ -20,9 +21,10 @@ from robolink.calibration.camera.camera_model import (
 from robolink.calibration.core.least_squares import LinearFit, linear_fit
 from robolink.calibration.core.planar_checks import require_poses
 from robolink.calibration.core.pose_checks import check_poses, keep_unmeasured, require_finite
-from robolink.calibration.core.result import CalibrationResult
+from robolink.calibration.core.result import CalibrationResult, offset_sigma_mm
 from robolink.calibration.core.robust import Floats
-from robolink.calibration.pin.n_angle import planar_arrays
+from robolink.calibration.flange_checks import require_flange_in_base, with_height_error
+from robolink.calibration.flange_plane import TipHeight, height_of, known_z_mm, solvable_planes
 from robolink.calibration.quality.fit_quality import judged
 from robolink.calibration.quality.tolerances import PLANAR_TOLERANCE, Tolerance
 from robolink.errors import CalibrationError
@@ -77,6 +79,7 @@ def solve_camera_affine(
     sightings: Sequence[PixelSighting],
     *,
     stored: ToolOffset | None = None,
+    height: TipHeight | None = None,
     sigma_mm: float | None = None,
     before: CameraModel | None = None,
     limits: CameraLimits = USUAL_CAMERA,
@@ -87,6 +90,7 @@ def solve_camera_affine(
     Args:
         sightings: At least four: three places that are not in line at one U, and other U.
         stored: The offset stored now; Z, U, V and W are kept from it, or 0 without one.
+        height: Z of the tip, for a flange that leans; without it that of ``stored`` counts.
         sigma_mm: Standard deviation of one coordinate of one sighting, in mm, when known.
         before: The camera at its last calibration; a changed one is refused.
         limits: What is a good and what the same camera.
@@ -94,7 +98,8 @@ def solve_camera_affine(
 
     Raises:
         CalibrationError: ``too_few_poses``, ``rank_deficient``, ``insufficient_rotation``,
-            ``camera_changed``, ``implausible_offset``, and those of :func:`check_poses`.
+            ``camera_changed``, ``implausible_offset``, ``tool_pose``, ``local_pose``,
+            ``tilted_pose``, and those of :func:`check_poses`.
         ConfigError: ``sigma_mm`` is not positive.
     """
     require_poses(len(sightings), UNKNOWNS // 2)
@@ -102,8 +107,11 @@ def solve_camera_affine(
         require_finite(**{f"px of {number}": sighting.px, f"py of {number}": sighting.py})
     poses = [sighting.flange for sighting in sightings]
     warnings = check_poses(poses, allow_mixed_hand=False)
+    require_flange_in_base(poses)
+    height = height_of(stored, height)
     pixels = np.array([(sighting.px, sighting.py) for sighting in sightings], dtype=float)
-    fit = linear_fit(*_system(poses, pixels))
+    a, b, per_height = _system(poses, pixels, height)
+    fit = linear_fit(a, b)
     _require_observable(fit)
     camera = _camera(fit.x, pixels.mean(axis=0))
     if before is not None:
@@ -132,22 +140,50 @@ def solve_camera_affine(
         sigma_mm=sigma_mm,
         tolerance=tolerance,
     )
+    by_height = linear_fit(a, per_height).x[6:].tolist()
+    result = with_height_error(result, (by_height[0], by_height[1]), height)
     rms_px = _rms_px(camera, residuals) if result.dof else None
     doubts = (*result.warnings, *limits.doubts(camera, rms_px))
-    return replace(result, rms_px=rms_px, warnings=doubts)
+    known = _with_spread(camera, fit, offset_sigma_mm(result), pixels.mean(axis=0).tolist())
+    return replace(result, rms_px=rms_px, warnings=doubts, camera=known)
 
 
-def _system(poses: Sequence[Pose], pixels: Floats) -> tuple[Floats, Floats]:
-    """Return the 2N x 8 system in M (by rows), b at the mean pixel, and t."""
-    p, z = planar_arrays(poses)
+def _with_spread(
+    camera: CameraModel, fit: LinearFit, offset_mm: float | None, mean_pixel: Sequence[float]
+) -> CameraModel:
+    """Return the camera with how sure its place and its scale are; as it is without a scatter."""
+    if offset_mm is None:
+        return camera
+    variances = fit.unit_covariance.diagonal()
+    # What one look scatters, as wide as the few degrees of freedom made the interval.
+    sigma_mm = offset_mm / math.sqrt(float(variances[6:].max()))
+    px, py = mean_pixel
+    return replace(
+        camera,
+        centre_mm=camera.base_mm(px, py),
+        place_sigma_mm=sigma_mm * math.sqrt(float(variances[4:6].max())),
+        scale_sigma=sigma_mm * math.sqrt(float(variances[:4].max())) / min(camera.scale_mm_per_px),
+    )
+
+
+def _system(
+    poses: Sequence[Pose], pixels: Floats, height: TipHeight | None
+) -> tuple[Floats, Floats, Floats]:
+    """Return the 2N x 8 system in M (by rows), b at the mean pixel, and t.
+
+    The last is by how much its right side changes for 1 mm of the tip's height.
+    """
+    planes = solvable_planes(poses, height)
     a = np.zeros((len(poses), 2, UNKNOWNS))
     # About the mean pixel, M and b hardly disturb each other.
     centred = pixels - pixels.mean(axis=0)
     a[:, 0, 0:2] = a[:, 1, 2:4] = centred
     a[:, 0, 4] = a[:, 1, 5] = 1.0
-    a[:, 0, 6], a[:, 0, 7] = -z.real, z.imag
-    a[:, 1, 6], a[:, 1, 7] = -z.imag, -z.real
-    return a.reshape(-1, UNKNOWNS), np.column_stack((p.real, p.imag)).ravel()
+    a[:, :, 6:] = -np.array([plane.columns for plane in planes]).transpose(0, 2, 1)
+    per_height = np.array([plane.axis for plane in planes])
+    places = np.array([(pose.x_mm, pose.y_mm) for pose in poses], dtype=float)
+    right = places + per_height * known_z_mm(height)
+    return a.reshape(-1, UNKNOWNS), right.ravel(), per_height.ravel()
 
 
 def _camera(x: Floats, mean_pixel: Floats) -> CameraModel:

@@ -1,7 +1,7 @@
 """What a fixed camera does to the plane of the tips: a linear map from pixels to the base."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from robolink.errors import CalibrationError
 from robolink.messages import tr
@@ -17,10 +17,26 @@ class CameraModel:
     Attributes:
         mm_per_px: The 2 x 2 matrix: scale, turn, shear and mirror.
         origin_mm: Base point that is seen at pixel (0, 0).
+        centre_mm: Base point at which its place is known best; ``None`` where nobody knows.
+        place_sigma_mm: Standard deviation there of where it sees a thing, each axis.
+        scale_sigma: Relative standard deviation of its scale.
     """
 
     mm_per_px: Matrix2
     origin_mm: tuple[float, float]
+    centre_mm: tuple[float, float] | None = field(default=None, compare=False)
+    place_sigma_mm: float = field(default=0.0, compare=False)
+    scale_sigma: float = field(default=0.0, compare=False)
+
+    def sigma_at_mm(self, x_mm: float, y_mm: float) -> float:
+        """Return how uncertain it is where a thing is that is seen at a place of the base.
+
+        u^2 = u_place^2 + (u_scale times the distance from the centre)^2
+        (docs/reference/evidence.md 7).
+        """
+        centre = self.centre_mm or (x_mm, y_mm)
+        away_mm = math.dist((x_mm, y_mm), centre)
+        return math.hypot(self.place_sigma_mm, self.scale_sigma * away_mm)
 
     def base_mm(self, px: float, py: float) -> tuple[float, float]:
         """Return where in the base a pixel looks."""

@@ -3,21 +3,41 @@
 What the camera is off by is the same in all looks, while the offset turns with the tool: so
 both are told apart. With the tip seen at s, flange p and R = Rz(U), ``p - s + R t`` is one
 point, and the least squares are those of a pin touched at several angles
-(docs/reference/calibration.md 2.1).
+(docs/reference/calibration.md 2.1). Under a flange that leans or hangs upside down each look
+says ``s - p - c t_z = A t + e`` with the camera's error e (docs/reference/evidence.md 3).
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 
+import numpy as np
+
+from robolink.calibration.camera.camera_model import CameraModel
 from robolink.calibration.camera.up_camera import Sighting, check_sightings, solve_up_camera
-from robolink.calibration.core.planar_checks import require_poses
+from robolink.calibration.core.least_squares import linear_fit
+from robolink.calibration.core.planar_checks import MIN_ROTATION_DEG, check_planar, require_poses
+from robolink.calibration.core.pose_checks import keep_unmeasured
 from robolink.calibration.core.result import CalibrationResult
+from robolink.calibration.flange_checks import with_height_error
+from robolink.calibration.flange_plane import (
+    FlangePlane,
+    TipHeight,
+    height_of,
+    known_z_mm,
+    solvable_planes,
+)
 from robolink.calibration.pin.n_angle import solve_n_angle
+from robolink.calibration.quality.fit_quality import judged
 from robolink.calibration.quality.tolerances import PLANAR_TOLERANCE, Tolerance
 from robolink.model import ToolOffset
 
 CAMERA_MOVED_MM = 0.1
 """A camera that is off by more than this since its own calibration is doubted."""
+
+_UNKNOWNS = 4
+
+_KEPT = ("z_mm", "u_deg", "v_deg", "w_deg")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,7 +61,9 @@ def solve_camera_round(
     sightings: Sequence[Sighting],
     *,
     stored: ToolOffset | None = None,
+    height: TipHeight | None = None,
     sigma_mm: float | None = None,
+    camera: CameraModel | None = None,
     tolerance: Tolerance = PLANAR_TOLERANCE,
 ) -> CameraRound:
     """Return the offset of a tip that a calibrated camera saw at one or several angles.
@@ -50,7 +72,10 @@ def solve_camera_round(
         sightings: The tip, with the flange pose (Tool 0) of each look. A single one relies on
             the camera being where its calibration put it.
         stored: The offset stored now; Z, U, V and W are kept from it, or 0 without one.
+        height: Z of the tip, for a flange that leans; without it that of ``stored`` counts.
         sigma_mm: Standard deviation of one coordinate of one look, where it is known.
+        camera: The camera; what is uncertain about it counts for a single look. Several looks find
+            what it is off by.
         tolerance: Residuals above which the result carries a warning.
 
     Raises:
@@ -62,7 +87,12 @@ def solve_camera_round(
     check_sightings(tuple(sightings))
     inputs = tuple(sighting.flange for sighting in sightings)
     if len(sightings) == 1:
-        return as_round(solve_up_camera(sightings[0], stored=stored, sigma_mm=sigma_mm))
+        found = solve_up_camera(
+            sightings[0], stored=stored, height=height, sigma_mm=sigma_mm, camera=camera
+        )
+        return as_round(found)
+    if any((s.flange.v_deg, s.flange.w_deg) != (0.0, 0.0) for s in sightings):
+        return _leaning(sightings, stored, height_of(stored, height), sigma_mm, tolerance)
     mean_x = sum(sighting.x_mm for sighting in sightings) / len(sightings)
     mean_y = sum(sighting.y_mm for sighting in sightings) / len(sightings)
     on_one_point = [
@@ -78,6 +108,59 @@ def solve_camera_round(
     error_mm = (mean_x - x_mm, mean_y - y_mm)
     result = replace(result, method="camera", inputs=inputs)
     return as_round(result, camera_error_mm=error_mm)
+
+
+def _leaning(
+    sightings: Sequence[Sighting],
+    stored: ToolOffset | None,
+    height: TipHeight | None,
+    sigma_mm: float | None,
+    tolerance: Tolerance,
+) -> CameraRound:
+    """Solve for t and the camera's error with the flange as it hangs.
+
+    Raises:
+        CalibrationError: ``tilted_pose``, and those of :func:`check_planar`.
+    """
+    flanges = tuple(sighting.flange for sighting in sightings)
+    planes = solvable_planes(flanges, height)
+    turned = [
+        replace(flange, u_deg=plane.heading_deg, v_deg=0.0, w_deg=0.0)
+        for flange, plane in zip(flanges, planes, strict=True)
+    ]
+    warnings = check_planar(
+        turned, minimum=2, min_rotation_deg=MIN_ROTATION_DEG, allow_mixed_hand=False
+    )
+    a = np.zeros((len(planes), 2, _UNKNOWNS))
+    a[:, :, :2] = np.array([plane.columns for plane in planes]).transpose(0, 2, 1)
+    a[:, 0, 2] = a[:, 1, 3] = 1.0
+    seen = np.array([(s.x_mm - s.flange.x_mm, s.y_mm - s.flange.y_mm) for s in sightings])
+    lean = np.array([plane.axis for plane in planes]) * known_z_mm(height)
+    fit = linear_fit(a.reshape(-1, _UNKNOWNS), (seen - lean).ravel())
+    x_mm, y_mm, error_x, error_y = fit.x.tolist()
+    residuals = fit.residuals.reshape(-1, 2)
+    mean = np.mean([(s.x_mm, s.y_mm) for s in sightings], axis=0).tolist()
+    result = CalibrationResult(
+        method="camera",
+        offset=keep_unmeasured(stored, x_mm=x_mm, y_mm=y_mm),
+        measured=("x_mm", "y_mm"),
+        kept=_KEPT,
+        reference_point_mm=(mean[0] - error_x, mean[1] - error_y),
+        sigma_gain=math.sqrt(float(fit.unit_covariance.diagonal()[:2].max())),
+        warnings=warnings,
+        inputs=flanges,
+        residuals_mm=tuple(map(tuple, residuals.tolist())),
+        condition_number=fit.condition_number,
+        rank=fit.rank,
+        unobservable=_KEPT,
+    )
+    unit = fit.unit_covariance[:2, :2]
+    result = judged(
+        result, residuals, unit, unknowns=_UNKNOWNS, sigma_mm=sigma_mm, tolerance=tolerance
+    )
+    by_height = FlangePlane.of(flanges[0]).in_flange(0.0, 0.0, 1.0)
+    found = with_height_error(result, by_height, height)
+    return as_round(found, camera_error_mm=(error_x, error_y))
 
 
 def as_round(

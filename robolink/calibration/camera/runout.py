@@ -8,6 +8,9 @@ c is where the camera believes the axis to be off; t is the constant offset that
 and for a tip on the axis its runout; e makes the circle an ellipse (camera scale, or a tilted
 view), and s comes from a bearing or a bent shaft. Only t belongs into a tool
 (docs/reference/calibration.md 2.8).
+
+Few angles cannot tell them apart: at 0 and 180 degrees conj(z) is z. The offset is then that of
+a round circle, and the report says that a wobble would not show (docs/reference/evidence.md 9).
 """
 
 import math
@@ -20,14 +23,29 @@ from robolink.calibration.camera.up_camera import Sighting, check_sightings
 from robolink.calibration.core.dispersion import Dispersion
 from robolink.calibration.core.least_squares import LinearFit, linear_fit
 from robolink.calibration.core.planar_checks import check_planar
+from robolink.calibration.core.statistics import f_quantile
+from robolink.calibration.flange_plane import FlangePlane, standing_upright
 from robolink.calibration.pin.planar import Complexes
 
 HARMONICS_FROM = 8
 """Sightings from which on ellipse and second harmonic are looked for."""
 
-SIGNIFICANT = 3.0
+WOBBLE_QUANTILE = 0.995
+"""Of F, for each of two amplitudes: a round circle is said to wobble in 1 % of the cases."""
 
-_BENT_ARC_DEG = 180.0
+_HARMONICS = 4
+
+_RANK_BELOW = 1e-6
+
+_BADLY_TOLD_APART = 100.0
+"""Condition above which angles are too near each other, so that errors come out as wobble."""
+
+_SAME_ANGLE_DEG = 0.01
+
+_ROUNDING_MM = 1e-9
+
+_BENT_ARC_DEG = 179.99
+"""Half a turn, as printed angles hold it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,13 +56,16 @@ class RunoutReport:
         tip_mm: The constant offset (first harmonic), x and y in the flange's axes.
         half_width95_mm: Half its 95 % interval, ``None`` when nothing tells the scatter.
         centre_mm: By how much the camera's place for the axis is off, base axes.
-        ellipse_mm: Amplitude of the ellipse, ``None`` with too few sightings.
+        ellipse_mm: Amplitude of the ellipse, ``None`` with too few sightings or angles.
         second_mm: Amplitude of the second harmonic, likewise.
+        amplitude_limit_mm: An amplitude beyond this is no noise, ``None`` without a test.
         rms_mm: Of what the constant offset leaves.
         peak_mm: The largest of it.
         rms_after_mm: Of what all harmonics together leave.
         harmonics_matter: Whether they explain what the offset leaves, beyond the noise.
-        warnings: Named doubts.
+        distinct_angles: How many angles there are, modulo 360.
+        rank: How many of the four terms they tell apart.
+        warnings: Named doubts: ``wobble``, ``wobble_not_identifiable``, ``small_rotation``.
     """
 
     tip_mm: tuple[float, float]
@@ -52,10 +73,13 @@ class RunoutReport:
     centre_mm: tuple[float, float]
     ellipse_mm: float | None
     second_mm: float | None
+    amplitude_limit_mm: float | None
     rms_mm: float
     peak_mm: float
     rms_after_mm: float | None
     harmonics_matter: bool
+    distinct_angles: int
+    rank: int
     warnings: tuple[str, ...]
 
     @property
@@ -68,51 +92,96 @@ def runout_report(sightings: Sequence[Sighting], *, sigma_mm: float | None = Non
     """Return offset and wobble of a tip that was seen at several angles.
 
     Args:
-        sightings: At least four, over half a turn or more; the flange may stand anywhere.
+        sightings: At least four, over half a turn or more; the flange may stand anywhere, upright
+            or upside down.
         sigma_mm: Standard deviation of one coordinate of one sighting, when it is known.
 
     Raises:
-        CalibrationError: ``too_few_poses``, ``insufficient_rotation``, ``degenerate_angles``
-            and those of ``pose_checks.check_poses``.
+        CalibrationError: ``too_few_poses``, ``insufficient_rotation``, ``degenerate_angles``,
+            ``tilted_pose``, ``tool_pose``, ``local_pose`` and those of ``pose_checks.check_poses``.
         ConfigError: ``sigma_mm`` is not positive.
     """
-    flanges = [sighting.flange for sighting in sightings]
+    check_sightings(tuple(sightings))
+    flanges = standing_upright([sighting.flange for sighting in sightings])
     warnings = check_planar(
         flanges, minimum=4, min_rotation_deg=_BENT_ARC_DEG, allow_mixed_hand=False
     )
-    check_sightings(tuple(sightings))
     seen = np.array([complex(s.x_mm - s.flange.x_mm, s.y_mm - s.flange.y_mm) for s in sightings])
-    z = np.exp(1j * np.radians([flange.u_deg for flange in flanges]))
+    angles_deg = [flange.u_deg for flange in flanges]
+    z = np.exp(1j * np.radians(angles_deg))
+    distinct = _distinct(angles_deg)
+    rank, told_apart = _told_apart(distinct)
+    if not told_apart:
+        warnings = (*warnings, "wobble_not_identifiable")
     plain = _harmonics(seen, [np.ones_like(z), z])
-    left = plain.residuals.reshape(2, -1)
-    total, dof = float((left**2).sum()), 2 * len(seen) - 4
     full = None
-    if len(seen) >= HARMONICS_FROM:
+    if told_apart and len(seen) >= HARMONICS_FROM:
         full = _harmonics(seen, [np.ones_like(z), z, z.conj(), z**2])
-        noise, spare = float(full.residuals @ full.residuals), 2 * len(seen) - 8
-    else:
-        noise, spare = total, dof
-    scatter = Dispersion.of(noise, spare, sigma_mm)
-    best = full or plain
-    amplitudes = [math.hypot(*best.x[k : k + 2].tolist()) for k in range(4, len(best.x), 2)]
-    matters = bool(
-        amplitudes
-        and scatter
-        and max(amplitudes) > SIGNIFICANT * scatter.sigma_mm * math.sqrt(best.unit_covariance[4, 4])
+    upside_down = FlangePlane.of(sightings[0].flange).r33 < 0
+    return _report(
+        plain, full, sigma_mm, mirror=upside_down, counts=(len(distinct), rank), warnings=warnings
     )
+
+
+def _report(
+    plain: LinearFit,
+    full: LinearFit | None,
+    sigma_mm: float | None,
+    *,
+    mirror: bool,
+    counts: tuple[int, int],
+    warnings: tuple[str, ...],
+) -> RunoutReport:
+    best, left = full or plain, plain.residuals.reshape(2, -1)
+    noise, dof = float(best.residuals @ best.residuals), best.residuals.size - len(best.x)
+    scatter = Dispersion.of(noise, dof, sigma_mm)
+    amplitudes = [math.hypot(*best.x[k : k + 2].tolist()) for k in range(4, len(best.x), 2)]
+    limit = None
+    if full is not None:
+        # The scatter of these sightings, stated or not: only so is the share of false alarms kept.
+        gain = math.sqrt(
+            2 * f_quantile(WOBBLE_QUANTILE, 2, dof) * float(full.unit_covariance[4, 4])
+        )
+        limit = gain * math.sqrt(noise / dof)
+    matters = limit is not None and max(amplitudes) > max(limit, _ROUNDING_MM)
+    centre_x, centre_y, x, y = best.x[:4].tolist()
     gain = math.sqrt(float(best.unit_covariance[2, 2]))
+    distinct, rank = counts
     return RunoutReport(
-        tip_mm=(float(best.x[2]), float(best.x[3])),
+        tip_mm=(x, -y if mirror else y),
         half_width95_mm=scatter.factor95 * scatter.sigma_mm * gain if scatter else None,
-        centre_mm=(float(best.x[0]), float(best.x[1])),
+        centre_mm=(centre_x, centre_y),
         ellipse_mm=amplitudes[0] if amplitudes else None,
         second_mm=amplitudes[1] if amplitudes else None,
-        rms_mm=math.sqrt(total / len(seen)),
+        amplitude_limit_mm=limit,
+        rms_mm=math.sqrt(float((left**2).sum()) / left.shape[1]),
         peak_mm=float(np.hypot(*left).max()),
-        rms_after_mm=math.sqrt(noise / len(seen)) if full else None,
+        rms_after_mm=math.sqrt(noise / left.shape[1]) if full else None,
         harmonics_matter=matters,
+        distinct_angles=distinct,
+        rank=rank,
         warnings=(*warnings, "wobble") if matters else warnings,
     )
+
+
+def _distinct(angles_deg: Sequence[float]) -> list[float]:
+    """Return the angles modulo 360, those that agree within the encoder's noise once."""
+    found: list[float] = []
+    for angle in sorted(angle % 360.0 for angle in angles_deg):
+        if not found or angle - found[-1] > _SAME_ANGLE_DEG:
+            found.append(angle)
+    if len(found) > 1 and found[0] + 360.0 - found[-1] <= _SAME_ANGLE_DEG:
+        found.pop()
+    return found
+
+
+def _told_apart(angles_deg: Sequence[float]) -> tuple[int, bool]:
+    """Return how many of the four terms some angles tell apart, and whether all of them well."""
+    z = np.exp(1j * np.radians(angles_deg))
+    columns = np.column_stack((np.ones_like(z), z, z.conj(), z**2))
+    sizes = np.linalg.svd(columns, compute_uv=False)
+    rank = int((sizes > _RANK_BELOW).sum())
+    return rank, rank == _HARMONICS and bool(sizes[0] <= _BADLY_TOLD_APART * sizes[-1])
 
 
 def _harmonics(seen: Complexes, terms: Sequence[Complexes]) -> LinearFit:

@@ -2,15 +2,29 @@
 
 The camera tells where the tip is in the base, the controller where the flange is:
 ``t = Rz(-U) (tip - flange)``. In this form there is no Atan2(0, 0) and no order of its
-arguments to get wrong (docs/reference/calibration.md 1.2).
+arguments to get wrong (docs/reference/calibration.md 1.2). A flange that leans or hangs upside
+down takes the general form (docs/reference/evidence.md 3): with the tip's height seen as well it
+is ``R' (tip - flange)``.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
+from robolink.calibration.camera.camera_model import CameraModel
 from robolink.calibration.core.dispersion import Dispersion
 from robolink.calibration.core.pose_checks import check_poses, keep_unmeasured, require_finite
 from robolink.calibration.core.result import CalibrationResult
-from robolink.model import Pose, ToolOffset, rotate_xy
+from robolink.calibration.flange_checks import require_flange_in_base, with_height_error
+from robolink.calibration.flange_plane import (
+    FlangePlane,
+    TipHeight,
+    height_of,
+    known_z_mm,
+    solvable_planes,
+)
+from robolink.calibration.quality.station_part import StationPart, with_station
+from robolink.messages import tr
+from robolink.model import Pose, ToolOffset
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,47 +34,106 @@ class Sighting:
     Attributes:
         flange: Actual flange pose (Tool 0) at the picture, mm and degrees.
         x_mm, y_mm: Where it was seen, in the base.
+        z_mm: Its height there, ``None`` for a camera that does not tell it.
     """
 
     flange: Pose
     x_mm: float
     y_mm: float
+    z_mm: float | None = None
 
-    def in_flange_mm(self) -> tuple[float, float]:
-        """Return where it is in the flange's axes."""
-        return rotate_xy(
-            self.x_mm - self.flange.x_mm, self.y_mm - self.flange.y_mm, -self.flange.u_deg
-        )
+    def in_flange_mm(self, tip_z_mm: float = 0.0) -> tuple[float, float]:
+        """Return X and Y of what was seen, in the flange's axes, where its Z is ``tip_z_mm``."""
+        dx, dy = self.x_mm - self.flange.x_mm, self.y_mm - self.flange.y_mm
+        return FlangePlane.of(self.flange).in_flange(dx, dy, tip_z_mm)
 
 
 def solve_up_camera(
-    sighting: Sighting, *, stored: ToolOffset | None = None, sigma_mm: float | None = None
+    sighting: Sighting,
+    *,
+    stored: ToolOffset | None = None,
+    height: TipHeight | None = None,
+    sigma_mm: float | None = None,
+    camera: CameraModel | None = None,
 ) -> CalibrationResult:
     """Return the offset of a tip that a calibrated camera saw once.
 
     Args:
-        sighting: The tip, and the flange pose at that moment.
+        sighting: The tip, and the flange pose at that moment. With its height Z is measured as
+            well, and the flange may lean as it likes.
         stored: The offset stored now; Z, U, V and W are kept from it, or 0 without one.
+        height: Z of the tip, for a flange that leans; without it that of ``stored`` counts.
         sigma_mm: Standard deviation of one coordinate of one sighting, robot and camera
             together. Without it the result has no interval: one look leaves no residual.
+        camera: The camera, whose place and scale are as uncertain as they say.
 
     An error of the camera's own calibration goes into the offset in full and shows in no
     residual. Several looks at different U tell it (:func:`solve_n_angle`).
 
     Raises:
-        CalibrationError: ``non_finite``, ``suspect_units`` or ``implausible_offset``.
+        CalibrationError: ``non_finite``, ``suspect_units``, ``tool_pose``, ``local_pose``,
+            ``tilted_pose`` or ``implausible_offset``.
         ConfigError: ``sigma_mm`` is not positive.
     """
     check_sightings((sighting,))
-    x_mm, y_mm = sighting.in_flange_mm()
-    scatter = Dispersion.of(0.0, 0, sigma_mm)
-    covariance = ((scatter.sigma_mm**2, 0.0), (0.0, scatter.sigma_mm**2)) if scatter else ()
+    if sighting.z_mm is not None:
+        in_space = _seen_in_space(sighting, sighting.z_mm, stored, sigma_mm)
+        return _with_camera(in_space, sighting, camera)
+    height = height_of(stored, height)
+    (plane,) = solvable_planes((sighting.flange,), height)
+    x_mm, y_mm = sighting.in_flange_mm(known_z_mm(height))
+    result = _one_look(sighting, {"x_mm": x_mm, "y_mm": y_mm}, stored, sigma_mm)
+    result = with_height_error(result, plane.in_flange(0.0, 0.0, 1.0), height)
+    return _with_camera(result, sighting, camera)
+
+
+def _with_camera(
+    result: CalibrationResult, sighting: Sighting, camera: CameraModel | None
+) -> CalibrationResult:
+    """Return a result with what its camera is unsure of: as much in every direction."""
+    if camera is None:
+        return result
+    variance = camera.sigma_at_mm(sighting.x_mm, sighting.y_mm) ** 2
+    axes = range(len(result.measured))
+    part = StationPart(
+        tr("place and scale of the camera"),
+        tuple(tuple(variance if i == j else 0.0 for j in axes) for i in axes),
+        origin=tr("record of the station"),
+    )
+    return with_station(result, part)
+
+
+def _seen_in_space(
+    sighting: Sighting, z_mm: float, stored: ToolOffset | None, sigma_mm: float | None
+) -> CalibrationResult:
+    from robolink.calibration.core.rotations import rotation_of  # numpy, which X and Y do without
+
+    flange = sighting.flange
+    away = (sighting.x_mm - flange.x_mm, sighting.y_mm - flange.y_mm, z_mm - flange.z_mm)
+    x_mm, y_mm, z_mm = (rotation_of(flange).T @ away).tolist()
+    return _one_look(sighting, {"x_mm": x_mm, "y_mm": y_mm, "z_mm": z_mm}, stored, sigma_mm)
+
+
+def _one_look(
+    sighting: Sighting,
+    found: dict[str, float],
+    stored: ToolOffset | None,
+    sigma_mm: float | None,
+) -> CalibrationResult:
+    scatter, axes = Dispersion.of(0.0, 0, sigma_mm), range(len(found))
+    covariance: tuple[tuple[float, ...], ...] = ()
+    if scatter:
+        # A rotation leaves errors that are alike in all directions as they are.
+        variance = scatter.sigma_mm**2
+        covariance = tuple(tuple(variance if i == j else 0.0 for j in axes) for i in axes)
+    others = tuple(n for n in ("z_mm", "u_deg", "v_deg", "w_deg") if n not in found)
+    place = (sighting.x_mm, sighting.y_mm, sighting.z_mm)
     return CalibrationResult(
         method="camera",
-        offset=keep_unmeasured(stored, x_mm=x_mm, y_mm=y_mm),
-        measured=("x_mm", "y_mm"),
-        kept=("z_mm", "u_deg", "v_deg", "w_deg"),
-        reference_point_mm=(sighting.x_mm, sighting.y_mm),
+        offset=keep_unmeasured(stored, **found),
+        measured=tuple(found),
+        kept=others,
+        reference_point_mm=tuple(value for value in place if value is not None),
         sigma_gain=1.0,
         warnings=(),
         inputs=(sighting.flange,),
@@ -68,24 +141,40 @@ def solve_up_camera(
         half_width95=scatter.half_widths(covariance) if scatter else (),
         sigma_mm=sigma_mm,
         sigma_stated=scatter is not None,
-        rank=2,
+        rank=len(found),
         dof=0,
-        unobservable=("z_mm", "u_deg", "v_deg", "w_deg"),
+        unobservable=others,
     )
 
 
 def check_sightings(
     sightings: tuple[Sighting, ...], *, allow_mixed_hand: bool = False
 ) -> tuple[str, ...]:
-    """Refuse sightings that are no numbers or do not belong together.
+    """Refuse sightings that are no numbers or do not belong together, or not to the base.
 
     Raises:
-        CalibrationError: ``non_finite``, ``suspect_units``, ``mixed_hand``, ``mixed_local``
-            or ``mixed_tool``.
+        CalibrationError: ``non_finite``, ``suspect_units``, ``mixed_hand``, ``mixed_local``,
+            ``mixed_tool``, ``tool_pose`` or ``local_pose``.
     """
     for number, sighting in enumerate(sightings, start=1):
         require_finite(
             **{f"x_mm of sighting {number}": sighting.x_mm},
             **{f"y_mm of sighting {number}": sighting.y_mm},
+            **{f"z_mm of sighting {number}": sighting.z_mm or 0.0},
         )
-    return check_poses([s.flange for s in sightings], allow_mixed_hand=allow_mixed_hand)
+    flanges = [sighting.flange for sighting in sightings]
+    doubts = check_poses(flanges, allow_mixed_hand=allow_mixed_hand)
+    require_flange_in_base(flanges)
+    return doubts
+
+
+def seen_in_flange(
+    sightings: Sequence[Sighting], height: TipHeight | None
+) -> list[tuple[float, float]]:
+    """Return X and Y of everything seen, in the flange's axes.
+
+    Raises:
+        CalibrationError: ``tilted_pose``.
+    """
+    solvable_planes([sighting.flange for sighting in sightings], height)
+    return [sighting.in_flange_mm(known_z_mm(height)) for sighting in sightings]

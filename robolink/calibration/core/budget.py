@@ -7,9 +7,9 @@ expanded uncertainty is Student's t for nu_eff, cut to a whole number, times u_c
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Final, Literal, Self
+from typing import Any, Final, Literal, Self
 
 from robolink.calibration.core.statistics import student_t
 
@@ -72,6 +72,26 @@ class UncertaintyBudget:
     ) -> Self:
         """Return the budget of some rows."""
         return cls(tuple(rows), tuple(not_assessed), probability)
+
+    @classmethod
+    def from_json(cls, document: Mapping[str, Any]) -> Self:
+        """Return the budget that :meth:`as_json` wrote.
+
+        Raises:
+            KeyError, TypeError, ValueError: It is none.
+        """
+        rows = (
+            BudgetRow(
+                row["name"],
+                float(row["u_mm"]),
+                math.inf if row["nu"] is None else float(row["nu"]),
+                float(row["sensitivity"]),
+                row["origin"],
+                row["kind"],
+            )
+            for row in document["rows"]
+        )
+        return cls(tuple(rows), tuple(document["not_assessed"]), float(document["probability"]))
 
     def with_row(self, row: BudgetRow) -> "UncertaintyBudget":
         """Return the budget with one row more, which then counts as assessed."""

@@ -1,66 +1,111 @@
 """How large the placement errors are, and what follows for an interval.
 
-Either the poses tell it themselves, by their residuals and with Student's t, or somebody who
-knows the cell states it. Without one of them there is no interval, and none is made up.
+Three things can tell it: the residuals, with Student's t; somebody who knows the cell and states
+it; the grid on which the tip was jogged. The one that gives the widest interval decides, because a
+residual can be small by luck and a statement wrong (docs/reference/evidence.md 5, 6). Where none
+of them exists there is no interval, and none is made up.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Self
+from typing import Final, Literal, Self
 
-from robolink.calibration.core.statistics import NORMAL_95, student_t95
+from robolink.calibration.core.budget import BudgetRow, UncertaintyBudget
+from robolink.calibration.core.statistics import f_quantile, student_t95
 from robolink.errors import ConfigError
 from robolink.messages import tr
 
-DISBELIEVED_ABOVE = 3.0
-"""Residuals this many times larger than the stated sigma contradict it."""
+Source = Literal["residuals", "stated", "resolution"]
+
+_REGION: Final = 0.95
 
 
 @dataclass(frozen=True, slots=True)
 class Dispersion:
-    """Standard deviation of one coordinate of one placement, and the factor for 95 %.
+    """Standard deviation of one coordinate of one placement.
 
     Attributes:
         sigma_mm: The standard deviation.
-        stated: Whether a person stated it.
-        factor95: Student's t for an estimate, the normal quantile for a stated value.
+        nu: Its degrees of freedom; infinite for what is known otherwise than from residuals.
+        source: What told it.
     """
 
     sigma_mm: float
-    stated: bool
-    factor95: float
+    nu: float
+    source: Source
 
     @classmethod
-    def of(cls, sum_of_squares: float, dof: int, stated_mm: float | None) -> Self | None:
-        """Return what is known, ``None`` when nothing is.
+    def of(
+        cls,
+        sum_of_squares: float,
+        dof: int,
+        stated_mm: float | None,
+        grid_mm: float | None = None,
+    ) -> Self | None:
+        """Return what gives the widest interval; ``None`` when nothing is known.
 
         Args:
             sum_of_squares: Of all residual coordinates, mm^2.
             dof: Degrees of freedom that are left.
-            stated_mm: The stated sigma, if there is one; it goes before the estimate.
+            stated_mm: The stated sigma, if there is one.
+            grid_mm: Step of the jogs, if it is known: q / sqrt(12) is its standard uncertainty.
 
         Raises:
-            ConfigError: The stated sigma is not a positive number.
+            ConfigError: The stated sigma or the grid is not a positive number.
         """
+        known = cls.known(sum_of_squares, dof, stated_mm, grid_mm)
+        return max(known, key=lambda one: one.sigma_mm * one.factor95, default=None)
+
+    @classmethod
+    def known(
+        cls,
+        sum_of_squares: float,
+        dof: int,
+        stated_mm: float | None,
+        grid_mm: float | None = None,
+    ) -> Iterator[Self]:
+        """Yield each of the three that there is; see :meth:`of`."""
+        if dof > 0:
+            yield cls(math.sqrt(sum_of_squares / dof), dof, "residuals")
         if stated_mm is not None:
             require_positive(stated_mm, "sigma_mm")
-            return cls(stated_mm, True, NORMAL_95)
-        if dof < 1:
-            return None
-        return cls(math.sqrt(sum_of_squares / dof), False, student_t95(dof))
+            yield cls(stated_mm, math.inf, "stated")
+        if grid_mm is not None:
+            require_positive(grid_mm, "grid_mm")
+            yield cls(grid_mm / math.sqrt(12), math.inf, "resolution")
 
-    def contradicted_by(self, sum_of_squares: float, dof: int) -> bool:
-        """Tell whether the residuals are far larger than a stated sigma allows."""
-        if not self.stated or dof < 1:
-            return False
-        return math.sqrt(sum_of_squares / dof) > DISBELIEVED_ABOVE * self.sigma_mm
+    @property
+    def factor95(self) -> float:
+        """Student's t for an estimate, the normal quantile for what is known."""
+        return student_t95(self.nu)
+
+    def region_factor(self, dimensions: int) -> float:
+        """Return the factor for a region of 95 % in several dimensions together."""
+        return math.sqrt(dimensions * f_quantile(_REGION, dimensions, self.nu))
 
     def half_widths(self, covariance: Sequence[Sequence[float]]) -> tuple[float, ...]:
         """Return half of each component's 95 % interval."""
         return tuple(
             self.factor95 * math.sqrt(max(row[index], 0.0)) for index, row in enumerate(covariance)
         )
+
+    def budget(self, gain: float) -> UncertaintyBudget:
+        """Return the budget of a length in which one placement's error counts ``gain`` times."""
+        name, origin = {
+            "residuals": (tr("scatter of the touches"), tr("how well they agree")),
+            "stated": (tr("error of a touch"), tr("stated for this cell")),
+            "resolution": (tr("step of the jogs"), tr("the grid that they lie on")),
+        }[self.source]
+        kind: Literal["A", "B"] = "A" if self.source == "residuals" else "B"
+        row = BudgetRow(name, self.sigma_mm, self.nu, gain, origin, kind)
+        unknown = (
+            tr("angle of U"),
+            tr("repeatability of the robot"),
+            tr("linearity over the poses"),
+            tr("temperature"),
+        )
+        return UncertaintyBudget.of((row,), not_assessed=unknown)
 
 
 def require_positive(value: float, name: str) -> None:

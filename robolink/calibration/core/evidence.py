@@ -49,7 +49,7 @@ class FitEvidence:
         run_order: The test of the order, where there are enough touches.
         consensus: How many poses a robust fit kept.
         seed_spread_mm: How far its results under different seeds lie apart.
-        resolution_mm: Grid of the jogs, when it is known.
+        grid_mm: Step of the jogs, when it is known.
     """
 
     distinct: int | None = None
@@ -62,7 +62,7 @@ class FitEvidence:
     run_order: RunOrder | None = None
     consensus: int | None = None
     seed_spread_mm: float | None = None
-    resolution_mm: float | None = None
+    grid_mm: float | None = None
 
     def as_json(self) -> dict[str, object]:
         """Return what is known of it as plain values."""
@@ -76,7 +76,7 @@ class FitEvidence:
             "birge_ratio": self.birge_ratio,
             "consensus": self.consensus,
             "seed_spread_mm": self.seed_spread_mm,
-            "jog_grid_mm": self.resolution_mm,
+            "jog_grid_mm": self.grid_mm,
         }
         if self.run_order is not None:
             order = self.run_order

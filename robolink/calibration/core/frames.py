@@ -1,8 +1,13 @@
 """Where the flange is when a tip is somewhere, and a tip seen from another one."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
+from typing import Final
 
 from robolink.model import Pose, ToolOffset, rotate_xy
+
+_NONE: Final[Mapping[int, ToolOffset]] = MappingProxyType({})
 
 
 def flange_pose(tip: Pose, offset: ToolOffset) -> Pose:
@@ -58,6 +63,55 @@ def tilted_from(written: ToolOffset, tip: ToolOffset) -> ToolOffset:
     aside = [b - a for a, b in zip(written.components(), tip.components(), strict=True)][:3]
     x_mm, y_mm, z_mm = (own.T @ aside).tolist()
     return ToolOffset(x_mm, y_mm, z_mm)
+
+
+def flange_poses(
+    poses: Sequence[Pose],
+    *,
+    tools: Mapping[int, ToolOffset] = _NONE,
+    local_frames: Mapping[int, ToolOffset] = _NONE,
+) -> tuple[Pose, ...]:
+    """Return poses of tools and locals as poses of the flange in the base.
+
+    ``flange = Local * pose * inverse(Tool)`` (docs/reference/evidence.md 4). A tool or local whose
+    value is not given is left in the pose, for whoever solves it to refuse.
+
+    Args:
+        poses: Poses with the tool and the local in which they were taken.
+        tools: Values of tools, by number.
+        local_frames: Where locals lie in the base, by number.
+    """
+    return tuple(_converted(pose, tools, local_frames) for pose in poses)
+
+
+def _converted(
+    pose: Pose, tools: Mapping[int, ToolOffset], local_frames: Mapping[int, ToolOffset]
+) -> Pose:
+    if pose.local in local_frames and pose.local:
+        pose = in_base(pose, local_frames[pose.local])
+    return flange_of(pose, tools[pose.tool]) if pose.tool and pose.tool in tools else pose
+
+
+def in_base(pose: Pose, local: ToolOffset) -> Pose:
+    """Return a pose of a local as a pose of the base: ``R_l p + p_l``, orientation ``R_l R``."""
+    if (pose.v_deg, pose.w_deg, local.v_deg, local.w_deg) == (0.0, 0.0, 0.0, 0.0):
+        dx, dy = rotate_xy(pose.x_mm, pose.y_mm, local.u_deg)
+        return replace(
+            pose,
+            x_mm=local.x_mm + dx,
+            y_mm=local.y_mm + dy,
+            z_mm=local.z_mm + pose.z_mm,
+            u_deg=local.u_deg + pose.u_deg,
+            local=0,
+        )
+    from robolink.calibration.core.rotations import (  # numpy, which four axes do without
+        rotation_of,
+        uvw_deg,
+    )
+
+    own = rotation_of(Pose(0.0, 0.0, 0.0, local.u_deg, local.v_deg, local.w_deg))
+    x_mm, y_mm, z_mm = (own @ pose.coordinates()[:3] + local.components()[:3]).tolist()
+    return Pose(x_mm, y_mm, z_mm, *uvw_deg(own @ rotation_of(pose)), hand=pose.hand, tool=pose.tool)
 
 
 def flange_of(tip: Pose, offset: ToolOffset) -> Pose:

@@ -36,11 +36,11 @@ class CalibrationResult:
         covariance: Of the measured components, in their order: mm^2 between two lengths,
             deg^2 between two angles, mm deg between both. Empty when neither a residual nor
             a stated sigma tells how large the errors are.
-        half_width95: Half the 95 % interval of each measured component, in their order, mm or
-            degrees: Student's t where the scatter was estimated, the normal distribution where
-            it was stated. Empty when ``covariance`` is.
-        sigma_mm: Standard deviation of one coordinate of one placement, as it was stated or
-            estimated; ``None`` when it is unknown.
+        half_width95: Half the 95 % interval of each measured component alone, in their order, mm
+            or degrees: the widest of what residuals, a stated sigma and the grid of the jogs
+            give. Empty when ``covariance`` is.
+        sigma_mm: Standard deviation of one coordinate of one placement that the interval rests
+            on; ``None`` when it is unknown.
         sigma_stated: Whether ``sigma_mm`` was stated by the caller.
         rms_mm: Root mean square of the residual distances that were kept, ``None`` without a
             degree of freedom.

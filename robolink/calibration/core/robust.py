@@ -1,17 +1,22 @@
-"""Which poses belong together: many small draws, the best of them, then refits.
+"""Which poses belong together: the largest set that agrees on one tip.
 
-Whole poses are rejected, never single coordinates. A known measurement scale decides best;
-without one it is estimated from the median residual of the best draw
-(docs/reference/calibration.md 2.10).
+Whole poses are rejected, never single coordinates. Every smallest sample that has a solution is
+tried where there are not too many of them, else random draws; the best of them are refined until
+their set stays, and the largest set is kept. So the answer is a property of the data, not of the
+seed of the draws, and where draws under several seeds disagree that is told
+(docs/reference/evidence.md 10).
 """
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import TypeVar
+from itertools import combinations
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from robolink.calibration.core.dispersion import require_positive
 from robolink.errors import CalibrationError
 from robolink.messages import tr
 
@@ -19,18 +24,26 @@ Floats = NDArray[np.float64]
 
 Mask = NDArray[np.bool_]
 
-FitT = TypeVar("FitT")
+Indices = NDArray[np.intp]
 
-ResidualsT = TypeVar("ResidualsT")
-
-REJECT_BEYOND = 3.0
+REJECT_BEYOND: Final = 4.0
 """Residual distance, in standard deviations of a coordinate, beyond which a pose is rejected."""
 
-MOST_REFITS = 20
+MOST_SAMPLES: Final = 20_000
+"""Up to so many smallest samples are all tried."""
 
+REFINED: Final = 30
+"""So many of the best samples are refined."""
+
+MOST_REFITS: Final = 20
+
+_WIDER: Final = (1.5, 1.25, 1.0)
+
+_AT_ONCE: Final = 400_000
+"""Distances that are computed in one piece, so that the memory stays small."""
 
 # Median length of a normal vector with 2 or 3 coordinates, in standard deviations of one.
-_MEDIAN_DISTANCE = {2: 1.1774100225, 3: 1.5381722545}
+_MEDIAN_DISTANCE: Final = {2: 1.1774100225, 3: 1.5381722545}
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,94 +51,199 @@ class Robust:
     """How outliers are looked for.
 
     Attributes:
-        threshold_mm: Residual distance beyond which a pose is rejected; ``None`` takes three
+        threshold_mm: Residual distance beyond which a pose is rejected; ``None`` takes four
             times the stated sigma, or the estimated one.
-        resolution_mm: No coordinate is taken to be better than this, so that a lucky draw of
+        resolution_mm: No coordinate is taken to be better than this, so that a lucky sample of
             exact values does not reject all others. The default is half a small pixel.
-        draws: Minimal draws; 52 find a clean one with 99.9 % at one half of outliers.
-        seed: Of the draws; the same seed gives the same result.
+        draws: Random samples, where there are too many to try all.
+        seeds: Of the draws, one set of draws each. The largest set that any of them finds is the
+            result; how far they lie apart is told.
     """
 
     threshold_mm: float | None = None
     resolution_mm: float = 0.005
     draws: int = 100
-    seed: int = 1
+    seeds: tuple[int, ...] = (1, 2, 3, 4, 5)
 
 
-def draw_poses(count: int, size: int, robust: Robust) -> NDArray[np.intp]:
+@dataclass(frozen=True, slots=True)
+class Consensus:
+    """Poses that agree.
+
+    Attributes:
+        kept: Which they are, in the largest set that was found.
+        others: Different sets that single seeds ended with.
+    """
+
+    kept: Mask
+    others: tuple[Mask, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Agreement:
+    """What the search asks of a method.
+
+    Attributes:
+        count: How many poses there are.
+        size: How many of them have one solution.
+        dimensions: Coordinates of a residual, 2 or 3.
+        unknowns: Numbers that a fit finds.
+        of_samples: Residual distances of all poses, a row for each sample; infinite where a
+            sample cannot tell.
+        of_fit: Residual distances of all poses from the least squares of some; ``None`` where
+            these cannot tell.
+    """
+
+    count: int
+    size: int
+    dimensions: int
+    unknowns: int
+    of_samples: Callable[[Indices], Floats]
+    of_fit: Callable[[Mask], Floats | None]
+
+
+def largest_consensus(
+    agreement: Agreement, robust: Robust, *, sigma_mm: float | None = None
+) -> Consensus:
+    """Return the largest set of poses that agree.
+
+    Raises:
+        CalibrationError: ``too_many_outliers`` when more than a third is left out.
+        ConfigError: The threshold is not positive.
+    """
+    known = _known_threshold(robust, sigma_mm)
+    memory: dict[bytes, Floats | None] = {}
+    ends = [
+        _best_set(agreement, samples, robust, known, memory)
+        for samples in _starts(agreement, robust)
+    ]
+    found = [end for end in ends if end is not None]
+    if not found:
+        raise _too_many(agreement.count, agreement.count)
+    _, _, best = min(found, key=lambda end: end[:2])
+    rejected = int(np.count_nonzero(~best))
+    if 3 * rejected > best.size:
+        raise _too_many(rejected, best.size)
+    different = {mask.tobytes(): mask for _, _, mask in found if not np.array_equal(mask, best)}
+    return Consensus(best, tuple(different.values()))
+
+
+def draw_poses(count: int, size: int, draws: int, seed: int) -> Indices:
     """Return draws of ``size`` different poses out of ``count``, one a row."""
-    random = np.random.default_rng(robust.seed)
-    drawn = np.empty((robust.draws, 0), dtype=np.intp)
+    random = np.random.default_rng(seed)
+    drawn = np.empty((draws, 0), dtype=np.intp)
     for taken in range(size):
-        pick = random.integers(0, count - taken, robust.draws)
+        pick = random.integers(0, count - taken, draws)
         for earlier in np.sort(drawn, axis=1).T:
             pick += pick >= earlier
         drawn = np.column_stack((drawn, pick))
     return drawn
 
 
-def first_guess(distances_mm: Floats, threshold_mm: float | None) -> int:
-    """Return which draw explains the poses best.
+def _starts(agreement: Agreement, robust: Robust) -> Iterator[Indices]:
+    """Yield all smallest samples at once, or draws of them, one set for each seed."""
+    count, size = agreement.count, agreement.size
+    if math.comb(count, size) <= MOST_SAMPLES:
+        yield np.array(list(combinations(range(count), size)), dtype=np.intp)
+        return
+    for seed in robust.seeds:
+        yield draw_poses(count, size, robust.draws, seed)
 
-    Args:
-        distances_mm: Residual distances, a row for each draw and a column for each pose.
-        threshold_mm: Known threshold; without one the least median decides.
-    """
+
+def _known_threshold(robust: Robust, sigma_mm: float | None) -> float | None:
+    if robust.threshold_mm is not None:
+        require_positive(robust.threshold_mm, "threshold_mm")
+        return robust.threshold_mm
+    return None if sigma_mm is None else REJECT_BEYOND * max(sigma_mm, robust.resolution_mm)
+
+
+def _best_set(
+    agreement: Agreement,
+    samples: Indices,
+    robust: Robust,
+    known_mm: float | None,
+    memory: dict[bytes, Floats | None],
+) -> tuple[int, float, Mask] | None:
+    """Return the largest set, as minus its size, its sum of squares and itself."""
+
+    def refit(kept: Mask) -> Floats | None:
+        key = kept.tobytes()
+        if key not in memory:
+            memory[key] = agreement.of_fit(kept)
+        return memory[key]
+
+    best = _best_samples(agreement, samples, known_mm)
+    starts = agreement.of_samples(samples[best])
+    threshold_mm = known_mm
     if threshold_mm is None:
-        return int(np.argmin(np.median(distances_mm, axis=1)))
-    # As many as possible, and among equals the tightest.
-    return int(np.argmin(np.minimum(distances_mm / threshold_mm, 1.0).sum(axis=1)))
+        threshold_mm = _estimated(agreement, robust, starts[0], refit)
+    ends = (_settled(distances, threshold_mm, refit) for distances in starts)
+    # Python keeps the first among equals: the sample with the least cost.
+    return min(
+        ((-int(kept.sum()), squares, kept) for kept, squares in filter(None, ends)),
+        key=lambda end: end[:2],
+        default=None,
+    )
 
 
-def refit_until_settled(
-    residuals: ResidualsT,
-    *,
-    refit: Callable[[Mask], ResidualsT],
-    distances: Callable[[ResidualsT], Floats],
-    threshold: Callable[[Floats], float],
-    finish: Callable[[Mask], FitT],
-) -> tuple[FitT, Mask]:
-    """Fit again with the poses inside the threshold until the same ones stay.
+def _best_samples(agreement: Agreement, samples: Indices, threshold_mm: float | None) -> Indices:
+    """Return the samples that explain the poses best, the best first.
 
-    Two thirds of the poses always take part: a lucky first draw that few poses share must not
-    talk itself into an ever smaller circle.
-
-    Raises:
-        CalibrationError: ``too_many_outliers`` when more than a third is rejected at the end.
+    Against a known threshold as many poses as possible and among equals the tightest; without one
+    the least median decides.
     """
-    used = None
-    for _ in range(MOST_REFITS):
-        lengths = distances(residuals)
-        inside = lengths <= threshold(lengths)
-        least = -(-2 * lengths.size // 3)
-        taking_part = inside | (lengths <= np.partition(lengths, least - 1)[least - 1])
-        if used is not None and np.array_equal(taking_part, used):
-            break
-        residuals, used = refit(taking_part), taking_part
-    rejected = int(np.count_nonzero(~inside))
-    if 3 * rejected > inside.size:
-        raise _too_many(rejected, inside.size)
-    return finish(inside), inside
+    costs = []
+    for part in _parts(samples, agreement.count):
+        distances = agreement.of_samples(part)
+        if threshold_mm is None:
+            costs.append(np.median(distances, axis=1))
+        else:
+            costs.append((np.minimum(distances / threshold_mm, 1.0) ** 2).sum(axis=1))
+    return np.argsort(np.concatenate(costs), kind="stable")[:REFINED]
 
 
-def threshold_rule(
-    robust: Robust, *, sigma_mm: float | None, dimensions: int, unknowns: int
-) -> tuple[float | None, Callable[[Floats], float]]:
-    """Return the threshold if it is known, and the rule that gives it from distances."""
-    known = robust.threshold_mm
-    if known is None and sigma_mm is not None:
-        known = REJECT_BEYOND * max(sigma_mm, robust.resolution_mm)
-    if known is not None:
-        fixed = known
-        return known, lambda _: fixed
+def _parts(samples: Indices, count: int) -> Iterable[Indices]:
+    rows = max(_AT_ONCE // count, 1)
+    return (samples[first : first + rows] for first in range(0, len(samples), rows))
 
-    def estimated(distances_mm: Floats) -> float:
+
+def _estimated(
+    agreement: Agreement,
+    robust: Robust,
+    distances: Floats,
+    refit: Callable[[Mask], Floats | None],
+) -> float:
+    """Return a threshold from the median distances of the best sample, then of its refit."""
+    for _ in range(2):
         # The correction for few poses is the usual one of least median of squares.
-        spare = max(distances_mm.size - unknowns / dimensions, 1.0)
-        scale = (1 + 5 / spare) * float(np.median(distances_mm)) / _MEDIAN_DISTANCE[dimensions]
-        return REJECT_BEYOND * max(scale, robust.resolution_mm)
+        spare = max(distances.size - agreement.unknowns / agreement.dimensions, 1.0)
+        middle = float(np.median(distances)) / _MEDIAN_DISTANCE[agreement.dimensions]
+        threshold_mm = REJECT_BEYOND * max((1 + 5 / spare) * middle, robust.resolution_mm)
+        refined = refit(distances <= threshold_mm)
+        if refined is None:
+            break
+        distances = refined
+    return threshold_mm
 
-    return None, estimated
+
+def _settled(
+    distances: Floats, threshold_mm: float, refit: Callable[[Mask], Floats | None]
+) -> tuple[Mask, float] | None:
+    """Refine a sample until its set stays; return the set and its sum of squares."""
+    kept: Mask | None = None
+    for step in range(MOST_REFITS):
+        limit = threshold_mm * _WIDER[min(step, len(_WIDER) - 1)]
+        inside = distances <= limit
+        if step >= len(_WIDER) and kept is not None and np.array_equal(inside, kept):
+            break
+        refined = refit(inside)
+        if refined is None:
+            return None
+        kept, distances = inside, refined
+    if kept is None:
+        return None
+    chosen = distances[kept]
+    return kept, float(chosen @ chosen)
 
 
 def _too_many(rejected: int, count: int) -> CalibrationError:

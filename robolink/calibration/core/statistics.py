@@ -125,6 +125,17 @@ def f_quantile(p: float, d1: float, d2: float) -> float:
     )
 
 
+def f_exceeded(f: float, d1: float, d2: float) -> float:
+    """Return how likely a value of F with ``d1`` and ``d2`` degrees of freedom is above ``f``.
+
+    Raises:
+        ValueError: One of them is not positive.
+    """
+    _require_dof(d1)
+    _require_dof(d2)
+    return _beta_below(d2 / 2, d1 / 2, d2 / (d1 * f + d2), d1 * f / (d1 * f + d2))
+
+
 @lru_cache(maxsize=64)
 def studentized_range_0999(count: int) -> float:
     """Return the range that ``count`` normal values of standard deviation 1 stay in, in 99.9 %.

@@ -4,20 +4,37 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from robolink.calibration.core.planar_checks import MIN_ROTATION_DEG, check_planar
+from robolink.calibration.core.planar_checks import (
+    MIN_ROTATION_DEG,
+    UPRIGHT_WITHIN_DEG,
+    check_rotation,
+    require_poses,
+    some_on_their_head,
+    tilted,
+)
 from robolink.calibration.core.pose_checks import keep_unmeasured
 from robolink.calibration.core.result import CalibrationResult
-from robolink.calibration.core.robust import Mask, Robust
-from robolink.calibration.pin.planar import UNKNOWNS, Complexes, fit_planar, fit_planar_robust
+from robolink.calibration.core.robust import Floats, Indices, Mask, Robust
+from robolink.calibration.core.rotations import checked_table, pose_table
+from robolink.calibration.evidence.pose_evidence import copies, with_evidence
+from robolink.calibration.evidence.robust_evidence import require_robust_poses, with_consensus
+from robolink.calibration.pin.planar import (
+    UNKNOWNS,
+    Complexes,
+    as_rotations,
+    fit_planar,
+    planar_consensus,
+)
 from robolink.calibration.quality.fit_quality import judged
 from robolink.calibration.quality.tolerances import PLANAR_TOLERANCE, Tolerance
+from robolink.errors import CalibrationError
+from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
 
 RECOMMENDED_POSES = 4
 
-
-# Two poses always agree with each other: more have to confirm them before any is an outlier.
-_ROBUST_POSES = 4
+ROBUST_POSES = 6
+"""Among fewer an outlier search cannot be trusted (docs/reference/evidence.md 10)."""
 
 _KEPT = ("z_mm", "u_deg", "v_deg", "w_deg")
 
@@ -31,6 +48,7 @@ def solve_n_angle(
     min_rotation_deg: float = MIN_ROTATION_DEG,
     allow_mixed_hand: bool = False,
     tolerance: Tolerance = PLANAR_TOLERANCE,
+    grid_mm: float | None = None,
 ) -> CalibrationResult:
     """Return the offset of a tip that was on one point in all flange poses.
 
@@ -38,66 +56,128 @@ def solve_n_angle(
     (docs/reference/calibration.md 2.1). X and Y are measured, the rest is kept.
 
     Args:
-        poses: Flange poses (Tool 0), mm and degrees, at least two.
+        poses: Flange poses (Tool 0), mm and degrees, at least two, in the order in which they
+            were taken. All may be given in one local: the point is then a point of it.
         stored: The offset stored now; Z, U, V and W are kept from it, or 0 without one.
         sigma_mm: Standard deviation of one coordinate of one placement, when it is known.
-        robust: Look for outliers first; needs four poses.
+        robust: Look for outliers first; needs six poses.
         min_rotation_deg: Smallest arc over which the angles have to spread.
         allow_mixed_hand: Warn instead of refusing when the arm was configured differently.
         tolerance: Residuals above which the result carries a warning.
+        grid_mm: Step of the jogs with which the tip was brought onto the point, if it is known.
 
     Raises:
         CalibrationError: ``too_few_poses``, ``degenerate_angles``, ``insufficient_rotation``,
             ``tilted_pose``, ``non_finite``, ``suspect_units``, ``mixed_hand``,
-            ``mixed_local``, ``mixed_tool``, ``too_many_outliers`` or ``implausible_offset``.
-        ConfigError: ``sigma_mm`` is not positive.
+            ``mixed_local``, ``mixed_tool``, ``tool_pose``, ``robust_too_few``,
+            ``robust_unstable``, ``too_many_outliers`` or ``implausible_offset``.
+        ConfigError: ``sigma_mm``, ``grid_mm`` or the threshold is not positive.
     """
-    warnings = check_planar(
-        poses,
-        minimum=_ROBUST_POSES if robust else 2,
-        min_rotation_deg=min_rotation_deg,
-        allow_mixed_hand=allow_mixed_hand,
-    )
-    if len(poses) < RECOMMENDED_POSES:
-        warnings = (*warnings, "few_poses")
-    p, z = planar_arrays(poses)
+    require_poses(len(poses), 2)
+    table, doubts = checked_table(poses, allow_mixed_hand=allow_mixed_hand)
+    p, z, down = _planar(table, poses)
+    duplicates = copies(table)
     kept: Mask = np.ones(len(poses), dtype=bool)
-    if robust is None:
-        fit = fit_planar(p, z)
-    else:
-        fit, kept = fit_planar_robust(p, z, robust, sigma_mm=sigma_mm)
-        _require_spread_of_kept(poses, kept, min_rotation_deg)
+    kept[list(duplicates)] = False
+    distinct = len(poses) - len(duplicates)
+    if distinct < 2:
+        raise CalibrationError(
+            "degenerate_angles",
+            tr("All poses are copies of one; the offset cannot be found from them."),
+            remedy=tr("Turn the tool between the poses, best over half a turn or more."),
+            others=("too_few_poses",),
+        )
+    doubts = (*doubts, *check_rotation(poses, _spread_deg(z), min_rotation_deg))
+    few = ("few_poses",) if distinct < RECOMMENDED_POSES else ()
+    spread_mm = 0.0
+    if robust is not None:
+        require_robust_poses(distinct, ROBUST_POSES)
+        kept, spread_mm = _agreeing(p, z, np.flatnonzero(kept), robust, sigma_mm)
+        check_rotation(poses, _spread_deg(z[kept]), min_rotation_deg)
+    fit = fit_planar(p, z, kept)
+    tip = fit.tip.conjugate() if down else fit.tip
+    taken = ~kept
+    taken[list(duplicates)] = False
     result = CalibrationResult(
         method="n-angle",
-        offset=keep_unmeasured(stored, x_mm=fit.tip.real, y_mm=fit.tip.imag),
+        offset=keep_unmeasured(stored, x_mm=tip.real, y_mm=tip.imag),
         measured=("x_mm", "y_mm"),
         kept=_KEPT,
         reference_point_mm=(fit.point.real, fit.point.imag),
         sigma_gain=fit.sigma_gain,
-        warnings=warnings,
+        warnings=(*doubts, *few),
         inputs=tuple(poses),
-        residuals_mm=tuple((e.real, e.imag) for e in fit.residuals.tolist()),
-        rejected=tuple(np.flatnonzero(~kept).tolist()),
+        residuals_mm=tuple(
+            zip(fit.residuals.real.tolist(), fit.residuals.imag.tolist(), strict=True)
+        ),
+        rejected=tuple(np.flatnonzero(taken).tolist()),
         condition_number=fit.condition_number,
         rank=UNKNOWNS,
         unobservable=_KEPT,
     )
-    return judged(
+    residuals = fit.residuals[kept].view(float).reshape(-1, 2)
+    result = judged(
         result,
-        fit.residuals[kept].view(float).reshape(-1, 2),
+        residuals,
         np.eye(2) * fit.sigma_gain**2,
         unknowns=UNKNOWNS,
         sigma_mm=sigma_mm,
         tolerance=tolerance,
+        grid_mm=grid_mm,
     )
-
-
-def _require_spread_of_kept(poses: Sequence[Pose], kept: Mask, min_rotation_deg: float) -> None:
-    chosen = [pose for pose, keep in zip(poses, kept, strict=True) if keep]
-    check_planar(chosen, minimum=2, min_rotation_deg=min_rotation_deg, allow_mixed_hand=True)
+    result = with_evidence(
+        result,
+        as_rotations(z[kept]),
+        residuals,
+        kept=np.flatnonzero(kept),
+        duplicates=duplicates,
+        unknowns=UNKNOWNS,
+    )
+    return with_consensus(result, kept, spread_mm) if robust else result
 
 
 def planar_arrays(poses: Sequence[Pose]) -> tuple[Complexes, Complexes]:
-    """Return flange positions x + iy in mm and orientations exp(iU)."""
-    table = np.array([(pose.x_mm, pose.y_mm, pose.u_deg) for pose in poses])
-    return table[:, 0] + 1j * table[:, 1], np.exp(1j * np.radians(table[:, 2]))
+    """Return flange positions x + iy in mm and orientations exp(iU), of upright flanges."""
+    table = pose_table(poses)
+    return table[:, 0] + 1j * table[:, 1], np.exp(1j * np.radians(table[:, 3]))
+
+
+def _planar(table: Floats, poses: Sequence[Pose]) -> tuple[Complexes, Complexes, bool]:
+    """Return positions, directions of the flange's X, and whether its Z points down.
+
+    Raises:
+        CalibrationError: ``tilted_pose``.
+    """
+    p = table[:, 0] + 1j * table[:, 1]
+    z = np.exp(1j * np.radians(table[:, 3]))
+    if not table[:, 4:].any():
+        return p, z, False
+    forward, sideways = np.cos(np.radians(table[:, 4:])).T
+    upward = forward * sideways
+    leaning = np.degrees(np.arccos(np.minimum(np.abs(upward), 1.0))) >= UPRIGHT_WITHIN_DEG
+    if leaning.any():
+        first = int(np.argmax(leaning))
+        raise tilted(first + 1, poses[first])
+    down = upward < 0
+    if down.any() and not down.all():
+        raise some_on_their_head()
+    return p, z * np.sign(forward), bool(down[0])
+
+
+def _spread_deg(z: Complexes) -> float:
+    """Return the shortest arc that holds all directions."""
+    turned = np.sort(np.degrees(np.angle(z)) % 360.0)
+    gaps = np.diff(turned, append=turned[0] + 360.0)
+    return 360.0 - float(gaps.max())
+
+
+def _agreeing(
+    p: Complexes, z: Complexes, among: Indices, robust: Robust, sigma_mm: float | None
+) -> tuple[Mask, float]:
+    """Return which poses agree, and how far results of other draws lie apart."""
+    some_p, some_z = p[among], z[among]
+    found = planar_consensus(some_p, some_z, robust, sigma_mm=sigma_mm)
+    tips = [fit_planar(some_p, some_z, kept).tip for kept in (found.kept, *found.others)]
+    kept: Mask = np.zeros(p.size, dtype=bool)
+    kept[among[found.kept]] = True
+    return kept, max(abs(a - b) for a in tips for b in tips)

@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass
 
+from robolink.calibration.core.dispersion import require_positive
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.quality.update_guard import NEEDLE_LIMIT_MM
 
@@ -14,14 +15,32 @@ class NeedleChain:
     Attributes:
         sigma_mm: Standard deviation of each measured length that the offset carries now.
         changes: How many differences were added to it.
+        full_sigma_mm: What it was after the full calibration, where that is known; needed only
+            while each difference starts from the touch of the one before.
     """
 
     sigma_mm: float
     changes: int = 0
+    full_sigma_mm: float | None = None
 
-    def after(self, difference_sigma_mm: float) -> "NeedleChain":
-        """Return the chain with one more difference."""
-        return NeedleChain(math.hypot(self.sigma_mm, difference_sigma_mm), self.changes + 1)
+    def after(self, difference_sigma_mm: float, *, shared_touch: bool = False) -> "NeedleChain":
+        """Return the chain with one more difference.
+
+        Args:
+            difference_sigma_mm: Standard deviation of one difference: that of two touches.
+            shared_touch: Whether each difference starts from the touch at which the one before it
+                ended. The touches between then cancel, t_k = t_0 + R'(c_k - c_0), and the chain
+                is as good as one difference: u^2 = u_0^2 + 2 s^2 for any k. Where old and new tip
+                are touched at each change it is u_0^2 + 2 k s^2 (docs/reference/evidence.md 12).
+        """
+        start = self.full_sigma_mm
+        if start is None and self.changes == 0:
+            start = self.sigma_mm
+        longer = math.hypot(self.sigma_mm, difference_sigma_mm)
+        # Of an older record nobody knows how it began: what it had become is what it starts from.
+        known = self.sigma_mm if start is None else start
+        sigma_mm = math.hypot(known, difference_sigma_mm) if shared_touch else longer
+        return NeedleChain(sigma_mm, self.changes + 1, known if shared_touch else None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +56,28 @@ class NeedleLimits:
     max_change_mm: float = NEEDLE_LIMIT_MM
     tolerance_mm: float = 0.1
     max_changes: int = 20
+
+
+def chain_sigma_mm(
+    full_sigma_mm: float, touch_sigma_mm: float, changes: int, *, shared_touch: bool
+) -> float:
+    """Return the standard deviation of a length after some needle changes.
+
+    Args:
+        full_sigma_mm: Standard deviation after the full calibration.
+        touch_sigma_mm: Standard deviation of one coordinate of one touch.
+        changes: How many changes followed, 0 or more.
+        shared_touch: As for :meth:`NeedleChain.after`.
+
+    Raises:
+        ConfigError: A standard deviation is not positive.
+    """
+    require_positive(full_sigma_mm, "u0_mm")
+    require_positive(touch_sigma_mm, "sigma_mm")
+    chain = NeedleChain(full_sigma_mm)
+    for _ in range(changes):
+        chain = chain.after(math.sqrt(2) * touch_sigma_mm, shared_touch=shared_touch)
+    return chain.sigma_mm
 
 
 def chain_of(result: CalibrationResult) -> NeedleChain | None:

@@ -2,7 +2,8 @@
 
 ``t_new = t_old + Rz(-U) d`` with d the shift of the tip in base axes. What the camera or pin
 gets wrong is in both looks and cancels; what every difference adds is counted in a chain,
-until a full calibration is due (docs/reference/calibration.md 2.9).
+until a full calibration is due (docs/reference/calibration.md 2.9). A flange that leans or hangs
+upside down has R' d in place of Rz(-U) d (docs/reference/evidence.md 3).
 """
 
 import math
@@ -11,15 +12,22 @@ from dataclasses import dataclass
 from robolink.calibration.core.dispersion import Dispersion, require_positive
 from robolink.calibration.core.pose_checks import check_poses, keep_unmeasured, require_finite
 from robolink.calibration.core.result import CalibrationResult
+from robolink.calibration.core.rotations import rotation_of
+from robolink.calibration.flange_checks import require_flange_in_base
+from robolink.calibration.flange_plane import FlangePlane
 from robolink.calibration.pin.needle_chain import NeedleChain, NeedleLimits
 from robolink.errors import CalibrationError
 from robolink.messages import tr
-from robolink.model import Pose, ToolOffset, rotate_xy
+from robolink.model import Pose, ToolOffset
 
 Point = tuple[float, ...]
 """(x, y) or (x, y, z) in the base, mm."""
 
 USUAL_LIMITS = NeedleLimits()
+
+_LEAN_WITHOUT_HEIGHT_DEG = 0.5
+"""Beyond this a change of length of 1 mm, which two coordinates do not show, shifts the tip in
+X and Y by more than 0.009 mm."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,36 +54,42 @@ def solve_needle_change(
     chain: NeedleChain,
     sigma_mm: float,
     limits: NeedleLimits = USUAL_LIMITS,
+    shared_touch: bool = False,
 ) -> NeedleChangeResult:
     """Return the offset of a new needle from where the old tip was and the new one is.
 
     Args:
-        flange: The flange pose (Tool 0, upright) of both looks.
+        flange: The flange pose (Tool 0) of both looks. It may lean where all three coordinates
+            are given, and by half a degree where only X and Y are.
         before_mm: Where the old tip was seen, (x, y) or (x, y, z) in the base.
         after_mm: Where the new tip is seen.
         stored: The offset of the old needle; what is not measured is kept from it.
         chain: What has happened since the last full calibration.
         sigma_mm: Standard deviation of one coordinate of one look.
         limits: When a shift is not believed, and when a full calibration is due.
+        shared_touch: Whether the old tip's place is that of the change before, so that it was not
+            touched again; see :meth:`NeedleChain.after`.
 
     Raises:
-        CalibrationError: ``implausible_change``, ``non_finite``, ``suspect_units`` or
-            ``implausible_offset``.
+        CalibrationError: ``implausible_change``, ``non_finite``, ``suspect_units``,
+            ``tool_pose``, ``local_pose``, ``tilted_pose`` or ``implausible_offset``.
         ConfigError: A standard deviation or limit is not positive.
         ValueError: The two places do not have two or three coordinates each.
     """
     _check_places(before_mm, after_mm)
     require_positive(limits.tolerance_mm, "tolerance_mm")
     check_poses((flange,), allow_mixed_hand=False)
+    require_flange_in_base((flange,))
     shift = tuple(b - a for a, b in zip(before_mm, after_mm, strict=True))
     _require_plausible(math.hypot(*shift), limits.max_change_mm)
-    dx, dy = rotate_xy(shift[0], shift[1], -flange.u_deg)
-    found = {"x_mm": stored.x_mm + dx, "y_mm": stored.y_mm + dy}
-    if len(shift) == 3:
-        found["z_mm"] = stored.z_mm + shift[2]
+    names = ("x_mm", "y_mm", "z_mm")
+    found = {
+        name: getattr(stored, name) + change
+        for name, change in zip(names, _in_flange(flange, shift), strict=False)
+    }
     scatter = Dispersion.of(0.0, 0, sigma_mm)
     assert scatter is not None  # noqa: S101 - a sigma was given
-    now = chain.after(math.sqrt(2) * sigma_mm)
+    now = chain.after(math.sqrt(2) * sigma_mm, shared_touch=shared_touch)
     covariance = tuple(
         tuple(now.sigma_mm**2 if row == column else 0.0 for column in range(len(found)))
         for row in range(len(found))
@@ -103,6 +117,29 @@ def solve_needle_change(
         chain=now,
         full_calibration_due=due,
     )
+
+
+def _in_flange(flange: Pose, shift: Point) -> list[float]:
+    """Return a shift of the base in the flange's axes.
+
+    Raises:
+        CalibrationError: ``tilted_pose``: a change of length would mix in unseen.
+    """
+    if len(shift) == 3:
+        turned: list[float] = (rotation_of(flange).T @ shift).tolist()
+        return turned
+    plane = FlangePlane.of(flange)
+    if plane.lean_deg > _LEAN_WITHOUT_HEIGHT_DEG:
+        raise CalibrationError(
+            "tilted_pose",
+            tr(
+                "The flange leans by {lean:.2f} degrees, so a longer or shorter needle would look "
+                "as if it were moved aside.",
+                lean=plane.lean_deg,
+            ),
+            remedy=tr("Hold the flange upright or straight upside down, or give the height too."),
+        )
+    return list(plane.in_flange(*shift))
 
 
 def _check_places(before_mm: Point, after_mm: Point) -> None:

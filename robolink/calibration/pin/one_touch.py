@@ -6,6 +6,7 @@ the difference between two tips is what is measured, and an error of the full ca
 stays as it was (docs/reference/calibration.md 2.9).
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,9 @@ from robolink.calibration.core.dispersion import Dispersion
 from robolink.calibration.core.pose_checks import check_poses, keep_unmeasured, require_finite
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.core.rotations import rotation_of
+from robolink.calibration.flange_checks import require_flange_in_base
+from robolink.calibration.quality.station_part import StationPart, with_station
+from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
 
 
@@ -24,12 +28,27 @@ class Pin:
     Attributes:
         x_mm, y_mm, z_mm: The place.
         sigma_mm: Standard deviation of each of them.
+        covariance_mm2: Of all three, base, where more is known than one standard deviation.
+        dof: Degrees of freedom of both; ``None`` where they were stated.
     """
 
     x_mm: float
     y_mm: float
     z_mm: float
     sigma_mm: float = 0.0
+    covariance_mm2: tuple[tuple[float, ...], ...] = ()
+    dof: float | None = None
+
+    def part(self, flange: Pose) -> StationPart:
+        """Return what the pin adds to a tip that touches it in a flange pose."""
+        base = np.array(self.covariance_mm2 or np.eye(3) * self.sigma_mm**2)
+        turn = rotation_of(flange)
+        return StationPart(
+            tr("place of the pin"),
+            (turn.T @ base @ turn).tolist(),
+            dof=math.inf if self.dof is None else self.dof,
+            origin=tr("record of the station"),
+        )
 
 
 def pin_touched(flange: Pose, offset: ToolOffset, *, sigma_mm: float = 0.0) -> Pin:
@@ -54,22 +73,26 @@ def solve_one_touch(
         sigma_mm: Standard deviation of one coordinate of one touch. Without it the result has
             no interval: one touch leaves no residual.
 
+    The pin counts in full: u^2 = u_pin^2 + s^2 (docs/reference/evidence.md 12).
+
     A pin that was moved puts all tools wrong by the same amount, and no touch can tell.
 
     Raises:
-        CalibrationError: ``non_finite``, ``suspect_units`` or ``implausible_offset``.
+        CalibrationError: ``non_finite``, ``suspect_units``, ``tool_pose``, ``local_pose`` or
+            ``implausible_offset``.
         ConfigError: ``sigma_mm`` is not positive.
     """
     check_poses((flange,), allow_mixed_hand=False)
+    require_flange_in_base((flange,))
     require_finite(x_mm=pin.x_mm, y_mm=pin.y_mm, z_mm=pin.z_mm, sigma_mm=pin.sigma_mm)
     away = np.array([pin.x_mm - flange.x_mm, pin.y_mm - flange.y_mm, pin.z_mm - flange.z_mm])
     x, y, z = (rotation_of(flange).T @ away).tolist()
     scatter = Dispersion.of(0.0, 0, sigma_mm)
     covariance: tuple[tuple[float, ...], ...] = ()
     if scatter:
-        variance = scatter.sigma_mm**2 + pin.sigma_mm**2
+        variance = scatter.sigma_mm**2
         covariance = ((variance, 0.0, 0.0), (0.0, variance, 0.0), (0.0, 0.0, variance))
-    return CalibrationResult(
+    result = CalibrationResult(
         method="one-touch",
         offset=keep_unmeasured(stored, x_mm=x, y_mm=y, z_mm=z),
         measured=("x_mm", "y_mm", "z_mm"),
@@ -86,3 +109,4 @@ def solve_one_touch(
         dof=0,
         unobservable=("u_deg", "v_deg", "w_deg"),
     )
+    return with_station(result, pin.part(flange))

@@ -10,15 +10,18 @@ from collections.abc import Sequence
 import numpy as np
 
 from robolink.calibration.core.planar_checks import angle_spread_deg, refuse_radians, require_poses
-from robolink.calibration.core.pose_checks import check_poses, keep_unmeasured
+from robolink.calibration.core.pose_checks import keep_unmeasured
 from robolink.calibration.core.result import CalibrationResult
-from robolink.calibration.core.robust import Mask, Robust
-from robolink.calibration.core.rotations import pose_arrays
+from robolink.calibration.core.robust import Floats, Indices, Mask, Robust
+from robolink.calibration.core.rotations import checked_table, rotations
+from robolink.calibration.evidence.pose_evidence import copies, with_evidence
+from robolink.calibration.evidence.robust_evidence import require_robust_poses, with_consensus
 from robolink.calibration.pin.pivot_fit import (
+    MINIMAL,
     UNKNOWNS,
     PivotDesign,
     fit_pivot,
-    fit_pivot_robust,
+    pivot_consensus,
     pivot_design,
 )
 from robolink.calibration.quality.fit_quality import judged
@@ -36,9 +39,8 @@ LEAST_SINGULAR_VALUE = 0.1
 
 RECOMMENDED_POSES = 4
 
-
-# Three poses always agree on something; more have to confirm it before any is an outlier.
-_ROBUST_POSES = 5
+ROBUST_POSES = 7
+"""Among fewer an outlier search cannot be trusted (docs/reference/evidence.md 10)."""
 
 _MEASURED = ("x_mm", "y_mm", "z_mm")
 
@@ -56,38 +58,53 @@ def solve_pivot(
     max_condition: float = MAX_CONDITION,
     allow_mixed_hand: bool = False,
     tolerance: Tolerance = TOUCH_TOLERANCE,
+    grid_mm: float | None = None,
 ) -> CalibrationResult:
     """Return X, Y and Z of a tip that was on one point in all flange poses.
 
     Args:
-        poses: Flange poses (Tool 0), mm and degrees, at least three.
+        poses: Flange poses (Tool 0), mm and degrees, at least three, in the order in which they
+            were taken. All may be given in one local: the point is then a point of it.
         stored: The offset stored now; U, V and W are kept from it, or 0 without one.
         sigma_mm: Standard deviation of one coordinate of one placement, when it is known.
-        robust: Look for outliers first; needs five poses.
+        robust: Look for outliers first; needs seven poses.
         max_condition: Largest condition number of the whole system that is accepted.
         allow_mixed_hand: Warn instead of refusing when the arm was configured differently.
         tolerance: Residuals above which the result carries a warning.
+        grid_mm: Step of the jogs with which the tip was brought onto the point, if it is known.
 
     Raises:
         CalibrationError: ``too_few_poses``, ``rank_deficient``, ``insufficient_rotation``,
             ``non_finite``, ``suspect_units``, ``mixed_hand``, ``mixed_local``,
-            ``mixed_tool``, ``too_many_outliers`` or ``implausible_offset``.
-        ConfigError: ``sigma_mm`` is not positive.
+            ``mixed_tool``, ``tool_pose``, ``robust_too_few``, ``robust_unstable``,
+            ``too_many_outliers`` or ``implausible_offset``.
+        ConfigError: ``sigma_mm``, ``grid_mm`` or the threshold is not positive.
     """
-    require_poses(len(poses), _ROBUST_POSES if robust else 3)
-    warnings = check_poses(poses, allow_mixed_hand=allow_mixed_hand)
-    positions, turned = pose_arrays(poses)
-    design = pivot_design(turned)
-    _require_observable(poses, design, max_condition)
+    require_poses(len(poses), MINIMAL)
+    table, warnings = checked_table(poses, allow_mixed_hand=allow_mixed_hand)
+    positions, turned = table[:, :3], rotations(table[:, 3:])
+    duplicates = copies(table)
+    distinct = len(poses) - len(duplicates)
+    require_poses(distinct, MINIMAL)
     kept: Mask = np.ones(len(poses), dtype=bool)
-    if robust is None:
-        fit = fit_pivot(positions, turned, condition_number=design.condition_number)
-    else:
-        fit, kept = fit_pivot_robust(positions, turned, robust, sigma_mm=sigma_mm)
+    kept[list(duplicates)] = False
+    design = pivot_design(turned if not duplicates else turned[kept])
+    _require_observable(poses, design, max_condition)
+    spread_mm = 0.0
+    if robust is not None:
+        require_robust_poses(distinct, ROBUST_POSES)
+        kept, spread_mm = _agreeing(positions, turned, np.flatnonzero(kept), robust, sigma_mm)
         design = pivot_design(turned[kept])
-        _require_observable(
-            [poses[i] for i in np.flatnonzero(kept).tolist()], design, max_condition
-        )
+        _require_observable(poses, design, max_condition)
+    all_kept = bool(kept.all())
+    fit = fit_pivot(
+        positions,
+        turned,
+        condition_number=design.condition_number,
+        kept=None if all_kept else kept,
+    )
+    taken = ~kept
+    taken[list(duplicates)] = False
     result = CalibrationResult(
         method="pivot",
         offset=keep_unmeasured(stored, **dict(zip(_MEASURED, fit.tip.tolist(), strict=True))),
@@ -95,22 +112,52 @@ def solve_pivot(
         kept=_KEPT,
         reference_point_mm=tuple(fit.point.tolist()),
         sigma_gain=math.sqrt(float(design.unit_covariance.diagonal().max())),
-        warnings=(*warnings, *_doubts(design, len(poses))),
+        warnings=(*warnings, *_doubts(design, distinct)),
         inputs=tuple(poses),
-        residuals_mm=tuple(map(tuple, fit.residuals.tolist())),
-        rejected=tuple(np.flatnonzero(~kept).tolist()),
+        residuals_mm=tuple(zip(*fit.residuals.T.tolist(), strict=True)),
+        rejected=tuple(np.flatnonzero(taken).tolist()),
         condition_number=design.condition_number,
         rank=design.rank,
         unobservable=_KEPT,
     )
-    return judged(
+    residuals = fit.residuals if all_kept else fit.residuals[kept]
+    result = judged(
         result,
-        fit.residuals[kept],
+        residuals,
         design.unit_covariance,
         unknowns=UNKNOWNS,
         sigma_mm=sigma_mm,
         tolerance=tolerance,
+        grid_mm=grid_mm,
     )
+    result = with_evidence(
+        result,
+        turned if all_kept else turned[kept],
+        residuals,
+        kept=np.flatnonzero(kept),
+        duplicates=duplicates,
+        unknowns=UNKNOWNS,
+    )
+    return with_consensus(result, kept, spread_mm) if robust else result
+
+
+def _agreeing(
+    positions: Floats,
+    turned: Floats,
+    among: Indices,
+    robust: Robust,
+    sigma_mm: float | None,
+) -> tuple[Mask, float]:
+    """Return which poses agree, and how far results of other draws lie apart."""
+    p, r = positions[among], turned[among]
+    found = pivot_consensus(p, r, robust, sigma_mm=sigma_mm)
+    tips = []
+    for agreeing in (found.kept, *found.others):
+        condition = pivot_design(r[agreeing]).condition_number
+        tips.append(fit_pivot(p, r, condition_number=condition, kept=agreeing).tip)
+    kept: Mask = np.zeros(len(positions), dtype=bool)
+    kept[among[found.kept]] = True
+    return kept, max(float(np.linalg.norm(a - b)) for a in tips for b in tips)
 
 
 def _doubts(design: PivotDesign, count: int) -> tuple[str, ...]:

@@ -17,13 +17,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from robolink.calibration.core.robust import (
+    Agreement,
+    Consensus,
     Floats,
+    Indices,
     Mask,
     Robust,
-    draw_poses,
-    first_guess,
-    refit_until_settled,
-    threshold_rule,
+    largest_consensus,
 )
 
 UNKNOWNS = 6
@@ -109,6 +109,37 @@ def fit_pivot(
     return PivotFit(tip, point, positions + rotations @ tip - point)
 
 
+def pivot_consensus(
+    positions: Floats, rotations: Floats, robust: Robust, *, sigma_mm: float | None
+) -> Consensus:
+    """Return which poses belong together.
+
+    Raises:
+        CalibrationError: ``too_many_outliers``.
+    """
+
+    def of_fit(kept: Mask) -> Floats | None:
+        if np.count_nonzero(kept) < MINIMAL:
+            return None
+        design = pivot_design(rotations[kept])
+        if design.rank < UNKNOWNS:
+            return None
+        condition = design.condition_number
+        return _lengths(
+            fit_pivot(positions, rotations, condition_number=condition, kept=kept).residuals
+        )
+
+    agreement = Agreement(
+        len(positions),
+        MINIMAL,
+        3,
+        UNKNOWNS,
+        lambda samples: _of_samples(positions, rotations, samples),
+        of_fit,
+    )
+    return largest_consensus(agreement, robust, sigma_mm=sigma_mm)
+
+
 def fit_pivot_robust(
     positions: Floats, rotations: Floats, robust: Robust, *, sigma_mm: float | None
 ) -> tuple[PivotFit, Mask]:
@@ -117,19 +148,9 @@ def fit_pivot_robust(
     Raises:
         CalibrationError: ``too_many_outliers``.
     """
-    known, rule = threshold_rule(robust, sigma_mm=sigma_mm, dimensions=3, unknowns=UNKNOWNS)
-
-    def fit(kept: Mask) -> PivotFit:
-        condition = pivot_design(rotations[kept]).condition_number
-        return fit_pivot(positions, rotations, condition_number=condition, kept=kept)
-
-    return refit_until_settled(
-        _best_draw(positions, rotations, robust, known),
-        refit=lambda kept: fit(kept).residuals,
-        distances=_lengths,
-        threshold=rule,
-        finish=fit,
-    )
+    kept = pivot_consensus(positions, rotations, robust, sigma_mm=sigma_mm).kept
+    condition = pivot_design(rotations[kept]).condition_number
+    return fit_pivot(positions, rotations, condition_number=condition, kept=kept), kept
 
 
 def _by_normal_equations(p: Floats, r: Floats) -> tuple[Floats, Floats]:
@@ -147,12 +168,9 @@ def _by_qr(p: Floats, r: Floats) -> tuple[Floats, Floats]:
     return tip, rm @ tip + pm
 
 
-def _best_draw(
-    positions: Floats, rotations: Floats, robust: Robust, threshold_mm: float | None
-) -> Floats:
-    """Return the residuals of all poses from the draw that explains them best."""
-    drawn = draw_poses(len(positions), MINIMAL, robust)
-    p, r = positions[drawn], rotations[drawn]
+def _of_samples(positions: Floats, rotations: Floats, samples: Indices) -> Floats:
+    """Return the residual distances of all poses from the solution of each sample."""
+    p, r = positions[samples], rotations[samples]
     rm, pm = r.mean(axis=1), p.mean(axis=1)
     left = np.eye(3) - rm.transpose(0, 2, 1) @ rm
     right = np.einsum("bkji,bkj->bi", r, p - pm[:, None]) / MINIMAL
@@ -162,10 +180,9 @@ def _best_draw(
     points = np.einsum("bij,bj->bi", rm, tips) + pm
     ends = (rotations.reshape(-1, 3) @ tips.T).reshape(*positions.shape, -1)
     ends += positions[..., None] - points.T
-    distances = np.sqrt(np.einsum("nib,nib->bn", ends, ends))
+    distances: Floats = np.sqrt(np.einsum("nib,nib->bn", ends, ends))
     distances[weak] = np.inf
-    best: Floats = ends[..., first_guess(distances, threshold_mm)]
-    return best
+    return distances
 
 
 def _lengths(residuals: Floats) -> Floats:

@@ -7,7 +7,8 @@ unknown, and the least squares over all poses is a division (docs/reference/cali
     t = -sum(conj(z - mean z) p) / sum |z - mean z|^2,   P = mean p + mean z t
 
 The angles are used as the controller knows them; nothing is fitted to an unlabelled circle.
-Leading axes are batches.
+Under a flange that stands on its head (W = 180) the Y of the tip counts the other way, so that
+t is the conjugate. Leading axes are batches.
 """
 
 import math
@@ -17,12 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robolink.calibration.core.robust import (
+    Agreement,
+    Consensus,
+    Floats,
+    Indices,
     Mask,
     Robust,
-    draw_poses,
-    first_guess,
-    refit_until_settled,
-    threshold_rule,
+    largest_consensus,
 )
 
 Complexes = NDArray[np.complex128]
@@ -30,9 +32,7 @@ Complexes = NDArray[np.complex128]
 UNKNOWNS = 4
 
 _NEARLY_PARALLEL = 0.2
-"""Draws of two poses that differ by less than about 11 degrees are not believed."""
-
-_ALL_PAIRS_UP_TO = 16
+"""Samples of two poses that differ by less than about 11 degrees are not believed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,41 +84,36 @@ def solve_planar(
     return tip, mean_p + mean_z * tip, weight
 
 
-def fit_planar_robust(
+def planar_consensus(
     p: Complexes, z: Complexes, robust: Robust, *, sigma_mm: float | None
-) -> tuple[PlanarFit, Mask]:
-    """Return the fit of the poses that belong together, and which these are.
+) -> Consensus:
+    """Return which poses belong together.
 
     Raises:
         CalibrationError: ``too_many_outliers``.
     """
-    known, rule = threshold_rule(robust, sigma_mm=sigma_mm, dimensions=2, unknowns=UNKNOWNS)
-    start = _best_pair(p, z, _pairs(z.size, robust), known)
-    return refit_until_settled(
-        start,
-        refit=lambda kept: fit_planar(p, z, kept).residuals,
-        distances=np.abs,
-        threshold=rule,
-        finish=lambda kept: fit_planar(p, z, kept),
-    )
+
+    def of_samples(samples: Indices) -> Floats:
+        first, second = samples.T
+        turned = z[first] - z[second]
+        parallel = np.abs(turned) < _NEARLY_PARALLEL
+        tips = (p[second] - p[first]) / np.where(parallel, 1.0, turned)
+        points = p[first] + z[first] * tips
+        distances: Floats = np.abs(p + z * tips[:, None] - points[:, None])
+        distances[parallel] = np.inf
+        return distances
+
+    def of_fit(kept: Mask) -> Floats | None:
+        chosen = z[kept]
+        if chosen.size < 2 or np.abs(chosen - chosen[0]).max() < _NEARLY_PARALLEL:
+            return None
+        residuals: Floats = np.abs(fit_planar(p, z, kept).residuals)
+        return residuals
+
+    agreement = Agreement(z.size, 2, 2, UNKNOWNS, of_samples, of_fit)
+    return largest_consensus(agreement, robust, sigma_mm=sigma_mm)
 
 
-def _best_pair(
-    p: Complexes, z: Complexes, pairs: NDArray[np.intp], threshold_mm: float | None
-) -> Complexes:
-    """Return the residuals of all poses from the pair that explains them best."""
-    first, second = pairs.T
-    turned = z[first] - z[second]
-    parallel = np.abs(turned) < _NEARLY_PARALLEL
-    tips = (p[second] - p[first]) / np.where(parallel, 1.0, turned)
-    points = p[first] + z[first] * tips
-    residuals = p + z * tips[:, None] - points[:, None]
-    residuals[parallel] = np.inf
-    best: Complexes = residuals[first_guess(np.abs(residuals), threshold_mm)]
-    return best
-
-
-def _pairs(count: int, robust: Robust) -> NDArray[np.intp]:
-    if count <= _ALL_PAIRS_UP_TO:
-        return np.column_stack(np.triu_indices(count, k=1))
-    return draw_poses(count, 2, robust)
+def as_rotations(z: Complexes) -> Floats:
+    """Return exp(iU) as N x 2 x 2 rotations."""
+    return np.array([[z.real, -z.imag], [z.imag, z.real]]).transpose(2, 0, 1)

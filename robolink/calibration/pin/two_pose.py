@@ -16,11 +16,14 @@ error. Each length has the standard deviation of one placement times 1 / (sqrt2 
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 from robolink.calibration.core.dispersion import Dispersion
 from robolink.calibration.core.planar_checks import (
     MIN_ROTATION_DEG,
     check_planar,
+    heading_deg,
+    on_its_head,
     planar_sigma_gain,
 )
 from robolink.calibration.core.pose_checks import keep_unmeasured
@@ -40,6 +43,7 @@ def solve_two_pose(
     min_rotation_deg: float = MIN_ROTATION_DEG,
     allow_mixed_hand: bool = False,
     sigma_mm: float | None = None,
+    grid_mm: float | None = None,
 ) -> CalibrationResult:
     """Return the offset of a tip that touched one point in both flange poses.
 
@@ -51,12 +55,13 @@ def solve_two_pose(
         allow_mixed_hand: Warn instead of refusing when the arm was configured differently.
         sigma_mm: Standard deviation of one coordinate of one placement. Without it the result
             has no interval, because two poses leave no residual.
+        grid_mm: Step of the jogs with which the tip was brought onto the point, if it is known.
 
     Raises:
         CalibrationError: ``degenerate_angles``, ``insufficient_rotation``, ``non_finite``,
-            ``suspect_units``, ``mixed_hand``, ``mixed_local``, ``mixed_tool`` or
-            ``implausible_offset``, or ``tilted_pose``.
-        ConfigError: ``sigma_mm`` is not positive.
+            ``suspect_units``, ``mixed_hand``, ``mixed_local``, ``mixed_tool``, ``tool_pose``,
+            ``implausible_offset`` or ``tilted_pose``.
+        ConfigError: ``sigma_mm`` or ``grid_mm`` is not positive.
     """
     warnings = check_planar(
         (first, second),
@@ -64,33 +69,49 @@ def solve_two_pose(
         min_rotation_deg=min_rotation_deg,
         allow_mixed_hand=allow_mixed_hand,
     )
-    half = math.radians(angle_difference_deg(second.u_deg, first.u_deg) / 2)
+    start_deg, end_deg = heading_deg(first), heading_deg(second)
+    half = math.radians(angle_difference_deg(end_deg, start_deg) / 2)
     d_x, d_y = second.x_mm - first.x_mm, second.y_mm - first.y_mm
-    mean_deg = first.u_deg + math.degrees(half)
+    mean_deg = start_deg + math.degrees(half)
     m_x, m_y = rotate_xy(d_x, d_y, -mean_deg)
     scale = 2 * math.sin(half)
     t_x, t_y = -m_y / scale, m_x / scale
-    at_x, at_y = rotate_xy(t_x, t_y, first.u_deg)
-    gain = planar_sigma_gain((first, second))
-    scatter = Dispersion.of(0.0, 0, sigma_mm)
-    variance = (scatter.sigma_mm * gain) ** 2 if scatter else 0.0
-    covariance = ((variance, 0.0), (0.0, variance)) if scatter else ()
-    return CalibrationResult(
+    at_x, at_y = rotate_xy(t_x, t_y, start_deg)
+    if on_its_head((first, second)):
+        t_y = -t_y
+    result = CalibrationResult(
         method="two-pose",
         offset=keep_unmeasured(stored, x_mm=t_x, y_mm=t_y),
         measured=MEASURED,
         kept=("z_mm", "u_deg", "v_deg", "w_deg"),
         reference_point_mm=(first.x_mm + at_x, first.y_mm + at_y),
-        sigma_gain=gain,
+        sigma_gain=planar_sigma_gain((first, second)),
         warnings=warnings,
         inputs=(first, second),
-        covariance=covariance,
-        half_width95=scatter.half_widths(covariance) if scatter else (),
-        sigma_mm=sigma_mm,
-        sigma_stated=scatter is not None,
         rank=4,
         dof=0,
         unobservable=("z_mm", "u_deg", "v_deg", "w_deg"),
+    )
+    result = replace(result, sigma_stated=sigma_mm is not None)
+    return _with_interval(result, Dispersion.of(0.0, 0, sigma_mm, grid_mm))
+
+
+def _with_interval(result: CalibrationResult, spread: Dispersion | None) -> CalibrationResult:
+    from_grid = spread is not None and spread.source == "resolution"
+    notes = ("resolution_floor",) if from_grid else ("order_not_testable",)
+    if spread is None:
+        return replace(result, notes=notes)
+    variance = (spread.sigma_mm * result.sigma_gain) ** 2
+    covariance = ((variance, 0.0), (0.0, variance))
+    return replace(
+        result,
+        notes=notes,
+        covariance=covariance,
+        half_width95=spread.half_widths(covariance),
+        sigma_mm=spread.sigma_mm,
+        interval_from=spread.source,
+        region95_radius_mm=spread.sigma_mm * result.sigma_gain * spread.region_factor(2),
+        budget=spread.budget(result.sigma_gain),
     )
 
 

@@ -34,9 +34,6 @@ _SENTENCES: Final[Mapping[str, Callable[[], str]]] = {
     "few_poses": lambda: tr("Few poses: four or more tell errors of placement from each other."),
     "large_rms": lambda: tr("The residuals are large for this method."),
     "large_residual": lambda: tr("One pose is far off; take it again."),
-    "sigma_too_small": lambda: tr(
-        "The poses scatter more than the stated standard deviation says."
-    ),
     "camera_moved": lambda: tr(
         "The camera sees things beside where they are: it was moved, or its calibration is old."
     ),

@@ -7,11 +7,19 @@ from typing import TypeVar
 import numpy as np
 
 from robolink.calibration.core.dispersion import Dispersion
+from robolink.calibration.core.evidence import FitEvidence
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.core.robust import Floats
+from robolink.calibration.core.statistics import chi_square_quantile
 from robolink.calibration.quality.tolerances import Tolerance
 
 ResultT = TypeVar("ResultT", bound=CalibrationResult)
+
+CONTRADICTED_ABOVE = 0.99
+"""Chi-square of the residuals beyond this quantile contradicts a stated sigma."""
+
+TOO_SMALL_BELOW = 0.001
+"""Below this quantile the residuals are better than the stated sigma allows."""
 
 
 def judged(
@@ -22,8 +30,9 @@ def judged(
     unknowns: int,
     sigma_mm: float | None,
     tolerance: Tolerance,
+    grid_mm: float | None = None,
 ) -> ResultT:
-    """Return ``result`` with covariance, interval, rms, degrees of freedom and doubts.
+    """Return ``result`` with covariance, interval, budget, rms, degrees of freedom and doubts.
 
     Args:
         result: The solution.
@@ -32,31 +41,104 @@ def judged(
         unknowns: How many numbers the fit had to find.
         sigma_mm: The stated standard deviation, if there is one.
         tolerance: Residuals above which the result carries a warning.
+        grid_mm: Step of the jogs, if it is known.
 
     Raises:
-        ConfigError: ``sigma_mm`` is not positive.
+        ConfigError: ``sigma_mm`` or ``grid_mm`` is not positive.
     """
     flat = residuals_mm.ravel()
     total, dof = float(flat @ flat), flat.size - unknowns
-    scatter = Dispersion.of(total, dof, sigma_mm)
     rms = worst = None
     if dof > 0:
         squares = np.einsum("ij,ij->i", residuals_mm, residuals_mm)
         rms, worst = math.sqrt(total / len(residuals_mm)), math.sqrt(float(squares.max()))
-    doubts = tolerance.doubts(rms, worst)
-    covariance: tuple[tuple[float, ...], ...] = ()
-    if scatter is not None:
-        covariance = tuple(map(tuple, (unit_covariance * scatter.sigma_mm**2).tolist()))
-        if scatter.contradicted_by(total, dof):
-            doubts = ("sigma_too_small", *doubts)
+    spread = with_interval(result, unit_covariance, total, dof, sigma_mm=sigma_mm, grid_mm=grid_mm)
+    evidence = result.evidence or FitEvidence()
+    agreement, doubts = _agreement(evidence, total, dof, sigma_mm, grid_mm)
     return replace(
-        result,
-        covariance=covariance,
-        half_width95=scatter.half_widths(covariance) if scatter else (),
-        sigma_mm=scatter.sigma_mm if scatter else None,
-        sigma_stated=sigma_mm is not None,
+        spread,
         rms_mm=rms,
         max_residual_mm=worst,
         dof=dof,
-        warnings=(*result.warnings, *doubts),
+        evidence=agreement,
+        warnings=(*spread.warnings, *doubts, *tolerance.doubts(rms, worst)),
     )
+
+
+def with_interval(
+    result: ResultT,
+    unit_covariance: Floats,
+    sum_of_squares: float,
+    dof: int,
+    *,
+    sigma_mm: float | None,
+    grid_mm: float | None = None,
+) -> ResultT:
+    """Return ``result`` with covariance, interval, region and budget, where anything tells them.
+
+    The widest of what residuals, a stated sigma and the grid of the jogs give is taken
+    (docs/reference/evidence.md 6).
+
+    Args:
+        result: The solution.
+        unit_covariance: Of the measured components for sigma = 1 mm.
+        sum_of_squares: Of all residual coordinates, mm^2.
+        dof: Degrees of freedom that are left.
+        sigma_mm: The stated standard deviation, if there is one.
+        grid_mm: Step of the jogs, if it is known.
+
+    Raises:
+        ConfigError: ``sigma_mm`` or ``grid_mm`` is not positive.
+    """
+    known = tuple(Dispersion.known(sum_of_squares, dof, sigma_mm, grid_mm))
+    widest = Dispersion.of(sum_of_squares, dof, sigma_mm, grid_mm)
+    if widest is None:
+        return result
+    covariance = tuple(map(tuple, (unit_covariance * widest.sigma_mm**2).tolist()))
+    lengths = [index for index, name in enumerate(result.measured) if name.endswith("_mm")]
+    region, gain = None, 0.0
+    if lengths:
+        among = unit_covariance[np.ix_(lengths, lengths)]
+        gain = math.sqrt(max(float(among.diagonal().max()), 0.0))
+        axis = math.sqrt(max(float(np.linalg.eigvalsh(among)[-1]), 0.0))
+        region = axis * max(one.sigma_mm * one.region_factor(len(lengths)) for one in known)
+    from_grid = widest.source == "resolution"
+    return replace(
+        result,
+        covariance=covariance,
+        half_width95=widest.half_widths(covariance),
+        sigma_mm=widest.sigma_mm,
+        sigma_stated=sigma_mm is not None,
+        interval_from=widest.source,
+        region95_radius_mm=region,
+        budget=widest.budget(gain) if lengths else None,
+        notes=(*result.notes, "resolution_floor") if from_grid else result.notes,
+    )
+
+
+def _agreement(
+    evidence: FitEvidence,
+    sum_of_squares: float,
+    dof: int,
+    sigma_mm: float | None,
+    grid_mm: float | None,
+) -> tuple[FitEvidence, tuple[str, ...]]:
+    """Compare the residuals with a stated sigma: chi-square, and the Birge ratio."""
+    evidence = replace(evidence, grid_mm=grid_mm)
+    if sigma_mm is None or dof < 1:
+        return evidence, ()
+    ratio = math.sqrt(sum_of_squares) / sigma_mm
+    found = ratio * ratio
+    limit = chi_square_quantile(CONTRADICTED_ABOVE, dof)
+    evidence = replace(
+        evidence,
+        chi_square=found,
+        chi_square_limit=limit,
+        birge_ratio=math.sqrt(found / dof),
+    )
+    if found > limit:
+        return evidence, ("sigma_contradicted",)
+    # On a coarse grid residuals may be nothing at all, whoever made the touches.
+    natural = grid_mm is not None and grid_mm >= sigma_mm
+    too_small = not natural and found < chi_square_quantile(TOO_SMALL_BELOW, dof)
+    return evidence, ("residuals_too_small",) if too_small else ()

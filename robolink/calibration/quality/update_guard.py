@@ -10,6 +10,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from robolink.calibration.core.result import CalibrationResult
 from robolink.errors import CalibrationError
 from robolink.messages import tr
 from robolink.model import ToolOffset
@@ -19,6 +20,26 @@ NEEDLE_LIMIT_MM = 2.0
 (docs/reference/calibration.md 2.9)."""
 
 NOISE_MM = 0.05
+
+
+TAKEN_AGAIN = ("step_in_run_order", "drift_in_run_order")
+"""Doubts after which the touches have to be taken again (docs/reference/evidence.md 8)."""
+
+BIRGE_LIMIT = 3.0
+"""Residuals this many times larger than the stated sigma need somebody to look."""
+
+
+def writes_refused_unattended(result: CalibrationResult) -> str:
+    """Return the code of a doubt that only a person may pass over; empty without one.
+
+    Something that moved while the touches were made leaves an offset between two truths, and
+    nobody is there to take the run again.
+    """
+    for code in TAKEN_AGAIN:
+        if code in result.warnings:
+            return code
+    ratio = result.evidence.birge_ratio if result.evidence is not None else None
+    return "sigma_contradicted" if ratio is not None and ratio > BIRGE_LIMIT else ""
 
 
 @dataclass(frozen=True, slots=True)

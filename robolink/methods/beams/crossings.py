@@ -4,7 +4,14 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from robolink.calibration import BeamsResult, Crossing, crossing_sigma_gain, solve_crossed_beams
+from robolink.calibration import (
+    BeamsResult,
+    Crossing,
+    FlangePlane,
+    TipHeight,
+    crossing_sigma_gain,
+    solve_crossed_beams,
+)
 from robolink.errors import CalibrationError
 from robolink.messages import tr
 from robolink.methods.beams.drive import BeamDrive, BeamScan, BeamTravel
@@ -75,10 +82,13 @@ class CrossingSampler:
                 crossings,
                 beams,
                 stored=self.stored,
+                height=self._height(),
                 sigma_mm=self.sigma_mm,
                 beams_may_have_moved=self.turned is not None,
             )
-        found = solve_crossed_beams(crossings, beams, stored=self.stored, sigma_mm=self.sigma_mm)
+        found = solve_crossed_beams(
+            crossings, beams, stored=self.stored, height=self._height(), sigma_mm=self.sigma_mm
+        )
         # Where the beams are is not relied on, so nothing tells yet how sure the tip is.
         return replace(found, half_width95=())
 
@@ -102,10 +112,22 @@ class CrossingSampler:
         """Say which one it is."""
         return tr("Crossing {number}, at {where}", number=number, where=self.named(crossing))
 
+    def _height(self, deeper_mm: float = 0.0) -> TipHeight:
+        """Return the height at which the beams see the needle, in the flange's axes.
+
+        The tip dips below the beams, so they see the shaft above it, along the flange's axis.
+        """
+        first, tip_z_mm = self.first, 0.0 if self.stored is None else self.stored.z_mm
+        above_mm = first.plan.dip_mm + deeper_mm
+        return TipHeight(tip_z_mm + above_mm / FlangePlane.of(first.frame).r33)
+
     def _require_straight(self, crossings: Sequence[Crossing]) -> None:
         """Refuse a needle whose shaft is not above its tip."""
         plan, beams = self.first.plan, self.first.station.beams
-        tip, shaft = (solve_crossed_beams(c, beams).offset for c in (crossings, self.shaft))
+        tip, shaft = (
+            solve_crossed_beams(seen, beams, height=self._height(deeper_mm)).offset
+            for seen, deeper_mm in ((crossings, 0.0), (self.shaft, plan.shaft_mm))
+        )
         beside_mm = math.hypot(shaft.x_mm - tip.x_mm, shaft.y_mm - tip.y_mm)
         lean_deg = math.degrees(math.atan2(beside_mm, plan.shaft_mm))
         if lean_deg > plan.max_lean_deg:

@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from robolink.calibration import Crossing, where_they_cross
+from robolink.calibration import Crossing, FlangePlane, carrying, where_they_cross
 from robolink.messages import tr
 from robolink.methods.beams.parameters import BeamsParameters
-from robolink.model import Path, Pose, ToolOffset, rotate_xy
+from robolink.model import Path, Pose, ToolOffset
 from robolink.procedures import approach_path, seek_or_retract
 from robolink.runner import Move, Procedure, Seek
 from robolink.stations import BeamStation
@@ -32,20 +32,20 @@ class BeamDrive:
     @property
     def safe_z_mm(self) -> float:
         """Height of the frame with the tip above the beams."""
-        return self.station.z_mm + self.plan.lift_mm - self.tip.z_mm
+        rise_mm = FlangePlane.of(self.frame).rise_mm(self.tip)
+        return self.station.z_mm + self.plan.lift_mm - rise_mm
 
     def place(self, beam: int, side: int) -> Pose:
         """Return the frame's pose with the tip beside a beam, on one side of it (1 or -1)."""
         station, plan = self.station, self.plan
         x_mm, y_mm = where_they_cross(station.beams)
         (nx, ny), across = station.beams[beam].normal, side * plan.search_mm
-        dx, dy = rotate_xy(self.tip.x_mm, self.tip.y_mm, self.frame.u_deg)
-        return replace(
-            self.frame,
-            x_mm=x_mm + ny * plan.aside_mm + nx * across - dx,
-            y_mm=y_mm - nx * plan.aside_mm + ny * across - dy,
-            z_mm=station.z_mm - plan.dip_mm - self.deeper_mm - self.tip.z_mm,
+        at = (
+            x_mm + ny * plan.aside_mm + nx * across,
+            y_mm - nx * plan.aside_mm + ny * across,
+            station.z_mm - plan.dip_mm - self.deeper_mm,
         )
+        return carrying(self.frame, self.tip, at)
 
     def round(self, first: int = 0) -> "list[BeamScan]":
         """Return the scans that cross both beams, both ways, beginning with one of them."""

@@ -14,15 +14,18 @@ from robolink.calibration import (
     BeamsResult,
     Crossing,
     Drift,
+    FlangePlane,
     VerifyResult,
     find_beams,
+    height_of,
+    solvable_planes,
     solve_crossed_beams,
     toward_zero,
 )
 from robolink.methods.beams.crossings import CrossingSampler
 from robolink.methods.beams.drive import BeamDrive, BeamTravel
 from robolink.methods.beams.parameters import BeamsParameters
-from robolink.model import Pose, ToolOffset, rotate_xy
+from robolink.model import Pose, ToolOffset
 from robolink.procedures import NO_OFFSET, sample_sequentially
 from robolink.runner import Procedure
 from robolink.stations import BeamStation
@@ -51,9 +54,10 @@ def measure_beams(
         sigma_mm: Standard deviation of one crossing's middle, where it is known.
 
     Raises:
-        CalibrationError: ``no_edge``, ``edge_passed``, ``bent_needle``, and those of
-            :func:`solve_crossed_beams`.
+        CalibrationError: ``tilted_pose`` before anything moves; ``no_edge``, ``edge_passed``,
+            ``bent_needle``, and those of :func:`solve_crossed_beams`.
     """
+    solvable_planes([here], height_of(stored))
     drive = BeamDrive(station, plan, here, stored or NO_OFFSET)
     turned = None
     if plan.turn_deg:
@@ -70,6 +74,7 @@ def trace_beams(
     *,
     here: Pose,
     tip: ToolOffset,
+    tip_sigma_mm: float = 0.0,
     asides_mm: Sequence[float] = REFERENCE_ASIDES_MM,
 ) -> Procedure[tuple[Beam, Beam]]:
     """Find where both beams are, with a reference pin whose tip is known. Runs in Tool 0.
@@ -79,6 +84,7 @@ def trace_beams(
         plan: How they are crossed.
         here: Where the flange is.
         tip: The pin's offset.
+        tip_sigma_mm: Standard deviation of each coordinate of that offset.
         asides_mm: Where along each beam it is crossed, both ways, from where they meet; two
             places or more, and none so near to it that the pin breaks both.
 
@@ -90,7 +96,7 @@ def trace_beams(
         drive = BeamDrive(guess, replace(plan, aside_mm=aside_mm), here, tip)
         crossings += yield from travel.through(drive.round())
         yield from travel.lifted()
-    return find_beams(crossings, (tip.x_mm, tip.y_mm))
+    return find_beams(crossings, (tip.x_mm, tip.y_mm), tip_sigma_mm=tip_sigma_mm)
 
 
 def verify_by_crossing(
@@ -124,7 +130,22 @@ def verify_by_crossing(
         drive = BeamDrive(station, plan, replace(here, u_deg=angle_deg), aside)
         crossings = yield from travel.through(drive.round())
         yield from travel.lifted()
-        found = solve_crossed_beams(crossings, station.beams).offset
-        dx, dy = rotate_xy(aside.x_mm - found.x_mm, aside.y_mm - found.y_mm, angle_deg)
-        drifts.append(Drift(angle_deg, dx, dy))
+        found = solve_crossed_beams(_unturned(crossings), station.beams).offset
+        plane = FlangePlane.of(drive.frame)
+        # The tip dips below the beams, which see the shaft above it.
+        seen_z_mm = aside.z_mm + plan.dip_mm / plane.r33
+        dx, dy = plane.in_base(aside.x_mm, aside.y_mm, seen_z_mm)
+        drifts.append(Drift(angle_deg, dx - found.x_mm, dy - found.y_mm))
     return VerifyResult(tuple(drifts), tolerance_mm)
+
+
+def _unturned(crossings: Sequence[Crossing]) -> list[Crossing]:
+    """Return crossings from which the way from the frame to the tip follows in base axes.
+
+    The frame is that of the tool, which may lean as it likes: only where it is counts.
+    """
+
+    def place(pose: Pose) -> Pose:
+        return replace(pose, u_deg=0.0, v_deg=0.0, w_deg=0.0, tool=None)
+
+    return [Crossing(c.beam, place(c.entry), place(c.exit)) for c in crossings]

@@ -9,6 +9,8 @@ from robolink.calibration import (
     Sighting,
     VerifyResult,
     as_round,
+    height_of,
+    solvable_planes,
     solve_board,
     solve_board_round,
 )
@@ -52,11 +54,13 @@ def measure_board(
         retake: Offer to take the look again that fits worst.
 
     Raises:
-        CalibrationError: ``fiducial_not_seen``, ``several_fiducials_seen``, ``far_off``,
-            ``camera_not_calibrated``, ``coincident_fiducials``, ``spacing_mismatch``, and the
-            others of :func:`solve_board` and :func:`solve_board_round`.
+        CalibrationError: ``tilted_pose`` before anything moves; ``fiducial_not_seen``,
+            ``several_fiducials_seen``, ``far_off``, ``camera_not_calibrated``,
+            ``coincident_fiducials``, ``spacing_mismatch``, and the others of :func:`solve_board`
+            and :func:`solve_board_round`.
     """
     board.require_apart()
+    solvable_planes([here], height_of(stored))
     tool, centred = stored or NO_OFFSET, False
     drive, angles_deg = CameraDrive(station, plan, here), plan.angles_deg(here.u_deg)
     if plan.centre_first:

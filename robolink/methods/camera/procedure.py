@@ -2,7 +2,13 @@
 
 from collections.abc import Sequence
 
-from robolink.calibration import CameraRound, solve_camera_round, solve_up_camera
+from robolink.calibration import (
+    CameraRound,
+    height_of,
+    solvable_planes,
+    solve_camera_round,
+    solve_up_camera,
+)
 from robolink.model import Pose, ToolOffset
 from robolink.procedures import NO_OFFSET, CameraDrive, CameraSamples, LookPlan, Place
 from robolink.runner import Procedure, SeenAt
@@ -29,9 +35,11 @@ def measure_camera(
         retake: Offer to take the look again that fits worst.
 
     Raises:
-        CalibrationError: ``tip_not_seen``, ``several_tips_seen``, ``camera_not_calibrated``, and
-            those of :func:`solve_camera_round`.
+        CalibrationError: ``tilted_pose`` before anything moves; ``tip_not_seen``,
+            ``several_tips_seen``, ``camera_not_calibrated``, and those of
+            :func:`solve_camera_round`.
     """
+    solvable_planes([here], height_of(stored))
     tip, centred = stored or NO_OFFSET, False
     drive, angles_deg = CameraDrive(station, plan, here), plan.angles_deg(here.u_deg)
     if plan.centre_first:
@@ -46,7 +54,7 @@ def measure_camera(
 
     def solve(looks: Sequence[SeenAt]) -> CameraRound:
         sightings = [station.sighting(look) for look in looks]
-        return solve_camera_round(sightings, stored=stored, sigma_mm=sigma_mm)
+        return solve_camera_round(sightings, stored=stored, sigma_mm=sigma_mm, camera=station.model)
 
     looks = CameraSamples(drive, solve, here, before_camera=centred)
     return (yield from looks.at(places, retake=retake))

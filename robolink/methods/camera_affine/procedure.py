@@ -7,6 +7,8 @@ from robolink.calibration import (
     CameraCalibration,
     PixelSighting,
     angle_spread_deg,
+    height_of,
+    solvable_planes,
     solve_camera_affine,
     toward_zero,
 )
@@ -42,10 +44,12 @@ def measure_camera_affine(
 
     Raises:
         CalibrationError: ``rank_deficient`` and ``insufficient_rotation`` before anything moves
-            when the pattern cannot tell; ``tip_not_seen``, ``several_tips_seen``,
-            ``camera_changed``, and the others of :func:`solve_camera_affine`.
+            when the pattern cannot tell, and ``tilted_pose``; ``tip_not_seen``,
+            ``several_tips_seen``, ``camera_changed``, and the others of
+            :func:`solve_camera_affine`.
     """
     _require_pattern(plan)
+    solvable_planes([here], height_of(stored))
     tip = stored or NO_OFFSET
     drive = CameraDrive(station, plan.look, here)
     places = [

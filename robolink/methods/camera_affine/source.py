@@ -67,6 +67,9 @@ class CameraAffineSource:
                 "seen_by": sensor_name(self.sensor),
                 "mm_per_px": [list(row) for row in model.mm_per_px],
                 "origin_mm": list(model.origin_mm),
+                "centre_mm": None if model.centre_mm is None else list(model.centre_mm),
+                "place_sigma_mm": model.place_sigma_mm,
+                "scale_sigma": model.scale_sigma,
             },
         )
 

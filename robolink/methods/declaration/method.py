@@ -7,7 +7,7 @@ command ``calibrate NAME``, the recipe's ``[source]`` and the page of all method
 
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, Final, Generic, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Final, Generic, Literal, TypeVar
 
 from annotated_types import Ge, Le
 
@@ -80,6 +80,10 @@ Pair = tuple[float, float]
 Rows = tuple[Pair, Pair]
 
 
+LengthRule = Literal["ask", "difference", "keep"]
+"""What is done where a tip proves longer or shorter: ask, write Z by difference, keep Z."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StatedLimits:
     """What somebody stated for this one measurement; ``None`` for what nobody did.
@@ -146,6 +150,10 @@ class MethodParameters:
     def sigma_gain(self) -> float | None:
         """Return the tip's standard deviation as a multiple of a measurement's, where known."""
         return None
+
+    def length_rule(self) -> LengthRule:
+        """Return what is done where the touches show that the tip is longer or shorter."""
+        return "ask"
 
     def states_station(self) -> bool:
         """Tell whether they say all about the station, so that it need not be known."""

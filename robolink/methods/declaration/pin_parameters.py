@@ -8,7 +8,14 @@ from annotated_types import Ge, Le
 
 from robolink.files.toml import Problem
 from robolink.messages import tr
-from robolink.methods.declaration.method import MM, Check, Help, MethodParameters
+from robolink.methods.declaration.method import (
+    MM,
+    Check,
+    Help,
+    LengthRule,
+    MethodParameters,
+    Option,
+)
 from robolink.procedures import TouchPlan
 
 
@@ -39,6 +46,27 @@ class PinParameters(MethodParameters):
     def room_mm(self) -> float:
         """Return how high the box has to be."""
         return self.lift_mm
+
+
+@dataclass(frozen=True, kw_only=True)
+class UprightPinParameters(PinParameters):
+    """How an upright tip is touched that keeps its Z: heights tell whether it may."""
+
+    if_length_changed: Annotated[
+        LengthRule,
+        Option(moves=False),
+        Help(
+            tr(
+                "Where the heights of the touches show that the tip is longer or shorter: ask a "
+                "person, write Z by the difference, or keep Z. Where nobody can be asked, ask "
+                "means that nothing is written."
+            )
+        ),
+    ] = "ask"
+
+    def length_rule(self) -> LengthRule:
+        """Return what is done where the length changed."""
+        return self.if_length_changed
 
 
 def clearance_below_lift(clearance_mm: float, lift_mm: float, check: Check) -> Iterator[Problem]:

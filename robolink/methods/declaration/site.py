@@ -4,7 +4,10 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from robolink.model import Controller, TipSensor
+    from robolink.pose_tables import ReadingChoices
     from robolink.stations import Station  # what --help does without
 
 
@@ -17,6 +20,7 @@ class Site:
         tool: Number of the tool.
         station: What is known of the station; its name is empty where nobody named one.
         points: Numbers of the taught points that touch the pin, where they are measured with.
+        pose_file: A file of poses in place of the points, and what it does not say itself.
         sigma_mm: Standard deviation of one coordinate of one measurement, where it is known.
         max_change_mm: Largest change that is believed.
         interval_mm: Largest half width of a 95 % interval that is believed, if one is judged.
@@ -28,6 +32,7 @@ class Site:
     tool: int
     station: "Station"
     points: tuple[int, ...] = ()
+    pose_file: "tuple[Path, ReadingChoices] | None" = None
     sigma_mm: float | None = None
     max_change_mm: float = 2.0
     interval_mm: float | None = None

@@ -46,7 +46,7 @@ METHOD = Method(
     pose_help=PoseHelp(
         points=tr("Three points or more taught on the pendant, for example 901-904."),
         typed=tr("A pose in mm and degrees, for example 287.5,103.25,180; give three or more."),
-        path=tr("A .json or .csv file with three poses or more."),
+        path=tr("A file with three poses or more."),
     ),
     tells_height=True,
     formerly=(Former(kind="operator", method="n_angle"),),

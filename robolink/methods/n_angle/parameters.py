@@ -11,7 +11,7 @@ from robolink.calibration import MIN_ROTATION_DEG, planar_sigma_gain
 from robolink.files.toml import Problem
 from robolink.messages import tr
 from robolink.methods.declaration.method import DEGREES, Angle, Check, Help, Length, Option
-from robolink.methods.declaration.pin_parameters import PinParameters
+from robolink.methods.declaration.pin_parameters import UprightPinParameters
 from robolink.model import Pose, angle_difference_deg
 from robolink.procedures import SamplingPolicy
 
@@ -19,7 +19,7 @@ _SAME_ANGLE_DEG: Final = 1e-9
 
 
 @dataclass(frozen=True, kw_only=True)
-class NAngleParameters(PinParameters):
+class NAngleParameters(UprightPinParameters):
     """How one pin is touched at several angles of U."""
 
     count: Annotated[

@@ -70,7 +70,7 @@ METHOD = Method(
     pose_help=PoseHelp(
         points=tr("The one point taught on the pendant with the tip on the pin."),
         typed=tr("The pose X,Y,Z,U in mm and degrees with the tip on the pin."),
-        path=tr("A .json or .csv file with the one pose."),
+        path=tr("A file with the one pose."),
     ),
     by_reference=False,
     formerly=(Former(kind="one_touch"),),

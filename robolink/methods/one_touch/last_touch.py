@@ -39,6 +39,8 @@ class LastTouch:
             told it.
         nozzle: Id of the nozzle that was mounted, empty when nobody gave one.
         at: When, as a label.
+        touches: How many touches the place rests on.
+        z_from: Where Z of the value came from, ``kept`` where nobody ever showed it.
     """
 
     station: str
@@ -49,6 +51,8 @@ class LastTouch:
     touch_sigma_mm: float | None
     nozzle: str
     at: str
+    touches: int = 1
+    z_from: str = "kept"
 
 
 def find_last_touch(controller: Controller, tool: int, station: str) -> LastTouch:
@@ -103,8 +107,15 @@ def _last_touch(entry: Recorded, station: str) -> LastTouch | None:
         place_mm=(float(said["x_mm"]), float(said["y_mm"]), float(said["z_mm"])),
         u_deg=float(said["u_deg"]),
         value=value,
-        chain=NeedleChain(float(said["sigma_mm"]), int(said["changes"])),
+        chain=NeedleChain(
+            float(said["sigma_mm"]),
+            int(said["changes"]),
+            # Records of before do not say it; their chain then starts where it had got to.
+            said.get("full_sigma_mm"),
+        ),
         touch_sigma_mm=None if sigma_mm is None else float(sigma_mm),
         nozzle=entry.signature.nozzle,
         at=entry.at,
+        touches=int(said.get("touches", 1)),
+        z_from=str(entry.details.get("z_from", "kept")),
     )

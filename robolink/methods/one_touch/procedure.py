@@ -3,9 +3,9 @@
 from collections.abc import Callable
 from dataclasses import replace
 
-from robolink.calibration import CalibrationResult
+from robolink.calibration import CalibrationResult, carrying
 from robolink.messages import tr
-from robolink.model import Path, Pose, ToolOffset, rotate_xy
+from robolink.model import Path, Pose, ToolOffset
 from robolink.procedures import NO_OFFSET, TouchPlan, approach_path, offset_z
 from robolink.runner import Ask, Move, Procedure
 
@@ -33,14 +33,7 @@ def measure_one_touch(
         CalibrationError: As ``solve``.
     """
     guess = stored or NO_OFFSET
-    dx, dy = rotate_xy(guess.x_mm, guess.y_mm, u_deg)
-    contact = replace(
-        here,
-        x_mm=pin_mm[0] - dx,
-        y_mm=pin_mm[1] - dy,
-        z_mm=pin_mm[2] - guess.z_mm,
-        u_deg=u_deg,
-    )
+    contact = carrying(replace(here, u_deg=u_deg), guess, pin_mm)
     yield from approach_path(
         offset_z(contact, plan.lift_mm), here=here, purpose=tr("go above the pin")
     )

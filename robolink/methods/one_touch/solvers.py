@@ -9,7 +9,7 @@ from robolink.calibration import CalibrationResult, NeedleLimits
 from robolink.errors import CalibrationError, ConfigError
 from robolink.messages import tr
 from robolink.methods.one_touch.last_touch import LastTouch, find_last_touch
-from robolink.model import Controller, Pose, ToolOffset, rotate_xy
+from robolink.model import Controller, Pose, ToolOffset
 from robolink.ways import Way, way
 
 if TYPE_CHECKING:
@@ -50,12 +50,15 @@ class Difference:
 
     def solve(self, flange: Sequence[Pose], stored: ToolOffset | None) -> CalibrationResult:
         """Solve exactly one touch; see :class:`~robolink.procedures.PoseMethod`."""
-        from robolink.calibration import solve_needle_change  # numpy, which a look does without
+        from robolink.calibration import (  # numpy, which a look does without
+            pin_touched,
+            solve_needle_change,
+        )
 
         touch = one_of(flange)
         old = self.last.value if stored is None else stored
-        dx, dy = rotate_xy(old.x_mm, old.y_mm, touch.u_deg)
-        before_mm = (touch.x_mm + dx, touch.y_mm + dy, touch.z_mm + old.z_mm)
+        before = pin_touched(touch, old)
+        before_mm = (before.x_mm, before.y_mm, before.z_mm)
         found = solve_needle_change(
             touch,
             before_mm,
@@ -64,6 +67,8 @@ class Difference:
             chain=self.last.chain,
             sigma_mm=self.sigma_mm,
             limits=self.limits,
+            # The old tip is where its own touch left it; nobody touches it again.
+            shared_touch=True,
         )
         result = replace(found, method="one-touch")
         if result.full_calibration_due or not self._one_more(result):
@@ -72,7 +77,7 @@ class Difference:
 
     def _one_more(self, result: "NeedleChangeResult") -> bool:
         """Tell whether the next difference would already be one too many."""
-        later = result.chain.after(math.sqrt(2) * self.sigma_mm)
+        later = result.chain.after(math.sqrt(2) * self.sigma_mm, shared_touch=True)
         half95_mm = result.half_width95[0] * later.sigma_mm / result.chain.sigma_mm
         return half95_mm > self.limits.tolerance_mm
 

@@ -14,6 +14,9 @@ from robolink.model import Pose
 from robolink.stations import StationKind
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
+    from robolink.pose_tables import ReadingChoices
     from robolink.procedures import PoseMethod, TipSource
 
 
@@ -33,6 +36,8 @@ def _source(parameters: PointsParameters, site: Site) -> "TipSource":
     """
     from robolink.methods.points.source import PointsSource, taught_poses
 
+    if site.pose_file is not None:
+        return _from_file(parameters, site, *site.pose_file)
     points = site.controller.points
     if points is None:
         raise ConfigError(
@@ -51,6 +56,26 @@ def _source(parameters: PointsParameters, site: Site) -> "TipSource":
         sentence=tr(
             "points {names} taught on the pendant with tool {tool}",
             names=", ".join(f"P{number}" for number in site.points),
+            tool=parameters.taught_tool,
+        ),
+    )
+
+
+def _from_file(
+    parameters: PointsParameters, site: Site, path: "Path", choices: "ReadingChoices"
+) -> "TipSource":
+    """Return what reads the poses of a file."""
+    from robolink.methods.points.source import PointsSource
+    from robolink.pose_tables import read_poses
+
+    return PointsSource(
+        lambda: read_poses(path, choices).poses,
+        _solver(parameters, site),
+        taught_tool=parameters.taught_tool,
+        plausible_mm=site.max_change_mm,
+        sentence=tr(
+            "poses of the file {path}, taught with tool {tool}",
+            path=path,
             tool=parameters.taught_tool,
         ),
     )

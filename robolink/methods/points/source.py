@@ -12,7 +12,7 @@ from robolink.calibration import (
     CalibrationResult,
     ToolFit,
     better_fit,
-    flange_pose,
+    flange_of,
     tilted_flange_pose,
     tool_fits,
 )
@@ -107,12 +107,20 @@ class PointsSource:
     def find(self, controller: Controller, tool: int, stored: ToolOffset | None) -> PosesFound:
         """Solve the poses and ask which tool they fit. Moves and writes nothing."""
         poses = self._poses()
-        taught = _require_defined(controller, self._taught_tool)
+        if self._taught_tool:
+            _require_taught_with(self._taught_tool, poses)
+        # A pose that names its tool knows better than the usual one of all of them, the flange.
+        named = {self._tool_of(pose) for pose in poses}
+        tools = {number: _require_defined(controller, number) for number in sorted(named)}
         if not self._method.upright:
-            flange = [tilted_flange_pose(pose, taught) for pose in poses]
+            flange = [tilted_flange_pose(pose, tools[self._tool_of(pose)]) for pose in poses]
             return PosesFound(self._method.solve(flange, stored), (), None)
-        _require_upright(self._taught_tool, taught)
-        result = self._method.solve([flange_pose(pose, taught) for pose in poses], stored)
+        for number, taught in tools.items():
+            _require_upright(number, taught)
+        flange = [flange_of(pose, tools[self._tool_of(pose)]) for pose in poses]
+        result = self._method.solve(flange, stored)
+        if named != {self._taught_tool}:
+            return PosesFound(result, (), None)
         # The listing may lack V and W; what is compared and written comes from single reads.
         listed = {number: o for number, o in controller.tools.read_all().items() if o is not None}
         fits = tool_fits(result, taught=self._taught_tool, stored=listed, calibrated=tool)
@@ -120,6 +128,9 @@ class PointsSource:
         if better is not None:
             result = replace(result, warnings=(*result.warnings, "other_tool_fits"))
         return PosesFound(result, fits, better)
+
+    def _tool_of(self, pose: Pose) -> int:
+        return self._taught_tool if pose.tool is None else pose.tool
 
     @property
     def remedy(self) -> str:
@@ -136,6 +147,27 @@ class PointsSource:
             "Check that all poses touched the same point and with which tool they were taught "
             "({taught_tool}).",
             taught_tool=way(Way.TAUGHT_TOOL),
+        )
+
+
+def _require_taught_with(tool: int, poses: Sequence[Pose]) -> None:
+    """Refuse poses that say themselves that they are those of another tool.
+
+    Raises:
+        CalibrationError: ``tool_pose``.
+    """
+    other = next((pose.tool for pose in poses if pose.tool not in (None, tool)), None)
+    if other is not None:
+        raise CalibrationError(
+            "tool_pose",
+            tr(
+                "These poses are those of tool {other}, not of tool {tool}.", other=other, tool=tool
+            ),
+            remedy=tr(
+                "Name the tool that was selected with {taught_tool}; what its number holds on this "
+                "controller is used.",
+                taught_tool=way(Way.TAUGHT_TOOL),
+            ),
         )
 
 

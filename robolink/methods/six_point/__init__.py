@@ -55,6 +55,6 @@ METHOD = Method(
     pose_help=PoseHelp(
         points=tr("The points on the pin, then the one along X and the one along Z."),
         typed=tr("A pose X,Y,Z,U,V,W in mm and degrees; give it five times or more."),
-        path=tr("A .json or .csv file with x_mm, y_mm, z_mm, u_deg, v_deg and w_deg of each pose."),
+        path=tr("A file of poses that state X to W."),
     ),
 )

@@ -43,7 +43,7 @@ METHOD = Method(
     pose_help=PoseHelp(
         points=tr("Two points taught on the pendant, for example 901,902. Nothing moves."),
         typed=tr("A pose in mm and degrees, for example 287.5,103.25,180; give it twice."),
-        path=tr("A .json or .csv file with the two poses."),
+        path=tr("A file with the two poses."),
     ),
     tells_height=True,
     formerly=(Former(kind="operator", method="two_pose", usual=True),),

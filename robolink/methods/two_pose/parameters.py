@@ -8,13 +8,13 @@ from annotated_types import Ge, Le
 from robolink.calibration import MIN_ROTATION_DEG, planar_sigma_gain
 from robolink.messages import tr
 from robolink.methods.declaration.method import DEGREES, Help, Option
-from robolink.methods.declaration.pin_parameters import PinParameters, two_poses_agree
+from robolink.methods.declaration.pin_parameters import UprightPinParameters, two_poses_agree
 from robolink.model import Pose
 from robolink.procedures import TouchPlan
 
 
 @dataclass(frozen=True, kw_only=True)
-class TwoPoseParameters(PinParameters):
+class TwoPoseParameters(UprightPinParameters):
     """How one pin is touched at two angles of U."""
 
     turn_deg: Annotated[

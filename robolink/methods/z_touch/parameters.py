@@ -44,7 +44,12 @@ class ZTouchParameters(MethodParameters):
         MinLen(2),
         MM_S,
         Option(metavar="2,1,.."),
-        Help(tr("Speed of each touch; two that differ tell the latency of the trigger.")),
+        Help(
+            tr(
+                "Speed of each touch; two that differ tell the latency of the trigger, three in "
+                "four touches or more also how far the robot runs on while it brakes."
+            )
+        ),
     ] = (2.0, 1.0, 2.0, 1.0)
     clearance_mm: Annotated[
         float,

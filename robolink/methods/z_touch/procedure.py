@@ -5,15 +5,19 @@ from dataclasses import dataclass, replace
 
 from robolink.calibration import (
     Drift,
+    FlangePlane,
     Touch,
     VerifyResult,
     ZTouchResult,
+    carrying,
+    height_of,
+    solvable_planes,
     solve_z_touch,
     touch_sigma_gain,
 )
 from robolink.messages import tr
 from robolink.methods.z_touch.parameters import ZTouchParameters
-from robolink.model import Path, Pose, ToolOffset, rotate_xy
+from robolink.model import Path, Pose, ToolOffset
 from robolink.procedures import (
     NO_OFFSET,
     approach_path,
@@ -43,9 +47,11 @@ def measure_z_touch(
         sigma_mm: Standard deviation of one touch, where it is known.
 
     Raises:
-        CalibrationError: ``no_edge``, ``edge_passed``, and those of :func:`solve_z_touch`.
+        CalibrationError: ``tilted_pose`` before anything moves; ``no_edge``, ``edge_passed``, and
+            those of :func:`solve_z_touch`.
     """
-    probing = _ZTouchSampler(station, plan, here, stored or NO_OFFSET, here, stored, sigma_mm)
+    solvable_planes([here], height_of(stored))
+    probing = _ZTouchSampler(station, plan, here, stored or NO_OFFSET, here, stored, sigma_mm, here)
     first = yield from probing.take(plan.speeds_mm_s[0])
     return (yield from sample_sequentially(probing, first, plan.speeds_mm_s, plan.sampling))
 
@@ -80,8 +86,9 @@ def verify_by_touching(
         for speed_mm_s in plan.speeds_mm_s:
             touches.append((yield from probing.take(speed_mm_s)))
         yield from probing.away()
-        here, found = probing.here, probing.solve(touches).offset
-        drifts.append(Drift(angle_deg, 0.0, 0.0, aside.z_mm - found.z_mm))
+        here, found = probing.here, probing.solve(touches)
+        rise_mm = FlangePlane.of(probing.frame).rise_mm(aside)
+        drifts.append(Drift(angle_deg, 0.0, 0.0, found.flange_z_mm + rise_mm - station.z_mm))
     return VerifyResult(tuple(drifts), tolerance_mm, heights_only=True)
 
 
@@ -95,6 +102,7 @@ class _ZTouchSampler:
         tip: Where the tip is expected, seen from the frame.
         here: Where the frame is.
         stored, sigma_mm: As for :func:`measure_z_touch`.
+        flange: A pose of the flange, where the frame is the flange: Z is along its axis.
         near: Whether the frame is at the clearance or below, not above the surface.
     """
 
@@ -105,6 +113,7 @@ class _ZTouchSampler:
     here: Pose
     stored: ToolOffset | None = None
     sigma_mm: float | None = None
+    flange: Pose | None = None
     near: bool = False
 
     @property
@@ -133,7 +142,13 @@ class _ZTouchSampler:
             self.near = False
 
     def solve(self, touches: Sequence[Touch]) -> ZTouchResult:
-        return solve_z_touch(touches, self.station.z_mm, stored=self.stored, sigma_mm=self.sigma_mm)
+        return solve_z_touch(
+            touches,
+            self.station.z_mm,
+            stored=self.stored,
+            flange=self.flange,
+            sigma_mm=self.sigma_mm,
+        )
 
     def foreseen(self, place: float) -> Touch:
         return Touch(0.0, place)
@@ -150,15 +165,11 @@ class _ZTouchSampler:
     @property
     def _above(self) -> Pose:
         """The frame's pose with the tip where it begins to seek."""
-        dx, dy = rotate_xy(self.tip.x_mm, self.tip.y_mm, self.frame.u_deg)
-        return replace(
-            self.frame,
-            x_mm=self.station.x_mm - dx,
-            y_mm=self.station.y_mm - dy,
-            z_mm=self.station.z_mm + self.plan.clearance_mm - self.tip.z_mm,
-        )
+        station = self.station
+        at = (station.x_mm, station.y_mm, station.z_mm + self.plan.clearance_mm)
+        return carrying(self.frame, self.tip, at)
 
     @property
     def _safe(self) -> Pose:
         """The frame's pose with the tip above the surface, where it may turn."""
-        return replace(self._above, z_mm=self.station.z_mm + self.plan.lift_mm - self.tip.z_mm)
+        return offset_z(self._above, self.plan.lift_mm - self.plan.clearance_mm)

@@ -30,6 +30,13 @@ def points(draft: Draft) -> Iterator[Problem]:
         if not isinstance(parameters, PointsParameters):
             if tool.points is not None:
                 yield Problem(where, tr('means nothing without kind = "points" in [source]'))
+            if tool.poses is not None:
+                yield Problem(
+                    f"{place}.poses", tr('means nothing without kind = "points" in [source]')
+                )
+        elif tool.poses is not None:
+            if tool.points is not None:
+                yield Problem(where, tr("stands beside poses; give one of the two"))
         elif tool.points is None:
             yield Problem(where, tr("is missing: the numbers of the points that touch the pin"))
         else:

@@ -96,6 +96,19 @@ class Poses(Table):
     """Flange pose to which the robot goes first and last: up, over, down."""
 
 
+class PoseFile(Table):
+    """A file of poses, and what it does not say itself (docs/poses.md, "Files of poses")."""
+
+    file: Line
+    """The file; a path that is not absolute begins in the folder of the recipe."""
+    columns: Line | None = None
+    """A name for each of its columns, "-" for one to skip: "x,y,z,u"."""
+    length: Literal["mm", "cm", "m", "in"] | None = None
+    """Unit of its lengths."""
+    euler: Line | None = None
+    """Rule by which its angles turn, such as "kuka"."""
+
+
 class Tool(Table):
     """One tool whose nozzle was changed."""
 
@@ -109,6 +122,8 @@ class Tool(Table):
     """Flange pose to which the robot goes after the measurement."""
     points: Annotated[tuple[PointNumber, ...], Field(strict=False, min_length=2)] | None = None
     """Numbers of the taught points that touch the pin with this tool; source "points" only."""
+    poses: PoseFile | None = None
+    """File with the poses that touch the pin with this tool, in place of points."""
 
 
 class Speeds(Table):

@@ -1,5 +1,7 @@
 """Where the interval comes from, in a sentence."""
 
+import math
+
 from robolink.calibration import CalibrationResult
 from robolink.messages import tr
 
@@ -8,7 +10,13 @@ def how_sure(fit: CalibrationResult) -> str:
     """Return what the interval of a measurement rests on, or why there is none."""
     if not fit.half_width95:
         return tr("No interval: nothing here tells how large the errors are.")
-    if fit.sigma_stated and fit.sigma_mm is not None:
+    if fit.interval_from == "resolution" and fit.sigma_mm is not None:
+        return tr(
+            "The interval rests on the step of the jogs, {step:g} mm.",
+            step=fit.sigma_mm * math.sqrt(12),
+        )
+    from_residuals = fit.interval_from == "residuals"
+    if fit.sigma_stated and fit.sigma_mm is not None and not from_residuals:
         return tr(
             "The interval rests on a stated standard deviation of {sigma:g} mm of one placement.",
             sigma=fit.sigma_mm,

@@ -160,7 +160,7 @@ def _connections(lines: Iterable[str], source: str) -> Iterator[tuple[str, str, 
             if current is None:
                 raise ValueError
             current[2].append(_passage(read))
-        except (KeyError, TypeError, ValueError) as error:
+        except (KeyError, RecursionError, TypeError, ValueError) as error:
             raise _unreadable(source, number) from error
     if current is None:
         raise _unreadable(source, 1)

@@ -9,6 +9,7 @@ from robolink.messages import tr
 from robolink_simulators.assist.parameters import (
     Answer,
     Parameters,
+    number_in,
     shown_flange,
     tool_number,
     whole_number,
@@ -27,13 +28,13 @@ def _jog_onto_pin(simulator: EpsonSimulator, request: Parameters) -> Answer:
 
 
 def _teach_point(simulator: EpsonSimulator, request: Parameters) -> Answer:
-    u_deg = request.get("u_deg")
-    if not isinstance(u_deg, (int, float)) or not -360 <= u_deg <= 360:
+    u_deg = number_in(request, "u_deg")
+    if not -360 <= u_deg <= 360:
         raise ConfigError(
             tr("{act} needs {name}, an angle.", act="teach_point", name="u_deg"),
             remedy=tr("Give it as {example}.", example='"u_deg": 180'),
         )
-    flange = simulator.world.operator.teach_point(whole_number(request, "number"), float(u_deg))
+    flange = simulator.world.operator.teach_point(whole_number(request, "number"), u_deg)
     return {"flange": shown_flange(flange)}
 
 

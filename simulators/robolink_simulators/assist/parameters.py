@@ -1,6 +1,5 @@
 """What acts at an assist port take and give."""
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -15,6 +14,7 @@ Parameters = Mapping[str, Any]
 """The request, as it came in."""
 
 _MOST = 9999
+_FAR = 1_000_000
 
 
 def whole_number(request: Parameters, name: str) -> int:
@@ -37,15 +37,20 @@ def whole_number(request: Parameters, name: str) -> int:
 
 
 def number_in(request: Parameters, name: str) -> float:
-    """Return a parameter that is a finite number.
+    """Return a parameter that is a number of at most a million, either way.
 
     Raises:
         ConfigError: It is missing, or something else.
     """
     value = request.get(name)
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+    # An integer of JSON may have hundreds of digits: it is compared before it becomes a float.
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not -_FAR <= value <= _FAR:
         raise ConfigError(
-            tr("{act} needs {name}, a number.", act=request.get("do"), name=name),
+            tr(
+                "{act} needs {name}, a number from -1000000 to 1000000.",
+                act=request.get("do"),
+                name=name,
+            ),
             remedy=tr("Give it as {example}.", example=f'"{name}": 1.5'),
         )
     return float(value)

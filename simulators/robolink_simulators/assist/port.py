@@ -1,8 +1,12 @@
 """The assist port: the hands, eyes and truth of a served simulator, as JSON lines.
 
-``{"do": "look"}`` is answered with ``{"ok": true, ...}``, anything that cannot be done with
-``{"ok": false, "error": sentence}``. A line that is no JSON object ends the connection, so
-that a web page which posts to the port gets nothing done.
+The first line shows the token of the URL, ``{"token": "..."}``; each further one has something
+done: ``{"do": "look"}``. Both are answered with ``{"ok": true, ...}``, what cannot be done with
+``{"ok": false, "error": sentence}``. A wrong token ends the connection after its answer; a line
+that is no JSON object, or is longer than :data:`LONGEST_LINE` bytes, at once, so that a web page
+which posts to the port gets nothing done. At most :data:`MOST_CLIENTS` are connected: a newcomer
+takes the place of whoever has waited longest without showing the token, and where all have shown
+it, there is none for him. So nobody who connects and keeps silent keeps others out.
 """
 
 import json
@@ -16,6 +20,12 @@ from robolink.closing import ClosedAtExit
 from robolink.errors import ConfigError, ConnectError, RobolinkError, TransportBrokenError
 from robolink.messages import tr
 from robolink_simulators.assist.acts import Assisted, perform
+from robolink_simulators.assist.entrance import (
+    SCHEME,
+    assist_address,
+    drawn_token,
+    is_token,
+)
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.cell.habits import PersonManner
 from robolink_simulators.cell.person import PersonLook
@@ -30,43 +40,71 @@ LEAST_THINKING_S: Final = 0.35
 """However fast simulated time passes, a person who thinks at all really answers no sooner: a driver
 takes it for typed ahead when an answer comes before the question can have been read."""
 
-_MAX_LINE: Final = 65536
-_SCHEME: Final = "assist+tcp"
+LONGEST_LINE: Final = 4096
+"""Bytes; the longest request there is, a whole world set up, takes some 1500."""
+
+MOST_CLIENTS: Final = 16
+
+_LONGEST_ANSWER: Final = 1 << 20
 _IN_PROCESS: Final[Mapping[str, Callable[[str], Assisted]]] = {
     "epson+sim": in_process.simulator_named,
     "softmotion+sim": plc_in_process.simulator_named,
 }
 
 
-def serve_assist(simulator: Assisted, *, port: int = 0, clock: ScaledClock) -> TcpHost:
+class AssistHost(TcpHost):
+    """A listening assist port; its URL holds the token."""
+
+    def __init__(self, simulator: Assisted, port: int, clock: ScaledClock, token: str) -> None:
+        self._token = token
+        super().__init__(
+            _AssistDevice(simulator, clock, token),
+            SCHEME,
+            ("127.0.0.1", port),
+            clock=clock,
+            lock=simulator.lock,
+        )
+
+    @property
+    def url(self) -> str:
+        """Where clients connect to, with what lets them in."""
+        return super().url.replace("://", f"://{self._token}@")
+
+
+def serve_assist(
+    simulator: Assisted, *, port: int = 0, clock: ScaledClock, token: str | None = None
+) -> AssistHost:
     """Serve the assist port of a simulator, on loopback only.
 
     Args:
         simulator: Whose world.
         port: Port, 0 for a free one.
         clock: The clock on which the simulator is served.
+        token: What its URL holds; drawn when it is left out.
 
     Raises:
         ConnectError: The port is taken.
     """
-    return TcpHost(
-        _AssistDevice(simulator, clock),
-        _SCHEME,
-        ("127.0.0.1", port),
-        clock=clock,
-        lock=simulator.lock,
-    )
+    return AssistHost(simulator, port, clock, drawn_token() if token is None else token)
 
 
 class _AssistDevice:
     """Implements :class:`~robolink_simulators.hosting.seam.WireDevice`."""
 
-    def __init__(self, simulator: Assisted, clock: ScaledClock) -> None:
+    def __init__(self, simulator: Assisted, clock: ScaledClock, token: str) -> None:
         self._simulator = simulator
         self._clock = clock
+        self._token = token
+        self._links: list[_AssistLink] = []
 
     def connect(self, now_ns: int) -> "_AssistLink":  # noqa: ARG002 - time plays no part
-        return _AssistLink(self._simulator, self._clock)
+        link = _AssistLink(self._simulator, self._clock, self._token)
+        self._links = [other for other in self._links if not other.closed]
+        if len(self._links) >= MOST_CLIENTS:
+            waiting = (other for other in self._links if not other.let_in)
+            next(waiting, link).closed = True
+        self._links.append(link)
+        return link
 
     def advance(self, now_ns: int) -> None:
         """Nothing happens here by itself."""
@@ -78,21 +116,25 @@ class _AssistDevice:
 class _AssistLink:
     """Implements :class:`~robolink_simulators.hosting.seam.DeviceLink`."""
 
-    def __init__(self, simulator: Assisted, clock: ScaledClock) -> None:
+    def __init__(self, simulator: Assisted, clock: ScaledClock, token: str) -> None:
         self._simulator = simulator
         self._clock = clock
+        self._token = token
         self._held = b""
         self._out = b""
+        self.let_in = False
         self.closed = False
 
     def receive(self, data: bytes, now_ns: int) -> None:
-        self._held += data
-        if len(self._held) > _MAX_LINE:
+        if not data:
             self.closed = True
-        while not self.closed and b"\n" in self._held:
-            line, _, self._held = self._held.partition(b"\n")
-            self._simulator.advance(now_ns)
-            self._out += self._answered(line)
+        *lines, self._held = (self._held + data).split(b"\n")
+        for line in lines:
+            if not self.closed:
+                self._simulator.advance(now_ns)
+                self._out += self._answered(line)
+        if len(self._held) > LONGEST_LINE:
+            self.closed = True
 
     def outgoing(self) -> bytes:
         out, self._out = self._out, b""
@@ -100,19 +142,30 @@ class _AssistLink:
 
     def _answered(self, line: bytes) -> bytes:
         try:
-            request = json.loads(line)
+            request = json.loads(line) if len(line) <= LONGEST_LINE else None
         except (ValueError, RecursionError):
             request = None
         if not isinstance(request, dict):
             self.closed = True
             return b""
         try:
-            answer: dict[str, Any] = {"ok": True, **perform(self._simulator, request)}
-            if "thinks_s" in answer:
-                answer["thinks_s"] = self._real_thinking_s(answer["thinks_s"])
+            answer = self._performed(request) if self.let_in else self._entered(request)
         except (RobolinkError, SpelRefusal, BlockRefused) as error:
             answer = {"ok": False, "error": str(error)}
         return json.dumps(answer).encode() + b"\n"
+
+    def _entered(self, request: dict[str, Any]) -> dict[str, Any]:
+        self.let_in = is_token(request.get("token"), self._token)
+        if self.let_in:
+            return {"ok": True}
+        self.closed = True
+        return {"ok": False, "error": tr("That is not the token of this simulator.")}
+
+    def _performed(self, request: dict[str, Any]) -> dict[str, Any]:
+        answer: dict[str, Any] = {"ok": True, **perform(self._simulator, request)}
+        if "thinks_s" in answer:
+            answer["thinks_s"] = self._real_thinking_s(answer["thinks_s"])
+        return answer
 
     def _real_thinking_s(self, thinks_s: float) -> float:
         """Return how long they think by the clock that really passes, which whoever asks has."""
@@ -123,30 +176,30 @@ class AssistClient(ClosedAtExit):
     """Talks to an assist port.
 
     Args:
-        url: ``assist+tcp://127.0.0.1:PORT``.
+        url: ``assist+tcp://TOKEN@127.0.0.1:PORT``.
         timeout_s: Longest wait for an answer.
 
     Raises:
-        ConfigError: It is not an assist URL.
+        ConfigError: It is not an assist URL, or its token is not that of the simulator.
         ConnectError: Nobody listens there.
     """
 
     def __init__(self, url: str, *, timeout_s: float = 5.0) -> None:
-        parts = urlsplit(url)
-        if parts.scheme != _SCHEME or not parts.hostname or not parts.port:
-            raise ConfigError(
-                tr("{url!r} is not an assist URL.", url=url),
-                remedy=tr("Take the one that 'robolink sim' prints."),
-            )
-        self._url = url
+        address = assist_address(url)
+        self._url = address.shown
         try:
-            self._socket = socket.create_connection((parts.hostname, parts.port), timeout_s)
+            self._socket = socket.create_connection((address.host, address.port), timeout_s)
         except OSError as error:
             raise ConnectError(
-                tr("No simulator listens on {url}.", url=url),
+                tr("No simulator listens on {url}.", url=self._url),
                 remedy=tr("Start one with 'robolink sim epson' or 'robolink sim softmotion'."),
             ) from error
         self._lines = self._socket.makefile("rb")
+        try:
+            self._enter(address.token)
+        except BaseException:
+            self.close()
+            raise
 
     def do(self, act: str, **parameters: object) -> dict[str, Any]:
         """Have something done and return what it gives.
@@ -155,14 +208,7 @@ class AssistClient(ClosedAtExit):
             ConfigError: The simulator cannot do it, and says why.
             TransportBrokenError: The simulator is gone.
         """
-        try:
-            self._socket.sendall(json.dumps({"do": act, **parameters}).encode() + b"\n")
-            line = self._lines.readline()
-        except OSError as error:
-            raise self._broken() from error
-        if not line:
-            raise self._broken()
-        answer: dict[str, Any] = json.loads(line)
+        answer = self._asked({"do": act, **parameters})
         if not answer.pop("ok"):
             raise ConfigError(str(answer["error"]))
         return answer
@@ -203,6 +249,27 @@ class AssistClient(ClosedAtExit):
         """Close the connection."""
         self._lines.close()
         self._socket.close()
+
+    def _enter(self, token: str) -> None:
+        if not self._asked({"token": token}).get("ok"):
+            raise ConfigError(
+                tr("The simulator on {url} does not know the token of this URL.", url=self._url),
+                remedy=tr("Take the whole URL that 'robolink sim' prints; each start has its own."),
+            )
+
+    def _asked(self, request: dict[str, object]) -> dict[str, Any]:
+        try:
+            self._socket.sendall(json.dumps(request).encode() + b"\n")
+            line = self._lines.readline(_LONGEST_ANSWER)
+        except OSError as error:
+            raise self._broken() from error
+        try:
+            answer = json.loads(line)
+        except (ValueError, RecursionError) as error:
+            raise self._broken() from error
+        if not isinstance(answer, dict) or "ok" not in answer:
+            raise self._broken()
+        return answer
 
     def _broken(self) -> TransportBrokenError:
         return TransportBrokenError(

@@ -46,7 +46,7 @@ class Flash:
                 raise ValueError(state["robot"])
             self._machine.tools.restore(state["tools"])
             serial = state.get("serial")
-        except (OSError, KeyError, TypeError, ValueError) as error:
+        except (OSError, KeyError, RecursionError, TypeError, ValueError) as error:
             raise ConfigError(
                 tr(
                     "{path} is no saved state of a simulated {robot}.", path=self._path, robot=robot

@@ -197,7 +197,7 @@ def read_profile(path: Path) -> Mapping[str, str]:
         if document["schema"] != PROFILE_SCHEMA:
             raise ValueError(document["schema"])
         return {str(name): str(value) for name, value in document["options"].items()}
-    except (OSError, AttributeError, KeyError, TypeError, ValueError) as error:
+    except (OSError, AttributeError, KeyError, RecursionError, TypeError, ValueError) as error:
         raise ConfigError(
             tr("{path} is not a cell profile.", path=path),
             remedy=tr("Give a file that 'robolink verify-controller --profile' has written."),

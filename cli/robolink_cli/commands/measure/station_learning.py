@@ -1,10 +1,19 @@
 """station learn: find a station with a tip that is known, show it, keep it."""
 
+from dataclasses import replace
+
 from robolink.errors import ConfigError, DeclinedError, UndefinedToolError
 from robolink.messages import tr
 from robolink.methods import learn_station
 from robolink.model import Controller, EntryKind, ToolOffset
-from robolink.nozzle_change import Limits, flange_now, foresee, require_inside
+from robolink.nozzle_change import (
+    Limits,
+    flange_now,
+    foresee,
+    height_is_known,
+    require_inside,
+    tip_sigma_mm,
+)
 from robolink.procedures import MeasurementContext
 from robolink.stations import Found, Station, StationKind, find_stations, station_entry
 from robolink_cli.console.render import note, table
@@ -62,8 +71,16 @@ def learn(
             start = controller.groups[0].pose()
             bench = MeasurementContext(controller, operator, start=start, settings=limits.settings)
             found = bench.run(
-                learn_station(known, here=start, tool=tool, tip=tip, sigma_mm=sigma_mm)
+                learn_station(
+                    known,
+                    here=start,
+                    tool=tool,
+                    tip=tip,
+                    sigma_mm=sigma_mm,
+                    tip_sigma_mm=tip_sigma_mm(controller, tool),
+                )
             )
+            found = _height_of_pin(controller, known, found, tool)
             _show(known, found)
             if not yes and not bench.runner().confirm(tr("Keep this on record?")):
                 raise DeclinedError(
@@ -72,6 +89,22 @@ def learn(
             controller.outcomes.append(station_entry(found))
         kept = _known(context, controller, name)
     context.emit("station", station_payload(kept), lambda: None)
+
+
+def _height_of_pin(controller: Controller, known: Station, found: Found, tool: int) -> Found:
+    """Return what was found, a pin's height only where Z of the tool is more than a kept value."""
+    if found.kind is not StationKind.PIN or height_is_known(controller, tool):
+        return found
+    note(
+        tr(
+            "Z of tool {tool} was never measured, calibrations kept it: the height of {station} "
+            "is not learnt from it.",
+            tool=tool,
+            station=found.id,
+        )
+    )
+    z_from = known.details.get("z_from", "")
+    return replace(found, z_mm=known.z_mm, details={**found.details, "z_from": z_from})
 
 
 def _known(context: CliContext, controller: Controller, name: str) -> Station:

@@ -128,7 +128,7 @@ class RetainedFile:
             if document["schema"] != SCHEMA or document["machine"] != self._machine:
                 raise ValueError(document["machine"])
             self._memory.restore(document["memory"])
-        except (OSError, AttributeError, KeyError, TypeError, ValueError) as error:
+        except (OSError, AttributeError, KeyError, RecursionError, TypeError, ValueError) as error:
             raise ConfigError(
                 tr(
                     "{path} is no saved state of a simulated PLC with {machine}.",

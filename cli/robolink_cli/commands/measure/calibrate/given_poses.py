@@ -152,9 +152,10 @@ def _carry_out(
     controller: Controller, frame: CalibrationRequest, given: PointsSource, listener: Listener
 ) -> ToolReport:
     one = frame.tool_plan(given, verify=False)
+    attended = not frame.yes and on_terminal()
     change = NozzleChange(
         controller,
-        ChangePlan((one,), ask_before_write=False),
+        ChangePlan((one,), ask_before_write=False, attended=attended),
         operator=terminal(),
         listener=listener,
         earlier=partial(earlier_corrections, controller),

@@ -46,7 +46,7 @@ def calibrate_with(
         frame = frame.at(station or "")
     limits = frame.limits
     higher = replace(limits, box=limits.box.larger(up_mm=parameters.height_mm()))
-    frame = replace(frame, limits=higher, method=method.name)
+    frame = replace(frame, limits=higher, method=method.name, length=parameters.length_rule())
     place_mm = None if at is None else _three(at)
 
     def site(controller: Controller) -> Site:

@@ -12,6 +12,7 @@ from robolink_cli.prompts.jumps import jump_limit_mm
 from robolink_cli.session.context import CliContext
 
 if TYPE_CHECKING:
+    from robolink.methods import LengthRule
     from robolink.nozzle_change import AcceptanceCriteria, ChangePlan, Limits, ToolPlan
     from robolink.procedures import TipSource
 
@@ -33,6 +34,7 @@ class CalibrationRequest:
         yes: Whether questions are answered beforehand.
         pin: Name of the pin that is touched; empty where nobody named one.
         finds_pin: Whether the method finds the pin itself, so that it need not be known.
+        length: What is done where the touches show that the tip is longer or shorter.
         method: Name of the method.
     """
 
@@ -48,6 +50,7 @@ class CalibrationRequest:
     yes: bool
     pin: str = ""
     finds_pin: bool = True
+    length: "LengthRule" = "ask"
     method: str = ""
 
     def at(self, station: str) -> "CalibrationRequest":
@@ -84,7 +87,13 @@ class CalibrationRequest:
         from robolink.nozzle_change import ToolPlan
 
         return ToolPlan(
-            self.tool, source, self.criteria, verify=verify, pin=self.pin, method=self.method
+            self.tool,
+            source,
+            self.criteria,
+            verify=verify,
+            pin=self.pin,
+            method=self.method,
+            length=self.length,
         )
 
 
@@ -129,6 +138,7 @@ def request_from(
         max_residual_mm=residual_mm,
         interval_mm=interval_mm,
         drift_tolerance_mm=tolerance_mm,
+        unattended=yes,
     )
     return CalibrationRequest(
         context.with_nozzle(nozzle, lot),

@@ -1,7 +1,8 @@
 """Reading a case: every value knows its path, and nothing is read past unknown names."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from typing import Final, TypeVar
 
 from robolink.errors import CalibrationError, ConfigError
@@ -12,9 +13,33 @@ EULER: Final = "R=Rz(U)Ry(V)Rx(W)"
 
 T = TypeVar("T")
 
-_HUGE: Final = 1e300
+_HUGE: Final = 1e12
+"""No length or angle of a cell is larger, and squares of what is smaller are finite."""
 
 _UNIT_WITHIN: Final = 0.01
+
+_FRAMES: Final = ("tools", "locals")
+
+
+@dataclass(frozen=True, slots=True)
+class KnownFrames:
+    """Values of the tools and locals that poses of a case may have been taken in.
+
+    Attributes:
+        tools: Offsets by number.
+        local_frames: Where locals lie in the base, by number.
+    """
+
+    tools: Mapping[int, ToolOffset] = field(default_factory=dict)
+    local_frames: Mapping[int, ToolOffset] = field(default_factory=dict)
+
+    def flange(self, pose: Pose) -> Pose:
+        """Return a pose as one of the flange in the base, as far as the values are known."""
+        if not (self.tools or self.local_frames):
+            return pose
+        from robolink.calibration import flange_poses
+
+        return flange_poses([pose], tools=self.tools, local_frames=self.local_frames)[0]
 
 
 class Node:
@@ -23,17 +48,30 @@ class Node:
     Args:
         value: What stands there.
         path: Where, for example ``input.poses[1]``.
+        frames: What is known of tools and locals that poses in it may name.
     """
 
-    def __init__(self, value: object, path: str) -> None:
+    def __init__(self, value: object, path: str, frames: "KnownFrames | None" = None) -> None:
         if not isinstance(value, dict):
             raise unusable(path, tr("an object is wanted here"))
+        self.frames = frames or KnownFrames()
         self._value: dict[str, object] = value
         self._read: set[str] = set()
         self.path = path
 
     def __contains__(self, name: str) -> bool:
         return name in self._value
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._value)
+
+    def is_object(self, name: str) -> bool:
+        """Tell whether an object stands under ``name``; elsewhere the name may mean another."""
+        return isinstance(self._value.get(name), dict)
+
+    def items(self, name: str) -> Iterator[tuple[object, str]]:
+        """Yield what stands in the list under ``name``, each with its path."""
+        return self._items(name)
 
     def at(self, name: str) -> str:
         """Return the path of ``name`` in this object."""
@@ -95,11 +133,11 @@ class Node:
 
     def child(self, name: str) -> "Node":
         """Return the object under ``name``."""
-        return Node(self.raw(name), self.at(name))
+        return Node(self.raw(name), self.at(name), self.frames)
 
     def children(self, name: str) -> list["Node"]:
         """Return the objects of the list under ``name``."""
-        return [Node(value, path) for value, path in self._items(name)]
+        return [Node(value, path, self.frames) for value, path in self._items(name)]
 
     def numbers(self, name: str) -> list[float]:
         """Return the numbers of the list under ``name``."""
@@ -159,7 +197,23 @@ def read_pose(node: Node) -> Pose:
         tool=node.optional("tool", node.whole),
     )
     node.finish()
-    return pose
+    return node.frames.flange(pose)
+
+
+def read_frames(node: Node) -> None:
+    """Read the values of ``tools`` and ``locals`` that the poses of a case are given in."""
+    node.frames = KnownFrames(
+        *(_by_number(node.child(name)) if node.is_object(name) else {} for name in _FRAMES)
+    )
+
+
+def _by_number(node: Node) -> dict[int, ToolOffset]:
+    found = {}
+    for name in node:
+        if not name.isdecimal():
+            raise unusable(node.at(name), tr("a number of a tool or local is wanted here"))
+        found[int(name)] = read_offset(node.child(name))
+    return found
 
 
 def _angles_deg(node: Node) -> tuple[float, float, float]:

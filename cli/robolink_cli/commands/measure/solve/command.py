@@ -6,7 +6,9 @@ import click
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink.pose_tables import NOTHING_SAID, ReadingChoices
 from robolink_cli.console.render import emit_json, json_is_on
+from robolink_cli.options.pose_reading import reading_options
 from robolink_cli.session.context import json_option
 
 
@@ -14,32 +16,33 @@ from robolink_cli.session.context import json_option
 @click.argument("file", type=click.Path(dir_okay=False, path_type=Path))
 @click.option(
     "--method",
-    type=click.Choice(["n_angle", "n_angle_robust", "pivot", "pivot_robust"]),
-    help="FILE is a table with one pose a line, to be solved with this method.",
+    type=click.Choice(["two_pose", "n_angle", "n_angle_robust", "pivot", "pivot_robust"]),
+    help="FILE holds poses only, of any kind that 'robolink poses show' reads.",
 )
-@click.option(
-    "--columns",
-    metavar="x,y,z,u,v,w",
-    help="What the table's columns are, when its first line does not say so. Angles are EPSON's; "
-    "a quaternion is qx,qy,qz,qs with the scalar last.",
-)
+@reading_options
 @click.option("--sigma", "sigma_mm", type=float, help="Standard deviation of one placement, mm.")
 @click.option(
     "--threshold", "threshold_mm", type=float, help="Residual that a robust method rejects, mm."
+)
+@click.option(
+    "--accept-residuals",
+    is_flag=True,
+    help="Large residuals are no reason for the exit code 7.",
 )
 @json_option
 def solve(
     file: Path,
     method: str | None,
-    columns: str | None,
+    choices: ReadingChoices,
     sigma_mm: float | None,
     threshold_mm: float | None,
+    accept_residuals: bool,
 ) -> int:
     """Calculate a tool offset from measurements in FILE, offline.
 
-    FILE is JSON: one case with method, units and input, or many under "vectors"; or, with
-    --method, a table of poses. Lengths are mm, angles degrees. The exit code is 7 when a case
-    gives no trustworthy result.
+    FILE is JSON: one case with method, units and input, or many under "vectors"; lengths are mm,
+    angles degrees. Or, with --method, it is any file of poses. The exit code is 7 when a case
+    gives no trustworthy result, or one whose residuals are beyond tolerance.
     """
     from robolink_cli.commands.measure.solve.pose_table import table_case
     from robolink_cli.commands.measure.solve.solving import exit_code, load, solve_document
@@ -47,11 +50,11 @@ def solve(
 
     if method is not None:
         case = table_case(
-            file, method=method, columns=columns, sigma_mm=sigma_mm, threshold_mm=threshold_mm
+            file, method=method, choices=choices, sigma_mm=sigma_mm, threshold_mm=threshold_mm
         )
-    elif any(option is not None for option in (columns, sigma_mm, threshold_mm)):
+    elif choices != NOTHING_SAID or (sigma_mm, threshold_mm) != (None, None):
         raise ConfigError(
-            tr("--columns, --sigma and --threshold belong to a table of poses."),
+            tr("--columns, --length, --euler, --sigma and --threshold belong to a file of poses."),
             remedy=tr("Give --method as well, or write the values into the JSON file."),
         )
     else:
@@ -63,4 +66,4 @@ def solve(
         results = document.get("results")
         for result in results if isinstance(results, list) else [document]:
             show_case(result)
-    return exit_code(document)
+    return exit_code(document, accept_residuals=accept_residuals)

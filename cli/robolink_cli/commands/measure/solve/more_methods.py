@@ -15,7 +15,8 @@ from robolink_cli.commands.measure.solve.case import (
     read_poses,
     unusable,
 )
-from robolink_cli.views.solve import result_payload
+from robolink_cli.commands.measure.solve.methods import known_tip
+from robolink_cli.views.solve import result_payload, space_payload
 
 Payload = dict[str, object]
 
@@ -33,7 +34,7 @@ def needle_change(node: Node) -> Payload:
         chain=known,
         sigma_mm=node.number("sigma_mm"),
     )
-    return result_payload(result) | {
+    return space_payload(result) | {
         "shift_mm": list(result.shift_mm),
         "chain": {"sigma_mm": result.chain.sigma_mm, "changes": result.chain.changes},
         "full_calibration_due": result.full_calibration_due,
@@ -62,24 +63,50 @@ def crossed_beams(node: Node) -> Payload:
     beams = [_beam(child) for child in node.children("beams")]
     if len(beams) != 2:
         raise unusable(node.at("beams"), tr("two beams are wanted"))
+    known, height = known_tip(node)
     result = cal.solve_crossed_beams(
         [_crossing(child) for child in node.children("crossings")],
         (beams[0], beams[1]),
+        stored=known,
+        height=height,
         sigma_mm=node.optional("sigma_mm", node.number),
         beams_may_have_moved=bool(node.optional("beams_may_have_moved", node.raw)),
     )
-    return result_payload(result) | {"lag_mm": list(result.lag_mm)}
+    covariance = result.covariance
+    return result_payload(result) | {
+        "lag_mm": list(result.lag_mm),
+        "u_mm": [row[index] ** 0.5 for index, row in enumerate(covariance)],
+        "u_without_beams_mm": list(result.u_without_beams_mm),
+        "half_width95": list(result.half_width95),
+    }
 
 
 def find_beams(node: Node) -> Payload:
     """Where two beams are, from a pin whose tip is known."""
     crossings = [_crossing(child) for child in node.children("crossings")]
-    beams = cal.find_beams(crossings, read_point(node.child("tip")))
-    return {"beams": [{"x": b.x_mm, "y": b.y_mm, "direction_deg": b.direction_deg} for b in beams]}
+    beams = cal.find_beams(
+        crossings,
+        read_point(node.child("tip")),
+        tip_sigma_mm=node.number_or("tip_sigma_mm", 0.0),
+        sigma_mm=node.optional("sigma_mm", node.number),
+    )
+    return {
+        "beams": [
+            {
+                "x": beam.x_mm,
+                "y": beam.y_mm,
+                "direction_deg": beam.direction_deg,
+                "sigma_mm": beam.sigma_mm,
+                "direction_sigma_deg": beam.direction_sigma_deg,
+                "correlation": beam.correlation,
+            }
+            for beam in beams
+        ]
+    }
 
 
 def z_touch(node: Node) -> Payload:
-    """Touches of a surface at two speeds."""
+    """Touches of a surface at two speeds, or at three."""
     touches = []
     for child in node.children("touches"):
         touches.append(cal.Touch(child.number("z"), child.number("speed_mm_s")))
@@ -87,10 +114,20 @@ def z_touch(node: Node) -> Payload:
     result = cal.solve_z_touch(
         touches,
         node.number("surface_z"),
+        stored=node.optional("stored", lambda name: read_offset(node.child(name))),
+        flange=node.optional("flange", lambda name: read_pose(node.child(name))),
         latency_s=node.optional("latency_s", node.number),
+        deceleration_mm_s2=node.number_or("deceleration_mm_s2", cal.USUAL_DECELERATION_MM_S2),
         sigma_mm=node.optional("sigma_mm", node.number),
     )
-    return result_payload(result) | {"latency_s": result.latency_s}
+    return result_payload(result) | {
+        "offset_z": result.offset.z_mm,
+        "flange_z": result.flange_z_mm,
+        "latency_s": result.latency_s,
+        "overshoot_s2_per_mm": result.overshoot_s2_per_mm,
+        "f_quadratic": result.f_quadratic,
+        "f_limit": result.f_limit,
+    }
 
 
 def six_point(node: Node) -> Payload:
@@ -135,10 +172,14 @@ def runout(node: Node) -> Payload:
         "codes": list(report.warnings),
         "offset": list(report.tip_mm),
         "half_width95_mm": report.half_width95_mm,
+        "centre": list(report.centre_mm),
         "centre_mm": list(report.centre_mm),
         "runout_mm": report.runout_mm,
         "ellipse_mm": report.ellipse_mm,
         "second_mm": report.second_mm,
+        "amplitude_limit_mm": report.amplitude_limit_mm,
+        "distinct_angles": report.distinct_angles,
+        "rank": report.rank,
         "rms_mm": report.rms_mm,
         "peak_mm": report.peak_mm,
         "harmonics_matter": report.harmonics_matter,
@@ -229,7 +270,14 @@ def _box(node: Node) -> WorkBox:
 
 
 def _beam(node: Node) -> "cal.Beam":
-    beam = cal.Beam(node.number("x"), node.number("y"), node.number("direction_deg"))
+    beam = cal.Beam(
+        node.number("x"),
+        node.number("y"),
+        node.number("direction_deg"),
+        sigma_mm=node.number_or("sigma_mm", 0.0),
+        direction_sigma_deg=node.number_or("direction_sigma_deg", 0.0),
+        correlation=node.number_or("correlation", 0.0),
+    )
     node.finish()
     return beam
 

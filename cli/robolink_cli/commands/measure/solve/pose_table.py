@@ -1,70 +1,52 @@
-"""A table of poses as a case: one pose a line, columns named in the first line or by option."""
+"""A table of poses as a case: whatever file of poses there is, for a method that takes poses."""
 
 from pathlib import Path
-from typing import Final
 
-from robolink.files.named import read_named
+from robolink.errors import CalibrationError
 from robolink.messages import tr
-from robolink_cli.commands.measure.solve.case import Node, unusable
-
-COLUMNS: Final = ("x", "y", "z", "u", "v", "w", "qx", "qy", "qz", "qs", "hand")
+from robolink.pose_tables import ReadingChoices, TabledPose, read_poses
+from robolink_cli.commands.measure.solve.case import Node
 
 
 def table_case(
     path: Path,
     *,
     method: str,
-    columns: str | None,
+    choices: ReadingChoices,
     sigma_mm: float | None,
     threshold_mm: float | None,
 ) -> Node:
-    """Return the case of a file with one pose a line.
+    """Return the case of a file of poses.
 
     Args:
-        path: Values stand apart by commas, semicolons, tabs or spaces.
+        path: The file (docs/poses.md, "Files of poses").
         method: A method that takes poses on one point.
-        columns: What the columns are; without it the first line says so.
+        choices: What the file does not say.
         sigma_mm: Standard deviation of one placement, if it is known.
         threshold_mm: Residual beyond which a robust method rejects a pose.
 
     Raises:
-        ConfigError: It cannot be read or is laid out in another way.
+        AmbiguousPosesError: The file can be read in more than one way.
+        CalibrationError: ``non_finite``; ``tool_pose`` for poses of another tool.
+        ConfigError: It cannot be read or is no list of poses.
     """
-    try:
-        text = read_named(path).decode("utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        cause = str(error) if isinstance(error, UnicodeDecodeError) else error.strerror
-        raise unusable(str(path), tr("it cannot be read ({error})", error=cause)) from error
-    rows = [_cells(line) for line in text.splitlines() if line.strip()]
-    names = _cells(columns) if columns is not None else (rows.pop(0) if rows else [])
-    unknown = [name for name in names if name not in COLUMNS]
-    if unknown or len(set(names)) != len(names) or not names:
-        raise unusable(
-            str(path),
-            tr("the columns have to be named, each once, from {names}", names=", ".join(COLUMNS)),
+    entries = read_poses(path, choices).entries
+    other = next((one.pose.tool for one in entries if one.pose.tool), None)
+    if other is not None:
+        raise CalibrationError(
+            "tool_pose",
+            tr("The poses were taken with tool {other}, not {tool}.", other=other, tool=0),
+            remedy=tr("Take them with the flange, Tool 0; offline nothing knows another tool."),
         )
-    poses = []
-    for number, row in enumerate(rows):
-        if len(row) != len(names):
-            raise unusable(f"input.poses[{number}]", tr("it has another number of columns"))
-        poses.append({n: _value(n, cell) for n, cell in zip(names, row, strict=True)})
-    given: dict[str, object] = {"poses": poses}
+    given: dict[str, object] = {"poses": [_as_case(one) for one in entries]}
     given |= {} if sigma_mm is None else {"sigma_mm": sigma_mm}
     given |= {} if threshold_mm is None else {"inlier_threshold": threshold_mm}
     return Node({"id": path.name, "method": method, "input": given}, "")
 
 
-def _cells(line: str) -> list[str]:
-    for separator in (";", ","):
-        if separator in line:
-            return [cell.strip() for cell in line.split(separator)]
-    return line.split()
-
-
-def _value(name: str, cell: str) -> object:
-    if name == "hand":
-        return cell
-    try:
-        return float(cell)
-    except ValueError:
-        return cell
+def _as_case(entry: TabledPose) -> dict[str, object]:
+    pose = entry.pose
+    case: dict[str, object] = dict(zip("xyzuvw", pose.coordinates(), strict=True))
+    case["local"] = pose.local
+    case |= {} if pose.hand is None else {"hand": str(pose.hand)}
+    return case if pose.tool is None else {**case, "tool": pose.tool}

@@ -1,19 +1,38 @@
 """Solving a case, or a file of them, without any robot."""
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Final
+from typing import Final, cast
 
-from robolink.errors import CalibrationError
+from robolink.errors import CalibrationError, ConfigError
 from robolink.files.named import read_named
 from robolink.messages import tr
-from robolink_cli.commands.measure.solve.case import Node, read_poses, unusable
-from robolink_cli.commands.measure.solve.methods import FROM_POSES
+from robolink_cli.commands.measure.solve.case import (
+    Node,
+    read_frames,
+    read_poses,
+    unusable,
+)
+from robolink_cli.commands.measure.solve.methods import SEEING_METHODS
 from robolink_cli.commands.measure.solve.more_methods import MORE_METHODS
+from robolink_cli.commands.measure.solve.pose_methods import POSE_METHODS
+from robolink_cli.commands.measure.solve.station_methods import STATION_METHODS
+from robolink_cli.commands.measure.solve.study_methods import STUDY_METHODS
 from robolink_cli.commands.measure.solve.touch_methods import TOUCH_METHODS
 
 CASE_SCHEMA: Final = "robolink-calibration-vectors/1"
-METHODS: Final = {**FROM_POSES, **MORE_METHODS, **TOUCH_METHODS}
+METHODS: Final = {
+    **POSE_METHODS,
+    **SEEING_METHODS,
+    **MORE_METHODS,
+    **STATION_METHODS,
+    **STUDY_METHODS,
+    **TOUCH_METHODS,
+}
+
+BEYOND_TOLERANCE: Final = frozenset({"large_rms", "large_residual", "large_pixel_residual"})
+"""Codes of a result that does not agree with itself: no offset to be written."""
 
 _GAINS_OF: Final = ("two_pose", "two_pose_general", "n_angle", "n_angle_robust")
 _SEVERITY: Final = ("ok", "warn", "error")
@@ -49,10 +68,27 @@ def solve_document(node: Node) -> dict[str, object]:
     if "vectors" not in node:
         return solve_case(node)
     node.ignore("conventions")
-    results = [solve_case(child) for child in node.children("vectors")]
+    results = [_answer(value, path) for value, path in node.items("vectors")]
     node.finish()
     worst = max((str(result["status"]) for result in results), key=_SEVERITY.index, default="ok")
     return {"status": worst, "results": results}
+
+
+def _answer(value: object, path: str) -> dict[str, object]:
+    """Return the answer to one of many cases; what is wrong with it ends no other."""
+    named = value if isinstance(value, dict) else {}
+    head = {name: named[name] for name in ("id", "method") if isinstance(named.get(name), str)}
+    try:
+        return solve_case(Node(value, path))
+    except ConfigError as error:
+        return {
+            "method": "",
+            **head,
+            "status": "error",
+            "codes": ["invalid_input"],
+            "what": error.what,
+            "remedy": error.remedy,
+        }
 
 
 def solve_case(node: Node) -> dict[str, object]:
@@ -70,19 +106,20 @@ def solve_case(node: Node) -> dict[str, object]:
     given = node.child("input")
     node.finish()
     try:
+        read_frames(given)
         found = METHODS[method](given)
     except CalibrationError as error:
         return head | _refusal(error, method, given)
     given.finish()
     codes = found.pop("codes", [])
     status = found.pop("status", "warn" if codes else "ok")
-    return head | {"status": status, "codes": codes} | found
+    return head | {"status": status, "codes": codes} | _json_numbers(found)
 
 
 def _refusal(error: CalibrationError, method: str, given: Node) -> dict[str, object]:
     refusal: dict[str, object] = {
         "status": "error",
-        "codes": [error.code],
+        "codes": [error.code, *error.others],
         "what": error.what,
         "remedy": error.remedy,
     }
@@ -93,12 +130,38 @@ def _refusal(error: CalibrationError, method: str, given: Node) -> dict[str, obj
     return refusal
 
 
+def _json_numbers(found: dict[str, object]) -> dict[str, object]:
+    """Return the values with null for what JSON has no number for."""
+    return {name: _json_number(value) for name, value in found.items()}
+
+
+def _json_number(value: object) -> object:
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, dict):
+        return {name: _json_number(item) for name, item in value.items()}
+    return [_json_number(item) for item in value] if isinstance(value, list) else value
+
+
 def _check_units(node: Node) -> None:
     node.text("length", "mm")
     node.text("angle", "deg")
     node.finish()
 
 
-def exit_code(document: Mapping[str, object]) -> int:
-    """Return 7 when a case was refused, else 0."""
-    return 7 if document["status"] == "error" else 0
+def exit_code(document: Mapping[str, object], *, accept_residuals: bool = False) -> int:
+    """Return 7 when a case was refused or its residuals are beyond tolerance, else 0.
+
+    Args:
+        document: As :func:`solve_document` returns it.
+        accept_residuals: Whether large residuals are no reason.
+    """
+    if document["status"] == "error":
+        return 7
+    results = document.get("results")
+    for result in results if isinstance(results, list) else [document]:
+        if not accept_residuals and not BEYOND_TOLERANCE.isdisjoint(
+            cast("list[str]", result["codes"])
+        ):
+            return 7
+    return 0

@@ -1,0 +1,116 @@
+"""poses show: what robolink understands of a file of poses. Nothing is connected."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from robolink.messages import tr
+from robolink_cli.console.render import emit_json, json_is_on, say, table
+from robolink_cli.options.pose_reading import reading_options
+from robolink_cli.session.context import json_option
+
+if TYPE_CHECKING:
+    from robolink.pose_tables import HowRead, PoseTable, ReadingChoices, TabledPose
+
+
+@click.group()
+def poses() -> None:
+    """Files of poses: what robolink understands of them."""
+
+
+@poses.command("show")
+@click.argument("file", type=click.Path(dir_okay=False, path_type=Path))
+@reading_options
+@json_option
+def show(file: Path, choices: "ReadingChoices") -> None:
+    """Show the poses in FILE in mm and EPSON's angles, and how they were read.
+
+    FILE may come from a robot of another maker, a spreadsheet or ROS; docs/poses.md lists them.
+    What it does not say is asked for and never guessed. No controller is asked.
+    """
+    from robolink.pose_tables import read_poses
+
+    found = read_poses(file, choices)
+    if json_is_on():
+        emit_json("robolink/poses/1", _payload(found))
+        return
+    _show_table(file, found)
+
+
+def _payload(found: "PoseTable") -> dict[str, object]:
+    how = found.how
+    read_as: dict[str, object] = {
+        "encoding": how.encoding,
+        "format": how.layout,
+        "length": str(how.length),
+        "length_by": how.length_by,
+        "angle": how.angle or None,
+        "rotation": how.rotation,
+        "separator": how.separator or None,
+        "decimal": how.decimal or None,
+        "columns": list(how.columns),
+        "ignored": list(how.ignored),
+        "skipped": how.skipped,
+    }
+    return {"poses": [_pose_payload(entry) for entry in found.entries], "read_as": read_as}
+
+
+def _pose_payload(entry: "TabledPose") -> dict[str, object]:
+    """Return a pose with its units in the keys; what the file does not say is left out."""
+    from robolink_cli.views.documents import COMPONENTS
+
+    pose = entry.pose
+    payload: dict[str, object] = dict(zip(COMPONENTS, pose.coordinates(), strict=True))
+    known = {
+        "name": entry.name or None,
+        "number": entry.number,
+        "hand": pose.hand,
+        "local": pose.local if "local" in entry.stated else None,
+        "tool": pose.tool,
+    }
+    return payload | {key: value for key, value in known.items() if value is not None}
+
+
+def _show_table(file: Path, found: "PoseTable") -> None:
+    rows = [
+        [
+            *(entry.number if entry.number is not None else place, entry.name),
+            *(f"{round(value, 3) + 0.0:.3f}" for value in entry.pose.coordinates()),
+            *_marks(entry),
+        ]
+        for place, entry in enumerate(found.entries, start=1)
+    ]
+    columns = (tr("no."), tr("name"), "X mm", "Y mm", "Z mm", "U deg", "V deg", "W deg")
+    table(str(file), (*columns, tr("hand"), tr("local"), tr("tool")), rows)
+    say("\n".join(_sentences(found.how, len(rows))))
+
+
+def _marks(entry: "TabledPose") -> tuple[str, str, str]:
+    pose = entry.pose
+    local = str(pose.local) if "local" in entry.stated else ""
+    return str(pose.hand or ""), local, "" if pose.tool is None else str(pose.tool)
+
+
+def _sentences(how: "HowRead", count: int) -> list[str]:
+    said = {
+        "file": tr("the file says so"),
+        "format": tr("as its format is defined"),
+        "option": tr("as you said"),
+        "default": tr("nothing else is said"),
+    }
+    lines = [
+        tr(
+            "{count} poses, read as: {layout}, {encoding}.",
+            count=count,
+            layout=how.layout,
+            encoding=how.encoding,
+        ),
+        tr("Lengths were in {length} ({said}).", length=how.length, said=said[how.length_by]),
+        tr("Rotation: {rotation} {angle}", rotation=how.rotation, angle=how.angle).rstrip(),
+    ]
+    if how.ignored:
+        lines.append(tr("Not used: {names}.", names=", ".join(how.ignored)))
+    if how.skipped:
+        lines.append(tr("Left out, because they are no taught poses: {count}.", count=how.skipped))
+    return lines

@@ -1,0 +1,171 @@
+"""X and Y of a tip under a flange that leans, or hangs upside down as six axes usually do.
+
+With A the upper left 2 x 2 part of R = Rz(U) Ry(V) Rx(W) and c = (R13, R23), a point t of the
+flange's axes lies at ``p + A (t_x, t_y) + c t_z`` in X and Y of the base. A can be inverted
+unless the flange lies on its side, for det A = R33 = cos V cos W. With V = W = 0 it is Rz(U); at
+W = 180 it is Rz(U) with its second column reversed, and c is 0: the sign of the tool's Y flips
+(docs/reference/evidence.md 3).
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from robolink.errors import CalibrationError
+from robolink.messages import tr
+from robolink.model import Pose, ToolOffset
+
+UPRIGHT_WITHIN_DEG = 0.01
+"""A lean below this is noise of the printed angles: at 120 mm it shifts a tip by 0.02 mm."""
+
+LARGEST_LEAN_DEG = 10.0
+"""Beyond this an error of the tip's height reaches X and Y by more than a sixth."""
+
+
+@dataclass(frozen=True, slots=True)
+class TipHeight:
+    """Z of a tip in the flange's axes, known before X and Y are measured.
+
+    Attributes:
+        z_mm: The Z.
+        sigma_mm: Its standard deviation, ``None`` where nobody knows it.
+    """
+
+    z_mm: float
+    sigma_mm: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class FlangePlane:
+    """How X and Y of the flange's axes lie in X and Y of the base, at one pose.
+
+    Attributes:
+        columns: The columns of A: where the flange's X and Y axis point.
+        axis: c, where the flange's Z axis points; its length is the sine of the lean.
+        level: R31 and R32: how fast the height changes along the flange's X and Y axis.
+        r33: det A: 1 for an upright flange, -1 for one upside down.
+    """
+
+    columns: tuple[tuple[float, float], tuple[float, float]]
+    axis: tuple[float, float]
+    level: tuple[float, float]
+    r33: float
+
+    @classmethod
+    def of(cls, pose: Pose) -> "FlangePlane":
+        """Return that of a flange pose."""
+        u, v, w = (math.radians(a) for a in (pose.u_deg, pose.v_deg, pose.w_deg))
+        cu, su, cv, sv, cw, sw = (f(a) for a in (u, v, w) for f in (math.cos, math.sin))
+        return cls(
+            columns=((cu * cv, su * cv), (cu * sv * sw - su * cw, su * sv * sw + cu * cw)),
+            axis=(cu * sv * cw + su * sw, su * sv * cw - cu * sw),
+            level=(-sv, cv * sw),
+            r33=cv * cw,
+        )
+
+    @property
+    def lean_deg(self) -> float:
+        """Angle between the flange's axis and the vertical, 0 to 90, up or down."""
+        return math.degrees(math.atan2(math.hypot(*self.axis), abs(self.r33)))
+
+    @property
+    def heading_deg(self) -> float:
+        """The U of an upright flange, or of one upside down, that is turned alike."""
+        (xx, yx), (xy, yy) = self.columns
+        sign = math.copysign(1.0, self.r33)
+        return math.degrees(math.atan2(yx - sign * xy, xx + sign * yy))
+
+    def in_flange(self, dx_mm: float, dy_mm: float, z_mm: float = 0.0) -> tuple[float, float]:
+        """Return (t_x, t_y) of what lies ``dx_mm, dy_mm`` from the flange, at ``z_mm`` of its Z."""
+        (xx, yx), (xy, yy) = self.columns
+        dx, dy = dx_mm - self.axis[0] * z_mm, dy_mm - self.axis[1] * z_mm
+        return (yy * dx - xy * dy) / self.r33, (xx * dy - yx * dx) / self.r33
+
+    def in_base(self, x_mm: float, y_mm: float, z_mm: float = 0.0) -> tuple[float, float]:
+        """Return how far from the flange, in X and Y of the base, a point of its axes lies."""
+        (xx, yx), (xy, yy) = self.columns
+        cx, cy = self.axis
+        return xx * x_mm + xy * y_mm + cx * z_mm, yx * x_mm + yy * y_mm + cy * z_mm
+
+    def rise_mm(self, tip: ToolOffset) -> float:
+        """Return how far above the flange, in the base, a point of its axes lies."""
+        return self.level[0] * tip.x_mm + self.level[1] * tip.y_mm + self.r33 * tip.z_mm
+
+
+def carrying(frame: Pose, tip: ToolOffset, place_mm: tuple[float, float, float]) -> Pose:
+    """Return where a frame is when what lies at ``tip`` in its axes is at a place of the base.
+
+    Args:
+        frame: Its angles, hand, local and tool.
+        tip: X, Y and Z count.
+        place_mm: The place.
+    """
+    plane = FlangePlane.of(frame)
+    dx, dy = plane.in_base(tip.x_mm, tip.y_mm, tip.z_mm)
+    x_mm, y_mm, z_mm = place_mm
+    return replace(frame, x_mm=x_mm - dx, y_mm=y_mm - dy, z_mm=z_mm - plane.rise_mm(tip))
+
+
+def height_of(stored: ToolOffset | None, given: TipHeight | None = None) -> TipHeight | None:
+    """Return what is known of a tip's Z: what was given, else what is stored."""
+    if given is not None or stored is None:
+        return given
+    return TipHeight(stored.z_mm)
+
+
+def solvable_planes(poses: Sequence[Pose], height: TipHeight | None) -> list[FlangePlane]:
+    """Return the plane of every pose, where X and Y of a tip can be solved from them.
+
+    Raises:
+        CalibrationError: ``tilted_pose``: a flange leans by more than 10 degrees; it leans and
+            the tip's height is unknown; or some hang upside down and others do not.
+    """
+    planes = [FlangePlane.of(pose) for pose in poses]
+    for number, plane in enumerate(planes, start=1):
+        if plane.lean_deg > LARGEST_LEAN_DEG:
+            raise _tilted(number, plane, tr("Up to {limit:g} are solved.", limit=LARGEST_LEAN_DEG))
+        if plane.lean_deg > UPRIGHT_WITHIN_DEG and height is None:
+            raise _tilted(number, plane, tr("The height of the tip is not known."))
+    if len({plane.r33 > 0 for plane in planes}) > 1:
+        raise CalibrationError(
+            "tilted_pose",
+            tr("Some poses have the flange upright, others upside down."),
+            remedy=tr("Take all of them with the flange the same way up."),
+        )
+    return planes
+
+
+def known_z_mm(height: TipHeight | None) -> float:
+    """Return the Z to solve with: 0 where nobody knows it, which only upright flanges bear."""
+    return 0.0 if height is None else height.z_mm
+
+
+def standing_upright(poses: Sequence[Pose]) -> list[Pose]:
+    """Return poses of one way up as upright ones, each turned as its flange is.
+
+    Raises:
+        CalibrationError: ``tilted_pose``: one leans, or some are upside down and others are not.
+    """
+    planes = solvable_planes(poses, None)
+    return [
+        pose
+        if (pose.v_deg, pose.w_deg) == (0.0, 0.0)
+        else replace(pose, u_deg=plane.heading_deg, v_deg=0.0, w_deg=0.0)
+        for pose, plane in zip(poses, planes, strict=True)
+    ]
+
+
+def _tilted(number: int, plane: FlangePlane, why: str) -> CalibrationError:
+    return CalibrationError(
+        "tilted_pose",
+        tr(
+            "In pose {number} the flange leans by {lean:.2f} degrees. {why}",
+            number=number,
+            lean=plane.lean_deg,
+            why=why,
+        ),
+        remedy=tr(
+            "Hold the flange upright or straight upside down, or use the pivot method, which "
+            "measures Z as well."
+        ),
+    )

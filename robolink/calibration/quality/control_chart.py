@@ -1,0 +1,132 @@
+"""Control charts: whether later calibrations still scatter as the first ones did.
+
+Single points against three standard deviations show a jump; an exponentially weighted mean
+(lambda 0.2, limits 2.86) shows a shift of one standard deviation after nine calibrations, where
+single points need 44. Sigma is the mean moving range over 1.128, so that a slow drift within the
+baseline does not widen the limits (docs/reference/evidence.md 14).
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Final
+
+from robolink.calibration.core.dispersion import require_positive
+from robolink.calibration.core.pose_checks import require_finite
+from robolink.errors import CalibrationError, ConfigError
+from robolink.messages import tr
+
+LEAST_BASELINE: Final = 20
+"""Limits from fewer calibrations lie: from ten, 2.4 % of all good points lie outside."""
+
+USUAL_LAMBDA: Final = 0.2
+
+USUAL_WIDTH: Final = 2.86
+
+_MEAN_RANGE: Final = 1.128
+"""Mean range of two normal values, in standard deviations."""
+
+_SINGLE_WIDTH: Final = 3.0
+
+
+@dataclass(frozen=True, slots=True)
+class ControlChart:
+    """What a chart of single values says.
+
+    Attributes:
+        centre: Mean of the baseline, mm.
+        sigma_mm: From its moving ranges.
+        limits: Where single points lie, mm; ``None`` where the baseline allows no limits, as are
+            the three below.
+        points_out: Which later values lie outside, from 0.
+        ewma: The weighted mean after each later value, in sigma from the centre.
+        ewma_first: The value at which it first left its limits, ``None`` if it did not.
+        warnings: ``chart_point_out``, ``chart_drift``.
+        notes: ``short_baseline``: fewer than 20 values; ``no_scatter``: all of them equal.
+    """
+
+    centre: float
+    sigma_mm: float
+    limits: tuple[float, float] | None
+    points_out: tuple[int, ...] | None
+    ewma: tuple[float, ...] | None
+    ewma_first: int | None
+    warnings: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
+def control_chart(
+    baseline_mm: Sequence[float],
+    values_mm: Sequence[float],
+    *,
+    weight: float = USUAL_LAMBDA,
+    ewma_width: float = USUAL_WIDTH,
+) -> ControlChart:
+    """Return what later values say against a baseline, both in the order of time.
+
+    Args:
+        baseline_mm: The first calibrations, of one coordinate less its nominal change.
+        values_mm: Those after them.
+        weight: Lambda of the weighted mean: the share of the newest value.
+        ewma_width: Its limits, in its own standard deviations.
+
+    Raises:
+        CalibrationError: ``too_few_values``: fewer than two in the baseline; ``non_finite``.
+        ConfigError: ``weight`` is not above 0 and at most 1, or ``ewma_width`` not positive.
+    """
+    _check(baseline_mm, values_mm, weight, ewma_width)
+    centre = math.fsum(baseline_mm) / len(baseline_mm)
+    ranges = [abs(b - a) for a, b in pairwise(baseline_mm)]
+    sigma = math.fsum(ranges) / len(ranges) / _MEAN_RANGE
+    notes = ("short_baseline",) if len(baseline_mm) < LEAST_BASELINE else ()
+    if sigma == 0:
+        notes = (*notes, "no_scatter")
+    if notes:
+        return ControlChart(centre, sigma, None, None, None, None, (), notes)
+    low, high = centre - _SINGLE_WIDTH * sigma, centre + _SINGLE_WIDTH * sigma
+    out = tuple(i for i, value in enumerate(values_mm) if not low <= value <= high)
+    ewma, first = _weighted([(value - centre) / sigma for value in values_mm], weight, ewma_width)
+    warnings = ("chart_point_out",) if out else ()
+    if first is not None:
+        warnings = (*warnings, "chart_drift")
+    return ControlChart(centre, sigma, (low, high), out, ewma, first, warnings, ())
+
+
+def _weighted(
+    scaled: Sequence[float], weight: float, width: float
+) -> tuple[tuple[float, ...], int | None]:
+    """Return the weighted mean after each value, and where it first leaves its limits.
+
+    After i values its variance is weight / (2 - weight) (1 - (1 - weight)^(2 i)).
+    """
+    means, first, mean = list[float](), None, 0.0
+    for index, value in enumerate(scaled):
+        mean = weight * value + (1 - weight) * mean
+        means.append(mean)
+        settled = 1 - (1 - weight) ** (2 * (index + 1))
+        limit = width * math.sqrt(weight / (2 - weight) * settled)
+        if first is None and abs(mean) > limit:
+            first = index
+    return tuple(means), first
+
+
+def _check(
+    baseline_mm: Sequence[float], values_mm: Sequence[float], weight: float, width: float
+) -> None:
+    for name, values in (("baseline", baseline_mm), ("values", values_mm)):
+        for index, value in enumerate(values):
+            require_finite(**{f"{name}[{index}]": value})
+    require_positive(weight, "lambda")
+    require_positive(width, "ewma_width")
+    if weight > 1:
+        raise ConfigError(
+            tr("lambda is {value!r}.", value=weight),
+            remedy=tr("Give a share of the newest value, above 0 and at most 1; usual is 0.2."),
+        )
+    if len(baseline_mm) < 2:
+        raise CalibrationError(
+            "too_few_values",
+            tr("{count} values are too few for a baseline.", count=len(baseline_mm)),
+            remedy=tr("Limits need {least} calibrations or more.", least=LEAST_BASELINE),
+        )

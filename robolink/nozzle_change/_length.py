@@ -1,0 +1,315 @@
+"""Whether the new tip is as long as the old one: from the heights at which it touched the pin.
+
+Methods that touch a pin upright measure X and Y and keep Z. The flange stands the higher on the
+pin, the longer the tip is (docs/reference/evidence.md 2), so a Z that is kept is compared with
+what the touches show. A length that changed is never swallowed: a person decides, or decided
+beforehand, or nothing is written.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+from robolink.calibration import LengthChange, TipShift, chain_of, judge_shifts
+from robolink.errors import CalibrationError
+from robolink.messages import tr
+from robolink.methods import find_last_touch
+from robolink.model import Controller, EntryKind
+from robolink.nozzle_change._pin_record import tells_height, touch_details, touch_heights_mm
+from robolink.nozzle_change._plan import ToolPlan
+from robolink.nozzle_change._proposal import Proposal
+from robolink.nozzle_change._records import decision_entry
+from robolink.nozzle_change._seating import touch_sigma_z_mm
+from robolink.procedures import MeasurementContext
+from robolink.stations import Station, find_stations
+from robolink.ways import Way, way
+
+Proposals = Sequence[tuple[ToolPlan, Proposal]]
+
+_UNKNOWN_SIGMA_MM: Final = 0.05
+"""Scatter of one touch by a person, where neither residuals nor anybody tells it."""
+
+
+@dataclass(frozen=True, slots=True)
+class KnownHeight:
+    """What the stored Z has to agree with: a pin whose height somebody showed.
+
+    Attributes:
+        place_mm: Where the pin is by it, base.
+        touches: How many touches it rests on.
+        sigma_mm: Standard deviation of its height beside that of the touches.
+        z_from: Where the Z came from that it goes back to.
+    """
+
+    place_mm: tuple[float, float, float]
+    touches: int = 1
+    sigma_mm: float = 0.0
+    z_from: str = "kept"
+
+
+@dataclass(frozen=True, slots=True)
+class _Told:
+    """What the heights of one tool tell, and against what; or why they tell nothing."""
+
+    change: LengthChange | None = None
+    known: KnownHeight | None = None
+    why: str = ""
+
+
+def known_height(controller: Controller, tool: int, pin: str) -> KnownHeight | None:
+    """Return what the height of a tool's touches of a pin has to agree with.
+
+    That is the last touch of the same tool there, if its value is still stored; else the height of
+    the pin, where it was measured or stated and not taken from a Z that was kept itself.
+
+    Returns:
+        ``None`` where nothing tells it.
+    """
+    if not pin:
+        return None
+    try:
+        last = find_last_touch(controller, tool, pin)
+    except CalibrationError:
+        return _of_station(controller, pin)
+    return KnownHeight(last.place_mm, last.touches, z_from=last.z_from)
+
+
+def height_is_known(controller: Controller, tool: int) -> bool:
+    """Tell whether Z of a tool is more than a value that calibrations kept.
+
+    Whoever wrote it by hand stands for it; a calibration of X and Y alone does not.
+    """
+    kept = controller.outcomes.recorded(tool=tool, kinds=(EntryKind.DONE, EntryKind.DECISION))
+    newest = next((entry for entry in kept if "question" not in entry.details), None)
+    return newest is None or newest.details.get("z_from") != "kept"
+
+
+def tip_sigma_mm(controller: Controller, tool: int) -> float:
+    """Return how uncertain the stored tip of a tool is by its last calibration, 0 for unknown."""
+    kept = controller.outcomes.recorded(tool=tool, kinds=(EntryKind.DONE, EntryKind.DECISION))
+    newest = next((entry for entry in kept if "question" not in entry.details), None)
+    touch = newest.details.get("touch") if newest else None
+    sigma = touch.get("sigma_mm") if isinstance(touch, Mapping) else None
+    return float(sigma) if isinstance(sigma, (int, float)) else 0.0
+
+
+def settle_lengths(
+    context: MeasurementContext, proposals: Proposals, *, attended: bool
+) -> Proposals:
+    """Return the proposals, each with the Z that its heights and somebody's decision make.
+
+    Args:
+        context: What asks the person.
+        proposals: The proposals, with what the stations make doubtful about them.
+        attended: Whether a person may be asked.
+
+    Raises:
+        CalibrationError: ``length_changed``: nobody decided; ``touch_heights_differ``: a touch was
+            in the air; ``length_not_observable``: Z was to be measured on a pin that moved.
+    """
+    found = [(plan, one, _told(context.controller, plan, one)) for plan, one in proposals]
+    sunk = _pins_that_sank([(plan.pin, told.change) for plan, _, told in found])
+    settled = []
+    for plan, proposal, told in found:
+        why = told.why
+        if told.change is not None and plan.pin in sunk:
+            why = tr("All tools stand alike higher or lower on the pin, so it may be the pin.")
+        if chain_of(proposal.result) is not None and plan.pin:
+            # A difference is as right as what it was added to.
+            last = find_last_touch(context.controller, plan.tool, plan.pin)
+            origin = {**proposal.kept_record, "z_from": last.z_from}
+            made = replace(proposal, kept_record=origin)
+        elif why:
+            made = _said(proposal, why, attended=attended)
+        else:
+            made = _decided(context, plan, proposal, told, attended=attended)
+        settled.append((plan, made))
+    return settled
+
+
+def _told(controller: Controller, plan: ToolPlan, proposal: Proposal) -> _Told:
+    """Return what the heights tell, or why they tell nothing; empty where nobody asks them."""
+    from robolink.calibration import length_change  # numpy, late
+
+    if proposal.before is None or proposal.z_from == "typed" or not tells_height(proposal.result):
+        return _Told()
+    known = known_height(controller, plan.tool, plan.pin)
+    if known is not None and _moved(known, plan, proposal):
+        return _Told(why=tr("The pin is not where it was."))
+    if proposal.z_from == "measured":
+        return _Told()
+    if known is None and plan.pin:
+        return _Told(why=tr("Nothing on record says how high the pin is."))
+    if known is None:
+        return _Told(why=tr("No pin was named.") if plan.moving else "")
+    pose = proposal.result.inputs[-1]
+    change = length_change(
+        [known.place_mm[2]] * known.touches,
+        touch_heights_mm(proposal),
+        stored_z_mm=proposal.offset.z_mm,
+        v_deg=pose.v_deg,
+        w_deg=pose.w_deg,
+        sigma_z_mm=touch_sigma_z_mm(controller, plan.pin),
+        u_place_mm=known.sigma_mm,
+    )
+    return _Told(change, known)
+
+
+def _moved(known: KnownHeight, plan: ToolPlan, proposal: Proposal) -> bool:
+    """Tell whether the pin stands elsewhere than where its height was found."""
+    if "station_moved" in proposal.result.warnings:
+        return True
+    now = touch_details(plan.pin, proposal)
+    away = tuple(
+        float(str(now[name])) - then
+        for name, then in zip(("x_mm", "y_mm"), known.place_mm, strict=False)
+    )
+    sigma_mm = max(proposal.result.sigma_mm or 0.0, _UNKNOWN_SIGMA_MM)
+    shift = judge_shifts([TipShift(plan.tool, away, sigma_mm)])
+    return shift is not None and shift.moved
+
+
+def _pins_that_sank(told: Sequence[tuple[str, LengthChange | None]]) -> set[str]:
+    """Return the pins on which several tools stand by as much higher, or lower."""
+    changes: dict[str, list[LengthChange]] = {}
+    for pin, one in told:
+        if one is not None:
+            changes.setdefault(pin, []).append(one)
+    sunk = set()
+    for pin, at in changes.items():
+        heights = [one.height_change_mm for one in at]
+        alike = max(heights) - min(heights) <= max(one.limit_mm for one in at)
+        if len(at) > 1 and alike and all(one.changed for one in at):
+            sunk.add(pin)
+    return sunk
+
+
+def _said(proposal: Proposal, why: str, *, attended: bool) -> Proposal:
+    """Return a proposal whose length nothing tells, with a note of it.
+
+    Raises:
+        CalibrationError: ``length_not_observable``: its Z was measured on a pin that moved, and
+            nobody is there to look at it.
+    """
+    from robolink.calibration import length_not_observable  # numpy, late
+
+    result = proposal.result
+    if proposal.z_from == "measured":
+        if not attended:
+            raise length_not_observable(why)
+        doubted = replace(result, warnings=(*result.warnings, "length_not_observable"))
+        note = tr("{why} Z was measured by the height of the touches, and may be wrong.", why=why)
+    else:
+        doubted = replace(result, notes=(*result.notes, "length_not_observable"))
+        note = tr("{why} Whether the tip is as long as before is not known; Z is kept.", why=why)
+    return replace(proposal, result=doubted, notes=(*proposal.notes, note))
+
+
+def _decided(
+    context: MeasurementContext,
+    plan: ToolPlan,
+    proposal: Proposal,
+    found: _Told,
+    *,
+    attended: bool,
+) -> Proposal:
+    """Return a proposal with the Z that was decided on.
+
+    Raises:
+        CalibrationError: ``length_changed``: nobody decided.
+    """
+    told, known = found.change, found.known
+    if told is None or known is None:
+        return proposal
+    # A Z that the heights confirm, or that follows them, is as good as the one it goes back to.
+    good = replace(proposal, kept_record={**proposal.kept_record, "z_from": known.z_from})
+    if not told.changed:
+        # The height of then stays what is compared with: small changes would else add up unseen.
+        return replace(good, length=told, pin_z_mm=known.place_mm[2], pin_touches=known.touches)
+    decision = plan.length
+    if decision == "ask":
+        if not attended:
+            raise _undecided(plan.tool, told)
+        question = tr(
+            "{found} Write Z {new:.3f} instead of keeping {old:.3f}?",
+            found=in_words(plan.tool, told),
+            new=told.z_by_difference_mm,
+            old=told.stored_z_mm,
+        )
+        decision = "difference" if context.runner().confirm(question) else "keep"
+    entry = decision_entry(
+        in_words(plan.tool, told), length=decision, z_by_difference_mm=told.z_by_difference_mm
+    )
+    context.controller.outcomes.append(replace(entry, tool=plan.tool))
+    return _with_length(good if decision == "difference" else proposal, told, decision)
+
+
+def _with_length(proposal: Proposal, told: LengthChange, decision: str) -> Proposal:
+    """Return a proposal with a change of length, written by difference or knowingly kept."""
+    result = proposal.result
+    doubted = replace(result, warnings=(*result.warnings, "length_changed"))
+    if decision != "difference":
+        note = tr("{found} Z is kept nevertheless.", found=in_words(proposal.tool, told))
+        return replace(proposal, result=doubted, length=told, notes=(*proposal.notes, note))
+    z_mm = told.z_by_difference_mm
+    measured = proposal.measured
+    return replace(
+        proposal,
+        result=replace(doubted, offset=replace(result.offset, z_mm=z_mm)),
+        measured=None
+        if measured is None
+        else replace(measured, z_mm=measured.z_mm + z_mm - told.stored_z_mm),
+        length=told,
+        z_from="measured",
+        notes=(*proposal.notes, tr("{found} Z follows it.", found=in_words(proposal.tool, told))),
+    )
+
+
+def in_words(tool: int, told: LengthChange) -> str:
+    """Return what the heights tell about a length, in one sentence."""
+    values = {
+        "tool": tool,
+        "apart": abs(told.longer_mm),
+        "up": told.height_change_mm,
+        "half": told.half95_mm,
+    }
+    if told.longer_mm > 0:
+        return tr(
+            "The tip of tool {tool} is {apart:.2f} mm longer (flange {up:+.2f} mm on the same pin, "
+            "+-{half:.2f}).",
+            **values,
+        )
+    return tr(
+        "The tip of tool {tool} is {apart:.2f} mm shorter (flange {up:+.2f} mm on the same pin, "
+        "+-{half:.2f}).",
+        **values,
+    )
+
+
+def _undecided(tool: int, told: LengthChange) -> CalibrationError:
+    return CalibrationError(
+        "length_changed",
+        in_words(tool, told),
+        remedy=tr(
+            "Nothing was written. Say beforehand whether Z follows the heights or is kept "
+            "({decide}), or run it where somebody can be asked.",
+            decide=way(Way.LENGTH),
+        ),
+    )
+
+
+def _of_station(controller: Controller, pin: str) -> KnownHeight | None:
+    entries = controller.outcomes.recorded(kinds=(EntryKind.STATION,))
+    station = find_stations(None, entries).get(pin)
+    if station is None or not shows_height(station):
+        return None
+    x_mm, y_mm, z_mm = station.x_mm, station.y_mm, station.z_mm
+    if x_mm is None or y_mm is None or z_mm is None:
+        return None
+    z_from = str(station.details["z_from"])
+    return KnownHeight((x_mm, y_mm, z_mm), sigma_mm=station.sigma_mm or 0.0, z_from=z_from)
+
+
+def shows_height(station: Station) -> bool:
+    """Tell whether the height of a pin is more than a Z that a calibration had kept."""
+    return station.details.get("z_from") in ("measured", "typed", "touched")

@@ -1,0 +1,103 @@
+"""How nozzles sit and how well touches repeat in height: from what a cell has on record."""
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Final
+
+from robolink.calibration import PERSON_SIGMA_Z_MM, PROBE_SIGMA_Z_MM
+from robolink.model import Controller, EntryKind, Recorded, ToolOffset, read_offset
+
+USUAL_SEAT_MM: Final = (0.1, 0.1, 0.05)
+"""Standard deviation of X, Y and Z while fewer changes are on record; a choice, not a finding."""
+
+LEAST_CHANGES: Final = 8
+"""So many changes tell the scatter better than the usual value does."""
+
+LEAST_TOUCHES: Final = 10
+"""So many touches, less one a run, tell how well a cell touches in height."""
+
+MOST_CHANGES: Final = 50
+"""Older changes say less about the nozzles of today."""
+
+
+@dataclass(frozen=True, slots=True)
+class Seating:
+    """How differently new nozzles sit.
+
+    Attributes:
+        sigma_mm: Standard deviation of X, Y and Z.
+        changes: From how many changes it was pooled; ``None`` for the usual value.
+    """
+
+    sigma_mm: tuple[float, float, float] = USUAL_SEAT_MM
+    changes: int | None = None
+
+
+def seating_of(controller: Controller) -> Seating:
+    """Return what the changes of all tools of a controller tell (docs/reference/evidence.md 11).
+
+    X and Y are pooled: a nozzle has no side on which it sits better. Z counts where it was
+    measured; a Z that was kept would look like a nozzle that always sits alike.
+    """
+    entries = controller.outcomes.recorded(kinds=(EntryKind.DONE, EntryKind.DECISION))
+    changes = list(_changes(entries))[:MOST_CHANGES]
+    if len(changes) < LEAST_CHANGES:
+        return Seating()
+    plane = math.sqrt(sum(dx * dx + dy * dy for dx, dy, _ in changes) / (2 * len(changes)))
+    heights = [dz for _, _, dz in changes if dz is not None]
+    above = USUAL_SEAT_MM[2]
+    if len(heights) >= LEAST_CHANGES:
+        above = math.sqrt(sum(dz * dz for dz in heights) / len(heights))
+    pooled = min(len(changes), len(heights) or len(changes))
+    # A scatter of nothing would make every touch a moved pin.
+    least = USUAL_SEAT_MM[2] / 10
+    sigma = (max(plane, least), max(plane, least), max(above, least))
+    return Seating(sigma, pooled)
+
+
+def touch_sigma_z_mm(controller: Controller, pin: str) -> float:
+    """Return the standard deviation of the height of one touch of a pin.
+
+    It is pooled within the runs on record once ten touches tell it; until then it is that of a
+    person who touches usually well (docs/reference/evidence.md 1).
+    """
+    squares = freedom = 0.0
+    for entry in controller.outcomes.recorded(kinds=(EntryKind.DONE, EntryKind.DECISION)):
+        touch = entry.details.get("touch")
+        if not isinstance(touch, Mapping) or touch.get("station") != pin:
+            continue
+        scatter, dof = touch.get("heights_mm2"), touch.get("heights_dof")
+        if isinstance(scatter, (int, float)) and isinstance(dof, int) and dof > 0:
+            squares, freedom = squares + scatter, freedom + dof
+    if freedom < LEAST_TOUCHES:
+        return PERSON_SIGMA_Z_MM
+    return max(math.sqrt(squares / freedom), PROBE_SIGMA_Z_MM)
+
+
+def _changes(entries: Iterable[Recorded]) -> Iterator[tuple[float, float, float | None]]:
+    """Yield by how much the tip of a tool differed from the one before, newest first."""
+    later: dict[int, tuple[ToolOffset, Recorded]] = {}
+    for entry in entries:
+        tip = read_offset(entry.details.get("tip"))
+        if entry.tool is None or tip is None or "touch" not in entry.details:
+            continue
+        if entry.tool in later:
+            newer, of = later[entry.tool]
+            if nozzle_of(of) != nozzle_of(entry) or not nozzle_of(of):
+                measured = "measured" in (of.details.get("z_from"), entry.details.get("z_from"))
+                both = of.details.get("z_from") == entry.details.get("z_from")
+                dz = newer.z_mm - tip.z_mm if measured and both else None
+                yield newer.x_mm - tip.x_mm, newer.y_mm - tip.y_mm, dz
+        later[entry.tool] = (tip, entry)
+
+
+def nozzle_of(entry: Recorded) -> str:
+    """Return the id of the nozzle that an entry speaks of, empty when nobody gave one."""
+    return nozzle_in(entry.details, entry.signature.nozzle)
+
+
+def nozzle_in(details: Mapping[str, object], of_the_run: str) -> str:
+    """Return the id of a nozzle from a record; one of its own goes before that of the run."""
+    own = details.get("nozzle")
+    return own if isinstance(own, str) and own else of_the_run

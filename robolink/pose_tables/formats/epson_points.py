@@ -1,0 +1,142 @@
+"""Point files of EPSON RC+ (``robot1.pts``).
+
+The layout is not documented; this is what public RC+ projects of 2009 to 2026 hold, all with
+``sVersion="2.0.0"``: a first line with a checksum, ``key=value`` lines, and a block per
+point::
+
+    Point1 {
+            nNumber=0
+            sLabel="pick"
+            nUndefined=0
+            rX=88.952
+            rU=-101.024
+            nLocal=0
+            nHand=1
+    }
+
+``nUndefined`` counts in bits. Deleted points show 262143, all eighteen; points whose X to W
+are in use show 0 or 448, which is R, S and T when the bits follow the order of the fields.
+That order is inferred. ``nHand`` is 1 for right and 2 for left, as the function Hand
+(docs/reference/spel.md 5.1).
+"""
+
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Final
+
+from robolink.errors import ConfigError
+from robolink.files.named import read_named
+from robolink.messages import tr
+from robolink.model import Hand, Pose
+from robolink.pose_tables.conventions import EPSON
+from robolink.pose_tables.encoding import decoded, line_counter
+from robolink.pose_tables.refusals import UnusableText, refused
+from robolink.pose_tables.values import LengthUnit, RawPose, RawTable
+
+_FIELDS: Final = ("nNumber", "nUndefined", "rX", "rY", "rZ", "rU", "rV", "rW", "nLocal", "nHand")
+_BLOCK: Final = re.compile(r"^Point[0-9]+ *\{\s*?\n(.*?)^\s*\}", re.MULTILINE | re.DOTALL)
+_FIELD: Final = re.compile(
+    rf"^\s*({'|'.join(_FIELDS)})=(-?[0-9]{{1,9}}(?:\.[0-9]{{1,9}})?(?:E[+-][0-9]{{1,3}})?)\s*$",
+    re.MULTILINE | re.ASCII,
+)
+_COUNT: Final = re.compile(r"^nNumberOfPoints=([0-9]{1,6})\s*$", re.MULTILINE | re.ASCII)
+_LABEL: Final = re.compile(r'^\s*sLabel="(.*)"\s*$', re.MULTILINE)
+_XYZU: Final = 0b1111
+_HANDS: Final = {1: Hand.RIGHT, 2: Hand.LEFT}
+
+
+def read_pts(path: Path) -> dict[int, Pose | None]:
+    """Read the points of a ``.pts`` file by number, ``None`` for a deleted one.
+
+    The poses carry no tool; a point does not know with which it was taught.
+
+    Raises:
+        ConfigError: It cannot be read or is no such file.
+    """
+    try:
+        return _points(decoded(read_named(path))[0])
+    except OSError as error:
+        raise refused(path, UnusableText(error.strerror or str(error))) from error
+    except UnusableText as cause:
+        raise refused(path, cause) from cause
+
+
+def parse_pts(text: str) -> dict[int, Pose | None]:
+    """Read the text of a ``.pts`` file; see :func:`read_pts`.
+
+    Raises:
+        ConfigError: It is not one, or a point of it cannot be read.
+    """
+    try:
+        return _points(text)
+    except UnusableText as cause:
+        raise ConfigError(cause.why, remedy=tr("Export the points again.")) from cause
+
+
+def read_points_table(text: str) -> RawTable | None:
+    """Return the points of a ``.pts`` text, the deleted ones left out; ``None`` for another text.
+
+    Raises:
+        UnusableText: A point of it cannot be read.
+    """
+    if "nNumberOfPoints" not in text:
+        return None
+    if not text.startswith("ENVT") and not (_COUNT.search(text) and _BLOCK.search(text)):
+        return None
+    poses: list[RawPose] = []
+    skipped = 0
+    for line, fields, label in _blocks(text):
+        pose = _pose(fields)
+        if pose is None:
+            skipped += 1
+            continue
+        given: dict[str, object] = {"number": int(fields["nNumber"]), "local": pose.local}
+        given |= {"hand": pose.hand} if pose.hand else {}
+        given |= {"name": label} if label else {}
+        place = (pose.x_mm, pose.y_mm, pose.z_mm)
+        poses.append(RawPose(line, place, (pose.u_deg, pose.v_deg, pose.w_deg), given))
+    return RawTable(
+        "EPSON .pts", poses, EPSON.formula, length=LengthUnit.MM, angle="deg", skipped=skipped
+    )
+
+
+def _points(text: str) -> dict[int, Pose | None]:
+    return {int(fields["nNumber"]): _pose(fields) for _, fields, _ in _blocks(text)}
+
+
+def _blocks(text: str) -> Iterator[tuple[int, dict[str, float], str]]:
+    """Yield the line, the numbers and the label of each point.
+
+    Raises:
+        UnusableText: A block cannot be read, or some are missing.
+    """
+    text = text.replace("\r\n", "\n")
+    line_at = line_counter(text)
+    counted = _COUNT.search(text)
+    blocks = list(_BLOCK.finditer(text))
+    if counted is None or int(counted[1]) != len(blocks):
+        raise UnusableText(tr("it is not a whole point file of EPSON RC+"))
+    seen: set[float] = set()
+    for number, block in enumerate(blocks, start=1):
+        fields = {name: float(value) for name, value in _FIELD.findall(block[1])}
+        if set(fields) != set(_FIELDS) or fields["nNumber"] in seen:
+            raise UnusableText(tr("point block {number} cannot be read", number=number))
+        seen.add(fields["nNumber"])
+        label = _LABEL.search(block[1])
+        yield line_at(block.start()), fields, label[1] if label else ""
+
+
+def _pose(fields: Mapping[str, float]) -> Pose | None:
+    if int(fields["nUndefined"]) & _XYZU:
+        return None
+    return Pose(
+        fields["rX"],
+        fields["rY"],
+        fields["rZ"],
+        fields["rU"],
+        fields["rV"],
+        fields["rW"],
+        hand=_HANDS.get(int(fields["nHand"])),
+        local=int(fields["nLocal"]),
+    )

@@ -1,0 +1,71 @@
+"""Values with their names beside them: ``X: 287.500 Y: 103.250 Z: -50.000 U: 0.000 /R /0``.
+
+So controllers print a position. A name that comes again begins the next pose, so one pose may take
+several lines. Position registers of FANUC (``POSREG.VA``) are written in this way too.
+"""
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
+
+from robolink.messages import tr
+from robolink.pose_tables.formats.documents import read_document
+from robolink.pose_tables.tabular.header import MEANINGS
+from robolink.pose_tables.tabular.separators import table_lines
+from robolink.pose_tables.values import RawTable, ReadingChoices
+
+_PAIR: Final = re.compile(
+    r"(?<![\w.])([A-Za-z][A-Za-z_]{0,11})(\s*[:=]\s*|\s+)"
+    r"([+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?)(?![\w.])\s*(mm|cm|m|in|deg|rad|°)?(?![\w])"
+)
+_FLAG: Final = re.compile(r"/\s*([RL]|\d+)\b")
+_POSITION_REGISTERS: Final = re.compile(r"\$POSREG\b")
+_FEWEST: Final = 3
+
+
+def read_labelled(lines: Sequence[str], choices: ReadingChoices) -> RawTable | None:
+    """Return the poses of values with names; ``None`` where lines are laid out otherwise.
+
+    Raises:
+        UnclearText: Unit or rule have to be named by a person.
+        UnusableText: A pose is not whole.
+    """
+    kept, _ = table_lines(lines)
+    poses: list[dict[str, object]] = []
+    name = ""
+    for _, text in kept:
+        found = [pair for pair in _PAIR.finditer(text) if _is_label(pair)]
+        pairs = [(pair[1], pair[3], pair[4]) for pair in found]
+        if len(pairs) < _FEWEST:
+            quoted = re.search(r"['\"]([^'\"]+)['\"]", text)
+            name = quoted[1] if quoted else name
+            continue
+        if {"x", "y"} <= {label.lower() for label, _, _ in pairs}:
+            before = text[: found[0].start()].strip(" \t:=,;({[")
+            called = before or name
+            poses.append({"name": called} if called else {})
+            name = ""
+        elif not poses:
+            return None
+        for label, value, unit in pairs:
+            key = f"{label} [{unit}]" if unit else label
+            if key in poses[-1]:
+                return None
+            poses[-1][key] = float(value)
+        _add_flags(poses[-1], text)
+    if not poses:
+        return None
+    if choices.euler is None and any(_POSITION_REGISTERS.search(line) for line in lines[:5]):
+        choices = replace(choices, euler="fanuc")
+    return read_document(poses, choices, layout=tr("values with names"))
+
+
+def _is_label(pair: re.Match[str]) -> bool:
+    """Tell a name of a value from other words; without a sign between only known names count."""
+    return bool(pair[2].strip()) or pair[1].lower() in MEANINGS
+
+
+def _add_flags(pose: dict[str, object], text: str) -> None:
+    for flag in _FLAG.findall(text):
+        pose["local" if flag.isdigit() else "hand"] = flag if not flag.isdigit() else int(flag)

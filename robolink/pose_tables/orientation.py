@@ -1,0 +1,135 @@
+"""Rotations of other makers, as U, V, W of EPSON: R = Rz(U) Ry(V) Rx(W).
+
+Each goes through the matrix, row by row; angles are never turned into each other
+(docs/reference/calibration.md 1.4). Plain Python, because a list of poses is read before anything
+that needs numpy is.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+from robolink.messages import tr
+from robolink.pose_tables.refusals import UnusableText
+
+Matrix = tuple[float, ...]
+"""Nine numbers, row by row."""
+
+UNIT_WITHIN: Final = 0.01
+"""A quaternion's length may differ from 1 by this; files keep three digits and more."""
+
+ROTATION_WITHIN: Final = 3e-3
+"""How far R R' may be from the identity: three decimals leave up to 2e-3."""
+
+_SINGULAR: Final = 1e-9
+_EXACT: Final = 1e-12
+
+
+def product(a: Sequence[float], b: Sequence[float]) -> Matrix:
+    """Return the matrix a b."""
+    return tuple(
+        a[row] * b[column] + a[row + 1] * b[column + 3] + a[row + 2] * b[column + 6]
+        for row in (0, 3, 6)
+        for column in (0, 1, 2)
+    )
+
+
+def about(axis: str, angle_rad: float) -> Matrix:
+    """Return the rotation about ``x``, ``y`` or ``z``."""
+    c, s = math.cos(angle_rad), math.sin(angle_rad)
+    return {
+        "x": (1.0, 0.0, 0.0, 0.0, c, -s, 0.0, s, c),
+        "y": (c, 0.0, s, 0.0, 1.0, 0.0, -s, 0.0, c),
+        "z": (c, -s, 0.0, s, c, 0.0, 0.0, 0.0, 1.0),
+    }[axis]
+
+
+def from_angles(axes: str, angles_rad: Sequence[float]) -> Matrix:
+    """Return the product of three rotations, left to right."""
+    first, second, third = map(about, axes, angles_rad)
+    return product(product(first, second), third)
+
+
+def from_quaternion(x: float, y: float, z: float, scalar: float, line: int) -> Matrix:
+    """Return the rotation of a quaternion, which is brought to the length 1.
+
+    Raises:
+        UnusableText: Its length is not near 1.
+    """
+    length = math.hypot(x, y, z, scalar)
+    if not abs(length - 1) <= UNIT_WITHIN:
+        why = tr("the quaternion has the length {length:.4g}, not 1", length=length)
+        raise UnusableText(why, line)
+    x, y, z, s = x / length, y / length, z / length, scalar / length
+    return (
+        *(1 - 2 * (y * y + z * z), 2 * (x * y - z * s), 2 * (x * z + y * s)),
+        *(2 * (x * y + z * s), 1 - 2 * (x * x + z * z), 2 * (y * z - x * s)),
+        *(2 * (x * z - y * s), 2 * (y * z + x * s), 1 - 2 * (x * x + y * y)),
+    )
+
+
+def from_rotation_vector(x: float, y: float, z: float) -> Matrix:
+    """Return the rotation about a vector by its length in radians (Rodrigues)."""
+    angle = math.hypot(x, y, z)
+    if angle == 0:
+        return about("z", 0.0)
+    half = math.sin(angle / 2) / angle
+    return from_quaternion(x * half, y * half, z * half, math.cos(angle / 2), 0)
+
+
+def is_rotation(matrix: Sequence[float], within: float = ROTATION_WITHIN) -> bool:
+    """Tell whether the rows have the length 1 and stand upright on each other; either hand."""
+    return _deviation(matrix) <= within
+
+
+def checked(matrix: Sequence[float], line: int) -> Matrix:
+    """Return the rotation that a matrix of a file stands for, free of its rounding.
+
+    Raises:
+        UnusableText: It is no rotation, or a left-handed one.
+    """
+    deviation = _deviation(matrix)
+    if not deviation <= ROTATION_WITHIN:
+        why = tr("the matrix is no rotation: its rows are off by {off:.3g}", off=deviation)
+        raise UnusableText(why, line)
+    if _determinant(matrix) < 0:
+        raise UnusableText(tr("the matrix is left-handed: it mirrors"), line)
+    found = tuple(matrix)
+    while _deviation(found) > _EXACT:  # nears the closest rotation, squaring what is off
+        cubed = product(product(found, _transposed(found)), found)
+        better = tuple(1.5 * a - 0.5 * b for a, b in zip(found, cubed, strict=True))
+        if _deviation(better) >= _deviation(found):
+            break
+        found = better
+    return found
+
+
+def uvw_deg(matrix: Sequence[float]) -> tuple[float, float, float]:
+    """Return U, V, W of a rotation in degrees, V in [-90, 90]; at +-90 W is 0."""
+    r = matrix
+    level = math.hypot(r[0], r[3])
+    v = math.atan2(-r[6], level)
+    if level < _SINGULAR:
+        found = (math.atan2(-r[1], r[4]), v, 0.0)
+    else:
+        found = (math.atan2(r[3], r[0]), v, math.atan2(r[7], r[8]))
+    u_deg, v_deg, w_deg = (math.degrees(angle) + 0.0 for angle in found)  # without -0
+    return u_deg, v_deg, w_deg
+
+
+def _transposed(m: Sequence[float]) -> Matrix:
+    return (m[0], m[3], m[6], m[1], m[4], m[7], m[2], m[5], m[8])
+
+
+def _deviation(matrix: Sequence[float]) -> float:
+    """Return the largest component of R R' - 1."""
+    square = product(matrix, _transposed(matrix))
+    return max(abs(value - (place % 4 == 0)) for place, value in enumerate(square))
+
+
+def _determinant(m: Sequence[float]) -> float:
+    return (
+        m[0] * (m[4] * m[8] - m[5] * m[7])
+        - m[1] * (m[3] * m[8] - m[5] * m[6])
+        + m[2] * (m[3] * m[7] - m[4] * m[6])
+    )

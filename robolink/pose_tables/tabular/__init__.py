@@ -1,0 +1,1 @@
+"""Tables of poses: which column is what, in lines or in objects."""

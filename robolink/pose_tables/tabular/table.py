@@ -1,0 +1,205 @@
+"""A table of poses: one a line, columns named in a header, in a comment above, or by a person."""
+
+import math
+import re
+from collections.abc import Sequence
+from typing import Final
+
+from robolink.messages import tr
+from robolink.pose_tables.lengths import metres_question
+from robolink.pose_tables.orientation import is_rotation
+from robolink.pose_tables.questions import unit_in, which_angle_unit, which_columns, which_length
+from robolink.pose_tables.refusals import UnclearText, UnusableText
+from robolink.pose_tables.tabular.columns import PoseColumns
+from robolink.pose_tables.tabular.header import (
+    COUNTS,
+    SKIPPED,
+    WORDS,
+    ColumnHead,
+    are_joints,
+    column_heads,
+    is_unit,
+    named_by_person,
+    names_place,
+    require_each_once,
+    with_units,
+)
+from robolink.pose_tables.tabular.separators import (
+    FEWEST,
+    TableForm,
+    form_of,
+    is_number,
+    table_lines,
+    without_trailing,
+)
+from robolink.pose_tables.values import LengthUnit, RawTable, ReadingChoices
+
+Row = tuple[int, list[str]]
+
+_WORD: Final = re.compile(r"[^\s;|,\"]+")
+_OPENS: Final = ("(", "[")
+_ONE_MATRIX: Final = {
+    12: "r11,r12,r13,x,r21,r22,r23,y,r31,r32,r33,z",
+    16: "r11,r12,r13,x,r21,r22,r23,y,r31,r32,r33,z,-,-,-,-",
+}
+_BY_COLUMNS: Final = "r11,r21,r31,-,r12,r22,r32,-,r13,r23,r33,-,x,y,z,-"
+_LAST_ROW: Final = (0.0, 0.0, 0.0, 1.0)
+
+
+def read_table(lines: Sequence[str], choices: ReadingChoices) -> RawTable:
+    """Return the poses of a table.
+
+    Raises:
+        UnclearText: Columns, unit or rule have to be named by a person.
+        UnusableText: It is no table of poses.
+    """
+    kept, comments = table_lines(lines)
+    if not any(any(map(is_number, _WORD.findall(text))) for _, text in kept):
+        raise UnusableText(tr("there is no pose in it"))
+    form = form_of(kept)
+    rows = list(form.cells(kept))
+    heads, body = _headed(rows, comments, form, choices)
+    body = [(line, _fitted(line, cells, heads)) for line, cells in body]
+    columns = PoseColumns(heads, choices, lambda cell: form.number(str(cell)))
+    speaks = unit_in(comments, angle=False) if columns.length is None else ""
+    _ask(columns, body, choices, comments)
+    poses = columns.poses(body)
+    turns = columns.turns
+    length = LengthUnit.M if columns.from_ros else columns.length
+    return RawTable(
+        tr("table"),
+        poses,
+        turns.text if turns else "",
+        length=length,
+        stated_length=length is not None and not columns.from_ros,
+        unit_in_comment=speaks,
+        angle=str(turns.angle or "") if turns else "",
+        separator=form.separator,
+        decimal=form.decimal,
+        columns=tuple(head.meaning for head in heads),
+        ignored=columns.ignored,
+    )
+
+
+def _ask(
+    columns: PoseColumns, body: Sequence[Row], choices: ReadingChoices, comments: Sequence[str]
+) -> None:
+    """Ask all that the columns leave open at once."""
+    questions = list(columns.questions)
+    turns = columns.turns
+    if turns and turns.angle and not turns.unit_said and unit_in(comments, angle=True):
+        questions.append(which_angle_unit(turns.names))
+    if questions:
+        if choices.length is None and columns.length is None and not columns.from_ros:
+            speaks = unit_in(comments, angle=False)
+            asked = which_length(speaks) if speaks else metres_question(columns.positions(body))
+            questions += [asked] if asked else []
+        raise UnclearText(*questions)
+
+
+def _headed(
+    rows: list[Row], comments: Sequence[str], form: TableForm, choices: ReadingChoices
+) -> tuple[tuple[ColumnHead, ...], list[Row]]:
+    """Return what the columns hold, and the rows of values."""
+    first = next(
+        (place for place, (_, cells) in enumerate(rows) if sum(map(is_number, cells)) >= FEWEST),
+        len(rows),
+    )
+    above, body = rows[:first], rows[first:]
+    width = without_trailing([cells for _, cells in body])
+    if choices.columns is not None:
+        return named_by_person(choices.columns), body
+    for place, (line, cells) in enumerate(above):
+        heads = column_heads(_joined(cells, form))
+        if names_place(heads):
+            units = above[place + 1 :]
+            heads = _trimmed(heads, width)
+            require_each_once(heads, line)
+            return _with_line_of_units(heads, units), body
+        if are_joints(cells):
+            raise UnusableText(tr("its columns are joints, and joints are no pose"), line)
+    heads = _in_comments(comments, form, width) or _one_matrix(body, form, width)
+    if heads:
+        return heads, body
+    raise UnclearText(which_columns(width))
+
+
+def _trimmed(heads: tuple[ColumnHead, ...], width: int) -> tuple[ColumnHead, ...]:
+    """Leave out columns behind the last value that have no name."""
+    while len(heads) > width and not heads[-1].text.strip():
+        heads = heads[:-1]
+    return heads
+
+
+def _with_line_of_units(heads: tuple[ColumnHead, ...], below: list[Row]) -> tuple[ColumnHead, ...]:
+    if not below:
+        return heads
+    (line, units), *more = below
+    whole = [*units, *[""] * (len(heads) - len(units))]
+    if more or len(whole) != len(heads) or not all(not cell or is_unit(cell) for cell in whole):
+        raise UnusableText(tr("there are no numbers below the names of the columns"), line)
+    return with_units(heads, whole)
+
+
+def _joined(cells: Sequence[str], form: TableForm) -> list[str]:
+    """Put a unit in brackets to its name where blanks separate."""
+    joined: list[str] = []
+    for cell in cells:
+        if joined and form.separator == " " and cell.startswith(_OPENS):
+            joined[-1] += f" {cell}"
+        else:
+            joined.append(cell)
+    return joined
+
+
+def _in_comments(comments: Sequence[str], form: TableForm, width: int) -> tuple[ColumnHead, ...]:
+    """Return the columns that a comment names, none where no comment does so for all."""
+    for comment in comments:
+        for text in (comment, comment.lstrip("#/!%; ")):
+            ((_, cells),) = form.cells([(0, text)]) if '"' not in text else [(0, [])]
+            heads = column_heads(_joined(cells, form))
+            whole = len(heads) == width and all(head.meaning != SKIPPED for head in heads)
+            if whole and names_place(heads):
+                require_each_once(heads)
+                return heads
+    return ()
+
+
+def _one_matrix(rows: Sequence[Row], form: TableForm, width: int) -> tuple[ColumnHead, ...]:
+    """Return the columns of matrices on one line, where only one reading makes rotations."""
+    if width not in _ONE_MATRIX:
+        return ()
+    values = [[form.number(cell) for cell in cells[:width]] for _, cells in rows]
+    if any(len(row) < width or any(map(math.isnan, row)) for row in values):
+        return ()
+    turned = [[row[place] for place in (0, 1, 2, 4, 5, 6, 8, 9, 10)] for row in values]
+    if width == 12:
+        by_parts = any(is_rotation(row[:9]) for row in values)
+        rows_of = any(map(is_rotation, turned))
+        return named_by_person(_ONE_MATRIX[12]) if rows_of and not by_parts else ()
+    last_row = all(tuple(row[12:]) == _LAST_ROW for row in values)
+    last_column = all(tuple(row[3::4]) == _LAST_ROW for row in values)
+    if last_row == last_column:
+        return ()
+    return named_by_person(_ONE_MATRIX[16] if last_row else _BY_COLUMNS)
+
+
+def _fitted(line: int, cells: list[str], heads: Sequence[ColumnHead]) -> list[str]:
+    """Return as many cells as there are columns; only words may be missing at the end."""
+    if len(cells) == len(heads):
+        return cells
+    more = [cell for cell in cells[len(heads) :] if cell]
+    missing = [head for head in heads[len(cells) :] if head.meaning not in _MAY_BE_MISSING]
+    if more or missing:
+        raise UnusableText(
+            tr(
+                "it has {count} columns, and {wanted} are named",
+                count=len(cells),
+                wanted=len(heads),
+            ),
+            line,
+        )
+    return [*cells, *[""] * (len(heads) - len(cells))][: len(heads)]
+
+
+_MAY_BE_MISSING: Final = (*WORDS, *COUNTS, SKIPPED)

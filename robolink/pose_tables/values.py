@@ -1,0 +1,158 @@
+"""What a file of poses holds, what a person adds to it, and how it was understood."""
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Final
+
+from robolink.model import Pose
+
+
+class LengthUnit(StrEnum):
+    """Units of length that files of poses come in."""
+
+    MM = "mm"
+    CM = "cm"
+    M = "m"
+    INCH = "in"
+
+    @property
+    def mm(self) -> float:
+        """How many mm one of it is."""
+        return {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}[self.value]
+
+
+class AngleUnit(StrEnum):
+    """Units of angle that files of poses come in."""
+
+    DEG = "deg"
+    RAD = "rad"
+
+
+@dataclass(frozen=True, slots=True)
+class TabledPose:
+    """One pose of a file.
+
+    Attributes:
+        pose: In mm and degrees; tool and local as far as the file says them.
+        name: What the file calls it; empty where it does not.
+        number: Its number in the file's own count, a point's for example.
+        line: Line of the file where it begins, from 1; in JSON the place in the list.
+        stated: What the file says besides X, Y and U, of ``z_mm``, ``v_deg``, ``w_deg`` and
+            ``local``; the rest of these is 0 in ``pose`` because the file is silent.
+    """
+
+    pose: Pose
+    name: str = ""
+    number: int | None = None
+    line: int = 0
+    stated: frozenset[str] = frozenset()
+
+
+@dataclass(frozen=True, slots=True)
+class ReadingChoices:
+    """What a person says about a file, because the file does not.
+
+    Attributes:
+        columns: A name for every column, ``-`` for one to skip; ``x,y,z,u`` for example.
+        length: ``mm``, ``m`` or ``in``.
+        euler: Name of the rule by which the angles turn (docs/poses.md, "Angles").
+    """
+
+    columns: str | None = None
+    length: str | None = None
+    euler: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class HowRead:
+    """How a file was understood, for a person to look over.
+
+    Attributes:
+        encoding: Of the bytes.
+        layout: Which kind of file it was taken for.
+        length: Unit of its lengths.
+        length_by: Who says so: the ``file``, its ``format``, an ``option`` or the ``default``.
+        angle: Unit of its angles; empty where its rotations are no angles.
+        rotation: How its rotations were understood.
+        separator: What stands between columns; empty where there are none.
+        decimal: The decimal sign of a table.
+        columns: What each column was taken for, ``-`` for one that was skipped.
+        ignored: Names of columns that say nothing about a pose.
+        skipped: How many entries are no taught poses: joints, untaught points.
+    """
+
+    encoding: str
+    layout: str
+    length: LengthUnit
+    length_by: str
+    rotation: str
+    angle: str = ""
+    separator: str = ""
+    decimal: str = ""
+    columns: tuple[str, ...] = ()
+    ignored: tuple[str, ...] = ()
+    skipped: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class PoseTable:
+    """The poses of a file, in its order, and how it was understood."""
+
+    entries: tuple[TabledPose, ...]
+    how: HowRead
+
+    @property
+    def poses(self) -> tuple[Pose, ...]:
+        """The poses alone."""
+        return tuple(entry.pose for entry in self.entries)
+
+
+NOTHING_SAID: Final = ReadingChoices()
+
+
+@dataclass(slots=True)
+class RawPose:
+    """One pose as a format gives it: lengths in the file's unit, angles turned into U, V, W.
+
+    Attributes:
+        line: As of :class:`TabledPose`.
+        position: X, Y, Z in the file's unit.
+        uvw_deg: U, V, W in degrees.
+        given: Name, number, hand, local and tool, as far as the file says them.
+        stated: As of :class:`TabledPose`.
+    """
+
+    line: int
+    position: tuple[float, float, float]
+    uvw_deg: tuple[float, float, float]
+    given: dict[str, object] = field(default_factory=dict)
+    stated: frozenset[str] = frozenset({"z_mm", "v_deg", "w_deg"})
+
+
+@dataclass(slots=True)
+class RawTable:
+    """What a format makes of a text, before its unit of length is settled.
+
+    Attributes:
+        layout: Name of the format.
+        poses: The poses.
+        rotation: How rotations were understood.
+        length: The unit, where the file or its format says one.
+        stated_length: Whether the file itself says it, and not only the format's definition.
+        unit_in_comment: A comment that speaks of a unit which nothing else says.
+        angle: Unit of angles, separator, decimal sign, columns, ignored, skipped: as of
+            :class:`HowRead`.
+    """
+
+    layout: str
+    poses: list[RawPose]
+    rotation: str
+    length: LengthUnit | None = None
+    stated_length: bool = False
+    unit_in_comment: str = ""
+    angle: str = ""
+    separator: str = ""
+    decimal: str = ""
+    columns: tuple[str, ...] = ()
+    ignored: tuple[str, ...] = ()
+    skipped: int = 0

@@ -1,0 +1,87 @@
+"""Who is let in at an assist port: whoever shows the token that stands in its URL.
+
+The port is on loopback, where any program of this machine, of whichever user, and any web page
+in a browser can connect. What it can do is harmless to a machine and fatal to a test: it moves
+the pin and presses the emergency stop. So its URL is ``assist+tcp://TOKEN@127.0.0.1:PORT``, drawn
+anew for each port and shown by ``robolink sim`` alone.
+"""
+
+import hmac
+import secrets
+from dataclasses import dataclass
+from typing import Final
+from urllib.parse import urlsplit
+
+from robolink.errors import ConfigError
+from robolink.messages import tr
+
+SCHEME: Final = "assist+tcp"
+
+_TOKEN_BYTES: Final = 16
+_TOKEN_CHARACTERS: Final = frozenset(
+    "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_"
+)
+
+
+def drawn_token() -> str:
+    """Return a token that nobody guesses: 128 bits, in characters that a URL carries."""
+    return secrets.token_urlsafe(_TOKEN_BYTES)
+
+
+def is_token(shown: object, token: str) -> bool:
+    """Whether ``shown`` is the token; takes as long for a near miss as for a far one."""
+    return isinstance(shown, str) and hmac.compare_digest(
+        shown.encode("utf-8", "surrogatepass"), token.encode()
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class AssistAddress:
+    """An assist URL, taken apart.
+
+    Attributes:
+        host: Host name or address.
+        port: TCP port.
+        token: What is shown at the entrance; empty when the URL has none. Never printed.
+    """
+
+    host: str
+    port: int
+    token: str
+
+    @property
+    def shown(self) -> str:
+        """The URL without its token, for sentences and records."""
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        return f"{SCHEME}://{host}:{self.port}"
+
+    def __repr__(self) -> str:
+        return f"AssistAddress({self.shown!r})"
+
+
+def assist_address(url: str) -> AssistAddress:
+    """Take an assist URL apart.
+
+    Args:
+        url: ``assist+tcp://TOKEN@127.0.0.1:PORT``.
+
+    Raises:
+        ConfigError: It is not an assist URL. It is not repeated, since it may hold a token.
+    """
+    try:
+        parts = urlsplit(url)
+        host, port, token = parts.hostname, parts.port, parts.username or ""
+    except ValueError:
+        host = None
+    if (
+        not host
+        or not port
+        or parts.scheme != SCHEME
+        or parts.password is not None
+        or not set(token) <= _TOKEN_CHARACTERS
+    ):
+        raise ConfigError(
+            tr("This is not an assist URL."),
+            remedy=tr("Take the one that 'robolink sim' prints."),
+        )
+    return AssistAddress(host, port, token)

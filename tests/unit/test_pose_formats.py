@@ -1,0 +1,187 @@
+"""Poses in programs and messages of others: made here as their makers write them."""
+
+import json
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from robolink.errors import AmbiguousPosesError, ConfigError
+from robolink.model import Hand
+from robolink.pose_tables import ReadingChoices, read_poses
+
+PLACE, ANGLES = (405.8, -62.9, 251.6), (40.0, 12.0, -172.0)
+TURNED = Rotation.from_euler("ZYX", ANGLES, degrees=True)
+XYZW = [f"{value:.9f}" for value in TURNED.as_quat()]
+VECTOR = [f"{value:.9f}" for value in TURNED.as_rotvec()]
+METRES = [f"{value / 1000:.7f}" for value in PLACE]
+TARGET = f"[[405.8,-62.9,251.6],[{XYZW[3]},{','.join(XYZW[:3])}],[0,-1,0,0],[9E+09,9E+09]]"
+KUKA = "{X 405.8,Y -62.9,Z 251.6,A 40.0,B 12.0,C -172.0,S 2,T 35}"
+ROWS = [
+    " ".join([*(f"{value:.9f}" for value in row), str(place)])
+    for row, place in zip(TURNED.as_matrix(), PLACE, strict=True)
+]
+MATRIX = [*([float(word) for word in row.split()] for row in ROWS), [0, 0, 0, 1]]
+COLUMNS = [
+    *("\t".join([*(f"{v:.9f}".replace(".", ",") for v in c), "0"]) for c in TURNED.as_matrix().T),
+    "405,8\t-62,9\t251,6\t1",
+]
+ROS = (
+    f"position:\n  x: {METRES[0]}\n  y: {METRES[1]}\n  z: {METRES[2]}\n"
+    f"orientation:\n  x: {XYZW[0]}\n  y: {XYZW[1]}\n  z: {XYZW[2]}\n  w: {XYZW[3]}\n"
+)
+FLOW = (
+    f"position: {{x: {METRES[0]}, y: {METRES[1]}, z: {METRES[2]}}}\n"
+    f"  orientation: {{x: {XYZW[0]}, y: {XYZW[1]}, z: {XYZW[2]}, w: {XYZW[3]}}}\n"
+)
+FANUC = (
+    "P[{n}:\"{name}\"]{{\n   GP1:\n\tUF : 2, UT : 3,\t\tCONFIG : 'N U T, 0, 0, 0',\n"
+    "\tX =   405.800  mm,\tY =   -62.900  mm,\tZ =   251.600  mm,\n"
+    "\tW =  -172.000 deg,\tP =    12.000 deg,\tR =    40.000 deg\n}};\n"
+)
+
+
+def indented(text, by):
+    return "".join(f"{by}{line}\n" for line in text.splitlines())
+
+
+@pytest.fixture
+def read(tmp_path):
+    def of(text, name="poses.txt", **choices):
+        path = tmp_path / name
+        path.write_text(text, encoding="utf-8")
+        return read_poses(path, ReadingChoices(**choices))
+
+    return of
+
+
+FORMS = {
+    "KUKA declaration": f"&REL 1\n;FOLD x\nDECL E6POS XPIN={KUKA}\n",
+    "KUKA frame": f"DECL FRAME F={KUKA}\n",
+    "KUKA movement": f"PTP {KUKA}\n",
+    "KUKA aggregate": f"LIN {KUKA.replace('{X', '{E6POS: X')}\n",
+    "KUKA beside tools": f"$TOOL={KUKA}\nTOOL_DATA[1]={KUKA}\n$BASE={KUKA}\nDECL POS XP={KUKA}\n",
+    "ABB target": f"MODULE M\n  CONST robtarget p1:={TARGET};\nENDMODULE\n",
+    "ABB movement": f"MoveL {TARGET},v100,fine,tool0;\n! {TARGET}\n",
+    "ABB print": f"{TARGET}\n",
+    "ABB array": f"CONST robtarget p{{1}}:=[{TARGET}];\n",
+    "ABB pose": f"VAR pose p1:=[[405.8,-62.9,251.6],[{XYZW[3]},{','.join(XYZW[:3])}]];\n"
+    "PERS tooldata t1:=[TRUE,[[1,2,3],[1,0,0,0]],[1,[0,0,1],[1,0,0,0],0,0,0]];\n",
+    "FANUC": FANUC.format(n=1, name="pin 1"),
+    "FANUC registers": "[*POSREG*]$POSREG  Storage: CMOS  : ARRAY[1,9] OF Position Reg\n"
+    "     [1,1] =   'pin 1' \n  Group: 1   Config: F U T, 0, 0, 0\n"
+    "  X:   405.800   Y:   -62.900   Z:   251.600\n"
+    "  W:  -172.000   P:    12.000   R:    40.000\n     [1,2] =   ''  Uninitialized\n",
+    "URScript name": f"  global pin_1=p[{', '.join([*METRES, *VECTOR])}]\n",
+    "URScript movement": "set_tcp(p[0,0,0.1,0,0,0])\nq=[0,1,2,3,4,5]\n"
+    f"movel(p[{','.join([*METRES, *VECTOR]).replace('0.', '.')}], a=1.2)\n",
+    "URScript with units": "p[405.8mm, -62.9mm, 251.6mm, {}]\n".format(", ".join(VECTOR)),
+    "SPEL+": "P1 = XY(  405.800,  -62.900,  251.600,   40.000,   12.000, -172.000 ) /R /A /0\n",
+    "SPEL+ print": " X:  405.800 Y:  -62.900 Z:  251.600 U:   40.000 V:   12.000 W: -172.000 /R\n",
+    "ROS pose": ROS,
+    "ROS stamped": f"header:\n  stamp:\n    sec: 1\n  frame_id: base\npose:\n"
+    f"{indented(ROS, '  ')}---\n",
+    "ROS array": f"header:\n  seq: 1\nposes:\n- {FLOW}",
+    "ROS transform": "transforms:\n- child_frame_id: t\n  transform:\n"
+    + indented(ROS.replace("position", "translation").replace("orientation", "rotation"), "    "),
+    "ROS odometry": f"pose:\n  pose:\n{indented(ROS, '    ')}  covariance: [0.0, 0.1]\n"
+    "twist:\n  twist:\n    linear:\n      x: 0.0\n      y: 0.0\n      z: 0.0\n",
+    "blocks": "\n".join([*ROWS, "0 0 0 1", ""]),
+    "blocks of three": "\n".join([*ROWS, ""]),
+    "blocks by columns": "\n".join([*COLUMNS, ""]),
+    "numpy": "[[" + "]\n [".join([*ROWS, "0. 0. 0. 1."]) + "]]\n",
+    "one line": " ".join([*ROWS, "0 0 0 1"]) + "\n",
+    "one line of three": ";".join(ROWS).replace(" ", ";").replace(".", ",") + "\n",
+    "one line by columns": " ".join(COLUMNS).replace("\t", " ").replace(",", ".") + "\n",
+    "JSON matrix": json.dumps({"poses": [{"name": "a", "T": MATRIX}]}),
+    "JSON message": json.dumps(
+        {
+            "pose": {
+                "position": dict(zip("xyz", map(float, METRES), strict=True)),
+                "orientation": dict(zip("xyzw", map(float, XYZW), strict=True)),
+            }
+        }
+    ),
+    "values with their names": "P1: X 405.8, Y -62.9, Z 251.6, U 40, V 12, W -172\n",
+    "where": '{"schema": "robolink/where/1", "x_mm": 405.8, "y_mm": -62.9, "z_mm": 251.6, '
+    '"u_deg": 40.0, "v_deg": 12.0, "w_deg": -172.0, "hand": null, "local": 0, "tool": null, '
+    '"joints_deg": [1.0, 2.0, 3.0]}',
+}
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_pose_is_read_as_its_maker_defines_it(read, form):
+    (pose,) = read(FORMS[form]).poses
+    assert pose.coordinates()[:3] == pytest.approx(PLACE, abs=1e-6)
+    angles = (pose.u_deg, pose.v_deg, pose.w_deg)
+    turned = Rotation.from_euler("ZYX", angles, degrees=True).as_matrix()
+    assert np.allclose(turned, TURNED.as_matrix(), atol=1e-7)
+
+
+def test_names_tools_and_frames_are_kept_where_the_file_says_them(read):
+    kuka = (
+        f"DECL E6POS XPIN1={KUKA}\nDECL FDAT FPIN1={{TOOL_NO 3,BASE_NO 2,IPO_FRAME #BASE}}\n"
+        "DECL E6AXIS XHOME={A1 0,A2 -90,A3 90,A4 0,A5 0,A6 0}\n"
+    )
+    found = read(kuka)
+    (entry,) = found.entries
+    assert (entry.name, entry.pose.tool, entry.pose.local) == ("XPIN1", 3, 2)
+    assert found.how.skipped == 1
+    first, second = read(FANUC.format(n=4, name="pin 1") + FANUC.format(n=5, name="")).entries
+    assert (first.name, first.number, first.pose.tool, first.pose.local) == ("pin 1", 4, 3, 2)
+    assert (second.name, second.number, second.line) == ("", 5, 7)
+    first, second = read("P901 = XY(1, 2, 3, 4) /L /2 ' c\npin = XY(5, 6, 7, 8)\n").entries
+    assert (first.number, first.pose.hand, first.pose.local) == (901, Hand.LEFT, 2)
+    assert (second.name, second.pose.hand, "local" in second.stated) == ("pin", None, False)
+    blocks = (
+        "Pin 1:\n" + "\n".join([*ROWS, "0 0 0 1"]) + "\nPin 2:\n" + "\n".join([*ROWS, "0 0 0 1"])
+    )
+    assert [entry.name for entry in read(blocks).entries] == ["Pin 1", "Pin 2"]
+    where = FORMS["where"].replace('"tool": null', '"tool": 2').replace("null", '"left"')
+    (pose,) = read(f"[{where}]").poses
+    assert (pose.tool, pose.hand, pose.local) == (2, Hand.LEFT, 0)
+
+
+def test_answers_that_were_appended_to_a_file_are_read_one_after_the_other(read):
+    assert len(read(FORMS["where"] + "\n" + FORMS["where"].replace(" ", "\n")).poses) == 2
+
+
+def test_units_that_a_format_defines_are_not_believed_against_reason(read):
+    with pytest.raises(AmbiguousPosesError, match="too large") as caught:
+        read("p[405.8, -62.9, 251.6, 0, 0, 0]\n")
+    assert caught.value.asks == ("length",)
+    (pose,) = read("p[405.8, -62.9, 251.6, 0, 0, 0]\n", length="mm").poses
+    assert pose.coordinates()[:3] == PLACE
+
+
+REFUSED = {
+    "DECL E6AXIS XHOME={A1 0,A2 -90,A3 90,A4 0,A5 0,A6 0}\n": "joints are no pose",
+    "CONST jointtarget j1:=[[0,0,0,0,30,0],[9E+09,9E+09]];\n": "joints are no pose",
+    "movej([0,-1.57,1.57,0,0,0], a=1.4)\n": "joints are no pose",
+    "P[1]{\n GP1:\n UF : 0, UT : 1,\n J1= 0.0 deg, J2= 1.0 deg\n};\n": "joints are no pose",
+    "P1 = AglToPls(0, 0, 0, 0)\n": "not given in coordinates",
+    "P1 = XY(300, 200, -50, 100) +X(10)\n": "line 1: the point is changed behind its numbers",
+    "P1 = XY(300, 200, -50)\n": "line 1: the point does not hold four or six",
+    "P1 = XY(x, y, z, u)\n": "line 1: the point does not hold four or six",
+    "DECL POS XP={X 1,Y 2,Z 3}\n": "line 1: there is no A, B, C",
+    "p[1, 2, 3]\n": "line 1: p[..] does not hold six numbers",
+    "p[0.1, 0.2, 0.3, 180, 0, 0]\n": "line 1: a rotation vector is longer",
+    "CONST robtarget p:=[[1,2,3],[1,1,0,0],[0,0,0,0],[9E9,9E9]];": "line 1: the quaternion has",
+    "name: [a, b]\nposition: [0.1, 0.2]\nvelocity: []\nx:\n": "no pose in it",
+    f"pose:\n{indented(ROS, '  ')}   w: 3\n": "",
+    '{"matrix": [[1,0,0,5],[0,1,0,6],[0,0,-1,7],[0,0,0,1]]}': "pose 1: the matrix is left-handed",
+}
+
+
+@pytest.mark.parametrize("text", REFUSED, ids=lambda text: repr(text[:20]))
+def test_what_is_no_pose_of_its_maker_is_refused(read, text):
+    with pytest.raises(ConfigError) as caught:
+        read(text)
+    assert REFUSED[text] in caught.value.what
+
+
+def test_four_rows_of_four_numbers_are_a_table_unless_they_are_rotations(read):
+    rows = "287.5 103.25 -50 0\n296.75 87.5 -50 90\n312.5 96.75 -50 180\n293.4 111.1 -50 -45\n"
+    with pytest.raises(AmbiguousPosesError):
+        read(rows)
+    assert len(read(rows, columns="x,y,z,u").poses) == 4

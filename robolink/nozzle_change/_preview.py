@@ -1,7 +1,7 @@
 """The nozzle change on paper: every step with its target, before anything moves."""
 
 from collections.abc import Callable, Generator, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 from robolink.calibration import flange_of
@@ -131,7 +131,8 @@ def _procedures(
 
 def _journey(target: Pose | None, purpose: str, here: Pose) -> Procedure[object]:
     if target is not None:
-        goal = Pose(*target.coordinates(), hand=here.hand, local=here.local, tool=0)
+        there = Pose(*target.coordinates(), tool=0, local=here.local)
+        goal = replace(there, hand=here.hand, posture=here.posture)
         yield from approach_path(goal, here=here, purpose=purpose)
     return None
 

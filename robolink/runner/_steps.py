@@ -114,6 +114,7 @@ class SeenAt(Pose):
             hand=pose.hand,
             local=pose.local,
             tool=pose.tool,
+            posture=pose.posture,
             spot=spot,
             unit=unit,
         )

@@ -111,7 +111,8 @@ def in_base(pose: Pose, local: ToolOffset) -> Pose:
 
     own = rotation_of(Pose(0.0, 0.0, 0.0, local.u_deg, local.v_deg, local.w_deg))
     x_mm, y_mm, z_mm = (own @ pose.coordinates()[:3] + local.components()[:3]).tolist()
-    return Pose(x_mm, y_mm, z_mm, *uvw_deg(own @ rotation_of(pose)), hand=pose.hand, tool=pose.tool)
+    uvw = uvw_deg(own @ rotation_of(pose))
+    return Pose(x_mm, y_mm, z_mm, *uvw, hand=pose.hand, tool=pose.tool, posture=pose.posture)
 
 
 def flange_of(tip: Pose, offset: ToolOffset) -> Pose:

@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from itertools import pairwise
 
-from robolink.calibration import CalibrationResult, VerifyResult
+from robolink.calibration import CalibrationResult, VerifyResult, tip_pose
 from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
 from robolink.procedures.pin_touch import TouchPlan, contact_pose, verify_by_turning
@@ -70,7 +70,7 @@ class ManualPinSource(PinSource):
         tolerance_mm: float,
     ) -> VerifyResult:
         """Turn about the new tip; see :class:`~robolink.procedures.MovingSource`."""
-        angles = [pose.u_deg + result.offset.u_deg for pose in result.inputs]
+        angles = [tip_pose(pose, result.offset, tool=tool).u_deg for pose in result.inputs]
         context.controller.tools.select(tool)
         procedure = verify_by_turning(
             self.touch,

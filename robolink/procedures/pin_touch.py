@@ -7,9 +7,16 @@ clearance above the pin, and the last bit is done by the person, who sees it.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from robolink.calibration import CalibrationResult, Drift, VerifyResult
+from robolink.calibration import (
+    CalibrationResult,
+    Drift,
+    FlangePlane,
+    VerifyResult,
+    flange_of,
+    tip_pose,
+)
 from robolink.messages import tr
-from robolink.model import Path, Pose, ToolOffset, rotate_xy
+from robolink.model import Path, Pose, ToolOffset
 from robolink.procedures.approach import NO_OFFSET, offset_z
 from robolink.runner import Ask, Move, Procedure
 
@@ -54,12 +61,12 @@ def verify_by_turning(
     """
     drifts = []
     for angle in angles_deg:
-        aside_x, aside_y = rotate_xy(
-            written.x_mm - tip.x_mm, written.y_mm - tip.y_mm, angle - written.u_deg
+        frame = replace(contact, u_deg=angle)
+        plane = FlangePlane.of(flange_of(frame, written))
+        aside_x, aside_y = plane.in_base(
+            written.x_mm - tip.x_mm, written.y_mm - tip.y_mm, written.z_mm - tip.z_mm
         )
-        place = replace(
-            contact, x_mm=contact.x_mm + aside_x, y_mm=contact.y_mm + aside_y, u_deg=angle
-        )
+        place = replace(frame, x_mm=contact.x_mm + aside_x, y_mm=contact.y_mm + aside_y)
         yield Move(offset_z(place, plan.lift_mm), Path.JOINT, tr("turn about the new tip"))
         yield Move(
             offset_z(place, plan.clearance_mm), Path.STRAIGHT, tr("come down to the clearance")
@@ -75,16 +82,9 @@ def contact_pose(result: CalibrationResult, *, tool: int) -> Pose:
 
     Height and angle are those of the last pose, seen through the proposed offset.
     """
-    last = result.inputs[-1]
     x_mm, y_mm = result.reference_point_mm[:2]
-    return replace(
-        last,
-        x_mm=x_mm,
-        y_mm=y_mm,
-        z_mm=last.z_mm + result.offset.z_mm,
-        u_deg=last.u_deg + result.offset.u_deg,
-        tool=tool,
-    )
+    last = tip_pose(result.inputs[-1], result.offset, tool=tool)
+    return replace(last, x_mm=x_mm, y_mm=y_mm)
 
 
 def lift_off(plan: TouchPlan, touch: Pose) -> Move:
@@ -115,11 +115,10 @@ def touch_again(plan: TouchPlan, last: Pose, u_deg: float, guess: ToolOffset) ->
 
 def _turned(contact: Pose, u_deg: float, guess: ToolOffset) -> Pose:
     """Return the flange pose at ``u_deg`` that brings the tip, by ``guess``, to the same point."""
-    before_x, before_y = rotate_xy(guess.x_mm, guess.y_mm, contact.u_deg)
-    after_x, after_y = rotate_xy(guess.x_mm, guess.y_mm, u_deg)
+    turned = replace(contact, u_deg=u_deg)
+    tip = guess.components()[:3]
+    before_x, before_y = FlangePlane.of(contact).in_base(*tip)
+    after_x, after_y = FlangePlane.of(turned).in_base(*tip)
     return replace(
-        contact,
-        x_mm=contact.x_mm + before_x - after_x,
-        y_mm=contact.y_mm + before_y - after_y,
-        u_deg=u_deg,
+        turned, x_mm=contact.x_mm + before_x - after_x, y_mm=contact.y_mm + before_y - after_y
     )

@@ -121,6 +121,37 @@ def flange_of(tip: Pose, offset: ToolOffset) -> Pose:
     return tilted_flange_pose(tip, offset) if tilted else flange_pose(tip, offset)
 
 
+def tip_pose(flange: Pose, offset: ToolOffset, *, tool: int | None) -> Pose:
+    """Return where a tool's tip is under a flange, on four axes and on more.
+
+    Undoes :func:`flange_of`; ``tool`` is the number that the pose gets.
+    """
+    angles = (flange.v_deg, flange.w_deg, offset.v_deg, offset.w_deg)
+    if angles == (0.0, 0.0, 0.0, 0.0):
+        dx, dy = rotate_xy(offset.x_mm, offset.y_mm, flange.u_deg)
+        dz, u_deg, v_deg, w_deg = offset.z_mm, flange.u_deg + offset.u_deg, 0.0, 0.0
+    else:
+        from robolink.calibration.core.rotations import (  # numpy, which four axes do without
+            rotation_of,
+            uvw_deg,
+        )
+
+        turned = rotation_of(flange)
+        own = rotation_of(Pose(0.0, 0.0, 0.0, offset.u_deg, offset.v_deg, offset.w_deg))
+        dx, dy, dz = (turned @ offset.components()[:3]).tolist()
+        u_deg, v_deg, w_deg = uvw_deg(turned @ own)
+    return replace(
+        flange,
+        x_mm=flange.x_mm + dx,
+        y_mm=flange.y_mm + dy,
+        z_mm=flange.z_mm + dz,
+        u_deg=u_deg,
+        v_deg=v_deg,
+        w_deg=w_deg,
+        tool=tool,
+    )
+
+
 def seen_from(written: ToolOffset, tip: ToolOffset) -> ToolOffset:
     """Return where a tip is, seen from the frame of a written offset of a four-axis robot."""
     dx, dy = rotate_xy(tip.x_mm - written.x_mm, tip.y_mm - written.y_mm, -written.u_deg)

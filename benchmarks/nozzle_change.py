@@ -35,7 +35,7 @@ def _change(seed: int) -> tuple[float, float]:
         NozzleChange(
             controller,
             ChangePlan((ToolPlan(1),), ask_before_write=False),
-            operator=AssistedOperator.with_eyes(eyes, lambda _: None),
+            operator=AssistedOperator.with_eyes(eyes, lambda _: None, clock=controller.clock),
         ).run()
         wall_ns = perf_counter_ns() - start
         simulated_ns = controller.clock.now_ns() - simulated_ns

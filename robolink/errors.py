@@ -327,7 +327,18 @@ class CalibrationError(RobolinkError):
 
 
 class VerifyError(RobolinkError):
-    """The tip drifts too far when the tool turns about it; the old value was put back."""
+    """The tip was not proved by turning about it; the old value was put back.
+
+    Attributes:
+        code: The named reason: ``large_drift``, ``drift_undecided``, ``not_touched`` ..; empty
+            where there is none of its own.
+    """
+
+    def __init__(
+        self, what: str, *, remedy: str = "", code: str = "", controller: str = ""
+    ) -> None:
+        super().__init__(what, remedy=remedy, controller=controller)
+        self.code = code
 
 
 class DeclinedError(RobolinkError):

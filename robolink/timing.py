@@ -10,6 +10,9 @@ from typing import NamedTuple, Protocol, Self
 
 NS_PER_S = 1_000_000_000
 
+FASTEST_ANSWER_S = 0.3
+"""Nobody reads a question and answers it faster (docs/reference/evidence.md 1)."""
+
 
 class Clock(Protocol):
     """A monotonic time that can be waited on."""

@@ -28,6 +28,10 @@ if TYPE_CHECKING:
     from robolink.calibration.camera.camera_round import solve_camera_round as solve_camera_round
     from robolink.calibration.camera.runout import RunoutReport as RunoutReport
     from robolink.calibration.camera.runout import runout_report as runout_report
+    from robolink.calibration.camera.runout_table import RunoutRow as RunoutRow
+    from robolink.calibration.camera.runout_table import RunoutTable as RunoutTable
+    from robolink.calibration.camera.runout_table import RunoutTableResult as RunoutTableResult
+    from robolink.calibration.camera.runout_table import solve_runout_table as solve_runout_table
     from robolink.calibration.camera.up_camera import Sighting as Sighting
     from robolink.calibration.camera.up_camera import solve_up_camera as solve_up_camera
     from robolink.calibration.core.budget import DIVISORS as DIVISORS
@@ -84,6 +88,9 @@ if TYPE_CHECKING:
     from robolink.calibration.crossed_beams import crossing_sigma_gain as crossing_sigma_gain
     from robolink.calibration.crossed_beams import solve_crossed_beams as solve_crossed_beams
     from robolink.calibration.crossed_beams import where_they_cross as where_they_cross
+    from robolink.calibration.evidence.approach_bias import (
+        with_approach_bias as with_approach_bias,
+    )
     from robolink.calibration.evidence.units import RobotReach as RobotReach
     from robolink.calibration.evidence.units import require_near as require_near
     from robolink.calibration.evidence.units import require_stored_scale as require_stored_scale
@@ -165,18 +172,23 @@ if TYPE_CHECKING:
     from robolink.calibration.touch.length import (
         length_not_observable as length_not_observable,
     )
-    from robolink.calibration.touch.standoff import FARTHEST_MM as FARTHEST_MM
-    from robolink.calibration.touch.standoff import HIGHEST_MM as HIGHEST_MM
+    from robolink.calibration.touch.plane_touch import PlaneTouchResult as PlaneTouchResult
+    from robolink.calibration.touch.plane_touch import TouchedPlane as TouchedPlane
+    from robolink.calibration.touch.plane_touch import solve_plane_touch as solve_plane_touch
+    from robolink.calibration.touch.sphere_touch import SphereTouchResult as SphereTouchResult
+    from robolink.calibration.touch.sphere_touch import solve_sphere_touch as solve_sphere_touch
     from robolink.calibration.touch.standoff import Standoff as Standoff
     from robolink.calibration.touch.standoff import StandoffSeries as StandoffSeries
-    from robolink.calibration.touch.touch_evidence import PERSON_SIGMA_Z_MM as PERSON_SIGMA_Z_MM
-    from robolink.calibration.touch.touch_evidence import PROBE_SIGMA_Z_MM as PROBE_SIGMA_Z_MM
     from robolink.calibration.touch.touch_evidence import TouchEvidence as TouchEvidence
     from robolink.calibration.touch.touch_evidence import WitnessedTouch as WitnessedTouch
     from robolink.calibration.touch.touch_evidence import height_limit_mm as height_limit_mm
     from robolink.calibration.touch.touch_evidence import judge_touches as judge_touches
     from robolink.calibration.touch.touch_evidence import least_jog_mm as least_jog_mm
     from robolink.calibration.touch.touch_evidence import stand_upright as stand_upright
+    from robolink.calibration.touch.touch_limits import FARTHEST_MM as FARTHEST_MM
+    from robolink.calibration.touch.touch_limits import HIGHEST_MM as HIGHEST_MM
+    from robolink.calibration.touch.touch_limits import PERSON_SIGMA_Z_MM as PERSON_SIGMA_Z_MM
+    from robolink.calibration.touch.touch_limits import PROBE_SIGMA_Z_MM as PROBE_SIGMA_Z_MM
     from robolink.calibration.z_touch import USUAL_DECELERATION_MM_S2 as USUAL_DECELERATION_MM_S2
     from robolink.calibration.z_touch import Touch as Touch
     from robolink.calibration.z_touch import ZTouchResult as ZTouchResult
@@ -195,6 +207,7 @@ __getattr__ = lazy_exports(
         "camera.camera_model": "CameraLimits CameraModel require_same_camera",
         "camera.camera_round": "CameraRound as_round solve_camera_round",
         "camera.runout": "RunoutReport runout_report",
+        "camera.runout_table": "RunoutRow RunoutTable RunoutTableResult solve_runout_table",
         "camera.up_camera": "Sighting solve_up_camera",
         "core.budget": "BudgetRow DIVISORS UncertaintyBudget",
         "core.dispersion": "require_positive",
@@ -230,14 +243,18 @@ __getattr__ = lazy_exports(
         "quality.station_part": "SharedStation StationPart shared_station with_station",
         "quality.tolerances": "PLANAR_TOLERANCE TOUCH_TOLERANCE Tolerance",
         "quality.tool_fits": "ToolFit better_fit tool_fits",
+        "evidence.approach_bias": "with_approach_bias",
         "evidence.units": "RobotReach require_near require_stored_scale require_within_reach",
         "quality.update_guard": "Correction NEEDLE_LIMIT_MM require_shrinking update_guard "
         "writes_refused_unattended",
         "quality.verify_drift": "PLACING_TOLERANCE_MM verify_drift",
         "touch.length": ("LengthChange LengthDecision length_change length_not_observable"),
-        "touch.standoff": "HIGHEST_MM FARTHEST_MM Standoff StandoffSeries",
-        "touch.touch_evidence": "PERSON_SIGMA_Z_MM PROBE_SIGMA_Z_MM TouchEvidence WitnessedTouch "
+        "touch.plane_touch": "TouchedPlane PlaneTouchResult solve_plane_touch",
+        "touch.sphere_touch": "SphereTouchResult solve_sphere_touch",
+        "touch.standoff": "Standoff StandoffSeries",
+        "touch.touch_evidence": "TouchEvidence WitnessedTouch "
         "height_limit_mm judge_touches least_jog_mm stand_upright",
+        "touch.touch_limits": "FARTHEST_MM HIGHEST_MM PERSON_SIGMA_Z_MM PROBE_SIGMA_Z_MM",
         "z_touch": "USUAL_DECELERATION_MM_S2 Touch ZTouchResult solve_z_touch touch_sigma_gain",
     },
 )

@@ -166,7 +166,7 @@ def check_crossings(crossings: Sequence[Crossing], *, minimum: int) -> tuple[str
 
     Raises:
         CalibrationError: ``too_few_poses``, ``turned_in_crossing``, and those of
-            :func:`check_poses`.
+            ``pose_checks.check_poses``.
     """
     for beam in (0, 1):
         count = sum(crossing.beam == beam for crossing in crossings)

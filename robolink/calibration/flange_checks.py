@@ -5,13 +5,14 @@ or of another tool is no flange pose there, however well its numbers fit
 (docs/reference/evidence.md 4).
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import TypeVar
 
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.core.statistics import NORMAL_95
-from robolink.calibration.flange_plane import TipHeight
+from robolink.calibration.flange_plane import UPRIGHT_WITHIN_DEG, TipHeight
 from robolink.errors import CalibrationError
 from robolink.messages import tr
 from robolink.model import Pose
@@ -56,9 +57,14 @@ def with_height_error(
     Args:
         result: With X and Y as its first two measured components.
         per_mm: By how much they change for 1 mm of height; as long as the tangent of the lean.
-        height: What the height was solved with. Without a standard deviation nothing is added.
+        height: What the height was solved with. Without a standard deviation nothing is added, and
+            where the flange leans the result notes ``height_not_assessed``.
     """
-    if height is None or height.sigma_mm is None or not result.covariance:
+    if height is None or math.hypot(*per_mm) < math.tan(math.radians(UPRIGHT_WITHIN_DEG)):
+        return result
+    if height.sigma_mm is None:
+        return replace(result, notes=(*result.notes, "height_not_assessed"))
+    if not result.covariance:
         return result
     errors = tuple(rate * height.sigma_mm for rate in per_mm)
     rows = [list(row) for row in result.covariance]

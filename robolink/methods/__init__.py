@@ -90,6 +90,14 @@ if TYPE_CHECKING:
     from robolink.methods.registry import find_method as find_method
     from robolink.methods.registry import method_names as method_names
     from robolink.methods.registry import register as register
+    from robolink.methods.runout_table.parameters import AllRoundPlan as AllRoundPlan
+    from robolink.methods.runout_table.parameters import (
+        RunoutTableParameters as RunoutTableParameters,
+    )
+    from robolink.methods.runout_table.procedure import (
+        measure_runout_table as measure_runout_table,
+    )
+    from robolink.methods.runout_table.source import RunoutTableSource as RunoutTableSource
     from robolink.methods.six_point.parameters import SixPointParameters as SixPointParameters
     from robolink.methods.six_point.procedure import AxisTeachPlan as AxisTeachPlan
     from robolink.methods.six_point.procedure import measure_six_point as measure_six_point
@@ -145,6 +153,9 @@ __getattr__ = lazy_exports(
         "points.source": "PointsSource PosesFound taught_poses",
         "registry": "METHODS_GROUP all_methods find_method method_names register",
         "declaration.site": "Site",
+        "runout_table.parameters": "AllRoundPlan RunoutTableParameters",
+        "runout_table.procedure": "measure_runout_table",
+        "runout_table.source": "RunoutTableSource",
         "six_point.parameters": "SixPointParameters",
         "six_point.procedure": "AxisTeachPlan measure_six_point",
         "six_point.source": "SixPointSource SixPoints",

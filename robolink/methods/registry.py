@@ -28,6 +28,7 @@ _OWN: Final = {
     "camera": "robolink.methods.camera",
     "camera-affine": "robolink.methods.camera_affine",
     "board": "robolink.methods.board",
+    "runout-table": "robolink.methods.runout_table",
     "pivot": "robolink.methods.pivot",
     "six-point": "robolink.methods.six_point",
     "points": "robolink.methods.points",

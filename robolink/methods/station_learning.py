@@ -6,17 +6,21 @@ from dataclasses import asdict
 from typing import Final
 
 from robolink.calibration import offset_sigma_mm
-from robolink.errors import ConfigError
+from robolink.errors import CalibrationError, ConfigError
 from robolink.messages import tr
 from robolink.methods.beams.parameters import BeamsParameters
 from robolink.methods.z_touch.parameters import ZTouchParameters
-from robolink.model import Path, Pose, ToolOffset
-from robolink.procedures import offset_z
-from robolink.runner import Ask, Move, Procedure
+from robolink.model import Pose, ToolOffset
+from robolink.procedures import PinTouches, TouchPlan
+from robolink.runner import Procedure
 from robolink.stations import Found, Station, StationKind, beam_station, touch_station
 from robolink.ways import Way, way
 
-_LIFT_MM: Final = 10.0
+_MOST_APART_MM: Final = 0.3
+"""Each touch is half of that from their middle: the largest residual of a touch."""
+
+
+_USUAL: Final = TouchPlan()
 
 
 def learn_station(
@@ -27,6 +31,7 @@ def learn_station(
     tip: ToolOffset,
     sigma_mm: float | None = None,
     tip_sigma_mm: float = 0.0,
+    plan: TouchPlan = _USUAL,
 ) -> Procedure[Found]:
     """Find where a station is. Runs in Tool 0, from above it.
 
@@ -38,9 +43,11 @@ def learn_station(
         sigma_mm: Standard deviation of one coordinate of one touch, where it is known.
         tip_sigma_mm: Standard deviation of the tip's own offset. It puts the station as far off
             and shows in no touch, so it is added to what the station is unsure of.
+        plan: How a pin is touched; nominal for a look ahead.
 
     Raises:
-        CalibrationError: ``no_edge``, ``edge_passed``, and those of the solvers.
+        CalibrationError: ``no_edge``, ``edge_passed``, ``not_touched``, ``typed_ahead``,
+            ``touch_heights_differ``, ``touch_not_proven``, and those of the solvers.
         ConfigError: Nobody knows what the station switches, or about where it is; or it is a
             camera.
     """
@@ -53,7 +60,7 @@ def learn_station(
             ),
         )
     courses: dict[StationKind, Callable[[], Procedure[Found]]] = {
-        StationKind.PIN: lambda: _pin(station, tool, tip, _with_tip(sigma_mm, tip_sigma_mm)),
+        StationKind.PIN: lambda: _pin(station, tool, tip, _with_tip(sigma_mm, tip_sigma_mm), plan),
         StationKind.BEAMS: lambda: _beams(station, here, tool, tip, tip_sigma_mm),
         StationKind.TOUCH: lambda: _surface(station, here, tool, tip, sigma_mm),
     }
@@ -65,23 +72,49 @@ def _with_tip(sigma_mm: float | None, tip_sigma_mm: float) -> float | None:
     return None if sigma_mm is None else math.hypot(sigma_mm, tip_sigma_mm)
 
 
-def _pin(station: Station, tool: int, tip: ToolOffset, sigma_mm: float | None) -> Procedure[Found]:
+def _pin(
+    station: Station, tool: int, tip: ToolOffset, sigma_mm: float | None, plan: TouchPlan
+) -> Procedure[Found]:
+    """Touch the pin twice in one orientation; nothing would witness one touch alone."""
     from robolink.calibration import pin_touched  # numpy, which a look does without
 
-    touch: Pose = yield Ask(tr("Bring the tip onto the pin."))
-    yield Move(offset_z(touch, _LIFT_MM), Path.STRAIGHT, tr("lift off the pin"))
-    pin = pin_touched(touch, tip)
+    touches = PinTouches(plan)
+    first = yield from touches.first("first")
+    second = yield from touches.again(
+        first,
+        key="second",
+        turning=tr("go beside the pin"),
+        instruction=tr("Bring the tip onto the pin once more."),
+    )
+    if not plan.nominal:
+        touches.require_made()
+        _require_same_place(first, second)
+    one, other = pin_touched(first, tip), pin_touched(second, tip)
     return Found(
         id=station.id,
         kind=StationKind.PIN,
-        x_mm=pin.x_mm,
-        y_mm=pin.y_mm,
-        z_mm=pin.z_mm,
+        x_mm=(one.x_mm + other.x_mm) / 2,
+        y_mm=(one.y_mm + other.y_mm) / 2,
+        z_mm=(one.z_mm + other.z_mm) / 2,
         sigma_mm=sigma_mm,
         how=tr("touched with tool {tool}", tool=tool),
         gauge=station.gauge,
         tool=tool,
         details={"z_from": "touched"},
+    )
+
+
+def _require_same_place(one: Pose, other: Pose) -> None:
+    apart_mm = math.hypot(one.x_mm - other.x_mm, one.y_mm - other.y_mm)
+    if apart_mm <= _MOST_APART_MM:
+        return
+    raise CalibrationError(
+        "touch_not_proven",
+        tr(
+            "The two touches are {apart:.2f} mm apart: one of them was not on the pin.",
+            apart=apart_mm,
+        ),
+        remedy=tr("Nothing was recorded. Bring the tip onto the same point both times."),
     )
 
 

@@ -3,8 +3,14 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from robolink.calibration import CalibrationResult, require_shrinking, writes_refused_unattended
-from robolink.errors import CalibrationError
+from robolink.calibration import (
+    CalibrationResult,
+    DriftVerdict,
+    VerifyResult,
+    require_shrinking,
+    writes_refused_unattended,
+)
+from robolink.errors import CalibrationError, VerifyError
 from robolink.messages import tr
 from robolink.nozzle_change._proposal import LimitVerdict, Proposal
 
@@ -158,3 +164,47 @@ def _sureness(result: CalibrationResult) -> tuple[str, float | None]:
     if result.region95_radius_mm is not None:
         return tr("The radius of the 95 % region"), result.region95_radius_mm
     return tr("Half the 95 % interval"), result.half95_mm
+
+
+def require_proved(result: VerifyResult, identity: str) -> None:
+    """Refuse a proof that did not pass.
+
+    Args:
+        result: What it showed.
+        identity: Of the controller.
+
+    Raises:
+        VerifyError: The tip drifts, may drift, or its touches do not agree in height.
+    """
+    if result.passed:
+        return
+    if result.codes:
+        raise VerifyError(
+            tr(
+                "The heights of the touches of the proof differ from that of the measurement: at "
+                "least one touch was in the air."
+            ),
+            remedy=tr("Measure again, each time until the tip is on the pin."),
+            code=result.codes[0],
+            controller=identity,
+        )
+    drift_mm, limit_mm = result.max_drift_mm, result.tolerance_mm
+    if result.verdict is DriftVerdict.UNDECIDED:
+        what = tr(
+            "The tip drifts {drift:.3f} mm when the tool turns: too near to {limit:.3f} mm to tell "
+            "whether that is inside, and further touches did not decide it.",
+            drift=drift_mm,
+            limit=limit_mm,
+        )
+    else:
+        what = tr(
+            "The tip drifts {drift:.3f} mm when the tool turns; {limit:.3f} mm are allowed.",
+            drift=drift_mm,
+            limit=limit_mm,
+        )
+    raise VerifyError(
+        what,
+        remedy=tr("Check that the nozzle sits firmly and measure again."),
+        code=result.verdict.value,
+        controller=identity,
+    )

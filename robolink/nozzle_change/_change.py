@@ -6,21 +6,22 @@ keep, or write the old values back once. Several tools are all measured before t
 written. Whatever happens, the tool, power mode and speed of before are put back at the end.
 """
 
-from collections.abc import Callable, Sequence
-from contextlib import nullcontext
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext
 
 from robolink.calibration import VerifyResult
 from robolink.errors import CalibrationError, DeclinedError, StoppedError, VerifyError
 from robolink.messages import tr
 from robolink.model import Controller, ToolReceipt, new_operation, require_engineer
+from robolink.nozzle_change._acceptance import AcceptanceCriteria, require_proved
 from robolink.nozzle_change._length import settle_lengths
 from robolink.nozzle_change._listener import Listener, Moment
 from robolink.nozzle_change._measuring import Measuring
-from robolink.nozzle_change._plan import ChangePlan, ToolPlan
+from robolink.nozzle_change._plan import ChangePlan, ToolPlan, require_clearance
 from robolink.nozzle_change._proposal import ChangeReport, Proposal, ToolReport
 from robolink.nozzle_change._records import decision_entry, refusal_entry, verification_entry
 from robolink.nozzle_change._station_check import Proposals, check_stations, stations_found
-from robolink.procedures import MeasurementContext
+from robolink.procedures import TOUCH_CODES, MeasurementContext
 from robolink.runner import Operator
 from robolink.transaction import ToolChange, Wanted
 
@@ -64,14 +65,17 @@ class NozzleChange:
 
         Raises:
             CalibrationError: A measurement is not trusted; nothing was written.
+            ConfigError: A clearance is below the largest change that is believed.
             DeclinedError: The person said no; nothing was written.
             StoppedError: A stop came; what was written was put back, unless it was kept already.
-            VerifyError: A tip drifts too far; the old values were put back.
+            VerifyError: A tip drifts too far, or its touches were not made; the old values were
+                put back.
             RobolinkError: Anything else that ended it, with the state it left.
         """
         numbers = ", ".join(str(plan.tool) for plan in self._plan.tools)
         reason = tr("calibrate tool {tool}", tool=numbers)
         controller = self._controller
+        require_clearance(self._plan)
         controller.outcomes.change = new_operation()
         try:
             controller.require_settled(reason)
@@ -206,7 +210,10 @@ class NozzleChange:
         if source is None or not plan.verify:
             return None
         tool, criteria = receipt.tool, plan.criteria
-        with context.telling(lambda done: self._listener.step(tool, done)):
+        with (
+            context.telling(lambda done: self._listener.step(tool, done)),
+            self._touches_counting(tool, criteria),
+        ):
             result = source.verify(
                 context,
                 tool,
@@ -216,18 +223,24 @@ class NozzleChange:
             )
         self._controller.outcomes.append(verification_entry(tool, result))
         self._listener.verified(tool, result)
-        if not result.passed:
-            raise VerifyError(
-                tr(
-                    "The tip drifts {drift:.3f} mm when the tool turns; {limit:.3f} mm are "
-                    "allowed.",
-                    drift=result.max_drift_mm,
-                    limit=criteria.drift_tolerance_mm,
-                ),
-                remedy=tr("Check that the nozzle sits firmly and measure again."),
-                controller=self._controller.identity,
-            )
+        require_proved(result, self._controller.identity)
         return result
+
+    @contextmanager
+    def _touches_counting(self, tool: int, criteria: AcceptanceCriteria) -> Iterator[None]:
+        """Let touches of a proof that were not made end it as a failed proof, on record."""
+        try:
+            yield
+        except CalibrationError as error:
+            if error.code not in TOUCH_CODES:
+                raise
+            self._controller.outcomes.append(refusal_entry(tool, criteria, error))
+            raise VerifyError(
+                tr("The new tip was not proved. {cause}", cause=error.what),
+                remedy=error.remedy,
+                code=error.code,
+                controller=self._controller.identity,
+            ) from error
 
     def _tell(self, sentence: str) -> None:
         self._operator.tell(sentence)

@@ -4,12 +4,14 @@ import math
 from dataclasses import asdict, dataclass, field, replace
 
 from robolink.calibration import CalibrationResult
+from robolink.errors import ConfigError
+from robolink.messages import tr
 from robolink.methods import LengthRule, TwoPoseSource
 from robolink.model import Pose, ToolOffset, WorkBox, plain_offset
 from robolink.nozzle_change._acceptance import AcceptanceCriteria
 from robolink.nozzle_change._pin_record import touch_details
 from robolink.nozzle_change._proposal import Proposal
-from robolink.procedures import MovingSource, RequiresSensor, TipSource
+from robolink.procedures import MovingSource, RequiresSensor, StopsAbovePin, TipSource
 from robolink.runner import RunSettings
 
 
@@ -133,6 +135,34 @@ def _tip_about(flange: Pose, offset: ToolOffset) -> tuple[float, float]:
     above_mm = -math.sin(v) * x_mm + math.cos(v) * (math.sin(w) * y_mm + math.cos(w) * z_mm)
     beside_mm2 = x_mm**2 + y_mm**2 + z_mm**2 - above_mm**2
     return above_mm, math.sqrt(max(0.0, beside_mm2))
+
+
+def require_clearance(plan: ChangePlan) -> None:
+    """Refuse a plan in which a new tip could meet the pin before the person takes over.
+
+    A jump that an engineer accepts was seen before, and is the engineer's to answer for.
+
+    Raises:
+        ConfigError: A clearance is below the largest change that is believed.
+    """
+    for one in plan.tools:
+        source = one.source
+        clearance_mm = source.clearance_mm if isinstance(source, StopsAbovePin) else None
+        if clearance_mm is None or clearance_mm >= one.criteria.max_change_mm:
+            continue
+        raise ConfigError(
+            tr(
+                "The robot would stop {clearance:g} mm above the pin, and the new tip of tool "
+                "{tool} may be {limit:g} mm longer.",
+                clearance=clearance_mm,
+                tool=one.tool,
+                limit=one.criteria.max_change_mm,
+            ),
+            remedy=tr(
+                "Nothing was moved. Use a clearance of {limit:g} mm or more, or allow less change.",
+                limit=one.criteria.max_change_mm,
+            ),
+        )
 
 
 def require_ready(plan: ChangePlan) -> None:

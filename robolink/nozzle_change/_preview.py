@@ -18,7 +18,7 @@ from robolink.model import (
     SpotUnit,
     ToolOffset,
 )
-from robolink.nozzle_change._plan import ChangePlan
+from robolink.nozzle_change._plan import ChangePlan, require_clearance
 from robolink.procedures import MovingSource, approach_path
 from robolink.runner import (
     Ask,
@@ -67,8 +67,13 @@ def preview(controller: Controller, plan: ChangePlan) -> tuple[PlannedStep, ...]
     """Return the steps of the measurements from where the robot stands now.
 
     Reads only. The person's part is foreseen as no movement at all, but where the step says
-    about where it leads.
+    about where it leads. Where the robot stops beside a pin is drawn in the run: the limits are
+    looked at all around.
+
+    Raises:
+        ConfigError: A clearance is below the largest change that is believed.
     """
+    require_clearance(plan)
     if not plan.moves:
         return ()
     return tuple(_foresee(controller, plan, flange_now(controller)))
@@ -182,14 +187,17 @@ def _planned(step: Move | Seek, settings: RunSettings) -> PlannedStep:
         edge = None
     else:
         profile, edge = MotionProfile(Path.STRAIGHT, speed_mm_s=step.speed_mm_s), step.edge
-    refusal = _refusal(step.target, settings)
+    aside_mm = step.aside_mm if isinstance(step, Move) else 0.0
+    refusal = _refusal(step.target, settings, aside_mm=aside_mm)
     return PlannedStep(step.purpose, step.target, profile, edge, refusal)
 
 
-def _refusal(target: Pose, settings: RunSettings) -> str:
-    """Return why the limits forbid a target, empty when they do not."""
+def _refusal(target: Pose, settings: RunSettings, *, aside_mm: float = 0.0) -> str:
+    """Return why the limits forbid a target, or one so far beside it; empty when they do not."""
     try:
-        settings.box.check(target)
+        for dx_mm, dy_mm in ((aside_mm, aside_mm), (-aside_mm, -aside_mm)):
+            beside = replace(target, x_mm=target.x_mm + dx_mm, y_mm=target.y_mm + dy_mm)
+            settings.box.check(beside)
     except LimitError as error:
         return str(error)
     return ""

@@ -9,7 +9,8 @@ from robolink.messages import tr
 from robolink.model import EntryKind, NewEntry, Pose, describe_offset, plain_offset
 from robolink.nozzle_change._acceptance import AcceptanceCriteria
 from robolink.nozzle_change._proposal import Proposal
-from robolink.runner import SeenAt
+from robolink.procedures import jog_mm
+from robolink.runner import SeenAt, TouchedAt
 
 
 def calibration_entry(proposal: Proposal, criteria: AcceptanceCriteria, *, source: str) -> NewEntry:
@@ -52,7 +53,12 @@ def refusal_entry(
         tool=tool,
         tolerance=criteria.tolerance,
         verdict=why,
-        details={"code": code, "poses": [_pose(pose) for pose in poses], **_seen(poses)},
+        details={
+            "code": code,
+            "poses": [_pose(pose) for pose in poses],
+            **_seen(poses),
+            **_touches(poses),
+        },
     )
 
 
@@ -65,6 +71,8 @@ def verification_entry(tool: int, result: VerifyResult) -> NewEntry:
         "tolerance_mm": result.tolerance_mm,
         "drifts": [asdict(drift) for drift in result.drifts],
         "warnings": list(result.warnings),
+        "verdict": result.codes[0] if result.codes else result.verdict.value,
+        **_touches(result.inputs),
     }
     return NewEntry(
         EntryKind.VERIFY,
@@ -88,6 +96,7 @@ def _result(result: CalibrationResult) -> dict[str, object]:
         "reference_point_mm": list(result.reference_point_mm),
         "poses": [_pose(pose) for pose in result.inputs],
         **_seen(result.inputs),
+        **_touches(result.inputs),
         "residuals_mm": [list(residual) for residual in result.residuals_mm],
         "rejected": list(result.rejected),
         "rms_mm": result.rms_mm,
@@ -114,6 +123,25 @@ def _pose(pose: Pose) -> dict[str, object]:
     if pose.posture is not None:
         values["posture"] = asdict(pose.posture)
     return {name: value for name, value in values.items() if value is not None}
+
+
+def _touches(poses: Sequence[Pose]) -> dict[str, object]:
+    """Return how a person made each touch; nothing where nobody touched anything."""
+    if not any(isinstance(pose, TouchedAt) for pose in poses):
+        return {}
+    touched = [_touch(pose) if isinstance(pose, TouchedAt) else None for pose in poses]
+    seeds = {pose.seed for pose in poses if isinstance(pose, TouchedAt)} - {None}
+    return {"touches": touched, "standoff_seed": min(seeds, default=None, key=str)}
+
+
+def _touch(touch: TouchedAt) -> dict[str, object]:
+    return {
+        "arrival": None if touch.arrival is None else _pose(touch.arrival),
+        "standoff_mm": list(touch.standoff_mm),
+        "jog_mm": jog_mm(touch),
+        "seconds": touch.seconds,
+        "contact": touch.contact,
+    }
 
 
 def _seen(poses: Sequence[Pose]) -> dict[str, object]:

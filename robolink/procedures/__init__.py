@@ -29,13 +29,21 @@ if TYPE_CHECKING:
     from robolink.procedures.camera_verify import verify_by_looking as verify_by_looking
     from robolink.procedures.input_source import InputSource as InputSource
     from robolink.procedures.lazy_source import LazySource as LazySource
-    from robolink.procedures.pin_source import ManualPinSource as ManualPinSource
-    from robolink.procedures.pin_source import PinSource as PinSource
-    from robolink.procedures.pin_touch import TouchPlan as TouchPlan
-    from robolink.procedures.pin_touch import contact_pose as contact_pose
-    from robolink.procedures.pin_touch import lift_off as lift_off
-    from robolink.procedures.pin_touch import touch_again as touch_again
-    from robolink.procedures.pin_touch import verify_by_turning as verify_by_turning
+    from robolink.procedures.pin.judging import TOUCH_CODES as TOUCH_CODES
+    from robolink.procedures.pin.judging import heights_agree as heights_agree
+    from robolink.procedures.pin.judging import jog_mm as jog_mm
+    from robolink.procedures.pin.judging import require_touches as require_touches
+    from robolink.procedures.pin.proof import MOST_MORE as MOST_MORE
+    from robolink.procedures.pin.proof import DriftProof as DriftProof
+    from robolink.procedures.pin.proof import contact_pose as contact_pose
+    from robolink.procedures.pin.proof import drift_uncertainty_mm as drift_uncertainty_mm
+    from robolink.procedures.pin.proof import verify_by_turning as verify_by_turning
+    from robolink.procedures.pin.source import ManualPinSource as ManualPinSource
+    from robolink.procedures.pin.source import PinSource as PinSource
+    from robolink.procedures.pin.touches import PinTouches as PinTouches
+    from robolink.procedures.pin.touches import TouchPlan as TouchPlan
+    from robolink.procedures.pin.touches import lift_off as lift_off
+    from robolink.procedures.pin.touches import touch_again as touch_again
     from robolink.procedures.pose_method import PoseMethod as PoseMethod
     from robolink.procedures.sequential_sampling import TAKE_ALL as TAKE_ALL
     from robolink.procedures.sequential_sampling import Sampler as Sampler
@@ -48,6 +56,7 @@ if TYPE_CHECKING:
     from robolink.procedures.source import MeasurementContext as MeasurementContext
     from robolink.procedures.source import MovingSource as MovingSource
     from robolink.procedures.source import RequiresSensor as RequiresSensor
+    from robolink.procedures.source import StopsAbovePin as StopsAbovePin
     from robolink.procedures.source import TipSource as TipSource
 
 __getattr__ = lazy_exports(
@@ -62,13 +71,16 @@ __getattr__ = lazy_exports(
         "camera_verify": "NO_ERROR nearest_first seen_drift verify_by_looking",
         "input_source": "InputSource",
         "lazy_source": "LazySource",
-        "pin_source": "ManualPinSource PinSource",
-        "pin_touch": "TouchPlan contact_pose lift_off touch_again verify_by_turning",
+        "pin.judging": "TOUCH_CODES heights_agree jog_mm require_touches",
+        "pin.proof": "DriftProof MOST_MORE contact_pose drift_uncertainty_mm verify_by_turning",
+        "pin.source": "ManualPinSource PinSource",
+        "pin.touches": "PinTouches TouchPlan lift_off touch_again",
         "pose_method": "PoseMethod",
         "sequential_sampling": (
             "Sampler SamplingPolicy SequentialSampler TAKE_ALL finalize_samples may_end_early "
             "sample_sequentially"
         ),
-        "source": "FindsStation MeasurementContext MovingSource RequiresSensor TipSource",
+        "source": "FindsStation MeasurementContext MovingSource RequiresSensor StopsAbovePin "
+        "TipSource",
     },
 )

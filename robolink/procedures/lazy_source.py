@@ -14,9 +14,18 @@ class LazySource:
     Args:
         make: Makes it; may read, and refuse.
         sentence: What it does, for a report that is written before.
+        clearance_mm: Least height above a pin at which the robot stops, ``None`` where there is no
+            pin.
     """
 
-    def __init__(self, make: Callable[[], MovingSource], *, sentence: str) -> None:
+    def __init__(
+        self,
+        make: Callable[[], MovingSource],
+        *,
+        sentence: str,
+        clearance_mm: float | None = None,
+    ) -> None:
+        self.clearance_mm = clearance_mm
         self._make = make
         self._sentence = sentence
         self._made: MovingSource | None = None

@@ -151,6 +151,15 @@ class MovingSource(TipSource, Protocol):
 
 
 @runtime_checkable
+class StopsAbovePin(Protocol):
+    """A source that brings the tip near a pin, and leaves the rest to the person."""
+
+    @property
+    def clearance_mm(self) -> float | None:
+        """Least height above the expected contact at which the robot stops; ``None`` for none."""
+
+
+@runtime_checkable
 class FindsStation(Protocol):
     """A source whose measurement tells where a station is, beside where the tip is."""
 

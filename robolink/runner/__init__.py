@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from robolink.runner._jog_steps import parse_steps as parse_steps
     from robolink.runner._operator import Operator as Operator
     from robolink.runner._operator import Question as Question
-    from robolink.runner._runner import MOST_REFUSED as MOST_REFUSED
+    from robolink.runner._place_question import MOST_REFUSED as MOST_REFUSED
     from robolink.runner._runner import POLL_S as POLL_S
     from robolink.runner._runner import Runner as Runner
     from robolink.runner._runner import StepDone as StepDone
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from robolink.runner._steps import SeenAt as SeenAt
     from robolink.runner._steps import Step as Step
     from robolink.runner._steps import TeachPrompt as TeachPrompt
+    from robolink.runner._steps import TouchedAt as TouchedAt
     from robolink.runner._yes_no import ask_yes_no as ask_yes_no
     from robolink.runner._yes_no import yes_or_no as yes_or_no
 
@@ -41,9 +42,10 @@ __getattr__ = lazy_exports(
     {
         "_jog_steps": "jog_target parse_decimal parse_steps",
         "_operator": "Operator Question",
-        "_runner": "MOST_REFUSED POLL_S Runner StepDone ask_for_pose",
+        "_place_question": "MOST_REFUSED",
+        "_runner": "POLL_S Runner StepDone ask_for_pose",
         "_settings": "RunSettings",
-        "_steps": "Ask Confirm Look Move Notify Procedure Seek SeenAt Step TeachPrompt",
+        "_steps": "Ask Confirm Look Move Notify Procedure Seek SeenAt Step TeachPrompt TouchedAt",
         "_yes_no": "ask_yes_no yes_or_no",
     },
 )

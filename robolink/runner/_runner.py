@@ -12,7 +12,6 @@ from robolink.errors import (
     ControllerFaultError,
     DeclinedError,
     HeartbeatLostError,
-    JournalError,
     NotReadyError,
     NotReadyReason,
     StoppedError,
@@ -31,6 +30,7 @@ from robolink.model import (
 )
 from robolink.runner._jog_steps import jog_target, way_in_words
 from robolink.runner._operator import Operator, Question
+from robolink.runner._place_question import MOST_REFUSED, PlaceQuestion, ended_by_operator
 from robolink.runner._settings import RunSettings
 from robolink.runner._steps import (
     Ask,
@@ -42,7 +42,6 @@ from robolink.runner._steps import (
     Seek,
     SeenAt,
     Step,
-    TeachPrompt,
 )
 from robolink.runner._yes_no import ask_yes_no
 from robolink.sensing import seen_once
@@ -54,18 +53,10 @@ POLL_S = 1.0
 _MOST_REPEATS: Final = 2
 """Steps of one procedure that may be repeated: a computer busier than that has to be looked at."""
 
-MOST_REFUSED: Final = 10
-"""So many answers in a row that lead nowhere end a question: whoever answers, a person or what
-stands in for one, would go on like that."""
+CONTACT_POLL_S: Final = 0.2
+"""The same while an input is watched that shows contact."""
 
 T = TypeVar("T")
-
-_QUESTIONS: Final = {
-    TeachPrompt.PIN: Question.PLACE,
-    TeachPrompt.ROOM: Question.ROOM,
-    TeachPrompt.ALONG_X: Question.ALONG_X,
-    TeachPrompt.ALONG_Z: Question.ALONG_Z,
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -243,29 +234,21 @@ class Runner:
         return found
 
     def _ask(self, step: Ask) -> Pose:
-        self._operator.ask(step.instruction, _QUESTIONS[step.shown])
-        refused = 0
-        while True:
-            word = self._answer()
-            if word in ("", "done"):
-                return self._group.pose()
-            if word in ("q", "quit", "abort"):
-                raise _ended_by_operator()
-            repeats_left = self._repeats_left
-            try:
-                self.jog(word)
-                if self._repeats_left != repeats_left:  # another question came between
-                    self._operator.ask(step.instruction, _QUESTIONS[step.shown])
-            except JournalError:
-                raise  # no mistake of the person's: the record cannot be kept any more
-            except ConfigError as error:
-                # A typing mistake ends nothing; the limits held and nothing was sent.
-                refused += 1
-                if refused == MOST_REFUSED:
-                    raise self._gets_nowhere(error) from error
-                self._operator.tell(str(error))
-            else:
-                refused = 0
+        question = PlaceQuestion(
+            step,
+            controller=self._controller,
+            group=self._group,
+            operator=self._operator,
+            jog=self._jogged,
+            line=self._line,
+        )
+        return question.answer()
+
+    def _jogged(self, steps: str) -> bool:
+        """Jog, and return whether another question came between."""
+        repeats_left = self._repeats_left
+        self.jog(steps)
+        return self._repeats_left != repeats_left
 
     def _seen_through(self, go: Callable[[], T], target: Pose) -> T:
         """Move, and once more from where the robot stands if this computer was too busy to.
@@ -311,7 +294,7 @@ class Runner:
             self._operator.ask(question, Question.TEXT)
             text = self._line().strip()
             if text == "q":
-                raise _ended_by_operator()
+                raise ended_by_operator()
             if text:
                 return text
         raise DeclinedError(
@@ -319,28 +302,18 @@ class Runner:
             remedy=tr("Start again when somebody is there to answer."),
         )
 
-    def _gets_nowhere(self, error: ConfigError) -> DeclinedError:
-        return DeclinedError(
-            tr(
-                "{count} jogs in a row were refused; the last one: {cause}",
-                count=MOST_REFUSED,
-                cause=error.what,
-            ),
-            remedy=" ".join(
-                (error.remedy, tr("The robot stands where the last jog left it; start again."))
-            ).strip(),
-            controller=self._controller.identity,
-        )
+    def _line(self, between: Callable[[], object] | None = None) -> str:
+        """Return the next line typed, reading the status at least once a second meanwhile.
 
-    def _answer(self) -> str:
-        return self._line().strip().lower()
-
-    def _line(self) -> str:
-        """Return the next line typed, reading the status at least once a second meanwhile."""
+        Args:
+            between: Called as often as the input is looked at, which is then more often.
+        """
         while True:
-            line = self._operator.poll(POLL_S)
+            line = self._operator.poll(POLL_S if between is None else CONTACT_POLL_S)
             checkpoint(Checkpoint.QUESTION, line or "")
             self._watch()
+            if between is not None:
+                between()
             if line is not None:
                 return line
 
@@ -358,21 +331,14 @@ class Runner:
             )
 
 
-def _ended_by_operator() -> DeclinedError:
-    return DeclinedError(
-        tr("The procedure was ended by the operator."),
-        remedy=tr("Nothing was written."),
-    )
-
-
 def _answer(done: StepDone) -> Pose | bool | None:
     """Return what a procedure is sent for a step: an offer that nobody heard is not accepted."""
     return done.accepted is True if isinstance(done.step, Confirm) else done.pose
 
 
 def ask_for_pose(instruction: str) -> Procedure[Pose]:
-    """Let a person bring the tool somewhere; returns the pose there."""
-    pose: Pose = yield Ask(instruction)
+    """Let a person bring the tool somewhere, for its own sake; returns the pose there."""
+    pose: Pose = yield Ask(instruction, evidence=False)
     return pose
 
 

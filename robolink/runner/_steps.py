@@ -15,11 +15,19 @@ from robolink.model import TIP, InputEdge, Path, Pose, Spot, SpotUnit
 
 @dataclass(frozen=True, slots=True)
 class Move:
-    """Drive the frame in force to ``target``; answered with the pose that was reached."""
+    """Drive the frame in force to ``target``; answered with the pose that was reached.
+
+    Attributes:
+        target: Where to.
+        path: How.
+        purpose: What for, for a person.
+        aside_mm: In a look ahead, how far beside the target it may go when it is taken.
+    """
 
     target: Pose
     path: Path
     purpose: str
+    aside_mm: float = 0.0
 
 
 class TeachPrompt(Enum):
@@ -40,17 +48,24 @@ class TeachPrompt(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Ask:
-    """Let a person bring the tool somewhere; answered with the pose then.
+    """Let a person bring the tool somewhere; answered with :class:`TouchedAt`, the pose then.
+
+    When answers keep coming before anybody could have read the question, whoever runs the
+    procedure throws CalibrationError ``typed_ahead`` into it. The frame is then where it was.
 
     Attributes:
         instruction: Where to, for a person.
         shown: What the pose shows then.
         foreseen: About where that is, for a look ahead; ``None`` for where the frame is already.
+        contact: The input that shows contact with the pin, ``None`` where there is none.
+        evidence: Whether anything rests on the answer, so that one that was typed ahead is none.
     """
 
     instruction: str
     shown: TeachPrompt = TeachPrompt.PIN
     foreseen: Pose | None = None
+    contact: InputEdge | None = None
+    evidence: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,6 +132,51 @@ class SeenAt(Pose):
             posture=pose.posture,
             spot=spot,
             unit=unit,
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TouchedAt(Pose):
+    """The pose of the frame in force when a person said that it was there, and how it came there.
+
+    Attributes:
+        seconds: From the question to the answer, by the controller's clock; ``None`` where nobody
+            counted.
+        contact: Whether the contact input was off after the question and on at the answer;
+            ``None`` where there is none.
+        arrival: Where the robot had stopped before, ``None`` where the person brought the tip
+            from wherever it was.
+        standoff_mm: How far from the expected contact that was, base: X, Y, Z.
+        seed: From which the standoff was drawn, ``None`` where none was.
+    """
+
+    seconds: float | None = None
+    contact: bool | None = None
+    arrival: Pose | None = None
+    standoff_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    seed: int | None = None
+
+    @classmethod
+    def of(
+        cls, pose: Pose, *, seconds: float | None = None, contact: bool | None = None
+    ) -> "TouchedAt":
+        """Return what was shown at ``pose``; as it is where that is known already."""
+        if isinstance(pose, cls):
+            return pose
+        x_mm, y_mm, z_mm, u_deg, v_deg, w_deg = pose.coordinates()
+        return cls(
+            x_mm=x_mm,
+            y_mm=y_mm,
+            z_mm=z_mm,
+            u_deg=u_deg,
+            v_deg=v_deg,
+            w_deg=w_deg,
+            hand=pose.hand,
+            local=pose.local,
+            tool=pose.tool,
+            posture=pose.posture,
+            seconds=seconds,
+            contact=contact,
         )
 
 

@@ -36,7 +36,7 @@ from robolink.calibration import (
 )
 from robolink.calibration.z_touch import Touch
 from robolink.model import Pose, ToolOffset
-from tests.calibration._simulated import LEAST, MOST, TRIALS, refused
+from tests.calibration._simulated import LEAST, TRIALS, refused
 
 TIP = ToolOffset(12.0, -5.0, 120.0)
 STORED = ToolOffset(12.3, -5.2, 120.0, 7.0)
@@ -297,6 +297,13 @@ def test_what_the_height_is_unsure_by_is_in_the_interval():
         height = TipHeight(120.0 + rng.normal(0, 0.1), 0.1)
         result = solve_camera_round(looks, height=height, sigma_mm=sigma)
         hits += np.abs(np.subtract(xy(result), (12, -5))) <= result.half_width95
-    assert all(LEAST <= share <= MOST for share in hits / TRIALS), hits / TRIALS
+    # The widest of what is stated and what is seen is never too narrow, and a little wide.
+    assert all(LEAST <= share <= 0.995 for share in hits / TRIALS), hits / TRIALS
     unaware = solve_camera_round(exact, stored=STORED, sigma_mm=sigma)
     assert max(result.half_width95) > 3 * max(unaware.half_width95)
+    assert ("height_not_assessed" in result.notes, "height_not_assessed" in unaware.notes) == (
+        False,
+        True,
+    )
+    upside_down = solve_up_camera(seen(flange(30.0, (0.0, 180.0))), stored=STORED)
+    assert upside_down.notes == ()

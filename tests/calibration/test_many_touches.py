@@ -6,6 +6,7 @@ import random
 import pytest
 
 from robolink.calibration import planar_sigma_gain
+from robolink.errors import CalibrationError
 from robolink.methods import measure_n_angle, most_informative_order
 from robolink.model import Pose, ToolOffset, rotate_xy
 from robolink.procedures import SamplingPolicy, TouchPlan
@@ -112,11 +113,12 @@ def test_the_pose_that_fits_worst_is_named_and_taken_again(slip):
     assert result.max_residual_mm < 0.05
 
 
-def test_who_declines_keeps_the_measurement_with_its_doubt():
+def test_who_declines_to_take_it_again_gets_no_result():
     person = Person(slips=[3])
-    result = course(person, retake=True)
+    with pytest.raises(CalibrationError, match="One touch is") as refused:
+        course(person, retake=True)
+    assert refused.value.code == "large_residual"
     assert (person.touches, len(person.offers)) == (8, 1)
-    assert "large_residual" in result.warnings
 
 
 def test_a_person_who_always_says_yes_comes_to_an_end():

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import f as fisher
 
 from robolink.calibration import (
     RobotReach,
@@ -20,6 +21,7 @@ from robolink.calibration import (
     solve_pivot,
     solve_two_pose,
     uvw_deg,
+    with_approach_bias,
     with_station,
     writes_refused_unattended,
 )
@@ -104,6 +106,13 @@ def test_exact_poses_show_no_order_and_five_touches_cannot():
     assert told(solve_n_angle(PLAIN[:5])).run_order is None
 
 
+def test_the_limits_are_shared_among_the_splits():
+    found, spatial = order_of(solve_n_angle(PLAIN)), order_of(solve_pivot(SPATIAL))
+    assert found.step_f_limit == pytest.approx(fisher.ppf(1 - 0.01 / 7, 2, 10))
+    assert found.drift_f_limit == pytest.approx(fisher.ppf(0.99, 2, 10))
+    assert spatial.step_f_limit == pytest.approx(fisher.ppf(1 - 0.01 / 8, 3, 18))
+
+
 @pytest.mark.parametrize(("solve", "exact"), [(solve_n_angle, PLAIN), (solve_pivot, SPATIAL)])
 def test_copies_count_once(solve, exact):
     axes = 3 if solve is solve_pivot else 2
@@ -129,6 +138,14 @@ def test_copies_of_one_pose_tell_nothing():
         solve_pivot([SPATIAL[0], SPATIAL[1], SPATIAL[0], SPATIAL[1]])
     with refused("robust_too_few"):
         solve_n_angle([*PLAIN[:5], *PLAIN[:5]], robust=Robust())
+
+
+def test_one_angle_is_degenerate_even_where_any_rotation_is_accepted():
+    shifted = [replace(PLAIN[0], x_mm=300.0 + k) for k in range(3)]
+    with refused("degenerate_angles"):
+        solve_n_angle(shifted, min_rotation_deg=0.0)
+    with refused("degenerate_angles"):
+        solve_two_pose(*shifted[:2], min_rotation_deg=0.0)
 
 
 def test_a_pose_that_decides_alone_is_named():
@@ -306,3 +323,32 @@ def test_poses_out_of_reach_are_suspect():
     with refused("suspect_units"):
         require_near(inches, replace(PLAIN[0], x_mm=290.0))
     require_near(PLAIN, replace(PLAIN[0], x_mm=290.0))
+
+
+def approached(turns, bias_mm, seed=6):
+    """Touches that are off by a bias toward where the tip came from, and these standoffs."""
+    random = np.random.default_rng(seed)
+    sides = [(math.cos(turn), math.sin(turn)) for turn in turns]
+    poses = [
+        replace(p, x_mm=p.x_mm + bias_mm * x, y_mm=p.y_mm + bias_mm * y)
+        for p, (x, y) in zip(shaken(PLAIN, random, 0.01), sides, strict=True)
+    ]
+    return with_approach_bias(solve_n_angle(poses), sides)
+
+
+def test_a_bias_toward_the_approach_is_found_when_the_sides_are_drawn():
+    turns = np.random.default_rng(2).uniform(-math.pi, math.pi, 8).tolist()
+    biased, fair = approached(turns, 0.06), approached(turns, 0.0)
+    assert "approach_bias" in biased.warnings
+    assert told(biased).approach_bias_mm == pytest.approx(0.06, abs=0.02)
+    assert "approach_bias" not in fair.warnings
+    assert told(fair).approach_bias_u_mm == pytest.approx(0.005, abs=0.003)
+
+
+def test_a_bias_that_never_turns_against_tool_or_base_cannot_be_found():
+    in_the_tool = [math.radians(angle) + 0.4 for angle in SPREAD]
+    for turns in (in_the_tool, [0.4] * 8):
+        assert told(approached(turns, 0.06)).approach_bias_mm is None
+    with pytest.raises(ValueError, match="1 standoffs for 8"):
+        with_approach_bias(solve_n_angle(PLAIN), [None])
+    assert told(with_approach_bias(solve_n_angle(PLAIN), [None] * 8)).approach_bias_mm is None

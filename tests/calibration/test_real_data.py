@@ -47,3 +47,14 @@ def test_the_outliers_are_found_among_real_poses(robust):
     result = solve_pivot(spoilt, robust=robust)
     assert np.linalg.norm(np.subtract(result.offset.components()[:3], clean)) < 0.45
     assert 480 - len(result.rejected) >= 320
+
+
+def test_every_seed_finds_the_same_set_among_real_poses():
+    """Single seeds of plain refits gave 11 answers, 0.6 mm apart, on such data."""
+    spoilt = poses("lsqrrecipes_pivot_outliers.txt")
+    found = {solve_pivot(spoilt, robust=Robust(2.0, seeds=(k,))).rejected for k in range(8)}
+    assert len(found) == 1
+    together = solve_pivot(spoilt, robust=Robust(2.0))
+    assert {together.rejected} == found
+    assert together.evidence is not None
+    assert together.evidence.seed_spread_mm == 0.0

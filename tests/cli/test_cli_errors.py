@@ -32,11 +32,14 @@ def an_error(kind):
     if kind is errors.NotReadyError:
         reason = errors.NotReadyReason.GUARD_OPEN
         return kind("The guard is open.", reason=reason, remedy="Close it.")
+    if kind is errors.AmbiguousPosesError:
+        return kind("It went wrong.", asks=("length",), remedy="Do it right.")
     return kind("It went wrong.", remedy="Do it right.")
 
 
 CODES = {
     "ConfigError": 2,
+    "AmbiguousPosesError": 2,
     "LimitError": 2,
     "JournalError": 2,
     "TransportError": 3,

@@ -125,7 +125,7 @@ NUMBERS = {
     "too large a step": (["jog", "--yes", "x+50"], "too large for one step"),
     "clearance above the lift": (
         ["calibrate", "two-pose", "--tool", "1", "--clearance", "20"],
-        "must be smaller than --lift",
+        "must be more than 1.8 below --lift",
     ),
 }
 

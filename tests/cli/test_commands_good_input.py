@@ -220,7 +220,7 @@ def test_sim_serves_on_a_free_port_until_it_is_terminated():
         try:
             document = json.loads(served.stdout.readline())
             assert re.fullmatch(r"epson\+tcp://127\.0\.0\.1:\d+", document["url"])
-            assert re.fullmatch(r"assist\+tcp://127\.0\.0\.1:\d+", document["assist"])
+            assert re.fullmatch(r"assist\+tcp://[\w-]{20,}@127\.0\.0\.1:\d+", document["assist"])
             assert main.run(["-c", document["url"], "status"]) == 0
         finally:
             served.send_signal(signal.SIGTERM)

@@ -26,9 +26,6 @@ def test_who_stands_there_is_said_in_the_document(capsys):
     assert [one["refused"] for one in document["controllers"]] == [None, None]
 
 
-@pytest.mark.xfail(
-    strict=True, reason="a touch without a jog is believed until it is refused as not_touched"
-)
 @pytest.mark.parametrize("seed", [1, 3])
 def test_a_careless_person_is_refused_and_the_old_tool_stays_in_force(capsys, seed):
     words = ("demo", "--speed", "100", "--operator", "careless", "--seed", str(seed))

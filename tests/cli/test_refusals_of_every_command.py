@@ -87,6 +87,10 @@ BAD = {
         "'1,2' is no place",
     ),
     "calibrate board": (["--tool", "1", "--station", "C"], "say where the fiducials are"),
+    "calibrate runout-table": (
+        ["--tool", "1", "--station", "C", "--angles", "0,45,90,135,180,225,270,280"],
+        "must go all round in steps of 60 degrees or less",
+    ),
     "calibrate pivot": (["--tool", "1", "--pose", "1,2,3"], "does not state all"),
     "calibrate six-point": (["--tool", "0"], "never written"),
     "calibrate points": (["--tool", "1", "--points", "9-1"], "is not a point"),

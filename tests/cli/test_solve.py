@@ -6,6 +6,7 @@ import subprocess
 import sys
 from typing import Any
 
+import numpy as np
 import pytest
 from robolink_cli import main
 from robolink_cli.commands.measure.solve.solving import METHODS
@@ -15,6 +16,7 @@ from robolink_cli.commands.measure.solve.touch_methods import TOUCH_METHODS
 from robolink.calibration import Beam
 from robolink.model import rotate_xy
 from tests.calibration._simulated import pivoting
+from tests.calibration.test_surface_touches import on_plane, on_sphere
 
 UNITS = {"length": "mm", "angle": "deg"}
 PIN = (310.0, 95.0)
@@ -23,6 +25,12 @@ PIN = (310.0, 95.0)
 def on_pin(u, tip=(12.5, -3.25), **more):
     dx, dy = rotate_xy(tip[0], tip[1], u)
     return {"x": PIN[0] - dx, "y": PIN[1] - dy, "u": u, **more}
+
+
+def touching(surface):
+    """Return poses of a tip at (12, -5, 120) on a surface."""
+    poses = surface(np.random.default_rng(1))
+    return [dict(zip("xyzuvw", pose.coordinates(), strict=True)) for pose in poses]
 
 
 ROUND = [on_pin(u) for u in (0, 90, 180, 270)]
@@ -89,7 +97,8 @@ def test_a_person_reads_lines(tmp_path, capsys):
     shown = capsys.readouterr().out
     assert "two_pose: ok" in shown
     assert "offset mm: 12.500  -3.250" in shown
-    assert "95 %: x_mm 12.4723 to 12.5277" in shown
+    assert "95 %, alone: x_mm 12.4723 to 12.5277" in shown
+    assert "type B 0.0141 mm" in shown
     assert "not measured: z_mm" in shown
 
 
@@ -331,6 +340,11 @@ MORE: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "station_chain": (
         {"u_station_mm": 0.03, "sigma_mm": 0.01, "tools": [1, 2, 3]},
         {"correlation": 0.9},
+    ),
+    "plane_touch": ({"poses": touching(on_plane)}, {"offset": [12, -5, 120]}),
+    "sphere_touch": (
+        {"poses": touching(on_sphere), "radius_mm": 12.7},
+        {"offset": [12, -5, 120], "reference_point": [400, 50, -80]},
     ),
     "gauge_rr": (
         {

@@ -133,7 +133,9 @@ def calibrated(cell, controller):
     said: list[str] = []
     limits = Limits(speed_percent=5, speed_mm_s=20.0)
     plan = ChangePlan((ToolPlan(1),), limits)
-    operator = AssistedOperator.with_eyes(InProcessEyes(cell.simulator), said.append)
+    operator = AssistedOperator.with_eyes(
+        InProcessEyes(cell.simulator), said.append, clock=controller.clock
+    )
     (report,) = NozzleChange(controller, plan, operator=operator).run().tools
     return report, said
 

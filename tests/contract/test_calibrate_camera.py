@@ -11,7 +11,7 @@ from robolink_simulators.hosting.in_process import epson as in_process
 from robolink_simulators.hosting.in_process import softmotion as plc_in_process
 
 from robolink.journal import EntryKind, open_journal
-from tests.contract._camera_cell import camera_model, camera_station
+from tests.contract._camera_cell import camera_model, camera_station, furnish
 from tests.contract._sensor_cell import SensorCell
 from tests.faults._nozzle_cell import OLD_TIP, served_cell
 
@@ -96,6 +96,23 @@ def test_a_camera_is_found_and_then_sees_the_next_nozzle(desk, kind):
         assert seen["method"] == "camera"
         assert max(map(abs, seen["camera_error_mm"])) < 0.02
         assert len(seen["fit"]["residuals_mm"]) == 4
+
+
+def test_a_table_of_runout_is_shown_and_given_as_json(desk):
+    opened = desk()
+    usual = ("--tool", "1", "--station", "CAM", "--sensor", SIM, "--yes", "--json")
+    assert opened.run("calibrate", "camera-affine", "--at", opened.at, *usual)[0] == 0
+    furnish(opened.cell, wobble_mm=0.06)
+    code, found, messages = opened.run("calibrate", "runout-table", *usual)
+    assert code == 0, messages
+    assert found["method"] == "runout-table"
+    rows = found["runout_table"]
+    assert len(rows) == 12
+    assert max(math.hypot(row["dx_mm"], row["dy_mm"]) for row in rows) == pytest.approx(
+        0.06, abs=0.012
+    )
+    assert found["verification"]["passed"]
+    assert "the tip wobbles: it is at most 0.0" in messages
 
 
 def test_a_board_is_measured_by_its_fiducials(desk):

@@ -70,15 +70,17 @@ def slot(simulator, number=1):
     return simulator.plc.memory.slot(number).tool[:3]
 
 
-def eyes(simulator):
-    return AssistedOperator.with_eyes(InProcessEyes(simulator), lambda _text: None)
+def eyes(simulator, clock):
+    return AssistedOperator.with_eyes(InProcessEyes(simulator), lambda _text: None, clock=clock)
 
 
 def change(controller, simulator, *, listener=None, verify=True):
     source = PivotSource(informative_tilts(2, 20.0), TouchPlan())
     one = ToolPlan(1, source, AcceptanceCriteria(), verify=verify)
     plan = ChangePlan((one,), QUICK, ask_before_write=False)
-    return NozzleChange(controller, plan, operator=eyes(simulator), listener=listener)
+    return NozzleChange(
+        controller, plan, operator=eyes(simulator, controller.clock), listener=listener
+    )
 
 
 def test_a_pivot_finds_the_whole_tip_writes_it_and_proves_it_in_all_directions(plc, tmp_path):

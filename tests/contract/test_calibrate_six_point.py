@@ -31,9 +31,9 @@ def orientation(offset):
     return rotation_of(Pose(0.0, 0.0, 0.0, *offset.components()[3:]))
 
 
-def person(simulator, way_mm=12.0):
+def person(simulator, clock, way_mm=12.0):
     eyes = InProcessEyes(simulator)
-    return AssistedOperator.with_eyes(eyes, lambda _text: None, way_mm=way_mm)
+    return AssistedOperator.with_eyes(eyes, lambda _text: None, way_mm=way_mm, clock=clock)
 
 
 def change(controller, simulator, *, listener=None, verify=True):
@@ -41,7 +41,9 @@ def change(controller, simulator, *, listener=None, verify=True):
     plan = ChangePlan(
         (ToolPlan(1, source, AcceptanceCriteria(), verify=verify),), QUICK, ask_before_write=False
     )
-    return NozzleChange(controller, plan, operator=person(simulator), listener=listener)
+    return NozzleChange(
+        controller, plan, operator=person(simulator, controller.clock), listener=listener
+    )
 
 
 def turned_simulator(seed=4):

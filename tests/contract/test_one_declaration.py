@@ -40,8 +40,9 @@ LIMITS = [
     for value in beyond(field)
 ]
 RELATIONS = [
-    ("two-pose", {"clearance_mm": 12}, "clearance_mm", "must be smaller than"),
-    ("pivot", {"clearance_mm": 12}, "clearance_mm", "must be smaller than"),
+    ("two-pose", {"clearance_mm": 8.2}, "clearance_mm", "must be more than 1.8 below"),
+    ("pivot", {"clearance_mm": 12}, "clearance_mm", "must be more than 1.8 below"),
+    ("n-angle", {"off_in_contact": True}, "off_in_contact", "goes with"),
     ("z-touch", {"clearance_mm": 12, "input": 5}, "clearance_mm", "must be smaller than"),
     ("z-touch", {"speeds_mm_s": (2, 2), "input": 5}, "speeds_mm_s", "must differ by a factor"),
     ("z-touch", {"until_mm": 0.1, "input": 5}, "until_mm", "has nothing to leave out"),

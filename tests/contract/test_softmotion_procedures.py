@@ -107,7 +107,9 @@ def test_a_nozzle_change_finds_the_true_tip_writes_it_once_and_proves_it(cell, c
     said: list[str] = []
     limits = Limits(speed_percent=100, speed_mm_s=2000.0)
     plan = ChangePlan((ToolPlan(1),), limits, ask_before_write=False)
-    operator = AssistedOperator.with_eyes(InProcessEyes(cell.simulator), said.append)
+    operator = AssistedOperator.with_eyes(
+        InProcessEyes(cell.simulator), said.append, clock=controller.clock
+    )
     (report,) = NozzleChange(controller, plan, operator=operator).run().tools
     found, truth = controller.tools.read(1), world.tips[1]
     assert found is not None

@@ -19,6 +19,7 @@ from robolink.testing import (
     Subject,
     check_controller,
 )
+from robolink.timing import FASTEST_ANSWER_S
 from tests.contract.third_kind import BenchServer, open_bench
 
 TRUE = ToolOffset(12.4, -3.2, -20.0)
@@ -53,19 +54,23 @@ def server():
 
 
 class Fitter:
-    """Brings the tip to the pin, and says yes."""
+    """Reads the question, brings the tip to the pin, and says yes."""
 
-    def __init__(self, machine):
-        self.machine = machine
-        self.places = False
+    def __init__(self, machine, clock):
+        self.machine, self.clock = machine, clock
+        self.places = self.reads = False
 
     def tell(self, text):
         pass
 
     def ask(self, question, kind):
         self.places = kind is Question.PLACE
+        self.reads = True
 
     def poll(self, wait_s):
+        if self.reads:
+            self.reads = False
+            self.clock.sleep(1.2 * FASTEST_ANSWER_S)
         if not self.places:
             return "y"
         tip = self.machine.tip(TRUE)
@@ -114,7 +119,9 @@ def test_a_tool_of_it_is_calibrated_at_two_poses(server, monkeypatch):
     server.machine.go(server.machine.tip(server.machine.tool))
     with robolink.connect(server.url) as controller:
         plan = ToolPlan(1, TwoPoseSource(), AcceptanceCriteria(), verify=True)
-        change = NozzleChange(controller, ChangePlan((plan,)), operator=Fitter(server.machine))
+        change = NozzleChange(
+            controller, ChangePlan((plan,)), operator=Fitter(server.machine, controller.clock)
+        )
         change.run()
         written = controller.tools.read(1) or ToolOffset()
         assert controller.tools.selected() == 1

@@ -182,6 +182,8 @@ class RecipeCell(ABC):
             pytest.MonkeyPatch.context() as patch,
         ):
             patch.setattr(sys, "stdin", (_Terminal if asks else io.StringIO)())
+            # A run is taken again, up to each of its instants: the same one.
+            patch.setattr("robolink.procedures.pin.touches.fresh_seed", lambda: 7)
             patch.setattr(simulator, "on_request", lambda _, text: seen.pass_by("request", text))
             patch.setattr(simulator, "on_reply", lambda _, text: seen.pass_by("answer", text))
             patch.setattr(self.clock, "on_wait", lambda: seen.pass_by("wait"))

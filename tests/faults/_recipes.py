@@ -99,8 +99,8 @@ z = "kept"
 [source]
 kind = "two-pose"
 turn_deg = 60
-lift_mm = 3
-clearance_mm = 1
+lift_mm = 4
+clearance_mm = 2
 
 [station]
 id = "PIN-11"

@@ -180,7 +180,9 @@ class Change:
 
     def run(self, outcomes: InterruptingLog) -> None:
         with robolink.connect(register("interrupted", self.simulator), outcomes=outcomes) as robot:
-            operator = AssistedOperator.with_eyes(InProcessEyes(self.simulator), self.said.append)
+            operator = AssistedOperator.with_eyes(
+                InProcessEyes(self.simulator), self.said.append, clock=robot.clock
+            )
             plan = ChangePlan((ToolPlan(1),), ask_before_write=False)
             NozzleChange(robot, plan, operator=operator).run()
 

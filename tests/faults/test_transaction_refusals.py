@@ -36,7 +36,9 @@ class Cell:
             self.controller,
             ChangePlan((ToolPlan(1),), ask_before_write=False),
             operator=operator
-            or AssistedOperator.with_eyes(InProcessEyes(self.simulator), lambda _: None),
+            or AssistedOperator.with_eyes(
+                InProcessEyes(self.simulator), lambda _: None, clock=self.controller.clock
+            ),
             listener=listener,
             earlier=lambda tool: earlier_corrections(self.controller, tool),
         ).run()
@@ -88,7 +90,11 @@ def test_a_pin_that_is_not_reached_is_refused(cell):
     cell.simulator.world.pin_mm = (x_mm, y_mm, z_mm - 100)
     said: list[str] = []
     with pytest.raises(DeclinedError, match="jogs in a row were refused"):
-        cell.change(operator=GivesUp.with_eyes(InProcessEyes(cell.simulator), said.append))
+        cell.change(
+            operator=GivesUp.with_eyes(
+                InProcessEyes(cell.simulator), said.append, clock=cell.controller.clock
+            )
+        )
     assert any("box" in sentence for sentence in said), said
     cell.check_the_tool_is(STORED, writes=0)
     (entry,) = cell.recorded(EntryKind.REFUSED)

@@ -316,7 +316,11 @@ def test_what_these_kinds_can_measure_is_accepted(text):
         ),
         (with_(PIVOT, "[source]", "count = 3"), "source.count", "must be at least 4"),
         (with_(PIVOT, "[source]", "tilt_deg = 50"), "source.tilt_deg", "must be at most 45"),
-        (with_(PIVOT, "[source]", "lift_mm = 2"), "source.clearance_mm", "must be smaller than"),
+        (
+            with_(PIVOT, "[source]", "lift_mm = 2"),
+            "source.clearance_mm",
+            "must be more than 1.8 below lift_mm",
+        ),
         (
             PIN.replace("number = 3", f"number = 3\nretreat = {at(1, 2)[:-1]}, v_deg = 5 }}"),
             "tools#1.retreat.v_deg",
@@ -355,8 +359,10 @@ def test_angles_that_spread_are_accepted(angles):
 
 
 def test_the_clearance_stays_below_the_lift():
-    found = problems(with_(PIN, "[source]", "lift_mm = 2"))
-    assert found == {"source.clearance_mm": "must be smaller than lift_mm, which is 2"}
+    found = problems(with_(PIN, "[source]", "lift_mm = 3.8"))
+    assert list(found) == ["source.clearance_mm"]
+    assert found["source.clearance_mm"].startswith("must be more than 1.8 below lift_mm")
+    assert problems(with_(PIN, "[source]", "lift_mm = 3.9")) == {}
 
 
 def test_the_lift_has_room_in_the_box():

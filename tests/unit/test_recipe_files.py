@@ -39,7 +39,7 @@ from robolink.recipe._loading import _checked
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples" / "recipes").iterdir())
 KINDS = (
     'must be one of "beams", "board", "camera", "camera-affine", "n-angle", "one-touch", "pivot", '
-    '"points", "six-point", "two-pose", "z-touch"'
+    '"points", "runout-table", "six-point", "two-pose", "z-touch"'
 )
 LEAST = """\
 schema = "robolink/recipe/1"
@@ -132,7 +132,7 @@ def test_the_examples_are_those_that_the_page_describes():
     assert source.turn_deg == 180
     source = nozzles.source.parameters
     assert isinstance(source, NAngleParameters)
-    assert source.turns_deg == (90, 180, 270)
+    assert source.turns_deg == (180, 90, 270)
     assert ([tool.number for tool in nozzles.tools], nozzles.attempts) == ([1, 2], 2)
 
 

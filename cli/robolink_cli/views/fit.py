@@ -10,7 +10,7 @@ from robolink_cli.views.documents import number
 
 def remarks(result: CalibrationResult) -> Iterator[str]:
     """Yield what there is to say about a measurement beside its numbers, a sentence each."""
-    for said in (_fit, _interval, _region, _parts, _ways, _camera, _chain):
+    for said in (_fit, _interval, _region, _parts, _ways, _camera, _runout, _chain):
         sentence = said(result)
         if sentence:
             yield sentence
@@ -113,6 +113,24 @@ def _camera(result: CalibrationResult) -> str:
             shear=camera.shear_deg,
         )
     return ""
+
+
+def _runout(result: CalibrationResult) -> str:
+    """Return how far a tip wobbles; empty for other methods."""
+    if "runout_table" not in result.details():
+        return ""
+    from robolink.calibration import RunoutTableResult  # numpy, loaded by then
+
+    if not isinstance(result, RunoutTableResult):
+        return ""
+    rows = len(result.table.rows)
+    told = tr("the tip wobbles") if result.wobble else tr("no wobble beyond the noise")
+    return tr(
+        "{told}: it is at most {peak:.3f} mm from where X and Y put it, at {rows} angles",
+        told=told,
+        peak=result.table.peak_mm,
+        rows=rows,
+    )
 
 
 def _chain(result: CalibrationResult) -> str:

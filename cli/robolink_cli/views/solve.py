@@ -70,7 +70,8 @@ def _show_quality(document: Mapping[str, object]) -> None:
     intervals = document.get("interval95")
     if isinstance(intervals, dict) and intervals:
         for name, (low, high) in intervals.items():
-            say(tr("  95 %: {name} {low:.4f} to {high:.4f}", name=name, low=low, high=high))
+            say(tr("  95 %, alone: {name} {low:.4f} to {high:.4f}", name=name, low=low, high=high))
+        _show_parts(document)
     elif "interval95" in document:
         say(tr("  no interval: nothing tells how large the errors are; state sigma_mm"))
     if document.get("rms_residual") is not None:
@@ -82,10 +83,33 @@ def _show_quality(document: Mapping[str, object]) -> None:
                 dof=document["dof"],
             )
         )
+    if document.get("notes"):
+        say(tr("  notes: {notes}", notes=_words(document["notes"])))
     if document.get("rejected"):
         say(tr("  rejected poses (from 0): {poses}", poses=_words(document["rejected"])))
     if document.get("unobservable"):
         say(tr("  not measured: {names}", names=_words(document["unobservable"])))
+
+
+def _show_parts(document: Mapping[str, object]) -> None:
+    """Print what the interval rests on, the region of all lengths, and the parts of the budget."""
+    if document.get("region95_radius_mm") is not None:
+        say(
+            tr(
+                "  95 %, all lengths together: within {radius:.4f} mm",
+                radius=document["region95_radius_mm"],
+            )
+        )
+    budget = document.get("budget")
+    if isinstance(budget, dict):
+        say(
+            tr(
+                "  standard uncertainty: type A {a:.4f} mm, type B {b:.4f} mm, combined {c:.4f} mm",
+                a=budget["type_a_mm"],
+                b=budget["type_b_mm"],
+                c=budget["u_c_mm"],
+            )
+        )
 
 
 def _values(value: object, decimals: int) -> str:
@@ -120,6 +144,12 @@ _SHOWN = (
     ("v", tr("V deg")),
     ("w", tr("W deg")),
     ("reference_point", tr("reference point mm")),
+    ("reference_point_local", tr("reference point in its local, mm")),
+    ("u_c_mm", tr("combined standard uncertainty mm")),
+    ("nu_eff", tr("effective degrees of freedom")),
+    ("coverage_factor", tr("coverage factor")),
+    ("expanded_mm", tr("expanded uncertainty mm")),
+    ("not_assessed", tr("not assessed")),
     ("plain_ls_offset", tr("offset without rejecting, mm")),
     ("mm_per_px_matrix", tr("mm per pixel")),
     ("camera_origin", tr("camera origin mm")),
@@ -152,6 +182,8 @@ _SHOWN = (
     ("max_drift_mm", tr("largest drift mm")),
     ("passed", tr("passed")),
     ("correction_mm", tr("correction mm")),
+    ("plane", tr("plane")),
+    ("sphere", tr("sphere")),
     ("repeatability_mm", tr("repeatability mm")),
     ("reproducibility_mm", tr("reproducibility mm")),
     ("grr_mm", tr("both together mm")),

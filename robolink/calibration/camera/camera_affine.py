@@ -99,7 +99,7 @@ def solve_camera_affine(
     Raises:
         CalibrationError: ``too_few_poses``, ``rank_deficient``, ``insufficient_rotation``,
             ``camera_changed``, ``implausible_offset``, ``tool_pose``, ``local_pose``,
-            ``tilted_pose``, and those of :func:`check_poses`.
+            ``tilted_pose``, and those of ``pose_checks.check_poses``.
         ConfigError: ``sigma_mm`` is not positive.
     """
     require_poses(len(sightings), UNKNOWNS // 2)

@@ -27,9 +27,6 @@ from robolink.calibration.core.statistics import f_quantile
 from robolink.calibration.flange_plane import FlangePlane, standing_upright
 from robolink.calibration.pin.planar import Complexes
 
-HARMONICS_FROM = 8
-"""Sightings from which on ellipse and second harmonic are looked for."""
-
 WOBBLE_QUANTILE = 0.995
 """Of F, for each of two amplitudes: a round circle is said to wobble in 1 % of the cases."""
 
@@ -62,6 +59,10 @@ class RunoutReport:
         rms_mm: Of what the constant offset leaves.
         peak_mm: The largest of it.
         rms_after_mm: Of what all harmonics together leave.
+        residuals_mm: What they leave of each sighting, base axes.
+        noise_mm2: The sum of the squares of that.
+        dof: Degrees of freedom behind it.
+        sigma_gain: Standard deviation of X or Y of the tip as a multiple of a sighting's.
         harmonics_matter: Whether they explain what the offset leaves, beyond the noise.
         distinct_angles: How many angles there are, modulo 360.
         rank: How many of the four terms they tell apart.
@@ -77,6 +78,10 @@ class RunoutReport:
     rms_mm: float
     peak_mm: float
     rms_after_mm: float | None
+    residuals_mm: tuple[tuple[float, ...], ...]
+    noise_mm2: float
+    dof: int
+    sigma_gain: float
     harmonics_matter: bool
     distinct_angles: int
     rank: int
@@ -115,7 +120,8 @@ def runout_report(sightings: Sequence[Sighting], *, sigma_mm: float | None = Non
         warnings = (*warnings, "wobble_not_identifiable")
     plain = _harmonics(seen, [np.ones_like(z), z])
     full = None
-    if told_apart and len(seen) >= HARMONICS_FROM:
+    # With four sightings everything fits, and nothing is left to tell a wobble from noise.
+    if told_apart and len(seen) > _HARMONICS:
         full = _harmonics(seen, [np.ones_like(z), z, z.conj(), z**2])
     upside_down = FlangePlane.of(sightings[0].flange).r33 < 0
     return _report(
@@ -157,6 +163,10 @@ def _report(
         rms_mm=math.sqrt(float((left**2).sum()) / left.shape[1]),
         peak_mm=float(np.hypot(*left).max()),
         rms_after_mm=math.sqrt(noise / left.shape[1]) if full else None,
+        residuals_mm=tuple(map(tuple, best.residuals.reshape(2, -1).T.tolist())),
+        noise_mm2=noise,
+        dof=dof,
+        sigma_gain=gain,
         harmonics_matter=matters,
         distinct_angles=distinct,
         rank=rank,

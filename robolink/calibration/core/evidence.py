@@ -50,6 +50,8 @@ class FitEvidence:
         consensus: How many poses a robust fit kept.
         seed_spread_mm: How far its results under different seeds lie apart.
         grid_mm: Step of the jogs, when it is known.
+        approach_bias_mm: By how much touches are off toward where the tip came from.
+        approach_bias_u_mm: Its standard uncertainty.
     """
 
     distinct: int | None = None
@@ -63,6 +65,8 @@ class FitEvidence:
     consensus: int | None = None
     seed_spread_mm: float | None = None
     grid_mm: float | None = None
+    approach_bias_mm: float | None = None
+    approach_bias_u_mm: float | None = None
 
     def as_json(self) -> dict[str, object]:
         """Return what is known of it as plain values."""
@@ -77,6 +81,8 @@ class FitEvidence:
             "consensus": self.consensus,
             "seed_spread_mm": self.seed_spread_mm,
             "jog_grid_mm": self.grid_mm,
+            "approach_bias_mm": self.approach_bias_mm,
+            "approach_bias_u_mm": self.approach_bias_u_mm,
         }
         if self.run_order is not None:
             order = self.run_order

@@ -30,7 +30,7 @@ def check_planar(
 
     Raises:
         CalibrationError: ``too_few_poses``, ``tilted_pose``, ``degenerate_angles``,
-            ``insufficient_rotation``, and those of :func:`check_poses`.
+            ``insufficient_rotation``, and those of ``pose_checks.check_poses``.
     """
     require_poses(len(poses), minimum)
     doubts = check_poses(poses, allow_mixed_hand=allow_mixed_hand)
@@ -49,7 +49,7 @@ def check_rotation(
     """
     if spread_deg < min_rotation_deg:
         refuse_radians(poses, spread_deg)
-        _require_rotation(poses, spread_deg, min_rotation_deg)
+    _require_rotation(poses, spread_deg, min_rotation_deg)
     return ("small_rotation",) if spread_deg < WARN_ROTATION_DEG else ()
 
 

@@ -180,7 +180,8 @@ class VerifyResult:
     """Drift of the tip about the reference point, one entry per angle.
 
     ``warnings`` are named doubts about the test itself; ``heights_only`` tells that a surface was
-    touched, which shows Z and nothing else. ``codes`` name why its touches do not count.
+    touched, which shows Z and nothing else. ``codes`` name why its touches do not count;
+    ``inputs`` are their poses, where a person made them.
     """
 
     drifts: tuple[Drift, ...]
@@ -188,6 +189,7 @@ class VerifyResult:
     warnings: tuple[str, ...] = ()
     heights_only: bool = False
     codes: tuple[str, ...] = ()
+    inputs: tuple[Pose, ...] = ()
 
     @property
     def max_drift_mm(self) -> float:

@@ -64,10 +64,10 @@ def pose_table(poses: Sequence[Pose]) -> Floats:
 def checked_table(
     poses: Sequence[Pose], *, allow_mixed_hand: bool
 ) -> tuple[Floats, tuple[str, ...]]:
-    """Return the table of many poses and the names of doubts, as :func:`check_poses` but quicker.
+    """Return the table of many poses and the names of doubts; quicker than one by one.
 
     Raises:
-        CalibrationError: As :func:`check_poses`.
+        CalibrationError: As ``pose_checks.check_poses``.
     """
     try:
         table = pose_table(poses)

@@ -11,7 +11,7 @@ import numpy as np
 
 from robolink.calibration.core.evidence import FitEvidence
 from robolink.calibration.core.result import CalibrationResult
-from robolink.calibration.core.robust import Floats, Indices
+from robolink.calibration.core.robust import Floats, Indices, Mask
 from robolink.calibration.evidence.run_order import LEAST_TOUCHES, run_order
 
 HIGH_LEVERAGE: Final = 0.9
@@ -40,6 +40,13 @@ def copies(table: Floats) -> tuple[int, ...]:
             found.append(index)
         seen.add(row)
     return tuple(found)
+
+
+def left_out(kept: Mask, duplicates: tuple[int, ...]) -> tuple[int, ...]:
+    """Return the indices of poses that are neither kept nor copies: the outliers."""
+    rejected = ~kept
+    rejected[list(duplicates)] = False
+    return tuple(np.flatnonzero(rejected).tolist())
 
 
 def leverages(centred: Floats, inverse: Floats) -> Floats:

@@ -106,7 +106,7 @@ def solve_joint(
 
     Raises:
         CalibrationError: ``too_few_poses``, ``rank_deficient``, ``insufficient_rotation``,
-            ``implausible_offset``, and those of :func:`check_poses`.
+            ``implausible_offset``, and those of ``pose_checks.check_poses``.
         ConfigError: ``sigma_mm`` is not positive.
     """
     poses = [touch.flange for touch in touches]

@@ -1,6 +1,7 @@
 """Tool offset from one point touched or seen at several known angles, on four axes."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,11 +17,12 @@ from robolink.calibration.core.pose_checks import keep_unmeasured
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.core.robust import Floats, Indices, Mask, Robust
 from robolink.calibration.core.rotations import checked_table, pose_table
-from robolink.calibration.evidence.pose_evidence import copies, with_evidence
+from robolink.calibration.evidence.pose_evidence import copies, left_out, with_evidence
 from robolink.calibration.evidence.robust_evidence import require_robust_poses, with_consensus
 from robolink.calibration.pin.planar import (
     UNKNOWNS,
     Complexes,
+    PlanarFit,
     as_rotations,
     fit_planar,
     planar_consensus,
@@ -81,12 +83,7 @@ def solve_n_angle(
     kept[list(duplicates)] = False
     distinct = len(poses) - len(duplicates)
     if distinct < 2:
-        raise CalibrationError(
-            "degenerate_angles",
-            tr("All poses are copies of one; the offset cannot be found from them."),
-            remedy=tr("Turn the tool between the poses, best over half a turn or more."),
-            others=("too_few_poses",),
-        )
+        raise _all_copies()
     doubts = (*doubts, *check_rotation(poses, _spread_deg(z), min_rotation_deg))
     few = ("few_poses",) if distinct < RECOMMENDED_POSES else ()
     spread_mm = 0.0
@@ -95,29 +92,14 @@ def solve_n_angle(
         kept, spread_mm = _agreeing(p, z, np.flatnonzero(kept), robust, sigma_mm)
         check_rotation(poses, _spread_deg(z[kept]), min_rotation_deg)
     fit = fit_planar(p, z, kept)
-    tip = fit.tip.conjugate() if down else fit.tip
-    taken = ~kept
-    taken[list(duplicates)] = False
-    result = CalibrationResult(
-        method="n-angle",
-        offset=keep_unmeasured(stored, x_mm=tip.real, y_mm=tip.imag),
-        measured=("x_mm", "y_mm"),
-        kept=_KEPT,
-        reference_point_mm=(fit.point.real, fit.point.imag),
-        sigma_gain=fit.sigma_gain,
-        warnings=(*doubts, *few),
-        inputs=tuple(poses),
-        residuals_mm=tuple(
-            zip(fit.residuals.real.tolist(), fit.residuals.imag.tolist(), strict=True)
-        ),
-        rejected=tuple(np.flatnonzero(taken).tolist()),
-        condition_number=fit.condition_number,
-        rank=UNKNOWNS,
-        unobservable=_KEPT,
-    )
     residuals = fit.residuals[kept].view(float).reshape(-1, 2)
     result = judged(
-        result,
+        replace(
+            _result(fit, stored, down=down),
+            warnings=(*doubts, *few),
+            inputs=tuple(poses),
+            rejected=left_out(kept, duplicates),
+        ),
         residuals,
         np.eye(2) * fit.sigma_gain**2,
         unknowns=UNKNOWNS,
@@ -134,6 +116,36 @@ def solve_n_angle(
         unknowns=UNKNOWNS,
     )
     return with_consensus(result, kept, spread_mm) if robust else result
+
+
+def _result(fit: PlanarFit, stored: ToolOffset | None, *, down: bool) -> CalibrationResult:
+    """Return the offset of a fit; ``down`` where the flange's Z points down."""
+    tip = fit.tip.conjugate() if down else fit.tip
+    return CalibrationResult(
+        method="n-angle",
+        offset=keep_unmeasured(stored, x_mm=tip.real, y_mm=tip.imag),
+        measured=("x_mm", "y_mm"),
+        kept=_KEPT,
+        reference_point_mm=(fit.point.real, fit.point.imag),
+        sigma_gain=fit.sigma_gain,
+        warnings=(),
+        inputs=(),
+        residuals_mm=tuple(
+            zip(fit.residuals.real.tolist(), fit.residuals.imag.tolist(), strict=True)
+        ),
+        condition_number=fit.condition_number,
+        rank=UNKNOWNS,
+        unobservable=_KEPT,
+    )
+
+
+def _all_copies() -> CalibrationError:
+    return CalibrationError(
+        "degenerate_angles",
+        tr("All poses are copies of one; the offset cannot be found from them."),
+        remedy=tr("Turn the tool between the poses, best over half a turn or more."),
+        others=("too_few_poses",),
+    )
 
 
 def planar_arrays(poses: Sequence[Pose]) -> tuple[Complexes, Complexes]:

@@ -6,6 +6,7 @@ Tilt shows Z, turning about the tool shows X and Y; a plan needs both
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,12 +15,13 @@ from robolink.calibration.core.pose_checks import keep_unmeasured
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.core.robust import Floats, Indices, Mask, Robust
 from robolink.calibration.core.rotations import checked_table, rotations
-from robolink.calibration.evidence.pose_evidence import copies, with_evidence
+from robolink.calibration.evidence.pose_evidence import copies, left_out, with_evidence
 from robolink.calibration.evidence.robust_evidence import require_robust_poses, with_consensus
 from robolink.calibration.pin.pivot_fit import (
     MINIMAL,
     UNKNOWNS,
     PivotDesign,
+    PivotFit,
     fit_pivot,
     pivot_consensus,
     pivot_design,
@@ -89,13 +91,13 @@ def solve_pivot(
     kept: Mask = np.ones(len(poses), dtype=bool)
     kept[list(duplicates)] = False
     design = pivot_design(turned if not duplicates else turned[kept])
-    _require_observable(poses, design, max_condition)
+    _require_observable(poses, distinct, design, max_condition)
     spread_mm = 0.0
     if robust is not None:
         require_robust_poses(distinct, ROBUST_POSES)
         kept, spread_mm = _agreeing(positions, turned, np.flatnonzero(kept), robust, sigma_mm)
         design = pivot_design(turned[kept])
-        _require_observable(poses, design, max_condition)
+        _require_observable(poses, int(kept.sum()), design, max_condition)
     all_kept = bool(kept.all())
     fit = fit_pivot(
         positions,
@@ -103,26 +105,14 @@ def solve_pivot(
         condition_number=design.condition_number,
         kept=None if all_kept else kept,
     )
-    taken = ~kept
-    taken[list(duplicates)] = False
-    result = CalibrationResult(
-        method="pivot",
-        offset=keep_unmeasured(stored, **dict(zip(_MEASURED, fit.tip.tolist(), strict=True))),
-        measured=_MEASURED,
-        kept=_KEPT,
-        reference_point_mm=tuple(fit.point.tolist()),
-        sigma_gain=math.sqrt(float(design.unit_covariance.diagonal().max())),
-        warnings=(*warnings, *_doubts(design, distinct)),
-        inputs=tuple(poses),
-        residuals_mm=tuple(zip(*fit.residuals.T.tolist(), strict=True)),
-        rejected=tuple(np.flatnonzero(taken).tolist()),
-        condition_number=design.condition_number,
-        rank=design.rank,
-        unobservable=_KEPT,
-    )
     residuals = fit.residuals if all_kept else fit.residuals[kept]
     result = judged(
-        result,
+        replace(
+            _result(fit, design, stored),
+            warnings=(*warnings, *_doubts(design, distinct)),
+            inputs=tuple(poses),
+            rejected=left_out(kept, duplicates),
+        ),
         residuals,
         design.unit_covariance,
         unknowns=UNKNOWNS,
@@ -139,6 +129,23 @@ def solve_pivot(
         unknowns=UNKNOWNS,
     )
     return with_consensus(result, kept, spread_mm) if robust else result
+
+
+def _result(fit: PivotFit, design: PivotDesign, stored: ToolOffset | None) -> CalibrationResult:
+    return CalibrationResult(
+        method="pivot",
+        offset=keep_unmeasured(stored, **dict(zip(_MEASURED, fit.tip.tolist(), strict=True))),
+        measured=_MEASURED,
+        kept=_KEPT,
+        reference_point_mm=tuple(fit.point.tolist()),
+        sigma_gain=math.sqrt(float(design.unit_covariance.diagonal().max())),
+        warnings=(),
+        inputs=(),
+        residuals_mm=tuple(zip(*fit.residuals.T.tolist(), strict=True)),
+        condition_number=design.condition_number,
+        rank=design.rank,
+        unobservable=_KEPT,
+    )
 
 
 def _agreeing(
@@ -165,8 +172,10 @@ def _doubts(design: PivotDesign, count: int) -> tuple[str, ...]:
     return (*weak, "few_poses") if count < RECOMMENDED_POSES else weak
 
 
-def _require_observable(poses: Sequence[Pose], design: PivotDesign, max_condition: float) -> None:
-    least = LEAST_SINGULAR_VALUE * math.sqrt(len(poses) / 30) * MAX_CONDITION / max_condition
+def _require_observable(
+    poses: Sequence[Pose], count: int, design: PivotDesign, max_condition: float
+) -> None:
+    least = LEAST_SINGULAR_VALUE * math.sqrt(count / 30) * MAX_CONDITION / max_condition
     weak = design.condition_number > max_condition or design.smallest_singular_value < least
     if weak:
         angles = zip(*(pose.coordinates()[3:] for pose in poses), strict=True)

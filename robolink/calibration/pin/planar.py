@@ -116,4 +116,7 @@ def planar_consensus(
 
 def as_rotations(z: Complexes) -> Floats:
     """Return exp(iU) as N x 2 x 2 rotations."""
-    return np.array([[z.real, -z.imag], [z.imag, z.real]]).transpose(2, 0, 1)
+    turned = np.empty((z.size, 2, 2))
+    turned[:, 0, 0] = turned[:, 1, 1] = z.real
+    turned[:, 1, 0], turned[:, 0, 1] = z.imag, -z.imag
+    return turned

@@ -167,7 +167,7 @@ def solve_tool_axis(first: Pose, second: Pose, *, sigma_mm: float | None = None)
 
     Raises:
         CalibrationError: ``short_axis``, ``turned_on_the_way``, and those of
-            :func:`check_poses`.
+            ``pose_checks.check_poses``.
         ConfigError: ``sigma_mm`` is not positive.
     """
     check_poses((first, second), allow_mixed_hand=False)

@@ -95,6 +95,10 @@ _SENTENCES: Final[Mapping[str, Callable[[], str]]] = {
     "resolution_floor": lambda: tr(
         "The poses agree better than their resolution; the interval follows the resolution."
     ),
+    "height_not_assessed": lambda: tr(
+        "The flange leans, so an error of the tool's Z is in X and Y; nobody said how sure Z is, "
+        "and the interval leaves it out."
+    ),
     "order_not_testable": lambda: tr(
         "Too few touches to see whether something moved meanwhile; from six on that shows."
     ),

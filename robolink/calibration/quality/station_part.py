@@ -14,9 +14,7 @@ their correlation is u_s^2 / (u_s^2 + s^2), and their difference has 2 s^2 only
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TypeVar
-
-import numpy as np
+from typing import TYPE_CHECKING, TypeVar
 
 from robolink.calibration.core.budget import (
     BudgetRow,
@@ -26,7 +24,6 @@ from robolink.calibration.core.budget import (
 )
 from robolink.calibration.core.dispersion import require_positive
 from robolink.calibration.core.result import CalibrationResult
-from robolink.calibration.core.robust import Floats
 from robolink.calibration.core.statistics import (
     NORMAL_95,
     chi_square_quantile,
@@ -34,6 +31,9 @@ from robolink.calibration.core.statistics import (
     student_t95,
 )
 from robolink.messages import tr
+
+if TYPE_CHECKING:
+    from robolink.calibration.core.robust import Floats
 
 ResultT = TypeVar("ResultT", bound=CalibrationResult)
 
@@ -64,6 +64,8 @@ def with_station(result: ResultT, *parts: StationPart) -> ResultT:
         result: The result of the touches alone; lengths are its first components.
         parts: What its stations add; one that adds nothing leaves no trace.
     """
+    import numpy as np  # which the help of a command does without
+
     added = [part for part in parts if np.any(np.asarray(part.covariance))]
     if not result.half_width95 or not added:
         return result
@@ -103,11 +105,13 @@ def _by_normal(result: CalibrationResult) -> bool:
     )
 
 
-def _touches(result: CalibrationResult) -> Floats:
+def _touches(result: CalibrationResult) -> "Floats":
     """Return the covariance behind the interval of the touches.
 
     The interval may rest on more than the scatter: on a stated sigma, or on the grid of the jogs.
     """
+    import numpy as np
+
     factor = NORMAL_95 if _by_normal(result) else student_t95(result.dof or 1)
     covariance = np.array(result.covariance)
     scale = [
@@ -118,11 +122,13 @@ def _touches(result: CalibrationResult) -> Floats:
     return scaled
 
 
-def _root(covariance: Floats, index: int) -> float:
+def _root(covariance: "Floats", index: int) -> float:
     return math.sqrt(max(float(covariance[index, index]), 0.0))
 
 
-def _region(covariance: Floats, dof: float) -> float:
+def _region(covariance: "Floats", dof: float) -> float:
+    import numpy as np
+
     count = len(covariance)
     whole = dof if math.isinf(dof) else max(math.floor(dof), 1)
     if math.isinf(whole):
@@ -132,7 +138,7 @@ def _region(covariance: Floats, dof: float) -> float:
     return math.sqrt(square * float(np.linalg.eigvalsh(covariance)[-1]))
 
 
-def _budget_of(touches: Floats, index: int, dof: float) -> UncertaintyBudget:
+def _budget_of(touches: "Floats", index: int, dof: float) -> UncertaintyBudget:
     row = BudgetRow(
         tr("scatter of the touches"), _root(touches, index), dof, origin=tr("stated"), kind="B"
     )

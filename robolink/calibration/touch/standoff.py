@@ -14,16 +14,8 @@ import numpy as np
 
 from robolink.calibration.core.robust import Floats
 from robolink.calibration.core.rotations import pose_arrays
+from robolink.calibration.touch.touch_limits import FARTHEST_MM, LEVELS_MM, NEAREST_MM
 from robolink.model import Pose
-
-NEAREST_MM: Final = 0.8
-FARTHEST_MM: Final = 1.2
-"""How far beside the pin the tip stops: well above what a person misses it by."""
-
-LEVELS_MM: Final = (0.0, 0.6, 1.2, 1.8)
-"""How much above the clearance it stops: one and the same way down would not end at one height."""
-
-HIGHEST_MM: Final = max(LEVELS_MM)
 
 LEAST_UNEXPLAINED_MM2: Final = 0.28
 """For each touch beyond the second: the part of the squared standoffs that no pin and no needle

@@ -18,23 +18,17 @@ from robolink.calibration.touch.standoff import (
     pin_columns,
     standoff_columns,
 )
+from robolink.calibration.touch.touch_limits import (
+    LEAST_HEIGHT_LIMIT_MM,
+    LEAST_JOG_MM,
+    MOST_LEFT,
+    MOST_RESIDUAL_MM,
+    PERSON_SIGMA_Z_MM,
+    PRINT_STEPS,
+)
 from robolink.model import Pose
+from robolink.timing import FASTEST_ANSWER_S
 
-LEAST_JOG_MM: Final = 0.02
-PRINT_STEPS: Final = 3
-"""A robot at rest prints positions that differ by as much."""
-
-LEAST_SECONDS: Final = 0.3
-"""Nobody reads a question and answers it faster."""
-
-LEAST_HEIGHT_LIMIT_MM: Final = 0.10
-PERSON_SIGMA_Z_MM: Final = 0.05
-PROBE_SIGMA_Z_MM: Final = 0.01
-
-MOST_LEFT: Final = 0.5
-"""Share of the standoffs that may be left, with the uncertainty of the share on top."""
-
-MOST_RESIDUAL_MM: Final = 0.15
 _LEAST_TOUCHES: Final = 4
 """Fewer leave nothing by which standoffs could be told from scatter."""
 
@@ -89,7 +83,7 @@ class WitnessedTouch:
     @property
     def in_time(self) -> bool:
         """Whether the answer came after somebody could have read the question."""
-        return self.seconds is None or self.seconds >= LEAST_SECONDS
+        return self.seconds is None or self.seconds >= FASTEST_ANSWER_S
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,6 +112,19 @@ class TouchEvidence:
     gamma: float | None
     gamma_upper99: float | None
     max_residual_mm: float | None
+
+    @property
+    def most_telling(self) -> str:
+        """The one ground to name; empty where there is none.
+
+        One touch that fits badly makes the share of the standoffs uncertain too; it is then that
+        touch that is to be named.
+        """
+        uncertain = self.gamma is not None and self.gamma <= MOST_LEFT
+        codes = self.codes
+        if uncertain and codes[:1] == ("touch_not_proven",) and "large_residual" in codes:
+            return "large_residual"
+        return codes[0] if codes else ""
 
 
 def judge_touches(

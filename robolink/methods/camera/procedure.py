@@ -1,9 +1,12 @@
 """A tip seen by an up-looking camera at several angles of U."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import TypeVar
 
 from robolink.calibration import (
+    CalibrationResult,
     CameraRound,
+    Sighting,
     height_of,
     solvable_planes,
     solve_camera_round,
@@ -13,6 +16,8 @@ from robolink.model import Pose, ToolOffset
 from robolink.procedures import NO_OFFSET, CameraDrive, CameraSamples, LookPlan, Place
 from robolink.runner import Procedure, SeenAt
 from robolink.stations import CameraStation
+
+ResultT = TypeVar("ResultT", bound=CalibrationResult)
 
 
 def measure_camera(
@@ -39,6 +44,36 @@ def measure_camera(
             ``several_tips_seen``, ``camera_not_calibrated``, and those of
             :func:`solve_camera_round`.
     """
+
+    def solve(sightings: Sequence[Sighting]) -> CameraRound:
+        return solve_camera_round(sightings, stored=stored, sigma_mm=sigma_mm, camera=station.model)
+
+    return (yield from look_round(station, plan, solve, here=here, stored=stored, retake=retake))
+
+
+def look_round(
+    station: CameraStation,
+    plan: LookPlan,
+    solver: Callable[[Sequence[Sighting]], ResultT],
+    *,
+    here: Pose,
+    stored: ToolOffset | None,
+    retake: bool,
+) -> Procedure[ResultT]:
+    """Bring a tip before a calibrated camera at every angle of a plan, and solve what is seen.
+
+    Args:
+        station: Where the camera is, and what its pixels mean.
+        plan: At which angles it is looked at.
+        solver: Makes the result of what was seen.
+        here: Where the flange is; its U is where the angles count from.
+        stored: The offset stored now; the tip is expected there.
+        retake: Offer to take the look again that fits worst.
+
+    Raises:
+        CalibrationError: ``tilted_pose`` before anything moves; ``tip_not_seen``,
+            ``several_tips_seen``, ``camera_not_calibrated``, and those of the solver.
+    """
     solvable_planes([here], height_of(stored))
     tip, centred = stored or NO_OFFSET, False
     drive, angles_deg = CameraDrive(station, plan, here), plan.angles_deg(here.u_deg)
@@ -52,9 +87,8 @@ def measure_camera(
         here, centred = drive.pose(found), True
     places = [Place(u_deg, tip) for u_deg in angles_deg]
 
-    def solve(looks: Sequence[SeenAt]) -> CameraRound:
-        sightings = [station.sighting(look) for look in looks]
-        return solve_camera_round(sightings, stored=stored, sigma_mm=sigma_mm, camera=station.model)
+    def solve(looks: Sequence[SeenAt]) -> ResultT:
+        return solver([station.sighting(look) for look in looks])
 
     looks = CameraSamples(drive, solve, here, before_camera=centred)
     return (yield from looks.at(places, retake=retake))

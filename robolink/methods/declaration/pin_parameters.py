@@ -6,16 +6,19 @@ from typing import Annotated
 
 from annotated_types import Ge, Le
 
+from robolink.calibration import HIGHEST_MM
 from robolink.files.toml import Problem
 from robolink.messages import tr
 from robolink.methods.declaration.method import (
     MM,
     Check,
     Help,
+    InputNumber,
     LengthRule,
     MethodParameters,
     Option,
 )
+from robolink.model import InputEdge
 from robolink.procedures import TouchPlan
 
 
@@ -31,17 +34,33 @@ class PinParameters(MethodParameters):
         Ge(0.5),
         Le(50),
         MM,
-        Help(tr("How far above the pin the tip stops; the rest is the person's.")),
+        Help(tr("How far above the pin the tip stops at least; the rest is the person's.")),
     ] = 2.0
+    contact_input: Annotated[
+        InputNumber | None,
+        Option(metavar="N"),
+        Help(tr("Number of the input that shows contact of tip and pin, where there is one.")),
+    ] = None
+    off_in_contact: Annotated[
+        bool,
+        Help(tr("Whether that input goes off, not on, in contact.")),
+    ] = False
 
     @property
     def touch(self) -> TouchPlan:
         """The same for a procedure."""
-        return TouchPlan(lift_mm=self.lift_mm, clearance_mm=self.clearance_mm)
+        contact = None
+        if self.contact_input is not None:
+            contact = InputEdge(self.contact_input, falling=self.off_in_contact)
+        return TouchPlan(lift_mm=self.lift_mm, clearance_mm=self.clearance_mm, contact=contact)
 
     def problems(self, check: Check) -> Iterator[Problem]:
         """Check that the tip stops on its way down to the pin."""
-        yield from clearance_below_lift(self.clearance_mm, self.lift_mm, check)
+        yield from standoff_below_lift(self.clearance_mm, self.lift_mm, check)
+        if self.off_in_contact and self.contact_input is None:
+            yield Problem(
+                "off_in_contact", tr("goes with {other}", other=check.spell("contact_input"))
+            )
 
     def room_mm(self) -> float:
         """Return how high the box has to be."""
@@ -76,6 +95,21 @@ def clearance_below_lift(clearance_mm: float, lift_mm: float, check: Check) -> I
             "clearance_mm",
             tr(
                 "must be smaller than {other}, which is {lift:g}",
+                other=check.spell("lift_mm"),
+                lift=lift_mm,
+            ),
+        )
+
+
+def standoff_below_lift(clearance_mm: float, lift_mm: float, check: Check) -> Iterator[Problem]:
+    """Check that something is left to come down from the lift to the highest standoff."""
+    if clearance_mm + HIGHEST_MM >= lift_mm:
+        yield Problem(
+            "clearance_mm",
+            tr(
+                "must be more than {highest:g} below {other}, which is {lift:g}: the robot stops "
+                "up to {highest:g} mm above the clearance",
+                highest=HIGHEST_MM,
                 other=check.spell("lift_mm"),
                 lift=lift_mm,
             ),

@@ -58,12 +58,12 @@ class NAngleParameters(UprightPinParameters):
     def turns_deg(self) -> tuple[float, ...]:
         """U of the touches after the first, counted from it, in the order in which they are taken.
 
-        Angles that the person wrote are taken in the person's order.
+        Angles that the person wrote are taken in the person's order. Others never ascend: what
+        drifts from touch to touch would else look like a part of the tip
+        (docs/reference/evidence.md 8).
         """
         turns = self.touches_deg[1:]
-        if self.angles_deg is not None or not self.until_mm:
-            return turns
-        return most_informative_order(turns)
+        return turns if self.angles_deg is not None else most_informative_order(turns)
 
     @property
     def sampling(self) -> SamplingPolicy:

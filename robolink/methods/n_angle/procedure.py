@@ -8,13 +8,13 @@ from robolink.messages import tr
 from robolink.model import Pose, ToolOffset, angle_difference_deg
 from robolink.procedures import (
     TAKE_ALL,
+    PinTouches,
     SamplingPolicy,
     TouchPlan,
-    lift_off,
     sample_sequentially,
     touch_again,
 )
-from robolink.runner import Ask, Procedure
+from robolink.runner import Procedure
 
 
 def measure_n_angle(
@@ -35,14 +35,17 @@ def measure_n_angle(
         sampling: When it ends, and whether a pose may be taken again.
 
     Raises:
-        CalibrationError: As :func:`solve_n_angle`.
+        CalibrationError: ``not_touched``, ``typed_ahead``, ``touch_heights_differ``,
+            ``touch_not_proven``, ``large_residual``, and as :func:`solve_n_angle`.
     """
-    first: Pose = yield Ask(tr("Bring the tip onto the pin."))
-    yield lift_off(plan, first)
+    touches = PinTouches(plan, comes_down=stored is not None)
+    first = yield from touches.first()
     # Within half a turn of zero: adding up from touch to touch leaves the joint's range.
     angles = [angle_difference_deg(first.u_deg + turn_deg, 0.0) for turn_deg in turns_deg]
-    turning = _NAngleSampler(plan, stored, sigma_mm, first)
-    return (yield from sample_sequentially(turning, first, [first.u_deg, *angles], sampling))
+    turning = _NAngleSampler(touches, stored, sigma_mm, first)
+    result = yield from sample_sequentially(turning, first, [first.u_deg, *angles], sampling)
+    touches.require_made()
+    return result
 
 
 @dataclass(slots=True)
@@ -50,11 +53,12 @@ class _NAngleSampler:
     """Touches at angles of U; implements ``SequentialSampler``. Each ends lifted off the pin.
 
     Attributes:
-        plan, stored, sigma_mm: As for :func:`measure_n_angle`.
+        touches: How they are made.
+        stored, sigma_mm: As for :func:`measure_n_angle`.
         last: The touch from which the tip was lifted off.
     """
 
-    plan: TouchPlan
+    touches: PinTouches
     stored: ToolOffset | None
     sigma_mm: float | None
     last: Pose
@@ -67,7 +71,9 @@ class _NAngleSampler:
         return tr("{count} touches", count=count)
 
     def take(self, place: float) -> Procedure[Pose]:
-        self.last = yield from touch_again(self.plan, self.last, place, self.stored or ToolOffset())
+        self.last = yield from touch_again(
+            self.touches, self.last, place, self.stored or ToolOffset()
+        )
         return self.last
 
     def away(self) -> Procedure[None]:

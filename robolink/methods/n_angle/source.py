@@ -38,7 +38,7 @@ class NAngleSource(ManualPinSource):
 
     def _steps(self, stored: ToolOffset | None, *, live: bool) -> Procedure[CalibrationResult]:
         return measure_n_angle(
-            self.touch,
+            self._touching(live=live),
             turns_deg=self.turns_deg,
             stored=stored,
             sigma_mm=self.sigma_mm,

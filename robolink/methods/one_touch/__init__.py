@@ -46,7 +46,11 @@ def _source(parameters: OneTouchParameters, site: Site) -> "TipSource":
 
         return OneTouchSource(_solver(parameters, site), parameters.touch)
 
-    return LazySource(make, sentence=tr("measured on the robot: one pin touched once"))
+    return LazySource(
+        make,
+        sentence=tr("measured on the robot: one pin touched once"),
+        clearance_mm=parameters.clearance_mm,
+    )
 
 
 def _from_poses(parameters: OneTouchParameters, site: Site) -> "PoseMethod":

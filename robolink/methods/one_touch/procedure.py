@@ -4,10 +4,11 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from robolink.calibration import CalibrationResult, carrying
+from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink.model import Path, Pose, ToolOffset
-from robolink.procedures import NO_OFFSET, TouchPlan, approach_path, offset_z
-from robolink.runner import Ask, Move, Procedure
+from robolink.model import Pose, ToolOffset
+from robolink.procedures import PinTouches, TouchPlan, approach_path, offset_z
+from robolink.runner import Procedure
 
 
 def measure_one_touch(
@@ -30,16 +31,36 @@ def measure_one_touch(
         solve: Makes the result from the flange pose of the touch.
 
     Raises:
-        CalibrationError: As ``solve``.
+        CalibrationError: ``not_touched``, ``typed_ahead``, and as ``solve``.
+        ConfigError: Nobody knows how long the tool is.
     """
-    guess = stored or NO_OFFSET
+    guess = require_known_length(stored)
     contact = carrying(replace(here, u_deg=u_deg), guess, pin_mm)
+    touches = PinTouches(plan)
     yield from approach_path(
         offset_z(contact, plan.lift_mm), here=here, purpose=tr("go above the pin")
     )
-    yield Move(
-        offset_z(contact, plan.clearance_mm), Path.STRAIGHT, tr("come down to the clearance")
+    touch = yield from touches.again(
+        contact,
+        key=0,
+        turning=tr("go beside the pin"),
+        instruction=tr("Bring the tip onto the pin."),
     )
-    touch: Pose = yield Ask(tr("Bring the tip onto the pin."))
-    yield Move(offset_z(touch, plan.lift_mm), Path.STRAIGHT, tr("lift off the pin"))
     return solve(touch)
+
+
+def require_known_length(stored: ToolOffset | None) -> ToolOffset:
+    """Return the offset by which a tip stops above the pin.
+
+    Raises:
+        ConfigError: There is none.
+    """
+    if stored is None:
+        raise ConfigError(
+            tr("The tool is not defined, so nobody knows how far above the pin it has to stop."),
+            remedy=tr(
+                "Write about where the tip is with 'tool set', to a millimetre or two, and "
+                "measure then."
+            ),
+        )
+    return stored

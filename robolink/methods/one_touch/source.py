@@ -1,13 +1,19 @@
 """A pin whose place is known, touched once by a person: X, Y and Z of the new tip."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from robolink.calibration import CalibrationResult, VerifyResult, tip_pose
 from robolink.messages import tr
 from robolink.methods.one_touch.procedure import measure_one_touch
 from robolink.methods.one_touch.solvers import Absolute, Difference
 from robolink.model import Pose, ToolOffset
-from robolink.procedures import MeasurementContext, TouchPlan, contact_pose, verify_by_turning
+from robolink.procedures import (
+    MeasurementContext,
+    TouchPlan,
+    contact_pose,
+    drift_uncertainty_mm,
+    verify_by_turning,
+)
 from robolink.runner import Procedure
 
 HALF_A_TURN_DEG = 180.0
@@ -48,13 +54,24 @@ class OneTouchSource:
     ) -> CalibrationResult:
         """Touch and solve; see :class:`~robolink.procedures.MovingSource`."""
         context.controller.tools.select(0)
-        return context.run(self.procedure(stored, context.controller.groups[0].pose()))
+        here = context.controller.groups[0].pose()
+        return context.run(self._steps(stored, here, self.touch))
 
     def procedure(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:
         """Return the steps of a measurement; see :class:`~robolink.procedures.MovingSource`."""
+        return self._steps(stored, here, replace(self.touch, nominal=True))
+
+    @property
+    def clearance_mm(self) -> float:
+        """Least height above the pin at which the robot stops."""
+        return self.touch.clearance_mm
+
+    def _steps(
+        self, stored: ToolOffset | None, here: Pose, plan: TouchPlan
+    ) -> Procedure[CalibrationResult]:
         u_deg = self.solver.u_deg
         return measure_one_touch(
-            self.touch,
+            plan,
             here=here,
             pin_mm=self.solver.place_mm,
             u_deg=here.u_deg if u_deg is None else u_deg,
@@ -81,6 +98,7 @@ class OneTouchSource:
             contact=contact_pose(result, tool=tool),
             angles_deg=(toward_zero(measured_deg, HALF_A_TURN_DEG),),
             tolerance_mm=tolerance_mm,
+            u_mm=drift_uncertainty_mm(self.touch, result),
             written=result.offset,
             tip=tip,
         )

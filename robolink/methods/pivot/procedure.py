@@ -4,13 +4,12 @@ Nothing ever tilts in contact: the tip is lifted, tilted in the air in small ste
 above the pin, and comes down to a clearance; the last bit is done by the person.
 """
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
 from robolink.calibration import (
     CalibrationResult,
-    Drift,
     VerifyResult,
     pose_arrays,
     sigma_gain,
@@ -20,8 +19,16 @@ from robolink.errors import CalibrationError
 from robolink.messages import tr
 from robolink.methods.pivot.tilts import UPRIGHT, OverPin, Tilt, apart_deg, tilt_path
 from robolink.model import Path, Pose, ToolOffset
-from robolink.procedures import TAKE_ALL, SamplingPolicy, TouchPlan, lift_off, sample_sequentially
-from robolink.runner import Ask, Move, Procedure
+from robolink.procedures import (
+    MOST_MORE,
+    TAKE_ALL,
+    DriftProof,
+    PinTouches,
+    SamplingPolicy,
+    TouchPlan,
+    sample_sequentially,
+)
+from robolink.runner import Move, Notify, Procedure, TouchedAt
 from robolink.ways import Way, way
 
 MOST_DEVIATION_DEG: Final = 1.0
@@ -49,7 +56,8 @@ def measure_pivot(
         sampling: When it ends, and whether a pose may be taken again.
 
     Raises:
-        CalibrationError: ``not_tilted``, and as :func:`solve_pivot`.
+        CalibrationError: ``not_tilted``; ``not_touched``, ``typed_ahead``, ``touch_not_proven``,
+            ``large_residual``; and as :func:`solve_pivot`.
     """
     result, _ = yield from pivot_then_lift(
         plan, tilts=tilts, stored=stored, sigma_mm=sigma_mm, sampling=sampling
@@ -66,43 +74,65 @@ def pivot_then_lift(
     sampling: SamplingPolicy,
 ) -> Procedure[tuple[CalibrationResult, Pose]]:
     """Do what :func:`measure_pivot` does; return the pose of the lifted flange as well."""
-    first: Pose = yield Ask(tr("Bring the tip onto the pin."))
-    yield lift_off(plan, first)
-    swing = _Swing(plan, OverPin.touched(first, stored))
+    touches = PinTouches(plan, planar=False)
+    first = yield from touches.first(UPRIGHT)
+    swing = _Swing(plan, OverPin.touched(first, stored), touches)
     tilting = _PivotSampler(swing, stored, sigma_mm)
     result = yield from sample_sequentially(tilting, first, [UPRIGHT, *tilts], sampling)
     yield from swing.to(UPRIGHT)
+    touches.require_made()
     return result, swing.over.pose(UPRIGHT, plan.lift_mm)
 
 
 def verify_by_tilting(
-    plan: TouchPlan, *, over: OverPin, tilts: Sequence[Tilt], tolerance_mm: float
+    plan: TouchPlan,
+    *,
+    over: OverPin,
+    tilts: Sequence[Tilt],
+    tolerance_mm: float,
+    u_mm: float | None = None,
 ) -> Procedure[VerifyResult]:
     """Tilt about the new tip and let a person show where it went. Runs in the new tool.
 
     Args:
-        plan: Lift and clearance.
+        plan: Lift, clearance, contact input.
         over: The pin, and where the tip is in the frame in force.
         tilts: Orientations in which the tip is brought back onto the pin.
-        tolerance_mm: Largest drift that passes, in all three directions together.
+        tolerance_mm: Largest drift that passes with its guard band, in all three directions
+            together.
+        u_mm: Standard uncertainty of the drift that one touch shows, ``None`` for the usual one.
 
     The tip starts lifted and upright. The distance that the person jogs it, from where it should
-    have been to the pin, is the drift. It ends as it started.
+    have been to the pin, is the drift; the robot stops beside that place, so that no jog is no
+    answer. A drift too near to the tolerance is touched again, as in
+    :func:`~robolink.procedures.verify_by_turning`. It ends as it started.
 
     Raises:
-        CalibrationError: ``not_tilted``.
+        CalibrationError: ``not_tilted``, and ``not_touched`` or ``typed_ahead`` with the tip drawn
+            back.
     """
-    swing = _Swing(plan, over)
-    drifts = []
+    swing = _Swing(plan, over, PinTouches(plan, planar=False))
+    proof = DriftProof(tolerance_mm, plan.u_drift_mm if u_mm is None else u_mm)
+    by_place = {over.pose(tilt, 0.0).u_deg: tilt for tilt in tilts}
     for tilt in tilts:
-        found = yield from swing.touch(
-            tilt, tr("Bring the tip back onto the pin; what you jog is the drift.")
-        )
-        place = over.pose(tilt, 0.0)
-        moved = (found.x_mm - place.x_mm, found.y_mm - place.y_mm, found.z_mm - place.z_mm)
-        drifts.append(Drift(place.u_deg, *moved))
+        yield from _shown(swing, proof, tilt)
+    for _ in range(MOST_MORE):
+        doubted = proof.undecided()
+        if doubted is None:
+            break
+        yield Notify(proof.told(doubted))
+        yield from _shown(swing, proof, by_place[doubted.u_deg])
     yield from swing.to(UPRIGHT)
-    return VerifyResult(tuple(drifts), tolerance_mm)
+    return proof.result()
+
+
+def _shown(swing: "_Swing", proof: DriftProof, tilt: Tilt) -> Procedure[None]:
+    found = yield from swing.touch(
+        tilt,
+        tr("Bring the tip back onto the pin; what you jog shows the drift."),
+        key=len(proof.touches),
+    )
+    proof.add(swing.over.pose(tilt, 0.0), found, in_space=True)
 
 
 class _Swing:
@@ -111,11 +141,13 @@ class _Swing:
     Args:
         plan: Lift and clearance.
         over: The pin.
+        touches: How it is touched.
     """
 
-    def __init__(self, plan: TouchPlan, over: OverPin) -> None:
+    def __init__(self, plan: TouchPlan, over: OverPin, touches: PinTouches) -> None:
         self.over = over
         self._plan = plan
+        self._touches = touches
         self._stands = UPRIGHT
 
     def to(self, goal: Tilt) -> Procedure[None]:
@@ -144,14 +176,17 @@ class _Swing:
                 )
         self._stands = goal
 
-    def touch(self, tilt: Tilt, instruction: str) -> Procedure[Pose]:
-        """Tilt in the air, come down, let the person touch the pin, and lift off."""
+    def touch(self, tilt: Tilt, instruction: str, *, key: Hashable) -> Procedure[TouchedAt]:
+        """Tilt in the air, come down beside the pin, let the person touch it, and lift off."""
         yield from self.to(tilt)
-        down = self.over.pose(tilt, self._plan.clearance_mm)
-        yield Move(down, Path.STRAIGHT, tr("come down to the clearance"))
-        touch: Pose = yield Ask(instruction)
-        yield lift_off(self._plan, touch)
-        return touch
+        return (
+            yield from self._touches.again(
+                self.over.pose(tilt, 0.0),
+                key=key,
+                turning=tr("go beside the pin"),
+                instruction=instruction,
+            )
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,7 +206,7 @@ class _PivotSampler:
 
     def take(self, place: Tilt) -> Procedure[Pose]:
         return self.swing.touch(
-            place, tr("Bring the tip onto the pin again, with the tool tilted.")
+            place, tr("Bring the tip onto the pin again, with the tool tilted."), key=place
         )
 
     def away(self) -> Procedure[None]:

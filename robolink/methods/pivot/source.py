@@ -8,7 +8,14 @@ from robolink.calibration import CalibrationResult, VerifyResult, tilted_from
 from robolink.errors import CalibrationError, ConfigError
 from robolink.messages import tr
 from robolink.model import Controller, Pose, ToolOffset
-from robolink.procedures import TAKE_ALL, MeasurementContext, PinSource, SamplingPolicy, TouchPlan
+from robolink.procedures import (
+    TAKE_ALL,
+    MeasurementContext,
+    PinSource,
+    SamplingPolicy,
+    TouchPlan,
+    drift_uncertainty_mm,
+)
 from robolink.runner import Procedure
 
 if TYPE_CHECKING:
@@ -71,7 +78,11 @@ class PivotSource(PinSource):
             frame=result.offset,
         )
         procedure = verify_by_tilting(
-            self.touch, over=over, tilts=proving_tilts(self._tilt_deg), tolerance_mm=tolerance_mm
+            self.touch,
+            over=over,
+            tilts=proving_tilts(self._tilt_deg),
+            tolerance_mm=tolerance_mm,
+            u_mm=drift_uncertainty_mm(self.touch, result),
         )
         return context.run(procedure, tip=result.offset)
 
@@ -90,7 +101,7 @@ class PivotSource(PinSource):
         )
 
         return measure_pivot(
-            self.touch,
+            self._touching(live=live),
             tilts=self.tilts,
             stored=require_known_tip(stored),
             sigma_mm=self.sigma_mm,

@@ -41,7 +41,7 @@ class SixPointSource(PivotSource):
         from robolink.methods.six_point.procedure import measure_six_point  # numpy, as in the pivot
 
         return measure_six_point(
-            self.touch,
+            self._touching(live=live),
             self.ways,
             tilts=self.tilts,
             stored=require_known_tip(stored),

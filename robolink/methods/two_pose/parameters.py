@@ -29,9 +29,7 @@ class TwoPoseParameters(UprightPinParameters):
     @property
     def touch(self) -> TouchPlan:
         """The same for a procedure."""
-        return replace(
-            TouchPlan(lift_mm=self.lift_mm, clearance_mm=self.clearance_mm), turn_deg=self.turn_deg
-        )
+        return replace(super().touch, turn_deg=self.turn_deg)
 
     def no_residual(self) -> str:
         """Return why residuals cannot be judged."""

@@ -29,8 +29,8 @@ class TwoPoseSource(ManualPinSource):
         """What it does, for a report."""
         return tr("measured on the robot: one pin touched at two angles of U")
 
-    def _steps(self, stored: ToolOffset | None, *, live: bool) -> Procedure[CalibrationResult]:  # noqa: ARG002 - two are always taken
-        return measure_two_pose(self.touch, stored=stored, sigma_mm=self.sigma_mm)
+    def _steps(self, stored: ToolOffset | None, *, live: bool) -> Procedure[CalibrationResult]:
+        return measure_two_pose(self._touching(live=live), stored=stored, sigma_mm=self.sigma_mm)
 
 
 @dataclass(frozen=True, slots=True)

@@ -90,9 +90,9 @@ class Workplace(ABC):
         self._seed = seed
         self._random = random.Random(f"nozzles {seed}")
         self._replaced = replaced
+        self.parameters = WorldParameters()
         rng = random.Random(f"camera {seed}")
         self.camera = CameraTruth(camera_beside(self.tip_mm(), rng), parameters.optics, rng)
-        self.parameters = WorldParameters()
         self.set_up(parameters)
 
     def set_up(self, parameters: WorldParameters) -> None:
@@ -177,14 +177,19 @@ class Workplace(ABC):
         nozzle, board = self.tips.get(MOUNTED_TOOL, ToolOffset()), self.board
         if mark == TIP:
             # A held board hides the tip of its nozzle.
-            seen = [tip for tool, tip in self.tips.items() if not (board and tool == MOUNTED_TOOL)]
-        else:
-            seen = list(board.fiducials(nozzle)) if board else []
+            shown = [tool for tool in self.tips if not (board and tool == MOUNTED_TOOL)]
+            return self.camera.picture(self.tip_mm(tool) for tool in shown)
+        seen = board.fiducials(nozzle) if board else ()
         return self.camera.picture(self.robot.tip_mm(place) for place in seen)
 
     def tip_mm(self, tool: int = MOUNTED_TOOL) -> XyzMm:
-        """Return where a physical tip is now."""
-        return self.robot.tip_mm(self.tips.get(tool))
+        """Return where a physical tip is now; the mounted one as its spindle wobbles."""
+        x_mm, y_mm, z_mm = self.robot.tip_mm(self.tips.get(tool))
+        if tool != MOUNTED_TOOL or not self.parameters.wobble_mm:
+            return x_mm, y_mm, z_mm
+        toward = math.radians(2 * self.robot.flange().u_deg + self.parameters.wobble_toward_deg)
+        wobble_mm = self.parameters.wobble_mm
+        return x_mm + wobble_mm * math.cos(toward), y_mm + wobble_mm * math.sin(toward), z_mm
 
     def axis(self, axis: Axis, tool: int = MOUNTED_TOOL) -> Direction:
         """Return how an axis of a physical tool lies in the base now."""

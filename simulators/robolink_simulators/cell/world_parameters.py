@@ -32,6 +32,9 @@ class WorldParameters:
         backlash_mm: Play of the linear axes.
         lean_deg: By how much the mounted nozzle's shaft is bent.
         lean_toward_deg: Toward which direction, counted from the flange's X.
+        wobble_mm: How far the mounted nozzle's tip circles twice a turn (a second harmonic), as
+            on a spindle with a bad bearing. What it meets, a pin or a beam, does not feel it.
+        wobble_toward_deg: In which direction of the base it is off with U at 0.
         tool_u_deg, tool_v_deg, tool_w_deg: How the mounted tool is turned on the flange.
         camera_um_per_px_x, camera_um_per_px_y: Length of a pixel at focus.
         camera_turn_deg, camera_shear_deg, camera_mirrored: How the image lies in the base.
@@ -63,6 +66,8 @@ class WorldParameters:
     backlash_mm: float = 0.0
     lean_deg: float = 0.0
     lean_toward_deg: float = 0.0
+    wobble_mm: float = 0.0
+    wobble_toward_deg: float = 0.0
     tool_u_deg: float = 0.0
     tool_v_deg: float = 0.0
     tool_w_deg: float = 0.0

@@ -65,6 +65,17 @@ def show(context: CliContext, name: str) -> None:
     metavar="URL",
     help=tr("A simulator's assist or sim URL: its operator brings the tip onto the pin."),
 )
+@click.option(
+    "--contact-input",
+    type=click.IntRange(0, 0xFFFF),
+    metavar="N",
+    help=tr("A pin: number of the input that shows contact of tip and pin, where there is one."),
+)
+@click.option(
+    "--off-in-contact",
+    is_flag=True,
+    help=tr("Whether that input goes off, not on, in contact."),
+)
 @controller_options
 @dry_run_option
 @yes_option
@@ -77,24 +88,34 @@ def learn(
     speed_mm_s: float,
     box_mm: float,
     assist: str | None,
+    contact_input: int | None,
+    off_in_contact: bool,
     dry_run: bool,
     yes: bool,
 ) -> None:
     """Find a station with a tool whose offset is known, such as a gauge pin, and keep where it is.
 
-    A pin is touched by a person; beams and surfaces are sought about where the cell file says. No
-    tool is written. What is wrong with the tool's offset shifts the station by as much.
+    A pin is touched by a person, twice; beams and surfaces are sought about where the cell file
+    says. No tool is written. What is wrong with the tool's offset shifts the station by as much.
     """
+    from robolink.model import InputEdge
     from robolink.nozzle_change import Limits, usual_box
+    from robolink.procedures import TouchPlan
     from robolink_cli.commands.measure.station_learning import learn as learn_it
 
     limits = Limits(usual_box(box_mm), speed_mm_s=speed_mm_s)
+    contact = None
+    if contact_input is not None:
+        contact = InputEdge(contact_input, falling=off_in_contact)
+    elif off_in_contact:
+        raise click.UsageError(tr("--off-in-contact goes with --contact-input."))
     learn_it(
         context,
         name,
         tool=tool,
         limits=limits,
         sigma_mm=sigma_mm,
+        touch=TouchPlan(contact=contact),
         assist=assist,
         dry_run=dry_run,
         yes=yes,

@@ -14,7 +14,7 @@ from robolink.nozzle_change import (
     require_inside,
     tip_sigma_mm,
 )
-from robolink.procedures import MeasurementContext
+from robolink.procedures import MeasurementContext, TouchPlan
 from robolink.stations import Found, Station, StationKind, find_stations, station_entry
 from robolink_cli.console.render import note, table
 from robolink_cli.prompts.operator import operator_at
@@ -34,6 +34,7 @@ def learn(
     tool: int,
     limits: Limits,
     sigma_mm: float | None,
+    touch: TouchPlan,
     assist: str | None,
     dry_run: bool,
     yes: bool,
@@ -50,7 +51,9 @@ def learn(
         known = _known(context, controller, name)
         tip = _tip(controller, tool)
         here = flange_now(controller)
-        course = learn_station(known, here=here, tool=tool, tip=tip)
+        course = learn_station(
+            known, here=here, tool=tool, tip=tip, plan=replace(touch, nominal=True)
+        )
         steps = foresee(course, here=here, settings=limits.settings(here, None))
         if dry_run:
             payload = {"dry_run": True, "tool": tool, "steps": steps_payload(controller, steps)}
@@ -78,6 +81,7 @@ def learn(
                     tip=tip,
                     sigma_mm=sigma_mm,
                     tip_sigma_mm=tip_sigma_mm(controller, tool),
+                    plan=touch,
                 )
             )
             found = _height_of_pin(controller, known, found, tool)

@@ -114,7 +114,9 @@ def _robust(node: Node, solver: Callable[..., CalibrationResult], *, turning: bo
     one = node.optional("seed", node.whole)
     chosen = seeds or (usual.seeds if one is None else (abs(one),))
     given = _given(node, turning=turning)
-    robust = cal.Robust(threshold, seeds=chosen)
+    grid = given.options["grid_mm"]
+    floor_mm = grid / math.sqrt(12) if isinstance(grid, float) else 0.0
+    robust = cal.Robust(threshold, max(usual.resolution_mm, floor_mm), seeds=chosen)
     payload = result_payload(given.solved(solver, robust=robust))
     plain = solver(given.poses, allow_mixed_hand=True, **given.options)
     lengths = [getattr(plain.offset, name) for name in plain.measured]

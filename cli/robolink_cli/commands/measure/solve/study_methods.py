@@ -1,4 +1,4 @@
-"""The methods of ``solve`` that judge the measuring itself: gauge study and control chart."""
+"""Methods of ``solve`` beside tips on points: surfaces that were touched, and two studies."""
 
 from collections.abc import Callable, Mapping
 from itertools import product
@@ -6,11 +6,35 @@ from typing import Final
 
 from robolink import calibration as cal
 from robolink.messages import tr
-from robolink_cli.commands.measure.solve.case import Node, finite, unusable
+from robolink_cli.commands.measure.solve.case import Node, finite, read_poses, unusable
+from robolink_cli.views.solve import result_payload
 
 Payload = dict[str, object]
 
 _AXES: Final = ("nozzle", "person", "repeat")
+
+
+def plane_touch(node: Node) -> Payload:
+    """A tip that touched a plane in several orientations."""
+    plane = node.optional("plane", lambda name: _plane(node.child(name)))
+    sigma = node.optional("sigma_mm", node.number)
+    result = cal.solve_plane_touch(read_poses(node), plane=plane, sigma_mm=sigma)
+    return result_payload(result) | result.details()
+
+
+def sphere_touch(node: Node) -> Payload:
+    """A tip that touched a sphere in several orientations."""
+    radius, sigma = (node.optional(name, node.number) for name in ("radius_mm", "sigma_mm"))
+    result = cal.solve_sphere_touch(read_poses(node), radius_mm=radius, sigma_mm=sigma)
+    return result_payload(result) | result.details()
+
+
+def _plane(node: Node) -> "cal.TouchedPlane":
+    normal, distance = node.numbers("normal"), node.number("distance_mm")
+    node.finish()
+    if len(normal) != 3 or not any(normal):
+        raise unusable(node.at("normal"), tr("three numbers are wanted here, not all of them 0"))
+    return cal.TouchedPlane((normal[0], normal[1], normal[2]), distance)
 
 
 def gauge_rr(node: Node) -> Payload:
@@ -101,7 +125,9 @@ def _list(value: object, path: str) -> list[object]:
 
 
 STUDY_METHODS: Final[Mapping[str, Callable[[Node], Payload]]] = {
+    "plane_touch": plane_touch,
+    "sphere_touch": sphere_touch,
     "gauge_rr": gauge_rr,
     "control_chart": control_chart,
 }
-"""Studies by the names that the shared cases use."""
+"""Methods by the names that a file gives them."""

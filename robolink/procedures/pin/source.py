@@ -2,20 +2,37 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 from robolink.calibration import CalibrationResult, VerifyResult, tip_pose
 from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
-from robolink.procedures.pin_touch import TouchPlan, contact_pose, verify_by_turning
+from robolink.procedures.pin.proof import (
+    contact_pose,
+    drift_uncertainty_mm,
+    verify_by_turning,
+)
+from robolink.procedures.pin.touches import TouchPlan
 from robolink.procedures.source import MeasurementContext
 from robolink.runner import Procedure
 
 
 class PinSource(ABC):
-    """Measures by touching one pin."""
+    """Measures by touching one pin.
+
+    Attributes:
+        touch: How the tip is taken off the pin and brought back.
+    """
 
     __slots__ = ()
+
+    touch: TouchPlan
+
+    @property
+    def clearance_mm(self) -> float:
+        """Least height above the pin at which the robot stops."""
+        return self.touch.clearance_mm
 
     @property
     def remedy(self) -> str:
@@ -35,9 +52,14 @@ class PinSource(ABC):
     def procedure(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:  # noqa: ARG002 - the person brings the tip to the pin
         """Return the steps of a measurement; see :class:`~robolink.procedures.MovingSource`.
 
-        All of them: when it ends early depends on touches that nobody has made yet.
+        All of them: when it ends early depends on touches that nobody has made yet. Where the tip
+        stops is foreseen at its highest; sideways it is drawn in the run.
         """
         return self._steps(stored, live=False)
+
+    def _touching(self, *, live: bool) -> TouchPlan:
+        """Return the plan of the touches, nominal where they are only shown."""
+        return self.touch if live else replace(self.touch, nominal=True)
 
     @abstractmethod
     def _steps(self, stored: ToolOffset | None, *, live: bool) -> Procedure[CalibrationResult]:
@@ -50,15 +72,9 @@ class PinSource(ABC):
 
 
 class ManualPinSource(PinSource):
-    """Measures by touching one pin at angles of U, and proves by turning about the new tip.
-
-    Attributes:
-        touch: Lift and clearance.
-    """
+    """Measures by touching one pin at angles of U, and proves by turning about the new tip."""
 
     __slots__ = ()
-
-    touch: TouchPlan
 
     def verify(
         self,
@@ -77,6 +93,7 @@ class ManualPinSource(PinSource):
             contact=contact_pose(result, tool=tool),
             angles_deg=(_middle_of_largest_gap(angles), angles[0]),
             tolerance_mm=tolerance_mm,
+            u_mm=drift_uncertainty_mm(self.touch, result),
             written=result.offset,
             tip=tip,
         )

@@ -1,0 +1,39 @@
+"""A tip seen all round by an up-looking camera: its offset, and a table of what that leaves."""
+
+from collections.abc import Sequence
+
+from robolink.calibration import RunoutTableResult, Sighting, solve_runout_table
+from robolink.methods.camera.procedure import look_round
+from robolink.model import Pose, ToolOffset
+from robolink.procedures import LookPlan
+from robolink.runner import Procedure
+from robolink.stations import CameraStation
+
+
+def measure_runout_table(
+    station: CameraStation,
+    plan: LookPlan,
+    *,
+    here: Pose,
+    stored: ToolOffset | None,
+    sigma_mm: float | None = None,
+    retake: bool = False,
+) -> Procedure[RunoutTableResult]:
+    """Measure X and Y of a tip and how it wobbles, with a calibrated camera. Runs in Tool 0.
+
+    Args:
+        station: Where the camera is, and what its pixels mean.
+        plan: At which angles it is looked at: all round, in steps of 60 degrees at most.
+        here: Where the flange is; its U is where the angles count from.
+        stored: The offset stored now; the tip is expected there.
+        sigma_mm: Standard deviation of one coordinate of one look, where it is known.
+        retake: Offer to take the look again that fits worst.
+
+    Raises:
+        CalibrationError: As :func:`measure_camera`, and those of :func:`solve_runout_table`.
+    """
+
+    def solve(sightings: Sequence[Sighting]) -> RunoutTableResult:
+        return solve_runout_table(sightings, stored=stored, sigma_mm=sigma_mm)
+
+    return (yield from look_round(station, plan, solve, here=here, stored=stored, retake=retake))

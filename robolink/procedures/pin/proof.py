@@ -1,0 +1,181 @@
+"""The proof of a tip on a pin: turn about it, stop beside the pin, and let a person touch it."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Final
+
+from robolink.calibration import (
+    CalibrationResult,
+    Drift,
+    DriftVerdict,
+    FlangePlane,
+    VerifyResult,
+    flange_of,
+    judge_drift,
+    tip_pose,
+)
+from robolink.messages import tr
+from robolink.model import Pose, ToolOffset
+from robolink.procedures.approach import NO_OFFSET
+from robolink.procedures.pin.judging import heights_agree
+from robolink.procedures.pin.touches import PinTouches, TouchPlan, plain_pose
+from robolink.runner import Notify, Procedure, TouchedAt
+
+MOST_MORE: Final = 2
+"""Touches that a drift may take which is neither surely inside nor surely outside."""
+
+
+def verify_by_turning(
+    plan: TouchPlan,
+    *,
+    contact: Pose,
+    angles_deg: Sequence[float],
+    tolerance_mm: float,
+    u_mm: float | None = None,
+    written: ToolOffset = NO_OFFSET,
+    tip: ToolOffset = NO_OFFSET,
+) -> Procedure[VerifyResult]:
+    """Turn about the new tip and let a person show where it went. Runs in the new tool.
+
+    Args:
+        plan: Lift, clearance, contact input.
+        contact: Pose of the new tool's tip on the pin, as the calibration implies it.
+        angles_deg: Tool angles U at which the tip is brought back onto the pin.
+        tolerance_mm: Largest drift that passes, with its guard band.
+        u_mm: Standard uncertainty of the drift that one touch shows, ``None`` for the usual one.
+        written: The offset in force.
+        tip: Where the tip was found. It differs from ``written`` where a difference was
+            written, and then the frame in force does not turn about the tip.
+
+    The tip starts lifted. The distance that the person jogs it, from where it should have
+    been to the pin, is the drift; the robot stops beside that place, so that no jog is no answer.
+    A drift that is neither surely inside the tolerance nor outside is touched again, at most twice;
+    what counts is the mean then. It ends lifted.
+
+    Raises:
+        CalibrationError: ``not_touched`` or ``typed_ahead``, with the tip drawn back.
+    """
+    touches = PinTouches(plan)
+    proof = DriftProof(tolerance_mm, plan.u_drift_mm if u_mm is None else u_mm)
+
+    def shown(angle_deg: float) -> Procedure[None]:
+        place = _place(contact, angle_deg, written, tip)
+        found = yield from touches.again(
+            place,
+            key=len(proof.touches),
+            turning=tr("turn about the new tip"),
+            instruction=tr("Bring the tip back onto the pin; what you jog shows the drift."),
+        )
+        proof.add(place, found)
+
+    for angle_deg in angles_deg:
+        yield from shown(angle_deg)
+    for _ in range(MOST_MORE):
+        doubted = proof.undecided()
+        if doubted is None:
+            break
+        yield Notify(proof.told(doubted))
+        yield from shown(doubted.u_deg)
+    heights_mm = [contact.z_mm, *(touch.z_mm for touch in proof.touches)]
+    return proof.result(heights_agree(heights_mm, plan.sigma_in_height_mm))
+
+
+def contact_pose(result: CalibrationResult, *, tool: int) -> Pose:
+    """Return the pose of the proposed tool's tip on the reference point.
+
+    Height and angle are those of the last pose, seen through the proposed offset.
+    """
+    x_mm, y_mm = result.reference_point_mm[:2]
+    last = tip_pose(plain_pose(result.inputs[-1]), result.offset, tool=tool)
+    return replace(last, x_mm=x_mm, y_mm=y_mm)
+
+
+def drift_uncertainty_mm(plan: TouchPlan, result: CalibrationResult) -> float:
+    """Return the standard uncertainty of the drift that one touch shows.
+
+    A scatter that was estimated from few touches is itself too uncertain to make it smaller.
+    """
+    sigma_mm = result.sigma_mm
+    if sigma_mm is None:
+        return plan.u_drift_mm
+    if result.sigma_stated or (result.dof or 0) >= _ENOUGH_DOF:
+        return sigma_mm
+    return max(sigma_mm, plan.u_drift_mm)
+
+
+_ENOUGH_DOF: Final = 4
+
+
+@dataclass(slots=True)
+class DriftProof:
+    """What the touches of a proof show so far.
+
+    Attributes:
+        tolerance_mm: Largest drift that passes, with its guard band.
+        u_mm: Standard uncertainty of the drift that one touch shows.
+        touches: Those made, in their order.
+    """
+
+    tolerance_mm: float
+    u_mm: float
+    touches: list[TouchedAt] = field(default_factory=list)
+    _apart: dict[float, list[tuple[float, float, float]]] = field(default_factory=dict)
+
+    def add(self, place: Pose, found: TouchedAt, *, in_space: bool = False) -> None:
+        """Take a touch.
+
+        Args:
+            place: Where the tip should have been.
+            found: Where it was.
+            in_space: Whether its height counts as drift, too.
+        """
+        self.touches.append(found)
+        dz_mm = found.z_mm - place.z_mm if in_space else 0.0
+        apart = (found.x_mm - place.x_mm, found.y_mm - place.y_mm, dz_mm)
+        self._apart.setdefault(place.u_deg, []).append(apart)
+
+    def undecided(self) -> Drift | None:
+        """Return the drift that needs another touch; none where one is outside for sure."""
+        drifts = self._drifts()
+        verdicts = [judge_drift(one.distance_mm, one.u_mm, self.tolerance_mm) for one in drifts]
+        if DriftVerdict.FAILED in verdicts or DriftVerdict.UNDECIDED not in verdicts:
+            return None
+        return drifts[verdicts.index(DriftVerdict.UNDECIDED)]
+
+    def told(self, drift: Drift) -> str:
+        """Return why it is touched again."""
+        return tr(
+            "At U {u:.1f} the tip drifts {drift:.3f} mm: too near to {limit:.3f} mm to decide. "
+            "It is touched once more there, and the mean counts.",
+            u=drift.u_deg,
+            drift=drift.distance_mm,
+            limit=self.tolerance_mm,
+        )
+
+    def result(self, heights_agree: bool = True) -> VerifyResult:
+        """Return what they say together."""
+        return VerifyResult(
+            self._drifts(),
+            self.tolerance_mm,
+            codes=() if heights_agree else ("touch_heights_differ",),
+            inputs=tuple(self.touches),
+        )
+
+    def _drifts(self) -> tuple[Drift, ...]:
+        """Return the mean drift at each angle; a mean of n is surer by the root of n."""
+        drifts = []
+        for angle_deg, apart in self._apart.items():
+            dx_mm, dy_mm, dz_mm = (sum(axis) / len(apart) for axis in zip(*apart, strict=True))
+            u_mm = self.u_mm / math.sqrt(len(apart))
+            drifts.append(Drift(angle_deg, dx_mm, dy_mm, dz_mm, u_mm))
+        return tuple(drifts)
+
+
+def _place(contact: Pose, angle_deg: float, written: ToolOffset, tip: ToolOffset) -> Pose:
+    """Return where the frame in force should be with the tip on the pin."""
+    frame = replace(contact, u_deg=angle_deg)
+    aside_x, aside_y = FlangePlane.of(flange_of(frame, written)).in_base(
+        written.x_mm - tip.x_mm, written.y_mm - tip.y_mm, written.z_mm - tip.z_mm
+    )
+    return replace(frame, x_mm=contact.x_mm + aside_x, y_mm=contact.y_mm + aside_y)

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 
 from robolink.errors import CalibrationError, ConfigError, RobolinkError
 from robolink.messages import tr
@@ -50,7 +51,8 @@ class Measuring:
         controller = self._context.controller
         controller.tools.select(0)
         here = controller.groups[0].pose()
-        target = Pose(*pose.coordinates(), hand=here.hand, local=here.local, tool=0)
+        there = Pose(*pose.coordinates(), tool=0, local=here.local)
+        target = replace(there, hand=here.hand, posture=here.posture)
         self._context.run(approach_path(target, here=here, purpose=purpose))
 
     def _attempt(self, plan: ToolPlan) -> Proposal:

@@ -141,6 +141,8 @@ def _result(result: CalibrationResult) -> dict[str, object]:
 
 def _pose(pose: Pose) -> dict[str, object]:
     values = {field.name: getattr(pose, field.name) for field in fields(Pose)}
+    if pose.posture is not None:
+        values["posture"] = asdict(pose.posture)
     return {name: value for name, value in values.items() if value is not None}
 
 

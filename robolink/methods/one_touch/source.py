@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field, replace
 
-from robolink.calibration import CalibrationResult, VerifyResult
+from robolink.calibration import CalibrationResult, VerifyResult, tip_pose
 from robolink.messages import tr
 from robolink.methods.one_touch.procedure import measure_one_touch
 from robolink.methods.one_touch.solvers import Absolute, Difference
@@ -92,7 +92,7 @@ class OneTouchSource:
         from robolink.calibration import toward_zero  # numpy, which a look does without
 
         context.controller.tools.select(tool)
-        measured_deg = result.inputs[-1].u_deg + result.offset.u_deg
+        measured_deg = tip_pose(result.inputs[-1], result.offset, tool=tool).u_deg
         procedure = verify_by_turning(
             self.touch,
             contact=contact_pose(result, tool=tool),

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 
-from robolink.calibration import CalibrationResult, VerifyResult
+from robolink.calibration import CalibrationResult, VerifyResult, tip_pose
 from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
 from robolink.procedures.pin.proof import (
@@ -86,7 +86,7 @@ class ManualPinSource(PinSource):
         tolerance_mm: float,
     ) -> VerifyResult:
         """Turn about the new tip; see :class:`~robolink.procedures.MovingSource`."""
-        angles = [pose.u_deg + result.offset.u_deg for pose in result.inputs]
+        angles = [tip_pose(pose, result.offset, tool=tool).u_deg for pose in result.inputs]
         context.controller.tools.select(tool)
         procedure = verify_by_turning(
             self.touch,

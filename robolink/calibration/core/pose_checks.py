@@ -67,6 +67,7 @@ def check_frames(
             "mixed_local",
             tr("The poses are given in different local coordinate systems."),
             remedy=tr("Give all of them in local 0, the base, or say what the locals are."),
+            others=("local_pose",),
         )
     if len(hands) > 1 and not allow_mixed_hand:
         raise CalibrationError(
@@ -85,6 +86,7 @@ def _refuse_tools(tools: Collection[int]) -> None:
             "mixed_tool",
             tr("The poses were taken with different tools selected."),
             remedy=tr("Take all of them in Tool 0."),
+            others=("tool_pose",),
         )
     for tool in tools:
         if tool:
@@ -111,7 +113,8 @@ def keep_unmeasured(stored: ToolOffset | None, **measured: float) -> ToolOffset:
                 longest=longest,
                 limit=MAX_OFFSET_MM,
             ),
-            remedy=tr("Check that both poses touch the same point and are flange poses."),
+            remedy=tr("Check that all poses touch the same point, are flange poses and in mm."),
+            others=("suspect_units",),
         )
     return offset
 

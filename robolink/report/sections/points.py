@@ -97,9 +97,6 @@ def _left_out(impact: Impact) -> Iterator[Element]:
     if impact.other_local:
         named = ", ".join(f"P{n} (local {local})" for n, local in impact.other_local.items())
         lines.append(tr("In another local, left out: {points}.", points=named))
-    if impact.tilted:
-        named = ", ".join(f"P{number}" for number in impact.tilted)
-        lines.append(tr("Tilted (V or W not 0), left out: {points}.", points=named))
     if lines:
         yield element("ul", *(element("li", line) for line in lines), class_="small")
 

@@ -67,7 +67,7 @@ docs: $(VENV)/.installed-docs ## Build the pages and the API into build/docs/htm
 
 .PHONY: messages
 messages: $(VENV)/.installed-dev ## Collect every sentence shown to a person.
-	$(BIN)/pybabel --quiet extract --keywords=tr --no-default-keywords --no-location \
+	$(BIN)/pybabel --quiet extract --mapping=pyproject.toml --keywords=tr --no-default-keywords --no-location \
 		--omit-header --sort-output --width=100 --output-file=$(POT) \
 		robolink cli/robolink_cli simulators/robolink_simulators
 

@@ -49,9 +49,9 @@ if TYPE_CHECKING:
     from robolink.calibration.core.frames import tilted_from as tilted_from
     from robolink.calibration.core.frames import tip_pose as tip_pose
     from robolink.calibration.core.frames import toward_zero as toward_zero
-    from robolink.calibration.core.planar_checks import MIN_ROTATION_DEG as MIN_ROTATION_DEG
-    from robolink.calibration.core.planar_checks import angle_spread_deg as angle_spread_deg
-    from robolink.calibration.core.planar_checks import planar_sigma_gain as planar_sigma_gain
+    from robolink.calibration.core.pose_checks import MIN_ROTATION_DEG as MIN_ROTATION_DEG
+    from robolink.calibration.core.pose_checks import angle_spread_deg as angle_spread_deg
+    from robolink.calibration.core.pose_checks import planar_sigma_gain as planar_sigma_gain
     from robolink.calibration.core.pose_suggestion import PoseLimits as PoseLimits
     from robolink.calibration.core.pose_suggestion import PosePlan as PosePlan
     from robolink.calibration.core.pose_suggestion import precise_enough as precise_enough
@@ -214,7 +214,7 @@ __getattr__ = lazy_exports(
         "core.evidence": "FitEvidence RunOrder",
         "core.frames": "flange_of flange_pose flange_poses in_base seen_from tilted_flange_pose "
         "tilted_from tip_pose toward_zero",
-        "core.planar_checks": "MIN_ROTATION_DEG angle_spread_deg planar_sigma_gain",
+        "core.pose_checks": "MIN_ROTATION_DEG angle_spread_deg planar_sigma_gain",
         "core.pose_suggestion": "PoseLimits PosePlan precise_enough select_poses sigma_gain "
         "suggest_poses",
         "core.result": "CalibrationResult Drift DriftVerdict GUARD_FACTOR PERSON_U_DRIFT_MM "

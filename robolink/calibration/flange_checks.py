@@ -10,9 +10,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TypeVar
 
+from robolink.calibration.core.pose_checks import UPRIGHT_WITHIN_DEG
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.core.statistics import NORMAL_95
-from robolink.calibration.flange_plane import UPRIGHT_WITHIN_DEG, TipHeight
+from robolink.calibration.flange_plane import TipHeight
 from robolink.errors import CalibrationError
 from robolink.messages import tr
 from robolink.model import Pose

@@ -26,6 +26,7 @@ class Measuring:
     def __init__(self, context: MeasurementContext, listener: Listener) -> None:
         self._context = context
         self._listener = listener
+        self._facts = context.controller.facts()
 
     def propose(self, plan: ToolPlan) -> Proposal:
         """Measure one tool, again where the plan allows it, and put it on record.
@@ -63,7 +64,13 @@ class Measuring:
             result = plan.named(plan.source.measure(context, tool, before))
             plan.criteria.judge_fit(result)
             proposal = self._listener.adjusted(Proposal(tool, before, result), context)
-        entry = calibration_entry(proposal, plan.criteria, source=plan.source.sentence)
+        entry = calibration_entry(
+            proposal,
+            plan.criteria,
+            source=plan.source.sentence,
+            facts=self._facts,
+            gauge=plan.gauge,
+        )
         context.controller.outcomes.append(entry)
         self._listener.moment(Moment.AFTER_MEASURE, context, tool)
         self.go_to(plan.retreat, tr("go away from where tool {tool} is measured", tool=tool))

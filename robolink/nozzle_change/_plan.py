@@ -13,6 +13,7 @@ from robolink.nozzle_change._pin_record import touch_details
 from robolink.nozzle_change._proposal import Proposal
 from robolink.procedures import MovingSource, RequiresSensor, StopsAbovePin, TipSource
 from robolink.runner import RunSettings
+from robolink.stations import Gauge
 
 
 def usual_box(sideways_mm: float = 150.0) -> WorkBox:
@@ -61,6 +62,7 @@ class ToolPlan:
         pin: Name of the station where a pin is touched; empty for none, or none that is kept.
         length: What is done where the heights of the touches show that the tip is longer or
             shorter: ``ask``, write Z by ``difference``, or ``keep`` it.
+        gauge: The gauge that is measured against; ``None`` for none, or none that is known.
         method: Name of the calibration method, for the record; empty for what the result says.
     """
 
@@ -72,6 +74,7 @@ class ToolPlan:
     approach: Pose | None = None
     retreat: Pose | None = None
     pin: str = ""
+    gauge: Gauge | None = None
     length: LengthRule = "ask"
     method: str = ""
 

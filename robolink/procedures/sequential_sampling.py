@@ -111,7 +111,7 @@ def agreement(
     known = (
         ""
         if half_mm is None
-        else tr("; {known} to +-{half:.3f} mm", known=method.known, half=half_mm)
+        else tr("; {known} to ±{half:.3f} mm", known=method.known, half=half_mm)
     )
     return tr(
         "{counted} agree within {rms:.3f} mm rms, the last within {last:.3f} mm{known}.",

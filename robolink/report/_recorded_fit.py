@@ -43,7 +43,7 @@ def recorded_fit(details: Mapping[str, Any]) -> CalibrationResult:
         rejected=tuple(details.get("rejected", ())),
         condition_number=details.get("condition_number"),
         dof=details.get("dof"),
-        notes=tuple(details.get("notes", ())),
+        notes=tuple(details.get("information", ())),
         interval_from=details.get("interval_from", ""),
         region95_radius_mm=details.get("region95_radius_mm"),
         budget=UncertaintyBudget.from_json(budget) if (budget := details.get("budget")) else None,

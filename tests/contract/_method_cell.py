@@ -29,6 +29,7 @@ remote_timeout_confirmed_by = "K. Sato, at the controller"
 [cells.a.stations.PIN-07]
 kind = "pin"
 gauge = "G-123"
+gauge_due = 2020-01-31
 
 [cells.a.stations.BEAMS-02]
 kind = "beams"

@@ -11,8 +11,7 @@ import numpy as np
 
 from robolink.calibration.camera.board import SPACING_TOLERANCE, check_spacing, mean_by_height
 from robolink.calibration.camera.up_camera import Sighting, check_sightings, seen_in_flange
-from robolink.calibration.core.planar_checks import require_poses
-from robolink.calibration.core.pose_checks import keep_unmeasured, require_finite
+from robolink.calibration.core.pose_checks import keep_unmeasured, require_finite, require_poses
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.core.robust import Floats
 from robolink.calibration.flange_checks import with_height_error

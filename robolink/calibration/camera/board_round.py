@@ -17,8 +17,11 @@ from robolink.calibration.camera.board_fit import solve_board_fit
 from robolink.calibration.camera.camera_round import CameraRound, as_round
 from robolink.calibration.camera.up_camera import Sighting
 from robolink.calibration.core.least_squares import LinearFit, linear_fit
-from robolink.calibration.core.planar_checks import MIN_ROTATION_DEG, angle_spread_deg
-from robolink.calibration.core.pose_checks import keep_unmeasured
+from robolink.calibration.core.pose_checks import (
+    MIN_ROTATION_DEG,
+    angle_spread_deg,
+    keep_unmeasured,
+)
 from robolink.calibration.core.robust import Floats
 from robolink.calibration.flange_checks import with_height_error
 from robolink.calibration.flange_plane import FlangePlane, TipHeight, height_of, known_z_mm

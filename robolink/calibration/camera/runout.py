@@ -22,7 +22,7 @@ import numpy as np
 from robolink.calibration.camera.up_camera import Sighting, check_sightings
 from robolink.calibration.core.dispersion import Dispersion
 from robolink.calibration.core.least_squares import LinearFit, linear_fit
-from robolink.calibration.core.planar_checks import check_planar
+from robolink.calibration.core.pose_checks import check_planar
 from robolink.calibration.core.statistics import f_quantile
 from robolink.calibration.flange_plane import FlangePlane, standing_upright
 from robolink.calibration.pin.planar import Complexes

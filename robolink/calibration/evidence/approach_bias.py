@@ -14,7 +14,7 @@ from typing import Final, TypeVar
 import numpy as np
 
 from robolink.calibration.core.evidence import FitEvidence
-from robolink.calibration.core.planar_checks import heading_deg
+from robolink.calibration.core.pose_checks import heading_deg
 from robolink.calibration.core.result import CalibrationResult
 
 CLAIMED_BEYOND: Final = 3.0

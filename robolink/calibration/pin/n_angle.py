@@ -5,15 +5,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from robolink.calibration.core.planar_checks import (
+from robolink.calibration.core.pose_checks import (
     MIN_ROTATION_DEG,
     UPRIGHT_WITHIN_DEG,
     check_rotation,
+    keep_unmeasured,
     require_poses,
     some_on_their_head,
     tilted,
 )
-from robolink.calibration.core.pose_checks import keep_unmeasured
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.core.robust import Floats, Indices, Mask, Robust
 from robolink.calibration.core.rotations import checked_table, pose_table

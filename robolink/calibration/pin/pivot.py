@@ -10,8 +10,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from robolink.calibration.core.planar_checks import angle_spread_deg, refuse_radians, require_poses
-from robolink.calibration.core.pose_checks import keep_unmeasured
+from robolink.calibration.core.pose_checks import (
+    angle_spread_deg,
+    keep_unmeasured,
+    refuse_radians,
+    require_poses,
+)
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.core.robust import Floats, Indices, Mask, Robust
 from robolink.calibration.core.rotations import checked_table, rotations

@@ -7,11 +7,18 @@ from robolink.calibration import CalibrationResult
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.methods import LengthRule, TwoPoseSource
-from robolink.model import Pose, ToolOffset, WorkBox, plain_offset
+from robolink.model import Controller, Pose, ToolOffset, WorkBox, plain_offset
 from robolink.nozzle_change._acceptance import AcceptanceCriteria
 from robolink.nozzle_change._pin_record import touch_details
 from robolink.nozzle_change._proposal import Proposal
-from robolink.procedures import MovingSource, RequiresSensor, StopsAbovePin, TipSource
+from robolink.nozzle_change._seating import touching_as_recorded
+from robolink.procedures import (
+    MovingSource,
+    RequiresSensor,
+    StopsAbovePin,
+    TipSource,
+    TouchesPin,
+)
 from robolink.runner import RunSettings
 from robolink.stations import Gauge
 
@@ -93,6 +100,14 @@ class ToolPlan:
         told = proposal.length
         length = {"length": asdict(told)} if told is not None and told.changed else {}
         return {**own, **touch, **length, **proposal.kept_record}
+
+    def as_recorded(self, controller: Controller) -> "ToolPlan":
+        """Return the same with what the record says of the touches, where nobody stated it."""
+        source = self.source
+        if not isinstance(source, TouchesPin):
+            return self
+        touch = touching_as_recorded(controller, source.touch, self.pin)
+        return replace(self, source=source.with_touch(touch))
 
     @property
     def moving(self) -> MovingSource | None:

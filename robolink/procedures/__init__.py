@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from robolink.procedures.pin.proof import verify_by_turning as verify_by_turning
     from robolink.procedures.pin.source import ManualPinSource as ManualPinSource
     from robolink.procedures.pin.source import PinSource as PinSource
+    from robolink.procedures.pin.source import TouchesPin as TouchesPin
     from robolink.procedures.pin.touches import PinTouches as PinTouches
     from robolink.procedures.pin.touches import TouchPlan as TouchPlan
     from robolink.procedures.pin.touches import lift_off as lift_off
@@ -74,7 +75,7 @@ __getattr__ = lazy_exports(
         "lazy_source": "LazySource",
         "pin.judging": "TOUCH_CODES heights_agree jog_mm require_one_height require_touches",
         "pin.proof": "DriftProof MOST_MORE contact_pose drift_uncertainty_mm verify_by_turning",
-        "pin.source": "ManualPinSource PinSource",
+        "pin.source": "ManualPinSource PinSource TouchesPin",
         "pin.touches": "PinTouches TouchPlan lift_off touch_again",
         "pose_method": "PoseMethod",
         "sequential_sampling": (

@@ -1,6 +1,7 @@
 """A pin whose place is known, touched once by a person: X, Y and Z of the new tip."""
 
 from dataclasses import dataclass, field, replace
+from typing import Self
 
 from robolink.calibration import CalibrationResult, VerifyResult, tip_pose
 from robolink.messages import tr
@@ -60,6 +61,10 @@ class OneTouchSource:
     def procedure(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:
         """Return the steps of a measurement; see :class:`~robolink.procedures.MovingSource`."""
         return self._steps(stored, here, replace(self.touch, nominal=True))
+
+    def with_touch(self, plan: TouchPlan) -> Self:
+        """Return the same source with another plan of its touch."""
+        return replace(self, touch=plan)
 
     @property
     def clearance_mm(self) -> float:

@@ -4,6 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
+from typing import Any, Protocol, Self, cast, runtime_checkable
 
 from robolink.calibration import CalibrationResult, VerifyResult, tip_pose
 from robolink.messages import tr
@@ -18,6 +19,18 @@ from robolink.procedures.source import MeasurementContext
 from robolink.runner import Procedure
 
 
+@runtime_checkable
+class TouchesPin(Protocol):
+    """A source in which a person touches a pin, in its measurement and in its proof."""
+
+    @property
+    def touch(self) -> TouchPlan:
+        """How the tip is taken off the pin and brought back."""
+
+    def with_touch(self, plan: TouchPlan) -> Self:
+        """Return the same source with another plan of its touches."""
+
+
 class PinSource(ABC):
     """Measures by touching one pin.
 
@@ -28,6 +41,11 @@ class PinSource(ABC):
     __slots__ = ()
 
     touch: TouchPlan
+
+    def with_touch(self, plan: TouchPlan) -> Self:
+        """Return the same source with another plan of its touches."""
+        # Each source is a dataclass of its own, which this base of them cannot be.
+        return cast(Self, replace(cast(Any, self), touch=plan))
 
     @property
     def clearance_mm(self) -> float:

@@ -11,6 +11,7 @@ from robolink_simulators.epson.arm.motion_parameters import MotionParameters
 from robolink_simulators.epson.arm.robot_settings import RobotSettings
 from robolink_simulators.epson.arm.robots import RobotModel
 from robolink_simulators.epson.memory.bits import IO_BITS, MEMORY_BITS, BitBank
+from robolink_simulators.epson.memory.control_points import ControlPoints
 from robolink_simulators.epson.memory.driven_robot import DrivenRobot
 from robolink_simulators.epson.memory.input_bits import InputBits
 from robolink_simulators.epson.memory.pallets import PalletTable
@@ -74,6 +75,7 @@ class Machine:
     parameters = _OfTheRobotInForce[MotionParameters]()
     settings = _OfTheRobotInForce[RobotSettings]()
     pallets = _OfTheRobotInForce[PalletTable]()
+    control_points = _OfTheRobotInForce[ControlPoints]()
     sensed = _OfTheRobotInForce[bool]()
     till_met = _OfTheRobotInForce[bool]()
     found = _OfTheRobotInForce["Point | None"]()

@@ -62,6 +62,8 @@ class ToolPlan:
         length: What is done where the heights of the touches show that the tip is longer or
             shorter: ``ask``, write Z by ``difference``, or ``keep`` it.
         method: Name of the calibration method, for the record; empty for what the result says.
+        station: Name of the station on whose record the measurement rests; empty where it rests on
+            none, because it finds the station itself or is told where it is.
     """
 
     tool: int
@@ -74,6 +76,7 @@ class ToolPlan:
     pin: str = ""
     length: LengthRule = "ask"
     method: str = ""
+    station: str = ""
 
     def named(self, result: CalibrationResult) -> CalibrationResult:
         """Return a result under the name of the method, whichever solver it borrows."""

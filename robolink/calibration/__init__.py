@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from robolink.calibration.core.frames import seen_from as seen_from
     from robolink.calibration.core.frames import tilted_flange_pose as tilted_flange_pose
     from robolink.calibration.core.frames import tilted_from as tilted_from
+    from robolink.calibration.core.frames import tip_pose as tip_pose
     from robolink.calibration.core.frames import toward_zero as toward_zero
     from robolink.calibration.core.pose_checks import MIN_ROTATION_DEG as MIN_ROTATION_DEG
     from robolink.calibration.core.pose_checks import angle_spread_deg as angle_spread_deg
@@ -212,7 +213,7 @@ __getattr__ = lazy_exports(
         "core.dispersion": "require_positive",
         "core.evidence": "FitEvidence RunOrder",
         "core.frames": "flange_of flange_pose flange_poses in_base seen_from tilted_flange_pose "
-        "tilted_from toward_zero",
+        "tilted_from tip_pose toward_zero",
         "core.pose_checks": "MIN_ROTATION_DEG angle_spread_deg planar_sigma_gain",
         "core.pose_suggestion": "PoseLimits PosePlan precise_enough select_poses sigma_gain "
         "suggest_poses",

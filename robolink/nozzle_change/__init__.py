@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from robolink.nozzle_change._proposal import LimitVerdict as LimitVerdict
     from robolink.nozzle_change._proposal import Proposal as Proposal
     from robolink.nozzle_change._proposal import ToolReport as ToolReport
+    from robolink.nozzle_change._seating import touching_as_recorded as touching_as_recorded
 
 __getattr__ = lazy_exports(
     __name__,
@@ -38,5 +39,6 @@ __getattr__ = lazy_exports(
         "_plan": "ChangePlan Limits ToolPlan require_ready usual_box",
         "_preview": "PlannedStep flange_now foresee preview require_inside",
         "_proposal": "ChangeReport Proposal ToolReport LimitVerdict",
+        "_seating": "touching_as_recorded",
     },
 )

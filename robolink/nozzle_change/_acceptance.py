@@ -138,7 +138,7 @@ class AcceptanceCriteria:
         if self.max_residual_mm is not None:
             yield tr("residual up to {limit:g} mm", limit=self.max_residual_mm)
         if self.interval_mm is not None:
-            yield tr("95 % interval up to +-{limit:g} mm", limit=self.interval_mm)
+            yield tr("95 % interval up to ±{limit:g} mm", limit=self.interval_mm)
 
     def _of_fit(self, result: CalibrationResult) -> Iterator[LimitVerdict]:
         for code, name, found_mm, limit_mm in (

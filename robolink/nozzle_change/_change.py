@@ -8,6 +8,7 @@ written. Whatever happens, the tool, power mode and speed of before are put back
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
+from dataclasses import replace
 
 from robolink.calibration import VerifyResult
 from robolink.errors import CalibrationError, DeclinedError, StoppedError, VerifyError
@@ -77,6 +78,9 @@ class NozzleChange:
         controller = self._controller
         require_clearance(self._plan)
         controller.outcomes.change = new_operation()
+        self._plan = replace(
+            self._plan, tools=tuple(one.as_recorded(controller) for one in self._plan.tools)
+        )
         try:
             controller.require_settled(reason)
             with (

@@ -19,7 +19,7 @@ from robolink.nozzle_change._pin_record import tells_height, touch_details, touc
 from robolink.nozzle_change._plan import ToolPlan
 from robolink.nozzle_change._proposal import Proposal
 from robolink.nozzle_change._records import decision_entry
-from robolink.nozzle_change._seating import touch_sigma_z_mm
+from robolink.nozzle_change._seating import touch_sigma_z_mm, touched_by
 from robolink.procedures import MeasurementContext
 from robolink.stations import Station, find_stations
 from robolink.ways import Way, way
@@ -149,7 +149,7 @@ def _told(controller: Controller, plan: ToolPlan, proposal: Proposal) -> _Told:
         stored_z_mm=proposal.offset.z_mm,
         v_deg=pose.v_deg,
         w_deg=pose.w_deg,
-        sigma_z_mm=touch_sigma_z_mm(controller, plan.pin),
+        sigma_z_mm=touch_sigma_z_mm(controller, plan.pin, touched_by(proposal.result.inputs)),
         u_place_mm=known.sigma_mm,
     )
     return _Told(change, known)
@@ -276,12 +276,12 @@ def in_words(tool: int, told: LengthChange) -> str:
     if told.longer_mm > 0:
         return tr(
             "The tip of tool {tool} is {apart:.2f} mm longer (flange {up:+.2f} mm on the same pin, "
-            "+-{half:.2f}).",
+            "±{half:.2f}).",
             **values,
         )
     return tr(
         "The tip of tool {tool} is {apart:.2f} mm shorter (flange {up:+.2f} mm on the same pin, "
-        "+-{half:.2f}).",
+        "±{half:.2f}).",
         **values,
     )
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 
 from robolink.errors import CalibrationError, ConfigError, RobolinkError
 from robolink.messages import tr
@@ -26,6 +27,7 @@ class Measuring:
     def __init__(self, context: MeasurementContext, listener: Listener) -> None:
         self._context = context
         self._listener = listener
+        self._facts = context.controller.facts()
 
     def propose(self, plan: ToolPlan) -> Proposal:
         """Measure one tool, again where the plan allows it, and put it on record.
@@ -50,7 +52,8 @@ class Measuring:
         controller = self._context.controller
         controller.tools.select(0)
         here = controller.groups[0].pose()
-        target = Pose(*pose.coordinates(), hand=here.hand, local=here.local, tool=0)
+        there = Pose(*pose.coordinates(), tool=0, local=here.local)
+        target = replace(there, hand=here.hand, posture=here.posture)
         self._context.run(approach_path(target, here=here, purpose=purpose))
 
     def _attempt(self, plan: ToolPlan) -> Proposal:
@@ -64,7 +67,13 @@ class Measuring:
             rests_on = self._station_record(plan.station)
             fresh = Proposal(tool, before, result, record=rests_on, kept_record=rests_on)
             proposal = self._listener.adjusted(fresh, context)
-        entry = calibration_entry(proposal, plan.criteria, source=plan.source.sentence)
+        entry = calibration_entry(
+            proposal,
+            plan.criteria,
+            source=plan.source.sentence,
+            facts=self._facts,
+            gauge=plan.gauge,
+        )
         context.controller.outcomes.append(entry)
         self._listener.moment(Moment.AFTER_MEASURE, context, tool)
         self.go_to(plan.retreat, tr("go away from where tool {tool} is measured", tool=tool))

@@ -7,12 +7,20 @@ from robolink.calibration import CalibrationResult
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.methods import LengthRule, TwoPoseSource
-from robolink.model import Pose, ToolOffset, WorkBox, plain_offset
+from robolink.model import Controller, Pose, ToolOffset, WorkBox, plain_offset
 from robolink.nozzle_change._acceptance import AcceptanceCriteria
 from robolink.nozzle_change._pin_record import touch_details
 from robolink.nozzle_change._proposal import Proposal
-from robolink.procedures import MovingSource, RequiresSensor, StopsAbovePin, TipSource
+from robolink.nozzle_change._seating import touching_as_recorded
+from robolink.procedures import (
+    MovingSource,
+    RequiresSensor,
+    StopsAbovePin,
+    TipSource,
+    TouchesPin,
+)
 from robolink.runner import RunSettings
+from robolink.stations import Gauge
 
 
 def usual_box(sideways_mm: float = 150.0) -> WorkBox:
@@ -61,6 +69,7 @@ class ToolPlan:
         pin: Name of the station where a pin is touched; empty for none, or none that is kept.
         length: What is done where the heights of the touches show that the tip is longer or
             shorter: ``ask``, write Z by ``difference``, or ``keep`` it.
+        gauge: The gauge that is measured against; ``None`` for none, or none that is known.
         method: Name of the calibration method, for the record; empty for what the result says.
         station: Name of the station on whose record the measurement rests; empty where it rests on
             none, because it finds the station itself or is told where it is.
@@ -74,6 +83,7 @@ class ToolPlan:
     approach: Pose | None = None
     retreat: Pose | None = None
     pin: str = ""
+    gauge: Gauge | None = None
     length: LengthRule = "ask"
     method: str = ""
     station: str = ""
@@ -93,6 +103,14 @@ class ToolPlan:
         told = proposal.length
         length = {"length": asdict(told)} if told is not None and told.changed else {}
         return {**own, **touch, **length, **proposal.kept_record}
+
+    def as_recorded(self, controller: Controller) -> "ToolPlan":
+        """Return the same with what the record says of the touches, where nobody stated it."""
+        source = self.source
+        if not isinstance(source, TouchesPin):
+            return self
+        touch = touching_as_recorded(controller, source.touch, self.pin)
+        return replace(self, source=source.with_touch(touch))
 
     @property
     def moving(self) -> MovingSource | None:

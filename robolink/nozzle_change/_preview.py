@@ -136,7 +136,8 @@ def _procedures(
 
 def _journey(target: Pose | None, purpose: str, here: Pose) -> Procedure[object]:
     if target is not None:
-        goal = Pose(*target.coordinates(), hand=here.hand, local=here.local, tool=0)
+        there = Pose(*target.coordinates(), tool=0, local=here.local)
+        goal = replace(there, hand=here.hand, posture=here.posture)
         yield from approach_path(goal, here=here, purpose=purpose)
     return None
 

@@ -2,19 +2,36 @@
 
 from collections.abc import Sequence
 from dataclasses import asdict, fields
+from datetime import datetime
 
 from robolink.calibration import CalibrationResult, VerifyResult
 from robolink.errors import CalibrationError, RobolinkError
 from robolink.messages import tr
-from robolink.model import EntryKind, NewEntry, Pose, describe_offset, plain_offset
+from robolink.model import ControllerFacts, EntryKind, NewEntry, Pose, describe_offset, plain_offset
 from robolink.nozzle_change._acceptance import AcceptanceCriteria
 from robolink.nozzle_change._proposal import Proposal
 from robolink.procedures import jog_mm
 from robolink.runner import SeenAt, TouchedAt
+from robolink.stations import Gauge
 
 
-def calibration_entry(proposal: Proposal, criteria: AcceptanceCriteria, *, source: str) -> NewEntry:
-    """Return the record of a measurement that was believed, with all that it rests on."""
+def calibration_entry(
+    proposal: Proposal,
+    criteria: AcceptanceCriteria,
+    *,
+    source: str,
+    facts: ControllerFacts | None = None,
+    gauge: Gauge | None = None,
+) -> NewEntry:
+    """Return the record of a measurement that was believed, with all that it rests on.
+
+    Args:
+        proposal: What was measured.
+        criteria: What was allowed.
+        source: How it was measured, one sentence.
+        facts: Which machine it was, where it was asked.
+        gauge: The gauge that was measured against, where one is known.
+    """
     result = proposal.result
     details: dict[str, object] = {
         "source": source,
@@ -22,6 +39,10 @@ def calibration_entry(proposal: Proposal, criteria: AcceptanceCriteria, *, sourc
         "proposed": plain_offset(result.offset),
         "tip": plain_offset(proposal.tip),
         "notes": list(proposal.notes),
+        # Entries are labelled in UTC; whoever stood there knows it by the clock on the wall.
+        "local_time": datetime.now().astimezone().isoformat(timespec="seconds"),
+        **({} if facts is None else {"facts": asdict(facts)}),
+        "gauges": [] if gauge is None else [asdict(gauge)],
         **_result(result),
         **proposal.record,
     }
@@ -109,7 +130,7 @@ def _result(result: CalibrationResult) -> dict[str, object]:
         "sigma_gain": result.sigma_gain,
         "condition_number": result.condition_number,
         "warnings": list(result.warnings),
-        "notes": list(result.notes),
+        "information": list(result.notes),
         "interval_from": result.interval_from,
         "region95_radius_mm": result.region95_radius_mm,
         "budget": result.budget.as_json() if result.budget else None,
@@ -120,6 +141,8 @@ def _result(result: CalibrationResult) -> dict[str, object]:
 
 def _pose(pose: Pose) -> dict[str, object]:
     values = {field.name: getattr(pose, field.name) for field in fields(Pose)}
+    if pose.posture is not None:
+        values["posture"] = asdict(pose.posture)
     return {name: value for name, value in values.items() if value is not None}
 
 

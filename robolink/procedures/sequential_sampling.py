@@ -109,10 +109,10 @@ def agreement(
     """
     known, half_mm, region_mm = "", fit.half95_mm, fit.region95_radius_mm
     if half_mm is not None:
-        known = tr("; {known} to +-{half:.3f} mm", known=method.known, half=half_mm)
+        known = tr("; {known} to ±{half:.3f} mm", known=method.known, half=half_mm)
         if region_mm is not None and region_mm > half_mm:
             known = tr(
-                "; {known} to +-{half:.3f} mm each, within {region:.3f} mm together",
+                "; {known} to ±{half:.3f} mm each, within {region:.3f} mm together",
                 known=method.known,
                 half=half_mm,
                 region=region_mm,

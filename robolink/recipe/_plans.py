@@ -62,6 +62,7 @@ def plan_of(
                 approach=tool.approach.pose if tool.approach else None,
                 retreat=tool.retreat.pose if tool.retreat else None,
                 pin=_pin(recipe),
+                gauge=station.gauge_on_record(),
                 length=parameters.length_rule(),
                 method=recipe.source.of_method.name,
                 station="" if needs.finds_pin or not station.learnt else station.id,

@@ -178,7 +178,9 @@ def test_on_a_terminal_a_no_writes_nothing(command, simulator, monkeypatch):
     monkeypatch.setattr(given_poses, "on_terminal", lambda: True)
     monkeypatch.setattr(given_poses, "agree", decline)
     assert command(*calibrate("--points", "901,902"))[0] == 9
-    assert asked == ["Write this to tool 1?"]
+    (question,) = asked
+    assert question.endswith("Write this to tool 1?")
+    assert "Nobody witnessed these touches" in question
     assert stored(simulator) == STORED
 
 
@@ -350,3 +352,15 @@ def test_an_impact_that_cannot_be_shown_says_why(command, words, code):
     found, _, err = command("impact", *words)
     assert found == code
     assert "Traceback" not in err
+
+
+def test_points_at_two_heights_are_refused_and_others_say_that_nobody_saw_them(command, simulator):
+    low = touching(-170)
+    simulator.machine.points.store(903, Point.at(Pose(low.x_mm, low.y_mm, low.z_mm - 50, -170)))
+    code, _, err = command(*calibrate("--points", "901,903", "--yes"))
+    assert code == 7
+    assert "Heights differ by 50.00 mm on one pin" in err
+    assert stored(simulator) == STORED
+    code, out, _ = command(*calibrate("--points", "901,902", "--yes", "--json"))
+    assert code == 0
+    assert "touches_not_witnessed" in json.loads(out)["fit"]["notes"]

@@ -131,7 +131,7 @@ def test_a_sensor_measures_at_its_station_and_nobody_is_asked(cell, method, stat
     assert "nobody touches anything" in done.err
     what, known = ("crossings", "X and Y are") if method == "beams" else ("touches", "Z is")
     assert f" {what} agree within 0.0" in done.err
-    assert f"; {known} known to +-0.0" in done.err
+    assert f"; {known} known to ±0.0" in done.err
     assert "One more, at " in done.err
     proof = "Touched again it is" if method == "z-touch" else "Turned about the new tip it drifts"
     assert proof in done.err

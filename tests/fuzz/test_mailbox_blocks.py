@@ -27,13 +27,14 @@ from robolink.protocols.mailbox import (
     encode_slot,
 )
 from robolink.standing import Effect
-from tests.fuzz._mutating import WORDS, edited_words, fuzzed, sealed
+from tests.fuzz._mutating import LREALS, WORDS, edited_words, fuzzed, sealed
 from tests.unit._mailbox_client import linked, owning
 from tests.unit.softmotion_driver._cell import Cell
 
 COMMAND_CRC, RESPONSE_CRC, SLOT_CRC = 61, 110, 34
 LONGEST_MM = 10_000.0
 TOOL = (12.5, -3.25, -20.0, 30.0, 0.0, 0.0)
+DYNAMICS = (100.0, 1000.0, 1000.0, 10000.0)
 
 RESPONSE = encode_response(Response(ack_head=7, tcp=TOOL, axes=TOOL))
 SLOT = encode_slot(Slot(counter=3, defined=True, tool=TOOL, name="nozzle"))
@@ -100,12 +101,15 @@ def test_a_plc_stays_sound_whatever_command_it_is_given(data):
         opcode = data.draw(st.sampled_from(Opcode))
         draft = client.command(
             opcode,
-            data.draw(st.sampled_from((0, 1, 3, 15))),
-            pose=TOOL,
-            dynamics=(100.0, 1000.0, 1000.0, 10000.0),
+            data.draw(st.sampled_from((0, 1, 3, 15, 16, -1))),
+            # One number that no machine has, mostly: whole random words are refused for another.
+            pose=with_one_of(TOOL, data.draw(st.integers(0, 11)), data.draw(LREALS)),
+            dynamics=with_one_of(DYNAMICS, data.draw(st.integers(0, 11)), data.draw(LREALS)),
         )
-        words = data.draw(edited_words(encode_command(draft, heartbeat=1)))
-        words[0] = draft.sequence  # or half of them would be none at all
+        words = list(encode_command(draft, heartbeat=1))
+        if data.draw(st.integers(0, 3)) == 0:
+            words = data.draw(edited_words(tuple(words)))
+        words[0] = draft.sequence  # or it would be no command at all
         client.link.write_command(sealed(words, COMMAND_CRC))
         client.wait(data.draw(st.sampled_from((0.0, 0.01, 0.6))))
         check_is_sound(client)
@@ -114,6 +118,11 @@ def test_a_plc_stays_sound_whatever_command_it_is_given(data):
     stranger.tell(Opcode.STOP)
     client.wait(2.0)
     assert client.now().active_movement == 0
+
+
+def with_one_of(numbers, at, other):
+    """Return numbers, one of them replaced; none where there is no such place."""
+    return tuple(other if place == at else number for place, number in enumerate(numbers))
 
 
 def check_is_sound(client):

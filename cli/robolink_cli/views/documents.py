@@ -1,6 +1,7 @@
 """What commands show: plain payloads, and the tables made from them."""
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -21,7 +22,8 @@ def offset_payload(offset: "ToolOffset | None") -> dict[str, float] | None:
 def pose_payload(pose: "Pose") -> dict[str, object]:
     """Return a pose with its units in the keys."""
     payload: dict[str, object] = dict(zip(COMPONENTS, pose.coordinates(), strict=True))
-    return payload | {"hand": pose.hand, "local": pose.local, "tool": pose.tool}
+    payload |= {"hand": pose.hand, "local": pose.local, "tool": pose.tool}
+    return payload if pose.posture is None else payload | {"posture": asdict(pose.posture)}
 
 
 def receipt_payload(receipt: "ToolReceipt") -> dict[str, object]:

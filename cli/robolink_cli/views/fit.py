@@ -40,7 +40,7 @@ def _interval(result: CalibrationResult) -> str:
     if not result.half_width95:
         return ""
     parts = (
-        f"{name[0].upper()} +-{half:.3f}"
+        f"{name[0].upper()} ±{half:.3f}"
         for name, half in zip(result.measured, result.half_width95, strict=True)
     )
     if result.interval_from == "resolution":
@@ -69,13 +69,17 @@ def _parts(result: CalibrationResult) -> str:
     budget = result.budget
     if budget is None:
         return ""
-    return tr(
+    told = tr(
         "standard uncertainty: from these touches {a:.4f} mm (type A), known otherwise "
         "{b:.4f} mm (type B), together {c:.4f} mm",
         a=budget.type_a_mm,
         b=budget.type_b_mm,
         c=budget.u_c_mm,
     )
+    if not budget.not_assessed:
+        return told
+    left_out = tr("; not assessed: {names}", names=", ".join(budget.not_assessed))
+    return told + left_out
 
 
 def _ways(result: CalibrationResult) -> str:

@@ -71,6 +71,7 @@ def check_frames(
             "mixed_local",
             tr("The poses are given in different local coordinate systems."),
             remedy=tr("Give all of them in local 0, the base, or say what the locals are."),
+            others=("local_pose",),
         )
     mixed = len({hand for hand in hands if hand is not None}) > 1
     if mixed and not allow_mixed_hand:
@@ -90,6 +91,7 @@ def _refuse_tools(tools: Collection[int]) -> None:
             "mixed_tool",
             tr("The poses were taken with different tools selected."),
             remedy=tr("Take all of them in Tool 0."),
+            others=("tool_pose",),
         )
     for tool in tools:
         if tool:
@@ -116,7 +118,8 @@ def keep_unmeasured(stored: ToolOffset | None, **measured: float) -> ToolOffset:
                 longest=longest,
                 limit=MAX_OFFSET_MM,
             ),
-            remedy=tr("Check that both poses touch the same point and are flange poses."),
+            remedy=tr("Check that all poses touch the same point, are flange poses and in mm."),
+            others=("suspect_units",),
         )
     return offset
 

@@ -25,8 +25,8 @@ FALSE_ALARM: Final = 0.01
 
 LEAST_TOUCHES: Final = 6
 
-NOTICEABLE_MM: Final = 0.002
-"""A smaller shift is left to rounding, whatever its F."""
+_ROUNDING_MM: Final = 1e-6
+"""A smaller shift is what floating point leaves of touches without scatter; it has no F."""
 
 _SEEN: Final = 1e-6
 """A split is judged when the design leaves so much of its column."""
@@ -140,7 +140,7 @@ def _gained(
 def _as_f(gained: Floats, shifts: Floats, whole: float, spare: int) -> Floats:
     left_over = np.maximum(whole - gained, 1e-300) / spare
     f: Floats = gained / shifts.shape[1] / left_over
-    small = np.einsum("ij,ij->i", shifts, shifts) < NOTICEABLE_MM**2
+    small = np.einsum("ij,ij->i", shifts, shifts) < _ROUNDING_MM**2
     f[small & (gained >= 0)] = 0.0
     f[gained < 0] = -1.0
     return f

@@ -18,10 +18,11 @@ from robolink.calibration import (
     PERSON_U_DRIFT_MM,
     PROBE_SIGMA_Z_MM,
     PROBE_U_DRIFT_MM,
+    FlangePlane,
 )
 from robolink.errors import CalibrationError
 from robolink.messages import tr
-from robolink.model import InputEdge, Path, Pose, ToolOffset, rotate_xy
+from robolink.model import InputEdge, Path, Pose, ToolOffset
 from robolink.procedures.approach import offset_z
 from robolink.procedures.pin.judging import require_touches, was_jogged
 from robolink.runner import Ask, Move, Notify, Procedure, TouchedAt
@@ -119,7 +120,7 @@ class PinTouches:
             CalibrationError: ``not_touched`` or ``typed_ahead``, with the tip drawn back.
         """
         self._taken.pop(key, None)
-        expected = _plain(expected)
+        expected = plain_pose(expected)
         x_mm, y_mm, z_mm = self._standoff(expected)
         beside = replace(expected, x_mm=expected.x_mm + x_mm, y_mm=expected.y_mm + y_mm)
         above_mm = self._plan.lift_mm if self._comes_down else z_mm
@@ -250,7 +251,7 @@ def fresh_seed() -> int:
 
 def lift_off(plan: TouchPlan, touch: Pose) -> Move:
     """Return the step that takes the tip off the pin, after which it may turn."""
-    return Move(offset_z(_plain(touch), plan.lift_mm), Path.STRAIGHT, tr("lift off the pin"))
+    return Move(offset_z(plain_pose(touch), plan.lift_mm), Path.STRAIGHT, tr("lift off the pin"))
 
 
 def touch_again(
@@ -279,16 +280,16 @@ def touch_again(
 
 def _turned(contact: Pose, u_deg: float, guess: ToolOffset) -> Pose:
     """Return the flange pose at ``u_deg`` that brings the tip, by ``guess``, to the same point."""
-    before_x, before_y = rotate_xy(guess.x_mm, guess.y_mm, contact.u_deg)
-    after_x, after_y = rotate_xy(guess.x_mm, guess.y_mm, u_deg)
+    turned = replace(plain_pose(contact), u_deg=u_deg)
+    tip = guess.components()[:3]
+    before_x, before_y = FlangePlane.of(contact).in_base(*tip)
+    after_x, after_y = FlangePlane.of(turned).in_base(*tip)
     return replace(
-        _plain(contact),
-        x_mm=contact.x_mm + before_x - after_x,
-        y_mm=contact.y_mm + before_y - after_y,
-        u_deg=u_deg,
+        turned, x_mm=contact.x_mm + before_x - after_x, y_mm=contact.y_mm + before_y - after_y
     )
 
 
-def _plain(pose: Pose) -> Pose:
+def plain_pose(pose: Pose) -> Pose:
     """Return a pose without how it was taken."""
-    return Pose(*pose.coordinates(), hand=pose.hand, local=pose.local, tool=pose.tool)
+    kept = Pose(*pose.coordinates(), hand=pose.hand, local=pose.local, tool=pose.tool)
+    return replace(kept, posture=pose.posture)

@@ -13,6 +13,7 @@ from robolink.nozzle_change import (
     height_is_known,
     require_inside,
     tip_sigma_mm,
+    touching_as_recorded,
 )
 from robolink.procedures import MeasurementContext, TouchPlan
 from robolink.stations import Found, Station, StationKind, find_stations, station_entry
@@ -50,6 +51,7 @@ def learn(
     with open_controller(context._replace(station=name), changes=not dry_run) as controller:
         known = _known(context, controller, name)
         tip = _tip(controller, tool)
+        touch = touching_as_recorded(controller, touch, name)
         here = flange_now(controller)
         course = learn_station(
             known, here=here, tool=tool, tip=tip, plan=replace(touch, nominal=True)

@@ -24,9 +24,6 @@ from robolink.messages import tr
 from robolink.protocols import spel
 from robolink.protocols.epson_text import Preference, parse_preferences
 
-_SIX_AXES = frozenset({5, 7})
-"""RobotType 5 is the six-axis arm, 7 the N series (docs/reference/spel.md 9)."""
-
 
 @dataclass(frozen=True, slots=True)
 class Robot:
@@ -38,7 +35,7 @@ class Robot:
     @property
     def six_axes(self) -> bool:
         """Whether V and W exist."""
-        return self.type_code in _SIX_AXES
+        return spel.tilts_tool(self.type_code)
 
 
 class RobotFacts:
@@ -64,7 +61,7 @@ class RobotFacts:
         if self._robot is None:
             with self._window.proving_ready(request):
                 number = spel.parse_integer(self._window.printed(spel.print_robot()))
-                kind = spel.parse_integer(self._window.printed(spel.print_robot_type()))
+                kind = spel.parse_robot_type(self._window.printed(spel.print_robot_type()))
             self._robot = Robot(number, kind)
         return self._robot
 

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from robolink.methods import LengthRule
     from robolink.nozzle_change import AcceptanceCriteria, ChangePlan, Limits, ToolPlan
     from robolink.procedures import TipSource
+    from robolink.stations import Gauge
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +85,13 @@ class CalibrationRequest:
         one = self.tool_plan(source, verify=self.verify)
         return ChangePlan((one,), limits=self.limits, ask_before_write=not self.yes)
 
+    def _gauge(self) -> "Gauge | None":
+        """Return the gauge that the cell file puts at the station, if there is one."""
+        from robolink.stations import find_stations
+
+        station = find_stations(self.context.cell, ()).get(self.context.station)
+        return None if station is None else station.gauge_on_record()
+
     def tool_plan(self, source: "TipSource", *, verify: bool) -> "ToolPlan":
         """Return what is to be done about the tool."""
         from robolink.nozzle_change import ToolPlan
@@ -94,6 +102,7 @@ class CalibrationRequest:
             self.criteria,
             verify=verify,
             pin=self.pin,
+            gauge=self._gauge(),
             method=self.method,
             length=self.length,
             station=self.station,

@@ -72,6 +72,8 @@ class ToolPlan:
             shorter: ``ask``, write Z by ``difference``, or ``keep`` it.
         gauge: The gauge that is measured against; ``None`` for none, or none that is known.
         method: Name of the calibration method, for the record; empty for what the result says.
+        station: Name of the station on whose record the measurement rests; empty where it rests on
+            none, because it finds the station itself or is told where it is.
     """
 
     tool: int
@@ -85,6 +87,7 @@ class ToolPlan:
     gauge: Gauge | None = None
     length: LengthRule = "ask"
     method: str = ""
+    station: str = ""
 
     def named(self, result: CalibrationResult) -> CalibrationResult:
         """Return a result under the name of the method, whichever solver it borrows."""

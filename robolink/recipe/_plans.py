@@ -50,7 +50,7 @@ def plan_of(
         accepted_with=way(Way.ACCEPT_JUMP),
         unattended=not ask_before_write,
     )
-    safe = recipe.poses.safe
+    safe, needs = recipe.poses.safe, recipe.source.of_method.needs
     return ChangePlan(
         tuple(
             ToolPlan(
@@ -65,6 +65,7 @@ def plan_of(
                 gauge=station.gauge_on_record(),
                 length=parameters.length_rule(),
                 method=recipe.source.of_method.name,
+                station="" if needs.finds_pin or not station.learnt else station.id,
             )
             for tool in recipe.tools
         ),

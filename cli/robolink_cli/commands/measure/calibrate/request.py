@@ -37,6 +37,7 @@ class CalibrationRequest:
         finds_pin: Whether the method finds the pin itself, so that it need not be known.
         length: What is done where the touches show that the tip is longer or shorter.
         method: Name of the method.
+        station: Name of the station on whose record the measurement rests; empty for none.
     """
 
     context: CliContext
@@ -53,6 +54,7 @@ class CalibrationRequest:
     finds_pin: bool = True
     length: "LengthRule" = "ask"
     method: str = ""
+    station: str = ""
 
     def at(self, station: str) -> "CalibrationRequest":
         """Return the same at a station of that name, which goes on record."""
@@ -103,6 +105,7 @@ class CalibrationRequest:
             gauge=self._gauge(),
             method=self.method,
             length=self.length,
+            station=self.station,
         )
 
 

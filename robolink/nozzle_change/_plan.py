@@ -21,7 +21,7 @@ from robolink.procedures import (
     TouchPlan,
 )
 from robolink.runner import RunSettings, inputs_of
-from robolink.stations import Gauge
+from robolink.stations import Gauge, Station
 
 
 def usual_box(sideways_mm: float = 150.0) -> WorkBox:
@@ -70,6 +70,7 @@ class ToolPlan:
         pin: Name of the station where a pin is touched; empty for none, or none that is kept.
         length: What is done where the heights of the touches show that the tip is longer or
             shorter: ``ask``, write Z by ``difference``, or ``keep`` it.
+        stated_pin: The pin as the cell file has it, ``None`` where it says nothing.
         gauge: The gauge that is measured against; ``None`` for none, or none that is known.
         method: Name of the calibration method, for the record; empty for what the result says.
     """
@@ -82,6 +83,7 @@ class ToolPlan:
     approach: Pose | None = None
     retreat: Pose | None = None
     pin: str = ""
+    stated_pin: Station | None = None
     gauge: Gauge | None = None
     length: LengthRule = "ask"
     method: str = ""

@@ -106,6 +106,17 @@ def test_exact_poses_show_no_order_and_five_touches_cannot():
     assert told(solve_n_angle(PLAIN[:5])).run_order is None
 
 
+def test_a_shift_too_small_to_matter_has_its_figure_and_no_name():
+    moved = [
+        replace(pose, x_mm=pose.x_mm + (0.001 if k > 3 else 0.0)) for k, pose in enumerate(PLAIN)
+    ]
+    result = solve_n_angle(moved)
+    order = order_of(result)
+    assert order.step_f > 100 * order.step_f_limit
+    assert order.step_mm[0] == pytest.approx(0.001, rel=0.05)
+    assert result.warnings == ()
+
+
 def test_the_limits_are_shared_among_the_splits():
     found, spatial = order_of(solve_n_angle(PLAIN)), order_of(solve_pivot(SPATIAL))
     assert found.step_f_limit == pytest.approx(fisher.ppf(1 - 0.01 / 7, 2, 10))

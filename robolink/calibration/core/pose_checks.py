@@ -44,31 +44,37 @@ def check_poses(
     refuse_metres(all(abs(p.x_mm) < METRES_BELOW and abs(p.y_mm) < METRES_BELOW for p in poses))
     tools = {pose.tool for pose in poses}
     one = of_one_tip and len(tools - {None}) == 1
-    found = {(pose.hand, pose.local, None if one else pose.tool) for pose in poses}
-    return check_frames(found, allow_mixed_hand)
+    hands, locals_ = {pose.hand for pose in poses}, {pose.local for pose in poses}
+    return check_frames(hands, locals_, {None} if one else tools, allow_mixed_hand)
 
 
 def check_frames(
-    found: Collection[tuple[Hand | None, int, int | None]], allow_mixed_hand: bool
+    hands: Collection[Hand | None],
+    locals_: Collection[int],
+    tools: Collection[int | None],
+    allow_mixed_hand: bool,
 ) -> tuple[str, ...]:
     """Refuse poses of frames or arms that do not belong together; return lesser doubts.
 
     Args:
-        found: Hand, local and tool of the poses, each combination once.
+        hands: Of the poses, each once; ``None`` where a pose tells none.
+        locals_: Their local coordinate systems, each once.
+        tools: Their tools, each once; ``None`` where a pose tells none.
         allow_mixed_hand: Whether different hands are a doubt only.
 
     Raises:
         CalibrationError: ``mixed_local``, ``mixed_tool``, ``tool_pose`` or ``mixed_hand``.
     """
-    hands = {hand for hand, _, _ in found if hand is not None}
-    _refuse_tools({tool for _, _, tool in found if tool is not None})
-    if len({local for _, local, _ in found}) > 1:
+    _refuse_tools({tool for tool in tools if tool is not None})
+    if len(locals_) > 1:
         raise CalibrationError(
             "mixed_local",
             tr("The poses are given in different local coordinate systems."),
             remedy=tr("Give all of them in local 0, the base, or say what the locals are."),
+            others=("local_pose",),
         )
-    if len(hands) > 1 and not allow_mixed_hand:
+    mixed = len({hand for hand in hands if hand is not None}) > 1
+    if mixed and not allow_mixed_hand:
         raise CalibrationError(
             "mixed_hand",
             tr("The poses were taken with different arm configurations."),
@@ -76,7 +82,7 @@ def check_frames(
                 "Take all of them with the same hand, so that errors of the arm lengths cancel."
             ),
         )
-    return ("mixed_hand",) if len(hands) > 1 else ()
+    return ("mixed_hand",) if mixed else ()
 
 
 def _refuse_tools(tools: Collection[int]) -> None:
@@ -85,6 +91,7 @@ def _refuse_tools(tools: Collection[int]) -> None:
             "mixed_tool",
             tr("The poses were taken with different tools selected."),
             remedy=tr("Take all of them in Tool 0."),
+            others=("tool_pose",),
         )
     for tool in tools:
         if tool:
@@ -111,7 +118,8 @@ def keep_unmeasured(stored: ToolOffset | None, **measured: float) -> ToolOffset:
                 longest=longest,
                 limit=MAX_OFFSET_MM,
             ),
-            remedy=tr("Check that both poses touch the same point and are flange poses."),
+            remedy=tr("Check that all poses touch the same point, are flange poses and in mm."),
+            others=("suspect_units",),
         )
     return offset
 

@@ -48,6 +48,3 @@ def left_out(impact: Impact) -> Iterator[str]:
     if impact.other_local:
         named = ", ".join(f"P{n} (local {local})" for n, local in impact.other_local.items())
         yield tr("In another local, left out: {points}.", points=named)
-    if impact.tilted:
-        named = ", ".join(f"P{number}" for number in impact.tilted)
-        yield tr("Tilted (V or W not 0), left out: {points}.", points=named)

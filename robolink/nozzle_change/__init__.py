@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from robolink.nozzle_change._plan import ChangePlan as ChangePlan
     from robolink.nozzle_change._plan import Limits as Limits
     from robolink.nozzle_change._plan import ToolPlan as ToolPlan
+    from robolink.nozzle_change._plan import clearance_too_small as clearance_too_small
     from robolink.nozzle_change._plan import require_contact_input as require_contact_input
     from robolink.nozzle_change._plan import require_ready as require_ready
     from robolink.nozzle_change._plan import usual_box as usual_box
@@ -38,7 +39,8 @@ __getattr__ = lazy_exports(
         "_change": "Earlier NozzleChange",
         "_length": "known_height",
         "_listener": "Listener Moment",
-        "_plan": "ChangePlan Limits ToolPlan require_contact_input require_ready usual_box",
+        "_plan": "ChangePlan Limits ToolPlan clearance_too_small require_contact_input "
+        "require_ready usual_box",
         "_preview": "PlannedStep flange_now foresee preview require_inside",
         "_proposal": "ChangeReport Proposal ToolReport LimitVerdict",
         "_records": "touches_made",

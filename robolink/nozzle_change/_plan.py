@@ -158,6 +158,16 @@ def _tip_about(flange: Pose, offset: ToolOffset) -> tuple[float, float]:
     return above_mm, math.sqrt(max(0.0, beside_mm2))
 
 
+def clearance_too_small(clearance_mm: float, limit_mm: float) -> str:
+    """Return why a clearance below the largest change that is believed is refused."""
+    return tr(
+        "The robot would stop {clearance:g} mm above the pin, and a new tip may be {limit:g} mm "
+        "longer.",
+        clearance=clearance_mm,
+        limit=limit_mm,
+    )
+
+
 def require_clearance(plan: ChangePlan) -> None:
     """Refuse a plan in which a new tip could meet the pin before the person takes over.
 
@@ -172,13 +182,7 @@ def require_clearance(plan: ChangePlan) -> None:
         if clearance_mm is None or clearance_mm >= one.criteria.max_change_mm:
             continue
         raise ConfigError(
-            tr(
-                "The robot would stop {clearance:g} mm above the pin, and the new tip of tool "
-                "{tool} may be {limit:g} mm longer.",
-                clearance=clearance_mm,
-                tool=one.tool,
-                limit=one.criteria.max_change_mm,
-            ),
+            clearance_too_small(clearance_mm, one.criteria.max_change_mm),
             remedy=tr(
                 "Nothing was moved. Use a clearance of {limit:g} mm or more, or allow less change.",
                 limit=one.criteria.max_change_mm,

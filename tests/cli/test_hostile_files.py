@@ -29,6 +29,7 @@ CONTENTS = {
     "many keys": b"".join(b"a%d = 1\n" % number for number in range(400)),
     "many digits": b'{"schema": ' + b"1" * 100_000 + b"}",
     "digits of a register": b"name,address\nTool1_X," + b"1" * 5000 + b"\n",
+    "digits of a name": b"name,address\nTool" + b"1" * 5000 + b"_X,1\n",
     "numbers that are none": b'{"schema": "robolink/backup/1", "tools": NaN, "tools": 1e999}',
     "control characters": b"\x1b]0;hostile\x07\x1b[2J = 1\n",
     "too long": b"# comment\n" * (1 + 4_000_000 // 10),

@@ -1,6 +1,7 @@
 """EPSON remote control, with requests and answers that are nearly right."""
 
 import math
+import re
 from contextlib import suppress
 
 import pytest
@@ -198,3 +199,22 @@ def test_the_driver_claims_nothing_that_is_not_so_whatever_is_answered(data, at)
     elif written:
         assert said.controller_state.effect is not Effect.UNCHANGED
     assert written or held == OLD
+
+
+LONG = "7" * 5000
+
+
+@pytest.mark.parametrize("text", [*PRINTED, "00100000001,4002"])
+def test_a_number_of_thousands_of_digits_is_no_number(text):
+    """Python refuses to read one, with an error that is none of ours."""
+    for digits in re.finditer(r"\d+", text):
+        longer = text[: digits.start()] + LONG + text[digits.end() :]
+        for parse in PARSERS:
+            with suppress(RemoteProtocolError):
+                parse(longer)
+
+
+@pytest.mark.parametrize("answer", ["!Execute,99", "#GetStatus,00100000001,0000", "#GetIO,1"])
+def test_an_answer_with_a_number_of_thousands_of_digits_is_refused(answer):
+    head, _, _ = answer.rpartition(",")
+    events_of(EpsonTextCodec(Role.HOST), f"{head},{LONG}\r\n".encode())

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from robolink.nozzle_change._plan import ChangePlan as ChangePlan
     from robolink.nozzle_change._plan import Limits as Limits
     from robolink.nozzle_change._plan import ToolPlan as ToolPlan
+    from robolink.nozzle_change._plan import require_contact_input as require_contact_input
     from robolink.nozzle_change._plan import require_ready as require_ready
     from robolink.nozzle_change._plan import usual_box as usual_box
     from robolink.nozzle_change._preview import PlannedStep as PlannedStep
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from robolink.nozzle_change._proposal import LimitVerdict as LimitVerdict
     from robolink.nozzle_change._proposal import Proposal as Proposal
     from robolink.nozzle_change._proposal import ToolReport as ToolReport
+    from robolink.nozzle_change._records import touches_made as touches_made
     from robolink.nozzle_change._seating import touching_as_recorded as touching_as_recorded
 
 __getattr__ = lazy_exports(
@@ -36,9 +38,10 @@ __getattr__ = lazy_exports(
         "_change": "Earlier NozzleChange",
         "_length": "height_is_known known_height tip_sigma_mm",
         "_listener": "Listener Moment",
-        "_plan": "ChangePlan Limits ToolPlan require_ready usual_box",
+        "_plan": "ChangePlan Limits ToolPlan require_contact_input require_ready usual_box",
         "_preview": "PlannedStep flange_now foresee preview require_inside",
         "_proposal": "ChangeReport Proposal ToolReport LimitVerdict",
+        "_records": "touches_made",
         "_seating": "touching_as_recorded",
     },
 )

@@ -4,7 +4,7 @@ import math
 from dataclasses import asdict, dataclass, field, replace
 
 from robolink.calibration import CalibrationResult
-from robolink.errors import ConfigError
+from robolink.errors import ConfigError, RejectedError
 from robolink.messages import tr
 from robolink.methods import LengthRule, TwoPoseSource
 from robolink.model import Controller, Pose, ToolOffset, WorkBox, plain_offset
@@ -18,8 +18,9 @@ from robolink.procedures import (
     StopsAbovePin,
     TipSource,
     TouchesPin,
+    TouchPlan,
 )
-from robolink.runner import RunSettings
+from robolink.runner import RunSettings, inputs_of
 from robolink.stations import Gauge
 
 
@@ -183,12 +184,54 @@ def require_clearance(plan: ChangePlan) -> None:
         )
 
 
-def require_ready(plan: ChangePlan) -> None:
-    """Find out whether the cameras of a plan are there, before anything moves.
+def require_inputs(controller: Controller, plan: ChangePlan) -> None:
+    """Refuse a plan whose touches an input is to show, where there are no inputs; asks nothing.
 
     Raises:
-        CalibrationError, ConfigError, ConnectError: As :meth:`RequiresSensor.require_ready`.
+        ConfigError: The controller has no inputs.
     """
+    for one in plan.tools:
+        if isinstance(one.source, TouchesPin) and one.source.touch.contact is not None:
+            inputs_of(controller)
+
+
+def require_contact_input(controller: Controller, touch: TouchPlan) -> None:
+    """Read the input that is to show contact, so that one that is not there is known at once.
+
+    Raises:
+        ConfigError: The controller has no inputs, or refuses to read this one.
+    """
+    if touch.contact is None:
+        return
+    inputs = inputs_of(controller)
+    try:
+        inputs.read_input(touch.contact.number)
+    except (ConfigError, RejectedError) as error:
+        raise ConfigError(
+            tr(
+                "Input {number}, which is to show contact, cannot be read: {cause}",
+                number=touch.contact.number,
+                cause=error.what,
+            ),
+            remedy=tr("Nothing was moved. Give the number of an input that the controller has."),
+        ) from error
+
+
+def require_contacts(controller: Controller, plan: ChangePlan) -> None:
+    """Read all inputs of a plan that are to show contact; see :func:`require_contact_input`."""
+    for one in plan.tools:
+        if isinstance(one.source, TouchesPin):
+            require_contact_input(controller, one.source.touch)
+
+
+def require_ready(controller: Controller, plan: ChangePlan) -> None:
+    """Find out whether cameras and contact inputs of a plan are there, before anything moves.
+
+    Raises:
+        CalibrationError, ConfigError, ConnectError: As :meth:`RequiresSensor.require_ready` and
+            :func:`require_contact_input`.
+    """
+    require_contacts(controller, plan)
     for one in plan.tools:
         if isinstance(one.source, RequiresSensor):
             one.source.require_ready()

@@ -124,7 +124,7 @@ class RecipeRun:
                     self._references[tool] = reference
             # One without a reference makes all of them wait: all are written, or none.
             self.takes_reference = len(self._references) < len(stored)
-        require_ready(self.plan)
+        require_ready(controller, self.plan)
         require_inside(controller, preview(controller, self.plan))
 
     def run(self) -> ChangeReport:

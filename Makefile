@@ -67,17 +67,25 @@ docs: $(VENV)/.installed-docs ## Build the pages and the API into build/docs/htm
 
 .PHONY: messages
 messages: $(VENV)/.installed-dev ## Collect every sentence shown to a person.
-	$(BIN)/pybabel --quiet extract --keywords=tr --no-default-keywords --no-location \
+	$(BIN)/pybabel --quiet extract --mapping=pyproject.toml --keywords=tr --no-default-keywords --no-location \
 		--omit-header --sort-output --width=100 --output-file=$(POT) \
 		robolink cli/robolink_cli simulators/robolink_simulators
 
 .PHONY: build
-build: $(VENV)/.installed-dev ## Build the wheel and the source archive into dist/.
+build: $(VENV)/.installed-dev ## Build wheel, source archive, bill of materials, licences: dist/.
 	$(BIN)/python -m hatchling build -t sdist -t wheel
+	$(BIN)/python tools/materials.py dist
+
+.PHONY: lock
+lock: $(VENV)/.installed-dev ## Name every package by version and hash: requirements*.lock.
+	$(BIN)/python tools/lock.py
 
 # Of every run-time dependency a wheel is taken, none is built: the offline PC has no compiler.
+# Which one, requirements.lock says; `make wheelhouse FROM=ranges` takes the newest that fit.
+FROM := requirements.lock
 GATHER = $(BIN)/python -m pip download --quiet --only-binary=:all: --python-version=3.11 \
-	--implementation=cp $(WHEELHOUSE)/robolink-*.whl
+	--implementation=cp $(if $(filter ranges,$(FROM)),$(WHEELHOUSE)/robolink-*.whl,--no-deps \
+	--require-hashes --requirement $(FROM))
 
 .PHONY: wheelhouse
 wheelhouse: $(VENV)/.installed-dev ## Gather all wheels for a PC without network: linux, win_amd64.
@@ -85,6 +93,8 @@ wheelhouse: $(VENV)/.installed-dev ## Gather all wheels for a PC without network
 	$(BIN)/python -m hatchling build -t wheel -d $(WHEELHOUSE)
 	$(GATHER) --platform=manylinux2014_x86_64 --dest=$(WHEELHOUSE)/linux
 	$(GATHER) --platform=win_amd64 --dest=$(WHEELHOUSE)/win_amd64
+	cp $(WHEELHOUSE)/robolink-*.whl $(WHEELHOUSE)/linux
+	cp $(WHEELHOUSE)/robolink-*.whl $(WHEELHOUSE)/win_amd64
 	rm $(WHEELHOUSE)/robolink-*.whl
 
 .PHONY: clean
@@ -93,8 +103,11 @@ clean: ## Remove everything that was made.
 
 # A stamp is written last, so that a set-up that was interrupted is made again.
 # What is never imported need not be compiled: Python does the rest at the first import.
+# With LOCKED, as in .ci/run, it is byte for byte what requirements-dev.lock names.
+LOCKED ?=
 $(VENV)/.installed-dev: pyproject.toml $(VENV)/.created
-	$(BIN)/python -m pip install --quiet --no-compile --editable '.[dev]'
+	$(if $(LOCKED),LOCKED=$(LOCKED) tools/install-locked $(BIN)/python,$(BIN)/python -m pip \
+		install --quiet --no-compile --editable '.[dev]')
 	touch $@ $(VENV)/.installed
 
 $(VENV)/.installed-docs: $(VENV)/.installed-dev

@@ -2,6 +2,7 @@
 
 from benchmarks.exchange import measure_exchange
 from benchmarks.journal import measure_journal
+from benchmarks.kinematics import measure_kinematics
 from benchmarks.mailbox import measure_mailbox
 from benchmarks.nozzle_change import measure_nozzle_change
 from benchmarks.solvers import measure_solvers
@@ -23,6 +24,7 @@ def main() -> None:
             *measure_start_up(),
             *measure_stopping(),
             *measure_solvers(),
+            *measure_kinematics(),
         ]
     )
 

@@ -7,16 +7,44 @@ import sys
 
 import pytest
 
+from tests._canary import Watch, install
+
 # Before anything imports numpy: threads for matrices of six rows cost far more than they bring,
 # the more so the more cores a machine has.
 for _library in ("OPENBLAS", "OMP", "MKL"):
     os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
 
 
+CANARIES = Watch()
+"""Every password of the test that runs, and what it made robolink say."""
+
+
 def pytest_sessionstart():
     """Let Ctrl-C interrupt: a shell starts what runs in the background with it ignored."""
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
+    install(CANARIES)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_teardown(item):
+    """Hear what a test left unread, before its capture ends."""
+    captured = item.funcargs.get("capsys")
+    if captured is not None and CANARIES.passwords:
+        captured.readouterr()
+
+
+@pytest.fixture(autouse=True)
+def no_password_shows(request):
+    """Fail a test whose password stands in anything that was written, said or logged."""
+    CANARIES.begin()
+    yield
+    if not CANARIES.passwords:
+        return
+    given = request.node.funcargs
+    folders = {given[name] for name in ("tmp_path", "robolink_state") if name in given}
+    if leaks := CANARIES.leaks(*folders):
+        pytest.fail("a password shows: " + ", ".join(leaks), pytrace=False)
 
 
 def pytest_collection_modifyitems(config, items):

@@ -47,11 +47,12 @@ if TYPE_CHECKING:
     from robolink.calibration.core.frames import seen_from as seen_from
     from robolink.calibration.core.frames import tilted_flange_pose as tilted_flange_pose
     from robolink.calibration.core.frames import tilted_from as tilted_from
+    from robolink.calibration.core.frames import tip_pose as tip_pose
     from robolink.calibration.core.frames import toward_zero as toward_zero
     from robolink.calibration.core.least_squares import linear_fit as linear_fit
-    from robolink.calibration.core.planar_checks import MIN_ROTATION_DEG as MIN_ROTATION_DEG
-    from robolink.calibration.core.planar_checks import angle_spread_deg as angle_spread_deg
-    from robolink.calibration.core.planar_checks import planar_sigma_gain as planar_sigma_gain
+    from robolink.calibration.core.pose_checks import MIN_ROTATION_DEG as MIN_ROTATION_DEG
+    from robolink.calibration.core.pose_checks import angle_spread_deg as angle_spread_deg
+    from robolink.calibration.core.pose_checks import planar_sigma_gain as planar_sigma_gain
     from robolink.calibration.core.pose_suggestion import PoseLimits as PoseLimits
     from robolink.calibration.core.pose_suggestion import PosePlan as PosePlan
     from robolink.calibration.core.pose_suggestion import precise_enough as precise_enough
@@ -137,6 +138,7 @@ if TYPE_CHECKING:
     from robolink.calibration.quality.control_chart import control_chart as control_chart
     from robolink.calibration.quality.doubts import doubt_sentence as doubt_sentence
     from robolink.calibration.quality.doubts import known_doubts as known_doubts
+    from robolink.calibration.quality.doubts import order_in_words as order_in_words
     from robolink.calibration.quality.gauge_study import GaugeStudy as GaugeStudy
     from robolink.calibration.quality.gauge_study import gauge_study as gauge_study
     from robolink.calibration.quality.impact import Impact as Impact
@@ -222,8 +224,8 @@ __getattr__ = lazy_exports(
         "core.dispersion": "require_positive",
         "core.evidence": "FitEvidence RunOrder",
         "core.frames": "flange_of flange_pose flange_poses in_base seen_from tilted_flange_pose "
-        "tilted_from toward_zero",
-        "core.planar_checks": "MIN_ROTATION_DEG angle_spread_deg planar_sigma_gain",
+        "tilted_from tip_pose toward_zero",
+        "core.pose_checks": "MIN_ROTATION_DEG angle_spread_deg planar_sigma_gain",
         "core.pose_suggestion": "PoseLimits PosePlan precise_enough select_poses sigma_gain "
         "suggest_poses",
         "core.result": "CalibrationResult Drift DriftVerdict GUARD_FACTOR PERSON_U_DRIFT_MM "
@@ -247,7 +249,7 @@ __getattr__ = lazy_exports(
         "pin.two_pose": "solve_two_pose two_of",
         "quality.control_chart": "USUAL_LAMBDA USUAL_WIDTH ControlChart control_chart",
         "quality.gauge_study": "GaugeStudy gauge_study",
-        "quality.doubts": "doubt_sentence known_doubts",
+        "quality.doubts": "doubt_sentence known_doubts order_in_words",
         "quality.impact": "Impact PointImpact impact_on",
         "quality.moved_station": "StationShift TipShift judge_shifts",
         "quality.station_part": "SharedStation StationPart shared_station with_station",

@@ -13,8 +13,11 @@ import numpy as np
 from robolink.calibration.beam_lines import Beam, Crossing, check_crossings, require_crossed
 from robolink.calibration.beam_uncertainty import beams_part
 from robolink.calibration.core.least_squares import LinearFit, linear_fit
-from robolink.calibration.core.planar_checks import MIN_ROTATION_DEG, angle_spread_deg
-from robolink.calibration.core.pose_checks import keep_unmeasured
+from robolink.calibration.core.pose_checks import (
+    MIN_ROTATION_DEG,
+    angle_spread_deg,
+    keep_unmeasured,
+)
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.core.robust import Floats
 from robolink.calibration.flange_checks import require_flange_in_base, with_height_error

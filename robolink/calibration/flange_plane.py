@@ -11,12 +11,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from robolink.calibration.core.pose_checks import UPRIGHT_WITHIN_DEG
 from robolink.errors import CalibrationError
 from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
-
-UPRIGHT_WITHIN_DEG = 0.01
-"""A lean below this is noise of the printed angles: at 120 mm it shifts a tip by 0.02 mm."""
 
 LARGEST_LEAN_DEG = 10.0
 """Beyond this an error of the tip's height reaches X and Y by more than a sixth."""

@@ -13,8 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from robolink.calibration.core.budget import DIVISORS, BudgetRow, UncertaintyBudget
-from robolink.calibration.core.planar_checks import require_poses
-from robolink.calibration.core.pose_checks import keep_unmeasured, require_finite
+from robolink.calibration.core.pose_checks import keep_unmeasured, require_finite, require_poses
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.flange_plane import FlangePlane, TipHeight, solvable_planes
 from robolink.calibration.quality.fit_quality import judged

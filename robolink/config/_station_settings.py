@@ -1,5 +1,6 @@
 """What one ``[cells.NAME.stations.ID]`` table may say, by the kind of station."""
 
+from datetime import date
 from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
@@ -23,6 +24,7 @@ class _Station(BaseModel):
         x_mm, y_mm, z_mm: Where it is, base; once it is learnt, the journal knows better.
         sigma_mm: Standard deviation of each of them.
         gauge: Id of the gauge or pin that stands there, as on its certificate.
+        gauge_due: Until when its calibration holds, as its certificate says.
         check_every_days: After so many days it has to be learnt again.
         notes: For people.
     """
@@ -34,6 +36,7 @@ class _Station(BaseModel):
     z_mm: float | None = None
     sigma_mm: Positive | None = None
     gauge: Text | None = None
+    gauge_due: date | None = None
     check_every_days: Positive | None = None
     notes: str | None = None
 

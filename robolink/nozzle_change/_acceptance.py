@@ -7,6 +7,7 @@ from robolink.calibration import (
     CalibrationResult,
     DriftVerdict,
     VerifyResult,
+    order_in_words,
     require_shrinking,
     writes_refused_unattended,
 )
@@ -58,8 +59,12 @@ class AcceptanceCriteria:
         if doubt:
             raise CalibrationError(
                 doubt,
-                tr("The touches do not belong together, and nobody is asked before the write."),
-                remedy=tr("Take the run again, or let a person look at it."),
+                _out_of_order(result)
+                or tr("The touches scatter far more than the stated standard deviation says."),
+                remedy=tr(
+                    "Nobody is asked before the write, so it is refused. Take the run again, or "
+                    "let a person look at it."
+                ),
             )
         for verdict in self._of_fit(result):
             if not verdict.passed:
@@ -138,7 +143,7 @@ class AcceptanceCriteria:
         if self.max_residual_mm is not None:
             yield tr("residual up to {limit:g} mm", limit=self.max_residual_mm)
         if self.interval_mm is not None:
-            yield tr("95 % interval up to +-{limit:g} mm", limit=self.interval_mm)
+            yield tr("95 % interval up to ±{limit:g} mm", limit=self.interval_mm)
 
     def _of_fit(self, result: CalibrationResult) -> Iterator[LimitVerdict]:
         for code, name, found_mm, limit_mm in (
@@ -156,14 +161,16 @@ class AcceptanceCriteria:
 
 
 def _sureness(result: CalibrationResult) -> tuple[str, float | None]:
-    """Return what a limit of the process is compared with, and its name.
+    """Return what a limit of the process is compared with, and its name."""
+    region = result.region95_radius_mm is not None
+    name = tr("The radius of the 95 % region") if region else tr("Half the 95 % interval")
+    return name, result.known_within_mm
 
-    A nozzle misses in the plane, not along an axis: two intervals of 95 % hold both coordinates in
-    90 to 92 % only (docs/reference/evidence.md 7).
-    """
-    if result.region95_radius_mm is not None:
-        return tr("The radius of the 95 % region"), result.region95_radius_mm
-    return tr("Half the 95 % interval"), result.half95_mm
+
+def _out_of_order(result: CalibrationResult) -> str:
+    """Return what moved while the touches were made; empty where nothing did."""
+    order = result.evidence.run_order if result.evidence is not None else None
+    return order_in_words(order) if order is not None else ""
 
 
 def require_proved(result: VerifyResult, identity: str) -> None:

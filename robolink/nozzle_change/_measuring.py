@@ -2,16 +2,18 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 
 from robolink.errors import CalibrationError, ConfigError, RobolinkError
 from robolink.messages import tr
-from robolink.model import NewEntry, Pose
+from robolink.model import EntryKind, NewEntry, Pose
 from robolink.nozzle_change._listener import Listener, Moment
 from robolink.nozzle_change._plan import ToolPlan
 from robolink.nozzle_change._proposal import Proposal
 from robolink.nozzle_change._records import calibration_entry, decision_entry, refusal_entry
 from robolink.procedures import MeasurementContext, approach_path
 from robolink.runner import Ask, Confirm, Look, Seek, StepDone
+from robolink.stations import find_stations
 
 
 class Measuring:
@@ -25,6 +27,7 @@ class Measuring:
     def __init__(self, context: MeasurementContext, listener: Listener) -> None:
         self._context = context
         self._listener = listener
+        self._facts = context.controller.facts()
 
     def propose(self, plan: ToolPlan) -> Proposal:
         """Measure one tool, again where the plan allows it, and put it on record.
@@ -49,7 +52,8 @@ class Measuring:
         controller = self._context.controller
         controller.tools.select(0)
         here = controller.groups[0].pose()
-        target = Pose(*pose.coordinates(), hand=here.hand, local=here.local, tool=0)
+        there = Pose(*pose.coordinates(), tool=0, local=here.local)
+        target = replace(there, hand=here.hand, posture=here.posture)
         self._context.run(approach_path(target, here=here, purpose=purpose))
 
     def _attempt(self, plan: ToolPlan) -> Proposal:
@@ -60,12 +64,34 @@ class Measuring:
         with self._watched(plan):
             result = plan.named(plan.source.measure(context, tool, before))
             plan.criteria.judge_fit(result)
-            proposal = self._listener.adjusted(Proposal(tool, before, result), context)
-        entry = calibration_entry(proposal, plan.criteria, source=plan.source.sentence)
+            rests_on = self._station_record(plan.station)
+            fresh = Proposal(tool, before, result, record=rests_on, kept_record=rests_on)
+            proposal = self._listener.adjusted(fresh, context)
+        entry = calibration_entry(
+            proposal,
+            plan.criteria,
+            source=plan.source.sentence,
+            facts=self._facts,
+            gauge=plan.gauge,
+        )
         context.controller.outcomes.append(entry)
         self._listener.moment(Moment.AFTER_MEASURE, context, tool)
         self.go_to(plan.retreat, tr("go away from where tool {tool} is measured", tool=tool))
         return proposal
+
+    def _station_record(self, name: str) -> dict[str, object]:
+        """Return which entry of the journal says where the station is, so that results compare.
+
+        Tools that were measured by one entry share its error, and differ by their touches alone
+        (docs/reference/evidence.md 12).
+        """
+        if not name:
+            return {}
+        entries = self._context.controller.outcomes.recorded(kinds=(EntryKind.STATION,))
+        known = find_stations(None, entries).get(name)
+        if known is None or not known.learnt:
+            return {}
+        return {"station_record": {"station": name, "entry": known.entry, "at": known.found_at}}
 
     @contextmanager
     def _watched(self, plan: ToolPlan) -> Iterator[None]:

@@ -15,6 +15,7 @@ from robolink.messages import tr
 from robolink.methods import AnyMethod, all_methods
 from robolink.model import Pose, ToolOffset
 from robolink.nozzle_change._proposal import Proposal
+from robolink.nozzle_change._seating import TouchWitness, touched_by
 from robolink.stations import Found, Station, StationKind
 
 
@@ -157,15 +158,16 @@ def touch_details(station: str, proposal: Proposal) -> dict[str, object]:
         "full_sigma_mm": chain.full_sigma_mm,
         "touch_sigma_mm": _touch_sigma_mm(result),
         # Tilted touches have Z from the fit, and their heights say nothing about it.
-        **({} if "z_mm" in result.measured else _scatter(heights)),
+        **({} if "z_mm" in result.measured else _scatter(heights, touched_by(result.inputs))),
         "touches": proposal.pin_touches or len(result.inputs) - len(result.rejected),
     }
 
 
-def _scatter(heights_mm: Sequence[float]) -> dict[str, object]:
+def _scatter(heights_mm: Sequence[float], by: TouchWitness) -> dict[str, object]:
     """Return how much the heights of one run differ, for those who pool it with others."""
     mean = fmean(heights_mm)
     return {
         "heights_mm2": sum((height - mean) ** 2 for height in heights_mm),
         "heights_dof": len(heights_mm) - 1,
+        "heights_by": by,
     }

@@ -18,7 +18,7 @@ from robolink.model import (
     SpotUnit,
     ToolOffset,
 )
-from robolink.nozzle_change._plan import ChangePlan, require_clearance
+from robolink.nozzle_change._plan import ChangePlan, require_clearance, require_inputs
 from robolink.procedures import MovingSource, approach_path
 from robolink.runner import (
     Ask,
@@ -71,9 +71,11 @@ def preview(controller: Controller, plan: ChangePlan) -> tuple[PlannedStep, ...]
     looked at all around.
 
     Raises:
-        ConfigError: A clearance is below the largest change that is believed.
+        ConfigError: A clearance is below the largest change that is believed, or an input is to
+            show contact where there are none.
     """
     require_clearance(plan)
+    require_inputs(controller, plan)
     if not plan.moves:
         return ()
     return tuple(_foresee(controller, plan, flange_now(controller)))
@@ -136,7 +138,8 @@ def _procedures(
 
 def _journey(target: Pose | None, purpose: str, here: Pose) -> Procedure[object]:
     if target is not None:
-        goal = Pose(*target.coordinates(), hand=here.hand, local=here.local, tool=0)
+        there = Pose(*target.coordinates(), tool=0, local=here.local)
+        goal = replace(there, hand=here.hand, posture=here.posture)
         yield from approach_path(goal, here=here, purpose=purpose)
     return None
 

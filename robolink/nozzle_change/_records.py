@@ -2,19 +2,36 @@
 
 from collections.abc import Sequence
 from dataclasses import asdict, fields
+from datetime import datetime
 
 from robolink.calibration import CalibrationResult, VerifyResult
 from robolink.errors import CalibrationError, RobolinkError
 from robolink.messages import tr
-from robolink.model import EntryKind, NewEntry, Pose, describe_offset, plain_offset
+from robolink.model import ControllerFacts, EntryKind, NewEntry, Pose, describe_offset, plain_offset
 from robolink.nozzle_change._acceptance import AcceptanceCriteria
 from robolink.nozzle_change._proposal import Proposal
 from robolink.procedures import jog_mm
 from robolink.runner import SeenAt, TouchedAt
+from robolink.stations import Gauge
 
 
-def calibration_entry(proposal: Proposal, criteria: AcceptanceCriteria, *, source: str) -> NewEntry:
-    """Return the record of a measurement that was believed, with all that it rests on."""
+def calibration_entry(
+    proposal: Proposal,
+    criteria: AcceptanceCriteria,
+    *,
+    source: str,
+    facts: ControllerFacts | None = None,
+    gauge: Gauge | None = None,
+) -> NewEntry:
+    """Return the record of a measurement that was believed, with all that it rests on.
+
+    Args:
+        proposal: What was measured.
+        criteria: What was allowed.
+        source: How it was measured, one sentence.
+        facts: Which machine it was, where it was asked.
+        gauge: The gauge that was measured against, where one is known.
+    """
     result = proposal.result
     details: dict[str, object] = {
         "source": source,
@@ -22,6 +39,10 @@ def calibration_entry(proposal: Proposal, criteria: AcceptanceCriteria, *, sourc
         "proposed": plain_offset(result.offset),
         "tip": plain_offset(proposal.tip),
         "notes": list(proposal.notes),
+        # Entries are labelled in UTC; whoever stood there knows it by the clock on the wall.
+        "local_time": datetime.now().astimezone().isoformat(timespec="seconds"),
+        **({} if facts is None else {"facts": asdict(facts)}),
+        "gauges": [] if gauge is None else [asdict(gauge)],
         **_result(result),
         **proposal.record,
     }
@@ -57,7 +78,7 @@ def refusal_entry(
             "code": code,
             "poses": [_pose(pose) for pose in poses],
             **_seen(poses),
-            **_touches(poses),
+            **touches_made(poses),
         },
     )
 
@@ -72,7 +93,7 @@ def verification_entry(tool: int, result: VerifyResult) -> NewEntry:
         "drifts": [asdict(drift) for drift in result.drifts],
         "warnings": list(result.warnings),
         "verdict": result.codes[0] if result.codes else result.verdict.value,
-        **_touches(result.inputs),
+        **touches_made(result.inputs),
     }
     return NewEntry(
         EntryKind.VERIFY,
@@ -96,7 +117,7 @@ def _result(result: CalibrationResult) -> dict[str, object]:
         "reference_point_mm": list(result.reference_point_mm),
         "poses": [_pose(pose) for pose in result.inputs],
         **_seen(result.inputs),
-        **_touches(result.inputs),
+        **touches_made(result.inputs),
         "residuals_mm": [list(residual) for residual in result.residuals_mm],
         "rejected": list(result.rejected),
         "rms_mm": result.rms_mm,
@@ -109,7 +130,7 @@ def _result(result: CalibrationResult) -> dict[str, object]:
         "sigma_gain": result.sigma_gain,
         "condition_number": result.condition_number,
         "warnings": list(result.warnings),
-        "notes": list(result.notes),
+        "information": list(result.notes),
         "interval_from": result.interval_from,
         "region95_radius_mm": result.region95_radius_mm,
         "budget": result.budget.as_json() if result.budget else None,
@@ -120,11 +141,18 @@ def _result(result: CalibrationResult) -> dict[str, object]:
 
 def _pose(pose: Pose) -> dict[str, object]:
     values = {field.name: getattr(pose, field.name) for field in fields(Pose)}
+    if pose.posture is not None:
+        values["posture"] = asdict(pose.posture)
     return {name: value for name, value in values.items() if value is not None}
 
 
-def _touches(poses: Sequence[Pose]) -> dict[str, object]:
-    """Return how a person made each touch; nothing where nobody touched anything."""
+def touches_made(poses: Sequence[Pose]) -> dict[str, object]:
+    """Return how a person made each touch, plain JSON; nothing where nobody touched anything.
+
+    ``touches`` has one entry a pose: where the robot had stopped, the standoff from there to the
+    expected contact, how far was jogged, after how many seconds it was answered, and whether an
+    input switched to contact meanwhile. ``standoff_seed`` is what the standoffs were drawn from.
+    """
     if not any(isinstance(pose, TouchedAt) for pose in poses):
         return {}
     touched = [_touch(pose) if isinstance(pose, TouchedAt) else None for pose in poses]

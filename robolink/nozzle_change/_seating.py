@@ -1,12 +1,17 @@
-"""How nozzles sit and how well touches repeat in height: from what a cell has on record."""
+"""How nozzles sit, how well touches repeat, how sure a tool is: from what a cell has on record."""
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
-from typing import Final
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Final, Literal
 
 from robolink.calibration import PERSON_SIGMA_Z_MM, PROBE_SIGMA_Z_MM
-from robolink.model import Controller, EntryKind, Recorded, ToolOffset, read_offset
+from robolink.model import Controller, EntryKind, Pose, Recorded, ToolOffset, read_offset
+from robolink.procedures import TouchPlan
+from robolink.runner import TouchedAt
+
+TouchWitness = Literal["person", "contact", "poses"]
+"""What witnesses touches: a person with a standoff, an input, or nothing."""
 
 USUAL_SEAT_MM: Final = (0.1, 0.1, 0.05)
 """Standard deviation of X, Y and Z while fewer changes are on record; a choice, not a finding."""
@@ -56,23 +61,74 @@ def seating_of(controller: Controller) -> Seating:
     return Seating(sigma, pooled)
 
 
-def touch_sigma_z_mm(controller: Controller, pin: str) -> float:
+def touched_by(poses: Sequence[Pose]) -> TouchWitness:
+    """Return what witnessed touches: an input, the person who made them, or nobody."""
+    touches = [pose for pose in poses if isinstance(pose, TouchedAt)]
+    if len(touches) < len(poses):
+        return "poses"
+    return "contact" if any(touch.contact is not None for touch in touches) else "person"
+
+
+def touch_sigma_z_mm(controller: Controller, pin: str, by: TouchWitness = "person") -> float:
     """Return the standard deviation of the height of one touch of a pin.
 
-    It is pooled within the runs on record once ten touches tell it; until then it is that of a
-    person who touches usually well (docs/reference/evidence.md 1).
+    It is pooled within the runs on record once ten touches tell it; until then it is what is
+    usual (docs/reference/evidence.md 1). Only touches that were made alike are pooled: an input
+    repeats better than an eye, and poses that somebody typed may be rounded.
+
+    Args:
+        controller: Whose record is looked at.
+        pin: Name of the pin; empty for one that nobody named, of which nothing is kept.
+        by: What witnesses the touches.
     """
+    usual_mm = PROBE_SIGMA_Z_MM if by == "contact" else PERSON_SIGMA_Z_MM
+    if not pin:
+        return usual_mm
     squares = freedom = 0.0
     for entry in controller.outcomes.recorded(kinds=(EntryKind.DONE, EntryKind.DECISION)):
         touch = entry.details.get("touch")
         if not isinstance(touch, Mapping) or touch.get("station") != pin:
             continue
         scatter, dof = touch.get("heights_mm2"), touch.get("heights_dof")
-        if isinstance(scatter, (int, float)) and isinstance(dof, int) and dof > 0:
+        alike = touch.get("heights_by") == by
+        if alike and isinstance(scatter, (int, float)) and isinstance(dof, int) and dof > 0:
             squares, freedom = squares + scatter, freedom + dof
     if freedom < LEAST_TOUCHES:
-        return PERSON_SIGMA_Z_MM
+        return usual_mm
     return max(math.sqrt(squares / freedom), PROBE_SIGMA_Z_MM)
+
+
+def touching_as_recorded(controller: Controller, plan: TouchPlan, pin: str) -> TouchPlan:
+    """Return a plan of touches with how well this cell touches the pin, where nobody stated it.
+
+    Args:
+        controller: Whose record is looked at.
+        plan: The plan; a standard deviation that it states stays.
+        pin: Name of the pin, empty for none.
+    """
+    if plan.sigma_z_mm is not None:
+        return plan
+    by: TouchWitness = "person" if plan.contact is None else "contact"
+    return replace(plan, sigma_z_mm=touch_sigma_z_mm(controller, pin, by))
+
+
+def height_is_known(controller: Controller, tool: int) -> bool:
+    """Tell whether Z of a tool is more than a value that calibrations kept.
+
+    Whoever wrote it by hand stands for it; a calibration of X and Y alone does not.
+    """
+    kept = controller.outcomes.recorded(tool=tool, kinds=(EntryKind.DONE, EntryKind.DECISION))
+    newest = next((entry for entry in kept if "question" not in entry.details), None)
+    return newest is None or newest.details.get("z_from") != "kept"
+
+
+def tip_sigma_mm(controller: Controller, tool: int) -> float:
+    """Return how uncertain the stored tip of a tool is by its last calibration, 0 for unknown."""
+    kept = controller.outcomes.recorded(tool=tool, kinds=(EntryKind.DONE, EntryKind.DECISION))
+    newest = next((entry for entry in kept if "question" not in entry.details), None)
+    touch = newest.details.get("touch") if newest else None
+    sigma = touch.get("sigma_mm") if isinstance(touch, Mapping) else None
+    return float(sigma) if isinstance(sigma, (int, float)) else 0.0
 
 
 def _changes(entries: Iterable[Recorded]) -> Iterator[tuple[float, float, float | None]]:

@@ -1,7 +1,8 @@
 """Rules by which three angles turn, by name: which matrix they stand for (docs/poses.md, "Angles").
 
 ``--euler`` and the recipe's ``euler`` name one. Also a product may be written: ``RzRyRx``, or
-``zyx`` for short, is R = Rz(first) Ry(second) Rx(third), whatever the columns are called.
+``zyx`` for short, is R = Rz(first) Ry(second) Rx(third), whatever the columns are called, but where
+they name the axes: RX is the turn about X in any order.
 """
 
 import re
@@ -123,7 +124,7 @@ def order_for(rule: RotationRule, letters: Sequence[str]) -> tuple[int, ...] | N
         return tuple(found.index(letter) for letter in rule.letters)
     if set(found) == set(_ROLL_PITCH_YAW) and rule.name in _WORDS:
         return tuple(found.index(word) for word in _WORDS[rule.name])
-    if set(found) == {"rx", "ry", "rz"} and len(set(rule.axes)) == 3 and rule.letters[0] != "1":
+    if set(found) == {"rx", "ry", "rz"} and len(set(rule.axes)) == 3:
         return tuple(found.index(f"r{axis}") for axis in rule.axes)
     if rule.letters[0] == "1":
         return (0, 1, 2)  # a product that somebody wrote out counts the columns

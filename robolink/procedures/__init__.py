@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from robolink.procedures.pin.judging import TOUCH_CODES as TOUCH_CODES
     from robolink.procedures.pin.judging import heights_agree as heights_agree
     from robolink.procedures.pin.judging import jog_mm as jog_mm
+    from robolink.procedures.pin.judging import require_one_height as require_one_height
     from robolink.procedures.pin.judging import require_touches as require_touches
     from robolink.procedures.pin.proof import MOST_MORE as MOST_MORE
     from robolink.procedures.pin.proof import DriftProof as DriftProof
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
     from robolink.procedures.pin.proof import verify_by_turning as verify_by_turning
     from robolink.procedures.pin.source import ManualPinSource as ManualPinSource
     from robolink.procedures.pin.source import PinSource as PinSource
+    from robolink.procedures.pin.source import TouchesPin as TouchesPin
     from robolink.procedures.pin.source import TouchSource as TouchSource
     from robolink.procedures.pin.touch_plan import TouchPlan as TouchPlan
     from robolink.procedures.pin.touches import PinTouches as PinTouches
@@ -74,9 +76,9 @@ __getattr__ = lazy_exports(
         "camera_verify": "NO_ERROR nearest_first seen_drift verify_by_looking",
         "input_source": "InputSource",
         "lazy_source": "LazySource",
-        "pin.judging": "TOUCH_CODES heights_agree jog_mm require_touches",
+        "pin.judging": "TOUCH_CODES heights_agree jog_mm require_one_height require_touches",
         "pin.proof": "DriftProof MOST_MORE contact_pose drift_uncertainty_mm verify_by_turning",
-        "pin.source": "ManualPinSource PinSource TouchSource",
+        "pin.source": "ManualPinSource PinSource TouchSource TouchesPin",
         "pin.touch_plan": "TouchPlan",
         "pin.touches": "PinTouches lift_off touch_again",
         "pose_method": "PoseMethod",

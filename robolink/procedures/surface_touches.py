@@ -15,7 +15,7 @@ from robolink.errors import CalibrationError
 from robolink.messages import tr
 from robolink.model import Path, Pose
 from robolink.procedures.approach import offset_z
-from robolink.procedures.pin.touch_plan import TouchPlan, fresh_seed, plain
+from robolink.procedures.pin.touch_plan import TouchPlan, fresh_seed, plain_pose
 from robolink.procedures.pin.witnessed import WitnessedTouches
 from robolink.runner import Move, Procedure, TouchedAt
 
@@ -70,7 +70,7 @@ class SurfaceTouches(WitnessedTouches):
             CalibrationError: ``not_touched`` or ``typed_ahead``, with the tip drawn back.
         """
         self._taken.pop(key, None)
-        expected = plain(expected)
+        expected = plain_pose(expected)
         away_mm = self._away_mm(columns, further_mm)
         x_mm, y_mm, z_mm = (away_mm * along for along in normal)
         beside = replace(expected, x_mm=expected.x_mm + x_mm, y_mm=expected.y_mm + y_mm)
@@ -90,7 +90,7 @@ class SurfaceTouches(WitnessedTouches):
 
     def off(self, touch: Pose) -> Move:
         """Return the step that lifts the tip off the surface."""
-        lifted = offset_z(plain(touch), self._plan.lift_mm)
+        lifted = offset_z(plain_pose(touch), self._plan.lift_mm)
         return Move(lifted, Path.STRAIGHT, tr("lift off the surface"))
 
     def require_made(self, columns: "Floats", misses_mm: "Floats") -> None:
@@ -139,10 +139,7 @@ class SurfaceTouches(WitnessedTouches):
         )
 
     def _how_to_make(self) -> str:
-        return tr(
-            "Nothing was written. The robot always stops away from the surface: jog until the tip "
-            "is on it, then answer."
-        )
+        return tr("The robot never stops on the surface: jog until the tip is on it, then answer.")
 
 
 def _refusal(code: str, residual_mm: float) -> CalibrationError:

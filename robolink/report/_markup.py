@@ -1,4 +1,4 @@
-"""Elements of a page. All text goes through here, so all text is escaped."""
+"""Elements of a drawing, and text and figures of a page. All text goes through here."""
 
 import unicodedata
 from typing import Final, TypeAlias
@@ -31,10 +31,9 @@ def element(tag: str, *content: Content, **attributes: object) -> Element:
     return made
 
 
-def figure(value: float, digits: int = 3) -> Element:
-    """Return a number: rounded to the eye, whole for a program that reads the page."""
-    # Adding zero takes the sign off what rounds to zero.
-    return element("data", f"{round(value, digits) + 0.0:.{digits}f}", value=repr(float(value)))
+def drawing(svg: Element) -> str:
+    """Return a drawing as it stands in a page; all text in it is escaped."""
+    return tostring(svg, encoding="unicode", method="html")
 
 
 def plain(text: str) -> str:
@@ -46,9 +45,10 @@ def plain(text: str) -> str:
     return "".join("\ufffd" if unicodedata.category(c) in _INVISIBLE else c for c in text)
 
 
-def document(root: Element) -> str:
-    """Return the text of a whole page."""
-    return "<!DOCTYPE html>\n" + tostring(root, encoding="unicode", method="html") + "\n"
+def rounded(value: float, digits: int = 3) -> str:
+    """Return a number as the eye reads it."""
+    # Adding zero takes the sign off what rounds to zero.
+    return f"{round(value, digits) + 0.0:.{digits}f}"
 
 
 def _append_text(parent: Element, text: str) -> None:

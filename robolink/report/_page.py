@@ -1,20 +1,25 @@
 """The whole page. It runs no script and loads nothing: it can be kept, mailed and printed."""
 
 from collections.abc import Iterator
+from functools import cache
 from importlib.resources import files
-from xml.etree.ElementTree import Element
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
 
 from robolink.messages import tr
-from robolink.report._markup import document, element
+from robolink.report._markup import drawing, plain, rounded
 from robolink.report._values import Report
-from robolink.report.pictures.fit import fit
-from robolink.report.pictures.pose_plan import pose_plan
-from robolink.report.pictures.tip import tip
-from robolink.report.sections.offsets import doubts, offsets, poses
-from robolink.report.sections.points import points
-from robolink.report.sections.record import evidence, judgements
-from robolink.report.sections.summary import facts, heading
-from robolink.report.sections.verification import verification
+from robolink.report.pictures.fit import fit_drawings
+from robolink.report.pictures.panel import Drawing
+from robolink.report.pictures.point_map import draw
+from robolink.report.pictures.pose_plan import pose_drawings
+from robolink.report.pictures.run_order import order_drawings
+from robolink.report.pictures.tip import tip_drawings
+from robolink.report.sections import certainty, decisions, points, summary
+from robolink.report.sections.offsets import offsets
+from robolink.report.sections.poses import pose_tables
 
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'"
 
@@ -27,60 +32,78 @@ def render(report: Report, *others: Report) -> str:
         others: The same of the other tools of that change.
     """
     reports = (report, *others)
-    numbers = ", ".join(str(one.tool) for one in reports)
-    title = tr("Tool {tool} of {controller}", tool=numbers, controller=report.controller)
     style = files("robolink.report").joinpath("style.css").read_text(encoding="utf-8")
-    # The style is the one text that is not escaped: a page takes it as it stands.
-    sheet = Element("style")
-    sheet.text = f"\n{style}"
-    head = element(
-        "head",
-        element("meta", charset="utf-8"),
-        element("meta", http_equiv="Content-Security-Policy", content=_POLICY),
-        element("meta", name="viewport", content="width=device-width"),
-        element("title", title),
-        sheet,
+    numbers = ", ".join(str(one.tool) for one in reports)
+    return (
+        _environment()
+        .get_template("page.html")
+        .render(
+            title=tr("Tool {tool} of {controller}", tool=numbers, controller=report.controller),
+            policy=_POLICY,
+            # The style is the one text that is not escaped: a page takes it as it stands.
+            style=Markup(style),
+            heading=summary.heading(reports),
+            facts=summary.facts(reports),
+            reports=reports,
+            record=report.record,
+            report=report,
+        )
     )
-    sections = (section for one in reports for section in _of_tool(one, alone=not others))
-    body = element(
-        "body",
-        heading(reports),
-        facts(reports),
-        *sections,
-        *evidence(report.record),
-        _foot(report),
-    )
-    return document(element("html", head, body, lang="en"))
 
 
-def _of_tool(report: Report, *, alone: bool) -> Iterator[Element]:
-    if not alone:
-        yield element("h2", tr("Tool {tool}", tool=report.tool), class_="tool")
-    yield from doubts(report)
-    yield from offsets(report)
-    yield from tip(report)
-    yield from judgements(report)
-    yield from fit(report)
-    yield from poses(report)
-    yield from pose_plan(report)
-    yield from verification(report)
-    if report.record is None or report.impact is not None:
-        yield from points(report)
+@cache
+def _environment() -> Environment:
+    """Return what fills the templates: every value is escaped, a missing one is an error."""
+    environment = Environment(
+        loader=PackageLoader("robolink.report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        finalize=_shown,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    environment.globals |= {
+        "tr": tr,
+        "figure": figure,
+        "drawn": drawn,
+        "drawings": drawings,
+        "order": lambda report: list(order_drawings(report.fit, report.evidence)),
+        "offsets": offsets,
+        "poses": pose_tables,
+        "map_of": draw,
+        "certainty": certainty,
+        "decisions": decisions,
+        "points": points,
+    }
+    return environment
 
 
-def _foot(report: Report) -> Element:
-    made = tr(
-        "Made by robolink {version}, {when}. Lengths in mm, angles in degrees.",
-        version=report.robolink_version,
-        when=report.made_at,
-    )
-    return element(
-        "footer",
-        element("p", made, class_="small"),
-        element(
-            "div",
-            element("p", tr("checked by")),
-            element("p", tr("date")),
-            class_="sign",
-        ),
-    )
+def figure(value: float, digits: int = 3) -> Markup:
+    """Return a number: rounded to the eye, whole for a program that reads the page."""
+    return Markup('<data value="{}">{}</data>').format(repr(float(value)), rounded(value, digits))
+
+
+def drawn(one: Drawing) -> Markup:
+    """Return a drawing as it stands in the page."""
+    return Markup(drawing(one.svg))
+
+
+def drawings(report: Report) -> list[Drawing]:
+    """Return the square drawings of a tool, which stand two in a row."""
+    return list(_squares(report))
+
+
+def _squares(report: Report) -> Iterator[Drawing]:
+    yield from tip_drawings(report)
+    yield from fit_drawings(report.fit)
+    yield from pose_drawings(report.fit)
+
+
+def _shown(value: Any) -> Any:  # noqa: ANN401 - whatever a template shows
+    """Return what a template shows of a value: no invisible characters, nothing for nothing."""
+    if value is None:
+        return ""
+    if isinstance(value, str) and not isinstance(value, Markup):
+        return plain(value)
+    return value

@@ -4,7 +4,16 @@ from collections.abc import Mapping
 from typing import Any
 
 from robolink.calibration import CalibrationResult, UncertaintyBudget
-from robolink.model import Hand, Pose, ToolOffset, method_name_now, read_offset
+from robolink.model import (
+    Elbow,
+    Hand,
+    Pose,
+    Posture,
+    ToolOffset,
+    Wrist,
+    method_name_now,
+    read_offset,
+)
 
 
 def recorded_fit(details: Mapping[str, Any]) -> CalibrationResult:
@@ -34,7 +43,7 @@ def recorded_fit(details: Mapping[str, Any]) -> CalibrationResult:
         rejected=tuple(details.get("rejected", ())),
         condition_number=details.get("condition_number"),
         dof=details.get("dof"),
-        notes=tuple(details.get("notes", ())),
+        notes=tuple(details.get("information", ())),
         interval_from=details.get("interval_from", ""),
         region95_radius_mm=details.get("region95_radius_mm"),
         budget=UncertaintyBudget.from_json(budget) if (budget := details.get("budget")) else None,
@@ -43,8 +52,12 @@ def recorded_fit(details: Mapping[str, Any]) -> CalibrationResult:
 
 def recorded_pose(pose: Mapping[str, Any]) -> Pose:
     """Return a pose of an entry."""
-    hand = pose.get("hand")
-    return Pose(**{**pose, "hand": Hand(hand) if hand else None})
+    hand, posture = pose.get("hand"), pose.get("posture")
+    flags: dict[str, Any] = {"hand": Hand(hand) if hand else None}
+    if posture is not None:
+        elbow, wrist = Elbow(posture["elbow"]), Wrist(posture["wrist"])
+        flags["posture"] = Posture(**{**posture, "elbow": elbow, "wrist": wrist})
+    return Pose(**{**pose, **flags})
 
 
 def _vectors(rows: Any) -> tuple[tuple[float, ...], ...]:  # noqa: ANN401 - read from JSON

@@ -15,7 +15,15 @@ from robolink.model import (
     with_method_name_now,
 )
 from robolink.report._recorded_fit import recorded_fit, recorded_pose
-from robolink.report._values import Attempt, Judgement, Outcome, Record, Report
+from robolink.report._values import (
+    Attempt,
+    GaugeOnRecord,
+    Judgement,
+    Outcome,
+    Record,
+    Report,
+    TouchOnRecord,
+)
 
 _ENDS: Final = {
     EntryKind.NOT_APPLIED: Outcome.NOT_APPLIED,
@@ -47,7 +55,7 @@ def report_of_tool(
         made_at=made_at,
         robolink_version=robolink_version,
         controller=entries[0].controller,
-        facts=ControllerFacts(),
+        facts=_facts(calibration.get("facts")),
         tool=tool,
         before=compared.get("before"),
         after=compared.get("after"),
@@ -67,6 +75,29 @@ def report_of_tool(
         verification=_verification(_last(entries, EntryKind.VERIFY)),
         judgements=judgements,
         record=record,
+        local_time=str(calibration.get("local_time", "")),
+        gauges=tuple(GaugeOnRecord(**gauge) for gauge in calibration.get("gauges", ())),
+        touches=tuple(_touch(said) for said in calibration.get("touches", ()) if said),
+        evidence=calibration.get("evidence") or {},
+    )
+
+
+def _facts(said: Mapping[str, Any] | None) -> ControllerFacts:
+    """Return what the controller said of itself when it was measured; nothing in old entries."""
+    if said is None:
+        return ControllerFacts()
+    lists = {name: tuple(said.get(name, ())) for name in ("robot_models", "robot_serials")}
+    return ControllerFacts(**{**said, **lists})
+
+
+def _touch(said: Mapping[str, Any]) -> TouchOnRecord:
+    """Return how a touch was made; the robot stopped beside the pin or the person brought it."""
+    brought = said.get("arrival") is None
+    return TouchOnRecord(
+        standoff_mm=None if brought else tuple(said["standoff_mm"]),
+        jog_mm=None if brought else said["jog_mm"],
+        seconds=said["seconds"],
+        contact=said["contact"],
     )
 
 
@@ -152,7 +183,12 @@ def _verification(entry: Recorded | None) -> VerifyResult | None:
         return None
     details: Mapping[str, Any] = entry.details
     drifts = tuple(Drift(**drift) for drift in details["drifts"])
-    return VerifyResult(drifts, details["tolerance_mm"], tuple(details["warnings"]))
+    return VerifyResult(
+        drifts,
+        details["tolerance_mm"],
+        tuple(details["warnings"]),
+        codes=tuple(details.get("codes", ())),
+    )
 
 
 def _list(value: object) -> list[Any]:

@@ -1,7 +1,9 @@
 """What a report says, before it has a form."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from enum import StrEnum
+from typing import Any
 
 from robolink.calibration import CalibrationResult, Impact, VerifyResult
 from robolink.model import ControllerFacts, Pose, Recorded, Signature, ToolOffset
@@ -36,6 +38,41 @@ class Judgement:
     what: str
     allowed: str
     found: str
+
+
+@dataclass(frozen=True, slots=True)
+class GaugeOnRecord:
+    """A gauge that was measured against.
+
+    Attributes:
+        id: As on its certificate.
+        station: The station at which it stands.
+        due: Until when its calibration holds, ISO 8601; empty where nobody stated it.
+        overdue: Whether that was over when it was measured.
+    """
+
+    id: str
+    station: str
+    due: str = ""
+    overdue: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class TouchOnRecord:
+    """How a person made one touch.
+
+    Attributes:
+        standoff_mm: How far from where the tip was expected the robot had stopped, x, y and z;
+            ``None`` for a touch to which the person brought the tip.
+        jog_mm: How far the person jogged it from there, ``None`` likewise.
+        seconds: How long that took.
+        contact: Whether an input was seen to switch meanwhile; ``None`` where none was watched.
+    """
+
+    standoff_mm: tuple[float, ...] | None
+    jog_mm: float | None
+    seconds: float | None
+    contact: bool | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,6 +136,11 @@ class Report:
         attempts: Measurements that were refused.
         judgements: What was judged on the way.
         record: What the journal adds, ``None`` for a report that is made on the way.
+        local_time: When it was measured by the clock of the place, ISO 8601 with its distance
+            from UTC; empty where that is not on record.
+        gauges: The gauges that were measured against.
+        touches: How the touches were made by which it was measured.
+        evidence: Figures of the checks that the measurement went through, plain JSON.
     """
 
     made_at: str
@@ -122,3 +164,7 @@ class Report:
     attempts: tuple[Attempt, ...] = ()
     judgements: tuple[Judgement, ...] = ()
     record: Record | None = None
+    local_time: str = ""
+    gauges: tuple[GaugeOnRecord, ...] = ()
+    touches: tuple[TouchOnRecord, ...] = ()
+    evidence: Mapping[str, Any] = field(default_factory=dict)

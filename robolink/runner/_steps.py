@@ -129,6 +129,7 @@ class SeenAt(Pose):
             hand=pose.hand,
             local=pose.local,
             tool=pose.tool,
+            posture=pose.posture,
             spot=spot,
             unit=unit,
         )
@@ -173,6 +174,7 @@ class TouchedAt(Pose):
             hand=pose.hand,
             local=pose.local,
             tool=pose.tool,
+            posture=pose.posture,
             seconds=seconds,
             contact=contact,
         )

@@ -11,7 +11,10 @@ from robolink.stations._apart import apart_mm
 from robolink.stations._records import station_of
 from robolink.stations._station import Station, StationKind
 
-_PLACE = ("x_mm", "y_mm", "z_mm", "sigma_mm", "gauge", "check_every_days", "kind", "notes")
+_PLACE = (
+    *("x_mm", "y_mm", "z_mm", "sigma_mm"),
+    *("gauge", "gauge_due", "check_every_days", "kind", "notes"),
+)
 
 
 def find_stations(cell: Cell | None, entries: Iterable[Recorded]) -> dict[str, Station]:
@@ -98,6 +101,7 @@ def _station(name: str, said: object) -> Station:
         sigma_mm=values.get("sigma_mm"),
         how=tr("stated in the cell file"),
         gauge=values.get("gauge", ""),
+        gauge_due=values.get("gauge_due", ""),
         check_every_days=values.get("check_every_days"),
         declared=True,
         details={key: value for key, value in values.items() if key not in _PLACE},
@@ -112,6 +116,7 @@ def _together(declared: Station, learnt: Station) -> Station:
         y_mm=declared.y_mm if learnt.y_mm is None else learnt.y_mm,
         z_mm=declared.z_mm if learnt.z_mm is None else learnt.z_mm,
         gauge=learnt.gauge or declared.gauge,
+        gauge_due=declared.gauge_due,
         check_every_days=declared.check_every_days,
         declared=True,
         apart_mm=apart_mm(declared, learnt),

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, date, datetime, timedelta
 from enum import StrEnum
 from typing import Final
 
@@ -21,6 +21,23 @@ class StationKind(StrEnum):
     CAMERA = "camera"
 
 
+@dataclass(frozen=True, slots=True)
+class Gauge:
+    """What is measured against, as it goes on record.
+
+    Attributes:
+        id: Its id, as on its certificate.
+        station: The station at which it stands.
+        due: Until when its calibration holds, ISO 8601; empty where nobody says it.
+        overdue: Whether that is over.
+    """
+
+    id: str
+    station: str
+    due: str = ""
+    overdue: bool = False
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Station:
     """One station of a cell.
@@ -34,6 +51,7 @@ class Station:
         found_at: When, ISO 8601 UTC; empty when the cell file says where it is.
         entry: Number of the entry in the journal, ``None`` when the cell file says it.
         gauge: Id of the gauge that stands there, empty for none.
+        gauge_due: Until when the calibration of that holds, ISO 8601; empty where nobody says it.
         check_every_days: After so many days it has to be learnt again, ``None`` for never.
         declared: Whether the cell file names it.
         apart_mm: How far the place in the cell file is from the one that was learnt.
@@ -50,6 +68,7 @@ class Station:
     found_at: str = ""
     entry: int | None = None
     gauge: str = ""
+    gauge_due: str = ""
     check_every_days: float | None = None
     declared: bool = False
     apart_mm: float = 0.0
@@ -63,8 +82,20 @@ class Station:
         *,
         sigma_mm: float | None = None,
     ) -> "Station":
-        """Return the same station at another place, base."""
-        return replace(self, x_mm=x_mm, y_mm=y_mm, z_mm=z_mm, sigma_mm=sigma_mm)
+        """Return the same station at another place, base; it then rests on no entry.
+
+        A camera's entry says what its pixels mean, wherever a tip is brought before it.
+        """
+        moved = (x_mm, y_mm, z_mm) != (self.x_mm, self.y_mm, self.z_mm)
+        told = moved and self.kind is not StationKind.CAMERA
+        return replace(
+            self,
+            x_mm=x_mm,
+            y_mm=y_mm,
+            z_mm=z_mm,
+            sigma_mm=sigma_mm,
+            entry=None if told else self.entry,
+        )
 
     @property
     def learnt(self) -> bool:
@@ -84,7 +115,35 @@ class Station:
         Args:
             now: The time of day; the computer's own by default.
         """
-        return " ".join(filter(None, (self._contradiction(), self._check(now))))
+        return " ".join(filter(None, (self._contradiction(), self._check(now), self._gauge(now))))
+
+    def gauge_overdue(self, now: datetime | None = None) -> bool:
+        """Tell whether the calibration of its gauge has run out; the due day itself still counts.
+
+        Args:
+            now: The time of day; the computer's own by default.
+        """
+        if not self.gauge_due:
+            return False
+        today = (now or datetime.now(UTC)).date()
+        return date.fromisoformat(self.gauge_due) < today
+
+    def gauge_on_record(self) -> Gauge | None:
+        """Return the gauge as a measurement made now puts it on record; ``None`` for none."""
+        if not self.gauge:
+            return None
+        return Gauge(self.gauge, self.id, self.gauge_due, self.gauge_overdue())
+
+    def _gauge(self, now: datetime | None) -> str:
+        if not self.gauge_overdue(now):
+            return ""
+        return tr(
+            "The calibration of gauge {gauge} at station {id} ran out on {due}: have it "
+            "calibrated, or use another one.",
+            gauge=self.gauge or tr("without a name"),
+            id=self.id,
+            due=self.gauge_due,
+        )
 
     def _contradiction(self) -> str:
         if self.apart_mm <= AGREEING_MM:

@@ -216,7 +216,7 @@ def test_each_crossing_that_others_check_tells_how_it_fits_and_how_sure_the_tip_
         f"{count} crossings" for count in (5, 6, 7, 8)
     ]
     assert all("the last within 0.00" in text for text in cell.told)
-    assert all("X and Y are known to +-0.0" in text for text in cell.told)
+    assert all("X and Y are known to ±0.0" in text for text in cell.told)
     assert "One more, at beam 2, leaves" in cell.told[0]
     assert "One more" not in cell.told[-1]
     assert cell.offers == []
@@ -359,7 +359,7 @@ def test_each_touch_tells_how_it_fits_and_the_worst_alone_is_made_again():
     assert [text.partition(" agree")[0] for text in cell.told] == [
         f"{count} touches" for count in (3, 4, 5, 6, 6)
     ]
-    assert "; Z is known to +-" in cell.told[0]
+    assert "; Z is known to ±" in cell.told[0]
     assert "One more, at 1 mm/s, leaves 75 % of that." in cell.told[0]
     (question, when), *_ = cell.offers
     assert question.startswith("Touch 3, at 2 mm/s, fits worst: it is 0.2")

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robolink.calibration import impact_on
+from robolink.calibration import flange_of, impact_on, tip_pose
 from robolink.model import Pose, ToolOffset, rotate_xy
 
 LENGTH = st.floats(-300, 300)
@@ -79,17 +79,28 @@ def test_points_that_cannot_be_judged_are_named_and_left_out():
         1: Pose(250, 200, 0, 0),
         2: None,
         3: Pose(10, 20, 0, 0, local=2),
-        4: Pose(250, 200, 0, 0, w_deg=180),
     }
     impact = impact_on(points, old=ToolOffset(1), new=ToolOffset(2))
     assert [entry.number for entry in impact.entries] == [1]
     assert impact.undefined == (2,)
     assert impact.other_local == {3: 2}
-    assert impact.tilted == (4,)
 
 
-def test_a_tilted_tool_judges_nothing():
-    impact = impact_on({1: Pose(250, 200, 0, 0)}, old=ToolOffset(v_deg=1), new=ToolOffset())
-    assert impact.entries == ()
-    assert impact.tilted == (1,)
-    assert impact.largest is None
+@pytest.mark.parametrize("pose", [Pose(250, 200, 0, 40, 0, 180), Pose(250, 200, 0, 40, 20, -150)])
+def test_a_leaning_tool_is_judged_in_space(pose):
+    """The flange with the old offset, and what it carries, worked out the long way."""
+    old, new = ToolOffset(12, -3, 120, 10, 5, -4), ToolOffset(12.4, -3.3, 119.5, 12, 6, -4)
+    flange = flange_of(pose, old)
+    entry = at(pose, old, new)
+    # The tip that is on the arm sits at the new offset: there it goes with the old one.
+    there = tip_pose(flange, new, tool=1)
+    moved = [a - b for a, b in zip(pose.coordinates(), there.coordinates(), strict=True)][:3]
+    assert (entry.dx_mm, entry.dy_mm, entry.dz_mm) == pytest.approx(moved)
+    assert entry.distance_mm == pytest.approx(math.dist((12, -3, 120), (12.4, -3.3, 119.5)))
+    assert 1.0 < entry.turn_deg < 3.0
+
+
+def test_upside_down_a_longer_tip_moves_up():
+    entry = at(Pose(250, 200, 0, 90, 0, 180), ToolOffset(0, 1, 100, 10), ToolOffset(0, 1, 101, 30))
+    assert (entry.dx_mm, entry.dy_mm, entry.dz_mm) == pytest.approx((0, 0, 1))
+    assert entry.turn_deg == pytest.approx(-20)

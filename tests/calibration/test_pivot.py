@@ -94,8 +94,8 @@ def test_both_ways_to_solve_agree_and_the_bad_case_takes_qr(half_deg):
     p, r = pose_arrays(poses_on(sigma_mm=0.01, half_deg=half_deg))
     design = pivot_design(r)
     assert (design.condition_number > QR_ABOVE_CONDITION) == (half_deg == 1.0)
-    by_qr, _ = _by_qr(p, r)
-    normal, _ = _by_normal_equations(p, r)
+    by_qr, _ = _by_qr(p, r, r.mean(axis=0))
+    normal, _ = _by_normal_equations(p, r, r.mean(axis=0))
     assert normal == pytest.approx(by_qr, abs=1e-9)
     chosen = fit_pivot(p, r, condition_number=design.condition_number)
     assert np.array_equal(chosen.tip, by_qr if half_deg == 1.0 else normal)
@@ -103,7 +103,7 @@ def test_both_ways_to_solve_agree_and_the_bad_case_takes_qr(half_deg):
 
 def test_qr_keeps_digits_where_the_normal_equations_lose_them():
     p, r = pose_arrays(poses_on(half_deg=0.0005))
-    tips = [solve(p, r)[0] for solve in (_by_qr, _by_normal_equations)]
+    tips = [solve(p, r, r.mean(axis=0))[0] for solve in (_by_qr, _by_normal_equations)]
     errors = [float(np.linalg.norm(tip - TIP)) for tip in tips]
     assert errors[0] < errors[1] / 10
 

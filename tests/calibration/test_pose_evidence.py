@@ -106,6 +106,17 @@ def test_exact_poses_show_no_order_and_five_touches_cannot():
     assert told(solve_n_angle(PLAIN[:5])).run_order is None
 
 
+def test_a_shift_too_small_to_matter_has_its_figure_and_no_name():
+    moved = [
+        replace(pose, x_mm=pose.x_mm + (0.001 if k > 3 else 0.0)) for k, pose in enumerate(PLAIN)
+    ]
+    result = solve_n_angle(moved)
+    order = order_of(result)
+    assert order.step_f > 100 * order.step_f_limit
+    assert order.step_mm[0] == pytest.approx(0.001, rel=0.05)
+    assert result.warnings == ()
+
+
 def test_the_limits_are_shared_among_the_splits():
     found, spatial = order_of(solve_n_angle(PLAIN)), order_of(solve_pivot(SPATIAL))
     assert found.step_f_limit == pytest.approx(fisher.ppf(1 - 0.01 / 7, 2, 10))
@@ -352,3 +363,21 @@ def test_a_bias_that_never_turns_against_tool_or_base_cannot_be_found():
     with pytest.raises(ValueError, match="1 standoffs for 8"):
         with_approach_bias(solve_n_angle(PLAIN), [None])
     assert told(with_approach_bias(solve_n_angle(PLAIN), [None] * 8)).approach_bias_mm is None
+
+
+def test_a_touch_that_a_person_brought_from_somewhere_does_not_disturb_the_bias():
+    random = np.random.default_rng(4)
+    sides = [(math.cos(turn), math.sin(turn)) for turn in random.uniform(-3, 3, 8).tolist()]
+    poses = [
+        replace(p, x_mm=p.x_mm + 0.06 * x, y_mm=p.y_mm + 0.06 * y)
+        for p, (x, y) in zip(shaken(PLAIN, random, 0.005), sides, strict=True)
+    ]
+    poses[0] = replace(poses[0], x_mm=poses[0].x_mm + 0.3)
+    without = with_approach_bias(solve_n_angle(poses), [None, *sides[1:]])
+    alone = with_approach_bias(solve_n_angle(poses[1:]), sides[1:])
+    assert told(without).approach_bias_mm == pytest.approx(told(alone).approach_bias_mm, abs=1e-9)
+    assert told(without).approach_bias_mm == pytest.approx(0.06, abs=0.02)
+    assert "approach_bias" in without.warnings
+    # Seven touches exceed three standard uncertainties by chance in some per cent.
+    strict = with_approach_bias(solve_n_angle(poses[1:]), sides[1:], false_alarm=1e-12)
+    assert "approach_bias" not in strict.warnings

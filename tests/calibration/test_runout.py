@@ -62,7 +62,7 @@ def test_four_sightings_show_no_harmonics():
 
 def test_a_short_arc_or_few_sightings_are_refused():
     with refused("insufficient_rotation"):
-        runout_report(turning(arc_deg=150.0))
+        runout_report(turning(arc_deg=25.0))
     with refused("too_few_poses"):
         runout_report(turning(3))
 
@@ -84,6 +84,7 @@ def test_the_interval_of_the_offset_holds_the_truth(count, stated):
         ((0.0, 180.0, 0.004, 179.996) * 2, 2),  # read with the noise of an encoder
         ((10.1, 190.1, 370.1, -169.9) * 2, 2),
         ((0.0, 90.0, 180.0) * 3, 3),
+        ((0.0, 90.0) * 4, 2),
         ((0.0, 0.5, 180.0, 180.5) * 2, 4),  # four, and too near each other to tell anything
     ],
 )

@@ -73,7 +73,7 @@ def test_what_was_not_looked_at_is_not_made_up():
         solve_runout_table(looks(tuple(30.0 * k for k in range(9))))
     with refused("too_few_poses"):
         solve_runout_table(looks(TWELVE[:7]))
-    with refused("insufficient_rotation"):
+    with refused("angles_too_far_apart"):
         solve_runout_table(looks(tuple(10.0 * k for k in range(12))))
 
 

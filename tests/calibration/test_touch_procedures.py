@@ -5,10 +5,13 @@ from dataclasses import replace
 
 import pytest
 
+from robolink.calibration import Drift, DriftVerdict
+from robolink.errors import CalibrationError
 from robolink.methods import measure_two_pose
-from robolink.model import Path, Pose, ToolOffset, rotate_xy
-from robolink.procedures import TouchPlan, contact_pose, verify_by_turning
-from robolink.runner import Ask, Move
+from robolink.model import Path, Pose, ToolOffset, WorkBox, rotate_xy
+from robolink.nozzle_change import foresee
+from robolink.procedures import DriftProof, TouchPlan, contact_pose, verify_by_turning
+from robolink.runner import Ask, Move, Notify, RunSettings, TouchedAt
 
 PIN = (310.0, 95.0, -40.0)
 PLAN = TouchPlan(lift_mm=10, clearance_mm=2)
@@ -25,6 +28,8 @@ class PerfectPerson:
 
     def answer(self, step):
         self.log.append(step)
+        if isinstance(step, Notify):
+            return None
         if isinstance(step, Move):
             self.pose = step.target
             return self.pose
@@ -129,3 +134,95 @@ def test_a_tool_angle_is_kept_and_seen_through():
     contact = contact_pose(result, tool=1)
     assert contact.u_deg == result.inputs[-1].u_deg + 30
     assert contact.z_mm == pytest.approx(PIN[2])
+
+
+@pytest.mark.parametrize(
+    ("error_mm", "verdict", "touches"),
+    [
+        (0.10, DriftVerdict.PASSED, 2),
+        (0.19, DriftVerdict.UNDECIDED, 4),
+        (0.21, DriftVerdict.UNDECIDED, 4),
+        (0.30, DriftVerdict.FAILED, 2),
+    ],
+)
+def test_a_drift_too_near_to_the_tolerance_is_touched_again_and_does_not_pass(
+    error_mm, verdict, touches
+):
+    outcome, person = verified(ToolOffset(12.3 + error_mm, -3.9, -20), ToolOffset(12.3, -3.9, -20))
+    assert outcome.verdict is verdict
+    assert outcome.passed is (verdict is DriftVerdict.PASSED)
+    assert sum(isinstance(step, Ask) for step in person.log) == len(outcome.inputs) == touches
+    assert len(outcome.drifts) == 2
+
+
+def test_the_mean_of_touches_at_one_angle_is_surer_and_may_pass():
+    proof = DriftProof(tolerance_mm=0.2, u_mm=0.03)
+    place = Pose(0.0, 0.0, 0.0, 90.0)
+
+    def shown(drift_mm):
+        proof.add(place, TouchedAt.of(replace(place, x_mm=drift_mm)))
+
+    shown(0.17)
+    assert proof.undecided() == Drift(90.0, 0.17, 0.0, 0.0, 0.03)
+    shown(0.15)
+    assert proof.undecided() is None
+    (drift,) = proof.result().drifts
+    assert (drift.dx_mm, drift.u_mm) == pytest.approx((0.16, 0.03 / math.sqrt(2)))
+    assert proof.result().passed
+
+
+def test_touches_of_the_proof_at_another_height_do_not_count():
+    class Floating(PerfectPerson):
+        """Touches the pin in the measurement, and the air above it in the proof."""
+
+        def answer(self, step):
+            pose = super().answer(step)
+            if isinstance(step, Ask):
+                self.pose = pose = replace(pose, z_mm=pose.z_mm + 0.5)
+            return pose
+
+    tip = ToolOffset(12.3, -3.9, -20)
+    result, _ = measured(tip, tip)
+    procedure = verify_by_turning(
+        PLAN, contact=contact_pose(result, tool=3), angles_deg=(90.0, 0.0), tolerance_mm=0.2
+    )
+    outcome = drive(procedure, Floating(tip, tip))
+    assert outcome.codes == ("touch_heights_differ",)
+    assert not outcome.passed
+
+
+def test_a_look_ahead_draws_nothing_and_says_how_far_beside_the_pin_it_may_stop():
+    tip = ToolOffset(12, -3.5, -20)
+    steps = [
+        [step for step, _ in followed(measure_two_pose(replace(PLAN, nominal=True), stored=tip))]
+        for _ in range(2)
+    ]
+    assert steps[0] == steps[1]
+    down = [step for step in steps[0] if isinstance(step, Move) and step.aside_mm]
+    assert {step.aside_mm for step in down} == {1.2}
+    assert min(step.target.z_mm for step in down) == pytest.approx(START.z_mm + 2.0 + 1.8)
+
+
+def followed(procedure):
+    """Follow a procedure as a look ahead does; yield its steps with where each leads."""
+    here, step = START, next(procedure)
+    while True:
+        here = step.foreseen or here if isinstance(step, Ask) else step.target
+        yield step, here
+        try:
+            step = procedure.send(here)
+        except (StopIteration, CalibrationError):
+            return
+
+
+def test_a_measurement_beside_the_edge_of_the_box_is_refused_before_it_moves():
+    plan, tip = replace(PLAN, nominal=True), ToolOffset(0.0, 0.0, -20)
+
+    def refusals(room_mm):
+        box = WorkBox.around(START, xy_mm=room_mm, below_mm=20, above_mm=20)
+        procedure = measure_two_pose(plan, stored=tip)
+        steps = foresee(procedure, here=START, settings=RunSettings(box))
+        return [step.refusal for step in steps if step.refusal]
+
+    assert not refusals(1.21)
+    assert refusals(1.19)

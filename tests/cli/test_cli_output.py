@@ -9,6 +9,7 @@ import click
 import pytest
 from robolink_cli import main
 from robolink_cli.console import render
+from robolink_cli.console.tolerance import PLAINLY
 
 from robolink import errors
 
@@ -143,3 +144,8 @@ def test_no_color_is_honoured(command, monkeypatch, value, expected):
     command(lambda context: seen.append(click.get_current_context().color))
     assert main.run(["status"]) == 0
     assert seen == [expected]
+
+
+def test_a_sign_that_an_encoding_lacks_stands_in_letters_and_the_rest_as_escapes():
+    assert "0.1 ± 0.02, ∞, 机".encode("ascii", PLAINLY) == b"0.1 +- 0.02, inf, \\u673a"
+    assert "± 90°".encode("cp936", PLAINLY).decode("cp936") == "± 90°"

@@ -31,12 +31,12 @@ def test_the_file_goes_before_the_environment(monkeypatch, tmp_path):
 
 def test_the_file_on_the_command_line_goes_before_the_one_in_the_environment(monkeypatch, tmp_path):
     for name in ("named", "given"):
-        (tmp_path / name).write_text(name)
+        (tmp_path / name).write_text(f"canary-{name}")
         (tmp_path / name).chmod(0o600)
     monkeypatch.setenv("ROBOLINK_PASSWORD_FILE", str(tmp_path / "named"))
     found = _password.find_password(URL, password_file=tmp_path / "given")
     assert found is not None
-    assert found.reveal() == "given"
+    assert found.reveal() == "canary-given"
 
 
 @pytest.mark.parametrize("mode", [0o640, 0o604, 0o660])

@@ -123,19 +123,24 @@ def test_the_page_says_who_when_with_what_and_what_came_of_it(run, recorded, sim
     code, out, _ = run("report", change[:4], "page.html", "--json")
     document = json.loads(out)
     assert (code, document["change"], document["problems"]) == (0, change, [])
-    assert document["tools"] == [{"tool": 1, "outcome": "verified"}]
+    (tool,) = document["tools"]
+    assert (tool["tool"], tool["outcome"], tool["method"]) == (1, "verified", "two-pose")
+    assert tool["measured"] == ["x_mm", "y_mm"]
+    assert tool["local_time"] is None  # an entry of before does not say it
     text = text_of(tmp_path / "page.html")
     for words in (
         f"controller {simulator.url}",
-        f"change {change}",
+        f"report number {change}",
         "Ann (engineer), user cell on pc-5",
         "nozzle, lot N-0815, L-7",
         f"recipe tip.toml, SHA-256 {'ab' * 32}",
         "station pin-2",
         "new offset one pin touched",
         "method two-pose",
-        "before 12.000 -3.500 -20.000",
-        "change 0.300 -0.200 0.000",
+        "X mm 12.000 12.300 0.300",
+        "Y mm -3.500 -3.700 -0.200",
+        "Kept, not measured Z mm U deg V deg W deg before -20.000 0.000",
+        "robot not on record",
         "calibration change up to 2 mm measured: X 12.300; rms 0.050 mm",
         "1 153.217 501.272 -83.500 0.000 right 0.030 0.040 0.050",
         "1 1.250 2.000 3.000 4.000",
@@ -148,7 +153,7 @@ def test_the_page_says_who_when_with_what_and_what_came_of_it(run, recorded, sim
         *(found.hash for found in open_journal().entries()),
     ):
         assert words in text
-    assert (tmp_path / "page.html").read_text(encoding="utf-8").count("<svg") == 2
+    assert (tmp_path / "page.html").read_text(encoding="utf-8").count("<svg") == 3
 
 
 def test_several_tools_stand_on_one_page(run, recorded, tmp_path):
@@ -160,7 +165,7 @@ def test_several_tools_stand_on_one_page(run, recorded, tmp_path):
     assert [tool["tool"] for tool in json.loads(out)["tools"]] == [1, 2]
     text = text_of(tmp_path / "page.html")
     assert "Tools 1, 2: change of the offsets Not finished" in text
-    assert text.count("before 12.000 -3.500") == 2
+    assert text.count("X mm 12.000 12.300 0.300") == 2
 
 
 def test_without_a_name_the_newest_change_is_meant_and_the_file_is_named_after_it(

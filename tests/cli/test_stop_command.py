@@ -168,11 +168,11 @@ def test_a_password_file_that_others_may_read_does_not_keep_it_back(moving, stop
 )
 @pytest.mark.parametrize("broken", [False, True])
 def test_the_password_is_where_the_cell_says(state_folder, tmp_path, monkeypatch, how, broken):
-    (tmp_path / "secret").write_text("right\n")
+    (tmp_path / "secret").write_text("canary-right\n")
     (tmp_path / "secret").chmod(0o600)
     monkeypatch.setenv("ROBOLINK_PASSWORD", "another cell's")
-    monkeypatch.setenv("ROBOLINK_PASSWORD_A", "right")
-    with serve_tcp(EpsonSimulator(seed=4, password=Secret("right"))) as host:
+    monkeypatch.setenv("ROBOLINK_PASSWORD_A", "canary-right")
+    with serve_tcp(EpsonSimulator(seed=4, password=Secret("canary-right"))) as host:
         cell = Path("robolink.toml")
         cell.write_text(CELL.format(url=host.url, more=how))
         assert main.run(["-c", "a", "status"]) == 0
@@ -186,10 +186,10 @@ def test_the_password_is_where_the_cell_says(state_folder, tmp_path, monkeypatch
 def test_the_password_file_of_the_environment_counts_with_a_url(
     state_folder, tmp_path, monkeypatch
 ):
-    (tmp_path / "secret").write_text("right\n")
+    (tmp_path / "secret").write_text("canary-right\n")
     (tmp_path / "secret").chmod(0o600)
     monkeypatch.setenv("ROBOLINK_PASSWORD_FILE", str(tmp_path / "secret"))
-    with serve_tcp(EpsonSimulator(seed=4, password=Secret("right"))) as host:
+    with serve_tcp(EpsonSimulator(seed=4, password=Secret("canary-right"))) as host:
         assert entry.run(["-c", host.url, "stop"]) == 0
 
 
@@ -203,11 +203,11 @@ def test_the_recording_is_written_afterwards(moving, stop, tmp_path):
 def test_a_wrong_password_in_the_environment_gives_way_to_the_keyring(
     state_folder, monkeypatch, capsys
 ):
-    keyring = SimpleNamespace(get_password=lambda service, user: "right")
+    keyring = SimpleNamespace(get_password=lambda service, user: "canary-right")
     monkeypatch.setitem(sys.modules, "keyring", keyring)
     monkeypatch.setitem(sys.modules, "keyring.errors", SimpleNamespace(KeyringError=OSError))
-    monkeypatch.setenv("ROBOLINK_PASSWORD", "wrong")
-    with serve_tcp(EpsonSimulator(seed=4, password=Secret("right"))) as host:
+    monkeypatch.setenv("ROBOLINK_PASSWORD", "canary-wrong")
+    with serve_tcp(EpsonSimulator(seed=4, password=Secret("canary-right"))) as host:
         assert entry.run(["-c", host.url, "stop"]) == 0
         keyring.get_password = lambda service, user: None
         assert entry.run(["-c", host.url, "stop"]) == 5

@@ -28,6 +28,7 @@ remote_timeout_confirmed_by = "K. Sato, at the controller"
 [cells.a.stations.PIN-07]
 kind = "pin"
 gauge = "G-123"
+gauge_due = 2020-01-31
 
 [cells.a.stations.BEAMS-02]
 kind = "beams"
@@ -120,20 +121,28 @@ class MethodCell:
     def lengthen(self, by_mm: float, dx_mm: float = 0.0, dy_mm: float = 0.0, tool: int = 1) -> None:
         """Mount another needle."""
         tip = self.world.tips[tool]
+        # Where the flange looks out along its Z, a longer needle ends farther along it.
+        down_mm = by_mm if tip.z_mm > 0 else -by_mm
         self.world.tips[tool] = replace(
-            tip, x_mm=tip.x_mm + dx_mm, y_mm=tip.y_mm + dy_mm, z_mm=tip.z_mm - by_mm
+            tip, x_mm=tip.x_mm + dx_mm, y_mm=tip.y_mm + dy_mm, z_mm=tip.z_mm + down_mm
         )
 
 
 @contextmanager
+def epson_cell(kind: str) -> Iterator[SensorCell]:
+    """Set a cell up around the usual EPSON robot, or around another one by its name."""
+    robot: dict[str, Any] = {} if kind == "epson" else {"robot": kind}
+    with sensor_cell(**robot) as cell:
+        cell.simulator.machine.motors_on = True
+        yield cell
+
+
+@contextmanager
 def method_cell(kind: str, folder: Path, monkeypatch: Any) -> Iterator[MethodCell]:
-    """Set a cell up with its cell file."""
+    """Set a cell up with its cell file; ``kind`` is one of :data:`KINDS` or an EPSON robot."""
     for name in [name for name in os.environ if name.startswith("ROBOLINK")]:
         monkeypatch.delenv(name)
-    make = sensor_cell if kind == "epson" else plc_sensor_cell
-    with make() as cell:
-        if kind == "epson":
-            cell.simulator.machine.motors_on = True
+    with plc_sensor_cell() if kind == "plc" else epson_cell(kind) as cell:
         path = folder / "robolink.toml"
         path.write_text(CELL.format(url=cell.url, beams=cell.place_mm, plate=cell.plate))
         monkeypatch.setenv("ROBOLINK_CONFIG", str(path))

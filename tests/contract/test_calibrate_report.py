@@ -189,5 +189,7 @@ def test_a_failed_verification_is_reported_with_its_drifts(simulator, capsys, tm
     code, document = live(simulator, capsys, "--tolerance", "0.0001")
     page = page_of(tmp_path / "page.html")
     assert (code, document["error"]["kind"]) == (8, "VerifyError")
-    for said in ("The verification failed", "was written back.", "<strong>failed</strong>"):
+    # So small a tolerance lies within what the touches themselves scatter.
+    verdict = "<strong>undecided, which does not pass</strong>"
+    for said in ("The verification failed", "was written back.", verdict):
         assert said in page

@@ -82,7 +82,7 @@ def test_six_points_give_the_orientation_where_the_controller_can_hold_it(cell, 
     [
         ("pivot", [touching(pose) for pose in TILTED[:2]], COLUMNS, 7, "too_few_poses"),
         ("pivot", [touching(Pose(0, 0, 0, u)) for u in (0, 90, 180)], COLUMNS, 7, "rank_deficient"),
-        ("pivot", [touching(pose) for pose in TILTED], COLUMNS[:4], 2, "has no v_deg"),
+        ("pivot", [touching(pose) for pose in TILTED], COLUMNS[:4], 2, "there is no V, W"),
         ("six-point", six_points()[-4:], COLUMNS, 7, "too_few_poses"),
         ("six-point", [touching(pose) for pose in TILTED], COLUMNS, 7, "turned_on_the_way"),
         ("n-angle", [touching(Pose(0, 0, 0, u)) for u in (0, 5, 10)], COLUMNS, 7, "insufficient"),

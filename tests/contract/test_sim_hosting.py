@@ -65,8 +65,8 @@ def served(simulator=None, *, factor=1.0):
 
 
 def test_a_login_with_and_without_a_password():
-    with served(EpsonSimulator(password=Secret("123"))) as host:
-        with raw(host.url, password="123"):
+    with served(EpsonSimulator(password=Secret("canary-123"))) as host:
+        with raw(host.url, password="canary-123"):
             pass
     with served() as host:
         with closing(RawClient(host.url)) as client:

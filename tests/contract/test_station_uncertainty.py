@@ -125,6 +125,7 @@ def test_how_well_touches_repeat_in_height_is_pooled_from_ten_of_them(arm):
         assert touch_sigma_z_mm(controller, "PIN-07") == 0.05
         for run in range(4):
             touch = {"station": "PIN-07", "heights_mm2": 0.0012, "heights_dof": 3}
+            touch["heights_by"] = "person"
             controller.outcomes.append(
                 NewEntry(EntryKind.DECISION, tool=1, verdict="", details={"touch": touch})
             )

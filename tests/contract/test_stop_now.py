@@ -89,11 +89,11 @@ def test_beside_a_client_that_is_logged_in_nobody_answers(serve, second):
 
 
 def test_a_password_is_given_once(serve):
-    simulator = EpsonSimulator(seed=7, password=Secret("right"))
+    simulator = EpsonSimulator(seed=7, password=Secret("canary-right"))
     with serve(simulator) as cell:
         with pytest.raises(LoginRefusedError):
-            stop_now(cell.url, password=Secret("wrong"))
-        assert stop_now(cell.url, password=Secret("right")).ready
+            stop_now(cell.url, password=Secret("canary-wrong"))
+        assert stop_now(cell.url, password=Secret("canary-right")).ready
 
 
 def test_a_controller_that_takes_no_stop_from_here_says_so(serve):

@@ -203,7 +203,7 @@ def test_the_login_is_in_no_transcript_and_one_attempt_is_made(cell):
     found = verify_epson(url, password=Secret("hush-4711"))
     assert "hush" not in format_dialogue(found.dialogue)
     with pytest.raises(LoginRefusedError):
-        verify_epson(url, password=Secret("wrong"))
+        verify_epson(url, password=Secret("canary-wrong"))
     logins = [text for _, _, text in simulator.log if text.startswith("$Login")]
     assert len(logins) == 2
 

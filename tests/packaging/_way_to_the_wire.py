@@ -1,8 +1,9 @@
-"""Which files a tool write passes through before its request is sent.
+"""Which files a tool write passes through before its request is sent, and poses until solved.
 
 ``python -m tests.packaging._way_to_the_wire`` prints them. Counted are files of the three packages
 in which a function is entered, once each, from the call of a function of a given name until the
-request is handed to the socket. Not counted: what runs because a module is being imported, and
+request is handed to the socket; with poses, from the call of the method's ``solve`` until it
+returns. Not counted: what runs because a module is being imported, and
 class bodies and comprehensions of their own, since nothing is entered there.
 """
 
@@ -76,6 +77,37 @@ class WayToTheWire:
             self.entered[name].setdefault(file, set()).add(code.co_qualname)
 
 
+@dataclass
+class WayToTheSolver(WayToTheWire):
+    """What was entered while poses were solved, from the method's ``solve`` until it returned.
+
+    ``stack`` holds the calls that were open where most files were, from :meth:`PointsSource.find`
+    on, in which the poses come to be; ``command`` the same from the command's function on.
+    """
+
+    command: list[tuple[str, str]] = field(default_factory=list)
+    _solving: FrameType | None = None
+    _deepest: list[tuple[str, str]] = field(default_factory=list)
+
+    def _look(self, frame: FrameType, event: str, called: object) -> None:
+        if event == "return" and frame is self._solving:
+            names = [function for _, function in self._deepest]
+            self.stack = self._deepest[names.index("find") :]
+            self.command = self._deepest[names.index("calibrate_with") :]
+        super()._look(frame, event, called)
+
+    def _sends(self, frame: FrameType) -> bool:
+        return False
+
+    def _enter(self, frame: FrameType) -> None:
+        if self._solving is None and frame.f_code.co_qualname == "TwoTouches.solve":
+            self._solving = frame
+        super()._enter(frame)
+        calls = list(reversed(list(_calls(frame)))) if self._solving is not None else []
+        if len({file for file, _ in calls}) > len({file for file, _ in self._deepest}):
+            self._deepest = calls
+
+
 def _calls(frame: FrameType | None) -> "list[tuple[str, str]]":
     found = []
     while frame is not None:
@@ -110,8 +142,26 @@ def follow_a_tool_write(url: str) -> WayToTheWire:
     return way
 
 
+def follow_typed_poses(url: str) -> WayToTheSolver:
+    """Calibrate tool 1 from two poses on the command line, twice, and follow the second time.
+
+    Args:
+        url: The controller. It is written.
+    """
+    from robolink_cli import main
+
+    def calibrate(x_mm: str) -> None:
+        poses = ("--pose", f"{x_mm},100,0", "--pose", "290,104,180", "--max-change", "50", "--yes")
+        assert main.run(["-c", url, "calibrate", "two-pose", "--tool", "1", *poses]) == 0
+
+    calibrate("300")
+    way = WayToTheSolver(b"", {"solve": {}})
+    way.follow(lambda: calibrate("301"))
+    return way
+
+
 def main() -> None:
-    """Print what a tool write of a simulated controller passes through."""
+    """Print what a tool write and two poses pass through, with a simulated controller."""
     import os
 
     from robolink_simulators.cell.clock import ScaledClock
@@ -122,12 +172,23 @@ def main() -> None:
         os.environ["ROBOLINK_STATE_DIR"] = folder
         with serve_tcp(EpsonSimulator(seed=1), clock=ScaledClock()) as served:
             way = follow_a_tool_write(served.url)
+            poses = follow_typed_poses(served.url)
+    _print_entered(way)
+    _print_calls("open when the request is sent", way.stack)
+    _print_entered(poses)
+    _print_calls("open from the command's function on, where most files are", poses.command)
+
+
+def _print_entered(way: WayToTheWire) -> None:
     for name, files in way.entered.items():
         print(f"\n{len(files)} files from {name}() on")  # noqa: T201
         for file, functions in sorted(files.items()):
             print(f"  {file}: {', '.join(sorted(functions))}")  # noqa: T201
-    print(f"\n{len(way.stack)} calls open when the request is sent")  # noqa: T201
-    for file, function in way.stack:
+
+
+def _print_calls(when: str, calls: list[tuple[str, str]]) -> None:
+    print(f"\n{len(calls)} calls, {len({file for file, _ in calls})} files {when}")  # noqa: T201
+    for file, function in calls:
         print(f"  {file}: {function}")  # noqa: T201
 
 

@@ -1,4 +1,4 @@
-"""The way of a tool write to the wire grows no longer unnoticed.
+"""The ways of a tool write to the wire, and of poses to the solver, grow no longer unnoticed.
 
 docs/decisions/0023-how-short-the-way-of-a-tool-write-is.md says what the figures mean.
 """
@@ -7,11 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from tests.packaging._way_to_the_wire import follow_a_tool_write
+from tests.packaging._way_to_the_wire import follow_a_tool_write, follow_typed_poses
 
 MOST_FILES = {"set_tool": 75, "change_tools": 40}
 MOST_CALLS = 14
 MOST_FILES_OPEN = 9
+MOST_FILES_TO_SOLVE = 6
+MOST_FILES_OPEN_FROM_THE_POSES = 5
+MOST_FILES_OPEN_FROM_THE_COMMAND = 9
 
 
 @pytest.fixture
@@ -36,3 +39,16 @@ def test_what_is_open_when_the_request_leaves_can_be_read_from_top_to_bottom(way
     page = Path(__file__).parents[2] / "docs" / "architecture.md"
     told = page.read_text(encoding="utf-8")
     assert [file for file, _ in calls if f"`{file}`" not in told] == []
+
+
+def test_typed_poses_pass_through_no_more_files_than_are_known(epson_tcp, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    way = follow_typed_poses(epson_tcp.url)
+    files, opened = sorted(way.entered["solve"]), {file for file, _ in way.stack}
+    assert "robolink/calibration/pin/two_pose.py" in opened
+    assert len(files) <= MOST_FILES_TO_SOLVE, files
+    assert len(opened) <= MOST_FILES_OPEN_FROM_THE_POSES, way.stack
+    assert len({file for file, _ in way.command}) <= MOST_FILES_OPEN_FROM_THE_COMMAND, way.command
+    page = Path(__file__).parents[2] / "docs" / "architecture.md"
+    told = page.read_text(encoding="utf-8")
+    assert [file for file in sorted({*files, *opened}) if f"`{file}`" not in told] == []

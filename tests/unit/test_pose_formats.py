@@ -185,3 +185,34 @@ def test_four_rows_of_four_numbers_are_a_table_unless_they_are_rotations(read):
     with pytest.raises(AmbiguousPosesError):
         read(rows)
     assert len(read(rows, columns="x,y,z,u").poses) == 4
+
+
+def test_a_target_to_which_another_tool_is_moved_is_no_place_of_the_flange(read):
+    constant = f"CONST robtarget p1:={TARGET};\n"
+    for text in (
+        f"MoveL {TARGET},v100,fine,tNeedle;\n",
+        f"MoveL {TARGET},v100,fine,tNeedle\\WObj:=wobj0;\n",
+        f"{constant}MoveJ p1, v100, z10, tNeedle;\n",
+    ):
+        with pytest.raises(ConfigError, match="of the tool tNeedle, not of the flange"):
+            read(text)
+    assert len(read(f"{constant}MoveJ pOther, v100, z10, tNeedle;\n").poses) == 1
+    assert len(read(f"{constant}MoveJ p1, v100, z10, tool0\\WObj:=wobj0;\n").poses) == 1
+
+
+def test_no_point_of_a_list_is_passed_over(read):
+    points = "P1 = XY(1, 2, 3, 4) /R /0\n{} = XY(11, 12, 13, 14) /R /0\n"
+    labelled = read(points.format("P2(pin1)"))
+    assert [entry.name for entry in labelled.entries] == ["", "pin1"]
+    assert labelled.poses[1].x_mm == 11.0
+    for unreadable in ("P2[pin1]", "P2 pin 1", "P2(pin 1)"):
+        with pytest.raises(ConfigError, match="line 2"):
+            read(points.format(unreadable))
+
+
+@pytest.mark.parametrize("columns", ["rx ry rz", "rz ry rx"])
+def test_columns_that_name_their_axes_are_not_counted(read, columns):
+    angles = dict(zip(("rz", "ry", "rx"), ANGLES, strict=True))
+    row = " ".join(str(angles[name]) for name in columns.split())
+    (pose,) = read(f"x y z {columns}\n405.8 -62.9 251.6 {row}\n", euler="RzRyRx").poses
+    assert pose.coordinates()[3:] == pytest.approx(ANGLES)

@@ -63,6 +63,10 @@ LAYOUTS = {
     "what a spreadsheet is told": "sep=;\nX;Y;Z;U\n287,5;103,25;-50;90\n-12,25;87,5;-50;-45\n",
     "two numbers, two names": "No,ID,Name,Point,x,y,z,u\n1,7,a,b,287.5,103.25,-50,90\n"
     "2,8,c,d,-12.25,87.5,-50,-45\n",
+    "names of two words between semicolons": "Name ; X ; Y ; Z ; U\n"
+    "Pin 1 ; 287,5 ; 103,25 ; -50 ; 90\nPin 2 ; -12,25 ; 87,5 ; -50 ; -45\n",
+    "names of two words between tabs": "Name\tX\tY\tZ\tU\nPin 1\t287.5\t103.25\t-50\t90\n"
+    "Pin 2\t-12.25\t87.5\t-50\t-45\n",
     "bars": "| x | y | z | u |\n| 287.5 | 103.25 | -50 | 90 |\n| -12.25 | 87.5 | -50 | -45 |\n",
     "about Z alone": "x,y,z,rz\n287.5,103.25,-50,90\n-12.25,87.5,-50,-45\n",
     "names and values": "Pin 1: X=287.5 mm Y=103.25 mm Z=-50 mm U=90 deg\n"

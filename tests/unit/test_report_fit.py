@@ -9,8 +9,8 @@ import pytest
 from robolink.calibration import Robust, Touch, solve_n_angle, solve_two_pose, solve_z_touch
 from robolink.model import ControllerFacts, Pose, ToolOffset
 from robolink.report import Outcome, Report, render
-from robolink.report.pictures.fit import fit, interval_ellipse
-from robolink.report.pictures.pose_plan import pose_plan
+from robolink.report.pictures.fit import fit_drawings, interval_ellipse
+from robolink.report.pictures.pose_plan import pose_drawings
 
 TIP = ToolOffset(12.0, -3.5, -20.0)
 ERRORS = ((0.012, -0.004), (-0.009, 0.011), (0.003, 0.007), (-0.006, -0.010), (0.004, 0.002))
@@ -44,7 +44,7 @@ def report(result):
 
 
 def drawn(parts):
-    return "".join(tostring(part, encoding="unicode") for part in parts)
+    return "".join(tostring(part.svg, encoding="unicode") + part.caption for part in parts)
 
 
 @pytest.mark.parametrize("angles", [(0, 20, 45, 60, 90), (0, 72, 144, 216, 288)])
@@ -68,24 +68,24 @@ def test_the_ellipse_reaches_as_far_as_the_intervals_of_x_and_y(angles):
 def test_two_touches_have_no_ellipse_and_the_page_says_why():
     result = solve_two_pose(*touches(0, 180))
     assert interval_ellipse(result) is None
-    assert drawn(fit(report(result))) == ""
+    assert drawn(fit_drawings(result)) == ""
     assert "nothing here tells how large the errors are" in render(report(result))
 
 
 def test_a_stated_sigma_gives_two_touches_an_ellipse():
     result = solve_two_pose(*touches(0, 180), sigma_mm=0.02)
-    assert "<ellipse" in drawn(fit(report(result)))
+    assert "<ellipse" in drawn(fit_drawings(result))
     assert "stated standard deviation of 0.02 mm" in render(report(result))
 
 
 def test_each_pose_has_its_dot_its_row_and_its_place():
     result = solve_n_angle(touches(0, 72, 144, 216, 288))
-    picture, page = drawn(fit(report(result))), render(report(result))
+    picture, page = drawn(fit_drawings(result)), render(report(result))
     assert picture.count('class="point"') == len(ERRORS) + 1  # and the middle of the ellipse
     assert 'class="rms"' in picture
     for residual in result.residual_distances_mm:
         assert f'value="{residual!r}"' in page
-    assert drawn(pose_plan(report(result))).count("<polygon") == len(ERRORS)
+    assert drawn(pose_drawings(result)).count("<polygon") == len(ERRORS)
     assert "degrees of freedom: 6" in page
 
 
@@ -94,16 +94,16 @@ def test_a_pose_that_was_left_out_is_marked_in_picture_table_and_plan():
     errors = ((0.0, 0.0),) * 3 + ((1.5, 0.0),) + ((0.0, 0.001),) * 2
     result = solve_n_angle(touches(*angles, errors=errors), robust=Robust())
     assert result.rejected == (3,)
-    picture, page = drawn(fit(report(result))), render(report(result))
+    picture, page = drawn(fit_drawings(result)), render(report(result))
     assert picture.count('class="largest"') == 1
     assert "red: left out" in picture
     assert "4 (left out)" in page
-    assert drawn(pose_plan(report(result))).count('class="largest"') == 1
+    assert drawn(pose_drawings(result)).count('class="largest"') == 1
 
 
 def test_heights_have_no_picture_from_above_and_need_none():
     touches = [Touch(-106.0 - 0.01 * v + e, v) for v, e in ((2.0, 0.002), (1.0, 0.0), (2.0, 0.0))]
     result = solve_z_touch(touches, -86.0, stored=TIP)
     assert result.residuals_mm
-    assert drawn(fit(report(result))) == drawn(pose_plan(report(result))) == ""
+    assert drawn(fit_drawings(result)) == drawn(pose_drawings(result)) == ""
     assert "95 % interval" in render(report(result))

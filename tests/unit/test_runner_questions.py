@@ -1,17 +1,20 @@
 """What a person may answer, how a jog step may be typed, and that no question is for ever."""
 
+import os
+import sys
 from itertools import count, cycle
 
 import pytest
-from robolink_cli.prompts.operator import MOST_STEPS, AssistedOperator
+from robolink_cli.prompts.operator import MOST_STEPS, AssistedOperator, TerminalOperator
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.in_process.epson import register, unregister
 
 import robolink
-from robolink.errors import ConfigError, DeclinedError
+from robolink.errors import CalibrationError, ConfigError, DeclinedError
 from robolink.model import WorkBox
 from robolink.runner import (
     MOST_REFUSED,
+    Ask,
     Question,
     Runner,
     RunSettings,
@@ -156,3 +159,64 @@ def test_a_stand_in_that_sees_another_way_each_time_gives_up():
     with pytest.raises(DeclinedError, match="did not get there"):
         for _ in range(MOST_STEPS + 1):
             operator.poll(0)
+
+
+def test_what_was_fed_in_before_a_question_answers_none_and_what_comes_after_does(monkeypatch):
+    far, near = os.pipe()
+    shown: list[str] = []
+    with open(far) as stdin, open(near, "w", buffering=1) as feed:
+        monkeypatch.setattr(sys, "stdin", stdin)
+        operator = TerminalOperator(shown.append)
+        feed.write("y\n\nz-2\n")
+        operator.ask("Write it?", Question.YES_NO)
+        assert operator.poll(0.05) is None
+        assert [line for line in shown if line.startswith("Typed too early")] == [
+            "Typed too early, so it was not taken: 'y'",
+            "Typed too early, so it was not taken: 'z-2'",
+        ]
+        feed.write("n\n")
+        assert operator.poll(20) == "n\n"
+        feed.close()
+        with pytest.raises(DeclinedError):
+            operator.poll(20)
+
+
+class Hasty(Typist):
+    """Reads some questions and not others, by a clock."""
+
+    def __init__(self, clock, *thinks_s):
+        super().__init__("")
+        self.clock, self.thinks_s = clock, list(thinks_s)
+
+    def poll(self, wait_s):
+        if self.thinks_s:
+            self.clock.sleep(self.thinks_s.pop(0))
+        return super().poll(wait_s)
+
+
+def shown_to(controller, *thinks_s):
+    hasty = Hasty(controller.clock, *thinks_s)
+    return hasty, runner_with(controller, hasty).run(touched())
+
+
+def touched():
+    """Ask for a place on which something rests."""
+    return (yield Ask("Bring the tip onto the pin."))
+
+
+def test_an_answer_that_nobody_can_have_read_the_question_for_is_asked_again(controller):
+    hasty, answer = shown_to(controller, 0.0, 0.2, 0.4)
+    assert len(hasty.asked) == 3
+    assert len(hasty.shown) == 2
+    assert answer.seconds == pytest.approx(0.4, abs=0.05)
+    assert answer.contact is None
+
+
+def test_whoever_keeps_answering_too_early_is_refused(controller):
+    with pytest.raises(CalibrationError, match="before anybody could have read it") as refused:
+        shown_to(controller, 0.0, 0.1, 0.2, 1.0)
+    assert refused.value.code == "typed_ahead"
+
+
+def test_a_jog_for_its_own_sake_needs_no_time(controller):
+    runner_with(controller, Hasty(controller.clock, 0.0)).run(ask_for_pose("Jog."))

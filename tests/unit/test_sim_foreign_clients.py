@@ -129,9 +129,9 @@ def test_a_bare_login(connect, habit, answer):
 
 
 def test_a_bare_login_is_the_empty_password_where_one_is_set(connect):
-    client = connect(EpsonSimulator(password=Secret("123")))
+    client = connect(EpsonSimulator(password=Secret("canary-123")))
     assert client.ask("$Login") == "!Login,13"
-    assert client.ask("$Login,123,CLRF") == "#Login,0"
+    assert client.ask("$Login,canary-123,CLRF") == "#Login,0"
 
 
 @pytest.mark.parametrize("habit", ["current", "all"])

@@ -9,6 +9,7 @@ from robolink.errors import ConfigError
 from robolink.journal import EntryKind, memory_journal
 from robolink.stations import (
     Found,
+    Gauge,
     StationKind,
     beam_station,
     find_station,
@@ -24,6 +25,7 @@ url = "epson+sim://a"
 [cells.a.stations.PIN]
 kind = "pin"
 gauge = "G-1"
+gauge_due = 2999-05-31
 check_every_days = 30
 [cells.a.stations.BEAMS]
 kind = "beams"
@@ -153,6 +155,7 @@ def test_a_check_is_due_by_the_calendar(file, record):
     pin = find_station(cell, record(PIN), "PIN")
     found = datetime.fromisoformat(pin.found_at)
     assert pin.remark(found + timedelta(days=29)) == ""
+    assert pin.gauge_on_record() == Gauge("G-1", "PIN", "2999-05-31", overdue=False)
     assert "has been due since" in pin.remark(found + timedelta(days=31))
     assert find_stations(cell, [])["PLATE"].remark(datetime.now(UTC)) == ""
 
@@ -202,3 +205,12 @@ def test_what_is_wrong_with_a_station_is_told_by_its_key(file, text, where, what
     (problem,) = check_file(path)
     assert problem.where == where
     assert what in problem.what
+
+
+@pytest.mark.parametrize(("day", "overdue"), [("2999-05-31", False), ("2999-06-01", True)])
+def test_the_calibration_of_a_gauge_holds_up_to_its_last_day(file, day, overdue):
+    file(CELL)
+    pin = find_stations(find_cell("a"), [])["PIN"]
+    noon = datetime.fromisoformat(f"{day}T12:00:00+00:00")
+    assert pin.gauge_overdue(noon) is overdue
+    assert ("gauge G-1 at station PIN ran out on 2999-05-31" in pin.remark(noon)) is overdue

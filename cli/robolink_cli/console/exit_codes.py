@@ -40,7 +40,7 @@ MEANINGS: Final[dict[int, str]] = {
     5: "the controller, or a check of its state, said no",
     UNKNOWN: "a write or a movement stands unproved; `robolink recover` comes next",
     7: "the measurements do not support a result",
-    8: "the proof failed; the old value was put back",
+    8: "the proof failed, or its touches were not made; the old value was put back",
     9: "a person said no, or was not there to say yes",
     10: "a stop ended it",
     BUG: "a defect in robolink",

@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Final
 import click
 
 from robolink.interrupts import Interrupted, output_closed
+from robolink_cli.console.tolerance import PLAINLY
 
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
@@ -116,7 +117,7 @@ def _watched(name: str) -> Iterator[None]:
     stream = io.TextIOWrapper(
         watched if buffer is raw else io.BufferedWriter(watched),
         encoding=before.encoding,
-        errors="backslashreplace",
+        errors=PLAINLY,
         newline=None if os.name == "nt" else "\n",
         line_buffering=before.line_buffering,
         write_through=before.write_through,

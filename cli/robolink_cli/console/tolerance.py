@@ -1,8 +1,29 @@
 """Output and input that never fail for want of a character."""
 
+import codecs
 import io
 import os
 import sys
+from typing import Final
+
+PLAINLY: Final = "robolink.plainly"
+"""Name of what stands in for characters that an encoding lacks: signs in letters, else escapes."""
+
+_IN_ASCII: Final = {"\u00b1": "+-", "\u221e": "inf", "\u00b0": " deg", "\u2192": "->"}
+
+
+def _plainly(error: UnicodeError) -> tuple[str | bytes, int]:
+    if not isinstance(error, UnicodeEncodeError):
+        return codecs.backslashreplace_errors(error)
+    lacking = error.object[error.start : error.end]
+    escaped = (
+        _IN_ASCII.get(one) or one.encode("ascii", "backslashreplace").decode("ascii")
+        for one in lacking
+    )
+    return "".join(escaped), error.end
+
+
+codecs.register_error(PLAINLY, _plainly)
 
 
 def tolerate_any_console() -> None:
@@ -13,7 +34,7 @@ def tolerate_any_console() -> None:
     """
     for stream in (sys.stdin, sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="backslashreplace")
+            stream.reconfigure(errors=PLAINLY)
 
 
 def colour_wanted() -> bool | None:

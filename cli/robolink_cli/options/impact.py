@@ -108,7 +108,6 @@ def impact_payload(impact: "Impact") -> dict[str, object]:
         "other_local": [
             {"point": number, "local": local} for number, local in impact.other_local.items()
         ],
-        "tilted": list(impact.tilted),
     }
 
 
@@ -145,9 +144,6 @@ def _show_left_out(impact: "Impact") -> None:
     if impact.other_local:
         named = ", ".join(f"P{n} (local {local})" for n, local in impact.other_local.items())
         say(tr("  in another local, left out: {points}", points=named))
-    if impact.tilted:
-        named = ", ".join(f"P{number}" for number in impact.tilted)
-        say(tr("  tilted (V or W not 0), left out: {points}", points=named))
 
 
 def _cell(value: float) -> str:

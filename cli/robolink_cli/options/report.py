@@ -1,6 +1,6 @@
 """The report of a tool change: the options, and a page that is written however it ends."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,9 +15,9 @@ from robolink_cli.console.render import note
 
 if TYPE_CHECKING:
     from robolink.calibration import Impact, VerifyResult
-    from robolink.model import Controller, ControllerFacts, ToolOffset, ToolReceipt
+    from robolink.model import Controller, ControllerFacts, Pose, ToolOffset, ToolReceipt
     from robolink.nozzle_change import Proposal
-    from robolink.report import Outcome, Report
+    from robolink.report import Outcome, Report, TouchOnRecord
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -124,6 +124,8 @@ class ReportDraft:
             "poses": result.inputs,
             "fit": result,
             "impact": impact,
+            "touches": tuple(_touches(result.inputs)),
+            "evidence": result.evidence.as_json() if result.evidence else {},
         }
 
     def note_result(self, result: "ToolReceipt | VerifyResult") -> None:
@@ -171,6 +173,18 @@ class ReportDraft:
         if receipt.skipped:
             return Outcome.SKIPPED
         return Outcome.WRITTEN if self._verification is None else Outcome.VERIFIED
+
+
+def _touches(poses: "Sequence[Pose]") -> "Iterator[TouchOnRecord]":
+    """Yield how a person made each touch."""
+    from robolink.procedures import jog_mm
+    from robolink.report import TouchOnRecord
+    from robolink.runner import TouchedAt
+
+    for pose in poses:
+        if isinstance(pose, TouchedAt):
+            standoff_mm = None if pose.arrival is None else pose.standoff_mm
+            yield TouchOnRecord(standoff_mm, jog_mm(pose), pose.seconds, pose.contact)
 
 
 @contextmanager

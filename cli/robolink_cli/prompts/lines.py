@@ -1,8 +1,8 @@
 """Lines that a person types, and forgetting those typed before there was anything to answer.
 
-A barcode scanner ends with CR and LF, a key stays down, a line is pasted: what waits in the
-input when a question is shown was never meant for it. On a terminal it is dropped; where stdin
-is no terminal, a script has written its answers beforehand, and nothing is.
+A barcode scanner ends with CR and LF, a key stays down, a line is pasted, a file is fed in: what
+waits in the input when a question is shown was never meant for it, and is dropped. A program that
+answers reads the question first; one that knows its answers beforehand has options for them.
 """
 
 import os
@@ -104,7 +104,7 @@ class TerminalLines:
 
 
 class StreamLines:
-    """Lines of a file or a pipe, read by a thread; nothing is ever dropped."""
+    """Lines of a file or a pipe, read by a thread."""
 
     def __init__(self) -> None:
         self._queue: queue.SimpleQueue[str | None] = queue.SimpleQueue()
@@ -112,9 +112,7 @@ class StreamLines:
 
     def next(self, wait_s: float) -> str | None:
         """Return the next line; see :class:`Lines`."""
-        if self._reader is None:
-            self._reader = threading.Thread(target=self._read, name="prompt", daemon=True)
-            self._reader.start()
+        self._start()
         try:
             line = self._queue.get(timeout=wait_s)
         except queue.Empty:
@@ -124,9 +122,28 @@ class StreamLines:
             raise EOFError
         return line
 
-    def forget(self, quiet_s: float) -> list[str]:  # noqa: ARG002 - there is nothing to wait for
-        """Drop nothing: these answers were written beforehand, on purpose."""
-        return []
+    def forget(self, quiet_s: float) -> list[str]:
+        """Drop what was written; see :class:`Lines`."""
+        import time
+
+        self._start()
+        dropped: list[str] = []
+        end_s = time.monotonic() + _BURST_S
+        while time.monotonic() < end_s:
+            try:
+                line = self._queue.get(block=quiet_s > 0, timeout=quiet_s or None)
+            except queue.Empty:
+                break
+            if line is None:
+                self._queue.put(None)  # it ends for whoever asks, too
+                break
+            dropped.append(line.rstrip("\r\n"))
+        return dropped
+
+    def _start(self) -> None:
+        if self._reader is None:
+            self._reader = threading.Thread(target=self._read, name="prompt", daemon=True)
+            self._reader.start()
 
     def _read(self) -> None:
         try:

@@ -1,8 +1,9 @@
 """How sure a measurement is, in words and as a table."""
 
 from collections.abc import Iterator
+from typing import Final
 
-from robolink.calibration import CalibrationResult, chain_of
+from robolink.calibration import CalibrationResult, chain_of, known_doubts, order_in_words
 from robolink.messages import tr
 from robolink_cli.console.render import table
 from robolink_cli.views.documents import number
@@ -10,10 +11,15 @@ from robolink_cli.views.documents import number
 
 def remarks(result: CalibrationResult) -> Iterator[str]:
     """Yield what there is to say about a measurement beside its numbers, a sentence each."""
-    for said in (_fit, _interval, _region, _parts, _ways, _camera, _runout, _chain):
+    for said in (_fit, _order, _interval, _region, _parts, _ways, _camera, _runout, _chain):
         sentence = said(result)
         if sentence:
             yield sentence
+    yield from known_doubts(note for note in result.notes if note not in _SAID_OTHERWISE)
+
+
+_SAID_OTHERWISE: Final = ("length_not_observable",)
+"""Notes whose reason the proposal gives, in a sentence of its own."""
 
 
 def _fit(result: CalibrationResult) -> str:
@@ -35,12 +41,18 @@ def _fit(result: CalibrationResult) -> str:
     )
 
 
+def _order(result: CalibrationResult) -> str:
+    """Return what moved while the poses were taken, by how much; empty where nothing did."""
+    order = result.evidence.run_order if result.evidence is not None else None
+    return order_in_words(order) if order is not None else ""
+
+
 def _interval(result: CalibrationResult) -> str:
     """Return the 95 % interval of each measured component; empty when nothing tells it."""
     if not result.half_width95:
         return ""
     parts = (
-        f"{name[0].upper()} +-{half:.3f}"
+        f"{name[0].upper()} ±{half:.3f}"
         for name, half in zip(result.measured, result.half_width95, strict=True)
     )
     if result.interval_from == "resolution":
@@ -69,13 +81,17 @@ def _parts(result: CalibrationResult) -> str:
     budget = result.budget
     if budget is None:
         return ""
-    return tr(
+    told = tr(
         "standard uncertainty: from these touches {a:.4f} mm (type A), known otherwise "
         "{b:.4f} mm (type B), together {c:.4f} mm",
         a=budget.type_a_mm,
         b=budget.type_b_mm,
         c=budget.u_c_mm,
     )
+    if not budget.not_assessed:
+        return told
+    left_out = tr("; not assessed: {names}", names=", ".join(budget.not_assessed))
+    return told + left_out
 
 
 def _ways(result: CalibrationResult) -> str:

@@ -43,6 +43,7 @@ def station_payload(station: Station) -> dict[str, Any]:
         "found_at": station.found_at or None,
         "entry": station.entry,
         "gauge": station.gauge or None,
+        "gauge_due": station.gauge_due or None,
         "check_due": due.isoformat() if due else None,
         "remark": station.remark() or None,
         "declared": station.declared,

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 from itertools import combinations
 
 from robolink.calibration.camera.board import check_spacing
-from robolink.calibration.core.planar_checks import require_poses
-from robolink.calibration.core.pose_checks import require_finite
+from robolink.calibration.core.pose_checks import require_finite, require_poses
 from robolink.model import ToolOffset, rotate_xy
 
 

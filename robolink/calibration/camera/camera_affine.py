@@ -19,8 +19,12 @@ from robolink.calibration.camera.camera_model import (
     require_same_camera,
 )
 from robolink.calibration.core.least_squares import LinearFit, linear_fit
-from robolink.calibration.core.planar_checks import require_poses
-from robolink.calibration.core.pose_checks import check_poses, keep_unmeasured, require_finite
+from robolink.calibration.core.pose_checks import (
+    check_poses,
+    keep_unmeasured,
+    require_finite,
+    require_poses,
+)
 from robolink.calibration.core.result import CalibrationResult, offset_sigma_mm
 from robolink.calibration.core.robust import Floats
 from robolink.calibration.flange_checks import require_flange_in_base, with_height_error

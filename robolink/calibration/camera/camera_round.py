@@ -16,8 +16,12 @@ import numpy as np
 from robolink.calibration.camera.camera_model import CameraModel
 from robolink.calibration.camera.up_camera import Sighting, check_sightings, solve_up_camera
 from robolink.calibration.core.least_squares import linear_fit
-from robolink.calibration.core.planar_checks import MIN_ROTATION_DEG, check_planar, require_poses
-from robolink.calibration.core.pose_checks import keep_unmeasured
+from robolink.calibration.core.pose_checks import (
+    MIN_ROTATION_DEG,
+    check_planar,
+    keep_unmeasured,
+    require_poses,
+)
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.flange_checks import with_height_error
 from robolink.calibration.flange_plane import (

@@ -22,7 +22,7 @@ import numpy as np
 from robolink.calibration.camera.up_camera import Sighting, check_sightings
 from robolink.calibration.core.dispersion import Dispersion
 from robolink.calibration.core.least_squares import LinearFit, linear_fit
-from robolink.calibration.core.planar_checks import check_planar
+from robolink.calibration.core.pose_checks import MIN_ROTATION_DEG, check_planar
 from robolink.calibration.core.statistics import f_quantile
 from robolink.calibration.flange_plane import FlangePlane, standing_upright
 from robolink.calibration.pin.planar import Complexes
@@ -40,9 +40,6 @@ _BADLY_TOLD_APART = 100.0
 _SAME_ANGLE_DEG = 0.01
 
 _ROUNDING_MM = 1e-9
-
-_BENT_ARC_DEG = 179.99
-"""Half a turn, as printed angles hold it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +94,7 @@ def runout_report(sightings: Sequence[Sighting], *, sigma_mm: float | None = Non
     """Return offset and wobble of a tip that was seen at several angles.
 
     Args:
-        sightings: At least four, over half a turn or more; the flange may stand anywhere, upright
+        sightings: At least four; the flange may stand anywhere, upright
             or upside down.
         sigma_mm: Standard deviation of one coordinate of one sighting, when it is known.
 
@@ -109,7 +106,7 @@ def runout_report(sightings: Sequence[Sighting], *, sigma_mm: float | None = Non
     check_sightings(tuple(sightings))
     flanges = standing_upright([sighting.flange for sighting in sightings])
     warnings = check_planar(
-        flanges, minimum=4, min_rotation_deg=_BENT_ARC_DEG, allow_mixed_hand=False
+        flanges, minimum=4, min_rotation_deg=MIN_ROTATION_DEG, allow_mixed_hand=False
     )
     seen = np.array([complex(s.x_mm - s.flange.x_mm, s.y_mm - s.flange.y_mm) for s in sightings])
     angles_deg = [flange.u_deg for flange in flanges]

@@ -15,8 +15,7 @@ from robolink.calibration.camera.camera_round import CAMERA_MOVED_MM, CameraRoun
 from robolink.calibration.camera.runout import RunoutReport, runout_report
 from robolink.calibration.camera.up_camera import Sighting
 from robolink.calibration.core.dispersion import Dispersion
-from robolink.calibration.core.planar_checks import require_poses
-from robolink.calibration.core.pose_checks import keep_unmeasured
+from robolink.calibration.core.pose_checks import keep_unmeasured, require_poses
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.flange_plane import FlangePlane
 from robolink.errors import CalibrationError

@@ -1,6 +1,11 @@
 """What a fit tells about itself beyond its answer: figures behind notes and doubts."""
 
+import math
 from dataclasses import dataclass
+from typing import Final
+
+NOTICEABLE_MM: Final = 0.002
+"""A smaller step or drift is left to rounding, whatever its F."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +33,8 @@ class RunOrder:
     @property
     def finding(self) -> str:
         """The name of what was found; empty when chance explains it."""
-        step, drift = self.step_f > self.step_f_limit, self.drift_f > self.drift_f_limit
+        step = self.step_f > self.step_f_limit and math.hypot(*self.step_mm) >= NOTICEABLE_MM
+        drift = self.drift_f > self.drift_f_limit and math.hypot(*self.drift_mm) >= NOTICEABLE_MM
         if step and (not drift or self.step_f >= self.drift_f):
             return "step_in_run_order"
         return "drift_in_run_order" if drift else ""

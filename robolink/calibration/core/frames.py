@@ -111,13 +111,45 @@ def in_base(pose: Pose, local: ToolOffset) -> Pose:
 
     own = rotation_of(Pose(0.0, 0.0, 0.0, local.u_deg, local.v_deg, local.w_deg))
     x_mm, y_mm, z_mm = (own @ pose.coordinates()[:3] + local.components()[:3]).tolist()
-    return Pose(x_mm, y_mm, z_mm, *uvw_deg(own @ rotation_of(pose)), hand=pose.hand, tool=pose.tool)
+    uvw = uvw_deg(own @ rotation_of(pose))
+    return Pose(x_mm, y_mm, z_mm, *uvw, hand=pose.hand, tool=pose.tool, posture=pose.posture)
 
 
 def flange_of(tip: Pose, offset: ToolOffset) -> Pose:
     """Return where the flange is, on four axes and on more."""
     tilted = (tip.v_deg, tip.w_deg, offset.v_deg, offset.w_deg) != (0.0, 0.0, 0.0, 0.0)
     return tilted_flange_pose(tip, offset) if tilted else flange_pose(tip, offset)
+
+
+def tip_pose(flange: Pose, offset: ToolOffset, *, tool: int | None) -> Pose:
+    """Return where a tool's tip is under a flange, on four axes and on more.
+
+    Undoes :func:`flange_of`; ``tool`` is the number that the pose gets.
+    """
+    angles = (flange.v_deg, flange.w_deg, offset.v_deg, offset.w_deg)
+    if angles == (0.0, 0.0, 0.0, 0.0):
+        dx, dy = rotate_xy(offset.x_mm, offset.y_mm, flange.u_deg)
+        dz, u_deg, v_deg, w_deg = offset.z_mm, flange.u_deg + offset.u_deg, 0.0, 0.0
+    else:
+        from robolink.calibration.core.rotations import (  # numpy, which four axes do without
+            rotation_of,
+            uvw_deg,
+        )
+
+        turned = rotation_of(flange)
+        own = rotation_of(Pose(0.0, 0.0, 0.0, offset.u_deg, offset.v_deg, offset.w_deg))
+        dx, dy, dz = (turned @ offset.components()[:3]).tolist()
+        u_deg, v_deg, w_deg = uvw_deg(turned @ own)
+    return replace(
+        flange,
+        x_mm=flange.x_mm + dx,
+        y_mm=flange.y_mm + dy,
+        z_mm=flange.z_mm + dz,
+        u_deg=u_deg,
+        v_deg=v_deg,
+        w_deg=w_deg,
+        tool=tool,
+    )
 
 
 def seen_from(written: ToolOffset, tip: ToolOffset) -> ToolOffset:

@@ -14,6 +14,17 @@ MAX_OFFSET_MM = 1000.0
 METRES_BELOW = 2.0
 """No flange stays so near to its own base axis, in mm; in metres most do."""
 
+MIN_ROTATION_DEG = 30.0
+
+WARN_ROTATION_DEG = 90.0
+
+_SAME_ANGLE_DEG = 1e-9
+
+_LIKE_A_NEEDLE_MM = 150.0
+
+UPRIGHT_WITHIN_DEG = 0.01
+"""A flange that leans less is upright: at 120 mm of tool it moves the tip by 0.02 mm."""
+
 
 def check_poses(
     poses: Sequence[Pose], *, allow_mixed_hand: bool, of_one_tip: bool = False
@@ -33,31 +44,37 @@ def check_poses(
     refuse_metres(all(abs(p.x_mm) < METRES_BELOW and abs(p.y_mm) < METRES_BELOW for p in poses))
     tools = {pose.tool for pose in poses}
     one = of_one_tip and len(tools - {None}) == 1
-    found = {(pose.hand, pose.local, None if one else pose.tool) for pose in poses}
-    return check_frames(found, allow_mixed_hand)
+    hands, locals_ = {pose.hand for pose in poses}, {pose.local for pose in poses}
+    return check_frames(hands, locals_, {None} if one else tools, allow_mixed_hand)
 
 
 def check_frames(
-    found: Collection[tuple[Hand | None, int, int | None]], allow_mixed_hand: bool
+    hands: Collection[Hand | None],
+    locals_: Collection[int],
+    tools: Collection[int | None],
+    allow_mixed_hand: bool,
 ) -> tuple[str, ...]:
     """Refuse poses of frames or arms that do not belong together; return lesser doubts.
 
     Args:
-        found: Hand, local and tool of the poses, each combination once.
+        hands: Of the poses, each once; ``None`` where a pose tells none.
+        locals_: Their local coordinate systems, each once.
+        tools: Their tools, each once; ``None`` where a pose tells none.
         allow_mixed_hand: Whether different hands are a doubt only.
 
     Raises:
         CalibrationError: ``mixed_local``, ``mixed_tool``, ``tool_pose`` or ``mixed_hand``.
     """
-    hands = {hand for hand, _, _ in found if hand is not None}
-    _refuse_tools({tool for _, _, tool in found if tool is not None})
-    if len({local for _, local, _ in found}) > 1:
+    _refuse_tools({tool for tool in tools if tool is not None})
+    if len(locals_) > 1:
         raise CalibrationError(
             "mixed_local",
             tr("The poses are given in different local coordinate systems."),
             remedy=tr("Give all of them in local 0, the base, or say what the locals are."),
+            others=("local_pose",),
         )
-    if len(hands) > 1 and not allow_mixed_hand:
+    mixed = len({hand for hand in hands if hand is not None}) > 1
+    if mixed and not allow_mixed_hand:
         raise CalibrationError(
             "mixed_hand",
             tr("The poses were taken with different arm configurations."),
@@ -65,7 +82,7 @@ def check_frames(
                 "Take all of them with the same hand, so that errors of the arm lengths cancel."
             ),
         )
-    return ("mixed_hand",) if len(hands) > 1 else ()
+    return ("mixed_hand",) if mixed else ()
 
 
 def _refuse_tools(tools: Collection[int]) -> None:
@@ -74,6 +91,7 @@ def _refuse_tools(tools: Collection[int]) -> None:
             "mixed_tool",
             tr("The poses were taken with different tools selected."),
             remedy=tr("Take all of them in Tool 0."),
+            others=("tool_pose",),
         )
     for tool in tools:
         if tool:
@@ -100,7 +118,8 @@ def keep_unmeasured(stored: ToolOffset | None, **measured: float) -> ToolOffset:
                 longest=longest,
                 limit=MAX_OFFSET_MM,
             ),
-            remedy=tr("Check that both poses touch the same point and are flange poses."),
+            remedy=tr("Check that all poses touch the same point, are flange poses and in mm."),
+            others=("suspect_units",),
         )
     return offset
 
@@ -159,3 +178,170 @@ def require_finite(**values: float) -> None:
                 tr("{name} is {value!r}.", name=name, value=value),
                 remedy=tr("Give finite numbers in mm and degrees."),
             )
+
+
+def check_planar(
+    poses: Sequence[Pose], *, minimum: int, min_rotation_deg: float, allow_mixed_hand: bool
+) -> tuple[str, ...]:
+    """Refuse poses that a planar solver cannot use; return the names of lesser doubts.
+
+    Raises:
+        CalibrationError: ``too_few_poses``, ``tilted_pose``, ``degenerate_angles``,
+            ``insufficient_rotation``, and those of ``check_poses``.
+    """
+    require_poses(len(poses), minimum)
+    doubts = check_poses(poses, allow_mixed_hand=allow_mixed_hand)
+    on_its_head(poses)
+    spread_deg = angle_spread_deg([heading_deg(pose) for pose in poses])
+    return (*doubts, *check_rotation(poses, spread_deg, min_rotation_deg))
+
+
+def check_rotation(
+    poses: Sequence[Pose], spread_deg: float, min_rotation_deg: float
+) -> tuple[str, ...]:
+    """Refuse poses that turn too little; return the names of lesser doubts.
+
+    Raises:
+        CalibrationError: ``degenerate_angles``, ``insufficient_rotation``, ``suspect_units``.
+    """
+    if spread_deg < min_rotation_deg:
+        refuse_radians(poses, spread_deg)
+    _require_rotation(poses, spread_deg, min_rotation_deg)
+    return ("small_rotation",) if spread_deg < WARN_ROTATION_DEG else ()
+
+
+def heading_deg(pose: Pose) -> float:
+    """Return the angle about Z at which the flange's X points, of an upright flange.
+
+    This is U, and half a turn more where V is 180: Rz(U) Ry(180) turns X over.
+    """
+    return pose.u_deg if math.cos(math.radians(pose.v_deg)) >= 0.0 else pose.u_deg + 180.0
+
+
+def on_its_head(poses: Sequence[Pose]) -> bool:
+    """Tell whether the flange's Z points down (W or V is 180), in all poses alike.
+
+    X and Y of the tip can be told as well then; one sign differs (docs/reference/evidence.md 3).
+
+    Raises:
+        CalibrationError: ``tilted_pose`` when a pose leans by 0.01 degrees or more, or some stand
+            on their head and some do not.
+    """
+    down = set()
+    for number, pose in enumerate(poses, start=1):
+        if pose.v_deg == 0.0 and pose.w_deg == 0.0:
+            down.add(False)
+            continue
+        upward = math.cos(math.radians(pose.v_deg)) * math.cos(math.radians(pose.w_deg))
+        if lean_deg(upward) >= UPRIGHT_WITHIN_DEG:
+            raise tilted(number, pose)
+        down.add(upward < 0)
+    if len(down) > 1:
+        raise some_on_their_head()
+    return True in down
+
+
+def lean_deg(upward: float) -> float:
+    """Return how far a flange leans from the vertical, up or down.
+
+    Args:
+        upward: Third component of its Z, R33.
+    """
+    return math.degrees(math.acos(min(abs(upward), 1.0)))
+
+
+def tilted(number: int, pose: Pose) -> CalibrationError:
+    """Return the refusal of a pose that leans."""
+    return CalibrationError(
+        "tilted_pose",
+        tr(
+            "Pose {number} has V = {v} and W = {w}; a planar method needs an upright flange.",
+            number=number,
+            v=pose.v_deg,
+            w=pose.w_deg,
+        ),
+        remedy=tr("Use the pivot method for poses of six axes."),
+    )
+
+
+def some_on_their_head() -> CalibrationError:
+    """Return the refusal of poses of which only some stand on their head."""
+    return CalibrationError(
+        "tilted_pose",
+        tr("In some poses the flange points up and in others down."),
+        remedy=tr("Use the pivot method for poses of six axes."),
+    )
+
+
+def angle_spread_deg(angles_deg: Sequence[float]) -> float:
+    """Return the shortest arc that holds all angles, modulo 360."""
+    turned = sorted(angle % 360.0 for angle in angles_deg)
+    gaps = [b - a for a, b in zip(turned, [*turned[1:], turned[0] + 360.0], strict=True)]
+    return 360.0 - max(gaps)
+
+
+def planar_sigma_gain(poses: Sequence[Pose]) -> float:
+    """Return by how much a placement error counts in each offset axis; inf if for ever."""
+    angles = [math.radians(heading_deg(pose)) for pose in poses]
+    cosines, sines = [math.cos(angle) for angle in angles], [math.sin(angle) for angle in angles]
+    mean_c, mean_s = sum(cosines) / len(poses), sum(sines) / len(poses)
+    weight = sum((c - mean_c) ** 2 for c in cosines) + sum((s - mean_s) ** 2 for s in sines)
+    return 1 / math.sqrt(weight) if weight > 0 else math.inf
+
+
+def require_poses(count: int, minimum: int) -> None:
+    """Refuse fewer than ``minimum`` poses.
+
+    Raises:
+        CalibrationError: ``too_few_poses``.
+    """
+    if count < minimum:
+        raise CalibrationError(
+            "too_few_poses",
+            tr(
+                "{count} poses were given; the method needs at least {minimum}.",
+                count=count,
+                minimum=minimum,
+            ),
+            remedy=tr("Take more, at angles that differ as much as the robot allows."),
+        )
+
+
+def refuse_radians(poses: Sequence[Pose], spread_deg: float) -> None:
+    """Refuse angles that would need a giant tool, and a plausible one when read as radians.
+
+    Raises:
+        CalibrationError: ``suspect_units``.
+    """
+    angles = [angle for pose in poses for angle in pose.coordinates()[3:]]
+    if spread_deg < _SAME_ANGLE_DEG or any(abs(angle) > 2 * math.pi for angle in angles):
+        return
+    positions = [pose.coordinates()[:3] for pose in poses]
+    # Twice the way from one pose is never less than the way between any two.
+    travel_mm = max(math.dist(positions[0], position) for position in positions)
+    if travel_mm / (2 * math.sin(math.radians(spread_deg / 2))) > _LIKE_A_NEEDLE_MM:
+        raise CalibrationError(
+            "suspect_units",
+            tr("The poses move {travel:.1f} mm while they hardly turn.", travel=travel_mm),
+            remedy=tr("The angles look like radians; give them in degrees."),
+        )
+
+
+def _require_rotation(poses: Sequence[Pose], spread_deg: float, minimum_deg: float) -> None:
+    if spread_deg < _SAME_ANGLE_DEG:
+        raise CalibrationError(
+            "degenerate_angles",
+            tr("All poses have the same U; the offset cannot be found from them."),
+            remedy=tr("Turn the tool between the poses, best over half a turn or more."),
+        )
+    if spread_deg < minimum_deg:
+        raise CalibrationError(
+            "insufficient_rotation",
+            tr(
+                "The poses spread over {spread:.2f} degrees in U only; every placement error "
+                "would count {gain:.1f} times.",
+                spread=spread_deg,
+                gain=planar_sigma_gain(poses),
+            ),
+            remedy=tr("Spread them over {minimum:.0f} degrees or more.", minimum=minimum_deg),
+        )

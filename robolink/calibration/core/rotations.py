@@ -7,10 +7,8 @@ matrix.
 
 import math
 from collections.abc import Sequence
-from itertools import chain
-from operator import attrgetter
+from struct import Struct
 from struct import error as struct_error
-from struct import pack
 
 import numpy as np
 
@@ -25,9 +23,9 @@ from robolink.model import Pose
 
 _SINGULAR = 1e-9
 
-_COORDINATES = attrgetter("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
+_ROW = Struct("6d")
 
-_FRAMES = attrgetter("hand", "local", "tool")
+_FAR = np.zeros(1, dtype=bool)
 
 
 def rotations(angles_deg: Floats) -> Floats:
@@ -55,10 +53,11 @@ def pose_table(poses: Sequence[Pose]) -> Floats:
     Raises:
         struct.error: A coordinate is no number.
     """
-    count = 6 * len(poses)
-    # Packing walks the objects once and takes numbers only; a text of digits is none.
-    packed = pack(f"{count}d", *chain.from_iterable(map(_COORDINATES, poses)))
-    return np.frombuffer(packed).reshape(-1, 6)
+    row = _ROW.pack
+    # Packing walks the objects once and takes numbers only; a text of digits is none. Attributes
+    # that are written out are read twice as fast as by a getter or a method.
+    rows = [row(p.x_mm, p.y_mm, p.z_mm, p.u_deg, p.v_deg, p.w_deg) for p in poses]
+    return np.frombuffer(b"".join(rows)).reshape(-1, 6)
 
 
 def checked_table(
@@ -75,8 +74,10 @@ def checked_table(
         table = np.full((1, 6), np.nan)
     if not np.isfinite(table).all():
         require_finite_poses(poses)  # which tells the pose and the name
-    refuse_metres(bool((np.abs(table[:, :2]) < METRES_BELOW).all()))
-    return table, check_frames(set(map(_FRAMES, poses)), allow_mixed_hand)
+    near = np.abs(table[:, :2]) < METRES_BELOW if abs(table[0, 0]) < METRES_BELOW else _FAR
+    refuse_metres(bool(near.all()))
+    hands, tools = {pose.hand for pose in poses}, {pose.tool for pose in poses}
+    return table, check_frames(hands, {pose.local for pose in poses}, tools, allow_mixed_hand)
 
 
 def rotation_of(pose: Pose) -> Floats:

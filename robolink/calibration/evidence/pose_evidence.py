@@ -67,9 +67,10 @@ def leverages(centred: Floats, inverse: Floats) -> Floats:
 
 def with_evidence(
     result: ResultT,
-    turned: Floats,
+    centred: Floats,
     residuals_mm: Floats,
     *,
+    unit_covariance: Floats,
     kept: Indices,
     duplicates: tuple[int, ...],
     unknowns: int,
@@ -78,18 +79,18 @@ def with_evidence(
 
     Args:
         result: The solution.
-        turned: Rotations of the poses that were kept, N x d x d, in the order of the touches.
+        centred: Rotations of the poses that were kept, less their mean, N x d x d, in the order
+            of the touches.
         residuals_mm: Theirs, N x d.
+        unit_covariance: Of the offset for sigma = 1, d x d: the inverse of the sum of
+            ``centred' centred``.
         kept: Their indices among all poses.
         duplicates: Indices of copies.
         unknowns: How many numbers the fit had to find.
     """
-    centred = turned - turned.sum(axis=0) / len(turned)
-    flat = centred.reshape(-1, turned.shape[1])
-    inverse = np.linalg.inv(flat.T @ flat)
-    found = leverages(centred, inverse)
+    found = leverages(centred, unit_covariance)
     alone = kept[found > HIGH_LEVERAGE] if len(kept) > 2 else kept[:0]
-    order = run_order(centred, inverse, residuals_mm, unknowns=unknowns)
+    order = run_order(centred, unit_covariance, residuals_mm, unknowns=unknowns)
     evidence = replace(
         result.evidence or FitEvidence(),
         distinct=len(result.inputs) - len(duplicates),

@@ -12,6 +12,7 @@ F of all splits is compared with the 1 % limit divided among them.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -24,8 +25,8 @@ FALSE_ALARM: Final = 0.01
 
 LEAST_TOUCHES: Final = 6
 
-NOTICEABLE_MM: Final = 0.002
-"""A smaller shift is left to rounding, whatever its F."""
+_ROUNDING_MM: Final = 1e-6
+"""A smaller shift is what floating point leaves of touches without scatter; it has no F."""
 
 _SEEN: Final = 1e-6
 """A split is judged when the design leaves so much of its column."""
@@ -50,19 +51,19 @@ def run_order(
     spare = residuals.size - unknowns - dimensions
     if count < LEAST_TOUCHES or spare < 1:
         return None
-    splits = _splits(count)
+    columns = _columns(count)
     gained, shifts = _gained(
-        _columns(centred.reshape(count, -1), residuals, splits), inverse, count
+        columns, columns.along(centred.reshape(count, -1)), columns.along(residuals), inverse
     )
     whole = float(np.einsum("ij,ij->", residuals, residuals))
     f = _as_f(gained, shifts, whole, spare)
     steps, drift = f[:-1], float(f[-1])
-    at = int(np.argmax(steps))
+    at = int(steps.argmax())
     seen = max(int(np.count_nonzero(steps >= 0)), 1)
     return RunOrder(
         step_f=max(float(steps[at]), 0.0),
         step_f_limit=f_quantile(1 - FALSE_ALARM / seen, dimensions, spare),
-        step_after=int(splits[at]),
+        step_after=int(columns.splits[at]),
         step_mm=tuple(shifts[at].tolist()),
         drift_f=max(drift, 0.0),
         drift_f_limit=f_quantile(1 - FALSE_ALARM, dimensions, spare),
@@ -72,67 +73,74 @@ def run_order(
 
 @dataclass(frozen=True, slots=True)
 class _Columns:
-    """Sums over the touches of columns c, a row for each: the steps, and last the drift.
+    """The columns c that are tried, which only the number of touches decides.
 
     Attributes:
-        sums, squares: Of c and c^2.
-        across: Of c times the rotations less their mean, flat.
-        right: Of c times the residuals.
+        splits: After how many touches a step is looked for.
+        ramp: The drift, which comes last: 0 at the first touch, 1 at the last.
+        squares: Of each column.
+        own: The same less what a constant takes over.
     """
 
-    sums: Floats
+    splits: Indices
+    ramp: Floats
     squares: Floats
-    across: Floats
-    right: Floats
+    own: Floats
+
+    def along(self, rows: Floats) -> Floats:
+        """Return the sum of each column times ``rows``, N x m."""
+        found = np.empty((len(self.own), rows.shape[1]))
+        found[-1] = self.ramp @ rows
+        found[:-1] = np.add.reduceat(rows, self.splits, axis=0)[::-1].cumsum(axis=0)[::-1]
+        return found
 
 
-def _splits(count: int) -> Indices:
-    """Return after how many touches a step is looked for; not everywhere among hundreds."""
-    if count <= _ALL_SPLITS_OF:
-        return np.arange(1, count)
-    return np.linspace(1, count - 1, _FEW_SPLITS).round().astype(np.intp)
-
-
-def _columns(flat: Floats, residuals: Floats, splits: Indices) -> _Columns:
-    count = len(residuals)
+@lru_cache(maxsize=64)
+def _columns(count: int) -> _Columns:
+    splits = np.arange(1, count)
+    if count > _ALL_SPLITS_OF:  # not everywhere among hundreds
+        splits = np.linspace(1, count - 1, _FEW_SPLITS).round().astype(np.intp)
     after = (count - splits).astype(float)
     ramp = np.arange(count) / (count - 1.0)
-
-    def summed(rows: Floats) -> Floats:
-        parts = np.add.reduceat(rows, splits, axis=0)
-        return np.concatenate((parts[::-1].cumsum(axis=0)[::-1], (ramp @ rows)[None]))
-
-    return _Columns(
-        np.append(after, ramp.sum()),
-        np.append(after, ramp @ ramp),
-        summed(flat),
-        summed(residuals),
-    )
+    sums, squares = np.append(after, ramp.sum()), np.append(after, ramp @ ramp)
+    return _Columns(splits, ramp, squares, squares - sums**2 / count)
 
 
-def _gained(columns: _Columns, inverse: Floats, count: int) -> tuple[Floats, Floats]:
+def _gained(
+    columns: _Columns, across: Floats, right: Floats, inverse: Floats
+) -> tuple[Floats, Floats]:
     """Return by how much each column shrinks the squares, and the vector that goes with it.
 
     A column c stands for c_i times one unknown vector, added to each touch. The first is -1 where
     the design hides the column.
+
+    Args:
+        columns: The columns.
+        across: Each times the rotations less their mean, flat.
+        right: Each times the residuals.
+        inverse: Unit covariance of the offset.
     """
     dimensions = len(inverse)
-    one = np.eye(dimensions)
-    across = columns.across.reshape(-1, dimensions, dimensions)
+    across = across.reshape(-1, dimensions, dimensions)
     # d' d: the column's own squares, less what the point and the offset take over.
-    left = (columns.squares - columns.sums**2 / count)[:, None, None] * one
-    left = left - across @ inverse @ across.transpose(0, 2, 1)
-    hidden = np.linalg.eigvalsh(left)[:, 0] < _SEEN * columns.squares
-    left[hidden] = one
-    shifts: Floats = np.linalg.solve(left, columns.right[..., None])[..., 0].astype(float)
-    gained: Floats = np.einsum("ij,ij->i", shifts, columns.right)
-    return np.where(hidden, -1.0, gained), shifts
+    taken = across @ inverse @ across.transpose(0, 2, 1)
+    left = columns.own[:, None, None] * np.eye(dimensions) - taken
+    limit = _SEEN * columns.squares
+    # What is taken has no negative eigenvalue, so that none of what is left lies below this.
+    hidden = columns.own - taken.trace(axis1=1, axis2=2) < limit
+    if hidden.any():
+        hidden = np.linalg.eigvalsh(left)[:, 0] < limit
+        left[hidden] = np.eye(dimensions)
+    shifts: Floats = np.linalg.solve(left, right[..., None])[..., 0].astype(float)
+    gained: Floats = np.einsum("ij,ij->i", shifts, right)
+    gained[hidden] = -1.0
+    return gained, shifts
 
 
 def _as_f(gained: Floats, shifts: Floats, whole: float, spare: int) -> Floats:
     left_over = np.maximum(whole - gained, 1e-300) / spare
     f: Floats = gained / shifts.shape[1] / left_over
-    small = np.einsum("ij,ij->i", shifts, shifts) < NOTICEABLE_MM**2
+    small = np.einsum("ij,ij->i", shifts, shifts) < _ROUNDING_MM**2
     f[small & (gained >= 0)] = 0.0
     f[gained < 0] = -1.0
     return f

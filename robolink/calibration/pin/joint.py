@@ -14,8 +14,7 @@ import numpy as np
 
 from robolink.calibration.core.dispersion import Dispersion
 from robolink.calibration.core.least_squares import LinearFit, linear_fit
-from robolink.calibration.core.planar_checks import require_poses
-from robolink.calibration.core.pose_checks import check_poses, keep_unmeasured
+from robolink.calibration.core.pose_checks import check_poses, keep_unmeasured, require_poses
 from robolink.calibration.core.result import COMPONENTS, CalibrationResult
 from robolink.calibration.core.robust import Floats
 from robolink.calibration.core.rotations import pose_arrays

@@ -1,19 +1,21 @@
 """Tool offset from one point touched or seen at several known angles, on four axes."""
 
+import math
 from collections.abc import Sequence
-from dataclasses import replace
+from struct import iter_unpack
 
 import numpy as np
 
-from robolink.calibration.core.planar_checks import (
+from robolink.calibration.core.pose_checks import (
     MIN_ROTATION_DEG,
     UPRIGHT_WITHIN_DEG,
+    WARN_ROTATION_DEG,
     check_rotation,
+    keep_unmeasured,
     require_poses,
     some_on_their_head,
     tilted,
 )
-from robolink.calibration.core.pose_checks import keep_unmeasured
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.core.robust import Floats, Indices, Mask, Robust
 from robolink.calibration.core.rotations import checked_table, pose_table
@@ -84,24 +86,29 @@ def solve_n_angle(
     distinct = len(poses) - len(duplicates)
     if distinct < 2:
         raise _all_copies()
-    doubts = (*doubts, *check_rotation(poses, _spread_deg(z), min_rotation_deg))
+    doubts = (*doubts, *_turned_enough(poses, z, min_rotation_deg))
     few = ("few_poses",) if distinct < RECOMMENDED_POSES else ()
     spread_mm = 0.0
     if robust is not None:
         require_robust_poses(distinct, ROBUST_POSES)
         kept, spread_mm = _agreeing(p, z, np.flatnonzero(kept), robust, sigma_mm)
-        check_rotation(poses, _spread_deg(z[kept]), min_rotation_deg)
-    fit = fit_planar(p, z, kept)
-    residuals = fit.residuals[kept].view(float).reshape(-1, 2)
+        _turned_enough(poses, z[kept], min_rotation_deg)
+    all_kept = bool(kept.all())
+    fit = fit_planar(p, z, None if all_kept else kept)
+    among = slice(None) if all_kept else kept
+    residuals = fit.residuals[among].view(float).reshape(-1, 2)
+    unit_covariance = np.eye(2) * fit.sigma_gain**2
     result = judged(
-        replace(
-            _result(fit, stored, down=down),
+        _result(
+            fit,
+            stored,
+            down=down,
             warnings=(*doubts, *few),
             inputs=tuple(poses),
             rejected=left_out(kept, duplicates),
         ),
         residuals,
-        np.eye(2) * fit.sigma_gain**2,
+        unit_covariance,
         unknowns=UNKNOWNS,
         sigma_mm=sigma_mm,
         tolerance=tolerance,
@@ -109,8 +116,9 @@ def solve_n_angle(
     )
     result = with_evidence(
         result,
-        as_rotations(z[kept]),
+        as_rotations(z[among] - fit.mean),
         residuals,
+        unit_covariance=unit_covariance,
         kept=np.flatnonzero(kept),
         duplicates=duplicates,
         unknowns=UNKNOWNS,
@@ -118,7 +126,15 @@ def solve_n_angle(
     return with_consensus(result, kept, spread_mm) if robust else result
 
 
-def _result(fit: PlanarFit, stored: ToolOffset | None, *, down: bool) -> CalibrationResult:
+def _result(
+    fit: PlanarFit,
+    stored: ToolOffset | None,
+    *,
+    down: bool,
+    warnings: tuple[str, ...],
+    inputs: tuple[Pose, ...],
+    rejected: tuple[int, ...],
+) -> CalibrationResult:
     """Return the offset of a fit; ``down`` where the flange's Z points down."""
     tip = fit.tip.conjugate() if down else fit.tip
     return CalibrationResult(
@@ -128,11 +144,10 @@ def _result(fit: PlanarFit, stored: ToolOffset | None, *, down: bool) -> Calibra
         kept=_KEPT,
         reference_point_mm=(fit.point.real, fit.point.imag),
         sigma_gain=fit.sigma_gain,
-        warnings=(),
-        inputs=(),
-        residuals_mm=tuple(
-            zip(fit.residuals.real.tolist(), fit.residuals.imag.tolist(), strict=True)
-        ),
+        warnings=warnings,
+        inputs=inputs,
+        rejected=rejected,
+        residuals_mm=tuple(iter_unpack("2d", fit.residuals.tobytes())),
         condition_number=fit.condition_number,
         rank=UNKNOWNS,
         unobservable=_KEPT,
@@ -174,6 +189,20 @@ def _planar(table: Floats, poses: Sequence[Pose]) -> tuple[Complexes, Complexes,
     if down.any() and not down.all():
         raise some_on_their_head()
     return p, z * np.sign(forward), bool(down[0])
+
+
+def _turned_enough(poses: Sequence[Pose], z: Complexes, min_rotation_deg: float) -> tuple[str, ...]:
+    """Return the doubts about how far the flange turned.
+
+    Raises:
+        CalibrationError: As ``pose_checks.check_rotation``.
+    """
+    wanted_deg = max(min_rotation_deg, WARN_ROTATION_DEG)
+    # Directions within an arc have a mean of at least the cosine of half of it; one that is
+    # shorter tells that they spread further, and the arc itself need not be found.
+    if wanted_deg <= 180.0 and abs(complex(z.mean())) < math.cos(math.radians(wanted_deg / 2)):
+        return ()
+    return check_rotation(poses, _spread_deg(z), min_rotation_deg)
 
 
 def _spread_deg(z: Complexes) -> float:

@@ -6,12 +6,16 @@ Tilt shows Z, turning about the tool shows X and Y; a plan needs both
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from struct import iter_unpack
 
 import numpy as np
 
-from robolink.calibration.core.planar_checks import angle_spread_deg, refuse_radians, require_poses
-from robolink.calibration.core.pose_checks import keep_unmeasured
+from robolink.calibration.core.pose_checks import (
+    angle_spread_deg,
+    keep_unmeasured,
+    refuse_radians,
+    require_poses,
+)
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.core.robust import Floats, Indices, Mask, Robust
 from robolink.calibration.core.rotations import checked_table, rotations
@@ -104,11 +108,14 @@ def solve_pivot(
         turned,
         condition_number=design.condition_number,
         kept=None if all_kept else kept,
+        mean=design.mean,
     )
     residuals = fit.residuals if all_kept else fit.residuals[kept]
     result = judged(
-        replace(
-            _result(fit, design, stored),
+        _result(
+            fit,
+            design,
+            stored,
             warnings=(*warnings, *_doubts(design, distinct)),
             inputs=tuple(poses),
             rejected=left_out(kept, duplicates),
@@ -122,8 +129,9 @@ def solve_pivot(
     )
     result = with_evidence(
         result,
-        turned if all_kept else turned[kept],
+        (turned if all_kept else turned[kept]) - design.mean,
         residuals,
+        unit_covariance=design.unit_covariance,
         kept=np.flatnonzero(kept),
         duplicates=duplicates,
         unknowns=UNKNOWNS,
@@ -131,7 +139,15 @@ def solve_pivot(
     return with_consensus(result, kept, spread_mm) if robust else result
 
 
-def _result(fit: PivotFit, design: PivotDesign, stored: ToolOffset | None) -> CalibrationResult:
+def _result(
+    fit: PivotFit,
+    design: PivotDesign,
+    stored: ToolOffset | None,
+    *,
+    warnings: tuple[str, ...],
+    inputs: tuple[Pose, ...],
+    rejected: tuple[int, ...],
+) -> CalibrationResult:
     return CalibrationResult(
         method="pivot",
         offset=keep_unmeasured(stored, **dict(zip(_MEASURED, fit.tip.tolist(), strict=True))),
@@ -139,9 +155,10 @@ def _result(fit: PivotFit, design: PivotDesign, stored: ToolOffset | None) -> Ca
         kept=_KEPT,
         reference_point_mm=tuple(fit.point.tolist()),
         sigma_gain=math.sqrt(float(design.unit_covariance.diagonal().max())),
-        warnings=(),
-        inputs=(),
-        residuals_mm=tuple(zip(*fit.residuals.T.tolist(), strict=True)),
+        warnings=warnings,
+        inputs=inputs,
+        rejected=rejected,
+        residuals_mm=tuple(iter_unpack("3d", fit.residuals.tobytes())),
         condition_number=design.condition_number,
         rank=design.rank,
         unobservable=_KEPT,

@@ -48,6 +48,7 @@ class PivotDesign:
         smallest_singular_value: Of the same.
         weakest_axis: Unit vector in flange axes along which the tip is known worst.
         unit_covariance: Of the tip for sigma = 1, 3 x 3; infinite where the rank is short.
+        mean: Of the rotations, 3 x 3.
     """
 
     condition_number: float
@@ -55,6 +56,7 @@ class PivotDesign:
     smallest_singular_value: float
     weakest_axis: Floats
     unit_covariance: Floats
+    mean: Floats
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +72,8 @@ def pivot_design(rotations: Floats) -> PivotDesign:
     """Return what N x 3 x 3 rotations can tell about a tip."""
     count = len(rotations)
     # Plain sums and floats: at a few poses, the calls cost more than the arithmetic.
-    _, s, axes = np.linalg.svd(rotations.sum(axis=0) / count)
+    mean = np.einsum("ijk->jk", rotations) / count  # three times as quick as a sum along an axis
+    _, s, axes = np.linalg.svd(mean)
     largest, *_ = singular = s.tolist()
     gaps = [max(1 - value, 0.0) for value in singular]
     lost = sum(gap < _RANK_BELOW for gap in gaps)
@@ -85,6 +88,7 @@ def pivot_design(rotations: Floats) -> PivotDesign:
         smallest_singular_value=math.sqrt(count * gaps[0]),
         weakest_axis=axes[0],
         unit_covariance=covariance,
+        mean=mean,
     )
 
 
@@ -94,6 +98,7 @@ def fit_pivot(
     *,
     condition_number: float,
     kept: Mask | None = None,
+    mean: Floats | None = None,
 ) -> PivotFit:
     """Return the least squares of the kept poses; residuals are those of all poses.
 
@@ -102,11 +107,14 @@ def fit_pivot(
         rotations: N x 3 x 3.
         condition_number: As :func:`pivot_design` tells it; decides how it is solved.
         kept: Which poses count.
+        mean: Of their rotations, where :func:`pivot_design` told it.
     """
     p, r = (positions, rotations) if kept is None else (positions[kept], rotations[kept])
     solve = _by_qr if condition_number > QR_ABOVE_CONDITION else _by_normal_equations
-    tip, point = solve(p, r)
-    return PivotFit(tip, point, positions + rotations @ tip - point)
+    tip, point = solve(p, r, r.sum(axis=0) / len(r) if mean is None else mean)
+    # As one tall matrix: a product for each of many small ones takes six times as long.
+    turned = (rotations.reshape(-1, 3) @ tip).reshape(-1, 3)
+    return PivotFit(tip, point, positions + turned - point)
 
 
 def pivot_consensus(
@@ -153,16 +161,16 @@ def fit_pivot_robust(
     return fit_pivot(positions, rotations, condition_number=condition, kept=kept), kept
 
 
-def _by_normal_equations(p: Floats, r: Floats) -> tuple[Floats, Floats]:
-    rm, pm = r.sum(axis=0) / len(p), p.sum(axis=0) / len(p)
+def _by_normal_equations(p: Floats, r: Floats, rm: Floats) -> tuple[Floats, Floats]:
+    pm = np.einsum("ij->j", p) / len(p)
     # Far from the origin p would swamp the differences that matter.
     right = (r.reshape(-1, 3).T @ (p - pm).reshape(-1)) / len(p)
     tip = np.linalg.solve(_ONE - rm.T @ rm, -right)
     return tip, rm @ tip + pm
 
 
-def _by_qr(p: Floats, r: Floats) -> tuple[Floats, Floats]:
-    rm, pm = r.mean(axis=0), p.mean(axis=0)
+def _by_qr(p: Floats, r: Floats, rm: Floats) -> tuple[Floats, Floats]:
+    pm = p.mean(axis=0)
     q, upper = np.linalg.qr((r - rm).reshape(-1, 3))
     tip = np.linalg.solve(upper, -q.T @ (p - pm).reshape(-1))
     return tip, rm @ tip + pm

@@ -8,7 +8,7 @@ unknown, and the least squares over all poses is a division (docs/reference/cali
 
 The angles are used as the controller knows them; nothing is fitted to an unlabelled circle.
 Under a flange that stands on its head (W = 180) the Y of the tip counts the other way, so that
-t is the conjugate. Leading axes are batches.
+t is the conjugate.
 """
 
 import math
@@ -44,14 +44,15 @@ class PlanarFit:
         point: The touched point in the base.
         residuals: Where each tip lies from that point.
         weight: Sum of |z - mean z|^2: how much the angles tell.
-        imbalance: |mean z|: 0 for angles that balance, near 1 when they are all alike.
+        mean: Of z, over the poses that count: 0 for angles that balance, near 1 in size when they
+            are all alike.
     """
 
     tip: complex
     point: complex
     residuals: Complexes
     weight: float
-    imbalance: float
+    mean: complex
 
     @property
     def sigma_gain(self) -> float:
@@ -61,27 +62,19 @@ class PlanarFit:
     @property
     def condition_number(self) -> float:
         """Of the 2N x 4 system in offset and point."""
-        return math.sqrt((1 + self.imbalance) / (1 - self.imbalance))
+        imbalance = min(abs(self.mean), 1 - 1e-16)
+        return math.sqrt((1 + imbalance) / (1 - imbalance))
 
 
 def fit_planar(p: Complexes, z: Complexes, kept: Mask | None = None) -> PlanarFit:
     """Return the least squares of the kept poses; residuals are those of all poses."""
     chosen_p, chosen_z = (p, z) if kept is None else (p[kept], z[kept])
-    tip, point, weight = solve_planar(chosen_p, chosen_z)
-    residuals = p + z * tip - point
-    imbalance = min(float(abs(chosen_z.mean())), 1 - 1e-16)
-    return PlanarFit(complex(tip), complex(point), residuals, float(weight), imbalance)
-
-
-def solve_planar(
-    p: Complexes, z: Complexes
-) -> tuple[Complexes | complex, Complexes | complex, NDArray[np.float64] | float]:
-    """Return tip, point and weight; the last axis counts the poses."""
-    mean_p, mean_z = p.mean(axis=-1), z.mean(axis=-1)
-    turned = z - mean_z[..., None]
-    weight = (turned.real**2 + turned.imag**2).sum(axis=-1)
-    tip = -(turned.conj() * (p - mean_p[..., None])).sum(axis=-1) / weight
-    return tip, mean_p + mean_z * tip, weight
+    mean_p, mean_z = complex(chosen_p.mean()), complex(chosen_z.mean())
+    turned = chosen_z - mean_z
+    weight = float(np.vdot(turned, turned).real)
+    tip = -complex(np.vdot(turned, chosen_p - mean_p)) / weight
+    point = mean_p + mean_z * tip
+    return PlanarFit(tip, point, p + z * tip - point, weight, mean_z)
 
 
 def planar_consensus(

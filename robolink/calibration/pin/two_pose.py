@@ -19,14 +19,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from robolink.calibration.core.dispersion import Dispersion
-from robolink.calibration.core.planar_checks import (
+from robolink.calibration.core.pose_checks import (
     MIN_ROTATION_DEG,
     check_planar,
     heading_deg,
+    keep_unmeasured,
     on_its_head,
     planar_sigma_gain,
 )
-from robolink.calibration.core.pose_checks import keep_unmeasured
 from robolink.calibration.core.result import CalibrationResult
 from robolink.errors import CalibrationError, ConfigError
 from robolink.messages import tr

@@ -46,11 +46,10 @@ def judged(
     Raises:
         ConfigError: ``sigma_mm`` or ``grid_mm`` is not positive.
     """
-    flat = residuals_mm.ravel()
-    total, dof = float(flat @ flat), flat.size - unknowns
+    squares = np.einsum("ij,ij->i", residuals_mm, residuals_mm)
+    total, dof = float(squares.sum()), residuals_mm.size - unknowns
     rms = worst = None
     if dof > 0:
-        squares = np.einsum("ij,ij->i", residuals_mm, residuals_mm)
         rms, worst = math.sqrt(total / len(residuals_mm)), math.sqrt(float(squares.max()))
     spread = with_interval(result, unit_covariance, total, dof, sigma_mm=sigma_mm, grid_mm=grid_mm)
     evidence = result.evidence or FitEvidence()
@@ -98,7 +97,8 @@ def with_interval(
     lengths = [index for index, name in enumerate(result.measured) if name.endswith("_mm")]
     region, gain = None, 0.0
     if lengths:
-        among = unit_covariance[np.ix_(lengths, lengths)]
+        whole = len(lengths) == len(unit_covariance)
+        among = unit_covariance if whole else unit_covariance[np.ix_(lengths, lengths)]
         gain = math.sqrt(max(float(among.diagonal().max()), 0.0))
         axis = math.sqrt(max(float(np.linalg.eigvalsh(among)[-1]), 0.0))
         region = axis * max(one.sigma_mm * one.region_factor(len(lengths)) for one in known)

@@ -14,6 +14,10 @@ corrected: then the tip leaves the place at which the point was taught by as muc
 the tool's angle turns the nozzle about the tip by ``-(u'_tool - u_tool)`` besides.
 
 On four axes the length is the same at every point; its direction turns with the point's U.
+
+Where something leans (V or W is not 0) the same is said with ``R_f = R_point R_tool^T``, the
+flange's orientation with the old offset, in place of ``Rz(u - u_tool)``; the nozzle turns by the
+angle between the two tools' orientations then, about whichever axis.
 """
 
 import math
@@ -31,7 +35,8 @@ class PointImpact:
         number: Number of the point.
         pose: What is stored for it: a tip pose in the base.
         dx_mm, dy_mm, dz_mm: Displacement of the tip in base axes.
-        turn_deg: By how much the nozzle turns about the tip.
+        turn_deg: By how much the nozzle turns about the tip: about Z, or, where a tool leans,
+            the size of the turn.
     """
 
     number: int
@@ -55,13 +60,11 @@ class Impact:
         entries: The points that could be judged.
         undefined: Numbers that were asked for and are not taught.
         other_local: Points left out because their axes are not the base's, number to local.
-        tilted: Points left out because V or W is not 0, where a turn about Z says too little.
     """
 
     entries: tuple[PointImpact, ...]
     undefined: tuple[int, ...] = ()
     other_local: Mapping[int, int] = field(default_factory=dict)
-    tilted: tuple[int, ...] = ()
 
     @property
     def largest(self) -> PointImpact | None:
@@ -83,23 +86,18 @@ def impact_on(points: Mapping[int, Pose | None], *, old: ToolOffset, new: ToolOf
     Whether a program drives a point with this tool at all is not stored in the point.
     """
     taught = {number: pose for number, pose in points.items() if pose is not None}
-    tilted = _tilted(old) or _tilted(new)
-    flat = {
-        number: pose
-        for number, pose in taught.items()
-        if pose.local == 0 and not (tilted or pose.v_deg or pose.w_deg)
-    }
     return Impact(
-        entries=tuple(_at(number, pose, old, new) for number, pose in flat.items()),
+        entries=tuple(
+            _at(number, pose, old, new) for number, pose in taught.items() if pose.local == 0
+        ),
         undefined=tuple(number for number in points if number not in taught),
         other_local={number: pose.local for number, pose in taught.items() if pose.local != 0},
-        tilted=tuple(
-            number for number, pose in taught.items() if pose.local == 0 and number not in flat
-        ),
     )
 
 
 def _at(number: int, pose: Pose, old: ToolOffset, new: ToolOffset) -> PointImpact:
+    if any((pose.v_deg, pose.w_deg, old.v_deg, old.w_deg, new.v_deg, new.w_deg)):
+        return _at_leaning(number, pose, old, new)
     flange_u_deg = pose.u_deg - old.u_deg
     dx_mm, dy_mm = rotate_xy(old.x_mm - new.x_mm, old.y_mm - new.y_mm, flange_u_deg)
     return PointImpact(
@@ -112,5 +110,18 @@ def _at(number: int, pose: Pose, old: ToolOffset, new: ToolOffset) -> PointImpac
     )
 
 
-def _tilted(offset: ToolOffset) -> bool:
-    return bool(offset.v_deg or offset.w_deg)
+def _at_leaning(number: int, pose: Pose, old: ToolOffset, new: ToolOffset) -> PointImpact:
+    from robolink.calibration.core.rotations import rotation_of  # numpy, late
+
+    before, after = (
+        rotation_of(Pose(0.0, 0.0, 0.0, *tool.components()[3:])) for tool in (old, new)
+    )
+    ends = zip(old.components()[:3], new.components()[:3], strict=True)
+    flange = rotation_of(pose) @ before.T
+    dx_mm, dy_mm, dz_mm = (flange @ [a - b for a, b in ends]).tolist()
+    if not (old.v_deg or old.w_deg or new.v_deg or new.w_deg):
+        turn_deg = angle_difference_deg(old.u_deg, new.u_deg)
+    else:
+        cosine = (float((after @ before.T).trace()) - 1) / 2
+        turn_deg = math.degrees(math.acos(min(1.0, max(-1.0, cosine))))
+    return PointImpact(number, pose, dx_mm, dy_mm, dz_mm, turn_deg)

@@ -3,13 +3,13 @@
 from collections.abc import Sequence
 
 from robolink.calibration.core.dispersion import require_positive
-from robolink.calibration.core.planar_checks import (
+from robolink.calibration.core.pose_checks import (
     MIN_ROTATION_DEG,
     WARN_ROTATION_DEG,
     angle_spread_deg,
+    check_poses,
     require_poses,
 )
-from robolink.calibration.core.pose_checks import check_poses
 from robolink.calibration.core.result import Drift, VerifyResult
 from robolink.calibration.core.rotations import pose_arrays
 from robolink.errors import CalibrationError

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from robolink.calibration import CalibrationResult, VerifyResult, seen_from
+from robolink.calibration import CalibrationResult, VerifyResult, seen_from, tip_pose
 from robolink.messages import tr
 from robolink.methods.beams.parameters import BeamsParameters
 from robolink.model import Pose, ToolOffset
@@ -65,7 +65,7 @@ class BeamsSource(InputSource[BeamsParameters]):
         context.controller.tools.select(tool)
         # Half a turn on shows an error twofold; where that was measured already, half of it.
         turn_deg = self.plan.turn_deg / 2 if self.plan.turn_deg else _HALF_A_TURN_DEG
-        measured_deg = result.inputs[-1].u_deg + result.offset.u_deg
+        measured_deg = tip_pose(result.inputs[-1], result.offset, tool=tool).u_deg
         procedure = verify_by_crossing(
             self.station,
             self.plan,

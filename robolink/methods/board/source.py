@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field, replace
 
-from robolink.calibration import BoardDrawing, CalibrationResult, VerifyResult, seen_from
+from robolink.calibration import BoardDrawing, CalibrationResult, VerifyResult, seen_from, tip_pose
 from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
 from robolink.procedures import (
@@ -79,7 +79,7 @@ class BoardSource(CalibratedCameraSource):
         from robolink.methods.board.procedure import verify_board  # numpy
 
         # The tool's own U turned with the board, so the joint stands where it stood.
-        measured_deg = [pose.u_deg + result.offset.u_deg for pose in result.inputs]
+        measured_deg = [tip_pose(pose, result.offset, tool=tool).u_deg for pose in result.inputs]
         turned = replace(seen_from(result.offset, tip), u_deg=tip.u_deg - result.offset.u_deg)
         with calibrated_camera(self.sensor, self.station) as camera:
             context.controller.tools.select(tool)

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from robolink.calibration import CalibrationResult, VerifyResult, seen_from
+from robolink.calibration import CalibrationResult, VerifyResult, seen_from, tip_pose
 from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
 from robolink.procedures import (
@@ -75,7 +75,7 @@ class CameraSource(CalibratedCameraSource):
         """Look again at other angles; see :class:`~robolink.procedures.MovingSource`."""
         from robolink.procedures import verify_by_looking  # numpy
 
-        measured_deg = [pose.u_deg + result.offset.u_deg for pose in result.inputs]
+        measured_deg = [tip_pose(pose, result.offset, tool=tool).u_deg for pose in result.inputs]
         with calibrated_camera(self.sensor, self.station) as camera:
             context.controller.tools.select(tool)
             procedure = verify_by_looking(

@@ -2,7 +2,13 @@
 
 from dataclasses import dataclass, field, replace
 
-from robolink.calibration import CalibrationResult, VerifyResult, offset_sigma_mm, seen_from
+from robolink.calibration import (
+    CalibrationResult,
+    VerifyResult,
+    offset_sigma_mm,
+    seen_from,
+    tip_pose,
+)
 from robolink.messages import tr
 from robolink.methods.camera_affine.parameters import CameraAffineParameters
 from robolink.model import Pose, TipSensor, ToolOffset
@@ -118,7 +124,7 @@ class CameraAffineSource:
 
         if not isinstance(result, CameraCalibration):
             raise TypeError(f"no camera was found by {result.method}")
-        measured_deg = [pose.u_deg + result.offset.u_deg for pose in result.inputs]
+        measured_deg = [tip_pose(pose, result.offset, tool=tool).u_deg for pose in result.inputs]
         with pixel_camera(self.sensor) as camera:
             context.controller.tools.select(tool)
             procedure = verify_by_looking(

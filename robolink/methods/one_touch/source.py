@@ -1,8 +1,9 @@
 """A pin whose place is known, touched once by a person: X, Y and Z of the new tip."""
 
 from dataclasses import dataclass, field, replace
+from typing import Self
 
-from robolink.calibration import CalibrationResult, VerifyResult
+from robolink.calibration import CalibrationResult, VerifyResult, tip_pose
 from robolink.messages import tr
 from robolink.methods.one_touch.procedure import measure_one_touch
 from robolink.methods.one_touch.solvers import Absolute, Difference
@@ -61,6 +62,10 @@ class OneTouchSource:
         """Return the steps of a measurement; see :class:`~robolink.procedures.MovingSource`."""
         return self._steps(stored, here, replace(self.touch, nominal=True))
 
+    def with_touch(self, plan: TouchPlan) -> Self:
+        """Return the same source with another plan of its touch."""
+        return replace(self, touch=plan)
+
     @property
     def clearance_mm(self) -> float:
         """Least height above the pin at which the robot stops."""
@@ -92,7 +97,7 @@ class OneTouchSource:
         from robolink.calibration import toward_zero  # numpy, which a look does without
 
         context.controller.tools.select(tool)
-        measured_deg = result.inputs[-1].u_deg + result.offset.u_deg
+        measured_deg = tip_pose(result.inputs[-1], result.offset, tool=tool).u_deg
         procedure = verify_by_turning(
             self.touch,
             contact=contact_pose(result, tool=tool),

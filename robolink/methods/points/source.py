@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from robolink.calibration import (
+    PERSON_SIGMA_Z_MM,
     CalibrationResult,
     ToolFit,
     better_fit,
@@ -20,7 +21,7 @@ from robolink.errors import CalibrationError, UndefinedToolError
 from robolink.messages import tr
 from robolink.methods.two_pose.source import TwoTouches
 from robolink.model import Controller, PointReader, Pose, ToolOffset
-from robolink.procedures import MeasurementContext, PoseMethod
+from robolink.procedures import MeasurementContext, PoseMethod, require_one_height
 from robolink.ways import Way, way
 
 
@@ -105,7 +106,18 @@ class PointsSource:
         return self.found.result
 
     def find(self, controller: Controller, tool: int, stored: ToolOffset | None) -> PosesFound:
-        """Solve the poses and ask which tool they fit. Moves and writes nothing."""
+        """Solve the poses and ask which tool they fit. Moves and writes nothing.
+
+        Nobody saw these touches being made: the result says so (docs/reference/evidence.md 1).
+
+        Raises:
+            CalibrationError: As :meth:`measure`; ``touch_heights_differ`` among others.
+        """
+        found = self._found(controller, tool, stored)
+        notes = (*found.result.notes, "touches_not_witnessed")
+        return replace(found, result=replace(found.result, notes=notes))
+
+    def _found(self, controller: Controller, tool: int, stored: ToolOffset | None) -> PosesFound:
         poses = self._poses()
         if self._taught_tool:
             _require_taught_with(self._taught_tool, poses)
@@ -119,6 +131,7 @@ class PointsSource:
             _require_upright(number, taught)
         flange = [flange_of(pose, tools[self._tool_of(pose)]) for pose in poses]
         result = self._method.solve(flange, stored)
+        require_one_height([pose.z_mm for pose in flange], sigma_z_mm=PERSON_SIGMA_Z_MM)
         if named != {self._taught_tool}:
             return PosesFound(result, (), None)
         # The listing may lack V and W; what is compared and written comes from single reads.

@@ -28,9 +28,9 @@ METHOD = Method(
     description=tr(
         "See the tip with a calibrated, up-looking camera all round: X and Y, and a table of how "
         "far beside them it is at each angle of U; nobody touches anything.\n\n"
-        "The table is for nozzles that wobble when they turn. It goes on record and into --json; "
-        "the controller has no place for it, so the program that places parts takes it back "
-        "itself. Only X and Y are offered to be written."
+        "The table is for nozzles that wobble when they turn. It goes on record and into the JSON "
+        "document; the controller has no place for it, so the program that places parts takes it "
+        "back itself. Only X and Y are offered to be written."
     ),
     parameters=RunoutTableParameters,
     measures=("x_mm", "y_mm"),

@@ -231,5 +231,5 @@ def _uncertainty(result: SixPointResult) -> str:
     if "ways_askew" in result.warnings:
         doubted = tr("That is more than the touches scatter: a way was not quite along its axis.")
         return f"{said} {doubted}"
-    known = tr("U, V and W are known to +-{half:.3f} degrees.", half=half_deg)
+    known = tr("U, V and W are known to ±{half:.3f} degrees.", half=half_deg)
     return f"{said} {known}"

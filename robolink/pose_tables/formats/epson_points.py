@@ -17,7 +17,7 @@ point::
 ``nUndefined`` counts in bits. Deleted points show 262143, all eighteen; points whose X to W
 are in use show 0 or 448, which is R, S and T when the bits follow the order of the fields.
 That order is inferred. ``nHand`` is 1 for right and 2 for left, as the function Hand
-(docs/reference/spel.md 5.1).
+(docs/reference/spel.md 5.1); nElbow, nWrist and the joint flags likewise.
 """
 
 import re
@@ -28,22 +28,26 @@ from typing import Final
 from robolink.errors import ConfigError
 from robolink.files.named import read_named
 from robolink.messages import tr
-from robolink.model import Hand, Pose
+from robolink.model import Elbow, Hand, Pose, Posture, Wrist
 from robolink.pose_tables.conventions import EPSON
 from robolink.pose_tables.encoding import decoded, line_counter
 from robolink.pose_tables.refusals import UnusableText, refused
 from robolink.pose_tables.values import LengthUnit, RawPose, RawTable
 
 _FIELDS: Final = ("nNumber", "nUndefined", "rX", "rY", "rZ", "rU", "rV", "rW", "nLocal", "nHand")
+_FLAGS: Final = ("nElbow", "nWrist", "nJ1Flag", "nJ2Flag", "nJ4Flag", "nJ6Flag")
+_NAMES: Final = "|".join((*_FIELDS, *_FLAGS))
 _BLOCK: Final = re.compile(r"^Point[0-9]+ *\{\s*?\n(.*?)^\s*\}", re.MULTILINE | re.DOTALL)
 _FIELD: Final = re.compile(
-    rf"^\s*({'|'.join(_FIELDS)})=(-?[0-9]{{1,9}}(?:\.[0-9]{{1,9}})?(?:E[+-][0-9]{{1,3}})?)\s*$",
+    rf"^\s*({_NAMES})=(-?[0-9]{{1,9}}(?:\.[0-9]{{1,9}})?(?:E[+-][0-9]{{1,3}})?)\s*$",
     re.MULTILINE | re.ASCII,
 )
 _COUNT: Final = re.compile(r"^nNumberOfPoints=([0-9]{1,6})\s*$", re.MULTILINE | re.ASCII)
 _LABEL: Final = re.compile(r'^\s*sLabel="(.*)"\s*$', re.MULTILINE)
 _XYZU: Final = 0b1111
 _HANDS: Final = {1: Hand.RIGHT, 2: Hand.LEFT}
+_ELBOWS: Final = {1: Elbow.ABOVE, 2: Elbow.BELOW}
+_WRISTS: Final = {1: Wrist.NO_FLIP, 2: Wrist.FLIP}
 
 
 def read_pts(path: Path) -> dict[int, Pose | None]:
@@ -120,7 +124,7 @@ def _blocks(text: str) -> Iterator[tuple[int, dict[str, float], str]]:
     seen: set[float] = set()
     for number, block in enumerate(blocks, start=1):
         fields = {name: float(value) for name, value in _FIELD.findall(block[1])}
-        if set(fields) != set(_FIELDS) or fields["nNumber"] in seen:
+        if not set(_FIELDS) <= set(fields) or fields["nNumber"] in seen:
             raise UnusableText(tr("point block {number} cannot be read", number=number))
         seen.add(fields["nNumber"])
         label = _LABEL.search(block[1])
@@ -139,4 +143,20 @@ def _pose(fields: Mapping[str, float]) -> Pose | None:
         fields["rW"],
         hand=_HANDS.get(int(fields["nHand"])),
         local=int(fields["nLocal"]),
+        posture=_posture(fields),
     )
+
+
+def _posture(fields: Mapping[str, float]) -> Posture | None:
+    """Return the flags of a point, ``None`` where they are those of any point of a SCARA."""
+    numbers = {name: int(fields.get(name, 0)) for name in _FLAGS}
+    posture = Posture(
+        elbow=_ELBOWS.get(numbers["nElbow"], Elbow.ABOVE),
+        wrist=_WRISTS.get(numbers["nWrist"], Wrist.NO_FLIP),
+        j1_flag=numbers["nJ1Flag"],
+        j2_flag=numbers["nJ2Flag"],
+        j4_flag=numbers["nJ4Flag"],
+        j6_flag=numbers["nJ6Flag"],
+    )
+    tilted = fields["rV"] != 0 or fields["rW"] != 0
+    return posture if tilted or posture != Posture() else None

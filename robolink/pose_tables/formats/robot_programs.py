@@ -44,6 +44,10 @@ _ABB_TARGET: Final = re.compile(
 _ABB_OTHER: Final = re.compile(
     r"\b(?:tooldata|wobjdata|loaddata)\s+\w+[^;]*;", re.IGNORECASE | re.DOTALL
 )
+_ABB_MOVE: Final = re.compile(
+    r"\bMove[A-Z]\w*\s+(?P<target>\w*)[^;]*?,\s*(?P<tool>\w+)\s*(?:\\\s*WObj\s*:=\s*\w+\s*)?;",
+    re.IGNORECASE,
+)
 _ABB_JOINTS: Final = re.compile(r"\bjointtarget\s+\w+", re.IGNORECASE)
 
 _FANUC_POINT: Final = re.compile(
@@ -112,11 +116,23 @@ def read_abb(text: str) -> RawTable | None:
         place, (q1, q2, q3, q4) = (_floats(part) for part in found.group(5, 6))
         matrix = orientation.from_quaternion(q2, q3, q4, q1, line)
         name = found["name"] or found["called"] or ""
+        _refuse_abb_tool(text, found, name, line)
         poses.append(_turned(line, place, matrix, {"name": name} if name else {}))
     joints = len(_ABB_JOINTS.findall(text))
     if not poses and not joints:
         return None
     return _program("ABB", poses, "quaternion Q1 (scalar) Q2 Q3 Q4", joints, angle="")
+
+
+def _refuse_abb_tool(text: str, target: re.Match[str], name: str, line: int) -> None:
+    """Refuse a target to which the module moves a tool: it is no place of the flange."""
+    for move in _ABB_MOVE.finditer(text):
+        within = move.start() < target.start() < move.end()
+        if (within or (name and move["target"] == name)) and move["tool"].lower() != "tool0":
+            raise UnusableText(
+                tr("it is a position of the tool {tool}, not of the flange", tool=move["tool"]),
+                line,
+            )
 
 
 def read_fanuc(text: str) -> RawTable | None:

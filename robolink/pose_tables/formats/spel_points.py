@@ -15,11 +15,13 @@ from robolink.pose_tables.refusals import UnusableText
 from robolink.pose_tables.values import LengthUnit, RawPose, RawTable
 
 _POINT: Final = re.compile(
-    r"\s*(?:P\s*\(?\s*(?P<number>\d+)\s*\)?|(?P<label>[A-Za-z_]\w*))\s*=\s*"
+    r"\s*(?:P\s*\(?\s*(?P<number>\d+)\s*\)?\s*(?:\(\s*(?P<tag>[A-Za-z_]\w*)\s*\))?"
+    r"|(?P<label>[A-Za-z_]\w*))\s*=\s*"
     r"(?P<form>XY\s*\(|(?=[+-]?[\d.]))(?P<values>[^)/:'\n]*)\)?(?P<rest>[^'\n]*)",
     re.IGNORECASE,
 )
 _ASSIGNED: Final = re.compile(r"\s*P\s*\(?\s*\d+\s*\)?\s*=", re.IGNORECASE)
+_COORDINATES_GIVEN: Final = re.compile(r"[^=]*=\s*XY\s*\(", re.IGNORECASE)
 _COORDINATES: Final = re.compile(r"\s*(?:XY\b|[+-]?[\d.])", re.IGNORECASE)
 _NUMBER: Final = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 _HAND: Final = re.compile(r"/\s*([RL])\b", re.IGNORECASE)
@@ -41,7 +43,8 @@ def read_spel(lines: Sequence[str]) -> RawTable | None:
         found = _POINT.fullmatch(text)
         if found is None or not (found["number"] or found["form"]):
             assigned = _ASSIGNED.match(text)
-            if assigned and _COORDINATES.match(text, assigned.end()):
+            of_point = assigned and _COORDINATES.match(text, assigned.end())
+            if of_point or _COORDINATES_GIVEN.match(text):
                 raise UnusableText(tr("the point does not hold four or six numbers"), line)
             skipped += bool(assigned)
             continue
@@ -70,7 +73,8 @@ def _point(line: int, found: re.Match[str]) -> RawPose:
     x, y, z, u = numbers[:4]
     v, w = numbers[4:] or (0.0, 0.0)
     given: dict[str, object] = {"number": int(found["number"])} if found["number"] else {}
-    given |= {"name": found["label"]} if found["label"] else {}
+    label = found["label"] or found["tag"]
+    given |= {"name": label} if label else {}
     hand, local = _HAND.search(found["rest"]), _LOCAL.search(found["rest"])
     given |= {"hand": _HANDS[hand[1].lower()]} if hand else {}
     given |= {"local": int(local[1] or local[2])} if local else {}

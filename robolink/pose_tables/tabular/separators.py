@@ -19,7 +19,8 @@ from robolink.pose_tables.refusals import UnusableText
 Line = tuple[int, str]
 """Number of the line, and its text."""
 
-_SEPARATORS: Final = ("\t", ";", "|", ",", " ")
+_SEPARATORS: Final = (("\t", ";", "|"), (",", " "))
+"""The first stand in no number and no name, so that the second are tried only without them."""
 _WORDS: Final = re.compile(r'"[^"]*"|\S+')
 _NUMBER: Final = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 _NOT_FINITE: Final = re.compile(r"[+-]?(?:nan|inf|infinity|-?1\.#\w+)", re.IGNORECASE)
@@ -97,16 +98,17 @@ def form_of(lines: Sequence[Line]) -> TableForm:
         UnusableText: In no way that all of them agree with.
     """
     looked_at = [*lines[:_LOOKED_AT]]
-    best, most = None, 0
-    for separator in _SEPARATORS:
-        for decimal in ".,":
-            form = TableForm(separator, decimal)
-            count = _columns_of_numbers(form, looked_at)
-            if count > most:
-                best, most = form, count
-    if best is None:
-        raise UnusableText(tr("its lines do not have the same columns of numbers"))
-    return best
+    for separators in _SEPARATORS:
+        best, most = None, 0
+        for separator in separators:
+            for decimal in ".,":
+                form = TableForm(separator, decimal)
+                count = _columns_of_numbers(form, looked_at)
+                if count > most:
+                    best, most = form, count
+        if best is not None:
+            return best
+    raise UnusableText(tr("its lines do not have the same columns of numbers"))
 
 
 def without_trailing(rows: Sequence[list[str]]) -> int:

@@ -53,6 +53,17 @@ def heights_agree(heights_mm: Sequence[float], sigma_z_mm: float) -> bool:
     return max(heights_mm) - min(heights_mm) <= limit_mm
 
 
+def require_one_height(heights_mm: Sequence[float], *, sigma_z_mm: float) -> None:
+    """Refuse heights of an upright flange that were not all taken on one pin.
+
+    Raises:
+        CalibrationError: ``touch_heights_differ``.
+    """
+    if len(heights_mm) > 1 and not heights_agree(heights_mm, sigma_z_mm):
+        range_mm = max(heights_mm) - min(heights_mm)
+        raise _refusal("touch_heights_differ", range_mm, None)
+
+
 _PRINTED_MM: Final = 0.001
 """No controller prints positions coarser; a finer one changes nothing."""
 

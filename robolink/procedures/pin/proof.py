@@ -9,14 +9,17 @@ from robolink.calibration import (
     CalibrationResult,
     Drift,
     DriftVerdict,
+    FlangePlane,
     VerifyResult,
+    flange_of,
     judge_drift,
+    tip_pose,
 )
 from robolink.messages import tr
-from robolink.model import Pose, ToolOffset, rotate_xy
+from robolink.model import Pose, ToolOffset
 from robolink.procedures.approach import NO_OFFSET
 from robolink.procedures.pin.judging import heights_agree
-from robolink.procedures.pin.touch_plan import TouchPlan
+from robolink.procedures.pin.touch_plan import TouchPlan, plain_pose
 from robolink.procedures.pin.touches import PinTouches
 from robolink.runner import Notify, Procedure, TouchedAt
 
@@ -84,19 +87,9 @@ def contact_pose(result: CalibrationResult, *, tool: int) -> Pose:
 
     Height and angle are those of the last pose, seen through the proposed offset.
     """
-    last = result.inputs[-1]
     x_mm, y_mm = result.reference_point_mm[:2]
-    return Pose(
-        x_mm,
-        y_mm,
-        last.z_mm + result.offset.z_mm,
-        last.u_deg + result.offset.u_deg,
-        last.v_deg,
-        last.w_deg,
-        hand=last.hand,
-        local=last.local,
-        tool=tool,
-    )
+    last = tip_pose(plain_pose(result.inputs[-1]), result.offset, tool=tool)
+    return replace(last, x_mm=x_mm, y_mm=y_mm)
 
 
 def drift_uncertainty_mm(plan: TouchPlan, result: CalibrationResult) -> float:
@@ -182,9 +175,8 @@ class DriftProof:
 
 def _place(contact: Pose, angle_deg: float, written: ToolOffset, tip: ToolOffset) -> Pose:
     """Return where the frame in force should be with the tip on the pin."""
-    aside_x, aside_y = rotate_xy(
-        written.x_mm - tip.x_mm, written.y_mm - tip.y_mm, angle_deg - written.u_deg
+    frame = replace(contact, u_deg=angle_deg)
+    aside_x, aside_y = FlangePlane.of(flange_of(frame, written)).in_base(
+        written.x_mm - tip.x_mm, written.y_mm - tip.y_mm, written.z_mm - tip.z_mm
     )
-    return replace(
-        contact, x_mm=contact.x_mm + aside_x, y_mm=contact.y_mm + aside_y, u_deg=angle_deg
-    )
+    return replace(frame, x_mm=contact.x_mm + aside_x, y_mm=contact.y_mm + aside_y)

@@ -4,8 +4,9 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
+from typing import Any, Protocol, Self, cast, runtime_checkable
 
-from robolink.calibration import CalibrationResult, VerifyResult
+from robolink.calibration import CalibrationResult, VerifyResult, tip_pose
 from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
 from robolink.procedures.pin.proof import (
@@ -18,6 +19,18 @@ from robolink.procedures.source import MeasurementContext
 from robolink.runner import Procedure
 
 
+@runtime_checkable
+class TouchesPin(Protocol):
+    """A source in which a person touches a pin, or a surface, in measurement and proof."""
+
+    @property
+    def touch(self) -> TouchPlan:
+        """How the tip is taken off what it touches, and brought back."""
+
+    def with_touch(self, plan: TouchPlan) -> Self:
+        """Return the same source with another plan of its touches."""
+
+
 class TouchSource(ABC):
     """Measures by touches that a person makes.
 
@@ -28,6 +41,11 @@ class TouchSource(ABC):
     __slots__ = ()
 
     touch: TouchPlan
+
+    def with_touch(self, plan: TouchPlan) -> Self:
+        """Return the same source with another plan of its touches."""
+        # Each source is a dataclass of its own, which this base of them cannot be.
+        return cast(Self, replace(cast(Any, self), touch=plan))
 
     @property
     def clearance_mm(self) -> float:
@@ -92,7 +110,7 @@ class ManualPinSource(PinSource):
         tolerance_mm: float,
     ) -> VerifyResult:
         """Turn about the new tip; see :class:`~robolink.procedures.MovingSource`."""
-        angles = [pose.u_deg + result.offset.u_deg for pose in result.inputs]
+        angles = [tip_pose(pose, result.offset, tool=tool).u_deg for pose in result.inputs]
         context.controller.tools.select(tool)
         procedure = verify_by_turning(
             self.touch,

@@ -1,7 +1,7 @@
 """How a tip is taken off what it touches, and how near the robot brings it again."""
 
 import secrets
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from robolink.calibration import (
@@ -55,6 +55,7 @@ def fresh_seed() -> int:
     return secrets.randbits(_SEED_BITS)
 
 
-def plain(pose: Pose) -> Pose:
+def plain_pose(pose: Pose) -> Pose:
     """Return a pose without how it was taken."""
-    return Pose(*pose.coordinates(), hand=pose.hand, local=pose.local, tool=pose.tool)
+    kept = Pose(*pose.coordinates(), hand=pose.hand, local=pose.local, tool=pose.tool)
+    return replace(kept, posture=pose.posture)

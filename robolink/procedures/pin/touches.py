@@ -9,12 +9,12 @@ from collections.abc import Hashable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from robolink.calibration import FARTHEST_MM, HIGHEST_MM
+from robolink.calibration import FARTHEST_MM, HIGHEST_MM, FlangePlane
 from robolink.messages import tr
-from robolink.model import Path, Pose, ToolOffset, rotate_xy
+from robolink.model import Path, Pose, ToolOffset
 from robolink.procedures.approach import offset_z
 from robolink.procedures.pin.judging import require_touches
-from robolink.procedures.pin.touch_plan import TouchPlan, fresh_seed, plain
+from robolink.procedures.pin.touch_plan import TouchPlan, fresh_seed, plain_pose
 from robolink.procedures.pin.witnessed import WitnessedTouches
 from robolink.runner import Move, Procedure, TouchedAt
 
@@ -64,7 +64,7 @@ class PinTouches(WitnessedTouches):
             CalibrationError: ``not_touched`` or ``typed_ahead``, with the tip drawn back.
         """
         self._taken.pop(key, None)
-        expected = plain(expected)
+        expected = plain_pose(expected)
         x_mm, y_mm, z_mm = self._standoff(expected)
         beside = replace(expected, x_mm=expected.x_mm + x_mm, y_mm=expected.y_mm + y_mm)
         above_mm = self._plan.lift_mm if self._comes_down else z_mm
@@ -131,15 +131,12 @@ class PinTouches(WitnessedTouches):
         )
 
     def _how_to_make(self) -> str:
-        return tr(
-            "Nothing was written. The robot always stops beside the pin: jog until the tip is "
-            "on it, then answer."
-        )
+        return tr("The robot never stops on the pin: jog until the tip is on it, then answer.")
 
 
 def lift_off(plan: TouchPlan, touch: Pose) -> Move:
     """Return the step that takes the tip off the pin, after which it may turn."""
-    return Move(offset_z(plain(touch), plan.lift_mm), Path.STRAIGHT, tr("lift off the pin"))
+    return Move(offset_z(plain_pose(touch), plan.lift_mm), Path.STRAIGHT, tr("lift off the pin"))
 
 
 def touch_again(
@@ -168,11 +165,10 @@ def touch_again(
 
 def _turned(contact: Pose, u_deg: float, guess: ToolOffset) -> Pose:
     """Return the flange pose at ``u_deg`` that brings the tip, by ``guess``, to the same point."""
-    before_x, before_y = rotate_xy(guess.x_mm, guess.y_mm, contact.u_deg)
-    after_x, after_y = rotate_xy(guess.x_mm, guess.y_mm, u_deg)
+    turned = replace(plain_pose(contact), u_deg=u_deg)
+    tip = guess.components()[:3]
+    before_x, before_y = FlangePlane.of(contact).in_base(*tip)
+    after_x, after_y = FlangePlane.of(turned).in_base(*tip)
     return replace(
-        plain(contact),
-        x_mm=contact.x_mm + before_x - after_x,
-        y_mm=contact.y_mm + before_y - after_y,
-        u_deg=u_deg,
+        turned, x_mm=contact.x_mm + before_x - after_x, y_mm=contact.y_mm + before_y - after_y
     )

@@ -5,7 +5,9 @@ from typing import TYPE_CHECKING
 from robolink.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
+    from robolink.protocols.spel._queries import RobotType as RobotType
     from robolink.protocols.spel._queries import list_tools as list_tools
+    from robolink.protocols.spel._queries import parse_robot_type as parse_robot_type
     from robolink.protocols.spel._queries import print_here as print_here
     from robolink.protocols.spel._queries import print_joint_angle as print_joint_angle
     from robolink.protocols.spel._queries import print_motor as print_motor
@@ -26,6 +28,7 @@ if TYPE_CHECKING:
     from robolink.protocols.spel._queries import print_tool_defined as print_tool_defined
     from robolink.protocols.spel._queries import print_tool_x as print_tool_x
     from robolink.protocols.spel._queries import print_two_texts as print_two_texts
+    from robolink.protocols.spel._queries import tilts_tool as tilts_tool
     from robolink.protocols.spel._queries import wait_half_a_second as wait_half_a_second
     from robolink.protocols.spel._queries import where as where
     from robolink.protocols.spel._statements import MAX_STATEMENT as MAX_STATEMENT
@@ -35,6 +38,8 @@ if TYPE_CHECKING:
     from robolink.protocols.spel._statements import move as move
     from robolink.protocols.spel._statements import power_high as power_high
     from robolink.protocols.spel._statements import power_low as power_low
+    from robolink.protocols.spel._statements import print_joint_of as print_joint_of
+    from robolink.protocols.spel._statements import print_reachable as print_reachable
     from robolink.protocols.spel._statements import select_tool as select_tool
     from robolink.protocols.spel._statements import set_tool as set_tool
     from robolink.protocols.spel._statements import speed as speed
@@ -55,6 +60,7 @@ if TYPE_CHECKING:
     from robolink.protocols.spel._values import parse_number as parse_number
     from robolink.protocols.spel._values import parse_point as parse_point
     from robolink.protocols.spel._values import parse_tool_listing as parse_tool_listing
+    from robolink.protocols.spel._values import posture_marks as posture_marks
     from robolink.protocols.spel._where import PrintedWhere as PrintedWhere
     from robolink.protocols.spel._where import format_where as format_where
     from robolink.protocols.spel._where import parse_where as parse_where
@@ -63,16 +69,17 @@ else:
         __name__,
         {
             "_queries": (
-                "list_tools print_here print_joint_angle print_motor print_output "
+                "RobotType list_tools parse_robot_type print_here print_joint_angle "
+                "print_motor print_output "
                 "print_point print_point_defined print_power print_real_position "
                 "print_robot print_robot_model print_robot_serial print_robot_type "
                 "print_selected_tool print_speed print_speed_s print_tool "
                 "print_plain_point print_tool_defined print_tool_x print_two_texts "
-                "wait_half_a_second where"
+                "tilts_tool wait_half_a_second where"
             ),
             "_statements": (
                 "MAX_STATEMENT Statement clear_tool go move power_high power_low "
-                "select_tool set_tool speed speed_s"
+                "print_joint_of print_reachable select_tool set_tool speed speed_s"
             ),
             "_until": (
                 "move_find move_till print_found_position print_input "
@@ -80,7 +87,7 @@ else:
             ),
             "_values": (
                 "Layout PrintedPoint decimal format_point format_tool_listing parse_boolean "
-                "parse_integer parse_number parse_point parse_tool_listing"
+                "parse_integer parse_number parse_point parse_tool_listing posture_marks"
             ),
             "_where": "PrintedWhere format_where parse_where",
         },

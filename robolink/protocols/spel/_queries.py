@@ -5,8 +5,12 @@ Source: docs/reference/epson.md 3.1, 3.3; docs/reference/spel.md 5.3, 6.1, 7.2, 
 Those that take a number raise LocalProtocolError when it is out of range.
 """
 
+from enum import IntEnum
+from typing import Final
+
 from robolink.messages import tr
 from robolink.protocols.spel._statements import LAST_TOOL, Statement, check_range
+from robolink.protocols.spel._values import parse_integer
 
 _LAST_OUTPUT = 0xFFFF
 """Two bytes carry a bit number (docs/reference/epson.md 2.2); which exist depends on the
@@ -65,8 +69,48 @@ def print_robot() -> Statement:
     return Statement("Print Robot")
 
 
+class RobotType(IntEnum):
+    """What RobotType gives (docs/reference/spel.md 9)."""
+
+    JOINT = 1
+    CARTESIAN = 2
+    SCARA = 3
+    SIX_AXIS = 5
+    RS = 6
+    N = 7
+
+
+_SIX_JOINTS: Final = frozenset({RobotType.SIX_AXIS, RobotType.N})
+_NAMES_OF_TYPES: Final = {
+    "joint": RobotType.JOINT,
+    "cartesian": RobotType.CARTESIAN,
+    "scara": RobotType.SCARA,
+    "6-axis": RobotType.SIX_AXIS,
+    "six-axis": RobotType.SIX_AXIS,
+    "rs": RobotType.RS,
+    "rs series": RobotType.RS,
+    "n": RobotType.N,
+    "n series": RobotType.N,
+}
+
+
+def tilts_tool(kind: int) -> bool:
+    """Tell whether a robot of that type has V and W."""
+    return kind in _SIX_JOINTS
+
+
+def parse_robot_type(text: str) -> int:
+    """Read a printed RobotType: its number, known or not, or its name in any case.
+
+    Raises:
+        RemoteProtocolError: It is neither.
+    """
+    named = _NAMES_OF_TYPES.get(text.strip().casefold())
+    return parse_integer(text) if named is None else named
+
+
 def print_robot_type() -> Statement:
-    """The kind of the robot in force: 3 SCARA, 5 six axes, 6 RS, 7 N (docs/reference/spel.md 9)."""
+    """The kind of the robot in force; :func:`parse_robot_type` reads it."""
     return Statement("Print RobotType")
 
 

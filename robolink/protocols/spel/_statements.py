@@ -5,11 +5,12 @@ fixed form, so that no value can turn into another statement. The one door past 
 :meth:`robolink.controllers.epson.EpsonController.execute_raw`.
 """
 
+from dataclasses import replace
 from typing import Final, NewType, TypeVar
 
 from robolink.errors import LocalProtocolError
 from robolink.messages import tr
-from robolink.model import Hand, Pose, ToolOffset
+from robolink.model import Hand, Pose, Posture, ToolOffset
 from robolink.protocols.spel._values import decimal, posture_marks
 
 Statement = NewType("Statement", str)
@@ -64,7 +65,7 @@ def go(target: Pose, *, six_axes: bool) -> Statement:
     Raises:
         LocalProtocolError: V or W on a robot of four axes, or a local other than 0.
     """
-    return Statement(f"Go {_point(target, six_axes=six_axes)}")
+    return Statement(f"Go {_target(target, six_axes=six_axes)}")
 
 
 def move(target: Pose, *, six_axes: bool) -> Statement:
@@ -73,7 +74,7 @@ def move(target: Pose, *, six_axes: bool) -> Statement:
     Raises:
         LocalProtocolError: V or W on a robot of four axes, or a local other than 0.
     """
-    return Statement(f"Move {_point(target, six_axes=six_axes)}")
+    return Statement(f"Move {_target(target, six_axes=six_axes)}")
 
 
 def power_low() -> Statement:
@@ -127,6 +128,44 @@ def _point(target: Pose, *, six_axes: bool) -> str:
         marks = posture_marks(target.posture, six_axes=six_axes)
         flags += "".join(f" /{mark}" for mark in marks)
     return f"{_xy(target.coordinates(), six_axes=six_axes)}{flags} /0"
+
+
+def _target(target: Pose, *, six_axes: bool) -> str:
+    """Return a point to move to.
+
+    On six axes its joints 1, 4 and 6 take the turns nearest to where they are: a tool that is
+    turned by a few degrees is not to go round the other way, with its cables, because a flag of the
+    place it came from says so. Hand, elbow and wrist stay those of the point (LJM with flag 2,
+    docs/reference/epson-robots.md, "Flags").
+    """
+    point = _point(target, six_axes=six_axes)
+    return f"LJM({point}, Here, 2)" if six_axes and target.posture is not None else point
+
+
+def print_reachable(target: Pose, *, six_axes: bool) -> Statement:
+    """Whether a point can be reached, a Boolean; raises no error if it cannot.
+
+    Source: docs/reference/spel.md 5.3.
+
+    Raises:
+        LocalProtocolError: As :func:`go`.
+    """
+    posture = target.posture
+    if posture is not None and six_axes:
+        # In their first turns: which turn a movement takes is another question.
+        posture = Posture(posture.elbow, posture.wrist)
+    plain = replace(target, posture=posture)
+    return Statement(f"Print TargetOK({_point(plain, six_axes=six_axes)})")
+
+
+def print_joint_of(target: Pose, joint: int, *, six_axes: bool) -> Statement:
+    """The value of one joint at a point, in degrees or mm (docs/reference/spel.md 5.3).
+
+    Raises:
+        LocalProtocolError: As :func:`go`, or no such joint.
+    """
+    check_range(tr("A joint"), joint, 1, 6)
+    return Statement(f"Print PAgl({_target(target, six_axes=six_axes)}, {joint})")
 
 
 def _xy(values: tuple[float, ...], *, six_axes: bool) -> str:

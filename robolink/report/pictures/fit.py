@@ -1,4 +1,4 @@
-"""How far each pose is from agreement, and how sure that leaves the offset."""
+"""How far each pose is from agreement, and how uncertain that leaves the offset."""
 
 import math
 from collections.abc import Iterator
@@ -8,9 +8,8 @@ from xml.etree.ElementTree import Element
 from robolink.calibration import CalibrationResult
 from robolink.messages import tr
 from robolink.report._markup import element
-from robolink.report._values import Report
-from robolink.report.pictures.panel import SIDE, PlotPanel, dot_names, side_by_side
-from robolink.report.pictures.shapes import circle, ellipse, words
+from robolink.report.pictures.panel import Drawing, PlotPanel, dot_names
+from robolink.report.pictures.shapes import circle, ellipse
 
 _LOWEST_MM: Final = 0.005
 """A panel shows at least so much to each side: less is below what a controller prints."""
@@ -19,19 +18,15 @@ Axes = tuple[float, float, float]
 """Half of the long and of the short axis, mm, and the angle of the long one from X, degrees."""
 
 
-def fit(report: Report) -> Iterator[Element]:
-    """Yield the drawing, for a measurement that leaves a residual or has an interval."""
-    if report.fit is None:
+def fit_drawings(result: CalibrationResult | None) -> Iterator[Drawing]:
+    """Yield the drawings of a measurement that leaves a residual or has an interval."""
+    if result is None:
         return
-    axes = interval_ellipse(report.fit)
-    panels = []
-    if any(any(residual[:2]) for residual in _in_the_plane(report.fit)):
-        panels.append(_residuals(report.fit))
+    if any(any(residual[:2]) for residual in _in_the_plane(result)):
+        yield _residuals(result)
+    axes = interval_ellipse(result)
     if axes is not None:
-        panels.append(_interval(report.fit, axes))
-    if panels:
-        yield element("h2", tr("How well the poses agree"))
-        yield side_by_side(tr("Residual of each pose, and the 95 % interval"), panels)
+        yield _interval(result, axes)
 
 
 def interval_ellipse(result: CalibrationResult) -> Axes | None:
@@ -44,7 +39,7 @@ def interval_ellipse(result: CalibrationResult) -> Axes | None:
         return None
     x, y = (result.measured.index(name) for name in ("x_mm", "y_mm"))
     xx, yy, xy = (result.covariance[i][j] for i, j in ((x, x), (y, y), (x, y)))
-    if xx <= 0 or yy <= 0:
+    if xx <= 0 or yy <= 0 or not result.half_width95:
         return None
     scale = result.half_width95[x] / math.sqrt(xx)
     middle, spread = (xx + yy) / 2, math.hypot((xx - yy) / 2, xy)
@@ -57,7 +52,7 @@ def _in_the_plane(result: CalibrationResult) -> tuple[tuple[float, ...], ...]:
     return tuple(residual for residual in result.residuals_mm if len(residual) > 1)
 
 
-def _residuals(result: CalibrationResult) -> Element:
+def _residuals(result: CalibrationResult) -> Drawing:
     """Draw the residual of each pose from above, in base axes."""
     panel = PlotPanel(max(*result.residual_distances_mm, _LOWEST_MM) * 1.2)
     places = [panel.at(residual[0], residual[1]) for residual in _in_the_plane(result)]
@@ -68,26 +63,35 @@ def _residuals(result: CalibrationResult) -> Element:
         for n, place in enumerate(places)
     ]
     names = dot_names(places, [str(number) for number in range(1, len(places) + 1)])
-    title = tr("residual of each pose, base; circle: rms")
+    said = tr("Residual of each pose, base; the circle is the rms.")
     if result.rejected:
-        title = tr("residual of each pose, base; red: left out")
-    return element("g", *panel.frame(title), rms, *dots, *names)
+        said = tr("Residual of each pose, base; the circle is the rms; red: left out.")
+    return panel.drawn(tr("Residual of each pose"), said, rms, *dots, *names)
 
 
-def _interval(result: CalibrationResult, axes: Axes) -> Element:
-    """Draw the interval about the measured tip, in the axes of the flange."""
+def _interval(result: CalibrationResult, axes: Axes) -> Drawing:
+    """Draw the intervals about the measured tip, in the axes of the flange."""
     halves = [result.half_width95[result.measured.index(name)] for name in ("x_mm", "y_mm")]
-    panel = PlotPanel(max(*halves, _LOWEST_MM) * 1.4)
+    radius_mm = result.region95_radius_mm
+    panel = PlotPanel(max(*halves, radius_mm or 0.0, _LOWEST_MM) * 1.25)
     middle = panel.at(0, 0)
     long_mm, short_mm, turn_deg = axes
-    shape = ellipse(
-        middle, long_mm * panel.per_mm, short_mm * panel.per_mm, turn_deg, class_="interval"
+    shape: list[Element] = [
+        ellipse(
+            middle, long_mm * panel.per_mm, short_mm * panel.per_mm, turn_deg, class_="interval"
+        )
+    ]
+    said = tr(
+        "Tip on the flange: X \u00b1 {x:.4f} mm, Y \u00b1 {y:.4f} mm, "
+        "each 95 % for its axis alone.",
+        x=halves[0],
+        y=halves[1],
     )
-    said = "X \u00b1 {:.4f}  Y \u00b1 {:.4f} mm".format(*halves)
-    return element(
-        "g",
-        *panel.frame(tr("95 % interval of the tip on the flange")),
-        shape,
-        element("g", circle(middle, 2.4), class_="point"),
-        words(said, 8, SIDE - 8, class_="tick"),
-    )
+    if radius_mm is not None:
+        shape.append(circle(middle, round(radius_mm * panel.per_mm, 2), class_="rms"))
+        said += " " + tr(
+            "The outer circle, radius {radius:.4f} mm, holds the whole tip, 95 %.",
+            radius=radius_mm,
+        )
+    dot = element("g", circle(middle, 2.4), class_="point")
+    return panel.drawn(tr("95 % interval of the tip on the flange"), said, *shape, dot)

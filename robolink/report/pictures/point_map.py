@@ -1,7 +1,6 @@
 """The taught points from above, with an arrow each for the tip's displacement."""
 
 import math
-from dataclasses import dataclass
 from typing import Final
 from xml.etree.ElementTree import Element
 
@@ -9,6 +8,7 @@ from robolink.calibration import Impact, PointImpact
 from robolink.messages import tr
 from robolink.report._markup import element
 from robolink.report.pictures.labels import Paper
+from robolink.report.pictures.panel import Drawing
 from robolink.report.pictures.plane import WIDTH, Plane, enlargement, plane_around, step_down
 from robolink.report.pictures.shapes import Place, arrow, circle, line, words
 
@@ -17,22 +17,7 @@ _STILL_MM: Final = 5e-7
 """A displacement below this is a rounding, and has no direction."""
 
 
-@dataclass(frozen=True, slots=True)
-class Picture:
-    """A drawing, and what must be said beside it.
-
-    Attributes:
-        svg: The drawing.
-        factor: How many times longer than true the arrows are, ``None`` without arrows.
-        unnamed: How many points have no room for their number.
-    """
-
-    svg: Element
-    factor: float | None
-    unnamed: int
-
-
-def draw(impact: Impact) -> Picture:
+def draw(impact: Impact) -> Drawing:
     """Draw the points of ``impact``, of which there is at least one."""
     places = [(entry.pose.x_mm, entry.pose.y_mm) for entry in impact.entries]
     plane = plane_around(places)
@@ -41,7 +26,7 @@ def draw(impact: Impact) -> Picture:
     marks = _Marks(plane, factor, impact.largest)
     drawn = [marks.draw(entry) for entry in _largest_last(impact)]
     names, unnamed = marks.names(impact)
-    content = [*grid(plane), *drawn, *names]
+    content = [*_grid(plane), *drawn, *names]
     height = plane.height + _TOP + _BELOW
     svg = element(
         "svg",
@@ -51,7 +36,30 @@ def draw(impact: Impact) -> Picture:
         viewBox=f"0 0 {WIDTH + _LEFT + 10:g} {height:g}",
         role="img",
     )
-    return Picture(svg, factor, unnamed)
+    return Drawing(svg, _caption(factor, unnamed))
+
+
+def _caption(factor: float | None, unnamed: int) -> str:
+    """Return what must be said beside it.
+
+    Args:
+        factor: How many times longer than true the arrows are, ``None`` without arrows.
+        unnamed: How many points have no room for their number.
+    """
+    said = [tr("Taught points in base coordinates, seen from above, with equal axes.")]
+    if factor is None:
+        said.append(tr("Nothing moves sideways."))
+    else:
+        said.append(
+            tr(
+                "Each arrow is the sideways movement of the tip, drawn {factor:g} times as long "
+                "as it is; the ring marks the largest.",
+                factor=factor,
+            )
+        )
+    if unnamed:
+        said.append(tr("{count} numbers have no room; the table has them.", count=unnamed))
+    return " ".join(said)
 
 
 class _Marks:
@@ -108,7 +116,7 @@ def _largest_last(impact: Impact) -> list[PointImpact]:
     return sorted(impact.entries, key=lambda entry: entry is impact.largest)
 
 
-def grid(plane: Plane) -> list[Element]:
+def _grid(plane: Plane) -> list[Element]:
     """Return paper, grid lines and axes of a plane."""
     width, height = WIDTH, plane.height
     parts = [element("rect", width=f"{width:g}", height=f"{height:.1f}", class_="paper")]

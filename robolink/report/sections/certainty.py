@@ -1,15 +1,32 @@
-"""Where the interval comes from, in a sentence."""
+"""How uncertain the result is: the interval, what it rests on, and the budget."""
 
 import math
 
-from robolink.calibration import CalibrationResult
+from robolink.calibration import CalibrationResult, doubt_sentence
 from robolink.messages import tr
+from robolink.model import Pose
 
 
-def how_sure(fit: CalibrationResult) -> str:
-    """Return what the interval of a measurement rests on, or why there is none."""
+def interval_sentences(fit: CalibrationResult) -> tuple[str, ...]:
+    """Return which interval it is, what it rests on, or why there is none."""
     if not fit.half_width95:
-        return tr("No interval: nothing here tells how large the errors are.")
+        return (tr("No interval: nothing here tells how large the errors are."),)
+    said = [_what_it_rests_on(fit)]
+    lengths = [name[0].upper() for name in fit.measured if name.endswith("_mm")]
+    if len(lengths) > 1:
+        said.append(tr("Each interval holds for its axis alone."))
+    if fit.region95_radius_mm is not None:
+        said.append(
+            tr(
+                "All together: the tip lies within {radius:.3f} mm of ({axes}), 95 %.",
+                radius=fit.region95_radius_mm,
+                axes=", ".join(lengths),
+            )
+        )
+    return (*said, *map(doubt_sentence, fit.notes))
+
+
+def _what_it_rests_on(fit: CalibrationResult) -> str:
     if fit.interval_from == "resolution" and fit.sigma_mm is not None:
         return tr(
             "The interval rests on the step of the jogs, {step:g} mm.",
@@ -27,3 +44,17 @@ def how_sure(fit: CalibrationResult) -> str:
         "The interval rests on the scatter of the poses: Student's t, degrees of freedom: {dof}.",
         dof=fit.dof,
     )
+
+
+def resolution_sentence(poses: tuple[Pose, ...]) -> str:
+    """Return the finest step in which the poses are written, empty without poses."""
+    digits = max((_digits(value) for pose in poses for value in pose.coordinates()[:3]), default=-1)
+    return "" if digits < 0 else tr("Positions as they were read: {step:g} mm.", step=10**-digits)
+
+
+def _digits(value: float) -> int:
+    """Return after how many decimals a number ends, 9 at most."""
+    for digits in range(9):
+        if math.isclose(round(value, digits), value, abs_tol=1e-10):
+            return digits
+    return 9

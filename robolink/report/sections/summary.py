@@ -1,11 +1,12 @@
-"""The head of the page: what became of the change, and where."""
+"""The head of the page: what became of the change, which machine, who, when and with what."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from datetime import datetime
 from typing import Final
-from xml.etree.ElementTree import Element
 
 from robolink.messages import tr
-from robolink.report._markup import element
+from robolink.model import ControllerFacts
 from robolink.report._values import Outcome, Record, Report
 
 _TONES: Final = {
@@ -24,7 +25,26 @@ _TONES: Final = {
 """How each looks; what matters most stands last."""
 
 
-def heading(reports: Sequence[Report]) -> Element:
+@dataclass(frozen=True, slots=True)
+class Heading:
+    """The top of the page.
+
+    Attributes:
+        title: What the page is about.
+        verdict: What became of the change, in words.
+        tone: How that looks: ``good``, ``still`` or ``bad``.
+        endings: Why it ended so, one sentence each.
+        suspicion: That the record behind the page was tampered with; empty when it was not.
+    """
+
+    title: str
+    verdict: str
+    tone: str
+    endings: tuple[str, ...]
+    suspicion: str
+
+
+def heading(reports: Sequence[Report]) -> Heading:
     """Return the title and the one thing that must not be missed."""
     worst = max(reports, key=lambda report: list(_TONES).index(report.outcome))
     if len(reports) == 1:
@@ -32,62 +52,90 @@ def heading(reports: Sequence[Report]) -> Element:
     else:
         numbers = ", ".join(str(report.tool) for report in reports)
         title = tr("Tools {numbers}: change of the offsets", numbers=numbers)
-    verdict = element("p", _verdict(worst.outcome), class_=f"outcome {_TONES[worst.outcome]}")
     endings = dict.fromkeys(report.ending for report in reports if report.ending)
-    return element(
-        "header",
-        element("h1", title),
-        verdict,
-        *(element("p", ending, class_="ending") for ending in endings),
-        _suspicion(worst.record),
-    )
+    record = worst.record
+    suspicion = record.check if record is not None and record.problems else ""
+    return Heading(title, _verdict(worst.outcome), _TONES[worst.outcome], tuple(endings), suspicion)
 
 
-def _suspicion(record: Record | None) -> Element | None:
-    """Return the warning that the record behind the page was tampered with."""
-    if record is None or not record.problems:
-        return None
-    return element("p", record.check, class_="ending bad")
+def facts(reports: Sequence[Report]) -> list[tuple[str, str]]:
+    """Return which machine it was, who did it, when and by what means; names with values."""
+    report = reports[0]
+    shown = [
+        *(() if report.record is None else [(tr("report number"), report.record.change)]),
+        (tr("controller"), report.controller),
+        *_machine(report.facts, asked=report.record is not None),
+        (tr("tool"), ", ".join(str(one.tool) for one in reports)),
+        *_time(report),
+        *([] if report.record is None else _circumstances(report.record)),
+        *_gauges(reports),
+        (tr("new offset"), _joined(*dict.fromkeys(one.source for one in reports))),
+        (tr("method"), _joined(*dict.fromkeys(one.method for one in reports if one.record))),
+    ]
+    return [(name, value) for name, value in shown if value]
 
 
-def facts(reports: Sequence[Report]) -> Element:
-    """Return which controller and robot it was, who did it, when, and by what means."""
-    report, about = reports[0], reports[0].facts
-    robots = ", ".join(about.robot_models)
+def _machine(about: ControllerFacts, *, asked: bool) -> list[tuple[str, str]]:
+    """Return what the controller said of itself; that it said nothing, where it was asked."""
     serials = ", ".join(about.robot_serials)
-    shown = {
-        tr("controller"): report.controller,
-        tr("its name, type, serial"): _joined(
-            about.controller_name, about.controller_type, about.controller_serial
-        ),
-        tr("firmware, project"): _joined(about.firmware, about.project),
-        tr("robot"): _joined(robots, serials and tr("serial {serials}", serials=serials)),
-        tr("tool"): ", ".join(str(one.tool) for one in reports),
-        tr("time"): report.made_at if report.record is None else _period(report.record),
-        **({} if report.record is None else _circumstances(report.record)),
-        tr("new offset"): _joined(*dict.fromkeys(one.source for one in reports)),
-        tr("method"): _joined(*dict.fromkeys(one.method for one in reports if one.record)),
-    }
-    pairs = [(name, value) for name, value in shown.items() if value]
-    rows = [part for name, value in pairs for part in (element("dt", name), element("dd", value))]
-    return element("dl", *rows)
+    robot = _joined(
+        ", ".join(about.robot_models), serials and tr("serial {serials}", serials=serials)
+    )
+    own = _joined(
+        about.controller_name,
+        about.controller_type,
+        about.controller_serial and tr("serial {serials}", serials=about.controller_serial),
+    )
+    if asked and not (robot or own or about.firmware):
+        return [(tr("robot"), tr("not on record"))]
+    return [
+        (tr("controller's name, type"), own),
+        (tr("firmware, project"), _joined(about.firmware, about.project)),
+        (tr("robot"), robot or (tr("not on record") if asked else "")),
+    ]
 
 
-def _circumstances(record: Record) -> dict[str, str]:
+def _time(report: Report) -> list[tuple[str, str]]:
+    """Return when it was, in the time of the place and in UTC."""
+    if report.record is None:
+        return [(tr("time"), report.made_at)]
+    first, last = (report.record.entries[index].at for index in (0, -1))
+    at = (first, last) if first[:19] != last[:19] else (first,)
+    utc = tr(" to ").join(_clock(one) for one in at)
+    local = report.local_time and _clock(report.local_time)
+    return [
+        (tr("time (UTC)"), utc),
+        (tr("local time"), f"{local} {report.local_time[19:]}".strip() if local else ""),
+    ]
+
+
+def _clock(at: str) -> str:
+    try:
+        return f"{datetime.fromisoformat(at):%Y-%m-%d %H:%M:%S}"
+    except ValueError:
+        return at
+
+
+def _circumstances(record: Record) -> list[tuple[str, str]]:
     signature = record.signature
     recipe_hash = signature.recipe_hash and tr("SHA-256 {hash}", hash=signature.recipe_hash)
-    return {
-        tr("change"): record.change,
-        tr("done by"): "; ".join(record.people),
-        tr("nozzle, lot"): _joined(signature.nozzle, signature.lot),
-        tr("recipe"): _joined(signature.recipe, recipe_hash),
-        tr("station"): signature.station,
-    }
+    return [
+        (tr("done by"), "; ".join(record.people)),
+        (tr("nozzle, lot"), _joined(signature.nozzle, signature.lot)),
+        (tr("recipe"), _joined(signature.recipe, recipe_hash)),
+        (tr("station"), signature.station),
+        (tr("software"), signature.version and f"robolink {signature.version}"),
+    ]
 
 
-def _period(record: Record) -> str:
-    first, last = record.entries[0].at, record.entries[-1].at
-    return tr("{first} to {last}", first=first, last=last)
+def _gauges(reports: Sequence[Report]) -> Iterator[tuple[str, str]]:
+    """Yield the gauges that were measured against, and until when each is calibrated."""
+    for gauge in dict.fromkeys(gauge for report in reports for gauge in report.gauges):
+        due = gauge.due and tr("calibration due {date}", date=gauge.due)
+        late = gauge.overdue and tr("OVERDUE")
+        no_date = not gauge.due and tr("no due date is stated")
+        station = tr("station {id}", id=gauge.station)
+        yield tr("gauge"), _joined(gauge.id, station, due or no_date or "", late or "")
 
 
 def _verdict(outcome: Outcome) -> str:

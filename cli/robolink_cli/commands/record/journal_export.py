@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import fields
 from pathlib import Path
@@ -26,8 +27,13 @@ COLUMNS: Final = (
 )
 """The columns of a CSV file."""
 
-_FORMULAS: Final = ("=", "+", "-", "@", "\t", "\r")
-"""What makes a spreadsheet calculate a cell instead of showing it."""
+_FORMULA: Final = re.compile("((?:^|[;\t\r\n|])[\\s\x00-\x20]*)([=+@\uff1d\uff0b\uff20\uff0d-])")
+"""Where a spreadsheet would calculate a cell instead of showing it.
+
+Also behind a semicolon, tab or line end within a text: where a spreadsheet cuts lines at those, as
+it does in most of Europe, the rest of the text becomes a cell of its own. The full-width signs are
+taken for the others in East Asia.
+"""
 
 
 def csv_lines(entries: Iterable[Recorded]) -> Iterator[bytes]:
@@ -115,11 +121,9 @@ def _csv_row(entry: Recorded) -> dict[str, object]:
         value = payload.get(offset)
         if isinstance(value, dict):
             row |= {f"{offset}_{name}": number for name, number in value.items()}
-    row |= {name: entry.details.get(name) for name in _FIGURES}
-    return row | {"details": json.dumps(dict(entry.details), sort_keys=True)}
+    row |= {name: _as_shown(entry.details.get(name)) for name in _FIGURES}
+    return row | {"details": _as_shown(json.dumps(dict(entry.details), sort_keys=True))}
 
 
 def _as_shown(value: object) -> object:
-    if isinstance(value, str) and value.startswith(_FORMULAS):
-        return f"'{value}"
-    return value
+    return _FORMULA.sub(r"\1'\2", value) if isinstance(value, str) else value

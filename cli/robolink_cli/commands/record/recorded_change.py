@@ -1,7 +1,7 @@
 """A change as the journal has it: finding it, checking the journal, adding taught points."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -16,6 +16,7 @@ from robolink_cli.commands.record.journal_lookup import controller_meant, entrie
 from robolink_cli.options.impact import ImpactRequest, judge
 from robolink_cli.session.context import CliContext
 from robolink_cli.session.opening import open_controller
+from robolink_cli.views.documents import offset_payload, verification_payload
 
 _OF_A_CHANGE = (
     EntryKind.CALIBRATION,
@@ -97,9 +98,34 @@ def report_payload(reports: Sequence[Report], path: Path) -> dict[str, object]:
     return {
         "file": str(path),
         "change": record.change,
-        "tools": [{"tool": one.tool, "outcome": str(one.outcome)} for one in reports],
+        "done_by": list(record.people),
+        "began_at": record.entries[0].at,
+        "ended_at": record.entries[-1].at,
+        "tools": [_tool_payload(one) for one in reports],
         "entries": [entry.number for entry in record.entries],
         "problems": list(record.problems),
+    }
+
+
+def _tool_payload(report: Report) -> dict[str, object]:
+    """Return what an auditor's program wants of one tool; ``null`` for what is not on record."""
+    fit, proof = report.fit, report.verification
+    return {
+        "tool": report.tool,
+        "outcome": str(report.outcome),
+        "method": report.method,
+        "local_time": report.local_time or None,
+        "machine": {name: value or None for name, value in asdict(report.facts).items()},
+        "gauges": [asdict(gauge) for gauge in report.gauges],
+        "before": offset_payload(report.before),
+        "after": offset_payload(report.after),
+        "measured": list(report.determined),
+        "half_width95": dict(zip(fit.measured, fit.half_width95, strict=False)) if fit else {},
+        "interval_from": fit.interval_from or None if fit else None,
+        "region95_radius_mm": fit.region95_radius_mm if fit else None,
+        "budget": fit.budget.as_json() if fit and fit.budget else None,
+        "warnings": list(fit.warnings) if fit else [],
+        "verification": verification_payload(proof) if proof else None,
     }
 
 

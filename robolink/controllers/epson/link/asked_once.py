@@ -24,9 +24,6 @@ from robolink.messages import tr
 from robolink.protocols import spel
 from robolink.protocols.epson_text import Preference, parse_preferences
 
-_SIX_AXES = frozenset({5, 7})
-"""RobotType 5 is the six-axis arm, 7 the N series (docs/reference/spel.md 9)."""
-
 
 @dataclass(frozen=True, slots=True)
 class Robot:
@@ -38,19 +35,23 @@ class Robot:
     @property
     def six_axes(self) -> bool:
         """Whether V and W exist."""
-        return self.type_code in _SIX_AXES
+        return spel.tilts_tool(self.type_code)
 
 
 class RobotFacts:
     """Reads which robot is in force, when that is needed first.
 
     Execute acts on the robot chosen with SetCurRobot (docs/reference/epson.md 1.5); robolink never
-    changes that choice.
+    changes that choice, but a statement that a person typed may.
     """
 
     def __init__(self, window: CommandWindow) -> None:
         self._window = window
         self._robot: Robot | None = None
+
+    def forget(self) -> None:
+        """Ask again when it is needed next: another robot may be in force."""
+        self._robot = None
 
     def read(self, request: str = "Print Robot") -> Robot:
         """Return the robot in force.
@@ -64,7 +65,7 @@ class RobotFacts:
         if self._robot is None:
             with self._window.proving_ready(request):
                 number = spel.parse_integer(self._window.printed(spel.print_robot()))
-                kind = spel.parse_integer(self._window.printed(spel.print_robot_type()))
+                kind = spel.parse_robot_type(self._window.printed(spel.print_robot_type()))
             self._robot = Robot(number, kind)
         return self._robot
 

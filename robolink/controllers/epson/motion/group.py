@@ -1,6 +1,7 @@
 """The robot arm of an EPSON controller: where it is, and how it is told to go elsewhere."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from robolink.controllers.epson.link.link import EpsonLink
 from robolink.controllers.epson.link.requests import executes
@@ -8,6 +9,7 @@ from robolink.controllers.epson.link.stopping import bring_to_rest
 from robolink.controllers.epson.motion.movement import EpsonMotion
 from robolink.controllers.epson.motion.positions import read_position
 from robolink.controllers.epson.motion.power_and_speed import Settings
+from robolink.controllers.epson.motion.singularities import require_clear
 from robolink.controllers.epson.motion.until_input import (
     EpsonMotionUntilInput,
     read_input,
@@ -148,6 +150,8 @@ class EpsonGroup(MotionGroupCore):
                 self._require_motors(statement)
                 found = spel.parse_integer(window.printed(spel.print_selected_tool()))
                 self._require_tool(target, found, statement)
+                if self._six_axes:
+                    require_clear(window, self._flagged(target), profile)
                 self.settings.slow_down(profile)
                 last_look()
                 with link.uninterrupted():
@@ -171,10 +175,26 @@ class EpsonGroup(MotionGroupCore):
 
     def _statement_for(self, target: Pose, profile: MotionProfile) -> spel.Statement:
         build = spel.move if profile.path is Path.STRAIGHT else spel.go
-        return build(target, six_axes=self._link.robot.read().six_axes)
+        return build(self._flagged(target), six_axes=self._six_axes)
 
     def _statement_until(self, target: Pose, edge: InputEdge) -> spel.Statement:
-        return statement_until(target, edge, six_axes=self._link.robot.read().six_axes)
+        return statement_until(self._flagged(target), edge, six_axes=self._six_axes)
+
+    @property
+    def _six_axes(self) -> bool:
+        return self._link.robot.read().six_axes
+
+    def _flagged(self, target: Pose) -> Pose:
+        """Return a target of six axes with the present hand, elbow and wrist where it has none.
+
+        Left out, the controller would take its own defaults and might turn the wrist over.
+        """
+        if not self._six_axes or (target.hand is not None and target.posture is not None):
+            return target
+        here = self.pose()
+        return replace(
+            target, hand=target.hand or here.hand, posture=target.posture or here.posture
+        )
 
     def _require_supervision(self, statement: str) -> None:
         # With a remote time-out of 0 the robot may keep moving when this PC is gone

@@ -18,7 +18,7 @@ class EpsonPoints:
 
     Source: docs/reference/spel.md 5.1.
 
-    A point holds coordinates, a hand and a local, but not the tool that was in force when
+    A point holds coordinates, flags and a local, but not the tool that was in force when
     it was taught (docs/reference/epson.md 3.2); so the poses returned here carry ``tool=None``.
     """
 
@@ -59,5 +59,14 @@ def _printed_pose(window: CommandWindow, query: spel.Statement, *, tool: int | N
     x_mm, y_mm, z_mm, u_deg, *rest = point.coordinates
     v_deg, w_deg = rest or (0.0, 0.0)
     return Pose(
-        x_mm, y_mm, z_mm, u_deg, v_deg, w_deg, hand=point.hand, local=point.local, tool=tool
+        x_mm,
+        y_mm,
+        z_mm,
+        u_deg,
+        v_deg,
+        w_deg,
+        hand=point.hand,
+        local=point.local,
+        tool=tool,
+        posture=point.posture,
     )

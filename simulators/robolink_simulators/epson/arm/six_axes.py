@@ -95,6 +95,11 @@ def posture_of(model: RobotModel, joints: Joints) -> Posture:
     )
 
 
+def wrist_of(joints: Joints) -> Wrist:
+    """Return to which side joint 5 is bent."""
+    return Wrist.FLIP if joints[4] * NOT_FLIPPED_SIGN < 0 else Wrist.NO_FLIP
+
+
 def solve(model: RobotModel, flange: Pose, hand: Hand, posture: Posture) -> Joints:
     """Return the joints that put the flange at ``flange``, whatever their ranges.
 
@@ -201,12 +206,7 @@ def _branch_of(model: RobotModel, joints: Joints) -> _Branch:
     out = l2 - l3 * math.sin(q2) + reach * math.cos(q2 + q3 + lift)
     hand = Hand.RIGHT if out >= 0 else Hand.LEFT
     above = (math.cos(q3 + lift) >= 0) is (hand is Hand.RIGHT)
-    flipped = joints[4] * NOT_FLIPPED_SIGN < 0
-    return _Branch(
-        hand,
-        Elbow.ABOVE if above else Elbow.BELOW,
-        Wrist.FLIP if flipped else Wrist.NO_FLIP,
-    )
+    return _Branch(hand, Elbow.ABOVE if above else Elbow.BELOW, wrist_of(joints))
 
 
 def _flags_joint_1(model: RobotModel) -> bool:

@@ -217,7 +217,11 @@ def _agree_to_write(tool: int, *, yes: bool) -> None:
             tr("Tool {tool} would be written, and nobody can be asked here.", tool=tool),
             remedy=tr("Run it on a terminal, or give --yes. Nothing was written."),
         )
-    agree(tr("Write this to tool {tool}?", tool=tool), yes=False)
+    question = tr(
+        "Nobody witnessed these touches, and nothing has proved them. Write this to tool {tool}?",
+        tool=tool,
+    )
+    agree(question, yes=False)
 
 
 def _show_end(report: ToolReport) -> None:

@@ -37,7 +37,7 @@ def length_change(node: Node) -> Payload:
     if undecided:
         payload |= {
             "what": tr(
-                "The tip is {longer:+.3f} mm longer (+-{half:.3f}), and nobody decided what is "
+                "The tip is {longer:+.3f} mm longer (±{half:.3f}), and nobody decided what is "
                 "written.",
                 longer=found.longer_mm,
                 half=found.half95_mm,
@@ -104,8 +104,8 @@ def _shift(node: Node) -> "cal.TipShift":
     seat = tuple(node.optional("seat_sigma_mm", node.numbers) or ())
     sigma_mm = node.number("touch_sigma_mm")
     node.finish()
-    if len(vector) not in (2, 3):
-        raise unusable(node.at("vector"), tr("two numbers or three are wanted"))
+    if len(vector) not in (1, 2, 3):
+        raise unusable(node.at("vector"), tr("one number, two or three are wanted"))
     if seat and len(seat) < len(vector):
         raise unusable(node.at("seat_sigma_mm"), tr("one number an axis is wanted"))
     cal.require_positive(sigma_mm, "touch_sigma_mm")

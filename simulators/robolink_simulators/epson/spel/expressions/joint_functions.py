@@ -12,7 +12,7 @@ from robolink.model import Elbow, Hand, Posture, Wrist
 from robolink_simulators.epson.arm.joints import Joints, check_ranges
 from robolink_simulators.epson.arm.kinematics import PLAIN, flange_of, frame_of
 from robolink_simulators.epson.arm.robots import RobotModel
-from robolink_simulators.epson.arm.six_axes import solve_near
+from robolink_simulators.epson.arm.six_axes import solve_near, wrist_of
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.epson.refusals import OutOfReach, RefusalKind, SpelRefusal
@@ -128,13 +128,16 @@ def least_motion(machine: Machine, target: Point, flag: int = 1) -> Joints:
     "Flags").
 
     Raises:
-        Refusal: No way leads there inside the ranges of the joints.
+        Refusal: No way leads there inside the ranges of the joints, or there is no such flag.
     """
+    if not 1 <= flag <= _HIGHEST_LJM:
+        raise out_of_range(f"LJM flag {flag}")
     model, near = machine.model, machine.arm.joints
     flange = flange_of(model, machine.pose_of(target), machine.offset)
     start = _standing(machine, target)
+    other_wrist = (target.posture or PLAIN).wrist is not wrist_of(start)
     found, failure = list[Joints](), OutOfReach("No turn of the wrist reaches that point")
-    for flip in (False,) if flag == 2 else (False, True):
+    for flip in (other_wrist,) if flag == 2 else (False, True):
         try:
             joints = solve_near(model, frame_of(flange), start, flip=flip)
         except OutOfReach as refused:
@@ -183,8 +186,6 @@ def with_least_motion(session: Session, arguments: Arguments) -> Point:
     if len(arguments) > 1 and as_point(arguments[1]) != Point.at(machine.tip()):
         raise SpelRefusal(RefusalKind.NOT_SIMULATED, "LJM counts from where the arm is here")
     flag = as_integer(arguments[2]) if len(arguments) > 2 else 1
-    if not 1 <= flag <= _HIGHEST_LJM:
-        raise out_of_range(f"LJM flag {flag}")
     return machine.flagged(target, least_motion(machine, target, flag))
 
 

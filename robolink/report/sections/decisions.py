@@ -1,0 +1,88 @@
+"""What was decided by which rule: limits of the measurement, and the proof about the new tip."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from robolink.calibration import GUARD_FACTOR, DriftVerdict, VerifyResult
+from robolink.messages import tr
+from robolink.report._values import Outcome, Report
+
+
+@dataclass(frozen=True, slots=True)
+class Proof:
+    """The proof by turning about the new tip.
+
+    Attributes:
+        result: What came of it.
+        verdict: That in a word.
+        rule: By which rule it was decided, one sentence.
+        guarded: Whether a guard band was taken off the tolerance.
+        heights: Whether the drift has a height.
+    """
+
+    result: VerifyResult
+    verdict: str
+    rule: str
+    guarded: bool
+    heights: bool
+
+
+def proof(report: Report) -> Proof | None:
+    """Return the proof, ``None`` where nothing was turned."""
+    result = report.verification
+    if result is None:
+        return None
+    guarded = any(drift.u_mm for drift in result.drifts)
+    if result.passed:
+        verdict = tr("passed")
+    elif result.verdict is DriftVerdict.UNDECIDED:
+        verdict = tr("undecided, which does not pass")
+    else:
+        verdict = tr("failed")
+    return Proof(
+        result, verdict, _rule(guarded=guarded), guarded, any(d.dz_mm for d in result.drifts)
+    )
+
+
+def _rule(*, guarded: bool) -> str:
+    if guarded:
+        return tr(
+            "Decision rule (after ISO 14253-1): a drift passes when drift + {factor:g} u is within "
+            "the tolerance, and fails when drift - {factor:g} u is beyond it. What lies between is "
+            "undecided and does not pass; u is the standard uncertainty of the drift.",
+            factor=GUARD_FACTOR,
+        )
+    return tr(
+        "Decision rule: a drift passes when it is within the tolerance; nothing is taken off for "
+        "its uncertainty."
+    )
+
+
+def was_not_proved(report: Report) -> bool:
+    """Tell whether a value stands in the controller that nothing proved."""
+    return report.verification is None and report.outcome in (Outcome.WRITTEN, Outcome.SKIPPED)
+
+
+def limits_rule(report: Report) -> str:
+    """Return by which rule the limits were judged, empty where nothing was."""
+    if not report.judgements:
+        return ""
+    return tr(
+        "Decision rule of the limits: what is found is compared with what is allowed as it stands; "
+        "one that is exceeded refuses the measurement."
+    )
+
+
+def conformity(report: Report) -> Iterator[str]:
+    """Yield what may be stated of the tool now, in sentences."""
+    result = report.verification
+    if report.outcome is Outcome.VERIFIED and result is not None:
+        yield tr(
+            "The tool conforms: when it turned, its tip stayed within {limit:g} mm by the decision "
+            "rule below.",
+            limit=result.tolerance_mm,
+        )
+    elif report.outcome in (Outcome.WRITTEN, Outcome.SKIPPED):
+        yield tr("Conformity is not stated: the tip was not proved by turning about it.")
+    elif report.outcome is not Outcome.PROPOSED:
+        yield tr("Conformity is not stated: this change was not kept.")

@@ -1,0 +1,66 @@
+"""What an auditor asks of the page about a calibration, on both kinds of controllers."""
+
+import json
+import re
+from datetime import datetime
+
+import pytest
+from robolink_cli.commands.record.recorded_change import report_payload
+
+from robolink.journal import EntryKind
+from robolink.report import reports_of, save
+from tests.contract._method_cell import KINDS, method_cell
+
+pytestmark = pytest.mark.simulator_only
+
+
+@pytest.fixture(params=KINDS)
+def cell(request, tmp_path, monkeypatch):
+    with method_cell(request.param, tmp_path, monkeypatch) as cell:
+        yield cell
+
+
+def text_of(path):
+    page = path.read_text(encoding="utf-8").partition("</style>")[2]
+    return " ".join(re.sub(r"<[^>]*>", " ", page).split())
+
+
+def test_machine_gauge_people_times_budget_touches_and_rule_stand_on_the_page(cell, tmp_path):
+    done = cell.calibrate("n-angle", "--station", "PIN-07", "--count", "8")
+    assert done.code == 0, done.err
+    assert "gauge G-123 at station PIN-07 ran out on 2020-01-31" in done.err
+    change = cell.recorded(EntryKind.CALIBRATION)[0].change
+    entries = [entry for entry in cell.recorded() if entry.change == change][::-1]
+    reports = reports_of(entries, made_at="2026-03-04", robolink_version="1.2.3", check="Checked.")
+    page = tmp_path / "page.html"
+    save(reports[0], page)
+    (tool,) = json.loads(json.dumps(report_payload(reports, page)))["tools"]
+    assert tool["gauges"] == [
+        {"id": "G-123", "station": "PIN-07", "due": "2020-01-31", "overdue": True}
+    ]
+    assert datetime.fromisoformat(tool["local_time"]).utcoffset() is not None
+    assert tool["budget"]["u_c_mm"] > 0
+    assert tool["region95_radius_mm"] > max(tool["half_width95"].values())
+    assert tool["verification"]["passed"]
+    assert any(tool["machine"].values())
+    text = text_of(page)
+    for words in (
+        "gauge G-123, station PIN-07, calibration due 2020-01-31, OVERDUE",
+        "time (UTC)",
+        "local time",
+        "done by",
+        "Measured before after change 95 % interval X mm",
+        "Kept, not measured",
+        "Each interval holds for its axis alone.",
+        "All together: the tip lies within",
+        "degrees of freedom",
+        "combined",
+        "not assessed",
+        "Test for a step: F",
+        "How the touches were made",
+        "1 brought by the person",
+        "Decision rule (after ISO 14253-1)",
+        "The tool conforms",
+    ):
+        assert words in text
+    assert text.count("undecided") == 1  # in the rule alone

@@ -8,15 +8,17 @@ or of another tool is no flange pose there, however well its numbers fit
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TypeVar
+from typing import Final, TypeVar
 
 from robolink.calibration.core.pose_checks import UPRIGHT_WITHIN_DEG
 from robolink.calibration.core.result import CalibrationResult
-from robolink.calibration.core.statistics import NORMAL_95
+from robolink.calibration.core.statistics import NORMAL_95, chi_square_quantile
 from robolink.calibration.flange_plane import TipHeight
 from robolink.errors import CalibrationError
 from robolink.messages import tr
 from robolink.model import Pose
+
+_REGION: Final = math.sqrt(chi_square_quantile(0.95, 2))
 
 ResultT = TypeVar("ResultT", bound=CalibrationResult)
 
@@ -75,4 +77,13 @@ def with_height_error(
     halves = list(result.half_width95)
     for i, error in enumerate(errors):
         halves[i] = (halves[i] ** 2 + (NORMAL_95 * error) ** 2) ** 0.5
-    return replace(result, covariance=tuple(map(tuple, rows)), half_width95=tuple(halves))
+    region_mm = result.region95_radius_mm
+    if region_mm is not None:
+        # At most: the two ellipses need not point the same way.
+        region_mm = math.hypot(region_mm, _REGION * math.hypot(*errors))
+    return replace(
+        result,
+        covariance=tuple(map(tuple, rows)),
+        half_width95=tuple(halves),
+        region95_radius_mm=region_mm,
+    )

@@ -161,14 +161,10 @@ class AcceptanceCriteria:
 
 
 def _sureness(result: CalibrationResult) -> tuple[str, float | None]:
-    """Return what a limit of the process is compared with, and its name.
-
-    A nozzle misses in the plane, not along an axis: two intervals of 95 % hold both coordinates in
-    90 to 92 % only (docs/reference/evidence.md 7).
-    """
-    if result.region95_radius_mm is not None:
-        return tr("The radius of the 95 % region"), result.region95_radius_mm
-    return tr("Half the 95 % interval"), result.half95_mm
+    """Return what a limit of the process is compared with, and its name."""
+    region = result.region95_radius_mm is not None
+    name = tr("The radius of the 95 % region") if region else tr("Half the 95 % interval")
+    return name, result.known_within_mm
 
 
 def _out_of_order(result: CalibrationResult) -> str:

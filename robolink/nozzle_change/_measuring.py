@@ -6,13 +6,14 @@ from dataclasses import replace
 
 from robolink.errors import CalibrationError, ConfigError, RobolinkError
 from robolink.messages import tr
-from robolink.model import NewEntry, Pose
+from robolink.model import EntryKind, NewEntry, Pose
 from robolink.nozzle_change._listener import Listener, Moment
 from robolink.nozzle_change._plan import ToolPlan
 from robolink.nozzle_change._proposal import Proposal
 from robolink.nozzle_change._records import calibration_entry, decision_entry, refusal_entry
 from robolink.procedures import MeasurementContext, approach_path
 from robolink.runner import Ask, Confirm, Look, Seek, StepDone
+from robolink.stations import find_stations
 
 
 class Measuring:
@@ -63,7 +64,9 @@ class Measuring:
         with self._watched(plan):
             result = plan.named(plan.source.measure(context, tool, before))
             plan.criteria.judge_fit(result)
-            proposal = self._listener.adjusted(Proposal(tool, before, result), context)
+            rests_on = self._station_record(plan.station)
+            fresh = Proposal(tool, before, result, record=rests_on, kept_record=rests_on)
+            proposal = self._listener.adjusted(fresh, context)
         entry = calibration_entry(
             proposal,
             plan.criteria,
@@ -75,6 +78,20 @@ class Measuring:
         self._listener.moment(Moment.AFTER_MEASURE, context, tool)
         self.go_to(plan.retreat, tr("go away from where tool {tool} is measured", tool=tool))
         return proposal
+
+    def _station_record(self, name: str) -> dict[str, object]:
+        """Return which entry of the journal says where the station is, so that results compare.
+
+        Tools that were measured by one entry share its error, and differ by their touches alone
+        (docs/reference/evidence.md 12).
+        """
+        if not name:
+            return {}
+        entries = self._context.controller.outcomes.recorded(kinds=(EntryKind.STATION,))
+        known = find_stations(None, entries).get(name)
+        if known is None or not known.learnt:
+            return {}
+        return {"station_record": {"station": name, "entry": known.entry, "at": known.found_at}}
 
     @contextmanager
     def _watched(self, plan: ToolPlan) -> Iterator[None]:

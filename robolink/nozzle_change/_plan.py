@@ -21,7 +21,7 @@ from robolink.procedures import (
     TouchPlan,
 )
 from robolink.runner import RunSettings, inputs_of
-from robolink.stations import Gauge
+from robolink.stations import Gauge, Station
 
 
 def usual_box(sideways_mm: float = 150.0) -> WorkBox:
@@ -70,8 +70,11 @@ class ToolPlan:
         pin: Name of the station where a pin is touched; empty for none, or none that is kept.
         length: What is done where the heights of the touches show that the tip is longer or
             shorter: ``ask``, write Z by ``difference``, or ``keep`` it.
+        stated_pin: The pin as the cell file has it, ``None`` where it says nothing.
         gauge: The gauge that is measured against; ``None`` for none, or none that is known.
         method: Name of the calibration method, for the record; empty for what the result says.
+        station: Name of the station on whose record the measurement rests; empty where it rests on
+            none, because it finds the station itself or is told where it is.
     """
 
     tool: int
@@ -82,9 +85,11 @@ class ToolPlan:
     approach: Pose | None = None
     retreat: Pose | None = None
     pin: str = ""
+    stated_pin: Station | None = None
     gauge: Gauge | None = None
     length: LengthRule = "ask"
     method: str = ""
+    station: str = ""
 
     def named(self, result: CalibrationResult) -> CalibrationResult:
         """Return a result under the name of the method, whichever solver it borrows."""
@@ -156,6 +161,16 @@ def _tip_about(flange: Pose, offset: ToolOffset) -> tuple[float, float]:
     return above_mm, math.sqrt(max(0.0, beside_mm2))
 
 
+def clearance_too_small(clearance_mm: float, limit_mm: float) -> str:
+    """Return why a clearance below the largest change that is believed is refused."""
+    return tr(
+        "The robot would stop {clearance:g} mm above the pin, and a new tip may be {limit:g} mm "
+        "longer.",
+        clearance=clearance_mm,
+        limit=limit_mm,
+    )
+
+
 def require_clearance(plan: ChangePlan) -> None:
     """Refuse a plan in which a new tip could meet the pin before the person takes over.
 
@@ -170,13 +185,7 @@ def require_clearance(plan: ChangePlan) -> None:
         if clearance_mm is None or clearance_mm >= one.criteria.max_change_mm:
             continue
         raise ConfigError(
-            tr(
-                "The robot would stop {clearance:g} mm above the pin, and the new tip of tool "
-                "{tool} may be {limit:g} mm longer.",
-                clearance=clearance_mm,
-                tool=one.tool,
-                limit=one.criteria.max_change_mm,
-            ),
+            clearance_too_small(clearance_mm, one.criteria.max_change_mm),
             remedy=tr(
                 "Nothing was moved. Use a clearance of {limit:g} mm or more, or allow less change.",
                 limit=one.criteria.max_change_mm,

@@ -107,12 +107,16 @@ def agreement(
         fit: What they say; it has a degree of freedom.
         last: Index of the one that was taken last.
     """
-    half_mm = fit.half95_mm
-    known = (
-        ""
-        if half_mm is None
-        else tr("; {known} to ±{half:.3f} mm", known=method.known, half=half_mm)
-    )
+    known, half_mm, region_mm = "", fit.half95_mm, fit.region95_radius_mm
+    if half_mm is not None:
+        known = tr("; {known} to ±{half:.3f} mm", known=method.known, half=half_mm)
+        if region_mm is not None and region_mm > half_mm:
+            known = tr(
+                "; {known} to ±{half:.3f} mm each, within {region:.3f} mm together",
+                known=method.known,
+                half=half_mm,
+                region=region_mm,
+            )
     return tr(
         "{counted} agree within {rms:.3f} mm rms, the last within {last:.3f} mm{known}.",
         counted=method.counted(len(fit.residuals_mm)),
@@ -133,8 +137,9 @@ class SamplingPolicy:
     """How a measurement with many touches or crossings goes on.
 
     Attributes:
-        until_mm: End early when half the 95 % interval of each measured length is at most this;
-            ``None`` for taking all.
+        until_mm: End early when the tip is known within this, in 95 %, as a limit of the process
+            judges it: :attr:`~robolink.calibration.CalibrationResult.known_within_mm`. ``None``
+            for taking all.
         retake: Offer to take the one again that fits worst.
     """
 
@@ -211,10 +216,10 @@ def may_end_early(count: int, *, unknowns: int, sigma_stated: bool) -> bool:
 
 
 def _enough(fit: CalibrationResult, until_mm: float | None) -> bool:
-    half_mm, dof = fit.half95_mm, fit.dof or 0
-    if until_mm is None or half_mm is None:
+    within_mm, dof = fit.known_within_mm, fit.dof or 0
+    if until_mm is None or within_mm is None:
         return False
-    return (fit.sigma_stated or dof >= LEAST_DOF_TO_STOP) and half_mm <= until_mm
+    return (fit.sigma_stated or dof >= LEAST_DOF_TO_STOP) and within_mm <= until_mm
 
 
 def _progress(

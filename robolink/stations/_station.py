@@ -82,8 +82,20 @@ class Station:
         *,
         sigma_mm: float | None = None,
     ) -> "Station":
-        """Return the same station at another place, base."""
-        return replace(self, x_mm=x_mm, y_mm=y_mm, z_mm=z_mm, sigma_mm=sigma_mm)
+        """Return the same station at another place, base; it then rests on no entry.
+
+        A camera's entry says what its pixels mean, wherever a tip is brought before it.
+        """
+        moved = (x_mm, y_mm, z_mm) != (self.x_mm, self.y_mm, self.z_mm)
+        told = moved and self.kind is not StationKind.CAMERA
+        return replace(
+            self,
+            x_mm=x_mm,
+            y_mm=y_mm,
+            z_mm=z_mm,
+            sigma_mm=sigma_mm,
+            entry=None if told else self.entry,
+        )
 
     @property
     def learnt(self) -> bool:

@@ -307,3 +307,17 @@ def test_what_the_height_is_unsure_by_is_in_the_interval():
     )
     upside_down = solve_up_camera(seen(flange(30.0, (0.0, 180.0))), stored=STORED)
     assert upside_down.notes == ()
+
+
+def test_the_region_holds_what_the_height_is_unsure_of_as_each_axis_does():
+    looks = [seen(flange(u, (6.0, 175.0))) for u in TURNS]
+    unsure, sure = (
+        solve_camera_round(looks, height=TipHeight(120.0, sigma), sigma_mm=0.001)
+        for sigma in (1.0, 1e-6)
+    )
+    assert max(unsure.half_width95) > 20 * max(sure.half_width95)
+    assert unsure.region95_radius_mm is not None
+    assert unsure.region95_radius_mm > max(unsure.half_width95)
+    assert unsure.known_within_mm == unsure.region95_radius_mm
+    lean = math.tan(math.acos(math.cos(math.radians(6)) * math.cos(math.radians(5))))
+    assert unsure.region95_radius_mm == pytest.approx(2.448 * lean, rel=0.02)

@@ -97,6 +97,16 @@ def test_with_a_stated_sigma_three_touches_may_do():
     assert len(course(Person(), until_mm=0.02, sigma_mm=0.01).inputs) == 4
 
 
+def test_an_early_end_is_judged_as_the_result_will_be():
+    """X and Y are judged together, so an end at which each alone is good enough is too early."""
+    three = course(Person(), until_mm=0.2, sigma_mm=0.01)
+    until_mm = 1.05 * three.half95_mm
+    assert until_mm < 0.95 * three.region95_radius_mm
+    result = course(Person(), until_mm=until_mm, sigma_mm=0.01)
+    assert 3 < len(result.inputs) < 8
+    assert result.known_within_mm == result.region95_radius_mm <= until_mm
+
+
 def test_an_interval_that_is_never_reached_takes_all_touches():
     assert len(course(Person(), until_mm=1e-6).inputs) == 8
 

@@ -363,3 +363,21 @@ def test_a_bias_that_never_turns_against_tool_or_base_cannot_be_found():
     with pytest.raises(ValueError, match="1 standoffs for 8"):
         with_approach_bias(solve_n_angle(PLAIN), [None])
     assert told(with_approach_bias(solve_n_angle(PLAIN), [None] * 8)).approach_bias_mm is None
+
+
+def test_a_touch_that_a_person_brought_from_somewhere_does_not_disturb_the_bias():
+    random = np.random.default_rng(4)
+    sides = [(math.cos(turn), math.sin(turn)) for turn in random.uniform(-3, 3, 8).tolist()]
+    poses = [
+        replace(p, x_mm=p.x_mm + 0.06 * x, y_mm=p.y_mm + 0.06 * y)
+        for p, (x, y) in zip(shaken(PLAIN, random, 0.005), sides, strict=True)
+    ]
+    poses[0] = replace(poses[0], x_mm=poses[0].x_mm + 0.3)
+    without = with_approach_bias(solve_n_angle(poses), [None, *sides[1:]])
+    alone = with_approach_bias(solve_n_angle(poses[1:]), sides[1:])
+    assert told(without).approach_bias_mm == pytest.approx(told(alone).approach_bias_mm, abs=1e-9)
+    assert told(without).approach_bias_mm == pytest.approx(0.06, abs=0.02)
+    assert "approach_bias" in without.warnings
+    # Seven touches exceed three standard uncertainties by chance in some per cent.
+    strict = with_approach_bias(solve_n_angle(poses[1:]), sides[1:], false_alarm=1e-12)
+    assert "approach_bias" not in strict.warnings

@@ -34,3 +34,19 @@ def test_a_side_fixed_in_the_tool_is_what_the_offset_is_wrong_by(named, capsys):
     assert found["x_mm"] - truth.x_mm == pytest.approx(0.0, abs=0.03)
     assert found["y_mm"] - truth.y_mm == pytest.approx(-BIAS_MM, abs=0.03)
     assert simulator().world.operator.touches >= 3
+
+
+@pytest.mark.parametrize("frame", ["approach", "base"])
+def test_a_side_from_which_the_tip_comes_is_told_with_its_size(named, capsys, frame):
+    # One that is fixed in the base moves the pin that is found, and no tip.
+    bare, simulator = named
+    habits = {"eye_sigma_mm": 0.005, "person_bias_mm": 0.05, "person_bias_frame": frame}
+    url = f"{bare}?seed=5&" + "&".join(f"world.{name}={value}" for name, value in habits.items())
+    words = ("calibrate", "n-angle", "--tool", "1", "--count", "8", "--assist", bare)
+    assert main.run(["-c", url, *words, "--yes", "--json", "--no-verify", "--speed", "100"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    truly_mm = 0.05 if frame == "approach" else 0.0
+    assert ("approach_bias" in document["warnings"]) is (frame == "approach")
+    found_mm = document["fit"]["evidence"]["approach_bias_mm"]
+    assert found_mm == pytest.approx(truly_mm, abs=0.025)
+    assert document["proposed"]["x_mm"] == pytest.approx(simulator().world.tips[1].x_mm, abs=0.05)

@@ -103,6 +103,10 @@ def test_one_touch_may_trust_the_place_of_the_pin(arm):
     done = arm.calibrate("one-touch", *one_touch)
     assert done.code == 0, done.err
     assert within(done.document, arm.truth)
+    # Who compares two tools has to know whether they share an error of the pin.
+    learnt, measured = arm.recorded(EntryKind.STATION)[0], arm.recorded(EntryKind.CALIBRATION)[0]
+    rests_on = {"station": "PIN-07", "entry": learnt.number, "at": learnt.at}
+    assert measured.details["station_record"] == rests_on
     # The pin counts in full, beside the touch.
     halves = done.document["fit"]["half_width95"]
     assert halves["x_mm"] == pytest.approx(1.96 * 0.01 * 2**0.5, rel=1e-3)
@@ -119,6 +123,7 @@ def test_a_sensor_measures_at_its_station_and_nobody_is_asked(cell, method, stat
     done = cell.calibrate(method, "--station", station)
     assert done.code == 0, done.err
     assert done.document["method"] == method
+    assert "station_record" not in cell.recorded(EntryKind.CALIBRATION)[0].details
     found = done.document["proposed"]
     for axis in axes:
         assert found[f"{axis}_mm"] == pytest.approx(getattr(cell.truth, f"{axis}_mm"), abs=0.02)

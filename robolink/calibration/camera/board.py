@@ -9,12 +9,15 @@ lean and which way up it hangs go in first (docs/reference/evidence.md 3).
 import math
 from collections.abc import Sequence
 
+from robolink.calibration.camera.camera_model import CameraModel
+from robolink.calibration.camera.camera_uncertainty import camera_part
 from robolink.calibration.camera.up_camera import Sighting, check_sightings, seen_in_flange
 from robolink.calibration.core.dispersion import Dispersion
 from robolink.calibration.core.pose_checks import keep_unmeasured
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.flange_checks import with_height_error
 from robolink.calibration.flange_plane import FlangePlane, TipHeight, height_of
+from robolink.calibration.quality.station_part import with_station
 from robolink.errors import CalibrationError
 from robolink.messages import tr
 from robolink.model import ToolOffset
@@ -33,6 +36,7 @@ def solve_board(
     height: TipHeight | None = None,
     spacing_mm: float | None = None,
     sigma_mm: float | None = None,
+    camera: CameraModel | None = None,
     allow_mixed_hand: bool = False,
 ) -> CalibrationResult:
     """Return the tool of a board of which two fiducials were seen.
@@ -44,6 +48,7 @@ def solve_board(
         height: Z of the board, for a flange that leans; without it that of ``stored`` counts.
         spacing_mm: Nominal distance between the fiducials, checked when it is given.
         sigma_mm: Standard deviation of one coordinate of one sighting.
+        camera: The camera, whose place and scale are as uncertain as they say.
         allow_mixed_hand: Warn instead of refusing when the arm was configured differently.
 
     Raises:
@@ -54,8 +59,9 @@ def solve_board(
     """
     warnings = check_sightings((first, second), allow_mixed_hand=allow_mixed_hand)
     height = height_of(stored, height)
-    (x1, y1), (x2, y2) = seen_in_flange((first, second), height)
-    spacing = math.hypot(x1 - x2, y1 - y2)
+    places = seen_in_flange((first, second), height)
+    x_mm, y_mm, u_deg = _middle_and_direction(places)
+    spacing = math.dist(*places)
     check_spacing(spacing, spacing_mm)
     scatter = Dispersion.of(0.0, 0, sigma_mm)
     covariance: tuple[tuple[float, ...], ...] = ()
@@ -65,12 +71,7 @@ def solve_board(
         covariance = ((half, 0.0, 0.0), (0.0, half, 0.0), (0.0, 0.0, angle))
     result = CalibrationResult(
         method="board",
-        offset=keep_unmeasured(
-            stored,
-            x_mm=(x1 + x2) / 2,
-            y_mm=(y1 + y2) / 2,
-            u_deg=math.degrees(math.atan2(y1 - y2, x1 - x2)),
-        ),
+        offset=keep_unmeasured(stored, x_mm=x_mm, y_mm=y_mm, u_deg=u_deg),
         measured=("x_mm", "y_mm", "u_deg"),
         kept=("z_mm", "v_deg", "w_deg"),
         reference_point_mm=(),
@@ -86,7 +87,22 @@ def solve_board(
         dof=0,
         unobservable=("z_mm", "v_deg", "w_deg"),
     )
-    return with_height_error(result, mean_by_height((first, second)), height)
+    result = with_height_error(result, mean_by_height((first, second)), height)
+    if camera is None:
+        return result
+    part = camera_part(
+        camera,
+        (first, second),
+        lambda seen: _middle_and_direction(seen_in_flange(seen, height)),
+        angles=(2,),
+    )
+    return with_station(result, part)
+
+
+def _middle_and_direction(places: Sequence[tuple[float, float]]) -> tuple[float, float, float]:
+    """Return the middle of two fiducials in the flange's axes, and the direction to the first."""
+    (x1, y1), (x2, y2) = places
+    return (x1 + x2) / 2, (y1 + y2) / 2, math.degrees(math.atan2(y1 - y2, x1 - x2))
 
 
 def mean_by_height(sightings: Sequence[Sighting]) -> tuple[float, float]:

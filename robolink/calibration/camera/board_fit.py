@@ -10,6 +10,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from robolink.calibration.camera.board import SPACING_TOLERANCE, check_spacing, mean_by_height
+from robolink.calibration.camera.camera_model import CameraModel
+from robolink.calibration.camera.camera_uncertainty import camera_part
 from robolink.calibration.camera.up_camera import Sighting, check_sightings, seen_in_flange
 from robolink.calibration.core.pose_checks import keep_unmeasured, require_finite, require_poses
 from robolink.calibration.core.result import CalibrationResult
@@ -18,6 +20,7 @@ from robolink.calibration.flange_checks import with_height_error
 from robolink.calibration.flange_plane import FlangePlane, TipHeight, height_of
 from robolink.calibration.pin.planar import Complexes
 from robolink.calibration.quality.fit_quality import judged
+from robolink.calibration.quality.station_part import with_station
 from robolink.calibration.quality.tolerances import PLANAR_TOLERANCE, Tolerance
 from robolink.errors import CalibrationError
 from robolink.messages import tr
@@ -35,6 +38,7 @@ def solve_board_fit(
     stored: ToolOffset | None = None,
     height: TipHeight | None = None,
     sigma_mm: float | None = None,
+    camera: CameraModel | None = None,
     allow_mixed_hand: bool = False,
     tolerance: Tolerance = PLANAR_TOLERANCE,
 ) -> CalibrationResult:
@@ -46,6 +50,7 @@ def solve_board_fit(
         stored: The offset stored now; Z, V and W are kept from it, or 0 without one.
         height: Z of the board, for a flange that leans; without it that of ``stored`` counts.
         sigma_mm: Standard deviation of one coordinate of one sighting, when it is known.
+        camera: The camera, whose place and scale are as uncertain as they say.
         allow_mixed_hand: Warn instead of refusing when the arm was configured differently.
         tolerance: Residuals above which the result carries a warning.
 
@@ -65,8 +70,8 @@ def solve_board_fit(
     height = height_of(stored, height)
     seen = np.array([complex(*place) for place in seen_in_flange(sightings, height)])
     drawing = np.array([complex(*place) for place in drawing_mm])
-    turn = _turn(seen, drawing)
-    origin = complex(seen.mean() - turn * drawing.mean())
+    _require_as_drawn(seen, drawing)
+    origin, turn = _placed(seen, drawing)
     residuals = seen - origin - turn * drawing
     unit = _unit_covariance(turn, drawing)
     result = CalibrationResult(
@@ -95,24 +100,38 @@ def solve_board_fit(
         sigma_mm=sigma_mm,
         tolerance=tolerance,
     )
-    return with_height_error(result, mean_by_height(sightings), height)
+    result = with_height_error(result, mean_by_height(sightings), height)
+    if camera is None:
+        return result
+
+    def found(others: Sequence[Sighting]) -> tuple[float, float, float]:
+        at = np.array([complex(*place) for place in seen_in_flange(others, height)])
+        moved, turned = _placed(at, drawing)
+        return moved.real, moved.imag, math.degrees(math.atan2(turned.imag, turned.real))
+
+    return with_station(result, camera_part(camera, sightings, found, angles=(2,)))
 
 
-def _turn(seen: Complexes, drawing: Complexes) -> complex:
+def _placed(seen: Complexes, drawing: Complexes) -> tuple[complex, complex]:
+    """Return the origin and the direction of a drawing, in the flange's axes."""
+    overlap = complex(np.vdot(drawing - drawing.mean(), seen - seen.mean()))
+    turn = overlap / abs(overlap)
+    return complex(seen.mean() - turn * drawing.mean()), turn
+
+
+def _require_as_drawn(seen: Complexes, drawing: Complexes) -> None:
     centred_f, centred_d = seen - seen.mean(), drawing - drawing.mean()
     size = float((np.abs(centred_d) ** 2).sum())
-    overlap = complex((centred_d.conj() * centred_f).sum())
     # Twice the rms distance from the middle is the spacing when there are two.
     spread_mm = 2 * math.sqrt(float((np.abs(centred_f) ** 2).sum()) / len(seen))
     check_spacing(min(spread_mm, 2 * math.sqrt(size / len(seen))), None)
-    scale = abs(overlap) / size
+    scale = float(abs(np.vdot(centred_d, centred_f))) / size
     if abs(scale - 1) > SPACING_TOLERANCE:
         raise CalibrationError(
             "spacing_mismatch",
             tr("The fiducials are {scale:.4f} times as far apart as in the drawing.", scale=scale),
             remedy=tr("Check which marks the camera found, their order, and its scale."),
         )
-    return overlap / abs(overlap)
 
 
 def _unit_covariance(turn: complex, drawing: Complexes) -> Floats:

@@ -14,7 +14,9 @@ from dataclasses import replace
 import numpy as np
 
 from robolink.calibration.camera.board_fit import solve_board_fit
+from robolink.calibration.camera.camera_model import CameraModel
 from robolink.calibration.camera.camera_round import CameraRound, as_round
+from robolink.calibration.camera.camera_uncertainty import camera_part
 from robolink.calibration.camera.up_camera import Sighting
 from robolink.calibration.core.least_squares import LinearFit, linear_fit
 from robolink.calibration.core.pose_checks import (
@@ -27,6 +29,7 @@ from robolink.calibration.flange_checks import with_height_error
 from robolink.calibration.flange_plane import FlangePlane, TipHeight, height_of, known_z_mm
 from robolink.calibration.pin.planar import Complexes
 from robolink.calibration.quality.fit_quality import judged
+from robolink.calibration.quality.station_part import with_station
 from robolink.calibration.quality.tolerances import PLANAR_TOLERANCE, Tolerance
 from robolink.model import ToolOffset
 
@@ -40,6 +43,7 @@ def solve_board_round(
     stored: ToolOffset | None = None,
     height: TipHeight | None = None,
     sigma_mm: float | None = None,
+    camera: CameraModel | None = None,
     tolerance: Tolerance = PLANAR_TOLERANCE,
 ) -> CameraRound:
     """Return the tool whose axes are those of the drawing of a held board, and the camera's error.
@@ -51,6 +55,8 @@ def solve_board_round(
         stored: The offset stored now; Z, V and W are kept from it, or 0 without one.
         height: Z of the board, for a flange that leans; without it that of ``stored`` counts.
         sigma_mm: Standard deviation of one coordinate of one look, where it is known.
+        camera: The camera, whose place and scale are as uncertain as they say; the round finds what
+            its place is off by.
         tolerance: Residuals above which the result carries a warning.
 
     Raises:
@@ -58,19 +64,27 @@ def solve_board_round(
         ConfigError: ``sigma_mm`` is not positive.
     """
     height = height_of(stored, height)
-    plain = solve_board_fit(
-        sightings, drawing_mm, stored=stored, height=height, sigma_mm=sigma_mm, tolerance=tolerance
-    )
     planes = [FlangePlane.of(sighting.flange) for sighting in sightings]
-    if angle_spread_deg([plane.heading_deg for plane in planes]) < MIN_ROTATION_DEG:
+    spread_deg = angle_spread_deg([plane.heading_deg for plane in planes])
+    plain = solve_board_fit(
+        sightings,
+        drawing_mm,
+        stored=stored,
+        height=height,
+        sigma_mm=sigma_mm,
+        camera=camera if spread_deg < MIN_ROTATION_DEG else None,
+        tolerance=tolerance,
+    )
+    if spread_deg < MIN_ROTATION_DEG:
         return as_round(plain)
     z_mm, columns = known_z_mm(height), np.array([plane.columns for plane in planes])
-    seen = np.array([complex(*sighting.in_flange_mm(z_mm)) for sighting in sightings])
     drawn = np.array([complex(*place) for place in drawing_mm])
-    turn_rad = math.radians(plain.offset.u_deg)
-    for _ in range(2):
-        fit = _step(seen, columns, drawn * np.exp(1j * turn_rad))
-        turn_rad += float(fit.x[2])
+
+    def found(others: Sequence[Sighting]) -> tuple[LinearFit, float]:
+        seen = np.array([complex(*sighting.in_flange_mm(z_mm)) for sighting in others])
+        return _turned_fit(seen, columns, drawn, math.radians(plain.offset.u_deg))
+
+    fit, turn_rad = found(sightings)
     x_mm, y_mm, _, error_x, error_y = fit.x.tolist()
     # A row of residuals times the transposed A leads from the flange's axes to the base's.
     vectors = (fit.residuals.reshape(2, -1).T[:, None, :] @ columns)[:, 0, :]
@@ -88,10 +102,25 @@ def solve_board_round(
         warnings=(),
     )
     result = judged(fresh, vectors, unit, unknowns=UNKNOWNS, sigma_mm=sigma_mm, tolerance=tolerance)
-    by_height = planes[0].in_flange(0.0, 0.0, 1.0)
-    return as_round(
-        with_height_error(result, by_height, height), camera_error_mm=(error_x, error_y)
-    )
+    result = with_height_error(result, planes[0].in_flange(0.0, 0.0, 1.0), height)
+    if camera is not None:
+
+        def components(others: Sequence[Sighting]) -> tuple[float, float, float]:
+            moved, turned_rad = found(others)
+            return float(moved.x[0]), float(moved.x[1]), math.degrees(turned_rad)
+
+        result = with_station(result, camera_part(camera, sightings, components, angles=(2,)))
+    return as_round(result, camera_error_mm=(error_x, error_y))
+
+
+def _turned_fit(
+    seen: Complexes, columns: Floats, drawn: Complexes, turn_rad: float
+) -> tuple[LinearFit, float]:
+    """Return the last step's fit and the direction, from one that is nearly right."""
+    for _ in range(2):
+        fit = _step(seen, columns, drawn * np.exp(1j * turn_rad))
+        turn_rad += float(fit.x[2])
+    return fit, turn_rad
 
 
 def _step(seen: Complexes, columns: Floats, turned: Complexes) -> LinearFit:

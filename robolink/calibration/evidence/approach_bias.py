@@ -12,10 +12,14 @@ from dataclasses import replace
 from typing import Final, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from robolink.calibration.core.evidence import FitEvidence
 from robolink.calibration.core.pose_checks import heading_deg
 from robolink.calibration.core.result import CalibrationResult
+from robolink.calibration.core.statistics import student_t
+
+Complexes = NDArray[np.complex128]
 
 CLAIMED_BEYOND: Final = 3.0
 """Standard uncertainties that a bias exceeds before it is told."""
@@ -26,14 +30,20 @@ ResultT = TypeVar("ResultT", bound=CalibrationResult)
 
 
 def with_approach_bias(
-    result: ResultT, standoffs_mm: Sequence[tuple[float, float] | None]
+    result: ResultT,
+    standoffs_mm: Sequence[tuple[float, float] | None],
+    *,
+    false_alarm: float = 1.0,
 ) -> ResultT:
     """Return ``result`` with the bias along the standoffs, and the doubt ``approach_bias``.
 
     Args:
         result: Of several angles about one point.
         standoffs_mm: Where the robot stopped beside the place of each touch, X and Y in the base,
-            one for each input; ``None`` where a person brought the tip.
+            one for each input; ``None`` where a person brought the tip from nobody knows where:
+            that touch tells nothing here.
+        false_alarm: How often chance may be told for a bias; 3 standard uncertainties are asked in
+            any case, which a handful of touches exceed by chance in some per cent.
 
     Raises:
         ValueError: There is not one standoff for each input.
@@ -42,17 +52,14 @@ def with_approach_bias(
         raise ValueError(f"{len(standoffs_mm)} standoffs for {len(result.inputs)} touches")
     evidence = result.evidence or FitEvidence()
     left_out = {*result.rejected, *evidence.duplicates}
+    left_out |= {index for index, aside in enumerate(standoffs_mm) if aside is None}
     kept = [index for index in range(len(result.inputs)) if index not in left_out]
     spare = 2 * len(kept) - 5
     if spare < 1:
         return result
     z = np.exp(1j * np.radians([heading_deg(result.inputs[index]) for index in kept]))
-    residuals = np.array([complex(*result.residuals_mm[index]) for index in kept])
-    along = np.array([_direction(standoffs_mm[index]) for index in kept])
-    # What the offset and the point take over of the column; both are complex, b is real.
-    centred = z - z.mean()
-    free = along - along.mean()
-    free = free - centred * (centred.conj() @ free) / (centred.conj() @ centred)
+    residuals = _beside(z, [complex(*result.residuals_mm[index]) for index in kept])
+    free = _beside(z, [_direction(standoffs_mm[index]) for index in kept])
     told = float((free.conj() @ free).real)
     if told < _SEEN * len(kept):
         return result
@@ -60,8 +67,18 @@ def with_approach_bias(
     whole = float((residuals.conj() @ residuals).real)
     u_mm = math.sqrt(max(whole - bias_mm**2 * told, 0.0) / spare / told)
     found = replace(evidence, approach_bias_mm=bias_mm, approach_bias_u_mm=u_mm)
-    doubt = ("approach_bias",) if abs(bias_mm) > max(CLAIMED_BEYOND * u_mm, 1e-9) else ()
+    beyond = max(CLAIMED_BEYOND, student_t(1 - false_alarm / 2, spare))
+    doubt = ("approach_bias",) if abs(bias_mm) > max(beyond * u_mm, 1e-9) else ()
     return replace(result, evidence=found, warnings=(*result.warnings, *doubt))
+
+
+def _beside(z: Complexes, values: Sequence[complex]) -> Complexes:
+    """Return what offset and point cannot take over of a column, one number a touch."""
+    around = np.array(values) - np.mean(values)
+    centred = z - z.mean()
+    weight = complex(np.vdot(centred, centred)) or 1.0
+    beside: Complexes = around - centred * (np.vdot(centred, around) / weight)
+    return beside
 
 
 def _direction(standoff_mm: tuple[float, float] | None) -> complex:

@@ -44,7 +44,8 @@ class StationPart:
 
     Attributes:
         name: What it is, in words, for the budget.
-        covariance: Of the measured lengths, in their order, mm^2.
+        covariance: Of the measured components, in their order: mm^2, mm deg and deg^2. It may end
+            before angles that the station has no part in.
         dof: Degrees of freedom of it; infinite where it was stated.
         origin: Where it comes from, in words.
     """
@@ -70,6 +71,7 @@ def with_station(result: ResultT, *parts: StationPart) -> ResultT:
     if not result.half_width95 or not added:
         return result
     count = len(added[0].covariance)
+    lengths = [i for i in range(count) if result.measured[i].endswith("_mm")]
     touches = _touches(result)
     places = [np.asarray(part.covariance) for part in added]
     total = touches.copy()
@@ -84,7 +86,7 @@ def with_station(result: ResultT, *parts: StationPart) -> ResultT:
         for i in range(count)
     ]
     widths = [coverage_factor(freedom[i]) * _root(total, i) for i in range(count)]
-    worst = max(range(count), key=widths.__getitem__)
+    worst = max(lengths, key=widths.__getitem__)
     budget = result.budget or _budget_of(touches, worst, own)
     for place, part in zip(places, added, strict=True):
         row = BudgetRow(part.name, _root(place, worst), part.dof, origin=part.origin)
@@ -93,7 +95,7 @@ def with_station(result: ResultT, *parts: StationPart) -> ResultT:
         result,
         covariance=tuple(map(tuple, total.tolist())),
         half_width95=(*widths, *result.half_width95[count:]),
-        region95_radius_mm=_region(total[:count, :count], freedom[worst]),
+        region95_radius_mm=_region(total[np.ix_(lengths, lengths)], freedom[worst]),
         budget=budget,
     )
 

@@ -90,7 +90,7 @@ class CrossingSampler:
             crossings, beams, stored=self.stored, height=self._height(), sigma_mm=self.sigma_mm
         )
         # Where the beams are is not relied on, so nothing tells yet how sure the tip is.
-        return replace(found, half_width95=())
+        return replace(found, half_width95=(), region95_radius_mm=None)
 
     def foreseen(self, place: BeamScan) -> Crossing:
         """Return what would be taken there."""

@@ -127,7 +127,7 @@ class BeamsParameters(MethodParameters):
     until_mm: Annotated[
         Length | None,
         Option(metavar="MM"),
-        Help(tr("End early when half the 95 % interval of X and of Y is at most this.")),
+        Help(tr("End early when X and Y together are known within this, in 95 %.")),
     ] = None
     retake: Annotated[
         bool,

@@ -69,7 +69,7 @@ def measure_board(
 
         def expected(looks: Sequence[SeenAt]) -> ToolOffset:
             sightings = [station.sighting(look) for look in looks]
-            return _board_tool(sightings, (1, 2), pair, tool, None).offset
+            return _board_tool(station, sightings, (1, 2), pair, tool).offset
 
         tool = yield from drive.centred(found, here, expected)
         here, centred = drive.pose(found[-1]), True
@@ -78,26 +78,36 @@ def measure_board(
     def solve(looks: Sequence[SeenAt]) -> CameraRound:
         sightings = [station.sighting(look) for look in looks]
         marks = [place.mark for place in places]
-        return _board_tool(sightings, marks, board, stored, sigma_mm)
+        return _board_tool(station, sightings, marks, board, stored, sigma_mm)
 
     looks = CameraSamples(drive, solve, here, before_camera=centred)
     return (yield from looks.at(places, retake=retake))
 
 
 def _board_tool(
+    station: CameraStation,
     sightings: Sequence[Sighting],
     marks: Sequence[int],
     board: BoardDrawing,
     stored: ToolOffset | None,
-    sigma_mm: float | None,
+    sigma_mm: float | None = None,
 ) -> CameraRound:
     if len(sightings) == 2 and board.is_pair:
         (first, second), spacing_mm = sightings, math.dist(*board.fiducials_mm)
         return as_round(
-            solve_board(first, second, stored=stored, spacing_mm=spacing_mm, sigma_mm=sigma_mm)
+            solve_board(
+                first,
+                second,
+                stored=stored,
+                spacing_mm=spacing_mm,
+                sigma_mm=sigma_mm,
+                camera=station.model,
+            )
         )
     drawing = [board.fiducials_mm[mark - 1] for mark in marks]
-    return solve_board_round(sightings, drawing, stored=stored, sigma_mm=sigma_mm)
+    return solve_board_round(
+        sightings, drawing, stored=stored, sigma_mm=sigma_mm, camera=station.model
+    )
 
 
 def verify_board(

@@ -39,7 +39,7 @@ class NAngleParameters(UprightPinParameters):
     until_mm: Annotated[
         Length | None,
         Option(metavar="MM"),
-        Help(tr("End early when half the 95 % interval of X and of Y is at most this.")),
+        Help(tr("End early when X and Y together are known within this, in 95 %.")),
     ] = None
     retake: Annotated[
         bool,

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Final
 
 from robolink.calibration import CalibrationResult, planar_sigma_gain
 from robolink.messages import tr
@@ -14,7 +15,10 @@ from robolink.procedures import (
     sample_sequentially,
     touch_again,
 )
-from robolink.runner import Procedure
+from robolink.runner import Procedure, TouchedAt
+
+FALSE_ALARM: Final = 0.001
+"""How often a bias along the approach is told where there is none."""
 
 
 def measure_n_angle(
@@ -83,9 +87,11 @@ class _NAngleSampler:
         return Pose(0.0, 0.0, 0.0, place)
 
     def solve(self, touches: Sequence[Pose]) -> CalibrationResult:
-        from robolink.calibration import solve_n_angle  # numpy, not for --help
+        from robolink.calibration import solve_n_angle, with_approach_bias  # numpy, not for --help
 
-        return solve_n_angle(touches, stored=self.stored, sigma_mm=self.sigma_mm)
+        fit = solve_n_angle(touches, stored=self.stored, sigma_mm=self.sigma_mm)
+        sides = [_came_from_mm(touch) for touch in touches]
+        return with_approach_bias(fit, sides, false_alarm=FALSE_ALARM)
 
     def gain(self, poses: Sequence[Pose]) -> float:
         return planar_sigma_gain(poses)
@@ -95,3 +101,13 @@ class _NAngleSampler:
 
     def which(self, number: int, pose: Pose) -> str:
         return tr("Pose {number}, at {where}", number=number, where=self.named(pose))
+
+
+def _came_from_mm(touch: Pose) -> tuple[float, float] | None:
+    """Return on which side of the pin the tip stopped; ``None`` where a person brought it.
+
+    Not as it was drawn: where the tip is another than the stored one, it stops elsewhere.
+    """
+    if not isinstance(touch, TouchedAt) or touch.arrival is None:
+        return None
+    return touch.arrival.x_mm - touch.x_mm, touch.arrival.y_mm - touch.y_mm

@@ -35,7 +35,7 @@ class PivotParameters(PinParameters):
     until_mm: Annotated[
         Length | None,
         Option(metavar="MM"),
-        Help(tr("End early when half the 95 % interval of X, of Y and of Z is at most this.")),
+        Help(tr("End early when X, Y and Z together are known within this, in 95 %.")),
     ] = None
     retake: Annotated[
         bool,

@@ -48,6 +48,12 @@ def calibrate_with(
     higher = replace(limits, box=limits.box.larger(up_mm=parameters.height_mm()))
     frame = replace(frame, limits=higher, method=method.name, length=parameters.length_rule())
     place_mm = None if at is None else _three(at)
+    # Where a camera is to be found is another matter than what its pixels mean.
+    told = needs.station is not StationKind.CAMERA and (
+        place_mm is not None or parameters.states_station()
+    )
+    rests = needs.named and not needs.finds_pin and not told
+    frame = replace(frame, station=(station or "") if rests else "")
 
     def site(controller: Controller) -> Site:
         return Site(

@@ -109,16 +109,28 @@ def settle_lengths(
         if told.change is not None and plan.pin in sunk:
             why = tr("All tools stand alike higher or lower on the pin, so it may be the pin.")
         if chain_of(proposal.result) is not None and plan.pin:
-            # A difference is as right as what it was added to.
-            last = find_last_touch(context.controller, plan.tool, plan.pin)
-            origin = {**proposal.kept_record, "z_from": last.z_from}
-            made = replace(proposal, kept_record=origin)
+            made = _chained(context.controller, plan, proposal)
         elif why:
             made = _said(proposal, why, attended=attended)
         else:
             made = _decided(context, plan, proposal, told, attended=attended)
         settled.append((plan, made))
     return settled
+
+
+def _chained(controller: Controller, plan: ToolPlan, proposal: Proposal) -> Proposal:
+    """Return a proposal that adds a difference, with the origin of the Z that it was added to."""
+    last = find_last_touch(controller, plan.tool, plan.pin)
+    origin = {**proposal.kept_record, "z_from": last.z_from}
+    notes = proposal.notes
+    if last.z_from == "kept" and "z_mm" in proposal.result.measured:
+        # A difference is as right as what it was added to.
+        kept = tr(
+            "The old Z was kept and never measured: how much longer or shorter the new tip is, is "
+            "right; its length is as right as the old one."
+        )
+        notes = (*notes, kept)
+    return replace(proposal, kept_record=origin, notes=notes)
 
 
 def _told(controller: Controller, plan: ToolPlan, proposal: Proposal) -> _Told:

@@ -526,3 +526,22 @@ def test_looking_at_a_controller_does_not_load_numpy():
         check=False,
     )
     assert done.stdout == "False\n", done.stderr
+
+
+def test_touches_without_an_arrival_were_seen_by_nobody(solved):
+    pose = {"x": 300.0, "y": 100.0, "z": -60.0, "u": 0.0}
+    turned = {"x": 324.0, "y": 92.0, "z": -60.0, "u": 180.0}
+    arrival = {**turned, "x": 325.0, "z": -57.4}
+    for given, notes in ((None, ["touches_not_witnessed"]), (arrival, [])):
+        touches = [{"captured": pose, "arrival": None}, {"captured": turned, "arrival": given}]
+        code, answer = solved(case("touch_evidence", touches=touches))
+        assert (code, answer["notes"]) == (0, notes)
+
+
+def test_a_proof_of_touches_without_a_stated_scatter_keeps_the_usual_guard_band(solved):
+    place = {"x": 300.0, "y": 100.0, "z": -80.0, "u": 90.0}
+    found, arrival = {**place, "x": 300.18}, {**place, "x": 301.0, "z": -78.0}
+    touches = [{"place": place, "arrival": arrival, "found": found}]
+    _, answer = solved(case("verify_evidence", touches=touches, tolerance_mm=0.2))
+    assert answer["guard_band_mm"] == pytest.approx(1.65 * 0.03)
+    assert (answer["status"], answer["codes"]) == ("warn", ["drift_undecided"])

@@ -96,6 +96,7 @@ def test_the_example_changes_a_needle_with_z_inside_the_stated_interval(cell, tm
         moved_mm = tool["proposed"][f"{axis}_mm"] - getattr(value, f"{axis}_mm")
         assert abs(moved_mm - change) <= halves[f"{axis}_mm"]
     assert tool["verification"]["passed"]
+    assert any("kept and never measured" in note for note in tool["notes"])
     assert cell.recorded(EntryKind.DONE)[0].signature.nozzle == "N-1"
     with capsys.disabled():
         sys.stdout.write(

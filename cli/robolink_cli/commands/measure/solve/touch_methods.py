@@ -31,12 +31,14 @@ def touch_evidence(node: Node) -> Payload:
         "typed_ahead": list(evidence.typed_ahead),
         "max_residual": evidence.max_residual_mm,
     }
+    seen = any(touch.arrival is not None or touch.contact for touch in touches)
+    payload["notes"] = [] if seen else ["touches_not_witnessed"]
     return payload | _verdict(evidence.codes, refuses=True)
 
 
 def verify_evidence(node: Node) -> Payload:
     """A proof: where the tip should have been, where the robot stopped, where the tip was found."""
-    tolerance, u = node.number("tolerance_mm"), node.number_or("u_drift_mm", 0.0)
+    tolerance, u = node.number("tolerance_mm"), node.number_or("u_drift_mm", cal.PERSON_U_DRIFT_MM)
     resolution = node.number_or("resolution_mm", 0.001)
     if tolerance <= 0 or u < 0:
         raise unusable(node.path, tr("the tolerance is above 0, and u_drift_mm not below"))

@@ -183,7 +183,7 @@ class PointsSource:
 
 
 def _live_pose(controller: Controller) -> Pose | None:
-    """Return where the robot is; ``None`` where it cannot be asked, and poses are solved as well."""
+    """Return where the robot is; ``None`` where it cannot be asked, which refuses nothing."""
     try:
         return controller.groups[0].pose() if controller.groups else None
     except RobolinkError:

@@ -9,7 +9,7 @@ from robolink.messages import tr
 from robolink.methods import LengthRule, TwoPoseSource
 from robolink.model import Controller, Pose, ToolOffset, WorkBox, plain_offset
 from robolink.nozzle_change._acceptance import AcceptanceCriteria
-from robolink.nozzle_change._pin_record import touch_details
+from robolink.nozzle_change._pin_record import require_pin_in_base, touch_details
 from robolink.nozzle_change._proposal import Proposal
 from robolink.nozzle_change._seating import touching_as_recorded
 from robolink.procedures import (
@@ -92,7 +92,12 @@ class ToolPlan:
     station: str = ""
 
     def named(self, result: CalibrationResult) -> CalibrationResult:
-        """Return a result under the name of the method, whichever solver it borrows."""
+        """Return a result under the name of the method, whichever solver it borrows.
+
+        Raises:
+            CalibrationError: ``local_pose``: the pin that is to be kept was not found in the base.
+        """
+        require_pin_in_base(self.pin, result)
         return replace(result, method=self.method) if self.method else result
 
     def details(self, proposal: Proposal) -> dict[str, object]:

@@ -22,6 +22,9 @@ Vector = tuple[float, float, float]
 PROVING_TOUCHES: Final = 4
 """Three components, and one touch that may contradict."""
 
+_LEFT: Final = 0.5
+"""Of the clearance, where a tip is wrong by as much as that."""
+
 _FAINT: Final = 1e-6
 """Makes two plans comparable before any combination of their touches shows everything."""
 
@@ -90,11 +93,23 @@ class SurfaceDrive:
             spot.normal,
             key=key,
             columns=columns,
-            further_mm=further_mm,
+            further_mm=max(further_mm, self._swing_mm(spot)),
             instruction=instruction,
         )
         self._over = self._over.moved_to(found)
         return found
+
+    def _swing_mm(self, spot: SurfaceSpot) -> float:
+        """Return how much more than the clearance keeps a tip off that is believed elsewhere.
+
+        A tip that is wrong by e is nearer by up to e |R'n - R0'n|: its place on the surface was
+        found in the first orientation. No e is larger than the clearance, which is refused below
+        the largest change that is believed; half of that is left.
+        """
+        upright = rotation_of(self.pose(replace(spot, tilt=UPRIGHT)))
+        turned = rotation_of(self.pose(spot)) - upright
+        nearer = float(np.linalg.norm(np.array(spot.normal) @ turned))
+        return self._plan.clearance_mm * max(0.0, nearer - _LEFT)
 
 
 def places_of(touches: Sequence[Pose], tip: ToolOffset) -> list[Vector]:

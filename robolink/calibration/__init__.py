@@ -137,6 +137,7 @@ if TYPE_CHECKING:
     from robolink.calibration.quality.control_chart import control_chart as control_chart
     from robolink.calibration.quality.doubts import doubt_sentence as doubt_sentence
     from robolink.calibration.quality.doubts import known_doubts as known_doubts
+    from robolink.calibration.quality.doubts import order_in_words as order_in_words
     from robolink.calibration.quality.gauge_study import GaugeStudy as GaugeStudy
     from robolink.calibration.quality.gauge_study import gauge_study as gauge_study
     from robolink.calibration.quality.impact import Impact as Impact
@@ -237,7 +238,7 @@ __getattr__ = lazy_exports(
         "pin.two_pose": "solve_two_pose two_of",
         "quality.control_chart": "USUAL_LAMBDA USUAL_WIDTH ControlChart control_chart",
         "quality.gauge_study": "GaugeStudy gauge_study",
-        "quality.doubts": "doubt_sentence known_doubts",
+        "quality.doubts": "doubt_sentence known_doubts order_in_words",
         "quality.impact": "Impact PointImpact impact_on",
         "quality.moved_station": "StationShift TipShift judge_shifts",
         "quality.station_part": "SharedStation StationPart shared_station with_station",

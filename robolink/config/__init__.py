@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from robolink.config._cells import check_file as check_file
     from robolink.config._cells import find_cell as find_cell
     from robolink.config._cells import load_cells as load_cells
+    from robolink.config._cells import settings_of_file as settings_of_file
     from robolink.config._files import ConfigFile as ConfigFile
     from robolink.config._files import Source as Source
     from robolink.config._files import config_files as config_files
@@ -25,12 +26,14 @@ if TYPE_CHECKING:
     from robolink.config._reach import proof_of_files as proof_of_files
     from robolink.config._reach import reach_cell as reach_cell
     from robolink.config._reach import remember_reach as remember_reach
+    from robolink.config._settings import CellSettings as CellSettings
 else:
     __getattr__ = lazy_exports(
         __name__,
         {
-            "_cells": "Cell cell_names check_file find_cell load_cells",
+            "_cells": "Cell cell_names check_file find_cell load_cells settings_of_file",
             "_files": "ConfigFile Source config_files",
             "_reach": "Expected Reach glance_at_cell proof_of_files reach_cell remember_reach",
+            "_settings": "CellSettings",
         },
     )

@@ -120,6 +120,19 @@ def check_file(path: Path) -> tuple[Problem, ...]:
     return tuple(names)
 
 
+def settings_of_file(path: Path) -> "Mapping[str, CellSettings]":
+    """Return the cells of one file as it says them alone; none where it is wrong.
+
+    Raises:
+        ConfigError: It cannot be read, or is no TOML.
+    """
+    from robolink.config._settings import CellFile
+
+    if check_file(path):
+        return {}
+    return CellFile.model_validate(read_document(path)).cells
+
+
 def cell_names() -> list[str]:
     """Return the names of all cells; for TAB, so files that are wrong are passed over."""
     names: dict[str, None] = {}

@@ -8,14 +8,14 @@ if TYPE_CHECKING:
     from robolink.nozzle_change._acceptance import AcceptanceCriteria as AcceptanceCriteria
     from robolink.nozzle_change._change import Earlier as Earlier
     from robolink.nozzle_change._change import NozzleChange as NozzleChange
-    from robolink.nozzle_change._length import height_is_known as height_is_known
     from robolink.nozzle_change._length import known_height as known_height
-    from robolink.nozzle_change._length import tip_sigma_mm as tip_sigma_mm
     from robolink.nozzle_change._listener import Listener as Listener
     from robolink.nozzle_change._listener import Moment as Moment
     from robolink.nozzle_change._plan import ChangePlan as ChangePlan
     from robolink.nozzle_change._plan import Limits as Limits
     from robolink.nozzle_change._plan import ToolPlan as ToolPlan
+    from robolink.nozzle_change._plan import clearance_too_small as clearance_too_small
+    from robolink.nozzle_change._plan import require_contact_input as require_contact_input
     from robolink.nozzle_change._plan import require_ready as require_ready
     from robolink.nozzle_change._plan import usual_box as usual_box
     from robolink.nozzle_change._preview import PlannedStep as PlannedStep
@@ -27,6 +27,9 @@ if TYPE_CHECKING:
     from robolink.nozzle_change._proposal import LimitVerdict as LimitVerdict
     from robolink.nozzle_change._proposal import Proposal as Proposal
     from robolink.nozzle_change._proposal import ToolReport as ToolReport
+    from robolink.nozzle_change._records import touches_made as touches_made
+    from robolink.nozzle_change._seating import height_is_known as height_is_known
+    from robolink.nozzle_change._seating import tip_sigma_mm as tip_sigma_mm
     from robolink.nozzle_change._seating import touching_as_recorded as touching_as_recorded
 
 __getattr__ = lazy_exports(
@@ -34,11 +37,13 @@ __getattr__ = lazy_exports(
     {
         "_acceptance": "AcceptanceCriteria",
         "_change": "Earlier NozzleChange",
-        "_length": "height_is_known known_height tip_sigma_mm",
+        "_length": "known_height",
         "_listener": "Listener Moment",
-        "_plan": "ChangePlan Limits ToolPlan require_ready usual_box",
+        "_plan": "ChangePlan Limits ToolPlan clearance_too_small require_contact_input "
+        "require_ready usual_box",
         "_preview": "PlannedStep flange_now foresee preview require_inside",
         "_proposal": "ChangeReport Proposal ToolReport LimitVerdict",
-        "_seating": "touching_as_recorded",
+        "_records": "touches_made",
+        "_seating": "height_is_known tip_sigma_mm touching_as_recorded",
     },
 )

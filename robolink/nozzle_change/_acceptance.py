@@ -7,6 +7,7 @@ from robolink.calibration import (
     CalibrationResult,
     DriftVerdict,
     VerifyResult,
+    order_in_words,
     require_shrinking,
     writes_refused_unattended,
 )
@@ -58,8 +59,12 @@ class AcceptanceCriteria:
         if doubt:
             raise CalibrationError(
                 doubt,
-                tr("The touches do not belong together, and nobody is asked before the write."),
-                remedy=tr("Take the run again, or let a person look at it."),
+                _out_of_order(result)
+                or tr("The touches scatter far more than the stated standard deviation says."),
+                remedy=tr(
+                    "Nobody is asked before the write, so it is refused. Take the run again, or "
+                    "let a person look at it."
+                ),
             )
         for verdict in self._of_fit(result):
             if not verdict.passed:
@@ -160,6 +165,12 @@ def _sureness(result: CalibrationResult) -> tuple[str, float | None]:
     region = result.region95_radius_mm is not None
     name = tr("The radius of the 95 % region") if region else tr("Half the 95 % interval")
     return name, result.known_within_mm
+
+
+def _out_of_order(result: CalibrationResult) -> str:
+    """Return what moved while the touches were made; empty where nothing did."""
+    order = result.evidence.run_order if result.evidence is not None else None
+    return order_in_words(order) if order is not None else ""
 
 
 def require_proved(result: VerifyResult, identity: str) -> None:

@@ -18,7 +18,13 @@ from robolink.nozzle_change._acceptance import AcceptanceCriteria, require_prove
 from robolink.nozzle_change._length import settle_lengths
 from robolink.nozzle_change._listener import Listener, Moment
 from robolink.nozzle_change._measuring import Measuring
-from robolink.nozzle_change._plan import ChangePlan, ToolPlan, require_clearance
+from robolink.nozzle_change._plan import (
+    ChangePlan,
+    ToolPlan,
+    require_clearance,
+    require_contacts,
+    require_inputs,
+)
 from robolink.nozzle_change._proposal import ChangeReport, Proposal, ToolReport
 from robolink.nozzle_change._records import decision_entry, refusal_entry, verification_entry
 from robolink.nozzle_change._station_check import Proposals, check_stations, stations_found
@@ -66,7 +72,8 @@ class NozzleChange:
 
         Raises:
             CalibrationError: A measurement is not trusted; nothing was written.
-            ConfigError: A clearance is below the largest change that is believed.
+            ConfigError: A clearance is below the largest change that is believed, or an input is
+                to show contact where there are none.
             DeclinedError: The person said no; nothing was written.
             StoppedError: A stop came; what was written was put back, unless it was kept already.
             VerifyError: A tip drifts too far, or its touches were not made; the old values were
@@ -77,6 +84,7 @@ class NozzleChange:
         reason = tr("calibrate tool {tool}", tool=numbers)
         controller = self._controller
         require_clearance(self._plan)
+        require_inputs(controller, self._plan)
         controller.outcomes.change = new_operation()
         self._plan = replace(
             self._plan, tools=tuple(one.as_recorded(controller) for one in self._plan.tools)
@@ -100,6 +108,7 @@ class NozzleChange:
             # What the write would be refused for is said before a person has measured anything.
             for one in self._plan.tools:
                 self._controller.tools.require_writable(one.tool)
+        require_contacts(self._controller, self._plan)
         plan, listener, context = self._plan, self._listener, self._context()
         measuring = Measuring(context, listener)
         measuring.go_to(plan.safe, tr("go to the safe pose"))

@@ -6,7 +6,8 @@ what the touches show. A length that changed is never swallowed: a person decide
 beforehand, or nothing is written.
 """
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -21,7 +22,7 @@ from robolink.nozzle_change._proposal import Proposal
 from robolink.nozzle_change._records import decision_entry
 from robolink.nozzle_change._seating import touch_sigma_z_mm, touched_by
 from robolink.procedures import MeasurementContext
-from robolink.stations import Station, find_stations
+from robolink.stations import AGREEING_MM, Station, StationKind, find_stations
 from robolink.ways import Way, way
 
 Proposals = Sequence[tuple[ToolPlan, Proposal]]
@@ -35,16 +36,19 @@ class KnownHeight:
     """What the stored Z has to agree with: a pin whose height somebody showed.
 
     Attributes:
-        place_mm: Where the pin is by it, base.
+        place_mm: Where the pin is by it, base; not a number for X and Y that nobody stated.
         touches: How many touches it rests on.
-        sigma_mm: Standard deviation of its height beside that of the touches.
+        sigma_mm: Standard deviation of its place beside that of the touches.
         z_from: Where the Z came from that it goes back to.
+        aside_mm: How far aside the pin may be found before it counts as moved; ``None`` for what
+            its scatter says.
     """
 
     place_mm: tuple[float, float, float]
     touches: int = 1
     sigma_mm: float = 0.0
     z_from: str = "kept"
+    aside_mm: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,11 +60,20 @@ class _Told:
     why: str = ""
 
 
-def known_height(controller: Controller, tool: int, pin: str) -> KnownHeight | None:
+def known_height(
+    controller: Controller, tool: int, pin: str, stated: Station | None = None
+) -> KnownHeight | None:
     """Return what the height of a tool's touches of a pin has to agree with.
 
     That is the last touch of the same tool there, if its value is still stored; else the height of
-    the pin, where it was measured or stated and not taken from a Z that was kept itself.
+    the pin, where it was measured or typed and not taken from a Z that was kept itself; else what
+    the cell file states.
+
+    Args:
+        controller: The controller, connected.
+        tool: Number of the tool.
+        pin: Name of the pin.
+        stated: The pin as the cell file has it.
 
     Returns:
         ``None`` where nothing tells it.
@@ -70,27 +83,8 @@ def known_height(controller: Controller, tool: int, pin: str) -> KnownHeight | N
     try:
         last = find_last_touch(controller, tool, pin)
     except CalibrationError:
-        return _of_station(controller, pin)
+        return _of_station(controller, pin) or _of_cell_file(stated)
     return KnownHeight(last.place_mm, last.touches, z_from=last.z_from)
-
-
-def height_is_known(controller: Controller, tool: int) -> bool:
-    """Tell whether Z of a tool is more than a value that calibrations kept.
-
-    Whoever wrote it by hand stands for it; a calibration of X and Y alone does not.
-    """
-    kept = controller.outcomes.recorded(tool=tool, kinds=(EntryKind.DONE, EntryKind.DECISION))
-    newest = next((entry for entry in kept if "question" not in entry.details), None)
-    return newest is None or newest.details.get("z_from") != "kept"
-
-
-def tip_sigma_mm(controller: Controller, tool: int) -> float:
-    """Return how uncertain the stored tip of a tool is by its last calibration, 0 for unknown."""
-    kept = controller.outcomes.recorded(tool=tool, kinds=(EntryKind.DONE, EntryKind.DECISION))
-    newest = next((entry for entry in kept if "question" not in entry.details), None)
-    touch = newest.details.get("touch") if newest else None
-    sigma = touch.get("sigma_mm") if isinstance(touch, Mapping) else None
-    return float(sigma) if isinstance(sigma, (int, float)) else 0.0
 
 
 def settle_lengths(
@@ -133,7 +127,9 @@ def _told(controller: Controller, plan: ToolPlan, proposal: Proposal) -> _Told:
 
     if proposal.before is None or proposal.z_from == "typed" or not tells_height(proposal.result):
         return _Told()
-    known = known_height(controller, plan.tool, plan.pin)
+    # A Z that was made from a stated height cannot be compared with it.
+    stated = None if proposal.z_from == "measured" else plan.stated_pin
+    known = known_height(controller, plan.tool, plan.pin, stated)
     if known is not None and _moved(known, plan, proposal):
         return _Told(why=tr("The pin is not where it was."))
     if proposal.z_from == "measured":
@@ -164,7 +160,10 @@ def _moved(known: KnownHeight, plan: ToolPlan, proposal: Proposal) -> bool:
         float(str(now[name])) - then
         for name, then in zip(("x_mm", "y_mm"), known.place_mm, strict=False)
     )
-    sigma_mm = max(proposal.result.sigma_mm or 0.0, _UNKNOWN_SIGMA_MM)
+    if known.aside_mm is not None:
+        return math.hypot(*away) > known.aside_mm
+    found_mm = max(proposal.result.sigma_mm or 0.0, _UNKNOWN_SIGMA_MM)
+    sigma_mm = math.hypot(found_mm, known.sigma_mm)
     shift = judge_shifts([TipShift(plan.tool, away, sigma_mm)])
     return shift is not None and shift.moved
 
@@ -308,6 +307,24 @@ def _of_station(controller: Controller, pin: str) -> KnownHeight | None:
         return None
     z_from = str(station.details["z_from"])
     return KnownHeight((x_mm, y_mm, z_mm), sigma_mm=station.sigma_mm or 0.0, z_from=z_from)
+
+
+def _of_cell_file(stated: Station | None) -> KnownHeight | None:
+    """Return the height that a person wrote into the cell file.
+
+    Without a standard deviation its place aside is taken to be right to within what a search
+    finds; what nobody stated of it does not count.
+    """
+    if stated is None or stated.z_mm is None or stated.kind is not StationKind.PIN:
+        return None
+    x_mm, y_mm, sigma_mm = stated.x_mm, stated.y_mm, stated.sigma_mm
+    if x_mm is None or y_mm is None:
+        nowhere = (math.nan, math.nan, stated.z_mm)
+        return KnownHeight(nowhere, sigma_mm=sigma_mm or 0.0, z_from="stated", aside_mm=math.inf)
+    place = (x_mm, y_mm, stated.z_mm)
+    if sigma_mm is None:
+        return KnownHeight(place, z_from="stated", aside_mm=AGREEING_MM)
+    return KnownHeight(place, sigma_mm=sigma_mm, z_from="stated")
 
 
 def shows_height(station: Station) -> bool:

@@ -4,7 +4,7 @@ import math
 from dataclasses import asdict, dataclass, field, replace
 
 from robolink.calibration import CalibrationResult
-from robolink.errors import ConfigError
+from robolink.errors import ConfigError, RejectedError
 from robolink.messages import tr
 from robolink.methods import LengthRule, TwoPoseSource
 from robolink.model import Controller, Pose, ToolOffset, WorkBox, plain_offset
@@ -18,9 +18,10 @@ from robolink.procedures import (
     StopsAbovePin,
     TipSource,
     TouchesPin,
+    TouchPlan,
 )
-from robolink.runner import RunSettings
-from robolink.stations import Gauge
+from robolink.runner import RunSettings, inputs_of
+from robolink.stations import Gauge, Station
 
 
 def usual_box(sideways_mm: float = 150.0) -> WorkBox:
@@ -69,6 +70,7 @@ class ToolPlan:
         pin: Name of the station where a pin is touched; empty for none, or none that is kept.
         length: What is done where the heights of the touches show that the tip is longer or
             shorter: ``ask``, write Z by ``difference``, or ``keep`` it.
+        stated_pin: The pin as the cell file has it, ``None`` where it says nothing.
         gauge: The gauge that is measured against; ``None`` for none, or none that is known.
         method: Name of the calibration method, for the record; empty for what the result says.
         station: Name of the station on whose record the measurement rests; empty where it rests on
@@ -83,6 +85,7 @@ class ToolPlan:
     approach: Pose | None = None
     retreat: Pose | None = None
     pin: str = ""
+    stated_pin: Station | None = None
     gauge: Gauge | None = None
     length: LengthRule = "ask"
     method: str = ""
@@ -163,6 +166,16 @@ def _tip_about(flange: Pose, offset: ToolOffset) -> tuple[float, float]:
     return above_mm, math.sqrt(max(0.0, beside_mm2))
 
 
+def clearance_too_small(clearance_mm: float, limit_mm: float) -> str:
+    """Return why a clearance below the largest change that is believed is refused."""
+    return tr(
+        "The robot would stop {clearance:g} mm above the pin, and a new tip may be {limit:g} mm "
+        "longer.",
+        clearance=clearance_mm,
+        limit=limit_mm,
+    )
+
+
 def require_clearance(plan: ChangePlan) -> None:
     """Refuse a plan in which a new tip could meet the pin before the person takes over.
 
@@ -177,13 +190,7 @@ def require_clearance(plan: ChangePlan) -> None:
         if clearance_mm is None or clearance_mm >= one.criteria.max_change_mm:
             continue
         raise ConfigError(
-            tr(
-                "The robot would stop {clearance:g} mm above the pin, and the new tip of tool "
-                "{tool} may be {limit:g} mm longer.",
-                clearance=clearance_mm,
-                tool=one.tool,
-                limit=one.criteria.max_change_mm,
-            ),
+            clearance_too_small(clearance_mm, one.criteria.max_change_mm),
             remedy=tr(
                 "Nothing was moved. Use a clearance of {limit:g} mm or more, or allow less change.",
                 limit=one.criteria.max_change_mm,
@@ -191,12 +198,54 @@ def require_clearance(plan: ChangePlan) -> None:
         )
 
 
-def require_ready(plan: ChangePlan) -> None:
-    """Find out whether the cameras of a plan are there, before anything moves.
+def require_inputs(controller: Controller, plan: ChangePlan) -> None:
+    """Refuse a plan whose touches an input is to show, where there are no inputs; asks nothing.
 
     Raises:
-        CalibrationError, ConfigError, ConnectError: As :meth:`RequiresSensor.require_ready`.
+        ConfigError: The controller has no inputs.
     """
+    for one in plan.tools:
+        if isinstance(one.source, TouchesPin) and one.source.touch.contact is not None:
+            inputs_of(controller)
+
+
+def require_contact_input(controller: Controller, touch: TouchPlan) -> None:
+    """Read the input that is to show contact, so that one that is not there is known at once.
+
+    Raises:
+        ConfigError: The controller has no inputs, or refuses to read this one.
+    """
+    if touch.contact is None:
+        return
+    inputs = inputs_of(controller)
+    try:
+        inputs.read_input(touch.contact.number)
+    except (ConfigError, RejectedError) as error:
+        raise ConfigError(
+            tr(
+                "Input {number}, which is to show contact, cannot be read: {cause}",
+                number=touch.contact.number,
+                cause=error.what,
+            ),
+            remedy=tr("Nothing was moved. Give the number of an input that the controller has."),
+        ) from error
+
+
+def require_contacts(controller: Controller, plan: ChangePlan) -> None:
+    """Read all inputs of a plan that are to show contact; see :func:`require_contact_input`."""
+    for one in plan.tools:
+        if isinstance(one.source, TouchesPin):
+            require_contact_input(controller, one.source.touch)
+
+
+def require_ready(controller: Controller, plan: ChangePlan) -> None:
+    """Find out whether cameras and contact inputs of a plan are there, before anything moves.
+
+    Raises:
+        CalibrationError, ConfigError, ConnectError: As :meth:`RequiresSensor.require_ready` and
+            :func:`require_contact_input`.
+    """
+    require_contacts(controller, plan)
     for one in plan.tools:
         if isinstance(one.source, RequiresSensor):
             one.source.require_ready()

@@ -18,7 +18,7 @@ from robolink.model import (
     SpotUnit,
     ToolOffset,
 )
-from robolink.nozzle_change._plan import ChangePlan, require_clearance
+from robolink.nozzle_change._plan import ChangePlan, require_clearance, require_inputs
 from robolink.procedures import MovingSource, approach_path
 from robolink.runner import (
     Ask,
@@ -71,9 +71,11 @@ def preview(controller: Controller, plan: ChangePlan) -> tuple[PlannedStep, ...]
     looked at all around.
 
     Raises:
-        ConfigError: A clearance is below the largest change that is believed.
+        ConfigError: A clearance is below the largest change that is believed, or an input is to
+            show contact where there are none.
     """
     require_clearance(plan)
+    require_inputs(controller, plan)
     if not plan.moves:
         return ()
     return tuple(_foresee(controller, plan, flange_now(controller)))

@@ -78,7 +78,7 @@ def refusal_entry(
             "code": code,
             "poses": [_pose(pose) for pose in poses],
             **_seen(poses),
-            **_touches(poses),
+            **touches_made(poses),
         },
     )
 
@@ -93,7 +93,7 @@ def verification_entry(tool: int, result: VerifyResult) -> NewEntry:
         "drifts": [asdict(drift) for drift in result.drifts],
         "warnings": list(result.warnings),
         "verdict": result.codes[0] if result.codes else result.verdict.value,
-        **_touches(result.inputs),
+        **touches_made(result.inputs),
     }
     return NewEntry(
         EntryKind.VERIFY,
@@ -117,7 +117,7 @@ def _result(result: CalibrationResult) -> dict[str, object]:
         "reference_point_mm": list(result.reference_point_mm),
         "poses": [_pose(pose) for pose in result.inputs],
         **_seen(result.inputs),
-        **_touches(result.inputs),
+        **touches_made(result.inputs),
         "residuals_mm": [list(residual) for residual in result.residuals_mm],
         "rejected": list(result.rejected),
         "rms_mm": result.rms_mm,
@@ -146,8 +146,13 @@ def _pose(pose: Pose) -> dict[str, object]:
     return {name: value for name, value in values.items() if value is not None}
 
 
-def _touches(poses: Sequence[Pose]) -> dict[str, object]:
-    """Return how a person made each touch; nothing where nobody touched anything."""
+def touches_made(poses: Sequence[Pose]) -> dict[str, object]:
+    """Return how a person made each touch, plain JSON; nothing where nobody touched anything.
+
+    ``touches`` has one entry a pose: where the robot had stopped, the standoff from there to the
+    expected contact, how far was jogged, after how many seconds it was answered, and whether an
+    input switched to contact meanwhile. ``standoff_seed`` is what the standoffs were drawn from.
+    """
     if not any(isinstance(pose, TouchedAt) for pose in poses):
         return {}
     touched = [_touch(pose) if isinstance(pose, TouchedAt) else None for pose in poses]

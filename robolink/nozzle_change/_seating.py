@@ -1,4 +1,4 @@
-"""How nozzles sit and how well touches repeat in height: from what a cell has on record."""
+"""How nozzles sit, how well touches repeat, how sure a tool is: from what a cell has on record."""
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -110,6 +110,25 @@ def touching_as_recorded(controller: Controller, plan: TouchPlan, pin: str) -> T
         return plan
     by: TouchWitness = "person" if plan.contact is None else "contact"
     return replace(plan, sigma_z_mm=touch_sigma_z_mm(controller, pin, by))
+
+
+def height_is_known(controller: Controller, tool: int) -> bool:
+    """Tell whether Z of a tool is more than a value that calibrations kept.
+
+    Whoever wrote it by hand stands for it; a calibration of X and Y alone does not.
+    """
+    kept = controller.outcomes.recorded(tool=tool, kinds=(EntryKind.DONE, EntryKind.DECISION))
+    newest = next((entry for entry in kept if "question" not in entry.details), None)
+    return newest is None or newest.details.get("z_from") != "kept"
+
+
+def tip_sigma_mm(controller: Controller, tool: int) -> float:
+    """Return how uncertain the stored tip of a tool is by its last calibration, 0 for unknown."""
+    kept = controller.outcomes.recorded(tool=tool, kinds=(EntryKind.DONE, EntryKind.DECISION))
+    newest = next((entry for entry in kept if "question" not in entry.details), None)
+    touch = newest.details.get("touch") if newest else None
+    sigma = touch.get("sigma_mm") if isinstance(touch, Mapping) else None
+    return float(sigma) if isinstance(sigma, (int, float)) else 0.0
 
 
 def _changes(entries: Iterable[Recorded]) -> Iterator[tuple[float, float, float | None]]:

@@ -16,6 +16,7 @@ from robolink.recipe._reference import Reference
 from robolink.recipe.file.recipe import Recipe
 from robolink.recipe.file.tables import Output, Prompt
 from robolink.runner import StepDone
+from robolink.stations import Station
 
 
 class Outputs(Protocol):
@@ -37,6 +38,7 @@ class RecipeListener(Listener):
         answers: What was answered beforehand.
         references: The references of basis "difference", by tool.
         taking_reference: Whether this run only takes them.
+        stated_pin: The pin as the cell file has it, ``None`` where it says nothing.
         audience: Told of everything as well.
     """
 
@@ -48,6 +50,7 @@ class RecipeListener(Listener):
         *,
         references: Mapping[int, Reference],
         taking_reference: bool = False,
+        stated_pin: Station | None = None,
         audience: Listener,
     ) -> None:
         self._audience = audience
@@ -56,6 +59,7 @@ class RecipeListener(Listener):
         self._answers = answers
         self._references = references
         self._taking_reference = taking_reference
+        self._stated_pin = stated_pin
         self._signature: Signature = controller.outcomes.signature
         self._nozzles: dict[int, str] = {}
         self._names = {tool.number: tool.name or "" for tool in recipe.tools}
@@ -131,7 +135,8 @@ class RecipeListener(Listener):
         recipe = self._recipe
         if not recipe.source.of_method.tells_height:
             return False
-        return known_height(self._controller, tool, recipe.station.id) is not None
+        pin = recipe.station.id
+        return known_height(self._controller, tool, pin, self._stated_pin) is not None
 
     def _ask(
         self, context: MeasurementContext, number: int, prompt: Prompt, tool: int | None

@@ -23,6 +23,7 @@ def plan_of(
     ask_before_write: bool = True,
     accepted_change_mm: float | None = None,
     sensor: str | TipSensor | None = None,
+    stated: Station | None = None,
 ) -> ChangePlan:
     """Return what a recipe asks for, on one controller.
 
@@ -34,6 +35,7 @@ def plan_of(
         ask_before_write: Whether a person accepts the proposals.
         accepted_change_mm: A larger jump than the recipe's that an engineer accepts this time.
         sensor: The camera, or its name or URL, in place of the recipe's.
+        stated: The station as the cell file has it, ``None`` where it says nothing.
 
     Raises:
         CalibrationError: ``rank_deficient``: this robot cannot tilt its tool.
@@ -62,6 +64,7 @@ def plan_of(
                 approach=tool.approach.pose if tool.approach else None,
                 retreat=tool.retreat.pose if tool.retreat else None,
                 pin=_pin(recipe),
+                stated_pin=stated if _pin(recipe) else None,
                 gauge=station.gauge_on_record(),
                 length=parameters.length_rule(),
                 method=recipe.source.of_method.name,

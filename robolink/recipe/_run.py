@@ -86,6 +86,7 @@ class RecipeRun:
             ask_before_write=ask_before_write,
             accepted_change_mm=accepted_change_mm,
             sensor=sensor,
+            stated=find_stations(cell, ()).get(loaded.recipe.station.id),
         )
         if take_reference and not loaded.recipe.source.of_method.by_reference:
             raise ConfigError(
@@ -124,7 +125,7 @@ class RecipeRun:
                     self._references[tool] = reference
             # One without a reference makes all of them wait: all are written, or none.
             self.takes_reference = len(self._references) < len(stored)
-        require_ready(self.plan)
+        require_ready(controller, self.plan)
         require_inside(controller, preview(controller, self.plan))
 
     def run(self) -> ChangeReport:
@@ -150,6 +151,7 @@ class RecipeRun:
             self._answers,
             references={} if self.takes_reference else self._references,
             taking_reference=self.takes_reference,
+            stated_pin=self.plan.tools[0].stated_pin,
             audience=self._audience,
         )
         change = NozzleChange(

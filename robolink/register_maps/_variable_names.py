@@ -26,6 +26,7 @@ _PREFIX: Final = re.compile(
 
 _WORD: Final = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
 _HIGHEST: Final = 15
+_MOST_DIGITS: Final = 9
 
 
 class Component(NamedTuple):
@@ -58,12 +59,13 @@ def component_of(name: str) -> Component | None:
 
 def _read(words: list[str]) -> Component | None:
     """Return what stands behind the word for a tool: its number, its axis, and words beside."""
-    numbers = [int(word) for word in words if word.isdigit()]
+    numbers = [word for word in words if word.isdigit()]
     axes = [word for word in words if word in COMPONENTS]
     units = [word for word in words if word in _UNITS]
     rest = [w for w in words if not w.isdigit() and w not in (*axes, *units, *_BESIDE)]
     if rest or len(numbers) != 1 or len(axes) != 1 or len(units) > 1:
         return None
-    if not 1 <= numbers[0] <= _HIGHEST:
+    # Python reads no number of thousands of digits.
+    if len(numbers[0]) > _MOST_DIGITS or not 1 <= int(numbers[0]) <= _HIGHEST:
         return None
-    return Component(numbers[0], axes[0], _UNITS[units[0]] if units else "")
+    return Component(int(numbers[0]), axes[0], _UNITS[units[0]] if units else "")

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from robolink.runner._operator import Operator as Operator
     from robolink.runner._operator import Question as Question
     from robolink.runner._place_question import MOST_REFUSED as MOST_REFUSED
+    from robolink.runner._place_question import inputs_of as inputs_of
     from robolink.runner._runner import POLL_S as POLL_S
     from robolink.runner._runner import Runner as Runner
     from robolink.runner._runner import StepDone as StepDone
@@ -42,7 +43,7 @@ __getattr__ = lazy_exports(
     {
         "_jog_steps": "jog_target parse_decimal parse_steps",
         "_operator": "Operator Question",
-        "_place_question": "MOST_REFUSED",
+        "_place_question": "MOST_REFUSED inputs_of",
         "_runner": "POLL_S Runner StepDone ask_for_pose",
         "_settings": "RunSettings",
         "_steps": "Ask Confirm Look Move Notify Procedure Seek SeenAt Step TeachPrompt TouchedAt",

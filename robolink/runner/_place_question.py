@@ -60,7 +60,8 @@ class PlaceQuestion:
         self._operator = operator
         self._jog = jog
         self._line = line
-        self._contact = _ContactWatch(controller.io, step.contact) if step.contact else None
+        edge = step.contact
+        self._contact = _ContactWatch(inputs_of(controller), edge) if edge else None
         self._asked_ns = 0
 
     def answer(self) -> TouchedAt:
@@ -149,12 +150,7 @@ class PlaceQuestion:
 class _ContactWatch:
     """Watches the input that shows contact while a person is asked."""
 
-    def __init__(self, io: DigitalIo | None, edge: InputEdge) -> None:
-        if io is None:
-            raise ConfigError(
-                tr("This controller has no inputs, so none can show contact."),
-                remedy=tr("Measure without a contact input."),
-            )
+    def __init__(self, io: DigitalIo, edge: InputEdge) -> None:
         self._io = io
         self._edge = edge
         self._was_off = False
@@ -168,6 +164,20 @@ class _ContactWatch:
     def switched(self) -> bool:
         """Tell whether it shows contact now, and did not since the question."""
         return self.look() and self._was_off
+
+
+def inputs_of(controller: Controller) -> DigitalIo:
+    """Return the inputs of a controller, one of which is to show contact.
+
+    Raises:
+        ConfigError: It has none.
+    """
+    if controller.io is None:
+        raise ConfigError(
+            tr("This controller has no inputs, so none can show contact."),
+            remedy=tr("Measure without a contact input."),
+        )
+    return controller.io
 
 
 def ended_by_operator() -> DeclinedError:

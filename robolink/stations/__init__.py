@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from robolink.stations._sensors import BeamStation as BeamStation
     from robolink.stations._sensors import CameraStation as CameraStation
     from robolink.stations._sensors import TouchStation as TouchStation
+    from robolink.stations._station import AGREEING_MM as AGREEING_MM
     from robolink.stations._station import Gauge as Gauge
     from robolink.stations._station import Station as Station
     from robolink.stations._station import StationKind as StationKind
@@ -32,6 +33,6 @@ __getattr__ = lazy_exports(
         "_places": "beam_station camera_station pin_of sensor_of touch_station",
         "_records": "Found station_entry",
         "_sensors": "BeamStation CameraStation TouchStation",
-        "_station": "Gauge Station StationKind",
+        "_station": "AGREEING_MM Gauge Station StationKind",
     },
 )

@@ -3,7 +3,6 @@
 import contextlib
 import io
 import json
-import math
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -123,7 +122,7 @@ class MethodCell:
         """Mount another needle."""
         tip = self.world.tips[tool]
         # Where the flange looks out along its Z, a longer needle ends farther along it.
-        down_mm = math.copysign(by_mm, tip.z_mm)
+        down_mm = by_mm if tip.z_mm > 0 else -by_mm
         self.world.tips[tool] = replace(
             tip, x_mm=tip.x_mm + dx_mm, y_mm=tip.y_mm + dy_mm, z_mm=tip.z_mm + down_mm
         )

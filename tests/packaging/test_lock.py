@@ -107,9 +107,11 @@ def index(tmp_path):
     return tmp_path
 
 
-def installed(index, pin, **variables):
-    here = f"{sys.version_info.major}.{sys.version_info.minor}"
-    (index / "requirements-dev.lock").write_text(f"# Python {here}; linux; 64 bit.\n{pin}\n")
+HERE = f"{sys.version_info.major}.{sys.version_info.minor}"
+
+
+def installed(index, pin, *, pythons=HERE, **variables):
+    (index / "requirements-dev.lock").write_text(f"# Python {pythons}; linux; 64 bit.\n{pin}\n")
     clean = {name: value for name, value in os.environ.items() if not name.startswith("PIP_")}
     return subprocess.run(
         [str(ROOT / "tools" / "install-locked"), sys.executable],
@@ -151,6 +153,16 @@ def test_an_index_that_lacks_a_package_is_told_and_the_ranges_are_taken(index, v
     assert done.returncode != 0  # there is no project in this folder that could be installed
     assert "does not have all that requirements-dev.lock names" in done.stderr
     assert ("by the ranges" in done.stderr) == (not variables)
+
+
+@pytest.mark.parametrize("pythons", [f"{HERE}1", "2.7, 3.0"])
+def test_a_lock_for_other_pythons_is_told_and_the_ranges_are_taken(index, pythons):
+    pin = f"robolink-tiny==1.0 --hash=sha256:{'0' * 64}"
+    done = installed(index, pin, pythons=pythons)
+    assert "is not for this Python or system" in done.stderr
+    assert "by the ranges" in done.stderr
+    done = installed(index, pin, pythons=pythons, LOCKED="only")
+    assert (done.returncode, "by the ranges" in done.stderr) == (1, False)
 
 
 # ---- what is said of it

@@ -166,3 +166,21 @@ def test_ljm_takes_the_short_way_round(robot):
         run("Print Agl(6)")
     ) == pytest.approx(150, abs=1e-3)
     assert float(run("Print PAgl(Here, 5)")) == pytest.approx(-60, abs=1e-3)
+
+
+def test_external_control_points_are_kept_until_power_off(robot):
+    run = robot("C8-C901S")
+    assert run("ECPSet 2, XY(300, 400, 200, 10, 20, 30); ECP 2") == "0"
+    assert run("Print ECP; Print ECPDef(2); Print ECPDef(3)").split() == ["2", "-1", "0"]
+    assert parse_point(run("Print ECPSet(2)")).coordinates == (300, 400, 200, 10, 20, 30)
+    run.client.simulator.panel._machine.forget_volatile(0)
+    assert run.client.simulator.machine.control_points.selected == 0
+    assert run.client.simulator.machine.control_points.defined(2)
+
+
+@pytest.mark.parametrize(("flag", "joint_5"), [("", 60), (" LJM 1", -60), (" LJM 2", 60)])
+def test_ljm_behind_a_movement_keeps_the_wrist_or_not(robot, flag, joint_5):
+    run = robot("C8-C901S")
+    run("Tool 0; Go JA(0, -35, 5, 0, -60, 0); P1 = Here /F +Z(1)")
+    assert run(f"Go P1{flag}") == "0"
+    assert float(run("Print Agl(5)")) == pytest.approx(joint_5, abs=1)

@@ -5,7 +5,9 @@ import math
 import random
 from pathlib import Path
 
+import click
 import pytest
+from robolink_cli.commands.simulate.sim import sim
 from robolink_simulators.cell.frames import product, transposed, zyx
 from robolink_simulators.epson.arm.joints import Joints, check_ranges
 from robolink_simulators.epson.arm.kinematics import (
@@ -204,3 +206,13 @@ def test_the_ends_of_ranges_are_whole_pulses_where_the_resolution_is_known():
     low, high = find_robot("GX4-C301S").ranges[0]
     scale = find_robot("GX4-C301S").pulses_per_unit[0]
     assert (round(low * scale), round(high * scale)) == (-1456356, 6699236)
+
+
+def test_the_shell_completes_the_name_of_a_robot_and_of_a_second_one():
+    complete = sim.commands["epson"].params
+    (option,) = [one for one in complete if one.name == "robot"]
+    context = click.Context(sim.commands["epson"])
+    names = [item.value for item in option.shell_complete(context, "cx4")]
+    assert names == ["CX4-A601C", "CX4-A601CR", "CX4-A601S", "CX4-A601SR"]
+    second = [item.value for item in option.shell_complete(context, "T6-602S,rs4")]
+    assert second == ["T6-602S,RS4-C351C", "T6-602S,RS4-C351S"]

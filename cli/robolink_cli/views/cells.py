@@ -4,7 +4,14 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from robolink.config import Cell, check_file, config_files, load_cells
+from robolink.config import (
+    Cell,
+    CellSettings,
+    check_file,
+    config_files,
+    load_cells,
+    settings_of_file,
+)
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_cli.access.cell import link_options
@@ -38,9 +45,9 @@ def check_payload(file: Path | None) -> dict[str, Any]:
     paths = [file] if file else [found.path for found in config_files() if found.present]
     files = [_checked(path) for path in paths]
     disagreement = None
-    if file is None and all(not entry["problems"] for entry in files):
+    if all(not entry["problems"] for entry in files):
         try:
-            load_cells()
+            _add_refusals(files, file)
         except ConfigError as error:
             disagreement = error.what
     ok = disagreement is None and all(not entry["problems"] for entry in files)
@@ -108,6 +115,37 @@ def show_cell(payload: Mapping[str, Any]) -> None:
         say(f"  {name:{names}}  {text:{width}}  {origins.get(name, '')}".rstrip())
     if not values["remote_timeout_s"]:
         say(tr("Nothing moves: no remote time-out is confirmed for this cell."))
+
+
+def _add_refusals(files: Sequence[Mapping[str, Any]], alone: Path | None) -> None:
+    """Add to each file that is right what methods refuse of its limits.
+
+    Args:
+        files: The files, as the document has them.
+        alone: The one file that is looked at; ``None`` for all, each adding to farther ones.
+
+    Raises:
+        ConfigError: The files do not go together.
+    """
+    from robolink_cli.access.method_limits import refused_by_methods  # here, for a quick --help
+
+    cells: list[tuple[str, CellSettings, Mapping[str, Path]]]
+    if alone is not None:
+        cells = [(name, said, {}) for name, said in settings_of_file(alone).items()]
+    else:
+        cells = [(cell.name, cell.settings, cell.origins) for cell in load_cells().values()]
+    for name, settings, origins in cells:
+        for problem in refused_by_methods(settings):
+            origin = alone or origins.get(problem.where) or _first_origin(origins)
+            (entry,) = (entry for entry in files if entry["path"] == str(origin))
+            where = f"cells.{name}.{problem.where}"
+            entry["problems"].append({"where": where, "what": problem.what})
+
+
+def _first_origin(origins: Mapping[str, Path]) -> Path:
+    """Return a file that says something about touches."""
+    keys = ("lift_mm", "clearance_mm", "max_change_mm")
+    return next(origins[key] for key in keys if key in origins)
 
 
 def _checked(path: Path) -> dict[str, Any]:

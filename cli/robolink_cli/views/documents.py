@@ -1,6 +1,6 @@
 """What commands show: plain payloads, and the tables made from them."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
@@ -55,10 +55,18 @@ def proposal_payload(proposal: "Proposal") -> dict[str, object]:
         "sigma_gain": result.sigma_gain,
         "warnings": list(result.warnings),
         "poses": [pose_payload(pose) for pose in result.inputs],
+        **_touches_payload(result.inputs),
         "fit": fit_payload(result),
         "length": length_payload(proposal),
         **result.details(),
     }
+
+
+def _touches_payload(poses: "Sequence[Pose]") -> dict[str, object]:
+    """Return how each touch was made, as the journal has it; ``None`` where nobody touched."""
+    from robolink.nozzle_change import touches_made  # here, because a status needs no numpy
+
+    return {"touches": None, "standoff_seed": None, **touches_made(poses)}
 
 
 def length_payload(proposal: "Proposal") -> dict[str, object] | None:
@@ -120,6 +128,7 @@ def verification_payload(result: "VerifyResult | None") -> dict[str, object] | N
             }
             for drift in result.drifts
         ],
+        **_touches_payload(result.inputs),
     }
 
 

@@ -1,8 +1,9 @@
 """How sure a measurement is, in words and as a table."""
 
 from collections.abc import Iterator
+from typing import Final
 
-from robolink.calibration import CalibrationResult, chain_of
+from robolink.calibration import CalibrationResult, chain_of, known_doubts, order_in_words
 from robolink.messages import tr
 from robolink_cli.console.render import table
 from robolink_cli.views.documents import number
@@ -10,10 +11,15 @@ from robolink_cli.views.documents import number
 
 def remarks(result: CalibrationResult) -> Iterator[str]:
     """Yield what there is to say about a measurement beside its numbers, a sentence each."""
-    for said in (_fit, _interval, _region, _parts, _ways, _camera, _runout, _chain):
+    for said in (_fit, _order, _interval, _region, _parts, _ways, _camera, _runout, _chain):
         sentence = said(result)
         if sentence:
             yield sentence
+    yield from known_doubts(note for note in result.notes if note not in _SAID_OTHERWISE)
+
+
+_SAID_OTHERWISE: Final = ("length_not_observable",)
+"""Notes whose reason the proposal gives, in a sentence of its own."""
 
 
 def _fit(result: CalibrationResult) -> str:
@@ -33,6 +39,12 @@ def _fit(result: CalibrationResult) -> str:
         rms=result.rms_mm,
         largest=result.max_residual_mm,
     )
+
+
+def _order(result: CalibrationResult) -> str:
+    """Return what moved while the poses were taken, by how much; empty where nothing did."""
+    order = result.evidence.run_order if result.evidence is not None else None
+    return order_in_words(order) if order is not None else ""
 
 
 def _interval(result: CalibrationResult) -> str:

@@ -3,9 +3,11 @@
 A code is for programs; what a person reads, on a screen or in a report, is the same sentence.
 """
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from typing import Final
 
+from robolink.calibration.core.evidence import RunOrder
 from robolink.messages import tr
 
 
@@ -26,6 +28,23 @@ def known_doubts(codes: Iterable[str]) -> tuple[str, ...]:
     """
     known = (_SENTENCES.get(code) for code in dict.fromkeys(codes))
     return tuple(sentence() for sentence in known if sentence is not None)
+
+
+def order_in_words(order: RunOrder) -> str:
+    """Return between which touches something moved, and by how much; empty where nothing did."""
+    if order.finding == "step_in_run_order":
+        return tr(
+            "Between touch {before} and {after} something moved by {shift:.2f} mm.",
+            before=order.step_after,
+            after=order.step_after + 1,
+            shift=math.hypot(*order.step_mm),
+        )
+    if order.finding == "drift_in_run_order":
+        return tr(
+            "From the first touch to the last something drifted by {shift:.2f} mm.",
+            shift=math.hypot(*order.drift_mm),
+        )
+    return ""
 
 
 # Called late, because the language is chosen when a command runs.

@@ -175,10 +175,7 @@ class PinTouches:
         raise CalibrationError(
             "not_touched",
             told,
-            remedy=tr(
-                "Nothing was written. The robot always stops beside the pin: jog until the tip is "
-                "on it, then answer."
-            ),
+            remedy=tr("The robot never stops on the pin: jog until the tip is on it, then answer."),
         )
 
     def require_made(self) -> None:

@@ -21,7 +21,7 @@ from robolink_simulators.epson.arm.robots import find_robot
 from robolink_simulators.epson.card import ControllerCard
 from robolink_simulators.epson.companion import Companion
 from robolink_simulators.epson.condition import Condition, Mode, Task
-from robolink_simulators.epson.flash import Flash, forget_volatile
+from robolink_simulators.epson.flash import Flash
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.variables import project_variables
 from robolink_simulators.epson.mishaps import EpsonMishaps
@@ -50,7 +50,8 @@ class EpsonSimulator:
     """Implements ``hosting.seam.WireDevice``.
 
     Args:
-        robot: Name of a model, as in docs/reference/epson-robots.md, "Families".
+        robot: Name of a model, as in docs/reference/epson-robots.md, "Families"; several, with
+            commas between, for a controller with several robots.
         seed: Decides the world and every scatter; the same seed gives the same run, but for
             the serial number.
         password: Of Remote Ethernet; none means an empty one.
@@ -74,7 +75,7 @@ class EpsonSimulator:
         alarms: The alarms that stand.
         card: What it says of itself.
         variables: The Global Preserve variables.
-        world: The truth, and the person at the cell.
+        worlds: The truth around each robot, and the person there.
         faults: What is planned to go wrong.
         exchanges: Requests answered.
         log: The last (now_ns, ">" or "<", text), with passwords hidden.
@@ -116,14 +117,19 @@ class EpsonSimulator:
         self.on_reply: RequestHook | None = None
         self._requests = 0
         self._links: list[EpsonServerLink] = []
-        self.machine = Machine(find_robot(robot), serial=serial or drawn_serial())
-        self.machine.switch_motors(True)
-        self.world = World.seeded(
-            self.machine,
-            seed,
-            pendant_live=lambda: self.condition.mode is Mode.TEACH,
-            now_ns=lambda: self._now_ns,
-            parameters=world,
+        model, *others = map(find_robot, robot.split(","))
+        self.machine = Machine(model, serial=serial or drawn_serial(), others=others)
+        self.machine.switch_all_motors(True)
+        self.worlds = tuple(
+            World.seeded(
+                self.machine.inputs,
+                one,
+                seed,
+                pendant_live=lambda: self.condition.mode is Mode.TEACH,
+                now_ns=lambda: self._now_ns,
+                parameters=world,
+            )
+            for one in self.machine.robots
         )
         self._flash = Flash(state_path, self.machine)
         self._flash.restore()
@@ -171,6 +177,11 @@ class EpsonSimulator:
             acting=self.acting,
         )
         self._mishaps = EpsonMishaps(self.panel)
+
+    @property
+    def world(self) -> World:
+        """The truth around the robot in force, and the person at the cell."""
+        return self.worlds[self.machine.robot_number - 1]
 
     @property
     def now_ns(self) -> int:
@@ -228,7 +239,7 @@ class EpsonSimulator:
             self._slot.free()
             self._mishaps.forget()
             self.condition.restart()
-            forget_volatile(self.machine, self._now_ns)
+            self.machine.forget_volatile(self._now_ns)
             self._window.restart()
 
     def push(self, data: bytes) -> None:
@@ -285,7 +296,7 @@ class EpsonSimulator:
         self._now_ns = now_ns
         self._stepping = True
         try:
-            self.machine.arm.advance(now_ns)
+            self.machine.advance(now_ns)
             self.machine.timed_bits.advance(now_ns)
             self._window.advance(now_ns)
             self._mishaps.carry_out(now_ns)

@@ -7,9 +7,7 @@ from typing import Final
 from robolink.errors import ConfigError
 from robolink.files.named import read_named
 from robolink.messages import tr
-from robolink_simulators.epson.arm.robot_settings import RobotSettings
 from robolink_simulators.epson.machine import Machine
-from robolink_simulators.epson.memory.points import LocalTable, PointTable
 from robolink_simulators.state_files import save_state
 
 SCHEMA: Final = "robolink/sim-state/1"
@@ -27,7 +25,7 @@ class Flash:
         self._path = path
         self._machine = machine
         # Nothing is written yet: a serial number that was drawn is kept at the first occasion.
-        self._written: tuple[int, int] | None = None
+        self._written: tuple[int, ...] | None = None
 
     def restore(self) -> None:
         """Give the machine the tools and the serial number of the file, if there is one.
@@ -39,12 +37,15 @@ class Flash:
         """
         if self._path is None or not self._path.exists():
             return
-        robot = self._machine.model.name
+        first, *others = self._machine.robots
+        robot = first.model.name
         try:
             state = json.loads(read_named(self._path))
             if state["schema"] != SCHEMA or state["robot"] != robot:
                 raise ValueError(state["robot"])
-            self._machine.tools.restore(state["tools"])
+            first.tools.restore(state["tools"])
+            for other, tools in zip(others, state.get("other_tools", ()), strict=True):
+                other.tools.restore(tools)
             serial = state.get("serial")
         except (OSError, KeyError, RecursionError, TypeError, ValueError) as error:
             raise ConfigError(
@@ -54,7 +55,7 @@ class Flash:
                 remedy=tr("Name another file, or delete this one to start afresh."),
             ) from error
         if serial is not None:
-            self._machine.serial = str(serial)
+            first.serial = str(serial)
             self._written = self._mark()
 
     def save_changes(self) -> None:
@@ -69,28 +70,17 @@ class Flash:
         self._written = mark
         if self._path is None:
             return
-        document = {
+        first, *others = self._machine.robots
+        document: dict[str, object] = {
             "schema": SCHEMA,
-            "robot": self._machine.model.name,
-            "serial": self._machine.serial,
-            "tools": self._machine.tools.to_state(),
+            "robot": first.model.name,
+            "serial": first.serial,
+            "tools": first.tools.to_state(),
         }
+        if others:
+            document["other_tools"] = [other.tools.to_state() for other in others]
         save_state(self._path, document)
 
-    def _mark(self) -> tuple[int, int]:
-        return (self._machine.tools.flash_writes, self._machine.tools.selected)
-
-
-def forget_volatile(machine: Machine, now_ns: int) -> None:
-    """Let a machine forget what a power cycle takes: all but tools, HomeSet and its place."""
-    machine.arm.halt(now_ns)
-    machine.switch_motors(False)
-    machine.reset_motion_parameters()
-    machine.outputs.clear()
-    machine.memory.clear()
-    machine.timed_bits.clear()
-    home = machine.settings.home_pulses
-    machine.settings = RobotSettings.of(machine.model.axes)
-    machine.settings.home_pulses = home
-    machine.points = PointTable()
-    machine.locals = LocalTable(tilting=machine.model.six_axes)
+    def _mark(self) -> tuple[int, ...]:
+        selected = [robot.tools.selected for robot in self._machine.robots]
+        return (self._machine.flash_writes, *selected)

@@ -1,62 +1,86 @@
-"""What SPEL+ statements touch: one robot, its tools, points, bits and settings."""
+"""What SPEL+ statements touch: the robots of a controller, and the bits that all of them share."""
 
 import random
-from dataclasses import replace
+from collections.abc import Sequence
+from typing import Any, Generic, TypeVar, overload
 
 from robolink.model import Pose, ToolOffset
 from robolink_simulators.epson.arm.arm import Arm
-from robolink_simulators.epson.arm.joints import Joints, check_ranges
-from robolink_simulators.epson.arm.kinematics import (
-    flange_of,
-    forward,
-    hand_of,
-    posture_of,
-    solve,
-    tip_of,
-)
+from robolink_simulators.epson.arm.joints import Joints
 from robolink_simulators.epson.arm.motion_parameters import MotionParameters
 from robolink_simulators.epson.arm.robot_settings import RobotSettings
 from robolink_simulators.epson.arm.robots import RobotModel
 from robolink_simulators.epson.memory.bits import IO_BITS, MEMORY_BITS, BitBank
+from robolink_simulators.epson.memory.control_points import ControlPoints
+from robolink_simulators.epson.memory.driven_robot import DrivenRobot
 from robolink_simulators.epson.memory.input_bits import InputBits
 from robolink_simulators.epson.memory.pallets import PalletTable
 from robolink_simulators.epson.memory.points import LocalTable, Point, PointTable
 from robolink_simulators.epson.memory.timed_bits import TimedBits
 from robolink_simulators.epson.memory.tools import ToolMemory
+from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 
 REMOTE_ETHERNET = 26
 """CtrlDev of a controller run over Remote Ethernet (docs/reference/spel.md 9)."""
 
+_T = TypeVar("_T")
+
+
+class _OfTheRobotInForce(Generic[_T]):
+    """An attribute of the robot that statements act on."""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = name
+
+    @overload
+    def __get__(self, machine: None, owner: type) -> "_OfTheRobotInForce[_T]": ...
+    @overload
+    def __get__(self, machine: "Machine", owner: type) -> _T: ...
+    def __get__(self, machine: "Machine | None", owner: type) -> Any:
+        return self if machine is None else getattr(machine.robot, self._name)
+
+    def __set__(self, machine: "Machine", value: _T) -> None:
+        setattr(machine.robot, self._name, value)
+
 
 class Machine:
-    """A controller's memory and its arm. No wire, no clock of its own.
+    """A controller's memory and its robots. No wire, no clock of its own.
+
+    What belongs to one robot (arm, tools, points, settings ...) is that of the robot in force:
+    ``Robot n`` and SetCurRobot choose it (docs/reference/epson.md 1.5).
 
     Args:
-        model: Which robot.
-        joints: Where the arm stands; see :class:`Arm`.
+        model: Which robot, number 1.
+        joints: Where its arm stands; see :class:`Arm`.
         backlash_deg: See :class:`Arm`.
-        serial: What RobotSerial$ gives; the controller's own number follows from it.
+        serial: What RobotSerial$ gives of it; the controller's own number follows from it.
+        others: Further robots, number 2 and on.
 
     Attributes:
-        arm: The arm in simulated time.
-        tools: Tool definitions and the tool in force.
-        points: P0 to P999.
-        locals: Local coordinate systems.
+        robots: All of them.
+        robot_number: The one in force.
         inputs: Input bits; the world sets them, or connects them to what the tip meets.
         outputs: Output bits.
         memory: Memory bits.
-        parameters: Speeds, accelerations, LimZ.
-        settings: What it is told about its load, its arm and its joints.
-        pallets: Pallets 0 to 15.
         timed_bits: Outputs and memory bits that switch back by themselves.
-        sensed: Whether the last Jump was stopped by its Sense.
-        till_met: Whether the last motion was stopped by its Till.
-        found: Where the last Find met its condition, the selected tool's tip.
-        motors_on: Whether the motors are on.
-        power_high: Whether power is high; low after anything that resets the parameters.
-        robot_number: The robot in force; this controller has one.
         control_device: What CtrlDev gives.
     """
+
+    model = _OfTheRobotInForce[RobotModel]()
+    serial = _OfTheRobotInForce[str]()
+    arm = _OfTheRobotInForce[Arm]()
+    tools = _OfTheRobotInForce[ToolMemory]()
+    points = _OfTheRobotInForce[PointTable]()
+    locals = _OfTheRobotInForce[LocalTable]()
+    parameters = _OfTheRobotInForce[MotionParameters]()
+    settings = _OfTheRobotInForce[RobotSettings]()
+    pallets = _OfTheRobotInForce[PalletTable]()
+    control_points = _OfTheRobotInForce[ControlPoints]()
+    sensed = _OfTheRobotInForce[bool]()
+    till_met = _OfTheRobotInForce[bool]()
+    found = _OfTheRobotInForce["Point | None"]()
+    motors_on = _OfTheRobotInForce[bool]()
+    power_high = _OfTheRobotInForce[bool]()
 
     def __init__(
         self,
@@ -65,101 +89,97 @@ class Machine:
         joints: Joints | None = None,
         backlash_deg: float = 0.0,
         serial: str = "SIM00001",
+        others: Sequence[RobotModel] = (),
     ) -> None:
-        self.model = model
-        self.serial = serial
-        self.arm = Arm(model, joints, backlash_deg=backlash_deg)
-        self.tools = ToolMemory()
-        self.points = PointTable()
-        self.locals = LocalTable(tilting=model.six_axes)
+        first = DrivenRobot(model, joints=joints, backlash_deg=backlash_deg, serial=serial)
+        more = [
+            DrivenRobot(other, serial=f"{serial}-{number}")
+            for number, other in enumerate(others, start=2)
+        ]
+        self.robots = (first, *more)
+        self.robot_number = 1
         self.inputs = InputBits(IO_BITS)
         self.outputs = BitBank(IO_BITS)
         self.memory = BitBank(MEMORY_BITS)
-        self.parameters = MotionParameters()
-        self.settings = RobotSettings.of(model.axes)
-        self.pallets = PalletTable()
         self.timed_bits = TimedBits()
-        self.sensed = False
-        self.till_met = False
-        self.found: Point | None = None
-        self.motors_on = False
-        self.power_high = False
-        self.robot_number = 1
         self.control_device = REMOTE_ETHERNET
 
     @property
+    def robot(self) -> DrivenRobot:
+        """The robot in force."""
+        return self.robots[self.robot_number - 1]
+
+    def choose(self, number: int) -> None:
+        """Put a robot in force.
+
+        Raises:
+            Refusal: There is no such robot.
+        """
+        if not 1 <= number <= len(self.robots):
+            raise SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, f"There is no robot {number}")
+        self.robot_number = number
+
+    @property
     def controller_serial(self) -> str:
-        """The serial number of the controller that drives it."""
-        return f"C-{self.serial}"
+        """The serial number of the controller."""
+        return f"C-{self.robots[0].serial}"
 
     @property
     def flash_writes(self) -> int:
         """How often TLSet or TLClr wrote the flash."""
-        return self.tools.flash_writes
+        return sum(robot.tools.flash_writes for robot in self.robots)
 
     @property
     def offset(self) -> ToolOffset | None:
         """The definition of the tool in force, ``None`` for the flange."""
-        return self.tools.get(self.tools.selected)
+        return self.robot.offset
 
     def tip(self) -> Pose:
-        """Return the commanded pose of the selected tool's tip (Here, CurPos)."""
-        return self._tip_of(self.arm.flange())
+        """See :meth:`DrivenRobot.tip`."""
+        return self.robot.tip()
 
     def real_tip(self, rng: random.Random, noise_mm: float) -> Pose:
-        """Return the measured pose of the selected tool's tip (RealPos)."""
-        return self._tip_of(self.arm.real_position(rng, noise_mm))
-
-    def joints_for(self, target: Point) -> Joints:
-        """Return the joints that bring the selected tool's tip to a point.
-
-        Raises:
-            Refusal: Its local is not defined, or the arm cannot take it up.
-        """
-        joints = self.solved(target)
-        check_ranges(self.model, joints)
-        return joints
-
-    def solved(self, target: Point) -> Joints:
-        """Return the joints of :meth:`joints_for`, whatever their ranges.
-
-        Raises:
-            Refusal: Its local is not defined, or the arm is too short.
-        """
-        flange = flange_of(self.model, self.pose_of(target), self.offset)
-        return solve(self.model, flange, target.hand, target.posture)
-
-    def flagged(self, target: Point, joints: Joints) -> Point:
-        """Return a point with the flags of the joints that take it up."""
-        hand, posture = hand_of(self.model, joints), posture_of(self.model, joints)
-        return replace(target, hand=hand, posture=posture)
-
-    def pose_of(self, target: Point) -> Pose:
-        """Return where a point is in the base frame; on four axes without V and W.
-
-        Raises:
-            Refusal: Its local is not defined.
-        """
-        base = self.locals.to_base(target)
-        x, y, z, u, v, w = base.coordinates
-        if not self.model.six_axes:
-            v = w = 0.0
-        return Pose(x, y, z, u, v, w, hand=base.hand, posture=base.posture)
+        """See :meth:`DrivenRobot.real_tip`."""
+        return self.robot.real_tip(rng, noise_mm)
 
     def tip_at(self, joints: Joints) -> Pose:
-        """Return where the selected tool's tip would be with other joints.
+        """See :meth:`DrivenRobot.tip_at`."""
+        return self.robot.tip_at(joints)
 
-        Raises:
-            OutOfReach: A joint would leave its range.
-        """
-        check_ranges(self.model, joints)
-        return self._tip_of(forward(self.model, joints))
+    def joints_for(self, target: Point) -> Joints:
+        """See :meth:`DrivenRobot.joints_for`."""
+        return self.robot.joints_for(target)
+
+    def solved(self, target: Point) -> Joints:
+        """See :meth:`DrivenRobot.solved`."""
+        return self.robot.solved(target)
+
+    def flagged(self, target: Point, joints: Joints) -> Point:
+        """See :meth:`DrivenRobot.flagged`."""
+        return self.robot.flagged(target, joints)
+
+    def pose_of(self, target: Point) -> Pose:
+        """See :meth:`DrivenRobot.pose_of`."""
+        return self.robot.pose_of(target)
+
+    def advance(self, now_ns: int) -> None:
+        """Let simulated time reach ``now_ns`` for every arm."""
+        for robot in self.robots:
+            robot.arm.advance(now_ns)
+
+    def halt(self, now_ns: int) -> None:
+        """Stop every arm where it is."""
+        for robot in self.robots:
+            robot.arm.halt(now_ns)
 
     def switch_motors(self, on: bool) -> None:
-        """Switch the motors; on also resets the motion parameters (docs/reference/spel.md 6.3)."""
-        self.motors_on = on
-        if on:
-            self.reset_motion_parameters()
+        """Switch the motors of the robot in force ."""
+        self.robot.switch_motors(on)
+
+    def switch_all_motors(self, on: bool) -> None:
+        """Switch the motors of every robot."""
+        for robot in self.robots:
+            robot.switch_motors(on)
 
     def clear_outputs(self) -> None:
         """Switch every output off, and forget which were to switch back."""
@@ -167,13 +187,15 @@ class Machine:
         self.timed_bits.clear()
 
     def reset_motion_parameters(self) -> None:
-        """Set the defaults and low power: start-up, Motor On, Reset and the like.
+        """Set the defaults and low power of every robot; see :class:`DrivenRobot`."""
+        for robot in self.robots:
+            robot.reset_motion_parameters()
 
-        Source: docs/reference/spel.md 6.3.
-        """
-        self.parameters = MotionParameters()
-        self.power_high = False
-        self.settings.reset()
-
-    def _tip_of(self, flange: Pose) -> Pose:
-        return tip_of(self.model, flange, self.offset, tool=self.tools.selected)
+    def forget_volatile(self, now_ns: int) -> None:
+        """Forget what a power cycle takes; robot 1 is in force then (assumed)."""
+        for robot in self.robots:
+            robot.forget_volatile(now_ns)
+        self.robot_number = 1
+        self.outputs.clear()
+        self.memory.clear()
+        self.timed_bits.clear()

@@ -72,7 +72,7 @@ class EpsonPanel:
     def raise_error(self, number: int, *, serious: bool = False) -> None:
         """Put the controller into its error state; a serious one needs a restart."""
         with self._acting() as now_ns:
-            self._machine.arm.halt(now_ns)
+            self._machine.halt(now_ns)
             self._window.fail(number, f"Error {number}", now_ns)
             self._condition.raise_error(number, serious=serious)
 
@@ -138,6 +138,6 @@ class EpsonPanel:
                 self._slot.client.cut()
 
     def _cut_power(self, number: int, text: str, now_ns: int) -> None:
-        self._machine.arm.halt(now_ns)
-        self._machine.switch_motors(False)
+        self._machine.halt(now_ns)
+        self._machine.switch_all_motors(False)
         self._window.fail(number, text, now_ns)

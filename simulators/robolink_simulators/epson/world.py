@@ -20,8 +20,9 @@ from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.epson.arm.arm import rest_of
 from robolink_simulators.epson.arm.kinematics import continued, frame_of, pose_of_frame, tip_of
 from robolink_simulators.epson.arm.robots import RobotModel
-from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.bits import IO_BITS
+from robolink_simulators.epson.memory.driven_robot import DrivenRobot
+from robolink_simulators.epson.memory.input_bits import InputBits
 from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.epson.memory.tip_input import Nozzle, TipInput
 from robolink_simulators.epson.refusals import OutOfReach
@@ -42,7 +43,8 @@ class World(Workplace):
     """Ground truth around an EPSON robot.
 
     Args:
-        machine: The robot in this world.
+        inputs: The inputs of its controller.
+        robot: The robot in this world.
         tips: The physical tip of each tool number, seen from the flange.
         pin_mm: X, Y, Z of the tip of the reference pin, in base coordinates.
         seed: Decides the next nozzles and the errors of the eye.
@@ -58,7 +60,8 @@ class World(Workplace):
 
     def __init__(
         self,
-        machine: Machine,
+        inputs: InputBits,
+        robot: DrivenRobot,
         tips: dict[int, ToolOffset],
         pin_mm: XyzMm,
         *,
@@ -67,13 +70,13 @@ class World(Workplace):
         now_ns: Callable[[], int],
         parameters: WorldParameters | None = None,
     ) -> None:
-        self.machine = machine  # its inputs are wired by what follows
+        self.machine, self._inputs = robot, inputs  # wired by what follows
         super().__init__(
-            _HandledArm(machine, now_ns),
+            _HandledArm(robot, now_ns),
             tips,
             pin_mm,
             seed=seed,
-            replaced=stored_on(machine.model),
+            replaced=stored_on(robot.model),
             parameters=parameters or WorldParameters(),
         )
         self.operator = PendantOperator(self, pendant_live=pendant_live, now_ns=now_ns, seed=seed)
@@ -81,7 +84,8 @@ class World(Workplace):
     @classmethod
     def seeded(
         cls,
-        machine: Machine,
+        inputs: InputBits,
+        robot: DrivenRobot,
         seed: int,
         *,
         pendant_live: Callable[[], bool],
@@ -93,23 +97,24 @@ class World(Workplace):
         The arm is put where the physical tip stands some mm beside the pin and above it.
         """
         rng = random.Random(f"world {seed}")
-        model, stored = machine.model, stored_on(machine.model)
+        model, stored = robot.model, stored_on(robot.model)
         tips = {MOUNTED_TOOL: exchanged(stored, rng)}
         joints = rest_of(model)
         if not model.six_axes:
             joints = joints.at_height(0.4 * model.ranges[2].low)
-        machine.arm.place(joints, 0)
-        machine.tools.restore(
+        robot.arm.place(joints, 0)
+        robot.tools.restore(
             {
                 "selected": MOUNTED_TOOL,
                 "offsets": {str(MOUNTED_TOOL): list(stored.components())},
                 "flash_writes": 0,
             }
         )
-        tip = tip_of(model, machine.arm.flange(), tips[MOUNTED_TOOL])
+        tip = tip_of(model, robot.arm.flange(), tips[MOUNTED_TOOL])
         pin_mm = pin_beside((tip.x_mm, tip.y_mm, tip.z_mm), rng)
         return cls(
-            machine,
+            inputs,
+            robot,
             tips,
             pin_mm,
             seed=seed,
@@ -144,11 +149,11 @@ class World(Workplace):
             noise_mm=noise_mm,
             rng=random.Random(f"input {number} {self._seed}"),
         )
-        self.machine.inputs.connect(number, sense)
+        self._inputs.connect(number, sense)
 
     def disconnect(self, number: int) -> None:
         """Take off what an input is connected to; it is off then."""
-        self.machine.inputs.set(number, on=False)
+        self._inputs.set(number, on=False)
 
     def truth(self) -> dict[str, Any]:
         """Return all of it, ready for JSON."""
@@ -211,7 +216,7 @@ class PendantOperator(SimulatedOperator):
 class _HandledArm:
     """Implements :class:`~robolink_simulators.cell.workplace.Handled`."""
 
-    def __init__(self, machine: Machine, now_ns: Callable[[], int]) -> None:
+    def __init__(self, machine: DrivenRobot, now_ns: Callable[[], int]) -> None:
         self._machine = machine
         self._now_ns = now_ns
 

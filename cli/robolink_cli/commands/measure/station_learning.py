@@ -11,11 +11,13 @@ from robolink.nozzle_change import (
     flange_now,
     foresee,
     height_is_known,
+    require_contact_input,
     require_inside,
     tip_sigma_mm,
     touching_as_recorded,
 )
 from robolink.procedures import MeasurementContext, TouchPlan
+from robolink.runner import inputs_of
 from robolink.stations import Found, Station, StationKind, find_stations, station_entry
 from robolink_cli.console.render import note, table
 from robolink_cli.prompts.operator import operator_at
@@ -51,6 +53,8 @@ def learn(
     with open_controller(context._replace(station=name), changes=not dry_run) as controller:
         known = _known(context, controller, name)
         tip = _tip(controller, tool)
+        if touch.contact is not None:
+            inputs_of(controller)
         touch = touching_as_recorded(controller, touch, name)
         here = flange_now(controller)
         course = learn_station(
@@ -63,6 +67,7 @@ def learn(
             return
         require_inside(controller, steps)
         controller.require_settled(tr("learn station {name}", name=name))
+        require_contact_input(controller, touch)
         purpose = tr("to find station {name} with tool {tool}", name=name, tool=tool)
         question = motion_question(
             controller, purpose, speed_mm_s=limits.speed_mm_s, box_mm=limits.box.x_max_mm

@@ -57,7 +57,14 @@ def host_and_port(address: str, option: str) -> tuple[str, int]:
     """
     host, colon, port = address.rpartition(":")
     host = host.removeprefix("[").removesuffix("]")
-    if not (colon and host and port.isascii() and port.isdigit() and int(port) <= 0xFFFF):
+    if not (
+        colon
+        and host
+        and port.isascii()
+        and port.isdigit()
+        and len(port) <= 5
+        and int(port) <= 0xFFFF
+    ):
         raise ConfigError(
             tr("{address!r} is no address to listen on.", address=address),
             remedy=tr("Write for example {option} 127.0.0.1:5000.", option=option),

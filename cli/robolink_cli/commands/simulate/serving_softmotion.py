@@ -87,7 +87,14 @@ def _can_place(text: str, node: int) -> "CanPlace":
     port = str(MULTICAST_PORT)
     if interface == _MULTICAST and ":" in channel:
         channel, _, port = channel.rpartition(":")
-    if not (interface and channel and port.isascii() and port.isdigit() and int(port) <= 0xFFFF):
+    if not (
+        interface
+        and channel
+        and port.isascii()
+        and port.isdigit()
+        and len(port) <= 5
+        and int(port) <= 0xFFFF
+    ):
         raise ConfigError(
             tr("{text!r} names no CAN bus.", text=text),
             remedy=tr("Write for example --can udp_multicast:239.74.163.2:43113."),

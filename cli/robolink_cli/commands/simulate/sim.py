@@ -14,7 +14,9 @@ def _complete_robot(_: click.Context, __: click.Parameter, start: str) -> list[s
     """Return the models whose names begin so, for TAB."""
     from robolink_simulators.epson.arm.robots import robot_names
 
-    return [name for name in robot_names() if name.casefold().startswith(start.casefold())]
+    before, comma, last = start.rpartition(",")
+    names = [name for name in robot_names() if name.casefold().startswith(last.casefold())]
+    return [f"{before}{comma}{name}" for name in names]
 
 
 @click.group()
@@ -41,7 +43,7 @@ sim.add_command(softmotion)
     default="T6-602S",
     show_default=True,
     shell_complete=_complete_robot,
-    help="Model of the robot, for example GX4-C351S, RS4-C351S or C8-C901S.",
+    help="Model of the robot, for example RS4-C351S or C8-C901S; several with commas between.",
 )
 @click.option(
     "--password-env",

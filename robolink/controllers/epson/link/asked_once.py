@@ -42,12 +42,16 @@ class RobotFacts:
     """Reads which robot is in force, when that is needed first.
 
     Execute acts on the robot chosen with SetCurRobot (docs/reference/epson.md 1.5); robolink never
-    changes that choice.
+    changes that choice, but a statement that a person typed may.
     """
 
     def __init__(self, window: CommandWindow) -> None:
         self._window = window
         self._robot: Robot | None = None
+
+    def forget(self) -> None:
+        """Ask again when it is needed next: another robot may be in force."""
+        self._robot = None
 
     def read(self, request: str = "Print Robot") -> Robot:
         """Return the robot in force.

@@ -107,20 +107,28 @@ class CommandDesk:
         return status_fields(flags, self._condition.code, self._options.status_flags)
 
     def _set_current_robot(self, robot: str) -> Fields:
-        if number(robot, 1) == 0 and self._options.robot_zero == "error_12":
+        chosen = check_robot(robot, self._machine)
+        if chosen == 0 and self._options.robot_zero == "error_12":
             raise malformed()
+        if chosen:
+            self._machine.choose(chosen)
         return ()
 
-    def _check_robot(self, robot: tuple[str, ...]) -> None:
-        """Accept robot 1, 0 for all, or no number where that means one of them."""
+    def _check_robot(self, robot: tuple[str, ...]) -> int:
+        """Return the number of a robot, 0 for all; none where that means one of them."""
         if robot:
-            check_robot(*robot)
-        elif self._options.missing_robot_number == "error_12":
+            return check_robot(robot[0], self._machine)
+        if self._options.missing_robot_number == "error_12":
             raise malformed()
+        in_force = self._options.missing_robot_number == "current"
+        return self._machine.robot_number if in_force else 0
 
     def _switch_motors(self, robot: tuple[str, ...], *, on: bool) -> Fields:
-        self._check_robot(robot)
-        self._machine.switch_motors(on)
+        chosen = self._check_robot(robot)
+        if chosen:
+            self._machine.robots[chosen - 1].switch_motors(on)
+        else:
+            self._machine.switch_all_motors(on)
         return ()
 
     def _start(self, function: str) -> Fields:

@@ -5,17 +5,18 @@ The order of fields is that of Epson's own client; the values are the simulator'
 
 from collections.abc import Callable
 from dataclasses import asdict
+from functools import partial
 from typing import Final
 
 from robolink.protocols.epson_text import ErrorCode, Preference, preferences_field
 from robolink_simulators.epson.card import ControllerCard
 from robolink_simulators.epson.condition import Condition
 from robolink_simulators.epson.machine import Machine
+from robolink_simulators.epson.memory.driven_robot import DrivenRobot
 from robolink_simulators.epson.options import EpsonOptions
 from robolink_simulators.epson.remote.io_commands import Fields, Served
 from robolink_simulators.epson.request_refusals import malformed, number
 
-_SCARA: Final = "3"
 _NOT_APPLICABLE: Final = "-1"
 _AXES: Final = 6
 _HIGHEST_LANGUAGE: Final = 6  # Spanish, which only ErrMsg$ documents (docs/reference/spel.md 4.4)
@@ -40,6 +41,7 @@ def query_commands(
     machine: Machine, condition: Condition, card: ControllerCard, options: EpsonOptions
 ) -> dict[str, Served]:
     """Return the queries by lower-case name."""
+    of_robot = partial(_of_robot, machine)
     health = _NEW if options.maintenance_data else (_NOT_APPLICABLE,)
     return {
         "getcontname": lambda: (card.name,),
@@ -55,18 +57,16 @@ def query_commands(
         "getcontsettings": lambda: (card.settings or preferences_field(preferences_of(options)),),
         "getcameramodel": lambda: (card.camera,),
         "getforceserial": lambda: (card.force_sensor,),
-        "getrobotinfo": lambda: ("1", _SCARA, machine.model.name),
-        "getrobotname": _of_robot(lambda: ("1", card.robot_name)),
-        "getrobotserial": _of_robot(lambda: ("1", machine.serial)),
-        "getmotor": _of_robot(
-            lambda: ("1", str(int(machine.motors_on)), str(int(machine.power_high)))
-        ),
-        "gethofs": _of_robot(lambda: ("0.000",) * _AXES),
+        "getrobotinfo": lambda: of_robot(_kind)("0"),
+        "getrobotname": of_robot(lambda _: (card.robot_name,)),
+        "getrobotserial": of_robot(lambda robot: (robot.serial,)),
+        "getmotor": of_robot(_drives),
+        "gethofs": of_robot(lambda _: ("0.000",) * _AXES, counted=False),
         "geterrmsg": _messages(card, options),
         "geterrfunc": lambda code: _function_of(condition, number(code)),
         "gethealthcont": lambda: health,
-        "gethealthrb": _of_robot(lambda: health),
-        "getpartwarning": _of_robot(lambda: ("0",) * _WARNED_PARTS),
+        "gethealthrb": of_robot(lambda _: health, counted=False),
+        "getpartwarning": of_robot(lambda _: ("0",) * _WARNED_PARTS, counted=False),
     }
 
 
@@ -83,13 +83,13 @@ def preferences_of(options: EpsonOptions) -> frozenset[Preference]:
     return frozenset(preference for preference, is_on in on.items() if is_on)
 
 
-def check_robot(text: str) -> None:
-    """Accept robot 1, the only one, and 0 for all.
+def check_robot(text: str, machine: Machine) -> int:
+    """Return the number of a robot that there is, or 0 for all.
 
     Raises:
         Refused: There is no such robot.
     """
-    number(text, 1)
+    return number(text, len(machine.robots))
 
 
 class Alarms:
@@ -130,12 +130,30 @@ def _function_of(condition: Condition, code: int) -> Fields:
     return ("main".ljust(_WIDTH_OF_A_FUNCTION), "1", "1", "1", _STAMP)
 
 
-def _of_robot(answer: Callable[[], Fields]) -> Served:
+def _of_robot(
+    machine: Machine, answer: Callable[[DrivenRobot], Fields], *, counted: bool = True
+) -> Served:
+    """Return a query of one robot, or of all with 0; the answer may begin with their number.
+
+    Source: docs/reference/epson.md 1.8.
+    """
+
     def serve(robot: str, *_more: str) -> Fields:
-        check_robot(robot)
-        return answer()
+        asked = check_robot(robot, machine)
+        told = machine.robots if asked == 0 else (machine.robots[asked - 1],)
+        if not counted:
+            return answer(told[0])
+        return (str(len(told)), *(field for one in told for field in answer(one)))
 
     return serve
+
+
+def _kind(robot: DrivenRobot) -> Fields:
+    return (str(robot.model.robot_type), robot.model.name)
+
+
+def _drives(robot: DrivenRobot) -> Fields:
+    return (str(int(robot.motors_on)), str(int(robot.power_high)))
 
 
 def _messages(card: ControllerCard, options: EpsonOptions) -> Served:

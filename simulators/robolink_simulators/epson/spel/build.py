@@ -80,15 +80,20 @@ class TreeBuilder(Transformer[Token, tuple[Statement, ...]]):
         limz = next((option.limz for option in options if option.limz is not None), None)
         untils = [option.until for option in options if option.until is not None]
         until = untils[0] if untils else None
-        return MotionStatement(verb.lower(), targets, MotionOptions(words, limz, until))
+        ljm = next((option.ljm for option in options if option.ljm is not None), None)
+        return MotionStatement(verb.lower(), targets, MotionOptions(words, limz, ljm, until))
 
     def plain_option(self, word: Token) -> MotionOptions:
-        """Build CP, ROT, LJM or an arch number."""
+        """Build CP, ROT or an arch number."""
         return MotionOptions(frozenset({word.lower()}))
+
+    def ljm_option(self, word: Token, flag: Expression | None) -> MotionOptions:
+        """Build LJM with or without its flag."""
+        return MotionOptions(frozenset({word.lower()}), ljm=flag)
 
     def limz_option(self, word: Token, value: Expression | None) -> MotionOptions:
         """Build LimZ with or without a height."""
-        return MotionOptions(frozenset({word.lower()}), value)
+        return MotionOptions(frozenset({word.lower()}), limz=value)
 
     def until_option(self, word: Token, condition: Expression | None) -> MotionOptions:
         """Build Till or Find with or without a condition."""

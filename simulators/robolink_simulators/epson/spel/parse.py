@@ -33,12 +33,12 @@ OF_OTHER_ROBOTS: Final = frozenset(_WORDS_OF_OTHER_ROBOTS.split())
 """Statements that the reference allows, for arms that this simulator has none of."""
 
 _WORDS_NOT_SIMULATED = """
-    arch armclr armset atrq autoljm box dispdev ecpset enctemper finedist hofs hordr hour jrange
+    arch armclr armset atrq autoljm box dispdev enctemper finedist hofs hordr hour jrange
     limittorque limittorquelp limittorquestop limzmargin mcordr msgbox olaccel olrate opencom
     opennet outreal parsestr performmode plane plocal ptpboost ptrq qpdecelr qpdecels shutdown
     softcp speedrlimitation syncrobots taskstate tclim tcspeed time xylim xylimmode diffpoint
     arc3 atclr bgo boxclr calib clearpoints closecom closenet close cls copy ctreset curve cvmove
-    date del ecpclr eresume error exportpoints flush fmtstr homeclr hofsjointaccuracy importpoints
+    date del eresume error exportpoints flush fmtstr homeclr hofsjointaccuracy importpoints
     input inputbox jtran latchenable line loadpoints localclr mcal mkdir opbcd palletclr
     pdescription planeclr ptclr ptran qp randomize read redim rename resetelapsedtime savepoints
     setcom setin setinreal setinw setlatch setnet setsw signal simset taskwait tc tmreset toff ton

@@ -131,6 +131,7 @@ class MotionOptions:
 
     words: frozenset[str] = frozenset()
     limz: Expression | None = None
+    ljm: Expression | None = None
     until: Until | None = None
 
 

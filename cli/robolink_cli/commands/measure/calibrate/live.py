@@ -84,7 +84,7 @@ class LiveCalibration:
             NotReadyError: The state forbids it.
         """
         self._controller.require_settled(tr("calibrate tool {tool}", tool=self.tool))
-        require_ready(self._plan)
+        require_ready(self._controller, self._plan)
         note_change(self._controller, self.tool, self._controller.tools.read(self.tool))
         keep_first_backup(self._controller, tell=note)
 

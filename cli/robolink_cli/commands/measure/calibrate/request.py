@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from robolink.methods import LengthRule
     from robolink.nozzle_change import AcceptanceCriteria, ChangePlan, Limits, ToolPlan
     from robolink.procedures import TipSource
-    from robolink.stations import Gauge
+    from robolink.stations import Station
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,24 +85,25 @@ class CalibrationRequest:
         one = self.tool_plan(source, verify=self.verify)
         return ChangePlan((one,), limits=self.limits, ask_before_write=not self.yes)
 
-    def _gauge(self) -> "Gauge | None":
-        """Return the gauge that the cell file puts at the station, if there is one."""
+    def _stated(self) -> "Station | None":
+        """Return the station as the cell file has it, if it does."""
         from robolink.stations import find_stations
 
-        station = find_stations(self.context.cell, ()).get(self.context.station)
-        return None if station is None else station.gauge_on_record()
+        return find_stations(self.context.cell, ()).get(self.context.station)
 
     def tool_plan(self, source: "TipSource", *, verify: bool) -> "ToolPlan":
         """Return what is to be done about the tool."""
         from robolink.nozzle_change import ToolPlan
 
+        stated = self._stated()
         return ToolPlan(
             self.tool,
             source,
             self.criteria,
             verify=verify,
             pin=self.pin,
-            gauge=self._gauge(),
+            stated_pin=stated if self.pin else None,
+            gauge=None if stated is None else stated.gauge_on_record(),
             method=self.method,
             length=self.length,
             station=self.station,

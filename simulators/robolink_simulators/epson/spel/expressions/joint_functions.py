@@ -128,8 +128,10 @@ def least_motion(machine: Machine, target: Point, flag: int = 1) -> Joints:
     "Flags").
 
     Raises:
-        Refusal: No way leads there inside the ranges of the joints.
+        Refusal: No way leads there inside the ranges of the joints, or there is no such flag.
     """
+    if not 1 <= flag <= _HIGHEST_LJM:
+        raise out_of_range(f"LJM flag {flag}")
     model, near = machine.model, machine.arm.joints
     flange = flange_of(model, machine.pose_of(target), machine.offset)
     start = _standing(machine, target)
@@ -184,8 +186,6 @@ def with_least_motion(session: Session, arguments: Arguments) -> Point:
     if len(arguments) > 1 and as_point(arguments[1]) != Point.at(machine.tip()):
         raise SpelRefusal(RefusalKind.NOT_SIMULATED, "LJM counts from where the arm is here")
     flag = as_integer(arguments[2]) if len(arguments) > 2 else 1
-    if not 1 <= flag <= _HIGHEST_LJM:
-        raise out_of_range(f"LJM flag {flag}")
     return machine.flagged(target, least_motion(machine, target, flag))
 
 

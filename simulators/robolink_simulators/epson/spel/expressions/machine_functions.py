@@ -122,8 +122,8 @@ MACHINE_FUNCTIONS: Final[dict[str, tuple[range, MachineFunction]]] = {
     "sfree": (range(1, 2), lambda s, a: int(as_integer(a[0]) in s.machine.settings.free_joints)),
     "arm": (range(1), lambda *_: 0),
     "armdef": (range(1, 2), lambda _, a: as_integer(a[0]) == 0),
-    "ecp": (range(1), lambda *_: 0),
-    "ecpdef": (range(1, 2), lambda *_: False),
+    "ecp": (range(1), lambda s, _: s.machine.control_points.selected),
+    "ecpdef": (range(1, 2), lambda s, a: s.machine.control_points.defined(as_integer(a[0]))),
     "agl": (range(1, 2), lambda s, a: _item(s.machine.arm.joints, a)),
     "pls": (range(1, 2), _pulses),
     "tillon": (range(1), lambda s, _: s.machine.till_met),
@@ -224,5 +224,6 @@ POINT_FUNCTIONS: Final[dict[str, tuple[range, PointFunction]]] = {
     "findpos": (range(1), _found_position),
     "tlset": (range(1, 2), _tool_point),
     "local": (range(1, 2), _local_point),
+    "ecpset": (range(1, 2), lambda s, a: Point(s.machine.control_points.get(as_integer(a[0])))),
 }
 """Name to the numbers of arguments allowed and the function."""

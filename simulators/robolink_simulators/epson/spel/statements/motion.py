@@ -84,8 +84,11 @@ def plan(evaluator: Evaluator, motion: MotionStatement) -> list[Leg]:
             if verb.endswith("move"):
                 return [_line(machine, target, rot="rot" in motion.options.words)]
             least = machine.model.six_axes and (verb != "go" or "ljm" in motion.options.words)
-            joints = least_motion(machine, target) if least else machine.joints_for(target)
-            return [go_leg(machine, machine.arm.joints, joints)]
+            if not least:
+                return [go_leg(machine, machine.arm.joints, machine.joints_for(target))]
+            ljm = motion.options.ljm
+            flag = 1 if ljm is None else evaluator.integer(ljm)
+            return [go_leg(machine, machine.arm.joints, least_motion(machine, target, flag))]
 
 
 def require_drives(machine: Machine) -> None:

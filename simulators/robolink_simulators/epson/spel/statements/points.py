@@ -111,6 +111,20 @@ def _flag(evaluator: Evaluator, command: KeywordStatement) -> str:
     return ""
 
 
+def _control_point(evaluator: Evaluator, command: KeywordStatement) -> str:
+    """Define an external control point; flags and local of the point do not count (assumed)."""
+    number, *values = _expect(command, 2, 5, 7)
+    place = point_argument(evaluator, tuple(values)).coordinates
+    evaluator.session.machine.control_points.set(evaluator.integer(number), place)
+    return ""
+
+
+def _no_control_point(evaluator: Evaluator, command: KeywordStatement) -> str:
+    (number,) = _expect(command, 1)
+    evaluator.session.machine.control_points.clear(evaluator.integer(number))
+    return ""
+
+
 POINT_STATEMENTS: Final[dict[str, Callable[[Evaluator, KeywordStatement], str]]] = {
     "here": _here,
     "plist": _plist,
@@ -118,6 +132,8 @@ POINT_STATEMENTS: Final[dict[str, Callable[[Evaluator, KeywordStatement], str]]]
     "plabel": _label,
     "pallet": _pallet,
     "local": _local,
+    "ecpset": _control_point,
+    "ecpclr": _no_control_point,
     **dict.fromkeys(FLAG_FUNCTIONS, _flag),
 }
 """Keyword to what carries it out."""

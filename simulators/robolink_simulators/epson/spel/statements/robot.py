@@ -79,7 +79,7 @@ def _continuous_path(machine: Machine, values: Numbers) -> str:
 
 
 def _numbered(kind: RefusalKind) -> Setting:
-    """Return Arm or ECP: number 0 is there, no other was ever defined."""
+    """Return Arm: number 0 is there, no other was ever defined."""
 
     def choose(_: Machine, values: Numbers) -> str:
         _expect(values, 0, 1)
@@ -130,6 +130,14 @@ def _home_set(machine: Machine, values: Numbers) -> str:
     return "".join(f"{a} {b}{CRLF}" for a, b in zip(home[::2], home[1::2], strict=True))
 
 
+def _control_point(machine: Machine, values: Numbers) -> str:
+    _expect(values, 0, 1)
+    if not values:
+        return number_text(machine.control_points.selected) + CRLF
+    machine.control_points.select(int(values[0]))
+    return ""
+
+
 def _avoid_singularity(machine: Machine, values: Numbers) -> str:
     """Set or show AvoidSingularity; 5 is for another kind of robot (documented: 4002)."""
     if machine.model.mechanism is Mechanism.SCARA:
@@ -156,7 +164,7 @@ ROBOT_SETTINGS: Final[dict[str, Setting]] = {
     "speedfactor": _speed_factor,
     "cp": _continuous_path,
     "arm": _numbered(RefusalKind.ARM_UNDEFINED),
-    "ecp": _numbered(RefusalKind.ECP_UNDEFINED),
+    "ecp": _control_point,
     "sfree": _free,
     "slock": _lock,
     "homeset": _home_set,

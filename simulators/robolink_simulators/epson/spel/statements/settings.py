@@ -146,7 +146,7 @@ def _robot(machine: Machine, values: Numbers) -> str:
     _expect(values, 0, 1)
     if not values:
         return _shown(machine.robot_number)
-    _checked(values, machine.robot_number, machine.robot_number)
+    machine.choose(int(values[0]))
     return ""
 
 

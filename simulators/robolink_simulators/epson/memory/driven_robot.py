@@ -1,0 +1,161 @@
+"""One robot of a controller: its arm, and what the controller keeps for it alone."""
+
+import random
+from dataclasses import replace
+
+from robolink.model import Pose, ToolOffset
+from robolink_simulators.epson.arm.arm import Arm
+from robolink_simulators.epson.arm.joints import Joints, check_ranges
+from robolink_simulators.epson.arm.kinematics import (
+    flange_of,
+    forward,
+    hand_of,
+    posture_of,
+    solve,
+    tip_of,
+)
+from robolink_simulators.epson.arm.motion_parameters import MotionParameters
+from robolink_simulators.epson.arm.robot_settings import RobotSettings
+from robolink_simulators.epson.arm.robots import RobotModel
+from robolink_simulators.epson.memory.control_points import ControlPoints
+from robolink_simulators.epson.memory.pallets import PalletTable
+from robolink_simulators.epson.memory.points import LocalTable, Point, PointTable
+from robolink_simulators.epson.memory.tools import ToolMemory
+
+
+class DrivenRobot:
+    """A robot: arm, tools, points, locals, pallets, settings, motors and power.
+
+    Args:
+        model: Which robot.
+        joints: Where the arm stands; see :class:`Arm`.
+        backlash_deg: See :class:`Arm`.
+        serial: What RobotSerial$ gives.
+
+    Attributes:
+        arm: The arm in simulated time.
+        tools: Tool definitions and the tool in force.
+        points: P0 to P999.
+        locals: Local coordinate systems.
+        parameters: Speeds, accelerations, LimZ.
+        settings: What it is told about its load, its arm and its joints.
+        pallets: Pallets 0 to 15.
+        control_points: External control points 1 to 15.
+        sensed: Whether the last Jump was stopped by its Sense.
+        till_met: Whether the last motion was stopped by its Till.
+        found: Where the last Find met its condition, the selected tool's tip.
+        motors_on: Whether the motors are on.
+        power_high: Whether power is high; low after anything that resets the parameters.
+    """
+
+    def __init__(
+        self,
+        model: RobotModel,
+        *,
+        joints: Joints | None = None,
+        backlash_deg: float = 0.0,
+        serial: str,
+    ) -> None:
+        self.model = model
+        self.serial = serial
+        self.arm = Arm(model, joints, backlash_deg=backlash_deg)
+        self.tools = ToolMemory()
+        self.points = PointTable()
+        self.locals = LocalTable(tilting=model.six_axes)
+        self.parameters = MotionParameters()
+        self.settings = RobotSettings.of(model.axes)
+        self.pallets = PalletTable()
+        self.control_points = ControlPoints()
+        self.sensed = False
+        self.till_met = False
+        self.found: Point | None = None
+        self.motors_on = False
+        self.power_high = False
+
+    @property
+    def offset(self) -> ToolOffset | None:
+        """The definition of the tool in force, ``None`` for the flange."""
+        return self.tools.get(self.tools.selected)
+
+    def tip(self) -> Pose:
+        """Return the commanded pose of the selected tool's tip (Here, CurPos)."""
+        return self._tip_of(self.arm.flange())
+
+    def real_tip(self, rng: random.Random, noise_mm: float) -> Pose:
+        """Return the measured pose of the selected tool's tip (RealPos)."""
+        return self._tip_of(self.arm.real_position(rng, noise_mm))
+
+    def tip_at(self, joints: Joints) -> Pose:
+        """Return where the selected tool's tip would be with other joints.
+
+        Raises:
+            OutOfReach: A joint would leave its range.
+        """
+        check_ranges(self.model, joints)
+        return self._tip_of(forward(self.model, joints))
+
+    def joints_for(self, target: Point) -> Joints:
+        """Return the joints that bring the selected tool's tip to a point.
+
+        Raises:
+            Refusal: Its local is not defined, or the arm cannot take it up.
+        """
+        joints = self.solved(target)
+        check_ranges(self.model, joints)
+        return joints
+
+    def solved(self, target: Point) -> Joints:
+        """Return the joints of :meth:`joints_for`, whatever their ranges.
+
+        Raises:
+            Refusal: Its local is not defined, or the arm is too short.
+        """
+        flange = flange_of(self.model, self.pose_of(target), self.offset)
+        return solve(self.model, flange, target.hand, target.posture)
+
+    def flagged(self, target: Point, joints: Joints) -> Point:
+        """Return a point with the flags of the joints that take it up."""
+        hand, posture = hand_of(self.model, joints), posture_of(self.model, joints)
+        return replace(target, hand=hand, posture=posture)
+
+    def pose_of(self, target: Point) -> Pose:
+        """Return where a point is in the base frame; on four axes without V and W.
+
+        Raises:
+            Refusal: Its local is not defined.
+        """
+        base = self.locals.to_base(target)
+        x, y, z, u, v, w = base.coordinates
+        if not self.model.six_axes:
+            v = w = 0.0
+        return Pose(x, y, z, u, v, w, hand=base.hand, posture=base.posture)
+
+    def switch_motors(self, on: bool) -> None:
+        """Switch the motors; on also resets the motion parameters (docs/reference/spel.md 6.3)."""
+        self.motors_on = on
+        if on:
+            self.reset_motion_parameters()
+
+    def reset_motion_parameters(self) -> None:
+        """Set the defaults and low power: start-up, Motor On, Reset and the like.
+
+        Source: docs/reference/spel.md 6.3.
+        """
+        self.parameters = MotionParameters()
+        self.power_high = False
+        self.settings.reset()
+
+    def forget_volatile(self, now_ns: int) -> None:
+        """Forget what a power cycle takes: all but tools, HomeSet and its place."""
+        self.arm.halt(now_ns)
+        self.switch_motors(False)
+        self.reset_motion_parameters()
+        home = self.settings.home_pulses
+        self.settings = RobotSettings.of(self.model.axes)
+        self.settings.home_pulses = home
+        self.points = PointTable()
+        self.locals = LocalTable(tilting=self.model.six_axes)
+        self.control_points.selected = 0
+
+    def _tip_of(self, flange: Pose) -> Pose:
+        return tip_of(self.model, flange, self.offset, tool=self.tools.selected)

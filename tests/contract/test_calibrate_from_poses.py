@@ -372,46 +372,6 @@ def test_points_at_two_heights_are_refused_and_others_say_that_nobody_saw_them(c
     assert "touches_not_witnessed" in json.loads(out)["fit"]["notes"]
 
 
-def test_that_nobody_saw_the_touches_is_said_though_yes_was_said_beforehand(command, simulator):
-    code, out, err = command(*calibrate("--points", "901,902", "--yes"))
-    assert code == 0
-    assert "Nobody saw these touches being made" in out
-    assert "not proved" in out + err
-    assert "verified" not in out + err
-    assert stored(simulator) != STORED
-
-
-BUMPED = (*((u, 0.0) for u in (0, 180, 90, -90)), *((u, 0.15) for u in (45, -135, 135, -45)))
-"""The pin was pushed by 0.15 mm between the fourth touch and the fifth."""
-
-
-def bumped_file(folder, step_mm):
-    """Write touches with a scatter of some micrometres, and the pin pushed by ``step_mm``."""
-    errors = (0.004, -0.003, 0.002, -0.005, 0.003, 0.001, -0.004, 0.002)
-    path = folder / "poses.csv"
-    lines = ["x_mm,y_mm,z_mm,u_deg"]
-    for (u, pushed), error in zip(BUMPED, errors, strict=True):
-        pose = touching(u)
-        x_mm = pose.x_mm + step_mm * (pushed > 0) + error
-        lines.append(f"{x_mm:.3f},{pose.y_mm - error:.3f},{pose.z_mm:.3f},{u}")
-    path.write_text("\n".join(lines))
-    return str(path)
-
-
-def test_touches_between_which_the_pin_moved_are_not_written_while_nobody_is_asked(
-    command, simulator, tmp_path
-):
-    before = stored(simulator)
-    words = ("calibrate", "n-angle", "--tool", "1", "--poses")
-    code, out, _ = command(*words, bumped_file(tmp_path, 0.15), "--yes", "--json")
-    assert (code, json.loads(out)["error"]["code"]) == (7, "step_in_run_order")
-    assert json.loads(out)["error"]["what"] == ("Between touch 4 and 5 something moved by 0.15 mm.")
-    assert stored(simulator) == before
-    code, out, _ = command(*words, bumped_file(tmp_path, 0.0), "--yes", "--json")
-    assert code == 0, out
-    assert stored(simulator) != before
-
-
 @pytest.mark.parametrize("tool", ["1", "5"])
 def test_poses_in_inches_are_refused_by_where_the_robot_is(command, simulator, tmp_path, tool):
     """Tool 5 has no value that would tell it by its length."""
@@ -450,3 +410,43 @@ def test_a_pin_that_was_touched_in_a_local_is_not_kept_as_one_of_the_base(comman
     assert "PIN-07" not in command("station", "list", "--json")[1]
     assert command(*words)[0] == 0
     assert stored(simulator) == ToolOffset(12.3, -3.9, -20.0)
+
+
+def test_that_nobody_saw_the_touches_is_said_though_yes_was_said_beforehand(command, simulator):
+    code, out, err = command(*calibrate("--points", "901,902", "--yes"))
+    assert code == 0
+    assert "Nobody saw these touches being made" in out
+    assert "not proved" in out + err
+    assert "verified" not in out + err
+    assert stored(simulator) != STORED
+
+
+BUMPED = (*((u, 0.0) for u in (0, 180, 90, -90)), *((u, 0.15) for u in (45, -135, 135, -45)))
+"""The pin was pushed by 0.15 mm between the fourth touch and the fifth."""
+
+
+def bumped_file(folder, step_mm):
+    """Write touches with a scatter of some micrometres, and the pin pushed by ``step_mm``."""
+    errors = (0.004, -0.003, 0.002, -0.005, 0.003, 0.001, -0.004, 0.002)
+    path = folder / "poses.csv"
+    lines = ["x_mm,y_mm,z_mm,u_deg"]
+    for (u, pushed), error in zip(BUMPED, errors, strict=True):
+        pose = touching(u)
+        x_mm = pose.x_mm + step_mm * (pushed > 0) + error
+        lines.append(f"{x_mm:.3f},{pose.y_mm - error:.3f},{pose.z_mm:.3f},{u}")
+    path.write_text("\n".join(lines))
+    return str(path)
+
+
+def test_touches_between_which_the_pin_moved_are_not_written_while_nobody_is_asked(
+    command, simulator, tmp_path
+):
+    before = stored(simulator)
+    words = ("calibrate", "n-angle", "--tool", "1", "--poses")
+    code, out, _ = command(*words, bumped_file(tmp_path, 0.15), "--yes", "--json")
+    assert (code, json.loads(out)["error"]["code"]) == (7, "step_in_run_order")
+    assert json.loads(out)["error"]["what"] == ("Between touch 4 and 5 something moved by 0.15 mm.")
+    assert stored(simulator) == before
+    code, out, _ = command(*words, bumped_file(tmp_path, 0.0), "--yes", "--json")
+    assert code == 0, out
+    assert stored(simulator) != before

@@ -49,6 +49,7 @@ if TYPE_CHECKING:
     from robolink.calibration.core.frames import tilted_from as tilted_from
     from robolink.calibration.core.frames import tip_pose as tip_pose
     from robolink.calibration.core.frames import toward_zero as toward_zero
+    from robolink.calibration.core.least_squares import linear_fit as linear_fit
     from robolink.calibration.core.pose_checks import MIN_ROTATION_DEG as MIN_ROTATION_DEG
     from robolink.calibration.core.pose_checks import angle_spread_deg as angle_spread_deg
     from robolink.calibration.core.pose_checks import planar_sigma_gain as planar_sigma_gain
@@ -175,11 +176,20 @@ if TYPE_CHECKING:
     )
     from robolink.calibration.touch.plane_touch import PlaneTouchResult as PlaneTouchResult
     from robolink.calibration.touch.plane_touch import TouchedPlane as TouchedPlane
+    from robolink.calibration.touch.plane_touch import plane_columns as plane_columns
     from robolink.calibration.touch.plane_touch import solve_plane_touch as solve_plane_touch
     from robolink.calibration.touch.sphere_touch import SphereTouchResult as SphereTouchResult
     from robolink.calibration.touch.sphere_touch import solve_sphere_touch as solve_sphere_touch
+    from robolink.calibration.touch.sphere_touch import sphere_columns as sphere_columns
+    from robolink.calibration.touch.sphere_touch import sphere_through as sphere_through
     from robolink.calibration.touch.standoff import Standoff as Standoff
     from robolink.calibration.touch.standoff import StandoffSeries as StandoffSeries
+    from robolink.calibration.touch.surface_evidence import SurfaceEvidence as SurfaceEvidence
+    from robolink.calibration.touch.surface_evidence import (
+        judge_surface_touches as judge_surface_touches,
+    )
+    from robolink.calibration.touch.surface_fit import tip_is_told as tip_is_told
+    from robolink.calibration.touch.surface_standoff import SurfaceStandoffs as SurfaceStandoffs
     from robolink.calibration.touch.touch_evidence import TouchEvidence as TouchEvidence
     from robolink.calibration.touch.touch_evidence import WitnessedTouch as WitnessedTouch
     from robolink.calibration.touch.touch_evidence import height_limit_mm as height_limit_mm
@@ -220,6 +230,7 @@ __getattr__ = lazy_exports(
         "suggest_poses",
         "core.result": "CalibrationResult Drift DriftVerdict GUARD_FACTOR PERSON_U_DRIFT_MM "
         "PROBE_U_DRIFT_MM VerifyResult judge_drift offset_sigma_mm worst_of",
+        "core.least_squares": "linear_fit",
         "core.robust": "Floats Robust",
         "core.rotations": "pose_arrays quaternion_rotations rotation_of rotations uvw_deg zyz_deg",
         "core.statistics": "NORMAL_95 chi_square_quantile f_quantile normal_quantile student_t "
@@ -250,9 +261,12 @@ __getattr__ = lazy_exports(
         "writes_refused_unattended",
         "quality.verify_drift": "PLACING_TOLERANCE_MM verify_drift",
         "touch.length": ("LengthChange LengthDecision length_change length_not_observable"),
-        "touch.plane_touch": "TouchedPlane PlaneTouchResult solve_plane_touch",
-        "touch.sphere_touch": "SphereTouchResult solve_sphere_touch",
+        "touch.plane_touch": "TouchedPlane PlaneTouchResult plane_columns solve_plane_touch",
+        "touch.sphere_touch": "SphereTouchResult solve_sphere_touch sphere_columns sphere_through",
         "touch.standoff": "Standoff StandoffSeries",
+        "touch.surface_evidence": "SurfaceEvidence judge_surface_touches",
+        "touch.surface_fit": "tip_is_told",
+        "touch.surface_standoff": "SurfaceStandoffs",
         "touch.touch_evidence": "TouchEvidence WitnessedTouch "
         "height_limit_mm judge_touches least_jog_mm stand_upright",
         "touch.touch_limits": "FARTHEST_MM HIGHEST_MM PERSON_SIGMA_Z_MM PROBE_SIGMA_Z_MM",

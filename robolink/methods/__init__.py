@@ -57,6 +57,9 @@ if TYPE_CHECKING:
         UprightPinParameters as UprightPinParameters,
     )
     from robolink.methods.declaration.site import Site as Site
+    from robolink.methods.declaration.surface_parameters import (
+        SurfaceParameters as SurfaceParameters,
+    )
     from robolink.methods.n_angle.parameters import NAngleParameters as NAngleParameters
     from robolink.methods.n_angle.parameters import most_informative_order as most_informative_order
     from robolink.methods.n_angle.procedure import measure_n_angle as measure_n_angle
@@ -81,6 +84,13 @@ if TYPE_CHECKING:
     from robolink.methods.pivot.tilts import Tilt as Tilt
     from robolink.methods.pivot.tilts import informative_tilts as informative_tilts
     from robolink.methods.pivot.tilts import proving_tilts as proving_tilts
+    from robolink.methods.plane_touch.parameters import (
+        PlaneTouchParameters as PlaneTouchParameters,
+    )
+    from robolink.methods.plane_touch.procedure import measure_plane_touch as measure_plane_touch
+    from robolink.methods.plane_touch.source import PlaneTouches as PlaneTouches
+    from robolink.methods.plane_touch.source import PlaneTouchSource as PlaneTouchSource
+    from robolink.methods.plane_touch.survey import PlaneSurvey as PlaneSurvey
     from robolink.methods.points.parameters import PointsParameters as PointsParameters
     from robolink.methods.points.source import PointsSource as PointsSource
     from robolink.methods.points.source import PosesFound as PosesFound
@@ -103,6 +113,15 @@ if TYPE_CHECKING:
     from robolink.methods.six_point.procedure import measure_six_point as measure_six_point
     from robolink.methods.six_point.source import SixPoints as SixPoints
     from robolink.methods.six_point.source import SixPointSource as SixPointSource
+    from robolink.methods.sphere_touch.parameters import (
+        SphereTouchParameters as SphereTouchParameters,
+    )
+    from robolink.methods.sphere_touch.procedure import (
+        measure_sphere_touch as measure_sphere_touch,
+    )
+    from robolink.methods.sphere_touch.source import SphereTouches as SphereTouches
+    from robolink.methods.sphere_touch.source import SphereTouchSource as SphereTouchSource
+    from robolink.methods.sphere_touch.survey import SphereSurvey as SphereSurvey
     from robolink.methods.station_learning import learn_station as learn_station
     from robolink.methods.two_pose.parameters import TwoPoseParameters as TwoPoseParameters
     from robolink.methods.two_pose.procedure import measure_two_pose as measure_two_pose
@@ -145,10 +164,15 @@ __getattr__ = lazy_exports(
         "one_touch.solvers": "Absolute Difference difference_from_last",
         "one_touch.source": "OneTouchSource",
         "declaration.pin_parameters": "PinParameters UprightPinParameters",
+        "declaration.surface_parameters": "SurfaceParameters",
         "pivot.parameters": "PivotParameters",
         "pivot.procedure": "measure_pivot verify_by_tilting",
         "pivot.source": "PivotSource PivotTouches require_tilting",
         "pivot.tilts": "OverPin Tilt informative_tilts proving_tilts",
+        "plane_touch.parameters": "PlaneTouchParameters",
+        "plane_touch.procedure": "measure_plane_touch",
+        "plane_touch.source": "PlaneTouchSource PlaneTouches",
+        "plane_touch.survey": "PlaneSurvey",
         "points.parameters": "PointsParameters",
         "points.source": "PointsSource PosesFound taught_poses",
         "registry": "METHODS_GROUP all_methods find_method method_names register",
@@ -159,6 +183,10 @@ __getattr__ = lazy_exports(
         "six_point.parameters": "SixPointParameters",
         "six_point.procedure": "AxisTeachPlan measure_six_point",
         "six_point.source": "SixPointSource SixPoints",
+        "sphere_touch.parameters": "SphereTouchParameters",
+        "sphere_touch.procedure": "measure_sphere_touch",
+        "sphere_touch.source": "SphereTouchSource SphereTouches",
+        "sphere_touch.survey": "SphereSurvey",
         "station_learning": "learn_station",
         "two_pose.parameters": "TwoPoseParameters",
         "two_pose.procedure": "measure_two_pose",

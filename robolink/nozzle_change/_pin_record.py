@@ -11,6 +11,7 @@ from robolink.calibration import (
     chain_of,
     offset_sigma_mm,
 )
+from robolink.errors import CalibrationError
 from robolink.messages import tr
 from robolink.methods import AnyMethod, all_methods
 from robolink.model import Pose, ToolOffset
@@ -33,6 +34,33 @@ def tells_height(result: CalibrationResult) -> bool:
 
 def _methods_of(result: CalibrationResult) -> Iterator[AnyMethod]:
     yield from (method for method in all_methods() if method.name == result.method)
+
+
+def require_pin_in_base(station: str, result: CalibrationResult) -> None:
+    """Refuse to keep the place of a pin that was found from poses of a local coordinate system.
+
+    The tip comes out the same in every local, the pin does not (docs/reference/evidence.md 4).
+
+    Args:
+        station: Name of the pin that is to be kept; empty for none.
+        result: What was measured.
+
+    Raises:
+        CalibrationError: ``local_pose``.
+    """
+    local = next((pose.local for pose in _kept_inputs(result) if pose.local), 0)
+    if not station or not local:
+        return
+    raise CalibrationError(
+        "local_pose",
+        tr(
+            "These are positions in Local {local}; the place of station {station} is kept in the "
+            "base.",
+            local=local,
+            station=station,
+        ),
+        remedy=tr("Take them in Local 0, or name no station: the tip is then found all the same."),
+    )
 
 
 def touch_heights_mm(proposal: Proposal) -> list[float]:

@@ -9,7 +9,7 @@ from robolink.messages import tr
 from robolink.methods import LengthRule, TwoPoseSource
 from robolink.model import Controller, Pose, ToolOffset, WorkBox, plain_offset
 from robolink.nozzle_change._acceptance import AcceptanceCriteria
-from robolink.nozzle_change._pin_record import touch_details
+from robolink.nozzle_change._pin_record import require_pin_in_base, touch_details
 from robolink.nozzle_change._proposal import Proposal
 from robolink.nozzle_change._seating import touching_as_recorded
 from robolink.procedures import (
@@ -92,7 +92,12 @@ class ToolPlan:
     station: str = ""
 
     def named(self, result: CalibrationResult) -> CalibrationResult:
-        """Return a result under the name of the method, whichever solver it borrows."""
+        """Return a result under the name of the method, whichever solver it borrows.
+
+        Raises:
+            CalibrationError: ``local_pose``: the pin that is to be kept was not found in the base.
+        """
+        require_pin_in_base(self.pin, result)
         return replace(result, method=self.method) if self.method else result
 
     def details(self, proposal: Proposal) -> dict[str, object]:
@@ -164,7 +169,7 @@ def _tip_about(flange: Pose, offset: ToolOffset) -> tuple[float, float]:
 def clearance_too_small(clearance_mm: float, limit_mm: float) -> str:
     """Return why a clearance below the largest change that is believed is refused."""
     return tr(
-        "The robot would stop {clearance:g} mm above the pin, and a new tip may be {limit:g} mm "
+        "The robot would stop {clearance:g} mm from contact, and a new tip may be {limit:g} mm "
         "longer.",
         clearance=clearance_mm,
         limit=limit_mm,

@@ -42,8 +42,9 @@ if TYPE_CHECKING:
     from robolink.procedures.pin.source import ManualPinSource as ManualPinSource
     from robolink.procedures.pin.source import PinSource as PinSource
     from robolink.procedures.pin.source import TouchesPin as TouchesPin
+    from robolink.procedures.pin.source import TouchSource as TouchSource
+    from robolink.procedures.pin.touch_plan import TouchPlan as TouchPlan
     from robolink.procedures.pin.touches import PinTouches as PinTouches
-    from robolink.procedures.pin.touches import TouchPlan as TouchPlan
     from robolink.procedures.pin.touches import lift_off as lift_off
     from robolink.procedures.pin.touches import touch_again as touch_again
     from robolink.procedures.pose_method import PoseMethod as PoseMethod
@@ -60,6 +61,8 @@ if TYPE_CHECKING:
     from robolink.procedures.source import RequiresSensor as RequiresSensor
     from robolink.procedures.source import StopsAbovePin as StopsAbovePin
     from robolink.procedures.source import TipSource as TipSource
+    from robolink.procedures.surface_proof import SurfaceProof as SurfaceProof
+    from robolink.procedures.surface_touches import SurfaceTouches as SurfaceTouches
 
 __getattr__ = lazy_exports(
     __name__,
@@ -75,8 +78,9 @@ __getattr__ = lazy_exports(
         "lazy_source": "LazySource",
         "pin.judging": "TOUCH_CODES heights_agree jog_mm require_one_height require_touches",
         "pin.proof": "DriftProof MOST_MORE contact_pose drift_uncertainty_mm verify_by_turning",
-        "pin.source": "ManualPinSource PinSource TouchesPin",
-        "pin.touches": "PinTouches TouchPlan lift_off touch_again",
+        "pin.source": "ManualPinSource PinSource TouchSource TouchesPin",
+        "pin.touch_plan": "TouchPlan",
+        "pin.touches": "PinTouches lift_off touch_again",
         "pose_method": "PoseMethod",
         "sequential_sampling": (
             "Sampler SamplingPolicy SequentialSampler TAKE_ALL finalize_samples may_end_early "
@@ -84,5 +88,7 @@ __getattr__ = lazy_exports(
         ),
         "source": "FindsStation MeasurementContext MovingSource RequiresSensor StopsAbovePin "
         "TipSource",
+        "surface_proof": "SurfaceProof",
+        "surface_touches": "SurfaceTouches",
     },
 )

@@ -10,7 +10,7 @@ from tests.contract._method_cell import method_cell
 
 pytestmark = pytest.mark.simulator_only
 
-ABOVE = "The robot would stop {clearance} mm above the pin, and a new tip may be {limit} mm longer."
+ABOVE = "The robot would stop {clearance} mm from contact, and a new tip may be {limit} mm longer."
 
 
 @pytest.fixture

@@ -92,6 +92,8 @@ BAD = {
         "must go all round in steps of 60 degrees or less",
     ),
     "calibrate pivot": (["--tool", "1", "--pose", "1,2,3"], "does not state all"),
+    "calibrate plane-touch": (["--tool", "1", "--spread", "30"], "must be more than"),
+    "calibrate sphere-touch": (["--tool", "1", "--radius", "30"], "must be more than"),
     "calibrate six-point": (["--tool", "0"], "never written"),
     "calibrate points": (["--tool", "1", "--points", "9-1"], "is not a point"),
     "station list": (["all"], "unexpected extra argument"),

@@ -3,6 +3,7 @@
 import json
 import os
 import sys
+from dataclasses import replace
 
 import pytest
 from robolink_cli import main
@@ -11,6 +12,8 @@ from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.memory.points import Point
 
 import robolink
+from robolink.errors import CalibrationError
+from robolink.methods import PointsSource
 from robolink.model import Hand, Pose, ToolOffset, rotate_xy
 
 REAL = ToolOffset(12.3, -3.9, -20.4)
@@ -25,6 +28,9 @@ def touching(u_deg, believed=None, **more):
     own = believed or ToolOffset()
     x, y = rotate_xy(REAL.x_mm - own.x_mm, REAL.y_mm - own.y_mm, u_deg)
     return Pose(PIN[0] - x, PIN[1] - y, PIN[2] - REAL.z_mm + own.z_mm, u_deg, **more)
+
+
+POSES = (touching(10), touching(-170))
 
 
 @pytest.fixture(autouse=True)
@@ -404,3 +410,43 @@ def test_touches_between_which_the_pin_moved_are_not_written_while_nobody_is_ask
     code, out, _ = command(*words, bumped_file(tmp_path, 0.0), "--yes", "--json")
     assert code == 0, out
     assert stored(simulator) != before
+
+
+@pytest.mark.parametrize("tool", ["1", "5"])
+def test_poses_in_inches_are_refused_by_where_the_robot_is(command, simulator, tmp_path, tool):
+    """Tool 5 has no value that would tell it by its length."""
+    path = tmp_path / "poses.csv"
+    rows = [f"{p.x_mm / 25.4:.5f},{p.y_mm / 25.4:.5f},{p.u_deg}" for p in POSES]
+    path.write_text("\n".join(["x_mm,y_mm,u_deg", *rows]))
+    before = dict(simulator.machine.tools.defined())
+    words = ("calibrate", "two-pose", "--tool", tool, "--max-change", "50", "--yes", "--json")
+    code, out, _ = command(*words, "--poses", str(path))
+    assert (code, json.loads(out)["error"]["code"]) == (7, "suspect_units")
+    typed = [word for row in rows for word in ("--pose", row)]
+    code, out, _ = command(*words, *typed)
+    assert (code, json.loads(out)["error"]["code"]) == (7, "suspect_units")
+    assert simulator.machine.tools.defined() == before
+
+
+def test_poses_in_inches_are_refused_by_the_length_of_the_stored_tool(serve, simulator):
+    """In a local nothing tells where they are; the points of the controller are in mm anyway."""
+    inches = [replace(p, x_mm=p.x_mm / 25.4, y_mm=p.y_mm / 25.4, local=2) for p in POSES]
+    with serve(simulator) as cell, robolink.connect(cell.url) as controller:
+        with pytest.raises(CalibrationError) as refused:
+            PointsSource(lambda: inches).find(controller, 1, STORED)
+        assert refused.value.code == "suspect_units"
+        found = PointsSource(lambda: inches, in_mm=True).find(controller, 1, STORED)
+        assert found.result.offset.x_mm == pytest.approx(REAL.x_mm / 25.4, abs=1e-6)
+
+
+def test_a_pin_that_was_touched_in_a_local_is_not_kept_as_one_of_the_base(command, simulator):
+    store = simulator.machine.points.store
+    store(932, Point(touching(10).coordinates(), local=2))
+    words = ("calibrate", "two-pose", "--tool", "1", "--points", "931,932", "--yes", "--json")
+    for more in ((), ("--dry-run",)):
+        code, out, _ = command(*words, "--station", "PIN-07", *more)
+        assert (code, json.loads(out)["error"]["code"]) == (7, "local_pose")
+        assert stored(simulator) == STORED
+    assert "PIN-07" not in command("station", "list", "--json")[1]
+    assert command(*words)[0] == 0
+    assert stored(simulator) == ToolOffset(12.3, -3.9, -20.0)

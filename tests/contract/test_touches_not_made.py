@@ -312,7 +312,7 @@ def test_a_clearance_below_the_largest_change_is_refused_before_anything_moves(a
     station = ("--station", "PIN-07") if method == "one-touch" else ()
     done = arm.calibrate(method, "--clearance", "1", *station)
     assert (done.code, done.document["error"]["kind"]) == (2, "ConfigError")
-    assert "would stop 1 mm above the pin" in done.document["error"]["what"]
+    assert "would stop 1 mm from contact" in done.document["error"]["what"]
     assert arm.cell.simulator.machine.arm.moves_started == 0
 
 

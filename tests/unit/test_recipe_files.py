@@ -39,7 +39,7 @@ from robolink.recipe._loading import _checked
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples" / "recipes").iterdir())
 KINDS = (
     'must be one of "beams", "board", "camera", "camera-affine", "n-angle", "one-touch", "pivot", '
-    '"points", "runout-table", "six-point", "two-pose", "z-touch"'
+    '"plane-touch", "points", "runout-table", "six-point", "sphere-touch", "two-pose", "z-touch"'
 )
 LEAST = """\
 schema = "robolink/recipe/1"
@@ -87,15 +87,17 @@ def test_the_examples_are_those_that_the_page_describes():
         "five-axes-pivot.toml",
         "gantry-touch-probe.toml",
         "held-board.toml",
+        "leaning-plate.toml",
         "needle-beams.toml",
         "needle-one-touch.toml",
         "nozzle-and-camera.toml",
         "pendant-points.toml",
         "pick-nozzle-camera.toml",
         "scara-pin.toml",
+        "sphere.toml",
         "two-nozzles.toml",
     ]
-    pivot, gantry, board, beams, one_touch, affine, points, camera, pin, nozzles = (
+    pivot, gantry, board, _plate, beams, one_touch, affine, points, camera, pin, _ball, nozzles = (
         load_recipe(path).recipe for path in EXAMPLES
     )
     source = pivot.source.parameters

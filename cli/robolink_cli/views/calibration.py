@@ -116,7 +116,7 @@ def show_course(steps: Sequence[PlannedStep]) -> None:
     ways = sum(step.shown in (TeachPrompt.ALONG_X, TeachPrompt.ALONG_Z) for step in steps)
     if ways:
         plan = tr(
-            "The plan: touches of the pin by a person: {asks}; ways along the tool's axes shown by "
+            "The plan: touches by a person: {asks}; ways along the tool's axes shown by "
             "a person: {ways}; movements of the robot between them: {moves}.",
             asks=asks,
             ways=ways,
@@ -124,8 +124,7 @@ def show_course(steps: Sequence[PlannedStep]) -> None:
         )
     elif asks:
         plan = tr(
-            "The plan: touches of the pin by a person: {asks}; movements of the robot between "
-            "them: {moves}.",
+            "The plan: touches by a person: {asks}; movements of the robot between them: {moves}.",
             asks=asks,
             moves=moves,
         )

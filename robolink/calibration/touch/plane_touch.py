@@ -125,6 +125,34 @@ def solve_plane_touch(
     return PlaneTouchResult(**values, plane=TouchedPlane((x, y, z), state.distance))
 
 
+def plane_columns(
+    poses: Sequence[Pose], tip: ToolOffset, normal: tuple[float, float, float]
+) -> Floats:
+    """Return the derivatives of the tip's distance from a plane, one row a pose.
+
+    Columns: X, Y and Z of the tip in the flange, the two leanings of the normal about the middle
+    of the places (mm), the plane's distance.
+
+    Args:
+        poses: Flange poses.
+        tip: About where the tip is.
+        normal: About how the plane lies; of any length.
+    """
+    p, r = pose_arrays(poses)
+    unit = np.array(normal) / math.hypot(*normal)
+    return _columns(r, p + r @ np.array(tip.components()[:3]), unit)
+
+
+def _columns(r: Floats, places: Floats, normal: Floats) -> Floats:
+    return np.column_stack(
+        (
+            np.einsum("nij,i->nj", r, normal),
+            (places - places.mean(axis=0)) @ _tangents(normal),
+            -np.ones(len(r)),
+        )
+    )
+
+
 def _on_known(p: Floats, r: Floats, plane: TouchedPlane) -> tuple[_State, LinearFit]:
     length = math.hypot(*plane.normal)
     normal = np.array(plane.normal) / length
@@ -141,16 +169,7 @@ def _found(p: Floats, r: Floats) -> tuple[_State, LinearFit]:
 
     def linear(state: _State) -> tuple[Floats, Floats]:
         places = p + r @ state.tip
-        middle = places.mean(axis=0)
-        tangents = _tangents(state.normal)
-        derivatives = np.column_stack(
-            (
-                np.einsum("nij,i->nj", r, state.normal),
-                (places - middle) @ tangents,
-                -np.ones(len(p)),
-            )
-        )
-        return derivatives, places @ state.normal - state.distance
+        return _columns(r, places, state.normal), places @ state.normal - state.distance
 
     def stepped(state: _State, by: Floats) -> _State:
         middle = (p + r @ state.tip).mean(axis=0)

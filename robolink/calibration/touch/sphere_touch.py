@@ -104,6 +104,29 @@ def solve_sphere_touch(
     return SphereTouchResult(**values, radius_mm=state.radius)
 
 
+def sphere_columns(
+    poses: Sequence[Pose], tip: ToolOffset, centre_mm: tuple[float, float, float]
+) -> Floats:
+    """Return the derivatives of the tip's distance from a sphere, one row a pose.
+
+    Columns: X, Y and Z of the tip in the flange, those of the centre in the base, the radius.
+
+    Args:
+        poses: Flange poses.
+        tip: About where the tip is.
+        centre_mm: About where the centre is.
+    """
+    p, r = pose_arrays(poses)
+    places = p + r @ np.array(tip.components()[:3]) - np.array(centre_mm)
+    ways = places / np.linalg.norm(places, axis=1)[:, None]
+    return np.hstack((np.einsum("nij,ni->nj", r, ways), -ways, -np.ones((len(p), 1))))
+
+
+def sphere_through(places_mm: Floats) -> tuple[Floats, float]:
+    """Return centre and radius of the algebraic sphere through four places and more, mm."""
+    return _sphere(places_mm)
+
+
 def _found(
     p: Floats, r: Floats, stored: ToolOffset | None, radius_mm: float | None
 ) -> tuple[_State, LinearFit]:

@@ -24,6 +24,10 @@ from robolink.model import Pose, ToolOffset
 MAX_CONDITION = 150.0
 """Beyond it the touches do not tell tip and surface apart."""
 
+MAX_GAIN = 50.0
+"""Nor where the error of one touch counts more than so many times in a length of the tip: a column
+that is nearly zero does not show in the condition, for which all are brought to one length."""
+
 SURFACE_TOLERANCE = Tolerance(rms_mm=0.3, max_residual_mm=1.0)
 
 KEPT = ("u_deg", "v_deg", "w_deg")
@@ -67,13 +71,20 @@ def square_sum(found: tuple[object, LinearFit]) -> float:
     return float(found[1].residuals @ found[1].residuals)
 
 
+def tip_is_told(fit: LinearFit, unknowns: int) -> bool:
+    """Tell whether touches tell tip and surface apart; the first three unknowns are the tip."""
+    if fit.rank < unknowns or fit.condition_number > MAX_CONDITION:
+        return False
+    return float(fit.unit_covariance.diagonal()[:3].max()) <= MAX_GAIN**2
+
+
 def require_told_apart(fit: LinearFit, unknowns: int, remedy: str) -> None:
     """Refuse touches that do not tell tip and surface apart.
 
     Raises:
         CalibrationError: ``rank_deficient`` or ``insufficient_rotation``.
     """
-    if fit.rank == unknowns and fit.condition_number <= MAX_CONDITION:
+    if tip_is_told(fit, unknowns):
         return
     code = "rank_deficient" if fit.rank < unknowns else "insufficient_rotation"
     what = tr("The orientations differ too little: the tip and the surface cannot be told apart.")

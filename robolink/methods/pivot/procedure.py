@@ -6,7 +6,6 @@ above the pin, and comes down to a clearance; the last bit is done by the person
 
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
-from typing import Final
 
 from robolink.calibration import (
     CalibrationResult,
@@ -15,10 +14,10 @@ from robolink.calibration import (
     sigma_gain,
     solve_pivot,
 )
-from robolink.errors import CalibrationError
 from robolink.messages import tr
-from robolink.methods.pivot.tilts import UPRIGHT, OverPin, Tilt, apart_deg, tilt_path
-from robolink.model import Path, Pose, ToolOffset
+from robolink.methods.pivot.swing import tilt_in_air
+from robolink.methods.pivot.tilts import UPRIGHT, OverPin, Tilt
+from robolink.model import Pose, ToolOffset
 from robolink.procedures import (
     MOST_MORE,
     TAKE_ALL,
@@ -28,11 +27,7 @@ from robolink.procedures import (
     TouchPlan,
     sample_sequentially,
 )
-from robolink.runner import Move, Notify, Procedure, TouchedAt
-from robolink.ways import Way, way
-
-MOST_DEVIATION_DEG: Final = 1.0
-"""A robot that stands further from the orientation it was sent to cannot take it up."""
+from robolink.runner import Notify, Procedure, TouchedAt
 
 
 def measure_pivot(
@@ -156,24 +151,7 @@ class _Swing:
         Raises:
             CalibrationError: ``not_tilted``: the robot stands otherwise than it was told.
         """
-        for tilt in tilt_path(self._stands, goal):
-            target = self.over.pose(tilt, self._plan.lift_mm)
-            reached: Pose = yield Move(target, Path.JOINT, tr("tilt and turn in the air"))
-            amiss_deg = apart_deg(target, reached)
-            if amiss_deg > MOST_DEVIATION_DEG:
-                raise CalibrationError(
-                    "not_tilted",
-                    tr(
-                        "The tool stands {amiss:.1f} degrees from the orientation it was sent to.",
-                        amiss=amiss_deg,
-                    ),
-                    remedy=tr(
-                        "This robot cannot take it up. It stands with the tip lifted. Tilt less "
-                        "with {tilt}, or teach the poses and give {points}.",
-                        tilt=way(Way.TILT),
-                        points=way(Way.TAUGHT_POINTS),
-                    ),
-                )
+        yield from tilt_in_air(self.over, self._stands, goal, self._plan.lift_mm)
         self._stands = goal
 
     def touch(self, tilt: Tilt, instruction: str, *, key: Hashable) -> Procedure[TouchedAt]:

@@ -155,7 +155,7 @@ def require_tilting(controller: Controller, method: str) -> None:
     Raises:
         CalibrationError: ``rank_deficient``.
     """
-    axes = _axes(controller)
+    axes = axes_of(controller)
     if not 0 < axes < _LEAST_AXES:
         return
     raise CalibrationError(
@@ -174,6 +174,7 @@ def require_tilting(controller: Controller, method: str) -> None:
     )
 
 
-def _axes(controller: Controller) -> int:
+def axes_of(controller: Controller) -> int:
+    """Return how many axes a robot has, 0 where its controller does not tell; reads only."""
     counted = controller.groups[0].axes() if controller.groups else {}
     return max((len(values) for name, values in counted.items() if name != "pulses"), default=0)

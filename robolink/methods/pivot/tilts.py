@@ -25,13 +25,19 @@ class Tilt:
     Attributes:
         turn_deg: Turned so far about the base's Z.
         lean_deg: And leaned so far about the flange's own Y, which five axes can do as well.
+        roll_deg: And so far about its own X, which takes six.
     """
 
     turn_deg: float = 0.0
     lean_deg: float = 0.0
+    roll_deg: float = 0.0
 
 
 UPRIGHT: Final = Tilt()
+
+_ANYWHERE: Final = Pose(0.0, 0.0, 0.0, 0.0)
+
+_ORIGIN: Final = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,12 +59,18 @@ class OverPin:
     @classmethod
     def touched(cls, first: Pose, guess: ToolOffset) -> "OverPin":
         """Return it for the flange, which touched the pin with a tip at about ``guess``."""
-        x, y, z = (rotation_of(first) @ guess.components()[:3]).tolist()
-        return cls(first, (first.x_mm + x, first.y_mm + y, first.z_mm + z), guess)
+        return cls(first, _ORIGIN, guess).moved_to(first)
+
+    def moved_to(self, pose: Pose) -> "OverPin":
+        """Return it for the place where the tip is with the frame in a pose."""
+        x, y, z = (rotation_of(pose) @ self.tip.components()[:3]).tolist()
+        return replace(self, pin_mm=(pose.x_mm + x, pose.y_mm + y, pose.z_mm + z))
 
     def pose(self, tilt: Tilt, above_mm: float) -> Pose:
         """Return the pose of the frame with the tip so far above the pin."""
-        turn, lean = rotations(np.array([(tilt.turn_deg, 0.0, 0.0), (0.0, tilt.lean_deg, 0.0)]))
+        turn, lean = rotations(
+            np.array([(tilt.turn_deg, 0.0, 0.0), (0.0, tilt.lean_deg, tilt.roll_deg)])
+        )
         own = _own_rotation(self.frame)
         turned = turn @ rotation_of(self.first) @ own.T @ lean @ own
         x, y, z = (np.array(self.pin_mm) - turned @ self.tip.components()[:3]).tolist()
@@ -89,12 +101,12 @@ def tilt_path(start: Tilt, goal: Tilt) -> Iterator[Tilt]:
     It turns where it does not lean, since the arm would else swing a leaning tip.
     """
     if start.turn_deg == goal.turn_deg:
-        yield from _leaning(start, goal.lean_deg)
+        yield from _leaning(start, goal)
         return
-    yield from _leaning(start, 0.0)
-    turned = Tilt(goal.turn_deg, 0.0)
+    yield from _leaning(start, Tilt(start.turn_deg))
+    turned = Tilt(goal.turn_deg)
     yield turned
-    yield from _leaning(turned, goal.lean_deg)
+    yield from _leaning(turned, goal)
 
 
 def apart_deg(one: Pose, other: Pose) -> float:
@@ -103,15 +115,15 @@ def apart_deg(one: Pose, other: Pose) -> float:
     return math.degrees(math.acos(min(1.0, max(-1.0, float(cosine)))))
 
 
-_ANYWHERE: Final = Pose(0.0, 0.0, 0.0, 0.0)
-
-_ORIGIN: Final = (0.0, 0.0, 0.0)
-
-
-def _leaning(start: Tilt, lean_deg: float) -> Iterator[Tilt]:
-    steps = math.ceil(abs(lean_deg - start.lean_deg) / STEP_DEG)
-    for lean in np.linspace(start.lean_deg, lean_deg, steps + 1).tolist()[1:]:
-        yield replace(start, lean_deg=lean)
+def _leaning(start: Tilt, goal: Tilt) -> Iterator[Tilt]:
+    lean_deg, roll_deg = goal.lean_deg - start.lean_deg, goal.roll_deg - start.roll_deg
+    steps = math.ceil(math.hypot(lean_deg, roll_deg) / STEP_DEG)
+    for share in np.linspace(0.0, 1.0, steps + 1).tolist()[1:]:
+        yield replace(
+            start,
+            lean_deg=start.lean_deg + share * lean_deg,
+            roll_deg=start.roll_deg + share * roll_deg,
+        )
 
 
 def _own_rotation(frame: ToolOffset) -> Floats:

@@ -58,6 +58,7 @@ def _source(parameters: PointsParameters, site: Site) -> "TipSource":
             names=", ".join(f"P{number}" for number in site.points),
             tool=parameters.taught_tool,
         ),
+        in_mm=True,
     )
 
 

@@ -14,10 +14,12 @@ from robolink.calibration import (
     ToolFit,
     better_fit,
     flange_of,
+    require_near,
+    require_stored_scale,
     tilted_flange_pose,
     tool_fits,
 )
-from robolink.errors import CalibrationError, UndefinedToolError
+from robolink.errors import CalibrationError, RobolinkError, UndefinedToolError
 from robolink.messages import tr
 from robolink.methods.two_pose.source import TwoTouches
 from robolink.model import Controller, PointReader, Pose, ToolOffset
@@ -69,6 +71,8 @@ class PointsSource:
         taught_tool: The tool whose tip they describe; 0 when they are flange poses.
         plausible_mm: Largest change that needs no explanation by another tool.
         sentence: Where they come from, for a report.
+        in_mm: Whether they are in mm for certain, as the controller's own points are; others are
+            doubted where the stored tool, or where the robot is, speaks for metres or inches.
     """
 
     def __init__(
@@ -79,12 +83,14 @@ class PointsSource:
         taught_tool: int = 0,
         plausible_mm: float = 2.0,
         sentence: str = "",
+        in_mm: bool = False,
     ) -> None:
         self._poses = poses
         self._method = TwoTouches() if method is None else method
         self._taught_tool = taught_tool
         self._plausible_mm = plausible_mm
         self._sentence = sentence
+        self._in_mm = in_mm
         self.found: PosesFound | None = None
 
     @property
@@ -111,7 +117,8 @@ class PointsSource:
         Nobody saw these touches being made: the result says so (docs/reference/evidence.md 1).
 
         Raises:
-            CalibrationError: As :meth:`measure`; ``touch_heights_differ`` among others.
+            CalibrationError: As :meth:`measure`; ``touch_heights_differ``, ``suspect_units`` among
+                others.
         """
         found = self._found(controller, tool, stored)
         notes = (*found.result.notes, "touches_not_witnessed")
@@ -126,11 +133,11 @@ class PointsSource:
         tools = {number: _require_defined(controller, number) for number in sorted(named)}
         if not self._method.upright:
             flange = [tilted_flange_pose(pose, tools[self._tool_of(pose)]) for pose in poses]
-            return PosesFound(self._method.solve(flange, stored), (), None)
+            return PosesFound(self._solved(controller, flange, stored), (), None)
         for number, taught in tools.items():
             _require_upright(number, taught)
         flange = [flange_of(pose, tools[self._tool_of(pose)]) for pose in poses]
-        result = self._method.solve(flange, stored)
+        result = self._solved(controller, flange, stored)
         require_one_height([pose.z_mm for pose in flange], sigma_z_mm=PERSON_SIGMA_Z_MM)
         if named != {self._taught_tool}:
             return PosesFound(result, (), None)
@@ -141,6 +148,18 @@ class PointsSource:
         if better is not None:
             result = replace(result, warnings=(*result.warnings, "other_tool_fits"))
         return PosesFound(result, fits, better)
+
+    def _solved(
+        self, controller: Controller, flange: Sequence[Pose], stored: ToolOffset | None
+    ) -> CalibrationResult:
+        if self._in_mm:
+            return self._method.solve(flange, stored)
+        live = _live_pose(controller)
+        if live is not None and not any(pose.local for pose in (*flange, live)):
+            require_near(flange, live)
+        result = self._method.solve(flange, stored)
+        require_stored_scale(result, stored)
+        return result
 
     def _tool_of(self, pose: Pose) -> int:
         return self._taught_tool if pose.tool is None else pose.tool
@@ -161,6 +180,14 @@ class PointsSource:
             "({taught_tool}).",
             taught_tool=way(Way.TAUGHT_TOOL),
         )
+
+
+def _live_pose(controller: Controller) -> Pose | None:
+    """Return where the robot is; ``None`` where it cannot be asked, which refuses nothing."""
+    try:
+        return controller.groups[0].pose() if controller.groups else None
+    except RobolinkError:
+        return None
 
 
 def _require_taught_with(tool: int, poses: Sequence[Pose]) -> None:

@@ -19,7 +19,8 @@ from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
 from robolink.procedures.approach import NO_OFFSET
 from robolink.procedures.pin.judging import heights_agree
-from robolink.procedures.pin.touches import PinTouches, TouchPlan, plain_pose
+from robolink.procedures.pin.touch_plan import TouchPlan, plain_pose
+from robolink.procedures.pin.touches import PinTouches
 from robolink.runner import Notify, Procedure, TouchedAt
 
 MOST_MORE: Final = 2

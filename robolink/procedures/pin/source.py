@@ -1,4 +1,4 @@
-"""What every measurement has in common in which a person brings a tip onto one pin."""
+"""What every measurement has in common in which a person brings a tip into contact."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -14,28 +14,28 @@ from robolink.procedures.pin.proof import (
     drift_uncertainty_mm,
     verify_by_turning,
 )
-from robolink.procedures.pin.touches import TouchPlan
+from robolink.procedures.pin.touch_plan import TouchPlan
 from robolink.procedures.source import MeasurementContext
 from robolink.runner import Procedure
 
 
 @runtime_checkable
 class TouchesPin(Protocol):
-    """A source in which a person touches a pin, in its measurement and in its proof."""
+    """A source in which a person touches a pin, or a surface, in measurement and proof."""
 
     @property
     def touch(self) -> TouchPlan:
-        """How the tip is taken off the pin and brought back."""
+        """How the tip is taken off what it touches, and brought back."""
 
     def with_touch(self, plan: TouchPlan) -> Self:
         """Return the same source with another plan of its touches."""
 
 
-class PinSource(ABC):
-    """Measures by touching one pin.
+class TouchSource(ABC):
+    """Measures by touches that a person makes.
 
     Attributes:
-        touch: How the tip is taken off the pin and brought back.
+        touch: How the tip is taken off what it touches, and brought back.
     """
 
     __slots__ = ()
@@ -49,13 +49,8 @@ class PinSource(ABC):
 
     @property
     def clearance_mm(self) -> float:
-        """Least height above the pin at which the robot stops."""
+        """Least distance from contact at which the robot stops."""
         return self.touch.clearance_mm
-
-    @property
-    def remedy(self) -> str:
-        """What to do when a measurement makes the tip jump."""
-        return tr("Check that all poses touched the same point.")
 
     def measure(
         self,
@@ -87,6 +82,17 @@ class PinSource(ABC):
             stored: The offset stored now.
             live: Whether they are taken, so that they may end early; else they are only shown.
         """
+
+
+class PinSource(TouchSource):
+    """Measures by touching one pin."""
+
+    __slots__ = ()
+
+    @property
+    def remedy(self) -> str:
+        """What to do when a measurement makes the tip jump."""
+        return tr("Check that all poses touched the same point.")
 
 
 class ManualPinSource(PinSource):

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from robolink.model import Pose
+from robolink_simulators.cell.frames import add, subtract
 from robolink_simulators.cell.habits import PersonManner, TouchCourse
 from robolink_simulators.cell.places import Axis, XyzMm
 from robolink_simulators.cell.workplace import MOUNTED_TOOL, Workplace
@@ -53,6 +54,7 @@ class SimulatedOperator:
         self._course = TouchCourse(self._habits[0], random.Random(f"habits {seed}"))
         self._manner: PersonManner | None = None
         self._left_at: tuple[Hashable, int] | None = None
+        self._spot_mm: XyzMm | None = None
 
     @property
     def touches(self) -> int:
@@ -139,6 +141,9 @@ class SimulatedOperator:
         course, workplace = self._present_course(), self._workplace
         workplace.touch_begins(course.touches)
         self._left_at = (workplace.robot.placement(), tool)
+        if workplace.surface is not None:
+            # The spot that is nearest now: jogs along the axes would else lead elsewhere.
+            self._spot_mm = add(workplace.tip_mm(tool), workplace.gap_mm(tool))
         return course.begin(workplace.gap_mm(tool), asked=asked)
 
     def _present_course(self) -> TouchCourse:
@@ -155,6 +160,8 @@ class SimulatedOperator:
         robot, error = self._workplace.robot, self._error
         aim = self._course.aim_mm(robot.turned((1.0, 0.0, 0.0)), robot.turned((0.0, 1.0, 0.0)))
         gap = self._workplace.gap_mm(tool)
+        if self._workplace.surface is not None and self._spot_mm is not None:
+            gap = subtract(self._spot_mm, self._workplace.tip_mm(tool))
         wired = self._workplace.parameters.contact_input is not None and tool == MOUNTED_TOOL
         dz_mm = -abs(error.dz_mm) - LAMP_MM if wired else error.dz_mm
         return (

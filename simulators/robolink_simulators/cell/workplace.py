@@ -17,7 +17,14 @@ from robolink_simulators.cell.camera import CameraTruth, Pixel
 from robolink_simulators.cell.held_board import SimulatedBoard
 from robolink_simulators.cell.places import Axis, Direction, axis_of
 from robolink_simulators.cell.places import XyzMm as XyzMm
-from robolink_simulators.cell.tip_switches import UPRIGHT, Lean, PinContact, TipSwitch
+from robolink_simulators.cell.surfaces import FlatPlate, RoundBall, Surface, SurfaceContact
+from robolink_simulators.cell.tip_switches import (
+    STANDING,
+    UPRIGHT,
+    Lean,
+    PinContact,
+    TipSwitch,
+)
 from robolink_simulators.cell.world_parameters import WorldParameters
 
 MOUNTED_TOOL: Final = 1
@@ -117,9 +124,22 @@ class Workplace(ABC):
             self.board = SimulatedBoard.grasped(random.Random(f"board {self._seed}"))
 
     def gap_mm(self, tool: int = MOUNTED_TOOL) -> XyzMm:
-        """Return the way from a physical tip to the pin."""
-        tip = self.tip_mm(tool)
+        """Return the way from a physical tip to the pin, or to the surface that is touched."""
+        tip, surface = self.tip_mm(tool), self.surface
+        if surface is not None:
+            return surface.way_mm(tip)
         return self.pin_mm[0] - tip[0], self.pin_mm[1] - tip[1], self.pin_mm[2] - tip[2]
+
+    @property
+    def surface(self) -> Surface | None:
+        """What the person touches in place of the pin; it goes through the pin's top."""
+        said = self.parameters
+        if said.person_touches == "plane":
+            lean_deg, toward_deg = said.plane_lean_deg, said.plane_lean_toward_deg
+            return FlatPlate.leaning(self.pin_mm, lean_deg, toward_deg)
+        if said.person_touches == "sphere":
+            return RoundBall.under(self.pin_mm, said.sphere_radius_mm)
+        return None
 
     def touch_begins(self, done: int) -> None:
         """Let happen what happens between two touches: somebody bumps the pin.
@@ -151,19 +171,29 @@ class Workplace(ABC):
         """Take off what an input is connected to; it is off then."""
 
     def _wire_contact(self, parameters: WorldParameters) -> None:
-        number, radius_mm = parameters.contact
+        number = parameters.contact_input
         if number is not None and number >= self.inputs:
             raise ConfigError(
                 tr("The simulated controller has no input {number}.", number=number),
                 remedy=tr("Give one from 0 to {last}.", last=self.inputs - 1),
             )
-        before, _ = self.parameters.contact
+        before = self.parameters.contact_input
         if self.parameters.contact == parameters.contact:
             return
         if before is not None:
             self.disconnect(before)
         if number is not None:
-            self.connect(number, PinContact(lambda: self.pin_mm, radius_mm))
+            self.connect(number, self._contact(parameters))
+
+    def _contact(self, parameters: WorldParameters) -> TipSwitch:
+        if parameters.person_touches == "pin":
+            return PinContact(lambda: self.pin_mm, parameters.pin_radius_mm)
+
+        def touched() -> Surface:
+            # By then these are the parameters in force.
+            return self.surface or FlatPlate(self.pin_mm, STANDING)
+
+        return SurfaceContact(touched)
 
     def lean_of(self, tool: int) -> Lean:
         """Return by how much a nozzle is bent, in the flange's axes."""
@@ -205,6 +235,7 @@ class Workplace(ABC):
         return {
             "tips": {str(tool): asdict(tip) for tool, tip in self.tips.items()},
             "pin_mm": list(self.pin_mm),
+            "surface": asdict(self.surface) if self.surface else None,
             "operator_sigma_mm": self.operator_sigma_mm,
             "camera": {
                 "middle_mm": list(self.camera.middle_mm),

@@ -13,6 +13,7 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_simulators.cell.camera import CameraOptics
 from robolink_simulators.cell.habits import BiasFrame, PersonHabits, PinBump
+from robolink_simulators.cell.surfaces import Touched
 from robolink_simulators.cell.tip_switches import Lean
 from robolink_simulators.option_values import values_from_text
 
@@ -52,8 +53,13 @@ class WorldParameters:
         person_presses_mm: How much deeper than the contact the person goes.
         person_types_ahead: Whether ENTER is pressed before each touch is asked for.
         person_thinks_s: How long the person looks before the first answer to a question.
-        contact_input: Number of the input that is on while the mounted nozzle touches the pin;
-            none where they are not wired.
+        person_touches: What the person brings the tip onto: the pin, or a plane or a sphere in its
+            place, wherever the tip is near it.
+        plane_lean_deg, plane_lean_toward_deg: By how much the plane leans from the level, and in
+            which direction of the base it falls. The pin's top is a point of it.
+        sphere_radius_mm: Radius of the sphere. The pin's top is its highest point.
+        contact_input: Number of the input that is on while the mounted nozzle touches what the
+            person brings it onto; none where they are not wired.
         pin_radius_mm: Half the thickness of the pin, for that.
         pin_bumped_after_touch, pin_bump_mm, pin_bump_toward_deg: After which touch the pin is
             bumped, how far, and in which direction of the base.
@@ -93,6 +99,10 @@ class WorldParameters:
     person_presses_mm: float = 0.0
     person_types_ahead: bool = False
     person_thinks_s: float = 1.0
+    person_touches: Touched = "pin"
+    plane_lean_deg: float = 0.0
+    plane_lean_toward_deg: float = 0.0
+    sphere_radius_mm: float = 10.0
     contact_input: int | None = None
     pin_radius_mm: float = 0.25
     pin_bumped_after_touch: int = 2
@@ -123,9 +133,9 @@ class WorldParameters:
         return PersonHabits(**{name: getattr(self, f"person_{name}") for name in names})
 
     @property
-    def contact(self) -> tuple[int | None, float]:
-        """How nozzle and pin are wired: the input, and the pin's radius in mm."""
-        return self.contact_input, self.pin_radius_mm
+    def contact(self) -> tuple[int | None, float, Touched]:
+        """How nozzle and pin are wired: the input, the pin's radius in mm, and what is touched."""
+        return self.contact_input, self.pin_radius_mm, self.person_touches
 
     @property
     def bump(self) -> PinBump:

@@ -129,6 +129,7 @@ def calibrate_from_poses(
             taught_tool=source.taught_tool,
             plausible_mm=frame.criteria.limit_mm,
             sentence=source.sentence,
+            in_mm=source.kind == "points",
         )
         listener = _PosesListener(
             draft, frame, given, controller=controller, taught_tool=source.taught_tool

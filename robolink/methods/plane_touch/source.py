@@ -1,0 +1,110 @@
+"""A plane in the cell, a person who brings the tip onto it, and a robot that tilts its tool."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+from robolink.calibration import CalibrationResult, VerifyResult, tilted_from
+from robolink.messages import tr
+from robolink.methods.pivot.source import require_known_tip
+from robolink.methods.plane_touch.survey import PlaneSurvey
+from robolink.model import Pose, ToolOffset
+from robolink.procedures import MeasurementContext, TouchPlan, TouchSource, drift_uncertainty_mm
+from robolink.runner import Procedure
+
+
+@dataclass(frozen=True, slots=True)
+class PlaneTouchSource(TouchSource):
+    """Measures by touching one plane with the tool upright and tilted.
+
+    Attributes:
+        touch: Lift, clearance, contact input.
+        survey: How many touches, and where.
+        axes: How many axes the robot has, 0 where nobody knows.
+        sigma_mm: Standard deviation of one touch along the normal, where it is known.
+    """
+
+    touch: TouchPlan
+    survey: PlaneSurvey
+    axes: int = 0
+    sigma_mm: float | None = None
+
+    @property
+    def sentence(self) -> str:
+        """What it does, for a report."""
+        return tr(
+            "measured on the robot: one plane touched {count} times, the tool upright and tilted "
+            "by {tilt:g} degrees",
+            count=self.survey.count,
+            tilt=self.survey.tilt_deg,
+        )
+
+    @property
+    def remedy(self) -> str:
+        """What to do when a measurement makes the tip jump."""
+        return tr("Check that all touches were on the same flat surface, and that it is fast.")
+
+    def verify(
+        self,
+        context: MeasurementContext,
+        tool: int,
+        result: CalibrationResult,
+        *,
+        tip: ToolOffset,
+        tolerance_mm: float,
+    ) -> VerifyResult:
+        """Touch the plane in other tilts; see :class:`~robolink.procedures.MovingSource`."""
+        from robolink.methods.plane_touch.proof import verify_on_plane  # numpy
+
+        context.controller.tools.select(tool)
+        procedure = verify_on_plane(
+            self.touch,
+            result,
+            here=context.controller.groups[0].pose(),
+            tip=tilted_from(result.offset, tip),
+            tilt_deg=self.survey.tilt_deg,
+            axes=self.axes,
+            tolerance_mm=tolerance_mm,
+            u_mm=drift_uncertainty_mm(self.touch, result),
+        )
+        return context.run(procedure, tip=result.offset)
+
+    def _steps(self, stored: ToolOffset | None, *, live: bool) -> Procedure[CalibrationResult]:
+        """Return the steps.
+
+        Raises:
+            ConfigError: Nobody knows about where the tip is, so it cannot be kept off the plane.
+        """
+        from robolink.methods.plane_touch.procedure import (
+            measure_plane_touch,  # numpy, which a look does without
+        )
+
+        return (
+            yield from measure_plane_touch(
+                self._touching(live=live),
+                self.survey,
+                stored=require_known_tip(stored),
+                axes=self.axes,
+                sigma_mm=self.sigma_mm,
+            )
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class PlaneTouches:
+    """Touches of one plane, the tool upright, turned and tilted.
+
+    Attributes:
+        sigma_mm: Standard deviation of one touch along the normal, where it is known.
+    """
+
+    upright: ClassVar[bool] = False
+    needs: ClassVar[tuple[str, ...]] = ("z_mm", "v_deg", "w_deg")
+
+    sigma_mm: float | None = None
+
+    def solve(self, flange: Sequence[Pose], stored: ToolOffset | None) -> CalibrationResult:
+        """Solve seven poses and more; see :class:`~robolink.procedures.PoseMethod`."""
+        from robolink.calibration import solve_plane_touch  # numpy, which a look does without
+
+        return solve_plane_touch(flange, stored=stored, sigma_mm=self.sigma_mm)

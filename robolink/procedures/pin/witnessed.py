@@ -1,0 +1,133 @@
+"""Touches that a person makes from where the robot stopped, and whether each was made.
+
+A touch counts when something was done since the robot stopped: the tip was jogged, or a contact
+input switched (docs/reference/evidence.md 1). Another try is asked for, then it is refused.
+"""
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Hashable
+from dataclasses import replace
+from typing import Final
+
+from robolink.errors import CalibrationError
+from robolink.messages import tr
+from robolink.model import Pose
+from robolink.procedures.pin.judging import was_jogged
+from robolink.procedures.pin.touch_plan import TouchPlan
+from robolink.runner import Ask, Move, Notify, Procedure, TouchedAt
+
+MOST_ASKED: Final = 3
+"""How often a person is asked for a touch before the refusal ends the measurement."""
+
+
+class WitnessedTouches(ABC):
+    """The touches of one thing in one measurement or one proof.
+
+    Args:
+        plan: Lift, clearance, contact input.
+    """
+
+    def __init__(self, plan: TouchPlan) -> None:
+        self._plan = plan
+        self._taken: dict[Hashable, TouchedAt] = {}
+        self._count = 0
+
+    def shown(self, instruction: str, *, key: Hashable = None) -> Procedure[TouchedAt]:
+        """Let the person bring the tip into contact from wherever it is, and lift off.
+
+        Nothing witnesses such a touch but those that follow.
+
+        Args:
+            instruction: What the person is to do.
+            key: By which a later touch takes the place of this one; ``None`` for its U.
+        """
+        self._count += 1
+        answer: Pose = yield Ask(instruction, contact=self._plan.contact)
+        touch = TouchedAt.of(answer)
+        yield self.off(touch)
+        self._taken[touch.u_deg if key is None else key] = touch
+        return touch
+
+    def touched(
+        self,
+        expected: Pose,
+        arrival: Pose,
+        standoff_mm: tuple[float, float, float],
+        *,
+        key: Hashable,
+        instruction: str,
+    ) -> Procedure[TouchedAt]:
+        """Let the person touch from where the robot stopped; nothing is lifted yet.
+
+        Args:
+            expected: Pose with the tip in contact, as far as it is known.
+            arrival: Where the robot stopped.
+            standoff_mm: How far from there that is.
+            key: By which a later touch takes the place of this one.
+            instruction: What the person is to do.
+
+        Raises:
+            CalibrationError: ``not_touched`` or ``typed_ahead``, with the tip drawn back.
+        """
+        self._count += 1
+        ask = Ask(instruction, foreseen=expected, contact=self._plan.contact)
+        for left in reversed(range(MOST_ASKED)):
+            touch = yield from self._answered(ask, arrival, standoff_mm)
+            if self._plan.nominal or self._made(touch):
+                self._taken[key] = touch
+                return touch
+            told = self._not_made(touch)
+            if left:
+                yield Notify(told)
+        yield self.off(touch)
+        raise CalibrationError(
+            "not_touched",
+            told,
+            remedy=self._how_to_make(),
+        )
+
+    @abstractmethod
+    def off(self, touch: Pose) -> Move:
+        """Return the step that takes the tip out of contact."""
+
+    @property
+    @abstractmethod
+    def _seed(self) -> int | None:
+        """From which the standoffs are drawn, ``None`` before any was."""
+
+    @abstractmethod
+    def _not_jogged(self, away_mm: float) -> str:
+        """Return that the robot is where it stopped, so far from contact."""
+
+    @abstractmethod
+    def _how_to_make(self) -> str:
+        """Return what a person is to do whose touches do not count."""
+
+    def _answered(
+        self, ask: Ask, arrival: Pose, standoff_mm: tuple[float, float, float]
+    ) -> Procedure[TouchedAt]:
+        try:
+            answer: Pose = yield ask
+        except CalibrationError:
+            yield self.off(arrival)
+            raise
+        return replace(
+            TouchedAt.of(answer), arrival=arrival, standoff_mm=standoff_mm, seed=self._seed
+        )
+
+    def _made(self, touch: TouchedAt) -> bool:
+        if self._plan.contact is not None:
+            return touch.contact is True
+        return was_jogged(touch)
+
+    def _not_made(self, touch: TouchedAt) -> str:
+        if self._plan.contact is not None:
+            return tr(
+                "Touch {number} was not made: input {input} did not go over to contact since the "
+                "robot stopped. Jog until it does; if it shows contact all the time, look at its "
+                "wiring.",
+                number=self._count,
+                input=self._plan.contact.number,
+            )
+        return self._not_jogged(math.hypot(*touch.standoff_mm))

@@ -1,0 +1,164 @@
+"""Touches of a surface that a person makes, each but the first from a distance that is drawn.
+
+Nothing ever tilts in contact: the tip is lifted, tilted in the air, and brought to a distance
+along the surface's normal; the last bit is done by the person. How far away it stops is drawn, so
+that a touch that was not made shows (docs/reference/evidence.md 1).
+"""
+
+import math
+from collections.abc import Hashable
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from robolink.calibration import HIGHEST_MM
+from robolink.errors import CalibrationError
+from robolink.messages import tr
+from robolink.model import Path, Pose
+from robolink.procedures.approach import offset_z
+from robolink.procedures.pin.touch_plan import TouchPlan, fresh_seed, plain_pose
+from robolink.procedures.pin.witnessed import WitnessedTouches
+from robolink.runner import Move, Procedure, TouchedAt
+
+if TYPE_CHECKING:
+    from robolink.calibration import Floats, SurfaceStandoffs  # numpy, which a look does without
+
+
+class SurfaceTouches(WitnessedTouches):
+    """The touches of one surface in one measurement or one proof.
+
+    Args:
+        plan: Lift, clearance, contact input.
+    """
+
+    def __init__(self, plan: TouchPlan) -> None:
+        super().__init__(plan)
+        self._drawing: SurfaceStandoffs | None = None
+
+    @property
+    def taken(self) -> tuple[TouchedAt, ...]:
+        """All that count, in their order."""
+        return tuple(self._taken.values())
+
+    def first(self, key: Hashable) -> Procedure[TouchedAt]:
+        """Let the person bring the tip onto the surface from wherever it is, and lift off."""
+        return (yield from self.shown(tr("Bring the tip onto the surface."), key=key))
+
+    def again(
+        self,
+        expected: Pose,
+        normal: tuple[float, float, float],
+        *,
+        key: Hashable,
+        columns: "Floats | None" = None,
+        further_mm: float = 0.0,
+        instruction: str = "",
+    ) -> Procedure[TouchedAt]:
+        """Stop at a distance from the surface, let the person touch it, and lift off.
+
+        The tip starts lifted.
+
+        Args:
+            expected: Pose of the frame in force with the tip on the surface, as far as it is known.
+            normal: The surface's unit normal there, away from it.
+            key: By which a later touch takes the place of this one.
+            columns: What tip and surface could explain; see ``SurfaceStandoffs.next``.
+            further_mm: How much more than the clearance it stops away, for a surface that nobody
+                knows yet.
+            instruction: What the person is to do, empty for the usual.
+
+        Raises:
+            CalibrationError: ``not_touched`` or ``typed_ahead``, with the tip drawn back.
+        """
+        self._taken.pop(key, None)
+        expected = plain_pose(expected)
+        away_mm = self._away_mm(columns, further_mm)
+        x_mm, y_mm, z_mm = (away_mm * along for along in normal)
+        beside = replace(expected, x_mm=expected.x_mm + x_mm, y_mm=expected.y_mm + y_mm)
+        above_mm = self._plan.lift_mm
+        yield Move(offset_z(beside, above_mm), Path.JOINT, tr("go over the surface"))
+        down = tr("come down to the clearance")
+        arrival: Pose = yield Move(offset_z(beside, z_mm), Path.STRAIGHT, down)
+        touch = yield from self.touched(
+            expected,
+            arrival,
+            (x_mm, y_mm, z_mm),
+            key=key,
+            instruction=instruction or tr("Bring the tip onto the surface again, where it is."),
+        )
+        yield self.off(touch)
+        return touch
+
+    def off(self, touch: Pose) -> Move:
+        """Return the step that lifts the tip off the surface."""
+        lifted = offset_z(plain_pose(touch), self._plan.lift_mm)
+        return Move(lifted, Path.STRAIGHT, tr("lift off the surface"))
+
+    def require_made(self, columns: "Floats", misses_mm: "Floats") -> None:
+        """Refuse touches that were not made, whatever each of them looked like.
+
+        Args:
+            columns: Derivatives of the distances by tip and surface, one row a touch that counts.
+            misses_mm: Distance of each from the surface that was found.
+
+        Raises:
+            CalibrationError: ``touch_not_proven`` or ``large_residual``.
+        """
+        from robolink.calibration import judge_surface_touches  # numpy
+
+        if self._plan.nominal:
+            return
+        evidence = judge_surface_touches(columns, misses_mm, self._distances_mm())
+        if code := evidence.most_telling:
+            raise _refusal(code, evidence.max_residual_mm)
+
+    def _away_mm(self, columns: "Floats | None", further_mm: float) -> float:
+        if self._plan.nominal:
+            return self._plan.clearance_mm + HIGHEST_MM + further_mm
+        from robolink.calibration import SurfaceStandoffs  # numpy
+
+        if self._drawing is None:
+            seed = self._plan.seed
+            self._drawing = SurfaceStandoffs(
+                fresh_seed() if seed is None else seed, self._plan.clearance_mm
+            )
+        return self._drawing.next(self._distances_mm(), columns, further_mm=further_mm)
+
+    def _distances_mm(self) -> list[float]:
+        return [math.hypot(*touch.standoff_mm) for touch in self.taken]
+
+    @property
+    def _seed(self) -> int | None:
+        return self._drawing.seed if self._drawing else None
+
+    def _not_jogged(self, away_mm: float) -> str:
+        return tr(
+            "Touch {number} was not made: the robot is where it stopped, {away:.1f} mm from the "
+            "surface. Jog onto it.",
+            number=self._count,
+            away=away_mm,
+        )
+
+    def _how_to_make(self) -> str:
+        return tr("The robot never stops on the surface: jog until the tip is on it, then answer.")
+
+
+def _refusal(code: str, residual_mm: float) -> CalibrationError:
+    whats = {
+        "touch_not_proven": tr(
+            "The distances at which the robot stopped from the surface were not jogged away: the "
+            "tip was not brought onto it each time."
+        ),
+        "large_residual": tr(
+            "One touch is {residual:.3f} mm from the surface that the others show: the tip was not "
+            "on it, or it moved.",
+            residual=residual_mm,
+        ),
+    }
+    return CalibrationError(
+        code,
+        whats[code],
+        remedy=tr(
+            "Nothing was written. Look whether the surface is fast and clean, and measure again, "
+            "each time until the tip is on it."
+        ),
+    )

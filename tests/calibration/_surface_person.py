@@ -1,0 +1,133 @@
+"""A person who brings a tip onto a surface, and a robot that tilts its tool, for procedures."""
+
+import math
+import random
+from dataclasses import replace
+
+import numpy as np
+
+from robolink.calibration import rotation_of
+from robolink.model import Pose, ToolOffset
+from robolink.procedures import TouchPlan
+from robolink.runner import Ask, Move, Notify, TouchedAt
+
+STORED = ToolOffset(12.0, -3.5, -20.0)
+TIP = ToolOffset(12.4, -3.2, -20.5)
+START = Pose(300.0, 100.0, -50.0, 72.0, tool=0)
+PLAN = TouchPlan(lift_mm=12.0, clearance_mm=2.0, seed=5)
+
+
+class Plate:
+    """A plane that leans toward a direction of the base."""
+
+    def __init__(self, lean_deg=0.0, toward_deg=0.0, point=(300.0, 100.0, -60.0)):
+        lean, toward = math.radians(lean_deg), math.radians(toward_deg)
+        beside = math.sin(lean)
+        self.normal = np.array(
+            [beside * math.cos(toward), beside * math.sin(toward), math.cos(lean)]
+        )
+        self.point = np.array(point)
+
+    def height(self, tip):
+        return float((tip - self.point) @ self.normal)
+
+    def way(self, tip):
+        return -self.height(tip) * self.normal
+
+
+class Ball:
+    """A sphere."""
+
+    def __init__(self, radius=10.0, centre=(300.0, 100.0, -70.0)):
+        self.radius, self.centre = radius, np.array(centre)
+
+    def height(self, tip):
+        return float(np.linalg.norm(tip - self.centre)) - self.radius
+
+    def way(self, tip):
+        out = tip - self.centre
+        return -self.height(tip) * out / np.linalg.norm(out)
+
+
+class SurfacePerson:
+    """Brings the tip the shortest way onto a surface, but for ``hover``.
+
+    Args:
+        surface: What is touched.
+        tip: Where the tip really is.
+        hover: Returns how far from the surface touch ``number`` ends, given the height before.
+    """
+
+    def __init__(self, surface, *, start=START, sigma_mm=0.01, seed=1, tip=TIP, hover=None):
+        self.surface, self.tip = surface, tip
+        self._random = random.Random(seed)
+        self._here, self._sigma_mm = start, sigma_mm
+        self._hover = hover or (lambda _number, _height: 0.0)
+        self.touches, self.moves, self.lowest = [], [], math.inf
+
+    def run(self, procedure):
+        """Answer every step; return the result."""
+        answer = None
+        try:
+            while True:
+                answer = self._answer(procedure.send(answer))
+        except StopIteration as finished:
+            return finished.value
+
+    def tip_at(self, pose):
+        return np.array(pose.coordinates()[:3]) + rotation_of(pose) @ self.tip.components()[:3]
+
+    def _answer(self, step):
+        match step:
+            case Notify():
+                return None
+            case Move():
+                self._here = step.target
+                self.moves.append(step)
+                self.lowest = min(self.lowest, self.surface.height(self.tip_at(self._here)))
+                return self._here
+            case Ask():
+                return self._touched()
+
+    def _touched(self):
+        at = self.tip_at(self._here)
+        height = self.surface.height(at)
+        left = self._hover(len(self.touches), height)
+        if left != height:
+            way = self.surface.way(at) * (1 - left / height)
+            error = [self._random.gauss(0, self._sigma_mm) for _ in "xyz"]
+            x, y, z = (np.array(self._here.coordinates()[:3]) + way + error).tolist()
+            self._here = replace(self._here, x_mm=x, y_mm=y, z_mm=z)
+        self.touches.append(self._here)
+        return TouchedAt.of(self._here, seconds=2.0)
+
+
+def touches_of(surface, tip, *, down=False, count=12, seed=3):
+    """Return flange poses, upright and tilted to all sides, with a tip on a plane."""
+    rng = random.Random(seed)
+    poses = []
+    for number in range(count):
+        lean = 0.0 if number < 3 else 30.0
+        toward, u = rng.uniform(0.0, math.tau), rng.uniform(-180.0, 180.0)
+        v, w = lean * math.cos(toward), lean * math.sin(toward) + (180.0 if down else 0.0)
+        at = Pose(rng.uniform(280, 320), rng.uniform(80, 120), 0.0, u, v, w, tool=0)
+        place = np.array(at.coordinates()[:3]) + rotation_of(at) @ tip.components()[:3]
+        rise = -surface.height(place) / surface.normal[2]
+        poses.append(replace(at, z_mm=rise))
+    return poses
+
+
+def touches_of_ball(ball, tip, *, down=False, count=14, seed=3):
+    """Return flange poses, tilted to all sides, with a tip all over the upper half of a sphere."""
+    rng = random.Random(seed)
+    poses = []
+    for _ in range(count):
+        toward, u, lean = rng.uniform(0.0, math.tau), rng.uniform(-180.0, 180.0), 30.0
+        v, w = lean * math.cos(toward), lean * math.sin(toward) + (180.0 if down else 0.0)
+        at = Pose(0.0, 0.0, 0.0, u, v, w, tool=0)
+        polar, way = rng.uniform(0.0, 1.0), rng.uniform(0.0, math.tau)
+        side = [math.sin(polar) * math.cos(way), math.sin(polar) * math.sin(way), math.cos(polar)]
+        place = ball.centre + ball.radius * np.array(side)
+        x, y, z = (place - rotation_of(at) @ tip.components()[:3]).tolist()
+        poses.append(replace(at, x_mm=x, y_mm=y, z_mm=z))
+    return poses

@@ -1,0 +1,120 @@
+"""plane-touch with a person at the surface: what it finds, and what it is not fooled by."""
+
+import numpy as np
+import pytest
+
+from robolink.calibration import PlaneTouchResult, rotation_of
+from robolink.errors import CalibrationError
+from robolink.methods import OverPin, PlaneSurvey, Tilt, measure_plane_touch
+from robolink.methods.plane_touch.proof import verify_on_plane
+from robolink.model import Pose, ToolOffset
+from tests.calibration._surface_person import PLAN, START, STORED, TIP, Plate, SurfacePerson
+
+DOWN = Pose(300.0, 100.0, -20.0, -150.0, 0.0, 180.0, tool=0)
+ASKEW = Pose(300.0, 100.0, -45.0, 30.0, 8.0, -12.0, tool=0)
+LENGTHS = TIP.components()[:3]
+
+
+def measured(person, *, axes=6, count=10, tilt_deg=30.0, stored=STORED):
+    survey = PlaneSurvey(count, tilt_deg)
+    return person.run(measure_plane_touch(PLAN, survey, stored=stored, axes=axes))
+
+
+@pytest.mark.parametrize("lean_deg", [0.0, 25.0])
+@pytest.mark.parametrize("start", [START, DOWN, ASKEW])
+def test_exact_touches_give_tip_and_plane_and_the_tip_keeps_clear(start, lean_deg):
+    person = SurfacePerson(Plate(lean_deg, 50.0), start=start, sigma_mm=0.0)
+    result = measured(person)
+    assert result.offset.components()[:3] == pytest.approx(LENGTHS, abs=1e-7)
+    assert np.abs(np.array(result.plane.normal) @ person.surface.normal) == pytest.approx(1.0)
+    # The stored tip is 0.7 mm beside the true one, and is what the robot goes by.
+    assert person.lowest > PLAN.clearance_mm - 0.5
+    final = person.moves[-1].target
+    assert rotation_of(final) == pytest.approx(rotation_of(person.touches[0]), abs=1e-9)
+
+
+@pytest.mark.soak
+def test_the_interval_holds_the_truth_about_as_often_as_it_says():
+    held = total = 0
+    for seed in range(200):
+        for axes, lean_deg in ((6, 0.0), (5, 20.0)):
+            result = measured(SurfacePerson(Plate(lean_deg, 50.0), seed=seed), axes=axes)
+            errors = np.abs(np.subtract(result.offset.components()[:3], LENGTHS))
+            held += int((errors <= result.half_width95).sum())
+            total += 3
+    assert 0.92 < held / total < 0.98
+
+
+@pytest.mark.parametrize(
+    ("hover", "code"),
+    [
+        (lambda number, height: height if number else 0.0, "not_touched"),
+        (lambda number, height: height if number > 5 else 0.0, "not_touched"),
+        (lambda number, height: height - 0.1 if number else 0.0, "surface_leans"),
+        (lambda number, height: height - 0.1 if number > 2 else 0.0, "large_residual"),
+        (lambda number, height: 0.4 * height if number > 2 else 0.0, "large_residual"),
+        (lambda number, _: 0.8 if number == 7 else 0.0, "large_residual"),
+    ],
+    ids=["enter only", "enter in the end", "nudged", "nudged late", "half way", "once in the air"],
+)
+def test_touches_that_were_not_made_are_refused(hover, code):
+    with pytest.raises(CalibrationError) as refused:
+        measured(SurfacePerson(Plate(10.0, 50.0), hover=hover), count=12)
+    assert refused.value.code == code
+
+
+def test_who_always_stops_short_by_the_same_finds_the_same_tip():
+    person = SurfacePerson(Plate(20.0), sigma_mm=0.0, hover=lambda *_: 0.3)
+    assert measured(person).offset.components()[:3] == pytest.approx(LENGTHS, abs=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("plate", "axes", "code"),
+    [
+        (Plate(0.0), 5, "insufficient_rotation"),
+        (Plate(0.0), 0, "insufficient_rotation"),
+        (Plate(34.0), 6, "surface_leans"),
+    ],
+)
+def test_a_plane_that_shows_too_little_or_leans_too_much_is_told_after_three_touches(
+    plate, axes, code
+):
+    person = SurfacePerson(plate)
+    with pytest.raises(CalibrationError) as refused:
+        measured(person, axes=axes)
+    assert refused.value.code == code
+    assert len(person.touches) == 3
+    assert person.lowest > 0.0
+
+
+@pytest.mark.parametrize(
+    "aside", [(0, 0, 0), (0.3, 0, 0), (0, 0.3, 0), (0, 0, 0.3)], ids=["right", "x", "y", "z"]
+)
+@pytest.mark.parametrize(("axes", "lean_deg"), [(6, 0.0), (5, 20.0)])
+def test_the_proof_shows_a_tip_that_slipped_in_any_direction(aside, axes, lean_deg):
+    plate = Plate(lean_deg, 50.0)
+    result = measured(SurfacePerson(plate, sigma_mm=0.0), axes=axes)
+    slipped = ToolOffset(*(np.array(LENGTHS) + aside))
+    found = proved(plate, result, slipped, axes=axes)
+    assert found.passed is not any(aside)
+    assert found.max_drift_mm == pytest.approx(float(np.linalg.norm(aside)), abs=1e-6)
+
+
+def proved(plate, result: PlaneTouchResult, tip, *, axes):
+    """Prove a result with a tip, in a frame that is turned as the flange is."""
+    written = result.offset
+    here = OverPin(START, tuple(plate.point.tolist()), written).pose(Tilt(), PLAN.lift_mm)
+    x, y, z = (np.array(here.coordinates()[:3]) + rotation_of(here) @ LENGTHS).tolist()
+    frame = Pose(x, y, z, *here.coordinates()[3:], tool=1)
+    left = ToolOffset(*np.subtract(tip.components()[:3], LENGTHS).tolist())
+    procedure = verify_on_plane(
+        PLAN,
+        result,
+        here=frame,
+        tip=ToolOffset(),
+        tilt_deg=30.0,
+        axes=axes,
+        tolerance_mm=0.1,
+        u_mm=0.01,
+    )
+    return SurfacePerson(plate, start=frame, sigma_mm=0.0, tip=left).run(procedure)

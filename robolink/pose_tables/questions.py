@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from typing import Final
 
 from robolink.messages import tr
-from robolink.pose_tables.conventions import RotationRule, rules_for
+from robolink.pose_tables.conventions import rules_for
 from robolink.pose_tables.refusals import OpenQuestion
 from robolink.ways import Way, way
 
@@ -109,8 +109,3 @@ def unit_in(comments: Iterable[str], *, angle: bool) -> str:
         if found and bool(_ANGLE_WORD.search(found[0])) == angle:
             return comment
     return ""
-
-
-def is_contradicted(rule: RotationRule | None, own: RotationRule) -> bool:
-    """Tell whether a person names another rule than the one that a format is defined with."""
-    return rule is not None and (rule.axes, rule.letters) != (own.axes, own.letters)

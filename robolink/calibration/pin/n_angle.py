@@ -18,7 +18,7 @@ from robolink.calibration.core.pose_checks import (
 )
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.core.robust import Floats, Indices, Mask, Robust
-from robolink.calibration.core.rotations import checked_table, pose_table
+from robolink.calibration.core.rotations import checked_table
 from robolink.calibration.evidence.pose_evidence import copies, left_out, with_evidence
 from robolink.calibration.evidence.robust_evidence import require_robust_poses, with_consensus
 from robolink.calibration.pin.planar import (
@@ -161,12 +161,6 @@ def _all_copies() -> CalibrationError:
         remedy=tr("Turn the tool between the poses, best over half a turn or more."),
         others=("too_few_poses",),
     )
-
-
-def planar_arrays(poses: Sequence[Pose]) -> tuple[Complexes, Complexes]:
-    """Return flange positions x + iy in mm and orientations exp(iU), of upright flanges."""
-    table = pose_table(poses)
-    return table[:, 0] + 1j * table[:, 1], np.exp(1j * np.radians(table[:, 3]))
 
 
 def _planar(table: Floats, poses: Sequence[Pose]) -> tuple[Complexes, Complexes, bool]:

@@ -165,7 +165,7 @@ def _touch(touch: TouchedAt) -> dict[str, object]:
         "arrival": None if touch.arrival is None else _pose(touch.arrival),
         "standoff_mm": list(touch.standoff_mm),
         "jog_mm": jog_mm(touch),
-        "seconds": touch.seconds,
+        "answered_s": touch.seconds,
         "contact": touch.contact,
     }
 

@@ -1,6 +1,7 @@
 """Where a recipe's station is: what the recipe says of it, and what its record adds."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
@@ -30,6 +31,9 @@ def located(recipe: Recipe, stations: Mapping[str, Station]) -> tuple[Recipe, St
         recorded = stations.get(place.id)
         fits = recorded is not None and recorded.kind is needs.station and needs.place is not None
         known = recorded if recorded and fits else Station(id=place.id, kind=needs.station)
+        if recorded is not None and not fits:
+            # Where it is does not matter to the method; what stands there goes on record.
+            known = replace(known, gauge=recorded.gauge, gauge_due=recorded.gauge_due)
     return recipe, _as_told(recipe, known)
 
 

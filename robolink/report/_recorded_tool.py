@@ -96,7 +96,7 @@ def _touch(said: Mapping[str, Any]) -> TouchOnRecord:
     return TouchOnRecord(
         standoff_mm=None if brought else tuple(said["standoff_mm"]),
         jog_mm=None if brought else said["jog_mm"],
-        seconds=said["seconds"],
+        seconds=said["answered_s"],
         contact=said["contact"],
     )
 

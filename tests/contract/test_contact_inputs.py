@@ -103,7 +103,7 @@ def test_the_document_says_how_each_touch_was_made_as_the_journal_does(cell, met
     assert (first["arrival"], first["jog_mm"]) == (None, None)
     assert second["arrival"]["u_deg"] == pytest.approx(measured["poses"][1]["u_deg"])
     assert 2.0 < second["jog_mm"] < 4.5
-    assert second["seconds"] > 0.3
+    assert second["answered_s"] > 0.3
     (entry,) = cell.recorded(robolink.journal.EntryKind.VERIFY)
     assert proved["touches"] == json.loads(json.dumps(entry.details["touches"]))
     assert len(proved["touches"]) == len(proved["drifts"])

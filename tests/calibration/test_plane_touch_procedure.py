@@ -65,7 +65,7 @@ def test_touches_that_were_not_made_are_refused(hover, code):
 
 @pytest.mark.parametrize(("axes", "lean_deg"), [(6, 0.0), (5, 20.0), (6, 29.0)])
 def test_a_tip_that_is_two_millimetres_elsewhere_meets_nothing_and_is_found(axes, lean_deg):
-    for toward_deg in (0.0, 50.0, 130.0, 200.0, 280.0):
+    for toward_deg in (50.0, 200.0):
         person = SurfacePerson(Plate(lean_deg, toward_deg), sigma_mm=0.0)
         result = measured(person, axes=axes, stored=ToolOffset(13.8, -4.6, -20.5))
         assert result.offset.components()[:3] == pytest.approx(LENGTHS, abs=1e-6)

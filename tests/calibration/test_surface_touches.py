@@ -117,7 +117,9 @@ def test_the_interval_holds_the_truth_in_a_sample(solve):
 @pytest.mark.parametrize("solve", [plane_of_sixteen, sphere_of_sixteen])
 def test_the_interval_holds_the_truth(solve, stated):
     shares = covered(lambda rng: solve(rng, stated), 2000)
-    assert all(LEAST <= share <= MOST for share in shares), shares
+    # A stated sigma is widened by residuals that are large by chance, and never narrowed.
+    most = MOST if stated is None else 0.99
+    assert all(LEAST <= share <= most for share in shares), shares
 
 
 def test_a_plane_that_is_known_tells_z_far_better():

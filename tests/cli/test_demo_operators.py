@@ -19,6 +19,7 @@ def test_a_careful_person_is_believed_and_a_believed_one_is_no_refusal():
         require_refused([change])
 
 
+@pytest.mark.soak
 def test_who_stands_there_is_said_in_the_document(capsys):
     assert main.run(["demo", "--json", "--speed", "100", "--operator", "careful"]) == 0
     document = json.loads(capsys.readouterr().out)
@@ -26,7 +27,7 @@ def test_who_stands_there_is_said_in_the_document(capsys):
     assert [one["refused"] for one in document["controllers"]] == [None, None]
 
 
-@pytest.mark.parametrize("seed", [1, 3])
+@pytest.mark.parametrize("seed", [1, pytest.param(3, marks=pytest.mark.soak)])
 def test_a_careless_person_is_refused_and_the_old_tool_stays_in_force(capsys, seed):
     words = ("demo", "--speed", "100", "--operator", "careless", "--seed", str(seed))
     assert main.run([*words, "--json"]) == 0

@@ -6,7 +6,7 @@ it numbers, shown before anything moves, and replayed from a record.
 """
 
 from collections.abc import Generator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from enum import Enum
 from typing import Any, TypeVar
 
@@ -103,6 +103,11 @@ class Look:
     pictures: int = 3
 
 
+def _as_it_is(pose: Pose) -> dict[str, Any]:
+    """Return every field of a pose by name; a field that poses gain later is among them."""
+    return {field.name: getattr(pose, field.name) for field in fields(Pose)}
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SeenAt(Pose):
     """The pose of the frame in force, and where the camera saw the mark meanwhile.
@@ -118,21 +123,7 @@ class SeenAt(Pose):
     @classmethod
     def of(cls, pose: Pose, spot: Spot, unit: SpotUnit) -> "SeenAt":
         """Return what was seen from ``pose``."""
-        x_mm, y_mm, z_mm, u_deg, v_deg, w_deg = pose.coordinates()
-        return cls(
-            x_mm=x_mm,
-            y_mm=y_mm,
-            z_mm=z_mm,
-            u_deg=u_deg,
-            v_deg=v_deg,
-            w_deg=w_deg,
-            hand=pose.hand,
-            local=pose.local,
-            tool=pose.tool,
-            posture=pose.posture,
-            spot=spot,
-            unit=unit,
-        )
+        return cls(**_as_it_is(pose), spot=spot, unit=unit)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -163,21 +154,7 @@ class TouchedAt(Pose):
         """Return what was shown at ``pose``; as it is where that is known already."""
         if isinstance(pose, cls):
             return pose
-        x_mm, y_mm, z_mm, u_deg, v_deg, w_deg = pose.coordinates()
-        return cls(
-            x_mm=x_mm,
-            y_mm=y_mm,
-            z_mm=z_mm,
-            u_deg=u_deg,
-            v_deg=v_deg,
-            w_deg=w_deg,
-            hand=pose.hand,
-            local=pose.local,
-            tool=pose.tool,
-            posture=pose.posture,
-            seconds=seconds,
-            contact=contact,
-        )
+        return cls(**_as_it_is(pose), seconds=seconds, contact=contact)
 
 
 @dataclass(frozen=True, slots=True)

@@ -42,6 +42,9 @@ def described(path: str, value: object) -> list[str]:
     """Return what makes Sphinx describe a thing, in reStructuredText."""
     if hasattr(value, "__origin__"):  # an alias of a type brings the words of that type
         return [f".. py:data:: {path}", "", f"   Stands for ``{value}``."]
+    if isinstance(value, (int, float, str, tuple, dict)):  # autodoc would quote its type's words
+        shown = [f"   :value: {value!r}"] if isinstance(value, (int, float, str)) else []
+        return [f".. py:data:: {path}", *shown]
     if inspect.isclass(value):
         kind = "autoexception" if issubclass(value, BaseException) else "autoclass"
     else:

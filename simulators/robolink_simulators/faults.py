@@ -109,6 +109,11 @@ class CountedFaults(Generic[AnyFault]):
         """What has not fired yet."""
         return tuple(fault for fault, _ in self._waiting)
 
+    def forget(self) -> None:
+        """Plan nothing any more, and forget what has been handed out."""
+        self._waiting = []
+        self.fired = []
+
     def take(self, request: str) -> tuple[AnyFault, ...]:
         """Count one request and return the faults that it meets."""
         if not self._waiting:

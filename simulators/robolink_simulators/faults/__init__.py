@@ -10,6 +10,8 @@ from robolink.lazy_exports import lazy_exports
 if TYPE_CHECKING:
     from robolink_simulators.faults.counted import CountedFaults as CountedFaults
     from robolink_simulators.faults.counted import Planned as Planned
+    from robolink_simulators.faults.disk import DiskFault as DiskFault
+    from robolink_simulators.faults.disk import FaultyDisk as FaultyDisk
     from robolink_simulators.faults.drawn import FaultRates as FaultRates
     from robolink_simulators.faults.drawn import drawn_faults as drawn_faults
     from robolink_simulators.faults.drawn import drawn_plc_faults as drawn_plc_faults
@@ -26,6 +28,7 @@ if TYPE_CHECKING:
 
 _HOMES: Final = {
     "counted": "CountedFaults Planned",
+    "disk": "DiskFault FaultyDisk",
     "drawn": "FaultRates drawn_faults drawn_plc_faults",
     "fieldbus": "PlcFault PlcFaultAction",
     "links": "FaultNotPossibleError LinkKind links_of require_possible",

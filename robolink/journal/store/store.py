@@ -56,7 +56,11 @@ class Tables:
         self.entries = EntryRows(connection, self.runner)
         self.markers = MarkerRows(self.runner)
         self.leases = LeaseRows(self.runner)
-        self.names = NameRows(self.runner, known=version >= migrations.NAMED)
+        self.names = NameRows(
+            self.runner,
+            known=version >= migrations.NAMED,
+            robots_known=version >= migrations.OF_ROBOTS,
+        )
         self.newer = version > len(migrations.MIGRATIONS)
         self.self_checks = self_checks
 

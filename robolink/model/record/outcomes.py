@@ -79,6 +79,14 @@ class OutcomeLog(Protocol):
         """Every name under which the controller is on record, its identity first."""
 
     @property
+    def robot(self) -> str:
+        """Of a controller with several robots the name of the one whose record this is.
+
+        Markers and the lease hold for the whole controller; tools, stations and what was done
+        to them are on record of the robot in force. Empty where there is one robot.
+        """
+
+    @property
     def remarks(self) -> tuple[str, ...]:
         """What a person should know about who the controller is, once, in sentences."""
 

@@ -109,6 +109,8 @@ class EpsonSimulator:
         self.watchers: list[Callable[[], None]] = []
         self.present_ns: Callable[[], int] | None = None
         self._now_ns = 0
+        # Until when all is done: a transport asks for one and the same instant several times.
+        self._settled_ns = -1
         self._stepping = False
         self.url = ""
         self.seed = seed
@@ -202,7 +204,10 @@ class EpsonSimulator:
             # A planned act happens at its own instant, in the middle of an advance.
             if self.present_ns is not None and not self._stepping:
                 self.advance(self.present_ns())
-            yield self._now_ns
+            try:
+                yield self._now_ns
+            finally:
+                self._settled_ns = -1
         for watcher in tuple(self.watchers):
             watcher()
 
@@ -219,7 +224,8 @@ class EpsonSimulator:
         """Let simulated time reach ``now_ns``, stopping wherever something changes."""
         while (change := self.next_change()) is not None and self._now_ns < change < now_ns:
             self._step(change)
-        self._step(max(now_ns, self._now_ns))
+        if now_ns != self._settled_ns or (change is not None and change <= now_ns):
+            self._step(max(now_ns, self._now_ns))
 
     def next_change(self) -> int | None:
         """Return when :meth:`advance` will next do something by itself, if ever."""
@@ -253,6 +259,7 @@ class EpsonSimulator:
 
     def take(self, link: EpsonServerLink, event: Request | BadRequest) -> None:
         """Deal with a request of a client; while another is logged in, it is not heard."""
+        self._settled_ns = -1
         shown = shown_request(event)
         self.log.append((self._now_ns, ">", shown))
         if not self._hears(link):
@@ -337,6 +344,7 @@ class EpsonSimulator:
 
     def forget(self, link: EpsonServerLink) -> None:
         """A connection is over; what runs goes on or not, as the option says."""
+        self._settled_ns = -1
         if self._slot.client is link:
             # Production that another device started is not this client's to supervise.
             own = self._service.unfinished and not self.condition.monitoring_only
@@ -356,6 +364,7 @@ class EpsonSimulator:
                 self._companion.publish_changes()
             self._supervise(now_ns)
             self._flash.save_changes()
+            self._settled_ns = now_ns
         finally:
             self._stepping = False
 

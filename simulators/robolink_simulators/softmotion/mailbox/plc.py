@@ -6,7 +6,6 @@ from typing import Final
 from robolink.protocols.mailbox import (
     COMMAND_WORDS,
     DEVICE_START,
-    RESPONSE,
     RESPONSE_WORDS,
     SLOT_WORDS,
     WordOrder,
@@ -19,7 +18,7 @@ from robolink_simulators.softmotion.group.condition import SmcGroupState
 from robolink_simulators.softmotion.kinematics.coordinates import CoordRef
 from robolink_simulators.softmotion.mailbox.commands.tools import ToolDesk
 from robolink_simulators.softmotion.mailbox.option_text import PlcOptions
-from robolink_simulators.softmotion.mailbox.outbox import Outbox
+from robolink_simulators.softmotion.mailbox.outbox import HEAD, Outbox
 from robolink_simulators.softmotion.mailbox.program import MailboxProgram
 from robolink_simulators.softmotion.mailbox.retained import RetainedMemory
 from robolink_simulators.softmotion.mailbox.words.units import UserUnits
@@ -150,8 +149,8 @@ class Plc:
             shifted = self.output(now_ns)[first + self.shift :][:count]
             return shifted + (0,) * (count - len(shifted))
         slot, offset = divmod(first - RESPONSE_WORDS, SLOT_WORDS)
-        if self._frozen is None and first + count <= RESPONSE.at("tcp").start:
-            told = self._outbox.beginning(self.program, self._heartbeat(now_ns))
+        if self._frozen is None and first + count <= HEAD.words:
+            told = self._outbox.head(self.program, self._heartbeat(now_ns))
             return told[first : first + count]
         if first + count <= RESPONSE_WORDS:
             return self.response(now_ns)[first : first + count]

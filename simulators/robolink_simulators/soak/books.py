@@ -52,7 +52,10 @@ class Books:
     def markers(self) -> list[BookedMarker]:
         """Return what is open, oldest first; nothing where it cannot be read."""
         rows = self._rows("SELECT operation, kind, request, details FROM markers ORDER BY id")
-        return [BookedMarker(*row[:3], json.loads(row[3])) for row in rows]
+        return [
+            BookedMarker(operation, kind, request, json.loads(details))
+            for operation, kind, request, details in rows
+        ]
 
     def holder(self) -> Mapping[str, Any] | None:
         """Return who holds the lease, ``None`` for nobody."""

@@ -18,10 +18,18 @@ from robolink.model import ToolOffset
 from robolink.timing import NS_PER_S
 from robolink.transaction import Wanted, change_tools
 from robolink_simulators.cell.clock import ManualClock
+from robolink_simulators.faults import DiskFault, FaultyDisk
 from robolink_simulators.soak.books import Books
-from robolink_simulators.soak.computer import FullDisk, VirtualComputer, VirtualProcess
+from robolink_simulators.soak.computer import VirtualComputer, VirtualProcess
 from robolink_simulators.soak.history import CellKind, Disturbance, Hindrance, History, Hour
-from robolink_simulators.soak.people import carry_out, describe, habits_in, put_right, wish_of
+from robolink_simulators.soak.people import (
+    OTHERS_TOOL,
+    carry_out,
+    describe,
+    habits_in,
+    put_right,
+    wish_of,
+)
 from robolink_simulators.soak.plant.epson import PASSWORD, EpsonPlant
 from robolink_simulators.soak.plant.machine import PlantMachine, SentRequest
 from robolink_simulators.soak.plant.softmotion import SoftMotionPlant
@@ -33,6 +41,9 @@ from robolink_simulators.soak.threads import Killed, TurnTaking
 _PLANTS: Final = {CellKind.EPSON: EpsonPlant, CellKind.SOFTMOTION: SoftMotionPlant}
 _TRIES: Final = 8
 """How often people try to get a cell going again; each time they look longer."""
+
+_PAST_THE_SYSTEM: Final = ("bent", "truncated", "lost")
+"""What happens to the journal's file while nobody has it open."""
 
 _ON_WIRE: Final = (Hindrance.WIRE, Hindrance.MACHINE, Hindrance.PENDANT)
 
@@ -52,7 +63,7 @@ class VirtualCell:
         self._rng = random.Random(f"cell {history.seed}")
         self._turns = TurnTaking(self._clock, self._rng, self._note_turn)
         self._surroundings = SeededSurroundings(self._clock, self._turns, self._rng)
-        self._disk = FullDisk()
+        self._disk = FaultyDisk(folder)
         self._folder = folder
         self._waiting: list[tuple[Disturbance, int]] = []
         self._at_work: VirtualProcess | None = None
@@ -65,7 +76,7 @@ class VirtualCell:
             environment = {"ROBOLINK_STATE_DIR": str(self._folder / "state")}
             stack.enter_context(mock.patch.dict(os.environ, environment))
             stack.enter_context(replaced(self._surroundings))
-            stack.enter_context(self._disk.freed_at_end())
+            stack.enter_context(self._disk)
             stack.enter_context(observed(self._at_checkpoint))
             self._computer = VirtualComputer(self._folder, self._surroundings)
             self._books = Books(self._computer.journal)
@@ -135,19 +146,28 @@ class VirtualCell:
             case Hindrance.KILL:
                 self._kill(process)
             case Hindrance.POWER_CUT:
-                self._computer.cut_power(self._clock.now_ns())
-                self._kill(process)
+                self._cut_power(process, disturbance)
             case Hindrance.SECOND_PERSON:
+                self._rules.now.crowded = True
                 other = self._computer.start("carl")
                 self._others.append(other)
                 self._turns.start("carl", other, lambda: self._second_person(other))
             case Hindrance.DISK:
-                self._disk.fill()
+                self._disk.begin(DiskFault[disturbance.what])
             case Hindrance.CLOCK:
                 self._surroundings.wall_jump_s += disturbance.seconds
             case Hindrance.INTERRUPT:
                 if self._turns.current.name == "main":
                     output_closed()
+
+    def _cut_power(self, process: VirtualProcess, disturbance: Disturbance) -> None:
+        self._books.close()
+        if disturbance.what:
+            # The disk said that it had kept what it may not have: nobody can rely on the rest.
+            self._books.trusted = False
+        process.alive = False
+        self._computer.cut_power(self._clock.now_ns(), self._disk, self._rng.getrandbits(32))
+        self._kill(process)
 
     def _kill(self, process: VirtualProcess) -> None:
         process.alive = False
@@ -172,10 +192,10 @@ class VirtualCell:
         """Somebody else at another terminal changes another tool."""
         try:
             with self._connected(process) as controller:
-                held = controller.tools.read(4)
+                held = controller.tools.read(OTHERS_TOOL)
                 offset = ToolOffset(7.0, 7.0, -float(1 + process.number % 40))
-                self._rules.now.wanted.setdefault(4, [None]).append(offset)
-                change_tools(controller, [Wanted(4, offset, held)])
+                self._rules.now.wanted.setdefault(OTHERS_TOOL, [None]).append(offset)
+                change_tools(controller, [Wanted(OTHERS_TOOL, offset, held)])
                 self._note("carl: done")
         except (RobolinkError, KeyboardInterrupt) as error:
             self._note(f"carl: {describe(error)}")
@@ -196,12 +216,20 @@ class VirtualCell:
         self._harm_the_journal(hour)
         self._rules.begin(hour, wish_of(hour))
         self._arm(hour)
-        with self._disk.freed_at_end():
-            self._do(hour)
+        self._do(hour)
+        for fault in DiskFault:
+            self._disk.end(fault)
         self.story.met["wire or machine"] += self._plant.disarm()
         self._waiting = []
         self._settle_down()
         self._rules.left(self._plant.state())
+        if hour.habit.impatient and self._books.markers():
+            self._note(f"{hour.habit.person} tries again at once")
+            self._plant.repair()
+            self._rules.begin_again()
+            self._do(hour)
+            self._settle_down()
+            self._rules.left(self._plant.state())
         usable, why = self._put_right(hour)
         self._rules.at_rest(self._plant.state(), usable=usable, why=why)
         self._note(f"journal {self._books.head()}")
@@ -212,24 +240,25 @@ class VirtualCell:
         for disturbance in hour.disturbances:
             if disturbance.kind in _ON_WIRE:
                 self._plant.arm(disturbance)
-            elif disturbance.kind is not Hindrance.DISK or disturbance.what == "full":
+            elif disturbance.what not in _PAST_THE_SYSTEM:
                 self._waiting.append((disturbance, disturbance.at))
+            if disturbance.what == "SYNC_LIES":
+                self._disk.begin(DiskFault.SYNC_LIES)
 
     def _harm_the_journal(self, hour: Hour) -> None:
         for disturbance in hour.disturbances:
-            if disturbance.kind is not Hindrance.DISK or disturbance.what == "full":
-                continue
-            if not self._computer.journal.exists():
+            if disturbance.what not in _PAST_THE_SYSTEM or not self._computer.journal.exists():
                 continue
             self._note(f"!! {disturbance}")
             self.story.met[disturbance.kind] += 1
             self._books.close()
             share = (disturbance.at % 97) / 97
-            {
-                "bent": lambda share=share: self._computer.bend(share),
-                "truncated": lambda share=share: self._computer.truncate(share),
-                "lost": self._computer.lose,
-            }[disturbance.what]()
+            if disturbance.what == "bent":
+                self._computer.bend(share)
+            elif disturbance.what == "truncated":
+                self._computer.truncate(share)
+            else:
+                self._computer.lose()
             self._books.trusted = False
 
     def _do(self, hour: Hour) -> None:

@@ -1,8 +1,8 @@
 """The computer at a virtual cell: its processes, its disk, and what becomes of both."""
 
-import resource
+import shutil
+import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import ClassVar, Final
 
@@ -12,6 +12,7 @@ from robolink.journal._places import place_of
 from robolink.journal.store.store import Store
 from robolink.model import Controller, Signature
 from robolink.timing import Clock
+from robolink_simulators.faults import FaultyDisk
 from robolink_simulators.soak.surroundings import SeededSurroundings
 
 _SUFFIXES: Final = ("", "-wal", "-shm")
@@ -53,9 +54,7 @@ class VirtualProcess:
         signature = Signature(
             os_user=self.person, host="cell-pc", version="soak", operator=self.person
         )
-        return self._journal.log(
-            address, signature=signature, holder=self._holder, clock=clock
-        )
+        return self._journal.log(address, signature=signature, holder=self._holder, clock=clock)
 
     def end(self) -> None:
         """End, by itself or not: the system closes what was open."""
@@ -106,10 +105,21 @@ class VirtualComputer:
         """Tell whether a process of that number runs."""
         return any(one.number == pid and one.alive for one in self._processes)
 
-    def cut_power(self, now_ns: int) -> None:
-        """Switch it off and on: every process is gone, the time since the start begins anew."""
-        for process in self._processes:
-            process.alive = False
+    def cut_power(self, now_ns: int, disk: FaultyDisk, seed: int) -> None:
+        """Switch it off and on: every process is gone, the time since the start begins anew.
+
+        Args:
+            now_ns: When.
+            disk: Knows what of the journal has reached it.
+            seed: Draws which sectors of the rest have.
+        """
+        with tempfile.TemporaryDirectory(dir=self.journal.parent) as kept:
+            disk.after_power_cut(self.journal, Path(kept), seed=seed)
+            for process in self._processes:
+                process.end()
+            self.lose()
+            for path in Path(kept).iterdir():
+                shutil.copyfile(path, self.journal.with_name(path.name))
         self.boots += 1
         self._surroundings.booted_ns = now_ns
 
@@ -146,38 +156,6 @@ class VirtualComputer:
 
     def _beside(self, suffix: str) -> Path:
         return self.journal.with_name(self.journal.name + suffix)
-
-
-class FullDisk:
-    """A disk that takes nothing more while it is full: this process's own limit on files."""
-
-    def __init__(self) -> None:
-        self._before: tuple[int, int] | None = None
-
-    @property
-    def full(self) -> bool:
-        """Whether it is."""
-        return self._before is not None
-
-    def fill(self) -> None:
-        """Let every write from now on fail."""
-        if self._before is None:
-            self._before = resource.getrlimit(resource.RLIMIT_FSIZE)
-            resource.setrlimit(resource.RLIMIT_FSIZE, (0, self._before[1]))
-
-    def free(self) -> None:
-        """Let writes succeed again."""
-        if self._before is not None:
-            resource.setrlimit(resource.RLIMIT_FSIZE, self._before)
-            self._before = None
-
-    @contextmanager
-    def freed_at_end(self) -> Iterator[None]:
-        """Free it at the end of the block, whatever that end is."""
-        try:
-            yield
-        finally:
-            self.free()
 
 
 def _holder_class(computer: VirtualComputer) -> type[LeaseHolder]:

@@ -10,6 +10,8 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Final, Self
 
+from robolink_simulators.faults import FaultAction, LinkKind, PlcFaultAction, links_of
+
 
 class CellKind(StrEnum):
     """What stands in the cell."""
@@ -81,6 +83,7 @@ class Habit:
         tires_mm: By how much their aim wanders from touch to touch.
         declines: They say no to the proposal.
         keeps: After an accident they keep what nobody verified.
+        impatient: After an accident they try again before they recover anything.
     """
 
     person: str = "anna"
@@ -90,6 +93,7 @@ class Habit:
     tires_mm: float = 0.0
     declines: bool = False
     keeps: bool = False
+    impatient: bool = False
 
     @property
     def careful(self) -> bool:
@@ -160,7 +164,11 @@ def _hour(seed: int, number: int, kind: CellKind) -> Hour:
 
 
 def _habit(rng: random.Random) -> Habit:
-    habit = Habit(person=rng.choice(("anna", "ben")), keeps=rng.random() < 0.15)
+    habit = Habit(
+        person=rng.choice(("anna", "ben")),
+        keeps=rng.random() < 0.15,
+        impatient=rng.random() < 0.35,
+    )
     if rng.random() < 0.75:
         return habit
     return replace(
@@ -190,7 +198,7 @@ _MOST: Final = 4
 _HINDRANCES: Final = {
     Hindrance.WIRE: 0.3,
     Hindrance.MACHINE: 0.14,
-    Hindrance.STOP: 0.16,
+    Hindrance.STOP: 0.24,
     Hindrance.KILL: 0.16,
     Hindrance.POWER_CUT: 0.05,
     Hindrance.PENDANT: 0.05,
@@ -200,21 +208,45 @@ _HINDRANCES: Final = {
     Hindrance.INTERRUPT: 0.06,
 }
 
-WIRE_FAULTS: Final = {
-    CellKind.EPSON: (
-        "DELAY DROP_REPLY TRUNCATE_REPLY GARBLE_REPLY DUPLICATE_REPLY SPLIT_REPLY DISCONNECT "
-        "DISCONNECT_BEFORE IGNORE_WRITE"
-    ).split(),
-    CellKind.SOFTMOTION: (
-        "DELAY DROP_REPLY GARBLE_REPLY TEAR_REPLY GARBLE_WRITE TEAR_WRITE IGNORE_WRITE DISCONNECT "
-        "DISCONNECT_BEFORE ZERO_INPUTS"
-    ).split(),
-}
+_LINKS: Final = {CellKind.EPSON: LinkKind.EPSON_SIM, CellKind.SOFTMOTION: LinkKind.MAILBOX_SIM}
 MACHINE_FAULTS: Final = {
-    CellKind.EPSON: ("ESTOP", "GUARD_OPEN", "DEVICE_FAULT", "RESTART", "TEACH", "SERIOUS"),
-    CellKind.SOFTMOTION: ("ESTOP", "AXIS_ERROR", "RESTART", "FREEZE", "WITHDRAW_PERMIT"),
+    CellKind.EPSON: (
+        FaultAction.ESTOP,
+        FaultAction.GUARD_OPEN,
+        FaultAction.DEVICE_FAULT,
+        FaultAction.SERIOUS_ERROR,
+        FaultAction.RESTART,
+        FaultAction.LOSE_LOGIN,
+        FaultAction.TEACH_MODE,
+    ),
+    CellKind.SOFTMOTION: (
+        PlcFaultAction.ESTOP,
+        PlcFaultAction.AXIS_ERROR,
+        PlcFaultAction.RESTART,
+        PlcFaultAction.FREEZE,
+        PlcFaultAction.FREEZE_HEARTBEAT,
+        PlcFaultAction.WITHDRAW_PERMIT,
+        PlcFaultAction.TAKE_OWNERSHIP,
+        PlcFaultAction.WORD_ORDER,
+        PlcFaultAction.SHIFT_MAP,
+    ),
 }
-_DISK_FAULTS: Final = ("full", "full", "bent", "truncated", "lost")
+"""What happens to the machine itself."""
+
+
+def _wire_faults(kind: CellKind) -> tuple[str, ...]:
+    family = FaultAction if kind is CellKind.EPSON else PlcFaultAction
+    return tuple(
+        action.name
+        for action in family
+        if action not in MACHINE_FAULTS[kind] and _LINKS[kind] in links_of(action)
+    )
+
+
+WIRE_FAULTS: Final = {kind: _wire_faults(kind) for kind in CellKind}
+"""What happens on the wire, by name."""
+
+_DISK_FAULTS: Final = ("FULL", "UNWRITABLE", "SYNC_FAILS", "bent", "truncated", "lost")
 
 # What the requests of each kind contain, where a fault tells most, with how many there are.
 _PLACES: Final = {
@@ -249,6 +281,9 @@ _POINTS: Final = {
         ("TLSet 1, XY", 4),
         ("Tool ", 8),
         ("Move ", 60),
+        ("lock Move", 15),
+        ("lock TLSet 1, XY", 2),
+        ("procedure", 40),
         ("wire sent", 700),
         ("question", 60),
         ("step", 30),
@@ -260,6 +295,9 @@ _POINTS: Final = {
         ("WRITE_TOOL", 4),
         ("SELECT_TOOL", 8),
         ("MOVE_LINEAR", 60),
+        ("lock 2103", 15),
+        ("lock 5205", 2),
+        ("procedure", 40),
         ("wire sent", 700),
         ("question", 60),
         ("step", 30),
@@ -281,11 +319,13 @@ def _disturbance(rng: random.Random, kind: CellKind, deed: Deed) -> Disturbance:
         seconds = rng.choice((0.05, 0.5, 2.0, 5.0, 20.0))
         position = rng.choice((None, None, *range(12)))
     elif hindrance is Hindrance.MACHINE:
-        what = rng.choice(MACHINE_FAULTS[kind])
+        what = rng.choice(MACHINE_FAULTS[kind]).name
         seconds = rng.choice((0.0, 0.0, 0.01, 0.3))
     elif hindrance is Hindrance.DISK:
         what = rng.choice(_DISK_FAULTS)
         match, at = "commit before", rng.randrange(8 if short else 75)
+    elif hindrance is Hindrance.POWER_CUT:
+        what = rng.choice(("", "SYNC_LIES"))
     elif hindrance is Hindrance.CLOCK:
         seconds = rng.choice((-86400.0, -5.0, 3600.0, 40 * 86400.0))
     return Disturbance(hindrance, what, match, at, seconds, position)

@@ -22,6 +22,9 @@ from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 TOOL: Final = 1
 """Whose nozzle is changed; the cell's own tool."""
 
+OTHERS_TOOL: Final = 4
+"""What a second person writes."""
+
 
 @dataclass(frozen=True, slots=True)
 class Wish:

@@ -18,7 +18,7 @@ from robolink.standing import Effect, standing_after
 from robolink_simulators.soak.books import BookedMarker, Books
 from robolink_simulators.soak.computer import VirtualProcess
 from robolink_simulators.soak.history import Hour
-from robolink_simulators.soak.people import TOOL, Wish
+from robolink_simulators.soak.people import OTHERS_TOOL, TOOL, Wish
 from robolink_simulators.soak.plant.machine import (
     MachineState,
     PlantMachine,
@@ -61,18 +61,21 @@ class HourSoFar:
     Attributes:
         hour: The hour.
         wish: What its person means to be true at its end.
-        before: What the machine kept at its beginning.
+        first: What the machine kept at its beginning.
+        before: What it kept at the beginning of the last try.
         entries: The newest entry at its beginning.
-        old_markers: What was open then, by operation.
+        old_markers: What was open before the last try, by operation.
         moves: Operations under which a movement has left, with how often.
         movements: How many the machine had begun.
         wanted: What each tool may hold.
         foreign: Tools written, and whether a tool was selected, by somebody else.
-        verified: Whether a proof was passed, and its report.
+        report: Of a tip that was measured and proved.
+        crowded: Whether a second person was at work.
     """
 
     hour: Hour
     wish: Wish
+    first: MachineState
     before: MachineState
     entries: int
     old_markers: frozenset[str]
@@ -80,6 +83,7 @@ class HourSoFar:
     moves: dict[str, int] = field(default_factory=dict)
     wanted: dict[int, list[ToolOffset | None]] = field(default_factory=dict)
     report: ChangeReport | None = None
+    crowded: bool = False
     selects: set[int] = field(default_factory=set)
 
 
@@ -110,6 +114,7 @@ class Rulebook:
             hour,
             wish,
             state,
+            state,
             self._books.last_number(),
             frozenset(marker.operation for marker in self._books.markers()),
             self._plant.movements,
@@ -118,6 +123,12 @@ class Rulebook:
             self.now.wanted[tool] = [offset]
         self._plant.touched.clear()
         self._plant.moved_itself = False
+
+    def begin_again(self) -> None:
+        """Begin another try in the same hour; what is open by now is of before."""
+        self.now.before = self._plant.state()
+        self.now.old_markers = frozenset(m.operation for m in self._books.markers())
+        self.now.report = None
 
     def hold(self, rule: str, holds: bool, sentence: str) -> None:
         """Look at a rule; ``sentence`` says what was seen where it does not hold."""
@@ -197,9 +208,7 @@ class Rulebook:
         elif sent.kind is SentKind.WRITE and sent.tool not in process.put_back:
             allowed = sent.tool in self.now.wanted
             process.put_back.add(sent.tool or 0)
-        self.hold(
-            "StillAfterStop", allowed, f"{sent.text} leaves after the stop was acknowledged"
-        )
+        self.hold("StillAfterStop", allowed, f"{sent.text} leaves after the stop was acknowledged")
 
     def stopped(self, process: VirtualProcess) -> None:
         """Check the machine at the moment in which a stop is acknowledged."""
@@ -221,16 +230,11 @@ class Rulebook:
                 for m in self._books.markers()
                 if m.operation not in self.now.old_markers and m.kind != "selection"
             ]
-            foreign = self.now.hour.deed and self._others_at_work(process)
             self.hold(
                 "ExitCodeIsTrue",
-                not begun or foreign,
+                not begun or self.now.crowded,
                 f"it ends with {code}, and {begun} is open",
             )
-
-    def _others_at_work(self, process: VirtualProcess) -> bool:
-        del process
-        return self._story.met["second person"] > 0
 
     def _succeeded(self, process: VirtualProcess, state: MachineState) -> None:
         self.hold(
@@ -278,7 +282,7 @@ class Rulebook:
         if error is None:
             return
         standing = standing_after(error)
-        foreign = self._plant.touched
+        foreign = self._plant.touched | ({OTHERS_TOOL} if self.now.crowded else set())
         for tool, stands in standing.tools.items():
             if not stands.known or tool in foreign:
                 continue
@@ -316,9 +320,7 @@ class Rulebook:
     def _open_selection(self) -> list[BookedMarker]:
         if not self._books.trusted:
             return [BookedMarker("", "selection", "", {})]
-        return [
-            m for m in self._books.markers() if m.kind == "selection" or "select" in m.details
-        ]
+        return [m for m in self._books.markers() if m.kind == "selection" or "select" in m.details]
 
     def left(self, state: MachineState) -> None:
         """Check what a deed left behind, however it ended, killed or not, before anybody acts."""
@@ -341,9 +343,7 @@ class Rulebook:
             ]
             self._agrees(tool, holds, named)
 
-    def _agrees(
-        self, tool: int, holds: ToolOffset | None, named: Sequence[BookedMarker]
-    ) -> None:
+    def _agrees(self, tool: int, holds: ToolOffset | None, named: Sequence[BookedMarker]) -> None:
         known, value = self._books.value_of(tool)
         if tool in self._plant.touched:
             self._by_others[tool] = holds
@@ -368,9 +368,7 @@ class Rulebook:
         self.hold("UsableAgain", usable, f"nobody gets it going again: {why}")
         if not usable:
             return
-        self.hold(
-            "SameToolSelected", state.selected == TOOL, f"tool {state.selected} is selected"
-        )
+        self.hold("SameToolSelected", state.selected == TOOL, f"tool {state.selected} is selected")
         begun = self._plant.movements - self.now.movements
         self.hold(
             "MovesOnce",
@@ -379,8 +377,8 @@ class Rulebook:
         )
         if not self._books.trusted:
             return
-        for tool in {*self.now.before.tools, *state.tools}:
-            holds, before = state.tools.get(tool), self.now.before.tools.get(tool)
+        for tool in {*self.now.first.tools, *state.tools}:
+            holds, before = state.tools.get(tool), self.now.first.tools.get(tool)
             self._agrees(tool, holds, ())
             if tool in self._plant.touched or self._plant.same(holds, before):
                 continue

@@ -9,7 +9,6 @@ from robolink.timing import Deadline
 from robolink.transport import parse_url
 from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.cell.world_parameters import WorldParameters
-from robolink_simulators.epson.condition import Mode
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.faults import Fault, FaultAction
 from robolink_simulators.hosting.in_process.transport import InProcessTransport
@@ -31,6 +30,10 @@ _WRITES: Final = re.compile(r'\$Execute,"(?:TLSet (\d+), |TLClr (\d+))')
 _SELECTS: Final = re.compile(r'\$Execute,"Tool (\d+)"')
 _STOPS: Final = re.compile(r"\$(?:Abort|Stop)")
 _SOME_ERROR: Final = 2000
+_UNSEEN: Final = frozenset(
+    {FaultAction.GARBLE_REQUEST, FaultAction.GARBLE_REPLY, FaultAction.SWAP_BYTES}
+)
+"""Text has no checksum: a digit that is another digit cannot be told from the right one."""
 
 
 class EpsonPlant(PlantMachine):
@@ -89,41 +92,33 @@ class EpsonPlant(PlantMachine):
 
     @property
     def movements(self) -> int:
-        """How many statements of movement have come in."""
+        """How many statements of movement have come in, but for those that the wire repeated."""
         return self._moves
 
     def arm(self, disturbance: Disturbance) -> None:
         """Plan a fault of the wire, or what somebody does at the controller."""
-        if disturbance.kind is Hindrance.WIRE:
-            action = FaultAction[disturbance.what]
-            self.undecided |= action is FaultAction.GARBLE_REPLY
-            self._simulator.faults.add(
-                Fault(
-                    action,
-                    disturbance.at,
-                    disturbance.match,
-                    seconds=disturbance.seconds,
-                    position=disturbance.position,
-                )
-            )
-        elif disturbance.what in FaultAction.__members__:
-            self._simulator.faults.add(
-                Fault(
-                    FaultAction[disturbance.what],
-                    disturbance.at,
-                    disturbance.match,
-                    seconds=disturbance.seconds,
-                    code=_SOME_ERROR,
-                )
-            )
-        else:
+        if disturbance.kind is Hindrance.PENDANT:
             self._planned.append((disturbance, disturbance.at))
+            return
+        action = FaultAction[disturbance.what]
+        self.undecided |= action in _UNSEEN
+        self._simulator.faults.add(
+            Fault(
+                action,
+                disturbance.at,
+                disturbance.match,
+                seconds=disturbance.seconds,
+                code=_SOME_ERROR,
+                position=disturbance.position,
+            )
+        )
 
     def disarm(self) -> int:
         """Forget what was planned; return how much was met."""
         faults = self._simulator.faults
         met = len(faults.fired)
-        faults.forget()
+        faults.clear()
+        faults.fired.clear()
         self._planned.clear()
         return met
 
@@ -139,10 +134,11 @@ class EpsonPlant(PlantMachine):
         panel.close_guard()
         panel.auto()
         if condition.serious:
-            self._restart()
+            self._simulator.restart()
 
     def _requested(self, _number: int, text: str) -> None:
-        if _MOVES.match(text):
+        repeated = FaultAction.DUPLICATE_REQUEST in {f.action for f in self._simulator.faults.fired}
+        if _MOVES.match(text) and not repeated:
             self._moves += 1
         waiting: list[tuple[Disturbance, int]] = []
         for disturbance, left in self._planned:
@@ -151,22 +147,9 @@ class EpsonPlant(PlantMachine):
             elif left:
                 waiting.append((disturbance, left - 1))
             else:
-                self._happen(disturbance)
+                old = self.state().tools.get(1, ToolOffset(12.0, -3.5, -20.0))
+                self.write_by_hand(1, ToolOffset(old.x_mm + 0.5, old.y_mm - 0.25, old.z_mm))
         self._planned = waiting
-
-    def _happen(self, disturbance: Disturbance) -> None:
-        if disturbance.kind is Hindrance.PENDANT:
-            old = self.state().tools.get(1, ToolOffset(12.0, -3.5, -20.0))
-            self.write_by_hand(1, ToolOffset(old.x_mm + 0.5, old.y_mm - 0.25, old.z_mm))
-        elif disturbance.what == "RESTART":
-            self._restart()
-        elif disturbance.what == "TEACH":
-            self._simulator.panel.set_mode(Mode.TEACH)
-        elif disturbance.what == "SERIOUS":
-            self._simulator.panel.raise_serious_error()
-
-    def _restart(self) -> None:
-        self._simulator.restart()
 
 
 class TappedTransport(InProcessTransport):

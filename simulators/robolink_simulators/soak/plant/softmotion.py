@@ -9,6 +9,7 @@ from robolink.protocols.mailbox import COMMAND, COMMAND_WORDS, Opcode, Words
 from robolink.transport import MailboxHead
 from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.cell.world_parameters import WorldParameters
+from robolink_simulators.faults import PlcFault, PlcFaultAction
 from robolink_simulators.hosting.in_process.mailbox_link import InProcessMailboxLink
 from robolink_simulators.soak.computer import VirtualProcess
 from robolink_simulators.soak.history import Disturbance, Hindrance
@@ -19,7 +20,6 @@ from robolink_simulators.soak.plant.machine import (
     SentRequest,
     WireTap,
 )
-from robolink_simulators.softmotion.mailbox.faults import PlcFault, PlcFaultAction
 from robolink_simulators.softmotion.mailbox.option_text import PlcOptions
 from robolink_simulators.softmotion.mailbox.options import MailboxOptions
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
@@ -36,6 +36,9 @@ _KINDS: Final = {
     Opcode.STOP: SentKind.STOP,
     Opcode.HALT: SentKind.STOP,
 }
+_NEEDS_RESTART: Final = frozenset(
+    {PlcFaultAction.FREEZE_HEARTBEAT, PlcFaultAction.WORD_ORDER, PlcFaultAction.SHIFT_MAP}
+)
 _I0, _OPCODE = COMMAND["i0"].word, COMMAND["opcode"].word
 
 
@@ -62,6 +65,7 @@ class SoftMotionPlant(PlantMachine):
         self._simulator.on_request = self._requested
         self._planned: list[tuple[Disturbance, int]] = []
         self._starts = self._simulator.plc.memory.boot_id
+        self._strange = False
 
     @property
     def simulator(self) -> SoftMotionSimulator:
@@ -113,8 +117,11 @@ class SoftMotionPlant(PlantMachine):
 
     def disarm(self) -> int:
         """Forget what was planned; return how much was met."""
-        met = len(self._simulator.faults.fired)
-        self._simulator.faults.forget()
+        faults = self._simulator.faults
+        met = len(faults.fired)
+        self._strange |= any(fault.action in _NEEDS_RESTART for fault in faults.fired)
+        faults.clear()
+        faults.fired.clear()
         self._planned.clear()
         return met
 
@@ -133,6 +140,11 @@ class SoftMotionPlant(PlantMachine):
         panel.give_permit()
         if self._simulator.plc.frozen:
             panel.thaw()
+        if self._strange:
+            self._strange = False
+            panel.lay_words("low_first")
+            panel.shift_map(0)
+            panel.restart()
 
     def _requested(self, _number: int, text: str) -> None:
         waiting: list[tuple[Disturbance, int]] = []

@@ -148,7 +148,6 @@ class VirtualCell:
             case Hindrance.POWER_CUT:
                 self._cut_power(process, disturbance)
             case Hindrance.SECOND_PERSON:
-                self._rules.now.crowded = True
                 other = self._computer.start("carl")
                 self._others.append(other)
                 self._turns.start("carl", other, lambda: self._second_person(other))
@@ -186,7 +185,7 @@ class VirtualCell:
         self._note("stop: acknowledged")
         if process.alive:
             process.stopped_ns = self._clock.now_ns()
-            self._rules.stopped(process)
+            self._rules.stopped()
 
     def _second_person(self, process: VirtualProcess) -> None:
         """Somebody else at another terminal changes another tool."""
@@ -194,7 +193,7 @@ class VirtualCell:
             with self._connected(process) as controller:
                 held = controller.tools.read(OTHERS_TOOL)
                 offset = ToolOffset(7.0, 7.0, -float(1 + process.number % 40))
-                self._rules.now.wanted.setdefault(OTHERS_TOOL, [None]).append(offset)
+                self._rules.others_write(OTHERS_TOOL, offset)
                 change_tools(controller, [Wanted(OTHERS_TOOL, offset, held)])
                 self._note("carl: done")
         except (RobolinkError, KeyboardInterrupt) as error:

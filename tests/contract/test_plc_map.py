@@ -157,6 +157,7 @@ def test_a_preview_is_what_is_sent_first_and_sends_nothing(served, controller):
     assert controller.tools.preview_write(1, NEW) == ()
 
 
+@pytest.mark.fault("F43")
 def test_a_write_that_is_acknowledged_and_not_done_is_noticed(served, controller):
     first = f"fc16 {served.map.slots[1].span.start}"
     served.plc.faults.add(Fault(FaultAction.IGNORE_WRITE, match=first))

@@ -96,6 +96,7 @@ def test_a_lost_answer_to_a_move_is_unknown_and_the_move_is_never_sent_twice(ser
             lift(controller).wait(timeout_s=60)
 
 
+@pytest.mark.fault("F59")
 def test_a_value_that_was_changed_meanwhile_is_a_conflict(serve):
     simulator = simulator_with(FaultAction.DROP_REPLY, WRITE)
     with serve(simulator) as url:
@@ -110,6 +111,7 @@ def test_a_value_that_was_changed_meanwhile_is_a_conflict(serve):
             assert "neither" in finding.sentence
 
 
+@pytest.mark.fault("F43")
 def test_a_write_that_is_acknowledged_but_not_applied_is_found_by_reading_back(serve):
     simulator = simulator_with(FaultAction.IGNORE_WRITE, WRITE)
     with serve(simulator) as url, robolink.connect(url) as controller:

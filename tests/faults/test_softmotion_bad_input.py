@@ -110,6 +110,7 @@ def test_a_unit_that_is_not_there_is_named():
     assert simulator.exchanges == 0
 
 
+@pytest.mark.fault("F70")
 def test_a_layout_of_another_major_version_is_refused_and_nothing_is_written(cell):
     response = cell.simulator.plc.response
     cell.simulator.plc.response = lambda now_ns: encode_response(
@@ -121,7 +122,8 @@ def test_a_layout_of_another_major_version_is_refused_and_nothing_is_written(cel
     check_nothing_was_written(cell)
 
 
-def test_a_mailbox_that_stands_still_is_not_met(cell):
+@pytest.mark.fault("F69")
+def test_f69_a_mailbox_that_stands_still_is_not_met(cell):
     cell.simulator.panel.freeze()
     with pytest.raises(ConnectError, match="stands still") as refusal:
         cell.connect()
@@ -129,7 +131,8 @@ def test_a_mailbox_that_stands_still_is_not_met(cell):
     check_nothing_was_written(cell)
 
 
-def test_a_heartbeat_that_freezes_during_a_movement_leaves_it_unknown_and_blocks_the_next(cell):
+@pytest.mark.fault("F69")
+def test_f69_a_heartbeat_that_freezes_during_a_movement_leaves_it_unknown_and_blocks_the_next(cell):
     with cell.connect() as controller:
         motion = lift(controller)
         cell.simulator.panel.freeze()

@@ -5,7 +5,6 @@ Rows F67, F68 and F75 of the catalogue, over real sockets and a pseudo terminal.
 
 import contextlib
 import os
-import select
 import socket
 import threading
 import time
@@ -31,6 +30,7 @@ from robolink.timing import NS_PER_S
 from robolink.transaction import recover
 from robolink.transport import open_modbus, parse_url
 from tests.contract._softmotion_cell import SLOW, above, served
+from tests.faults._firewall import behind_a_firewall
 from tests.unit._scripted_modbus import rtu, tcp, words
 
 TIMEOUT_S = 0.3
@@ -161,110 +161,6 @@ def test_f68_a_movement_of_twelve_seconds_is_no_silence_on_a_plc():
 
 
 # ---- F75
-
-
-class Firewall:
-    """Forwards a port, and resets its clients when it is told to, or at a request.
-
-    Attributes:
-        port: Where it listens.
-        opened: How often somebody connected.
-        requests: What clients sent, piece by piece.
-        reset_at: Whether what is forwarded is the last thing before a reset.
-    """
-
-    def __init__(self, port: int) -> None:
-        self._to = port
-        self._listener = socket.create_server(("127.0.0.1", 0))
-        self.port = self._listener.getsockname()[1]
-        self.opened = 0
-        self.requests: list[bytes] = []
-        self.reset_at: Callable[[bytes], bool] = lambda _data: False
-        self._others: dict[socket.socket, socket.socket] = {}
-        self._near: set[socket.socket] = set()
-        self._told, self._tell = socket.socketpair()
-        self._thread = threading.Thread(target=self._forward)
-        self._thread.start()
-
-    def reset(self) -> None:
-        """Reset all clients; the controller sees them leave."""
-        self._tell.send(b"reset")
-        assert self._tell.recv(8) == b"done"
-
-    def close(self) -> None:
-        """End."""
-        self._tell.send(b"close")
-        self._thread.join(5)
-        self._tell.close()
-
-    def _forward(self) -> None:
-        while True:
-            ready, _, _ = select.select([self._told, self._listener, *self._others], [], [])
-            for one in ready:
-                if one is self._listener:
-                    self._accept()
-                elif one is self._told:
-                    if self._obeyed(self._told.recv(8)):
-                        return
-                elif one in self._others:
-                    self._carry(one)
-
-    def _obeyed(self, word: bytes) -> bool:
-        """Do what is told; return whether that was the end."""
-        self._reset()
-        if word == b"close":
-            self._listener.close()
-            self._told.close()
-            return True
-        self._told.send(b"done")
-        return False
-
-    def _accept(self) -> None:
-        near, _ = self._listener.accept()
-        far = socket.create_connection(("127.0.0.1", self._to))
-        self.opened += 1
-        self._near.add(near)
-        self._others |= {near: far, far: near}
-
-    def _carry(self, one: socket.socket) -> None:
-        try:
-            data = one.recv(4096)
-        except OSError:
-            data = b""
-        if not data:
-            self._leave(one)
-            return
-        if one in self._near:
-            self.requests.append(data)
-        self._others[one].sendall(data)
-        if one in self._near and self.reset_at(data):
-            self._reset()
-
-    def _leave(self, one: socket.socket) -> None:
-        other = self._others.pop(one)
-        del self._others[other]
-        self._near -= {one, other}
-        one.close()
-        other.close()
-
-    def _reset(self) -> None:
-        ends, self._others = list(self._others), {}
-        for end in ends:
-            if end in self._near:  # what reached the controller stays there
-                end.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b"\1\0\0\0\0\0\0\0")
-            end.close()
-        self._near.clear()
-
-
-@contextmanager
-def behind_a_firewall(url: str) -> Iterator[tuple[Firewall, str]]:
-    port = parse_url(url).port
-    assert port is not None
-    firewall = Firewall(port)
-    try:
-        yield firewall, url.replace(str(port), str(firewall.port))
-    finally:
-        firewall.close()
 
 
 @pytest.fixture(params=["epson", "mailbox"])

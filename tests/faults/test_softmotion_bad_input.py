@@ -28,6 +28,7 @@ from robolink.errors import (
     OutcomeUnknownError,
     RejectedError,
     RemoteProtocolError,
+    TransportError,
 )
 from robolink.journal import memory_journal
 from robolink.model import ToolOffset, Verdict, WorkBox
@@ -277,3 +278,23 @@ def test_a_can_node_whose_heartbeat_is_lost_leaves_the_movement_unknown(tmp_path
     assert "motion is blocked" in unknown.value.remedy
     assert [marker.request for marker in outcomes.open_markers()] == [unknown.value.request]
     assert simulator.plc.group.movements_started == 1
+
+
+@pytest.mark.fault("F70")
+def test_f70_a_program_that_is_exchanged_during_a_session_is_told_nothing_more(cell):
+    with cell.connect() as controller:
+        controller.take()
+        response = cell.simulator.plc.response
+        cell.simulator.plc.response = lambda now_ns: encode_response(
+            replace(decode_response(response(now_ns)), version=0x0200)
+        )
+        for change in (
+            lambda: controller.tools.write(SCRATCH, NEW, expected=None),
+            lambda: controller.tools.select(0),
+            lambda: lift(controller),
+        ):
+            with pytest.raises((RemoteProtocolError, TransportError)):
+                change()
+    assert cell.commands == []
+    assert cell.slot_changes(SCRATCH) == 0
+    assert cell.movements_started == 0

@@ -25,7 +25,7 @@ STRANGE = [
 @pytest.mark.fault("F38")
 @pytest.mark.parametrize("text", STRANGE)
 def test_f38_what_only_python_calls_a_number_is_none(text):
-    with pytest.raises(ValueError, match=re.escape(text)):
+    with pytest.raises(ValueError, match=re.escape(repr(text))):
         decimal(text)
 
 

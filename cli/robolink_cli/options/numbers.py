@@ -24,7 +24,7 @@ def decimal(text: str) -> float:
         ValueError: It is none.
     """
     if not _NUMBER.fullmatch(text):
-        raise ValueError(text)
+        raise ValueError(repr(text))
     return float(text)
 
 

@@ -119,7 +119,7 @@ class _Reader:
     def _head(self) -> LinkKind | None:
         for key in self._document:
             if key not in _OF_FILE:
-                self._object(key, is_not_known(key, _OF_FILE), self._line("", 0, key))
+                self._object(key, is_not_known(key[:80], _OF_FILE), self._line("", 0, key))
         if self._document.get("schema") != SCHEMA:
             self._object("schema", one_of([SCHEMA]), self._line("", 0, "schema"))
         try:
@@ -149,7 +149,7 @@ class _Reader:
         for key, value in table.items():
             line, where = self._line("fault", number, key), f"fault {number}, {key}"
             if key not in names:
-                self._object(where, is_not_known(key, names), line)
+                self._object(where, is_not_known(key[:80], names), line)
             elif key == "action":
                 values[key] = self._action(where, value, link, line)
             else:
@@ -197,7 +197,7 @@ class _Reader:
         for key, value in table.items():
             line, where = self._line("drawn", 1, key), f"drawn, {key}"
             if key not in _OF_DRAWN:
-                self._object(where, is_not_known(key, _OF_DRAWN), line)
+                self._object(where, is_not_known(key[:80], _OF_DRAWN), line)
             elif key == "actions":
                 values[key] = self._actions(value, where, link, line)
             elif key == "match":

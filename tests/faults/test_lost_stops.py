@@ -12,6 +12,7 @@ from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 
 import robolink
 from robolink.controllers import stop_now
+from robolink.controllers.epson import EpsonController
 from robolink.errors import RobolinkError
 from robolink.model import ControllerState, MotionProfile, Path, WorkBox
 from tests.contract._softmotion_cell import SLOW, above, served
@@ -30,6 +31,7 @@ def creeping_robot() -> Iterator[tuple[EpsonSimulator, str]]:
         group = controller.groups[0]
         here = group.pose()
         group.move_to(replace(here, z_mm=here.z_mm + 30), CREEPING, box=WorkBox())
+        assert isinstance(controller, EpsonController)
         controller._close_link()
         yield simulator, host.url
 

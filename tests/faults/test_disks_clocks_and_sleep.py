@@ -162,17 +162,17 @@ def test_f64_a_time_out_lasts_as_long_as_it_is_whatever_the_clock_says(tmp_path)
     with ambient.replaced(Jumping()), serve_tcp(simulator) as host:
         journal = open_journal(str(tmp_path / "journal.db"))
         mine, other = (journal.log(host.url) for _ in range(2))
-        with robolink.connect(host.url, outcomes=mine, timeout_s=0.3) as controller:
+        with robolink.connect(host.url, outcomes=mine, timeout_s=1.0) as controller:
             marker = controller.begin(MarkerKind.CHANGE, "a change", {})
             for _ in range(5):
                 with pytest.raises(LeaseHeldError):  # the lease has not run out, nor ever will
                     other.look()
             controller.finish(marker)
-            simulator.on_request = lambda _number, _text: time.sleep(0.5)
+            simulator.on_request = lambda _number, _text: time.sleep(1.5)
             began_s = time.monotonic()
             with pytest.raises(TransportTimeoutError):
                 controller.status()
-            assert 0.25 < time.monotonic() - began_s < 2.0
+            assert 0.9 < time.monotonic() - began_s < 10.0
             simulator.on_request = None
         journal.close()
 

@@ -137,9 +137,9 @@ def line_to(answers: Any) -> Iterator[tuple[str, list[int], int]]:
         os.close(near)
 
 
-def opened(device: str) -> ModbusClient:
+def opened(device: str, timeout_s: float) -> ModbusClient:
     url = f"softmotion+modbus-rtu://{device}?baud=19200&parity=none&stopbits=1"
-    return open_modbus(parse_url(url), timeout_s=0.4)
+    return open_modbus(parse_url(url), timeout_s=timeout_s)
 
 
 @pytest.mark.fault("F54")
@@ -148,7 +148,7 @@ def test_f54_another_baud_rate_or_parity_is_named_and_nothing_is_read_from_the_n
     with line_to(lambda _n: noise.randbytes(noise.randint(1, 40))) as (device, asked, _far):
         busy_s = time.process_time()
         with pytest.raises((ConnectError, RemoteProtocolError)) as caught:
-            opened(device)
+            opened(device, 0.5)
         assert time.process_time() - busy_s < 0.3  # it waits, and does not spin
     assert len(asked) <= 3
     assert caught.value.remedy
@@ -166,7 +166,7 @@ def test_f54_an_adapter_that_is_pulled_out_is_named_and_not_tried_again():
 
     thread = threading.Thread(target=answer)
     thread.start()
-    client = opened(device)
+    client = opened(device, 3.0)
     thread.join(SOON_S)
     os.close(near)
     os.close(far)  # the cable, and with it the port, is gone

@@ -49,7 +49,7 @@ def test_f76_a_stop_that_is_never_answered_is_repeated_and_then_says_what_to_pre
     with creeping_robot() as (simulator, url):
         losing(simulator, request_, TRIES)
         before = len(simulator.log)
-        code = entry.run(["-c", url, "--timeout", "0.3", "stop"])
+        code = entry.run(["-c", url, "--timeout", "1", "stop"])
         said = capsys.readouterr()
         assert code not in (0, 70)
         assert "emergency stop" in said.err
@@ -65,7 +65,7 @@ def test_f76_a_stop_that_is_never_answered_is_repeated_and_then_says_what_to_pre
 @pytest.mark.fault("F76")
 def test_f76_a_stop_of_the_library_that_is_not_answered_is_no_success():
     simulator = EpsonSimulator(seed=7)
-    with serve_tcp(simulator) as host, robolink.connect(host.url, timeout_s=0.3) as controller:
+    with serve_tcp(simulator) as host, robolink.connect(host.url, timeout_s=1.0) as controller:
         losing(simulator, "$Abort", 1)
         with pytest.raises(RobolinkError) as unconfirmed:
             controller.stop()
@@ -85,6 +85,6 @@ def test_f76_a_lost_stop_of_a_plc_is_sent_again_until_it_is_seen_to_rest():
                     PlcFaultAction.DISCONNECT, on_exchange=number, match="write_command STOP"
                 )
                 cell.simulator.faults.add(fault)
-            assert stop_now(cell.url, timeout_s=0.4).running is False
+            assert stop_now(cell.url, timeout_s=1.0).running is False
             assert cell.simulator.faults.pending == ()
             assert cell.movements_started == 1

@@ -57,9 +57,15 @@ def mailbox() -> Iterator[Lossy]:
         cell.simulator.faults.add(PlcFault(PlcFaultAction.DISCONNECT, match="write_command WRITE"))
         memory = cell.simulator.plc.memory
         frame = to_frame(THIRD.components(), unit_um=1000.0)
+
+        def put_third() -> None:
+            cell.clock.advance(0.05)  # by then the program has looked at what it was told
+            with cell.simulator.acting():
+                memory.define(1, frame, "by hand")
+
         yield Lossy(
             cell.url,
-            lambda: memory.define(1, frame, "by hand"),
+            put_third,
             lambda: cell.commands.count("WRITE_TOOL"),
             lambda: cell.movements_started,
         )
@@ -69,7 +75,7 @@ def mailbox() -> Iterator[Lossy]:
 @pytest.mark.parametrize("kind", [epson, mailbox])
 def test_f59_a_third_value_is_a_conflict_that_blocks_motion_until_a_person_decides(kind):
     with kind() as lossy:
-        with robolink.connect(lossy.url, timeout_s=0.4) as controller:
+        with robolink.connect(lossy.url, timeout_s=2.0) as controller:
             before = controller.tools.read(1)
             with pytest.raises(OutcomeUnknownError):
                 controller.tools.write(1, NEW, expected=before)

@@ -33,9 +33,9 @@ from tests.contract._softmotion_cell import SLOW, above, served
 from tests.faults._firewall import behind_a_firewall
 from tests.unit._scripted_modbus import rtu, tcp, words
 
-TIMEOUT_S = 0.3
-EACH_S = 0.05
-"""Between two bytes; twenty of them take far longer than the time-out."""
+TIMEOUT_S = 0.6
+EACH_S = 0.25
+"""Between two bytes; the whole of any answer here takes 7 s and more."""
 
 ANYWHERE = WorkBox()
 
@@ -73,7 +73,7 @@ def one_byte_at_a_time(greeting: bytes, answer: bytes) -> Iterator[int]:
 def within_the_deadline() -> Iterator[None]:
     began_s = time.monotonic()
     yield
-    assert TIMEOUT_S * 0.9 < time.monotonic() - began_s < 3 * TIMEOUT_S
+    assert TIMEOUT_S * 0.9 < time.monotonic() - began_s < 5.0
 
 
 @pytest.mark.fault("F67")

@@ -100,7 +100,13 @@ KINDS = {
 }
 
 
-@pytest.fixture(params=KINDS)
+@pytest.fixture(
+    params=[
+        "epson",
+        "mailbox on Modbus TCP",
+        pytest.param("mailbox on CAN", marks=pytest.mark.soak),
+    ]
+)
 def held(request: pytest.FixtureRequest) -> Iterator[Held]:
     with KINDS[request.param]() as held:
         yield held

@@ -13,4 +13,5 @@ from tests.calibration._simulated import SAMPLE, TRIALS
 )
 def trials(request) -> int:
     """A sample each time; as many as tell a small error of an interval in ``make soak``."""
-    return request.param
+    number: int = request.param
+    return number

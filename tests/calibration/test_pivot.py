@@ -200,4 +200,4 @@ def test_a_robust_fit_is_less_honest_refuses_nothing_good_and_that_is_known(tria
 
     shares = coverage(measure, TIP, trials)
     sys.stdout.write(f"robust pivot, 8 poses, no outlier: {shares}\n")
-    assert_about(shares, 0.935, trials)
+    assert_about(shares, 0.945, trials)

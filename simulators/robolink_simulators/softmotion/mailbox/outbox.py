@@ -78,6 +78,10 @@ class Outbox:
         self._order = order
         self._identified = identified
 
+    def lay_words(self, order: WordOrder) -> None:
+        """Lay values of several words in another order from now on."""
+        self._order = order
+
     def words(self, program: MailboxProgram, heartbeat: int) -> Words:
         """Return response, slots and device block, one behind the other."""
         response = self.response(program, heartbeat)

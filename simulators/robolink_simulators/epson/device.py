@@ -222,10 +222,11 @@ class EpsonSimulator:
 
     def advance(self, now_ns: int) -> None:
         """Let simulated time reach ``now_ns``, stopping wherever something changes."""
+        if now_ns == self._settled_ns:
+            return
         while (change := self.next_change()) is not None and self._now_ns < change < now_ns:
             self._step(change)
-        if now_ns != self._settled_ns or (change is not None and change <= now_ns):
-            self._step(max(now_ns, self._now_ns))
+        self._step(max(now_ns, self._now_ns))
 
     def next_change(self) -> int | None:
         """Return when :meth:`advance` will next do something by itself, if ever."""

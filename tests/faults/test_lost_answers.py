@@ -145,7 +145,8 @@ def test_a_doubled_answer_is_never_taken_for_the_next_one(serve):
                 assert controller.tools.selected() == 1
 
 
-def test_a_late_answer_dies_with_its_connection(serve):
+@pytest.mark.fault("F01")
+def test_f01_a_late_answer_dies_with_its_connection(serve):
     simulator = EpsonSimulator(
         seed=5,
         faults=[Fault(FaultAction.DELAY, on_exchange=0, match="Print Tool", seconds=30.0)],

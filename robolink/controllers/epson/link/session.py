@@ -12,11 +12,11 @@ bytes die with the connection and can never be taken for the answer to a later q
 (docs/reference/faults.md F01, F06, F09).
 """
 
-import threading
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 
+from robolink import ambient
 from robolink.checkpoints import Checkpoint, checkpoint
 from robolink.controllers.epson.link.answers import rejected
 from robolink.controllers.epson.link.login import PASSWORD_REFUSALS, refused, unanswered
@@ -80,7 +80,7 @@ class EpsonSession:
         self._transport = transport
         self.identity, self.place, self.clock = transport.identity, transport.place, transport.clock
         self._codec = EpsonTextCodec(Role.HOST)
-        self._wire = threading.Lock()
+        self._wire = ambient.lock()
         self._gate = InterruptGate()
         self._gate.open()
         self._pending: PendingExecute | None = None

@@ -49,8 +49,8 @@ PARAMETERS = {
     "SetIOWord": [BYTES, WORDS],
     "SetMemIOWord": [BYTES, WORDS],
 }
-# Printed text may hold what begins and ends frames. Only a quote before an ETX before the very check
-# sum that would belong there cannot be told from an end.
+# Printed text may hold what begins and ends frames. Only a quote before an ETX before the very
+# check sum that would belong there cannot be told from an end.
 TEXTS = st.text(st.sampled_from('ab"\x02\x03\x06\x15 ,\r\nä'), max_size=20).filter(
     lambda text: text[-1:] not in ("\r", "\n") and '"\x03' not in text
 )

@@ -16,8 +16,9 @@ from typing import Literal
 from robolink.errors import LocalProtocolError, RemoteProtocolError
 from robolink.messages import tr
 from robolink.protocols._role import NEED_DATA, Need, Role
-from robolink.protocols.epson_binary._dialect import Dialect
+from robolink.protocols.epson_binary._dialect import Dialect, Letters
 from robolink.protocols.epson_binary._frames import EOT, FrameBuffer
+from robolink.protocols.epson_binary._letters import letter_of
 from robolink.protocols.epson_binary._messages import (
     read_answer,
     read_request,
@@ -60,6 +61,12 @@ class EpsonBinaryCodec:
     def bytes_held(self) -> bytes:
         """What has arrived and is part of no event yet, for messages about half a reply."""
         return self._buffer.held
+
+    def carries(self, name: str) -> bool:
+        """Whether a command has a letter that may be sent."""
+        letter = letter_of(name)
+        guessed = self._dialect.letters is Letters.GUESSED
+        return letter is not None and (letter.documented or guessed)
 
     def send(self, event: Event | Opening) -> bytes:
         """Return the bytes of one message.

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Final
 
 from robolink.model import Secret
+from robolink.protocols.epson_binary import Dialect
 from robolink.protocols.epson_text import BadRequest, ErrorCode, Request, StatusFlags
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.epson.arm.robots import find_robot
@@ -205,8 +206,14 @@ class EpsonSimulator:
 
     def connect(self, now_ns: int) -> EpsonServerLink:
         """Accept one client; see ``EpsonOptions.second_client``."""
+        return self._connected(EpsonServerLink(self, now_ns), now_ns)
+
+    def connect_serial(self, now_ns: int, dialect: Dialect) -> EpsonServerLink:
+        """Listen at a serial line to whoever turns Remote RS232 on there."""
+        return self._connected(EpsonServerLink(self, now_ns, dialect=dialect), now_ns)
+
+    def _connected(self, link: EpsonServerLink, now_ns: int) -> EpsonServerLink:
         self.advance(now_ns)
-        link = EpsonServerLink(self, now_ns)
         self._links.append(link)
         if self._slot.client is not None and self.options.second_client == "closed":
             link.cut()

@@ -1,4 +1,4 @@
-"""One login on an EPSON controller: a transport, a codec and a lock.
+"""One login on an EPSON controller: a line and a lock.
 
 Theory of operation. Remote Ethernet has no transaction numbers; an answer is known by its
 name and by its place in line (docs/reference/epson.md 1.1). So at most two requests are
@@ -19,10 +19,13 @@ from dataclasses import dataclass
 from robolink import ambient
 from robolink.checkpoints import Checkpoint, checkpoint
 from robolink.controllers.epson.link.answers import rejected
+from robolink.controllers.epson.link.line import EpsonLine
 from robolink.controllers.epson.link.login import PASSWORD_REFUSALS, refused, unanswered
 from robolink.controllers.epson.link.requests import command_class_of
 from robolink.errors import (
     BusyError,
+    NotReadyError,
+    NotReadyReason,
     RemoteProtocolError,
     RobolinkError,
     TransportBrokenError,
@@ -36,17 +39,14 @@ from robolink.model import Secret
 from robolink.protocols.epson_text import (
     NEED_DATA,
     EndOfStream,
-    EpsonTextCodec,
     Refusal,
     Reply,
     Request,
-    Role,
     find_command,
 )
 from robolink.protocols.spel import Statement
 from robolink.stop_latch import StopLatch
 from robolink.timing import Deadline
-from robolink.transport import Transport
 
 
 @dataclass(slots=True)
@@ -72,14 +72,15 @@ class EpsonSession:
         latch: What holds requests back while a stop is in force.
 
     Args:
-        transport: An open transport; the session owns it from here on.
+        line: An open line; the session owns it from here on.
         timeout_s: Longest wait for the answer to one request that moves nothing.
     """
 
-    def __init__(self, transport: Transport, *, timeout_s: float = 3.0) -> None:
-        self._transport = transport
+    def __init__(self, line: EpsonLine, *, timeout_s: float = 3.0) -> None:
+        self._line = line
+        self._transport = transport = line.transport
         self.identity, self.place, self.clock = transport.identity, transport.place, transport.clock
-        self._codec = EpsonTextCodec(Role.HOST)
+        self._codec = line.codec
         self._wire = ambient.lock()
         self._gate = InterruptGate()
         self._gate.open()
@@ -98,6 +99,33 @@ class EpsonSession:
     def pending(self) -> PendingExecute | None:
         """The Execute that has not been taken as finished, if any."""
         return self._pending
+
+    def carries(self, name: str) -> bool:
+        """Whether a command of this name can be sent over this line."""
+        return self._codec.carries(name)
+
+    def require_abort(self, request: str) -> None:
+        """Hold back what could not be ended over this line once it runs.
+
+        While a statement runs, Abort alone ends it (docs/reference/epson.md 1.5), and no manual
+        prints its letter on Remote RS232 (docs/reference/epson.md 2.2).
+
+        Raises:
+            NotReadyError: This line has no Abort.
+        """
+        if self._codec.carries("Abort"):
+            return
+        raise NotReadyError(
+            tr("Nothing that was begun over this serial line could be stopped over it."),
+            reason=NotReadyReason.NO_ABORT,
+            remedy=tr(
+                "Nothing was sent. Move over Remote Ethernet; or see with 'robolink "
+                "verify-controller' that the controller knows the letter A, and write "
+                "letters=guessed into the URL."
+            ),
+            controller=self.identity,
+            request=request,
+        )
 
     def login(self, password: Secret | None) -> None:
         """Log in. One attempt.
@@ -194,6 +222,7 @@ class EpsonSession:
     def _exchanging(self, request: Request) -> Iterator[None]:
         """Hold the exchange lock for ``request``, once it is legal and no stop forbids it."""
         what = _shown(request)
+        self._line.require_carried(request.name)
         checkpoint(Checkpoint.LOCK, what)
         try:
             with self._gate, self._wire:

@@ -1,6 +1,7 @@
 """One verification, from login to logout."""
 
 from robolink.controllers.epson.controller import EpsonController
+from robolink.controllers.epson.link.line import open_line
 from robolink.controllers.epson.link.session import EpsonSession
 from robolink.controllers.epson.verify import text_facts as text
 from robolink.controllers.epson.verify import wire_facts as wire
@@ -12,7 +13,7 @@ from robolink.messages import tr
 from robolink.model import ControllerFacts, Secret
 from robolink.protocols import spel
 from robolink.timing import wall_label
-from robolink.transport import DialogueLog, TraceSink, TracingTransport, open_transport
+from robolink.transport import DialogueLog, TraceSink, parse_url
 
 
 def verify_epson(
@@ -38,19 +39,17 @@ def verify_epson(
         ConnectError: Nobody is reached.
         LoginRefusedError: Wrong or missing password.
     """
-    transport = open_transport(url, timeout_s=timeout_s)
-    log = DialogueLog(transport.identity, wall_label())
-    traced = TracingTransport(transport, log)
-    if trace is not None:
-        traced = TracingTransport(traced, trace)
-    session = EpsonSession(traced, timeout_s=timeout_s)
+    log = DialogueLog(parse_url(url).identity, wall_label())
+    traces = (log,) if trace is None else (log, trace)
+    line = open_line(url, timeout_s=timeout_s, traces=traces)
+    session = EpsonSession(line, timeout_s=timeout_s)
     try:
         session.login(password)
         # It only reads, and the login sees to it that nobody else is there.
         outcomes = memory_journal(session.identity).log(session.identity)
         controller = EpsonController(session, outcomes, remote_timeout_s=0.0)
         try:
-            about, facts = _found_out(Interview(controller, session, traced, log))
+            about, facts = _found_out(Interview(controller, session, line.transport, log))
         finally:
             controller.close()
     finally:

@@ -1,10 +1,14 @@
-"""One client's connection to the simulated controller: codec, login, what leaves and when."""
+"""One client's connection to the simulated controller: codec, login, what leaves and when.
+
+On a serial line nothing is connected: EOT begins, and silence ends a request that was cut short.
+"""
 
 from collections import deque
 from collections.abc import Sequence
 from typing import Final, Protocol
 
 from robolink.errors import LocalProtocolError, RemoteProtocolError
+from robolink.protocols.epson_binary import Dialect, EpsonBinaryCodec, Opening
 from robolink.protocols.epson_text import (
     NEED_DATA,
     BadRequest,
@@ -58,14 +62,22 @@ class EpsonServerLink:
     stays after its logout (assumed).
     """
 
-    def __init__(self, controller: ServedRequest, now_ns: int) -> None:
+    def __init__(
+        self, controller: ServedRequest, now_ns: int, *, dialect: Dialect | None = None
+    ) -> None:
         options = controller.options
         self._controller = controller
-        self._codec = EpsonTextCodec(
-            Role.DEVICE,
-            terminator=_TERMINATORS[options.terminator],
-            unterminated=options.requests_end_with_silence,
+        self._codec: EpsonTextCodec | EpsonBinaryCodec = (
+            EpsonTextCodec(
+                Role.DEVICE,
+                terminator=_TERMINATORS[options.terminator],
+                unterminated=options.requests_end_with_silence,
+            )
+            if dialect is None
+            else EpsonBinaryCodec(Role.DEVICE, dialect)
         )
+        self._serial = dialect is not None
+        self._turned_on = not self._serial
         self._outbox: deque[tuple[int, bytes | None]] = deque()
         self._over = False
         self._anonymous_since_ns: int | None = now_ns
@@ -121,8 +133,7 @@ class EpsonServerLink:
         """End a request after which nothing came; cut whoever did not log in for too long."""
         if self._silent_from_ns is not None and now_ns >= self._silent_from_ns:
             self._silent_from_ns = None
-            self._codec.end_of_request()
-            self._serve()
+            self._end_request()
         deadline = self._login_deadline()
         if deadline is not None and now_ns >= deadline:
             self.cut()
@@ -171,12 +182,21 @@ class EpsonServerLink:
     def _read(self, data: bytes) -> None:
         self._codec.receive_data(data)
         self._serve()
-        begun = self._controller.options.requests_end_with_silence and self._codec.bytes_held
+        by_silence = self._serial or self._controller.options.requests_end_with_silence
+        begun = by_silence and self._codec.bytes_held
         self._silent_from_ns = self._controller.now_ns + _SILENCE_NS if begun else None
+
+    def _end_request(self) -> None:
+        broken = self._codec.end_of_request()
+        if isinstance(broken, (Request, BadRequest)) and self._turned_on:
+            self._controller.take(self, broken)
+        self._serve()
 
     def _serve(self) -> None:
         while not self._over and (event := self._codec.next_event()) is not NEED_DATA:
-            if isinstance(event, (Request, BadRequest)):
+            if isinstance(event, Opening):
+                self._turned_on = True
+            elif isinstance(event, (Request, BadRequest)) and self._turned_on:
                 self._controller.take(self, event)
 
     def _post(self, data: bytes | None, at_ns: int) -> None:

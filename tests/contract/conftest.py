@@ -11,9 +11,11 @@ from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.options import EpsonOptions
 from robolink_simulators.hosting.in_process.epson import register, unregister
+from robolink_simulators.hosting.streams.epson_serial import serve_serial
 from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 
 import robolink
+from robolink.protocols.epson_binary import Dialect, Letters
 
 SPEED = 40.0
 """Simulated seconds per real second on the socket."""
@@ -35,7 +37,12 @@ class Cell:
 @contextmanager
 def served(backend: str, simulator: EpsonSimulator) -> Iterator[Cell]:
     """Offer ``simulator`` on ``backend``."""
-    if backend == "sim":
+    if backend == "pty":
+        # With the letters that no manual prints: the others cannot end what they begin.
+        dialect = Dialect(letters=Letters.GUESSED)
+        with serve_serial(simulator, dialect=dialect, clock=ScaledClock(SPEED)) as line:
+            yield Cell(line.url, simulator)
+    elif backend == "sim":
         name = f"contract-{next(_names)}"
         register(name, simulator)
         try:
@@ -52,7 +59,7 @@ def _own_state_folder(tmp_path, monkeypatch):
     monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
 
 
-@pytest.fixture(params=["sim", "tcp", "hardware"])
+@pytest.fixture(params=["sim", "tcp", "pty", "hardware"])
 def cell(request) -> Iterator[Cell]:
     """A controller with the default habits: simulated, served, or real."""
     if request.param == "hardware":
@@ -70,7 +77,7 @@ def cell(request) -> Iterator[Cell]:
         yield cell
 
 
-@pytest.fixture(params=["sim", "tcp"])
+@pytest.fixture(params=["sim", "tcp", "pty"])
 def serve(request):
     """A maker of cells around a simulator of the test's own."""
     return lambda simulator: served(request.param, simulator)

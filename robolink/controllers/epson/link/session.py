@@ -281,7 +281,8 @@ class EpsonSession:
             elif isinstance(event, (Reply, Refusal)) and self._answers(event, wanted):
                 return event
             else:
-                self._take_aside(event)
+                # A login that was bent on its way comes back in its refusal, password and all.
+                self._take_aside(event, hidden=wanted == "login")
 
     def _answers(self, event: Reply | Refusal, wanted: str) -> bool:
         name = event.name.lower()
@@ -307,7 +308,7 @@ class EpsonSession:
         while (event := self._codec.next_event()) is not NEED_DATA:
             self._take_aside(event)
 
-    def _take_aside(self, event: object) -> None:
+    def _take_aside(self, event: object, *, hidden: bool = False) -> None:
         if isinstance(event, EndOfStream):
             raise TransportBrokenError(
                 tr("{identity} closed the connection.", identity=self.identity),
@@ -329,7 +330,7 @@ class EpsonSession:
         raise RemoteProtocolError(
             tr(
                 "The controller sent an answer to a question nobody asked: {event}.",
-                event=repr(event)[:_SHOWN],
+                event="***" if hidden else repr(event)[:_SHOWN],
             ),
             remedy=tr(
                 "The connection is closed, because later answers could be mistaken. Connect "

@@ -169,11 +169,12 @@ class CommandSender:
 
     def _seen_to_end(self, draft: Command) -> Ended:
         command, now = self._send(draft)
+        begun_ns = self._wire.clock.now_ns()
         deadline = Deadline.after(self._wire.clock, COMPLETION_S)
         while (end := self._end_of(command, now)) is None:
             if deadline.expired:
                 raise self._wire.ended(self._silence(command, tr("began, and has not ended")))
-            now = self._snapshots.news(now)
+            now = self._snapshots.news(now, begun_ns=begun_ns)
         return end
 
     def _end_of(self, command: Command, now: Response) -> Ended | None:

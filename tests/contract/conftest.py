@@ -15,7 +15,6 @@ from robolink_simulators.hosting.streams.epson_serial import serve_serial
 from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 
 import robolink
-from robolink.protocols.epson_binary import Dialect, Letters
 
 SPEED = 40.0
 """Simulated seconds per real second on the socket."""
@@ -38,9 +37,7 @@ class Cell:
 def served(backend: str, simulator: EpsonSimulator) -> Iterator[Cell]:
     """Offer ``simulator`` on ``backend``."""
     if backend == "pty":
-        # With the letters that no manual prints: the others cannot end what they begin.
-        dialect = Dialect(letters=Letters.GUESSED)
-        with serve_serial(simulator, dialect=dialect, clock=ScaledClock(SPEED)) as line:
+        with serve_serial(simulator, clock=ScaledClock(SPEED)) as line:
             yield Cell(line.url, simulator)
     elif backend == "sim":
         name = f"contract-{next(_names)}"
@@ -52,6 +49,23 @@ def served(backend: str, simulator: EpsonSimulator) -> Iterator[Cell]:
     else:
         with serve_tcp(simulator, clock=ScaledClock(SPEED)) as host:
             yield Cell(host.url, simulator)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config, items):
+    """Leave out what a serial line has no frame for, and the greater part of the rest to soak."""
+    impossible = []
+    for item in items:
+        given = getattr(item, "callspec", None)
+        if given is None or "pty" not in (given.params.get("cell"), given.params.get("serve")):
+            continue
+        if item.get_closest_marker("remote_ethernet"):
+            impossible.append(item)
+        elif not item.get_closest_marker("on_serial"):
+            item.add_marker(pytest.mark.soak)
+    if impossible:
+        config.hook.pytest_deselected(items=impossible)
+        items[:] = [item for item in items if item not in impossible]
 
 
 @pytest.fixture(autouse=True)

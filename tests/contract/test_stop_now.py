@@ -45,6 +45,7 @@ def left_moving(cell, **options):
     controller._link.session.close()
 
 
+@pytest.mark.on_serial
 @pytest.mark.parametrize("habits", HABITS, ids=str)
 def test_a_movement_whose_client_died_is_brought_to_rest(serve, habits):
     simulator = EpsonSimulator(seed=7, options=EpsonOptions(**habits))

@@ -253,6 +253,7 @@ def open_epson(
     session = EpsonSession(line, timeout_s=timeout_s)
     try:
         session.login(password)
+        session.prove_in_step()
     except BaseException:
         session.close()
         raise

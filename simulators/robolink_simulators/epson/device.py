@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import Final
 
 from robolink.model import Secret
-from robolink.protocols.epson_binary import Dialect
 from robolink.protocols.epson_text import BadRequest, ErrorCode, Request, StatusFlags
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.epson.arm.robots import find_robot
@@ -27,7 +26,7 @@ from robolink_simulators.epson.flash import Flash
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.variables import project_variables
 from robolink_simulators.epson.mishaps import EpsonMishaps
-from robolink_simulators.epson.options import EpsonOptions
+from robolink_simulators.epson.options import EpsonOptions, serial_dialect
 from robolink_simulators.epson.panel import EpsonPanel
 from robolink_simulators.epson.remote.bent_requests import arriving
 from robolink_simulators.epson.remote.client_slot import ClientSlot
@@ -216,8 +215,9 @@ class EpsonSimulator:
         """Accept one client; see ``EpsonOptions.second_client``."""
         return self._connected(EpsonServerLink(self, now_ns), now_ns)
 
-    def connect_serial(self, now_ns: int, dialect: Dialect) -> EpsonServerLink:
+    def connect_serial(self, now_ns: int) -> EpsonServerLink:
         """Listen at a serial line to whoever turns Remote RS232 on there."""
+        dialect = serial_dialect(self.options)
         return self._connected(EpsonServerLink(self, now_ns, dialect=dialect), now_ns)
 
     def _connected(self, link: EpsonServerLink, now_ns: int) -> EpsonServerLink:

@@ -14,6 +14,7 @@ from typing import Final, Literal
 from robolink.errors import ConfigError
 from robolink.files.named import read_named
 from robolink.messages import tr
+from robolink.protocols.epson_binary import Dialect, Letters, NakCode, Numbers
 from robolink_simulators.option_values import require_known, values_from_text
 
 
@@ -114,6 +115,13 @@ class EpsonOptions:
         till_already_met: What a motion does whose Till holds from the start: it stays, or
             starts and stops at once [open, docs/reference/spel.md 15].
         angle_wrap: Whether a stored tool angle is brought into -180..180 [U].
+        rs232_numbers: How Remote RS232 writes numbers [D in three languages, D otherwise in one].
+        rs232_nak_code: How the code of a refusal is written there [U].
+        rs232_letters: Which letters are understood: those that a manual prints, or also the
+            upper-case twins of readers, v and A [U].
+        rs232_status_flags: Flags of GetStatus there [D for RC+ 5; 11 are likely since RC+ 7].
+        rs232_word_port_bytes: Length of the number of a port of words there [U].
+        rs232_eot_answer: What EOT is answered with [U].
         numbers: Error numbers in use.
     """
 
@@ -159,11 +167,28 @@ class EpsonOptions:
     real_pos_noise_mm: float = 0.002
     till_already_met: Literal["stays", "starts"] = "stays"
     angle_wrap: bool = False
+    rs232_numbers: Literal["binary", "ascii_hex"] = "binary"
+    rs232_nak_code: Literal["digits", "binary"] = "digits"
+    rs232_letters: Literal["documented", "guessed"] = "guessed"
+    rs232_status_flags: Literal[10, 11] = 10
+    rs232_word_port_bytes: Literal[1, 2] = 1
+    rs232_eot_answer: Literal["none", "ack"] = "none"
     numbers: SpelNumbers = SpelNumbers()
 
 
 PROFILE_SCHEMA: Final = "robolink/epson-profile/1"
 _NUMBERS: Final = "numbers."
+
+
+def serial_dialect(options: EpsonOptions) -> Dialect:
+    """Return how a controller with these habits speaks Remote RS232."""
+    return Dialect(
+        numbers=Numbers(options.rs232_numbers),
+        nak_code=NakCode(options.rs232_nak_code),
+        letters=Letters(options.rs232_letters),
+        status_flags=options.rs232_status_flags,
+        word_port_bytes=options.rs232_word_port_bytes,
+    )
 
 
 def option_names() -> tuple[str, ...]:

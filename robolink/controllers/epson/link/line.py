@@ -47,10 +47,12 @@ class EpsonLine:
     Attributes:
         transport: Moves the bytes.
         codec: Frames them.
+        outlives_sessions: Whether bytes of an earlier session may still come.
     """
 
     transport: Transport
     codec: LineCodec
+    outlives_sessions: bool = False
 
     def require_carried(self, name: str) -> None:
         """Refuse a command that this line has no frame for, as older firmware would.
@@ -120,4 +122,5 @@ def _turned_on(transport: Transport, dialect: "Dialect") -> EpsonLine:
     except BaseException:
         transport.close()
         raise
-    return EpsonLine(transport, EpsonBinaryCodec(Role.HOST, dialect))
+    codec = EpsonBinaryCodec(Role.HOST, dialect)
+    return EpsonLine(transport, codec, outlives_sessions=True)

@@ -100,6 +100,11 @@ class EpsonSession:
         """The Execute that has not been taken as finished, if any."""
         return self._pending
 
+    @property
+    def outlived(self) -> bool:
+        """Whether bytes of an earlier session may still come: it is a serial line."""
+        return self._line.outlives_sessions
+
     def carries(self, name: str) -> bool:
         """Whether a command of this name can be sent over this line."""
         return self._codec.carries(name)
@@ -144,6 +149,29 @@ class EpsonSession:
             if answer.code in PASSWORD_REFUSALS:
                 raise refused(answer.code, self.identity)
             raise rejected(answer, controller=self.identity)
+
+    def prove_in_step(self) -> None:
+        """See that an answer belongs to its question, on a line that outlives its sessions.
+
+        No other request is answered with the letter of GetCurRobot, and nothing else asks for it
+        so early; so an answer to it can be no late one. It holds a number too, which shows that
+        both ends write numbers alike. Over TCP a connection has no past, and nothing is sent.
+
+        Raises:
+            RemoteProtocolError: The answers are not those to the questions, or numbers are
+                written in another way.
+            TransportError: Nothing comes.
+        """
+        if not self._line.outlives_sessions:
+            return
+        try:
+            self._ask(Request("GetCurRobot"))  # a refusal is an answer to it, too
+        except (RemoteProtocolError, TransportTimeoutError) as error:
+            error.remedy = tr(
+                "Connect again. If it happens twice, the controller writes numbers in another "
+                "way: say numbers=ascii_hex in the URL (docs/remote-rs232.md)."
+            )
+            raise
 
     def exchange(self, name: str, *parameters: str) -> Reply:
         """Send one request and return its answer.

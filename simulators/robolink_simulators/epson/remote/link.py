@@ -27,6 +27,8 @@ from robolink_simulators.faults.departing import DepartingReplies
 _SILENCE_NS: Final = 100_000_000
 """How long nothing must come for a request without a line end to be whole (inferred)."""
 
+_ACK: Final = b"\x06"
+
 _TERMINATORS: Final = {"crlf": b"\r\n", "cr": b"\r", "lf": b"\n"}
 
 
@@ -225,6 +227,8 @@ class EpsonServerLink:
                 return
             if isinstance(event, Opening):
                 self._turned_on = True
+                if self._controller.options.rs232_eot_answer == "ack":
+                    self.push(_ACK)
             elif isinstance(event, (Request, BadRequest)) and self._turned_on:
                 self._controller.take(self, event)
 

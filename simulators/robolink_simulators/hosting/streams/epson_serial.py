@@ -5,6 +5,7 @@ from urllib.parse import urlencode
 from robolink.protocols.epson_binary import Dialect
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.epson.options import serial_dialect
 from robolink_simulators.epson.remote.link import EpsonServerLink
 from robolink_simulators.hosting.streams.line_host import LineHost
 from robolink_simulators.hosting.streams.serial_cable import no_pseudo_terminal
@@ -16,7 +17,6 @@ _SHOWN_BAUD = 115_200
 def serve_serial(
     simulator: EpsonSimulator,
     *,
-    dialect: Dialect | None = None,
     baud: int = 0,
     clock: ScaledClock | None = None,
 ) -> "EpsonLineHost":
@@ -24,8 +24,6 @@ def serve_serial(
 
     Args:
         simulator: What to serve.
-        dialect: How this controller reads what the manuals leave open; by default as a host
-            takes it unless told otherwise.
         baud: As slowly as a line at this rate, in real time; 0 carries everything at once.
         clock: The simulated time; real time by default.
 
@@ -33,9 +31,7 @@ def serve_serial(
         ConnectError: This system has no pseudo terminals.
     """
     try:
-        return EpsonLineHost(
-            simulator, dialect or Dialect(), clock=clock or ScaledClock(), baud=baud
-        )
+        return EpsonLineHost(simulator, clock=clock or ScaledClock(), baud=baud)
     except (ImportError, AttributeError, OSError) as error:
         raise no_pseudo_terminal(error) from error
 
@@ -43,15 +39,14 @@ def serve_serial(
 class _SerialFace:
     """A controller as its serial port shows it; see ``hosting.seam.WireDevice``."""
 
-    def __init__(self, simulator: EpsonSimulator, dialect: Dialect) -> None:
+    def __init__(self, simulator: EpsonSimulator) -> None:
         self._simulator = simulator
-        self._dialect = dialect
         self.advance = simulator.advance
         self.next_change = simulator.next_change
 
     def connect(self, now_ns: int) -> EpsonServerLink:
         """Listen at the port."""
-        return self._simulator.connect_serial(now_ns, self._dialect)
+        return self._simulator.connect_serial(now_ns)
 
 
 class EpsonLineHost(LineHost):
@@ -61,13 +56,11 @@ class EpsonLineHost(LineHost):
         url: Where a client finds it, with all that it must know of the dialect.
     """
 
-    def __init__(
-        self, simulator: EpsonSimulator, dialect: Dialect, *, clock: ScaledClock, baud: int
-    ) -> None:
-        face = _SerialFace(simulator, dialect)
+    def __init__(self, simulator: EpsonSimulator, *, clock: ScaledClock, baud: int) -> None:
+        face = _SerialFace(simulator)
         super().__init__(face, clock=clock, lock=simulator.lock, baud=baud)
         self._simulator = simulator
-        options = {"baud": str(baud or _SHOWN_BAUD), **_told(dialect)}
+        options = {"baud": str(baud or _SHOWN_BAUD), **_told(serial_dialect(simulator.options))}
         self.url = f"epson+serial://{self.cable.near}?{urlencode(options)}"
         simulator.url = simulator.url or self.url
         simulator.present_ns = clock.now_ns

@@ -72,6 +72,7 @@ def test_a_lost_answer_is_no_reason_to_leave_it_moving(serve, request_, action):
         assert simulator.faults.pending == ()
 
 
+@pytest.mark.fault("F01")
 def test_the_late_end_of_an_execute_does_not_disturb_a_stop(serve):
     simulator = EpsonSimulator(seed=7)
     with serve(simulator) as cell:

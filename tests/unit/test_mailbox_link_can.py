@@ -73,6 +73,7 @@ def test_nobody_there_is_named_and_the_transfer_given_up(link_to):
     assert "terminators" in caught.value.remedy
 
 
+@pytest.mark.fault("F11")
 def test_a_lost_heartbeat_names_itself_before_anything_is_sent(link_to):
     bus, link = link_to(node_with(200))
     sent = len(bus.sent)
@@ -149,6 +150,7 @@ def test_a_refused_download_says_why_sends_nothing_more_and_keeps_the_link(link_
     link.beat(1)
 
 
+@pytest.mark.fault("F04")
 @pytest.mark.parametrize("answered", [1, 2, 19])
 def test_a_download_that_is_cut_off_is_aborted_once_and_sends_nothing_more(link_to, answered):
     left = [answered]
@@ -174,6 +176,7 @@ def toggled(service, data):
     return bytes([service | data[0] & 0x10]) + bytes(7)
 
 
+@pytest.mark.fault("F10")
 @pytest.mark.parametrize(
     "foreign",
     [

@@ -37,6 +37,7 @@ def over_rtu(*steps, echo=False):
     return line, ModbusClient(line, exchange, identity=IDENTITY, unit=1, timeout_s=1.0)
 
 
+@pytest.mark.fault("F03")
 def test_a_serial_line_is_proved_in_step_before_its_first_answer_is_taken():
     stale = rtu(words(41))
     line, client = over_rtu(lambda frame: [rtu(words(42))])
@@ -45,6 +46,7 @@ def test_a_serial_line_is_proved_in_step_before_its_first_answer_is_taken():
     assert [frame[1:6].hex() for frame in line.sent] == ["0400000003", "0400000001"]
 
 
+@pytest.mark.fault("F02")
 def test_on_a_serial_line_a_late_answer_is_never_taken_for_the_next():
     late = rtu(words(41))
     line, client = over_rtu(
@@ -59,6 +61,7 @@ def test_on_a_serial_line_a_late_answer_is_never_taken_for_the_next():
     assert questions == ["0400000003", "0400000001", "0300000003", "0400010001"]
 
 
+@pytest.mark.fault("F02")
 def test_on_a_serial_line_an_unanswered_probe_is_not_asked_again_in_the_same_words():
     line, client = over_rtu(lambda frame: [], lambda frame: [], lambda frame: [])
     for _ in range(3):

@@ -305,12 +305,32 @@ class EpsonSession:
         while True:
             event = self._codec.next_event()
             if event is NEED_DATA:
-                self._codec.receive_data(self._transport.receive(deadline=deadline))
+                self._codec.receive_data(self._heard(request, deadline))
             elif isinstance(event, (Reply, Refusal)) and self._answers(event, wanted):
                 return event
             else:
                 # A login that was bent on its way comes back in its refusal, password and all.
                 self._take_aside(event, hidden=wanted == "login")
+
+    def _heard(self, request: Request, deadline: Deadline) -> bytes:
+        try:
+            return self._transport.receive(deadline=deadline)
+        except TransportTimeoutError as error:
+            if not (held := self._codec.bytes_held):
+                raise
+            # Half an answer is another trouble than none: the controller is there.
+            raise TransportTimeoutError(
+                tr(
+                    "{identity} answered {count} bytes, then nothing: {request}.",
+                    identity=self.identity,
+                    count=len(held),
+                    request=_shown(request),
+                ),
+                remedy=error.remedy,
+                controller=self.identity,
+                request=_shown(request),
+                raw=held,
+            ) from error
 
     def _answers(self, event: Reply | Refusal, wanted: str) -> bool:
         name = event.name.lower()

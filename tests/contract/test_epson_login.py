@@ -38,11 +38,8 @@ def test_the_right_password_opens(serve):
             assert controller.status().ready
 
 
-<<<<<<< HEAD
 @pytest.mark.on_serial
-=======
 @pytest.mark.fault("F16")
->>>>>>> main
 @pytest.mark.parametrize("password", ["canary-wrong", None])
 def test_f16_a_wrong_password_is_tried_once_and_shown_nowhere(serve, password):
     simulator = EpsonSimulator(password=Secret(CANARY))

@@ -253,7 +253,10 @@ def open_epson(
     session = EpsonSession(line, timeout_s=timeout_s)
     try:
         session.login(password)
-        session.prove_in_step()
+        if session.outlived:
+            from robolink.controllers.epson.link.in_step import prove_in_step
+
+            prove_in_step(session)
     except BaseException:
         session.close()
         raise

@@ -54,7 +54,7 @@ def framed(first: int, letter: int, data: bytes) -> bytes:
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class SerialFrame:
     """What was received as one.
 
     Attributes:
@@ -114,7 +114,7 @@ class FrameBuffer:
         """Add what was received."""
         self._data += data
 
-    def take(self) -> Frame | None:
+    def take(self) -> SerialFrame | None:
         """Return the next frame, ``None`` while it is not whole.
 
         Raises:
@@ -126,7 +126,7 @@ class FrameBuffer:
             return None
         if self._data[0] == EOT and self._role is Role.DEVICE:
             del self._data[0]
-            return Frame(EOT)
+            return SerialFrame(EOT)
         self._check_first()
         length = self._length() if len(self._data) >= _LEAD else None
         if length is None and len(self._data) > self._max_frame:
@@ -139,12 +139,12 @@ class FrameBuffer:
             return None
         return self._cut(length)
 
-    def give_up(self) -> Frame | None:
+    def give_up(self) -> SerialFrame | None:
         """Return what is held as one frame that is not intact, ``None`` where nothing is."""
         if not self._data:
             return None
         letter = self._data[1] if len(self._data) > 1 else 0
-        frame = Frame(self._data[0], letter, bytes(self._data[_LEAD:]), intact=False)
+        frame = SerialFrame(self._data[0], letter, bytes(self._data[_LEAD:]), intact=False)
         self._data.clear()
         self._scanned, self._sum = 1, 0
         return frame
@@ -212,9 +212,9 @@ class FrameBuffer:
                 return at + _TAIL
         return None
 
-    def _cut(self, length: int) -> Frame:
+    def _cut(self, length: int) -> SerialFrame:
         whole = bytes(self._data[:length])
         del self._data[:length]
         self._scanned, self._sum = 1, 0
         intact = whole[-_TAIL] == ETX and check_sum(whole[1:-1]) == whole[-1]
-        return Frame(whole[0], whole[1], whole[_LEAD:-_TAIL], intact)
+        return SerialFrame(whole[0], whole[1], whole[_LEAD:-_TAIL], intact)

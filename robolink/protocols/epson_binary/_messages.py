@@ -6,7 +6,7 @@ from typing import Final
 from robolink.errors import LocalProtocolError, RemoteProtocolError
 from robolink.messages import tr
 from robolink.protocols.epson_binary._dialect import Dialect, Letters, NakCode, Numbers
-from robolink.protocols.epson_binary._frames import ACK, NAK, STX, Frame, framed, width
+from robolink.protocols.epson_binary._frames import ACK, NAK, STX, SerialFrame, framed, width
 from robolink.protocols.epson_binary._letters import BY_BYTE, Data, Letter, letter_of
 from robolink.protocols.epson_text import BadRequest, ErrorCode, Refusal, Reply, Request
 
@@ -60,7 +60,7 @@ def write_answer(answer: Reply | Refusal, dialect: Dialect) -> bytes:
     return framed(ACK, letter.byte, _written(answer.name, part, text, dialect))
 
 
-def read_answer(frame: Frame, dialect: Dialect) -> Reply | Refusal:
+def read_answer(frame: SerialFrame, dialect: Dialect) -> Reply | Refusal:
     """Return what a device says.
 
     Raises:
@@ -97,7 +97,7 @@ def read_answer(frame: Frame, dialect: Dialect) -> Reply | Refusal:
             return Reply(letter.name, (_number_text(frame, part, dialect),))
 
 
-def read_request(frame: Frame, dialect: Dialect) -> Request | BadRequest:
+def read_request(frame: SerialFrame, dialect: Dialect) -> Request | BadRequest:
     """Return what a host asks; what makes no sense becomes the refusal it deserves."""
     letter = BY_BYTE.get(frame.letter)
     name = "" if letter is None else letter.name
@@ -198,7 +198,7 @@ def _value(data: bytes, dialect: Dialect) -> int | None:
     return _integer(data.decode(_ENCODING), 16)
 
 
-def _number_text(frame: Frame, part: Data, dialect: Dialect) -> str:
+def _number_text(frame: SerialFrame, part: Data, dialect: Dialect) -> str:
     text = _read_part(frame.data, part, dialect)
     if text is None:
         raise _no_answer(
@@ -220,7 +220,7 @@ def _printed(answer: Reply) -> bytes:
         ) from error
 
 
-def _read_printed(frame: Frame, letter: Letter) -> Reply:
+def _read_printed(frame: SerialFrame, letter: Letter) -> Reply:
     """Nothing, or the ``0`` of Remote Ethernet, is the answer to what printed nothing."""
     data = frame.data
     if data in (b"", b"0"):
@@ -240,7 +240,7 @@ def _status_data(answer: Reply, dialect: Dialect) -> bytes:
     return bytes(int(flag) for flag in flags[-dialect.status_flags :]) + code.encode("ascii")
 
 
-def _read_status(frame: Frame, letter: Letter) -> Reply:
+def _read_status(frame: SerialFrame, letter: Letter) -> Reply:
     found = _STATUS.fullmatch(frame.data)
     if found is None:
         raise _no_answer(
@@ -261,7 +261,7 @@ def _code(refusal: Refusal, dialect: Dialect) -> bytes:
     return int(refusal.code).to_bytes(2, "big")
 
 
-def _read_code(frame: Frame, dialect: Dialect) -> int:
+def _read_code(frame: SerialFrame, dialect: Dialect) -> int:
     if dialect.nak_code is NakCode.BINARY:
         return int.from_bytes(frame.data, "big")
     if not frame.data.isdigit():
@@ -273,7 +273,7 @@ def _read_code(frame: Frame, dialect: Dialect) -> int:
     return int(frame.data)
 
 
-def _no_answer(frame: Frame, what: str, remedy: str) -> RemoteProtocolError:
+def _no_answer(frame: SerialFrame, what: str, remedy: str) -> RemoteProtocolError:
     raw = bytes([frame.first, frame.letter]) + frame.data[:80]
     return RemoteProtocolError(what, remedy=remedy, raw=raw)
 

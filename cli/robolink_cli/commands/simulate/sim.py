@@ -126,13 +126,9 @@ def epson(
         state_path=state,
         world=world_from(world),
     )
-<<<<<<< HEAD
+    plan_faults(simulator, faults, {LinkKind.EPSON_SERIAL if serial else LinkKind.EPSON_TCP})
     place = None if serial else listen
     serve_epson(simulator, place, speed=speed, allow_remote=allow_remote, baud=baud)
-=======
-    plan_faults(simulator, faults, {LinkKind.EPSON_TCP})
-    serve_epson(simulator, listen, speed=speed, allow_remote=allow_remote)
->>>>>>> main
 
 
 @sim.command()

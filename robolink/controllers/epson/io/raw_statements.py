@@ -27,7 +27,7 @@ class RawStatements:
             self._link.markers.require_settled(statement)
             self._link.window.require_ready(statement)
             if command_class_of(Request("Execute", (statement,))) is CommandClass.ACT:
-                self._link.session.require_abort(statement)
+                self._link.window.require_abort(statement)
             require_engineer(
                 self._link.markers.outcomes, tr("run {statement!r} as typed", statement=statement)
             )

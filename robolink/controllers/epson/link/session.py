@@ -24,8 +24,6 @@ from robolink.controllers.epson.link.login import PASSWORD_REFUSALS, refused, un
 from robolink.controllers.epson.link.requests import command_class_of
 from robolink.errors import (
     BusyError,
-    NotReadyError,
-    NotReadyReason,
     RemoteProtocolError,
     RobolinkError,
     TransportBrokenError,
@@ -109,29 +107,6 @@ class EpsonSession:
         """Whether a command of this name can be sent over this line."""
         return self._codec.carries(name)
 
-    def require_abort(self, request: str) -> None:
-        """Hold back what could not be ended over this line once it runs.
-
-        While a statement runs, Abort alone ends it (docs/reference/epson.md 1.5), and no manual
-        prints its letter on Remote RS232 (docs/reference/epson.md 2.2).
-
-        Raises:
-            NotReadyError: This line has no Abort.
-        """
-        if self._codec.carries("Abort"):
-            return
-        raise NotReadyError(
-            tr("Nothing that was begun over this serial line could be stopped over it."),
-            reason=NotReadyReason.NO_ABORT,
-            remedy=tr(
-                "Nothing was sent. Move over Remote Ethernet; or see with 'robolink "
-                "verify-controller' that the controller knows the letter A, and write "
-                "letters=guessed into the URL."
-            ),
-            controller=self.identity,
-            request=request,
-        )
-
     def login(self, password: Secret | None) -> None:
         """Log in. One attempt.
 
@@ -149,29 +124,6 @@ class EpsonSession:
             if answer.code in PASSWORD_REFUSALS:
                 raise refused(answer.code, self.identity)
             raise rejected(answer, controller=self.identity)
-
-    def prove_in_step(self) -> None:
-        """See that an answer belongs to its question, on a line that outlives its sessions.
-
-        No other request is answered with the letter of GetCurRobot, and nothing else asks for it
-        so early; so an answer to it can be no late one. It holds a number too, which shows that
-        both ends write numbers alike. Over TCP a connection has no past, and nothing is sent.
-
-        Raises:
-            RemoteProtocolError: The answers are not those to the questions, or numbers are
-                written in another way.
-            TransportError: Nothing comes.
-        """
-        if not self._line.outlives_sessions:
-            return
-        try:
-            self._ask(Request("GetCurRobot"))  # a refusal is an answer to it, too
-        except (RemoteProtocolError, TransportTimeoutError) as error:
-            error.remedy = tr(
-                "Connect again. If it happens twice, the controller writes numbers in another "
-                "way: say numbers=ascii_hex in the URL (docs/remote-rs232.md)."
-            )
-            raise
 
     def exchange(self, name: str, *parameters: str) -> Reply:
         """Send one request and return its answer.

@@ -48,7 +48,10 @@ def verify_epson(
     session = EpsonSession(line, timeout_s=timeout_s)
     try:
         session.login(password)
-        session.prove_in_step()
+        if session.outlived:
+            from robolink.controllers.epson.link.in_step import prove_in_step
+
+            prove_in_step(session)
         # It only reads, and the login sees to it that nobody else is there.
         outcomes = memory_journal(session.identity).log(session.identity)
         controller = EpsonController(session, outcomes, remote_timeout_s=0.0)

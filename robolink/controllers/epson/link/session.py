@@ -202,7 +202,8 @@ class EpsonSession:
     def _exchanging(self, request: Request) -> Iterator[None]:
         """Hold the exchange lock for ``request``, once it is legal and no stop forbids it."""
         what = _shown(request)
-        self._line.require_carried(request.name)
+        if not self._codec.carries(request.name):
+            self._line.require_carried(request.name)
         checkpoint(Checkpoint.LOCK, what)
         try:
             with self._gate, self._wire:

@@ -26,7 +26,7 @@ from robolink_simulators.epson.flash import Flash
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.variables import project_variables
 from robolink_simulators.epson.mishaps import EpsonMishaps
-from robolink_simulators.epson.options import EpsonOptions
+from robolink_simulators.epson.options import EpsonOptions, serial_dialect
 from robolink_simulators.epson.panel import EpsonPanel
 from robolink_simulators.epson.remote.bent_requests import arriving
 from robolink_simulators.epson.remote.client_slot import ClientSlot
@@ -247,8 +247,15 @@ class EpsonSimulator:
 
     def connect(self, now_ns: int) -> EpsonServerLink:
         """Accept one client; see ``EpsonOptions.second_client``."""
+        return self._connected(EpsonServerLink(self, now_ns), now_ns)
+
+    def connect_serial(self, now_ns: int) -> EpsonServerLink:
+        """Listen at a serial line to whoever turns Remote RS232 on there."""
+        dialect = serial_dialect(self.options)
+        return self._connected(EpsonServerLink(self, now_ns, dialect=dialect), now_ns)
+
+    def _connected(self, link: EpsonServerLink, now_ns: int) -> EpsonServerLink:
         self.advance(now_ns)
-        link = EpsonServerLink(self, now_ns)
         self._links.append(link)
         if self._slot.client is not None and self.options.second_client == "closed":
             link.cut()

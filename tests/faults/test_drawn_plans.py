@@ -1,14 +1,21 @@
 """Tools are read and written while a drawn plan goes on: what is reported done stands there.
 
 One change in twelve exchanges meets a fault, whatever the link can have. What cannot be told ends
-in one of our errors; what is told is so.
+in one of our errors; what is told is so. But for one thing: text has no checksum, so a digit that
+is bent on its way is another digit (docs/reference/faults.md F07, F08); a write finds it.
 """
 
 from collections import Counter
 
 import pytest
 from robolink_simulators.epson import EpsonSimulator
-from robolink_simulators.faults import FaultRates, LinkKind, drawn_faults, drawn_plc_faults
+from robolink_simulators.faults import (
+    FaultAction,
+    FaultRates,
+    LinkKind,
+    drawn_faults,
+    drawn_plc_faults,
+)
 from robolink_simulators.hosting.in_process import epson, softmotion
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
@@ -18,6 +25,7 @@ from robolink.model import ToolOffset
 
 RATES = FaultRates(rate=0.08, exchanges=80)
 CHANGES = 6
+BENT = (FaultAction.GARBLE_REPLY, FaultAction.SWAP_BYTES)
 
 
 def epson_cell(seed):
@@ -40,6 +48,11 @@ def softmotion_cell(seed):
 CELLS = {"epson": epson_cell, "softmotion": softmotion_cell}
 
 
+def bent(simulator):
+    """Tell whether text was bent on its way."""
+    return any(fault.action in BENT for fault in simulator.faults.fired)
+
+
 def changed(cell, seed):
     """Change a tool a few times; return how many changes were reported done, and the fired."""
     simulator, hosting, stored = CELLS[cell](seed)
@@ -50,7 +63,7 @@ def changed(cell, seed):
             for number in range(CHANGES):
                 wanted = ToolOffset(10.5 + number, -3.25, -50)
                 before = controller.tools.read(3)
-                assert before == stored(), seed
+                assert before == stored() or bent(simulator), seed
                 controller.tools.write(3, wanted, expected=before)
                 assert stored() == wanted, seed
                 done += 1

@@ -1,11 +1,11 @@
 """The journal as the driver of one controller uses it."""
 
-import threading
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
+from robolink import ambient
 from robolink.errors import JournalError, OutcomeUnknownError
 from robolink.journal._lease import Lease
 from robolink.journal._naming import Names, Naming
@@ -55,7 +55,7 @@ class JournalOutcomeLog:
         self.durable = store.durable
         self._journal = journal
         self._store = store
-        self._lock = threading.RLock()
+        self._lock = ambient.reentrant_lock()
         self._naming = Naming(store, controller)
         self._holder, self._clock = holder or this_process(), clock or BootClock()
         self._lease = Lease(store, controller, self._holder, self._clock)

@@ -37,8 +37,10 @@ def test_the_right_password_opens(serve):
             assert controller.status().ready
 
 
+@pytest.mark.fault("F16")
 @pytest.mark.parametrize("password", ["canary-wrong", None])
-def test_a_wrong_password_is_tried_once_and_shown_nowhere(serve, password):
+@pytest.mark.fault("F71")
+def test_f16_a_wrong_password_is_tried_once_and_shown_nowhere(serve, password):
     simulator = EpsonSimulator(password=Secret(CANARY))
     with serve(simulator) as cell, pytest.raises(LoginRefusedError) as caught:
         cell.connect(password=password)
@@ -50,6 +52,7 @@ def test_a_wrong_password_is_tried_once_and_shown_nowhere(serve, password):
     assert CANARY not in shown
 
 
+@pytest.mark.fault("F71")
 def test_the_login_frame_is_in_no_trace(serve):
     lines = []
     with serve(EpsonSimulator(password=Secret(CANARY))) as cell:
@@ -95,8 +98,9 @@ def bring_about(simulator, state):
         (acts.get(state) or getattr(panel, state))()
 
 
+@pytest.mark.fault("F17", "F20")
 @pytest.mark.parametrize("state", STATES)
-def test_a_state_that_forbids_a_write_is_named_before_anything_is_written(serve, state):
+def test_f17_a_state_that_forbids_a_write_is_named_before_anything_is_written(serve, state):
     simulator = EpsonSimulator(seed=3)
     reason, words = STATES[state]
     with serve(simulator) as cell, cell.connect() as controller:

@@ -79,6 +79,7 @@ def test_a_target_for_another_tool_is_refused(controller):
     assert caught.value.reason == "wrong_tool"
 
 
+@pytest.mark.fault("F23")
 def test_a_remote_timeout_of_never_forbids_motion(cell):
     with cell.connect(remote_timeout_s=0) as controller:
         controller.motors(True)
@@ -131,6 +132,7 @@ def test_a_move_that_takes_too_long_is_aborted_and_its_end_is_seen(controller):
     assert group.pose().z_mm < target.z_mm - 1
 
 
+@pytest.mark.fault("F21", "F22")
 @pytest.mark.parametrize("danger", ["press_estop", "open_guard"])
 def test_an_emergency_stop_or_an_open_guard_ends_the_move_and_nothing_is_resent(cell, danger):
     with cell.connect() as controller:

@@ -62,6 +62,7 @@ def test_an_equal_value_is_not_written_again_whatever_was_expected(controller):
     assert receipt.skipped
 
 
+@pytest.mark.fault("F36")
 def test_a_value_equal_after_rounding_is_not_written_again(controller):
     controller.tools.write(SCRATCH, NEW, expected=ANY)
     nearly = ToolOffset(NEW.x_mm + 0.0004, NEW.y_mm, NEW.z_mm)
@@ -125,8 +126,9 @@ def test_tool_0_is_never_written(controller):
     assert controller.exchanges == sent
 
 
+@pytest.mark.fault("F37")
 @pytest.mark.parametrize("bad", [float("nan"), float("inf"), None, "12"])
-def test_a_component_that_is_no_number_is_refused_before_anything_is_sent(bad):
+def test_f37_a_component_that_is_no_number_is_refused_before_anything_is_sent(bad):
     with pytest.raises(ConfigError, match="x_mm"):
         ToolOffset(bad)
 

@@ -61,7 +61,8 @@ def test_a_movement_whose_client_died_is_brought_to_rest(serve, habits):
 
 @pytest.mark.parametrize("action", [FaultAction.DROP_REPLY, FaultAction.DISCONNECT])
 @pytest.mark.parametrize("request_", ["Abort", "Stop", "GetStatus"])
-def test_a_lost_answer_is_no_reason_to_leave_it_moving(serve, request_, action):
+@pytest.mark.fault("F76")
+def test_f76_a_lost_answer_is_no_reason_to_leave_it_moving(serve, request_, action):
     simulator = EpsonSimulator(seed=7)
     with serve(simulator) as cell:
         left_moving(cell)
@@ -71,6 +72,7 @@ def test_a_lost_answer_is_no_reason_to_leave_it_moving(serve, request_, action):
         assert simulator.faults.pending == ()
 
 
+@pytest.mark.fault("F01")
 def test_the_late_end_of_an_execute_does_not_disturb_a_stop(serve):
     simulator = EpsonSimulator(seed=7)
     with serve(simulator) as cell:

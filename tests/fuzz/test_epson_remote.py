@@ -165,6 +165,7 @@ class Distorting(InProcessTransport):
 OLD, NEW = ToolOffset(12.5, -3.25, -20.0), ToolOffset(12.75, -3.0, -20.5)
 
 
+@pytest.mark.fault("F07")
 @fuzzed(20, 2500, data=st.data(), at=st.integers(0, 7))
 def test_the_driver_claims_nothing_that_is_not_so_whatever_is_answered(data, at):
     simulator, clock = EpsonSimulator(seed=3), ManualClock()

@@ -52,6 +52,25 @@ class SpelNumbers:
     logged_out_in_task: int = 2996
     home_undefined: int = 2228  # docs/reference/spel.md 10
     serious: int = 9001
+    no_such_file: int = 7213  # docs/reference/spel.md 10, path not found
+    task_gone: int = 2261  # docs/reference/spel.md 10
+    return_without_gosub: int = 2383  # docs/reference/spel.md 10
+    input_count: int = 2505  # docs/reference/spel.md 10
+    excessive_loop: int = 2556  # docs/reference/spel.md 10
+    no_such_function: int = 2122
+    task_number: int = 2260  # docs/reference/spel.md 17
+    not_in_this_task: int = 2123
+    lock_misused: int = 2124
+    robot_in_use: int = 2125
+    port_not_open: int = 2909
+    port_of_other_task: int = 2912
+    port_in_use: int = 2900
+    port_address: int = 2904
+    port_unset: int = 2906
+    port_open_already: int = 2908
+    port_broken: int = 2902  # docs/reference/spel.md 17
+    port_timed_out: int = 2910
+    port_line_too_long: int = 2915
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,6 +133,17 @@ class EpsonOptions:
         till_already_met: What a motion does whose Till holds from the start: it stays, or
             starts and stops at once [open, docs/reference/spel.md 15].
         angle_wrap: Whether a stored tool angle is brought into -180..180 [U].
+        statement_us: Simulated time that a statement of a program takes, in microseconds [U].
+        loop_passes: Passes of loops of a task without a Wait after which error 2556 is raised
+            [D; the count is U].
+        for_test: For looks at its end before the first pass, or after it [open].
+        integer_overflow: A whole number that a variable cannot hold is an error, or begins
+            again at the other end [open].
+        undeclared: A name that nobody declared is an error of the build, or a variable of that
+            type [open].
+        globals_at_start: Start clears global variables that are not preserved [D for the Run
+            window], or keeps them.
+        ports_of_ended_task: A task that ends closes its ports, or leaves them open [U].
         numbers: Error numbers in use.
     """
 
@@ -159,6 +189,13 @@ class EpsonOptions:
     real_pos_noise_mm: float = 0.002
     till_already_met: Literal["stays", "starts"] = "stays"
     angle_wrap: bool = False
+    statement_us: int = 50
+    loop_passes: int = 1_000_000
+    for_test: Literal["top", "bottom"] = "top"
+    integer_overflow: Literal["error", "wrap"] = "error"
+    undeclared: Literal["error", "real", "double"] = "error"
+    globals_at_start: Literal["cleared", "kept"] = "cleared"
+    ports_of_ended_task: Literal["closed", "open"] = "closed"
     numbers: SpelNumbers = SpelNumbers()
 
 

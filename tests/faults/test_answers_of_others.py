@@ -5,6 +5,7 @@ for differ from each other, so an answer in the wrong place shows.
 """
 
 import os
+import select
 from contextlib import contextmanager
 
 import pytest
@@ -22,7 +23,6 @@ from tests.faults._bending_relay import BendingRelay
 from tests.unit._scripted_modbus import rtu, words
 
 TIMEOUT_S = 0.3
-LATE_S = 0.4
 SLOTS = {2: ToolOffset(1, 2, 3, 4), 3: ToolOffset(-5, -6, -7, -8), 4: ToolOffset(9, 10, 11, 12)}
 
 
@@ -51,6 +51,7 @@ def asked(controller, tools):
     return answered
 
 
+@pytest.mark.parametrize("late_s", [0.31, 0.36, 0.45])
 @pytest.mark.parametrize(
     "link",
     [
@@ -59,17 +60,38 @@ def asked(controller, tools):
         pytest.param("modbus-rtu", marks=pytest.mark.fault("F02")),
     ],
 )
-def test_f01_f02_a_late_answer_of_a_plc_answers_no_other_question(link):
+def test_f01_f02_a_late_answer_of_a_plc_answers_no_other_question(link, late_s):
     with served(link, SoftMotionSimulator(seed=7)) as cell:
         with cell.connect(timeout_s=TIMEOUT_S) as controller:
             for slot, value in SLOTS.items():
                 controller.tools.write(slot, value, expected=None)
-            late = PlcFault(PlcFaultAction.DELAY, match="read_slot 2", seconds=LATE_S)
+            late = PlcFault(PlcFaultAction.DELAY, match="read_slot 2", seconds=late_s)
             cell.simulator.faults.add(late)
             asked(controller, [2, 3, 4, 3, 2])
             assert cell.simulator.faults.fired == [late]
         with cell.connect(timeout_s=TIMEOUT_S) as controller:
             assert asked(controller, SLOTS) == len(SLOTS)
+
+
+def test_the_simulated_device_on_a_line_answers_one_request_after_the_other():
+    """Else a late answer could come at any time, which no device on a line does."""
+    simulator = SoftMotionSimulator(seed=7)
+    simulator.faults.add(PlcFault(PlcFaultAction.DELAY, match="read_slot 2", seconds=0.1))
+    with serve_modbus_rtu(simulator, clock=ScaledClock()) as host:
+        assert host._cable is not None
+        near = os.open(host._cable.near, os.O_RDWR | os.O_NOCTTY)
+        answers = b""
+        try:
+            os.write(near, rtu(bytes([4, *(112 + 36).to_bytes(2, "big"), 0, 36])))
+            while simulator.exchanges < 1:
+                select.select([near], [], [], 0.01)
+            os.write(near, rtu(bytes([4, 0, 0, 0, 3])))
+            while len(answers) < 77 + 11:
+                assert select.select([near], [], [], 5)[0]
+                answers += os.read(near, 256)
+        finally:
+            os.close(near)
+    assert (answers[2], answers[77 + 2]) == (72, 6)
 
 
 @pytest.mark.fault("F03")

@@ -72,6 +72,7 @@ def epson(
     speed: float,
     options: tuple[str, ...],
     world: tuple[str, ...],
+    faults: Path | None,
     profile: Path | None,
     replay: Path | None,
     allow_remote: bool,
@@ -91,7 +92,9 @@ def epson(
             serve_recording(replay, listen, allow_remote=allow_remote, wait=stopped.wait)
         return
     from robolink_simulators.epson import EpsonSimulator
+    from robolink_simulators.faults import LinkKind
 
+    from robolink_cli.commands.simulate.planned_faults import plan_faults
     from robolink_cli.commands.simulate.serving import world_from
     from robolink_cli.commands.simulate.serving_epson import (
         habits,
@@ -109,6 +112,7 @@ def epson(
         state_path=state,
         world=world_from(world),
     )
+    plan_faults(simulator, faults, {LinkKind.EPSON_TCP})
     serve_epson(simulator, listen, speed=speed, allow_remote=allow_remote)
 
 

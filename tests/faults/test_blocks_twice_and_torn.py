@@ -88,7 +88,7 @@ def test_f26_whichever_answer_of_a_movement_is_lost_it_is_begun_once():
 
 @pytest.mark.fault("F27")
 def test_f27_a_block_that_reaches_the_plc_twice_is_carried_out_once(cell):
-    with closing(open_mailbox_link(cell.url, timeout_s=TIMEOUT_S)) as link:
+    with closing(open_mailbox_link(cell.url)) as link:
         client = MailboxClient(link)
         client.take()
         command = client.command(Opcode.WRITE_TOOL, SLOT, pose=(1.0, 2.0, 3.0, 0.0, 0.0, 0.0))
@@ -119,7 +119,7 @@ def test_f28_f32_a_block_whose_rest_comes_late_is_carried_out_whole_and_once(at)
 def test_f32_a_block_whose_rest_never_comes_triggers_nothing(cell):
     with cell.connect() as controller:
         controller.take()
-    with closing(open_mailbox_link(cell.url, timeout_s=TIMEOUT_S)) as link:
+    with closing(open_mailbox_link(cell.url)) as link:
         client = MailboxClient(link)
         whole = list(encode_command(client.command(Opcode.WRITE_TOOL, SLOT)))
         for cut in (1, 4, 32, 62, 63):
@@ -130,7 +130,7 @@ def test_f32_a_block_whose_rest_never_comes_triggers_nothing(cell):
 
 @pytest.mark.fault("F29")
 def test_f29_behind_the_highest_number_comes_1_and_0_is_never_sent(cell):
-    with closing(open_mailbox_link(cell.url, timeout_s=TIMEOUT_S)) as link:
+    with closing(open_mailbox_link(cell.url)) as link:
         client = MailboxClient(link)
         client.sequence = HIGHEST - 2
         client.take()

@@ -17,6 +17,7 @@ from robolink_simulators.softmotion.mailbox import PlcFault, PlcFaultAction, Sof
 
 import robolink
 from robolink import ToolOffset
+from robolink.controllers.epson.tools.table import EpsonToolTable
 from robolink.errors import RemoteProtocolError, RobolinkError, TransportError
 from robolink.protocols import spel
 from tests.contract._softmotion_cell import served
@@ -177,12 +178,14 @@ def test_f06_f10_an_answer_that_nobody_asked_for_ends_the_session(more):
 
     with relayed(to_server=heard, to_client=joined) as (_, url, _):
         with robolink.connect(url, timeout_s=PATIENCE_S) as controller:
-            assert controller.tools.selected() == 1
+            table = controller.tools
+            assert isinstance(table, EpsonToolTable)
+            window = table._window
             assert asked(controller, [2]) == 1
             assert doubled
             # Without the look at the status that goes before, whose name would give it away.
             with pytest.raises((RemoteProtocolError, TransportError)):
-                controller.tools._window.printed(spel.print_selected_tool())
+                window.printed(spel.print_selected_tool())
             with pytest.raises((RemoteProtocolError, TransportError)):
                 controller.status()
         with robolink.connect(url) as controller:

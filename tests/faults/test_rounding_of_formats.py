@@ -1,4 +1,4 @@
-"""What a format rounds is no difference, and the next number that it can hold is one (F36)."""
+"""What a format rounds is no difference, and the next number that it can hold is one."""
 
 from contextlib import contextmanager
 from itertools import count

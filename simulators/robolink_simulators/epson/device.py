@@ -28,11 +28,11 @@ from robolink_simulators.epson.memory.variables import project_variables
 from robolink_simulators.epson.mishaps import EpsonMishaps
 from robolink_simulators.epson.options import EpsonOptions, serial_dialect
 from robolink_simulators.epson.panel import EpsonPanel
-from robolink_simulators.epson.remote.bent_requests import arriving
 from robolink_simulators.epson.remote.client_slot import ClientSlot
 from robolink_simulators.epson.remote.command_window import SpelWindow
 from robolink_simulators.epson.remote.commands import CommandDesk
 from robolink_simulators.epson.remote.exchange import PendingRequest
+from robolink_simulators.epson.remote.intake import RequestIntake
 from robolink_simulators.epson.remote.link import EpsonServerLink
 from robolink_simulators.epson.remote.queries import Alarms
 from robolink_simulators.epson.remote.service import Service
@@ -42,7 +42,7 @@ from robolink_simulators.epson.spel.programs.loading import load_project
 from robolink_simulators.epson.spel.tasks.ports import Ports
 from robolink_simulators.epson.spel.tasks.runner import ProgramRunner
 from robolink_simulators.epson.world import World
-from robolink_simulators.faults import Departure, Fault, FaultAction, FaultPlan
+from robolink_simulators.faults import Departure, Fault, FaultPlan
 from robolink_simulators.faults.links import EPSON_LINKS
 from robolink_simulators.serial_numbers import drawn_serial
 
@@ -124,7 +124,6 @@ class EpsonSimulator:
         self.log: deque[tuple[int, str, str]] = deque(maxlen=_LOG_LINES)
         self.on_request: RequestHook | None = None
         self.on_reply: RequestHook | None = None
-        self._requests = 0
         self._links: list[EpsonServerLink] = []
         model, *others = map(find_robot, robot.split(","))
         self.machine = Machine(model, serial=serial or drawn_serial(), others=others)
@@ -186,6 +185,15 @@ class EpsonSimulator:
             acting=self.acting,
         )
         self._mishaps = EpsonMishaps(self.panel, self.restart)
+        self._intake = RequestIntake(
+            self.faults,
+            self._mishaps,
+            self._service,
+            self._slot,
+            self._flash,
+            options=self.options,
+            told=self._told,
+        )
         self._session = interpreter.session
         self.program: ProgramRunner | None = None
 
@@ -303,72 +311,22 @@ class EpsonSimulator:
                 link.push(data)
 
     def take(self, link: EpsonServerLink, event: Request | BadRequest) -> None:
-        """Deal with a request of a client; while another is logged in, it is not heard."""
+        """Deal with a request of a client."""
         self._settled_ns = -1
         shown = shown_request(event)
         self.log.append((self._now_ns, ">", shown))
-        if not self._hears(link):
-            return
-        faults = self.faults.take(shown)
-        heard = self._arriving(link, event, faults)
-        if heard is None:
-            return
-        self._mishaps.strike(faults, self._now_ns)
-        if link.over:
-            return  # a restart has cut it
-        self._carry_out(link, heard, shown, faults)
-        for fault in faults:
-            if fault.action is FaultAction.DUPLICATE_REQUEST:
-                again = partial(self._carry_out, link, heard, shown, ())
-                self._mishaps.plan(self._now_ns, fault.seconds, again)
+        if self._intake.hears(link):
+            self._intake.take(link, event, shown, self._now_ns)
 
     def take_late(self, link: EpsonServerLink, event: Request | BadRequest) -> None:
         """Deal with a request that was under way while its link carried nothing."""
-        if self._hears(link):
-            self._carry_out(link, event, shown_request(event), ())
+        self._settled_ns = -1
+        if self._intake.hears(link):
+            self._intake.carry_out(link, event, shown_request(event), self._now_ns)
 
-    def _hears(self, link: EpsonServerLink) -> bool:
-        if self._slot.client in (None, link):
-            return True
-        if self.options.second_client == "closed":
-            link.cut()
-        return False
-
-    def _arriving(
-        self, link: EpsonServerLink, event: Request | BadRequest, faults: Sequence[Fault]
-    ) -> Request | BadRequest | None:
-        """Return what arrives of a request now, ``None`` for nothing."""
-        heard: Request | BadRequest | None = event
-        for fault in faults:
-            match fault.action:
-                case FaultAction.DISCONNECT_BEFORE:
-                    link.cut()
-                    return None
-                case FaultAction.DROP_REQUEST:
-                    return None
-                case FaultAction.STALL:
-                    link.stall(event, fault.seconds)
-                    return None
-                case FaultAction.GARBLE_REQUEST | FaultAction.TRUNCATE_REQUEST if heard:
-                    unterminated = self.options.requests_end_with_silence
-                    heard = arriving(heard, fault, self.faults, unterminated=unterminated)
-        return heard
-
-    def _carry_out(
-        self,
-        link: EpsonServerLink,
-        event: Request | BadRequest,
-        shown: str,
-        faults: tuple[Fault, ...],
-    ) -> None:
-        self._requests += 1
-        exchange = PendingRequest(self._requests, event.name, faults, link)
-        try:
-            if self.on_request is not None:
-                self.on_request(exchange.number, shown)
-        finally:
-            self._service.carry_out(link, exchange, event, self._now_ns)
-            self._flash.save_changes()
+    def _told(self, number: int, shown: str) -> None:
+        if self.on_request is not None:
+            self.on_request(number, shown)
 
     def leaving(self, exchange: PendingRequest, reply: bytes) -> Sequence[Departure]:
         """Count a reply and return what of it leaves, when."""

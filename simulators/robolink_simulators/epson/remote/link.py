@@ -65,6 +65,9 @@ class EpsonServerLink:
 
     A client that has not logged in within the login time-out is cut off, and so is one that
     stays after its logout (assumed).
+
+    Attributes:
+        serial: Whether it is a serial line.
     """
 
     def __init__(
@@ -81,8 +84,8 @@ class EpsonServerLink:
             if dialect is None
             else EpsonBinaryCodec(Role.DEVICE, dialect)
         )
-        self._serial = dialect is not None
-        self._turned_on = not self._serial
+        self.serial = dialect is not None
+        self._turned_on = not self.serial
         self._outbox = DepartingReplies()
         self._late: list[Request | BadRequest] = []
         self._hung_up = False
@@ -211,7 +214,7 @@ class EpsonServerLink:
     def _read(self, data: bytes) -> None:
         self._codec.receive_data(data)
         self._serve()
-        by_silence = self._serial or self._controller.options.requests_end_with_silence
+        by_silence = self.serial or self._controller.options.requests_end_with_silence
         begun = by_silence and self._codec.bytes_held
         self._silent_from_ns = self._controller.now_ns + _SILENCE_NS if begun else None
 

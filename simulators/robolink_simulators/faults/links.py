@@ -49,6 +49,8 @@ _FRAMED: Final = frozenset({LinkKind.MODBUS_TCP, LinkKind.MODBUS_RTU})
 
 _OF_EPSON: Final = frozenset(
     {
+        FaultAction.GARBLE_REQUEST,  # a PLC's frames have a length: half of one is no request
+        FaultAction.TRUNCATE_REQUEST,
         FaultAction.RESTART,
         FaultAction.LOSE_LOGIN,
         FaultAction.TEACH_MODE,
@@ -56,12 +58,6 @@ _OF_EPSON: Final = frozenset(
         FaultAction.GUARD_OPEN,
         FaultAction.DEVICE_FAULT,
         FaultAction.SERIOUS_ERROR,
-    }
-)
-_OF_TEXT: Final = frozenset(
-    {
-        FaultAction.GARBLE_REQUEST,  # other frames have a checksum or a length
-        FaultAction.TRUNCATE_REQUEST,
     }
 )
 _OF_CONNECTIONS: Final[frozenset[AnyAction]] = frozenset(
@@ -99,8 +95,7 @@ _NOT_ON_CAN: Final = frozenset(
 def links_of(action: AnyAction) -> frozenset[LinkKind]:
     """Return the links on which a fault can happen."""
     if isinstance(action, FaultAction):
-        links = EPSON_LINKS if action in _OF_EPSON | _OF_TEXT else _STREAMS
-        links = links - _LINES if action in _OF_TEXT else links
+        links = EPSON_LINKS if action in _OF_EPSON else _STREAMS
     elif action in _OF_CAN:
         links = frozenset({LinkKind.CAN})
     elif action in _OF_FRAMES:

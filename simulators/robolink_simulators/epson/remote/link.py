@@ -65,9 +65,6 @@ class EpsonServerLink:
 
     A client that has not logged in within the login time-out is cut off, and so is one that
     stays after its logout (assumed).
-
-    Attributes:
-        serial: Whether it is a serial line.
     """
 
     def __init__(
@@ -84,8 +81,9 @@ class EpsonServerLink:
             if dialect is None
             else EpsonBinaryCodec(Role.DEVICE, dialect)
         )
-        self.serial = dialect is not None
-        self._turned_on = not self.serial
+        self.dialect = dialect
+        self._serial = dialect is not None
+        self._turned_on = not self._serial
         self._outbox = DepartingReplies()
         self._late: list[Request | BadRequest] = []
         self._hung_up = False
@@ -214,7 +212,7 @@ class EpsonServerLink:
     def _read(self, data: bytes) -> None:
         self._codec.receive_data(data)
         self._serve()
-        by_silence = self.serial or self._controller.options.requests_end_with_silence
+        by_silence = self._serial or self._controller.options.requests_end_with_silence
         begun = by_silence and self._codec.bytes_held
         self._silent_from_ns = self._controller.now_ns + _SILENCE_NS if begun else None
 

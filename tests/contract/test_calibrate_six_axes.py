@@ -106,7 +106,7 @@ def test_six_points_recover_the_orientation_too(at):
     assert abs(seen - true).max() < 0.01
 
 
-@each(*ROBOTS, *PLANAR, chosen={"CX4-A601SR", "RS4-C351S"})
+@each(*ROBOTS, *PLANAR, chosen={"CX4-A601SR"})
 def test_angles_and_then_one_touch_recover_two_needles(at):
     recovered(at.calibrate("n-angle", "--station", "PIN-07", "--count", "4"), at.truth)
     before, tip = at.stored, at.truth
@@ -131,7 +131,7 @@ def test_a_plate_recovers_the_length(at):
     recovered(at.calibrate("z-touch", "--station", "PLATE"), at.truth, "z")
 
 
-@each(*ROBOTS, *PLANAR, chosen={"CX7-A701S", "RS6-C552C"})
+@each(*ROBOTS, *PLANAR, chosen={"CX7-A701S"})
 def test_a_camera_is_found_and_then_recovers_the_tip_and_a_board(at):
     place = ",".join(map(str, at.world.camera.middle_mm))
     usual = ("--station", "CAM", "--sensor", at.cell.url)

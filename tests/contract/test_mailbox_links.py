@@ -124,6 +124,7 @@ def test_f35_each_exchange_over_modbus_is_one_request_for_registers(serial):
     ]
 
 
+@pytest.mark.fault("F49")
 def test_threads_never_get_each_others_answers(far_end, link):
     far_end.put_response(RESPONSE)
     far_end.put_slot(3, SLOT)

@@ -120,6 +120,7 @@ def test_f26_whichever_answer_is_lost_a_movement_is_begun_once():
     assert 10 < lost < 99
 
 
+@pytest.mark.fault("F59")
 def test_a_value_that_was_changed_meanwhile_is_a_conflict(serve):
     simulator = simulator_with(FaultAction.DROP_REPLY, WRITE)
     with serve(simulator) as url:
@@ -134,6 +135,7 @@ def test_a_value_that_was_changed_meanwhile_is_a_conflict(serve):
             assert "neither" in finding.sentence
 
 
+@pytest.mark.fault("F43")
 def test_a_write_that_is_acknowledged_but_not_applied_is_found_by_reading_back(serve):
     simulator = simulator_with(FaultAction.IGNORE_WRITE, WRITE)
     with serve(simulator) as url, robolink.connect(url) as controller:

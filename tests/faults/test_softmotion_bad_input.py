@@ -28,6 +28,7 @@ from robolink.errors import (
     OutcomeUnknownError,
     RejectedError,
     RemoteProtocolError,
+    TransportError,
 )
 from robolink.journal import memory_journal
 from robolink.model import ToolOffset, Verdict, WorkBox
@@ -112,6 +113,7 @@ def test_a_unit_that_is_not_there_is_named():
     assert simulator.exchanges == 0
 
 
+@pytest.mark.fault("F70")
 def test_a_layout_of_another_major_version_is_refused_and_nothing_is_written(cell):
     response = cell.simulator.plc.response
     cell.simulator.plc.response = lambda now_ns: encode_response(
@@ -123,7 +125,8 @@ def test_a_layout_of_another_major_version_is_refused_and_nothing_is_written(cel
     check_nothing_was_written(cell)
 
 
-def test_a_mailbox_that_stands_still_is_not_met(cell):
+@pytest.mark.fault("F69")
+def test_f69_a_mailbox_that_stands_still_is_not_met(cell):
     cell.simulator.panel.freeze()
     with pytest.raises(ConnectError, match="stands still") as refusal:
         cell.connect()
@@ -131,7 +134,8 @@ def test_a_mailbox_that_stands_still_is_not_met(cell):
     check_nothing_was_written(cell)
 
 
-def test_a_heartbeat_that_freezes_during_a_movement_leaves_it_unknown_and_blocks_the_next(cell):
+@pytest.mark.fault("F69")
+def test_f69_a_heartbeat_that_freezes_during_a_movement_leaves_it_unknown_and_blocks_the_next(cell):
     with cell.connect() as controller:
         motion = lift(controller)
         cell.simulator.panel.freeze()
@@ -282,3 +286,23 @@ def test_a_can_node_whose_heartbeat_is_lost_leaves_the_movement_unknown(tmp_path
     assert "motion is blocked" in unknown.value.remedy
     assert [marker.request for marker in outcomes.open_markers()] == [unknown.value.request]
     assert simulator.plc.group.movements_started == 1
+
+
+@pytest.mark.fault("F70")
+def test_f70_a_program_that_is_exchanged_during_a_session_is_told_nothing_more(cell):
+    with cell.connect() as controller:
+        controller.take()
+        response = cell.simulator.plc.response
+        cell.simulator.plc.response = lambda now_ns: encode_response(
+            replace(decode_response(response(now_ns)), version=0x0200)
+        )
+        for change in (
+            lambda: controller.tools.write(SCRATCH, NEW, expected=None),
+            lambda: controller.tools.select(0),
+            lambda: lift(controller),
+        ):
+            with pytest.raises((RemoteProtocolError, TransportError)):
+                change()
+    assert cell.commands == []
+    assert cell.slot_changes(SCRATCH) == 0
+    assert cell.movements_started == 0

@@ -58,6 +58,7 @@ def test_half_an_answer_is_named_and_not_taken():
     assert len(caught.value.raw) == 12
 
 
+@pytest.mark.fault("F67")
 @pytest.mark.fault("F10")
 def test_frames_that_never_stop_do_not_move_the_deadline():
     stream = [(after / 10, tcp(words(1), 99)) for after in range(100)]
@@ -118,7 +119,8 @@ def test_a_server_that_has_hung_up_is_noticed_before_anything_is_sent():
         (99, RemoteProtocolError, "not in the standard"),
     ],
 )
-def test_a_refused_write_is_named_and_counts_as_not_done_only_when_that_is_sure(
+@pytest.mark.fault("F56")
+def test_f56_a_refused_write_is_named_and_counts_as_not_done_only_when_that_is_sure(
     code, kind, sentence
 ):
     line, client = over_tcp(lambda frame: [tcp(bytes([0x90, code]), 1)])

@@ -4,6 +4,7 @@ import re
 from typing import Final
 
 from robolink.controllers.epson import open_epson
+from robolink.controllers.epson.link.line import text_line
 from robolink.model import Controller, OutcomeLog, Secret, ToolOffset
 from robolink.timing import Deadline
 from robolink.transport import parse_url
@@ -72,7 +73,7 @@ class EpsonPlant(PlantMachine):
         """Log in."""
         link = TappedTransport(self._simulator, self.clock, process, self.tap, self.address)
         self._links[process.number] = link
-        return open_epson(link, outcomes=outcomes, password=Secret(PASSWORD))
+        return open_epson(text_line(link), outcomes=outcomes, password=Secret(PASSWORD))
 
     def hang_up(self, process: VirtualProcess) -> None:
         """Close the connection of a process that died."""

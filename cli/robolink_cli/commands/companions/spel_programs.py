@@ -42,8 +42,14 @@ def check(files: tuple[Path, ...], points: tuple[Path, ...]) -> None:
     read for the names in them. Nothing runs and no controller is asked.
     """
     from robolink_simulators.epson.spel.programs.loading import check_project
+    from robolink_simulators.epson.spel.source.faults import ProgramRefused
 
-    project, labels_known = check_project(files, points)
+    try:
+        project, labels_known = check_project(files, points)
+    except ProgramRefused as refused:
+        for fault in refused.faults:
+            note(str(fault))
+        raise
     names = sorted(function.spelled for function in project.functions.values())
     if json_is_on():
         document = {"files": [str(p) for p in files], "functions": names}
@@ -133,7 +139,12 @@ def _run(
     from robolink_simulators.epson.spel.tasks.driving import run_to_end
 
     runner = simulator.load(*project)
-    runner.on_print = lambda text: (printed.append(text), say(text.rstrip("\r\n")))[0]
+
+    def show(text: str) -> None:
+        printed.append(text)
+        say(text.rstrip("\r\n"))
+
+    runner.on_print = show
     if trace:
         runner.on_statement = lambda task, file, line, text: note(
             f"{task.now_ns / 1e9:12.6f} {task.task_number:3} {file}:{line}: {text}"
@@ -150,7 +161,7 @@ def _run(
 def _failed(failure: "TaskFailure") -> ControllerFaultError:
     return ControllerFaultError(
         tr(
-            "Error {number} in {function}, {file}:{line}, task {task}: {text}",
+            "Error {number} in {function}, {file}:{line}, task {task}: {text}.",
             number=failure.number,
             function=failure.function,
             file=failure.file,
@@ -158,5 +169,6 @@ def _failed(failure: "TaskFailure") -> ControllerFaultError:
             task=failure.task,
             text=failure.text,
         ),
+        code=failure.number,
         remedy=tr("Mend that line, or let OnErr deal with the error."),
     )

@@ -211,6 +211,7 @@ class NotReadyReason(StrEnum):
     EDGE_PASSED = "edge_passed"
     DRY_RUN = "dry_run"
     VIRTUAL_IO = "virtual_io"
+    OTHER_ROBOT = "other_robot"
 
 
 class NotReadyError(ControllerError):

@@ -9,6 +9,7 @@ only.
 from contextlib import suppress
 from typing import TYPE_CHECKING, Final, NamedTuple
 
+from robolink import ambient
 from robolink.errors import (
     ConnectError,
     RejectedError,
@@ -135,8 +136,6 @@ def _stop_epson(link: LinkUrl, means: _Means) -> "ControllerStatus":
 
 
 def _stop_group(link: LinkUrl, means: _Means) -> "ControllerStatus":
-    import os
-
     from robolink.controllers.softmotion.link.commands import CommandSender
     from robolink.controllers.softmotion.link.snapshots import Snapshots
     from robolink.controllers.softmotion.link.stopping import bring_group_to_rest
@@ -144,7 +143,7 @@ def _stop_group(link: LinkUrl, means: _Means) -> "ControllerStatus":
     from robolink.transport import open_quick_link
 
     mailbox = open_quick_link(link, timeout_s=means.timeout_s, clock=means.clock)
-    owner = int.from_bytes(os.urandom(4)) or 1  # a token that nobody else has
+    owner = ambient.random_number(32)  # a token that nobody else has
     wire = MailboxWire(mailbox, owner=owner, timeout_s=means.timeout_s)
     try:
         snapshots = Snapshots(wire)

@@ -145,7 +145,8 @@ def test_a_doubled_answer_is_never_taken_for_the_next_one(serve):
                 assert controller.tools.selected() == 1
 
 
-def test_a_late_answer_dies_with_its_connection(serve):
+@pytest.mark.fault("F01")
+def test_f01_a_late_answer_dies_with_its_connection(serve):
     simulator = EpsonSimulator(
         seed=5,
         faults=[Fault(FaultAction.DELAY, on_exchange=0, match="Print Tool", seconds=30.0)],
@@ -185,7 +186,7 @@ def unclear():
             plan = FaultPlan(seed=seed)
             fault = Fault(FaultAction.GARBLE_REPLY, match=match, position=position)
             ((_, bent),) = plan.departures(b"#Execute,0\r\n", [fault])
-            assert bent is not None
+            assert isinstance(bent, bytes)
             if bent.startswith(shown.encode()) and bent[9:10].isdigit():
                 return EpsonSimulator(seed=seed, faults=[fault])
         raise AssertionError("no seed bends it so")
@@ -266,7 +267,7 @@ def seed_that_bends_digits(position):
     fault = Fault(FaultAction.GARBLE_REPLY, position=position)
     for seed in range(100):
         ((_, bent),) = FaultPlan(seed=seed).departures(b"5" * (position + 1), [fault])
-        if bent is not None and bent.isdigit():
+        if isinstance(bent, bytes) and bent.isdigit():
             return seed
     raise AssertionError("no seed bends it so")
 

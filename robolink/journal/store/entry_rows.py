@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
-from datetime import UTC, datetime
 from functools import lru_cache
 from typing import Any, Final, TypeAlias, TypeVar
 
@@ -13,6 +12,7 @@ from robolink.journal.store.chain import canonical, digest, storable
 from robolink.journal.store.prepared import Prepared, StatementRunner
 from robolink.journal.store.tables import ENTRIES, HEAD, IN_A_CHANGE
 from robolink.model import EntryKind, NewEntry, Signature
+from robolink.timing import wall_time
 
 T = TypeVar("T")
 
@@ -141,7 +141,7 @@ def _chained(
     head: _Head, common: Mapping[str, Any], change: str, entries: Sequence[NewEntry]
 ) -> list[dict[str, Any]]:
     number, previous = head
-    common = {**common, "at": datetime.now(UTC).isoformat(timespec="milliseconds")}
+    common = {**common, "at": wall_time().isoformat(timespec="milliseconds")}
     rows = []
     details, text = None, ""
     for entry in entries:

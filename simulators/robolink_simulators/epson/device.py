@@ -11,6 +11,7 @@ import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -27,6 +28,7 @@ from robolink_simulators.epson.memory.variables import project_variables
 from robolink_simulators.epson.mishaps import EpsonMishaps
 from robolink_simulators.epson.options import EpsonOptions
 from robolink_simulators.epson.panel import EpsonPanel
+from robolink_simulators.epson.remote.bent_requests import arriving
 from robolink_simulators.epson.remote.client_slot import ClientSlot
 from robolink_simulators.epson.remote.command_window import SpelWindow
 from robolink_simulators.epson.remote.commands import CommandDesk
@@ -38,6 +40,7 @@ from robolink_simulators.epson.remote.wire_text import shown_reply, shown_reques
 from robolink_simulators.epson.spel import Interpreter
 from robolink_simulators.epson.world import World
 from robolink_simulators.faults import Departure, Fault, FaultAction, FaultPlan
+from robolink_simulators.faults.links import EPSON_LINKS
 from robolink_simulators.serial_numbers import drawn_serial
 
 _LOG_LINES: Final = 2000
@@ -106,11 +109,13 @@ class EpsonSimulator:
         self.watchers: list[Callable[[], None]] = []
         self.present_ns: Callable[[], int] | None = None
         self._now_ns = 0
+        # Until when all is done: a transport asks for one and the same instant several times.
+        self._settled_ns = -1
         self._stepping = False
         self.url = ""
         self.seed = seed
         self.options = options or EpsonOptions()
-        self.faults = FaultPlan(faults, seed)
+        self.faults = FaultPlan(faults, seed, links=EPSON_LINKS)
         self.exchanges = 0
         self.log: deque[tuple[int, str, str]] = deque(maxlen=_LOG_LINES)
         self.on_request: RequestHook | None = None
@@ -176,7 +181,7 @@ class EpsonSimulator:
             options=self.options,
             acting=self.acting,
         )
-        self._mishaps = EpsonMishaps(self.panel)
+        self._mishaps = EpsonMishaps(self.panel, self.restart)
 
     @property
     def world(self) -> World:
@@ -199,7 +204,10 @@ class EpsonSimulator:
             # A planned act happens at its own instant, in the middle of an advance.
             if self.present_ns is not None and not self._stepping:
                 self.advance(self.present_ns())
-            yield self._now_ns
+            try:
+                yield self._now_ns
+            finally:
+                self._settled_ns = -1
         for watcher in tuple(self.watchers):
             watcher()
 
@@ -216,7 +224,8 @@ class EpsonSimulator:
         """Let simulated time reach ``now_ns``, stopping wherever something changes."""
         while (change := self.next_change()) is not None and self._now_ns < change < now_ns:
             self._step(change)
-        self._step(max(now_ns, self._now_ns))
+        if now_ns != self._settled_ns or (change is not None and change <= now_ns):
+            self._step(max(now_ns, self._now_ns))
 
     def next_change(self) -> int | None:
         """Return when :meth:`advance` will next do something by itself, if ever."""
@@ -250,18 +259,65 @@ class EpsonSimulator:
 
     def take(self, link: EpsonServerLink, event: Request | BadRequest) -> None:
         """Deal with a request of a client; while another is logged in, it is not heard."""
+        self._settled_ns = -1
         shown = shown_request(event)
         self.log.append((self._now_ns, ">", shown))
-        if self._slot.client not in (None, link):
-            if self.options.second_client == "closed":
-                link.cut()
+        if not self._hears(link):
             return
-        self._requests += 1
-        exchange = PendingRequest(self._requests, event.name, self.faults.take(shown), link)
-        if exchange.meets(FaultAction.DISCONNECT_BEFORE):
+        faults = self.faults.take(shown)
+        heard = self._arriving(link, event, faults)
+        if heard is None:
+            return
+        self._mishaps.strike(faults, self._now_ns)
+        if link.over:
+            return  # a restart has cut it
+        self._carry_out(link, heard, shown, faults)
+        for fault in faults:
+            if fault.action is FaultAction.DUPLICATE_REQUEST:
+                again = partial(self._carry_out, link, heard, shown, ())
+                self._mishaps.plan(self._now_ns, fault.seconds, again)
+
+    def take_late(self, link: EpsonServerLink, event: Request | BadRequest) -> None:
+        """Deal with a request that was under way while its link carried nothing."""
+        if self._hears(link):
+            self._carry_out(link, event, shown_request(event), ())
+
+    def _hears(self, link: EpsonServerLink) -> bool:
+        if self._slot.client in (None, link):
+            return True
+        if self.options.second_client == "closed":
             link.cut()
-            return
-        self._mishaps.strike(exchange.faults, self._now_ns)
+        return False
+
+    def _arriving(
+        self, link: EpsonServerLink, event: Request | BadRequest, faults: Sequence[Fault]
+    ) -> Request | BadRequest | None:
+        """Return what arrives of a request now, ``None`` for nothing."""
+        heard: Request | BadRequest | None = event
+        for fault in faults:
+            match fault.action:
+                case FaultAction.DISCONNECT_BEFORE:
+                    link.cut()
+                    return None
+                case FaultAction.DROP_REQUEST:
+                    return None
+                case FaultAction.STALL:
+                    link.stall(event, fault.seconds)
+                    return None
+                case FaultAction.GARBLE_REQUEST | FaultAction.TRUNCATE_REQUEST if heard:
+                    unterminated = self.options.requests_end_with_silence
+                    heard = arriving(heard, fault, self.faults, unterminated=unterminated)
+        return heard
+
+    def _carry_out(
+        self,
+        link: EpsonServerLink,
+        event: Request | BadRequest,
+        shown: str,
+        faults: tuple[Fault, ...],
+    ) -> None:
+        self._requests += 1
+        exchange = PendingRequest(self._requests, event.name, faults, link)
         try:
             if self.on_request is not None:
                 self.on_request(exchange.number, shown)
@@ -273,8 +329,11 @@ class EpsonSimulator:
         """Count a reply and return what of it leaves, when."""
         self._flash.save_changes()
         self.exchanges += 1
-        self.log.append((self._now_ns, "<", shown_reply(reply)))
+        # A login that was bent may come back in its refusal.
+        echoed = bool(exchange.faults) and reply[:1] == b"!"
+        self.log.append((self._now_ns, "<", "***" if echoed else shown_reply(reply)))
         if not exchange.faults:
+            self.faults.remember(reply)
             return ((0.0, reply),)
         return self.faults.departures(reply, exchange.faults)
 
@@ -285,6 +344,7 @@ class EpsonSimulator:
 
     def forget(self, link: EpsonServerLink) -> None:
         """A connection is over; what runs goes on or not, as the option says."""
+        self._settled_ns = -1
         if self._slot.client is link:
             # Production that another device started is not this client's to supervise.
             own = self._service.unfinished and not self.condition.monitoring_only
@@ -304,6 +364,7 @@ class EpsonSimulator:
                 self._companion.publish_changes()
             self._supervise(now_ns)
             self._flash.save_changes()
+            self._settled_ns = now_ns
         finally:
             self._stepping = False
 

@@ -131,6 +131,11 @@ class EpsonPanel:
             self._condition.task = Task.NONE
             self._machine.reset_motion_parameters()
 
+    def lose_login(self) -> None:
+        """Let the controller forget who is logged in; the connection stays (F15)."""
+        with self._acting():
+            self._slot.free()
+
     def cut_link(self) -> None:
         """Pull the cable of the client that is logged in."""
         with self._acting():

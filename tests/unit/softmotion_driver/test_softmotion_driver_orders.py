@@ -178,7 +178,7 @@ def test_a_command_that_a_stop_ends_is_not_taken_as_done(cell, plc, controller):
         controller.motors(False)
 
 
-@pytest.mark.parametrize(("lasts_ms", "looks"), [(4, 5), (40, 18), (250, 30), (2000, 210)])
+@pytest.mark.parametrize(("lasts_ms", "looks"), [(4, 5), (40, 18), (250, 30), (2000, 80)])
 def test_an_end_is_noticed_soon_and_a_long_wait_costs_few_questions(
     cell, plc, controller, lasts_ms, looks
 ):
@@ -193,7 +193,7 @@ def test_an_end_is_noticed_soon_and_a_long_wait_costs_few_questions(
     cell.link.read_head = read_head
     controller.io.read_input(3)
     late_ms = (asked_ns[-1] - asked_ns[0]) / MS - lasts_ms
-    assert late_ms <= min(lasts_ms / 4, 20)
+    assert late_ms <= min(lasts_ms / 4, 40)
     assert looks * 0.8 <= len(asked_ns) <= looks
 
 

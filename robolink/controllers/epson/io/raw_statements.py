@@ -29,7 +29,7 @@ class RawStatements:
             )
             with self._link.uninterrupted(), self._link.markers.ledger.block():
                 marker = self._link.markers.begin(MarkerKind.SET, statement, {"raw": True})
-                self._link.robot.forget()
+                self._link.forget_robot()
                 with self._link.markers.doubt(statement):
                     with self._link.markers.unless_stopped(marker):
                         answer = self._link.session.execute(statement)

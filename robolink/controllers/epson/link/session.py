@@ -12,11 +12,11 @@ bytes die with the connection and can never be taken for the answer to a later q
 (docs/reference/faults.md F01, F06, F09).
 """
 
-import threading
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 
+from robolink import ambient
 from robolink.checkpoints import Checkpoint, checkpoint
 from robolink.controllers.epson.link.answers import rejected
 from robolink.controllers.epson.link.login import PASSWORD_REFUSALS, refused, unanswered
@@ -80,7 +80,7 @@ class EpsonSession:
         self._transport = transport
         self.identity, self.place, self.clock = transport.identity, transport.place, transport.clock
         self._codec = EpsonTextCodec(Role.HOST)
-        self._wire = threading.Lock()
+        self._wire = ambient.lock()
         self._gate = InterruptGate()
         self._gate.open()
         self._pending: PendingExecute | None = None
@@ -252,7 +252,8 @@ class EpsonSession:
             elif isinstance(event, (Reply, Refusal)) and self._answers(event, wanted):
                 return event
             else:
-                self._take_aside(event)
+                # A login that was bent on its way comes back in its refusal, password and all.
+                self._take_aside(event, hidden=wanted == "login")
 
     def _answers(self, event: Reply | Refusal, wanted: str) -> bool:
         name = event.name.lower()
@@ -278,7 +279,7 @@ class EpsonSession:
         while (event := self._codec.next_event()) is not NEED_DATA:
             self._take_aside(event)
 
-    def _take_aside(self, event: object) -> None:
+    def _take_aside(self, event: object, *, hidden: bool = False) -> None:
         if isinstance(event, EndOfStream):
             raise TransportBrokenError(
                 tr("{identity} closed the connection.", identity=self.identity),
@@ -300,7 +301,7 @@ class EpsonSession:
         raise RemoteProtocolError(
             tr(
                 "The controller sent an answer to a question nobody asked: {event}.",
-                event=repr(event)[:_SHOWN],
+                event="***" if hidden else repr(event)[:_SHOWN],
             ),
             remedy=tr(
                 "The connection is closed, because later answers could be mistaken. Connect "

@@ -108,7 +108,7 @@ def _foreign(meaning: str, controller: str) -> RemoteProtocolError:
     )
 
 
-POLL_S: Final = 0.02
+POLL_S: Final = 0.04
 """Longest time from one look at the head of the response block to the next."""
 
 _SHORTEST_POLL_S: Final = 0.0005
@@ -200,22 +200,32 @@ class Snapshots:
         name = tr("Tool slot {number}", number=number)
         return self._whole(lambda: self._wire.read_slot(number), decode_slot, name, keep=keep)
 
-    def news(self, since: Response, *, wait_s: float = LOOK_S) -> Response:
+    def news(
+        self, since: Response, *, wait_s: float = LOOK_S, begun_ns: int | None = None
+    ) -> Response:
         """Return a snapshot once the head differs from ``since``, or ``wait_s`` has passed.
+
+        Args:
+            since: The last snapshot.
+            wait_s: Longest wait for something new.
+            begun_ns: When the waiting began of which this is a part; now, if not given. Who has
+                waited long looks rarely from the start.
 
         Raises:
             TransportTimeoutError: The PLC's heartbeat stands still; the session is over.
         """
         known = (since.ack_head, since.state, since.error_class, since.group_state)
         clock = self._wire.clock
-        begun_ns = looked_ns = clock.now_ns()
+        asked_ns = looked_ns = clock.now_ns()
+        until_ns = asked_ns + wait_s * NS_PER_S
+        begun_ns = asked_ns if begun_ns is None else begun_ns
         while True:
             head = self._wire.read_head()
             now_ns = clock.now_ns()
             self._heartbeat.note(head.heartbeat, now_ns)
-            waited_s = (now_ns - begun_ns) / NS_PER_S
-            if head[:4] != known or waited_s >= wait_s:
+            if head[:4] != known or now_ns >= until_ns:
                 break
+            waited_s = (now_ns - begun_ns) / NS_PER_S
             period_s = min(max(waited_s / _POLLS_PER_WAIT, _SHORTEST_POLL_S), POLL_S)
             clock.sleep(period_s - (now_ns - looked_ns) / NS_PER_S)
             looked_ns = clock.now_ns()

@@ -46,7 +46,7 @@ def main() -> int:
     given.results.parent.mkdir(parents=True, exist_ok=True)
     os.environ["ROBOLINK_STATE_DIR"] = tempfile.mkdtemp(prefix="robolink-small-")
     for kind in given.kind or KINDS:
-        runs = planned(kind)
+        runs = list(planned(kind))
         random.Random(given.seed).shuffle(runs)
         done = _done(given.results)
         left = [run for run in runs if str(run) not in done][: given.most]

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cache
 
 from robolink.controllers.softmotion.link.snapshots import read_block
 from robolink.errors import RobolinkError
@@ -44,6 +45,7 @@ class Recording:
     replies: dict[Pair, tuple[bytes, bytes]] = field(default_factory=dict)
 
 
+@cache
 def recorded(kind: str) -> Recording:
     """Run a calibration undisturbed."""
     recording, steps, asked = Recording(), Steps(), dict[bytes, Pair]()
@@ -173,10 +175,11 @@ class Planned:
         return f"{self.kind} | {self.pair} | {self.fault}"
 
 
-def planned(kind: str) -> list[Planned]:
+@cache
+def planned(kind: str) -> tuple[Planned, ...]:
     """Return every run that all small faults of one kind of controller need."""
-    return [
+    return tuple(
         Planned(kind, pair, group.fault, group.members)
         for pair, (request, reply) in recorded(kind).replies.items()
         for group in groups_at(kind, pair, request, reply)
-    ]
+    )

@@ -1,18 +1,25 @@
 """All small faults of a whole calibration: which there are, and a run with each one."""
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cache
 
 from robolink.controllers.softmotion.link.snapshots import read_block
 from robolink.errors import RobolinkError
-from robolink.protocols.epson_text import NEED_DATA, EpsonTextCodec, Role
+from robolink.protocols.epson_text import NEED_DATA, EpsonTextCodec, Reply, Role, parse_status
 from robolink.protocols.mailbox import BlockError, decode_slot
+from robolink.protocols.spel import parse_point, parse_tool_listing
 from robolink.transport.modbus.frames import TcpFraming
 from robolink.transport.modbus.framing import FrameError
 from tests.faults.small.cells import Steps, calibrated, wired_cell
 from tests.faults.small.judging import judge
 from tests.faults.small.wire import Act, SmallFault
+
+_POINT = re.compile(r"Print (RealPos|TLSet\()")
+"""Queries whose answer is a point."""
+
+_LISTING = '$Execute,"TLSet"'
 
 
 @dataclass(frozen=True, order=True)
@@ -94,18 +101,37 @@ def groups_at(kind: str, pair: Pair, request: bytes, reply: bytes) -> list[Group
     return list(groups.values())
 
 
-def _text_as_decoded(_pair: Pair, _request: bytes, bent: bytes) -> object:
+def _text_as_decoded(pair: Pair, _request: bytes, bent: bytes) -> object:
     codec = EpsonTextCodec(Role.HOST)
     events: list[object] = []
     try:
         codec.receive_data(bent)
         while (event := codec.next_event()) is not NEED_DATA:
-            events.append(repr(event))
+            events.append(_text(pair, event))
     except RobolinkError as error:
         events.append(type(error))
     # What is left over waits for an end that never comes; where the quotes and the line end are
     # broken, the next answer is read behind it.
     return (*events, bool(codec.bytes_held), bent.count(b'"') % 2, bent.endswith(b"\r\n"))
+
+
+def _text(pair: Pair, event: object) -> object:
+    """Return an answer as it is read: a point by its numbers, a status by its flags, for instance.
+
+    One that cannot be read is that, whatever stands in it.
+    """
+    if not isinstance(event, Reply) or (event.text or "").lstrip().startswith("!"):
+        return repr(event)
+    try:
+        if event.text is not None and _POINT.search(pair.shape):
+            return repr(parse_point(event.text))
+        if event.text is not None and pair.shape == _LISTING:
+            return repr(parse_tool_listing(event.text))
+        if event.text is None and pair.shape == "$GetStatus" and event.name == "GetStatus":
+            return repr(parse_status(event))
+    except RobolinkError:
+        return "unreadable"
+    return repr(event)
 
 
 def _words_as_decoded(pair: Pair, request: bytes, bent: bytes) -> object:

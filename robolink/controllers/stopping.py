@@ -113,15 +113,12 @@ class _Means(NamedTuple):
 
 
 def _stop_epson(link: LinkUrl, means: _Means) -> "ControllerStatus":
+    from robolink.controllers.epson.link.line import open_line
     from robolink.controllers.epson.link.stopping import StopLine
-    from robolink.transport import open_transport
 
-    transport = open_transport(link, timeout_s=means.timeout_s, clock=means.clock)
-    if means.trace is not None:
-        from robolink.transport import TracingTransport
-
-        transport = TracingTransport(transport, means.trace)
-    line = StopLine(transport, timeout_s=means.timeout_s)
+    traces = () if means.trace is None else (means.trace,)
+    opened = open_line(link, timeout_s=means.timeout_s, clock=means.clock, traces=traces)
+    line = StopLine(opened, timeout_s=means.timeout_s)
     try:
         line.login(means.password)
         flags, code = line.stop()

@@ -50,12 +50,14 @@ def test_too_little_is_named():
 
 @pytest.mark.parametrize("stated", [None, 0.01])
 @pytest.mark.parametrize("speeds", [SPEEDS, SPEEDS[1:]])
-def test_the_interval_holds_the_truth(speeds, stated):
+def test_the_interval_holds_the_truth(speeds, stated, trials):
     assert_honest(
         coverage(
             lambda rng: solve_z_touch(touches(speeds, rng, 0.01), SURFACE, sigma_mm=stated),
             (LENGTH,),
+            trials,
         ),
+        trials,
         stated=stated is not None,
     )
 

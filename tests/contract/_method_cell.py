@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import pytest
 from robolink_cli import main
 from robolink_simulators.cell.clock import ManualClock
 
@@ -18,6 +19,12 @@ from robolink.model import Recorded, ToolOffset
 from tests.contract._sensor_cell import SensorCell, plc_sensor_cell, sensor_cell
 
 KINDS = ("epson", "plc")
+
+
+def on(kind: str) -> list[Any]:
+    """Return both kinds, of which the other one is left to ``make soak``."""
+    return [one if one == kind else pytest.param(one, marks=pytest.mark.soak) for one in KINDS]
+
 
 CELL = """
 [cells.a]

@@ -36,6 +36,7 @@ class Condition:
         task: What the production program is doing.
         code: Error or warning number, 0 for none.
         program_error: The last error that ended a running program, 0 for none.
+        failure: Its number and where it happened, for GetErrMsg.
     """
 
     def __init__(self, *, monitoring_only: bool) -> None:
@@ -46,6 +47,7 @@ class Condition:
         self.task = Task.NONE
         self.code = 0
         self.program_error = 0
+        self.failure: tuple[int, str] | None = None
         self._estop_latched = False
         self._error = False
         self._serious = False
@@ -101,12 +103,14 @@ class Condition:
             return
         self._estop_latched = self._error = self._warning = False
         self.code = 0
+        self.failure = None
 
     def restart(self) -> None:
         """Switch off and on: only what stands outside the controller stays as it is."""
         self._estop_latched = self.estop_pressed
         self._error = self._serious = self._warning = False
         self.code = self.program_error = 0
+        self.failure = None
         self.task = Task.NONE
 
     def flags(self, *, executing: bool = False) -> StatusFlags:

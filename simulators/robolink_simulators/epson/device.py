@@ -9,7 +9,7 @@ the time, and asks when to call again.
 import random
 import threading
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -26,7 +26,7 @@ from robolink_simulators.epson.flash import Flash
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.variables import project_variables
 from robolink_simulators.epson.mishaps import EpsonMishaps
-from robolink_simulators.epson.options import EpsonOptions
+from robolink_simulators.epson.options import EpsonOptions, serial_dialect
 from robolink_simulators.epson.panel import EpsonPanel
 from robolink_simulators.epson.remote.bent_requests import arriving
 from robolink_simulators.epson.remote.client_slot import ClientSlot
@@ -38,6 +38,9 @@ from robolink_simulators.epson.remote.queries import Alarms
 from robolink_simulators.epson.remote.service import Service
 from robolink_simulators.epson.remote.wire_text import shown_reply, shown_request
 from robolink_simulators.epson.spel import Interpreter
+from robolink_simulators.epson.spel.programs.loading import load_project
+from robolink_simulators.epson.spel.tasks.ports import Ports
+from robolink_simulators.epson.spel.tasks.runner import ProgramRunner
 from robolink_simulators.epson.world import World
 from robolink_simulators.faults import Departure, Fault, FaultAction, FaultPlan
 from robolink_simulators.faults.links import EPSON_LINKS
@@ -86,6 +89,7 @@ class EpsonSimulator:
             the host; the request is carried out all the same.
         on_reply: Called with the answer before it leaves; it leaves all the same.
         watchers: Called after each act at the panel, so that a host looks for what leaves now.
+        program: The program that is loaded, if any; without one Start shows a running task only.
         present_ns: Tells the present time to such acts; a host sets it. Without one, they
             happen at the instant that the simulator was given last.
 
@@ -182,6 +186,8 @@ class EpsonSimulator:
             acting=self.acting,
         )
         self._mishaps = EpsonMishaps(self.panel, self.restart)
+        self._session = interpreter.session
+        self.program: ProgramRunner | None = None
 
     @property
     def world(self) -> World:
@@ -192,6 +198,34 @@ class EpsonSimulator:
     def now_ns(self) -> int:
         """The instant last given."""
         return self._now_ns
+
+    def load(
+        self,
+        programs: Sequence[Path],
+        points: Sequence[Path] = (),
+        *,
+        ports: Mapping[int, tuple[str, int]] | None = None,
+    ) -> ProgramRunner:
+        """Load a project: Start,n runs its function mainN from now on.
+
+        Args:
+            programs: Its .prg files.
+            points: Its .pts files; IOLabels.dat is taken from beside the programs.
+            ports: Where its TCP/IP ports lead whatever SetNet says.
+
+        Raises:
+            ProgramRefused: It cannot be built.
+            ConfigError: A file cannot be read.
+        """
+        with self.acting():
+            project = load_project(self._session, programs, points)
+            runner = ProgramRunner(self._session, self.condition, project, Ports(ports))
+            self.program = runner
+            if "robolink_begin" in project.preserved():
+                self._companion = None  # the real one is part of the project
+            starter = partial(_start, runner, lambda: self._now_ns)
+            self._desk.starter = self.panel.starter = starter
+            return runner
 
     def status_flags(self) -> StatusFlags:
         """Return the flags as they are, whatever the client may be shown."""
@@ -213,8 +247,15 @@ class EpsonSimulator:
 
     def connect(self, now_ns: int) -> EpsonServerLink:
         """Accept one client; see ``EpsonOptions.second_client``."""
+        return self._connected(EpsonServerLink(self, now_ns), now_ns)
+
+    def connect_serial(self, now_ns: int) -> EpsonServerLink:
+        """Listen at a serial line to whoever turns Remote RS232 on there."""
+        dialect = serial_dialect(self.options)
+        return self._connected(EpsonServerLink(self, now_ns, dialect=dialect), now_ns)
+
+    def _connected(self, link: EpsonServerLink, now_ns: int) -> EpsonServerLink:
         self.advance(now_ns)
-        link = EpsonServerLink(self, now_ns)
         self._links.append(link)
         if self._slot.client is not None and self.options.second_client == "closed":
             link.cut()
@@ -222,15 +263,17 @@ class EpsonSimulator:
 
     def advance(self, now_ns: int) -> None:
         """Let simulated time reach ``now_ns``, stopping wherever something changes."""
+        if now_ns == self._settled_ns:
+            return
         while (change := self.next_change()) is not None and self._now_ns < change < now_ns:
             self._step(change)
-        if now_ns != self._settled_ns or (change is not None and change <= now_ns):
-            self._step(max(now_ns, self._now_ns))
+        self._step(max(now_ns, self._now_ns))
 
     def next_change(self) -> int | None:
         """Return when :meth:`advance` will next do something by itself, if ever."""
         times = (
             self._window.next_change(),
+            None if self.program is None else self.program.next_change(),
             self._slot.deadline(unfinished=self._service.unfinished),
             self._mishaps.next_change(),
             self.machine.timed_bits.next_change(),
@@ -245,6 +288,8 @@ class EpsonSimulator:
             for link in self._links:
                 link.cut()
             self._window.interrupt(self._now_ns)
+            if self.program is not None:
+                self.program.forget()
             self._slot.free()
             self._mishaps.forget()
             self.condition.restart()
@@ -356,6 +401,8 @@ class EpsonSimulator:
         self._now_ns = now_ns
         self._stepping = True
         try:
+            if self.program is not None:
+                self.program.advance(now_ns)
             self.machine.advance(now_ns)
             self.machine.timed_bits.advance(now_ns)
             self._window.advance(now_ns)
@@ -385,3 +432,7 @@ class EpsonSimulator:
         for link in self._links:
             link.supervise(now_ns)
         self._links = [link for link in self._links if not link.drained]
+
+
+def _start(runner: ProgramRunner, now_ns: Callable[[], int], number: int) -> None:
+    runner.start(f"main{number or ''}", now_ns())

@@ -14,6 +14,7 @@ from robolink_simulators.epson.memory.bits import IO_BITS, MEMORY_BITS, BitBank
 from robolink_simulators.epson.memory.control_points import ControlPoints
 from robolink_simulators.epson.memory.driven_robot import DrivenRobot
 from robolink_simulators.epson.memory.input_bits import InputBits
+from robolink_simulators.epson.memory.io_labels import IOLabel
 from robolink_simulators.epson.memory.pallets import PalletTable
 from robolink_simulators.epson.memory.points import LocalTable, Point, PointTable
 from robolink_simulators.epson.memory.timed_bits import TimedBits
@@ -63,6 +64,7 @@ class Machine:
         outputs: Output bits.
         memory: Memory bits.
         timed_bits: Outputs and memory bits that switch back by themselves.
+        io_labels: Names of inputs, outputs and memory bits, in lower case; part of the project.
         control_device: What CtrlDev gives.
     """
 
@@ -102,6 +104,7 @@ class Machine:
         self.outputs = BitBank(IO_BITS)
         self.memory = BitBank(MEMORY_BITS)
         self.timed_bits = TimedBits()
+        self.io_labels: dict[str, IOLabel] = {}
         self.control_device = REMOTE_ETHERNET
 
     @property

@@ -14,6 +14,7 @@ from typing import Final, Literal
 from robolink.errors import ConfigError
 from robolink.files.named import read_named
 from robolink.messages import tr
+from robolink.protocols.epson_binary import Dialect, Letters, NakCode, Numbers
 from robolink_simulators.option_values import require_known, values_from_text
 
 
@@ -52,6 +53,25 @@ class SpelNumbers:
     logged_out_in_task: int = 2996
     home_undefined: int = 2228  # docs/reference/spel.md 10
     serious: int = 9001
+    no_such_file: int = 7213  # docs/reference/spel.md 10, path not found
+    task_gone: int = 2261  # docs/reference/spel.md 10
+    return_without_gosub: int = 2383  # docs/reference/spel.md 10
+    input_count: int = 2505  # docs/reference/spel.md 10
+    excessive_loop: int = 2556  # docs/reference/spel.md 10
+    no_such_function: int = 2122
+    task_number: int = 2260  # docs/reference/spel.md 17
+    not_in_this_task: int = 2123
+    lock_misused: int = 2124
+    robot_in_use: int = 2125
+    port_not_open: int = 2909
+    port_of_other_task: int = 2912
+    port_in_use: int = 2900
+    port_address: int = 2904
+    port_unset: int = 2906
+    port_open_already: int = 2908
+    port_broken: int = 2902  # docs/reference/spel.md 17
+    port_timed_out: int = 2910
+    port_line_too_long: int = 2915
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,6 +134,24 @@ class EpsonOptions:
         till_already_met: What a motion does whose Till holds from the start: it stays, or
             starts and stops at once [open, docs/reference/spel.md 15].
         angle_wrap: Whether a stored tool angle is brought into -180..180 [U].
+        statement_us: Simulated time that a statement of a program takes, in microseconds [U].
+        loop_passes: Passes of loops of a task without a Wait after which error 2556 is raised
+            [D; the count is U].
+        for_test: For looks at its end before the first pass, or after it [open].
+        integer_overflow: A whole number that a variable cannot hold is an error, or begins
+            again at the other end [open].
+        undeclared: A name that nobody declared is an error of the build, or a variable of that
+            type [open].
+        globals_at_start: Start clears global variables that are not preserved [D for the Run
+            window], or keeps them.
+        ports_of_ended_task: A task that ends closes its ports, or leaves them open [U].
+        rs232_numbers: How Remote RS232 writes numbers [D in three languages, D otherwise in one].
+        rs232_nak_code: How the code of a refusal is written there [U].
+        rs232_letters: Which letters are understood: those that a manual prints, or also the
+            upper-case twins of readers, v and A [U].
+        rs232_status_flags: Flags of GetStatus there [D for RC+ 5; 11 are likely since RC+ 7].
+        rs232_word_port_bytes: Length of the number of a port of words there [U].
+        rs232_eot_answer: What EOT is answered with [U].
         numbers: Error numbers in use.
     """
 
@@ -159,11 +197,35 @@ class EpsonOptions:
     real_pos_noise_mm: float = 0.002
     till_already_met: Literal["stays", "starts"] = "stays"
     angle_wrap: bool = False
+    statement_us: int = 50
+    loop_passes: int = 1_000_000
+    for_test: Literal["top", "bottom"] = "top"
+    integer_overflow: Literal["error", "wrap"] = "error"
+    undeclared: Literal["error", "real", "double"] = "error"
+    globals_at_start: Literal["cleared", "kept"] = "cleared"
+    ports_of_ended_task: Literal["closed", "open"] = "closed"
+    rs232_numbers: Literal["binary", "ascii_hex"] = "binary"
+    rs232_nak_code: Literal["digits", "binary"] = "digits"
+    rs232_letters: Literal["documented", "guessed"] = "guessed"
+    rs232_status_flags: Literal[10, 11] = 10
+    rs232_word_port_bytes: Literal[1, 2] = 1
+    rs232_eot_answer: Literal["none", "ack"] = "none"
     numbers: SpelNumbers = SpelNumbers()
 
 
 PROFILE_SCHEMA: Final = "robolink/epson-profile/1"
 _NUMBERS: Final = "numbers."
+
+
+def serial_dialect(options: EpsonOptions) -> Dialect:
+    """Return how a controller with these habits speaks Remote RS232."""
+    return Dialect(
+        numbers=Numbers(options.rs232_numbers),
+        nak_code=NakCode(options.rs232_nak_code),
+        letters=Letters(options.rs232_letters),
+        status_flags=options.rs232_status_flags,
+        word_port_bytes=options.rs232_word_port_bytes,
+    )
 
 
 def option_names() -> tuple[str, ...]:

@@ -23,6 +23,9 @@ class EpsonPanel:
         options: For the error numbers.
         acting: Surrounds each act: keeps other threads out, gives the present time, and tells
             a host afterwards to look for what leaves now.
+
+    Attributes:
+        starter: Starts the function of that number, where a program is loaded.
     """
 
     def __init__(
@@ -44,6 +47,7 @@ class EpsonPanel:
         self._numbers = options.numbers
         self._outputs_off_at_estop = options.outputs_off_at_estop
         self._acting = acting
+        self.starter: Callable[[int], None] | None = None
 
     def press_estop(self) -> None:
         """Press the emergency stop: the arm stands, the motors are off, an Execute fails."""
@@ -121,8 +125,14 @@ class EpsonPanel:
             self._condition.monitoring_only = on
 
     def start_production(self) -> None:
-        """Start the endless production task from the cell's own control device."""
+        """Start the production task from the cell's own control device.
+
+        Raises:
+            Refusal: The program that is loaded has no function main.
+        """
         with self._acting():
+            if self.starter is not None:
+                self.starter(0)
             self._condition.task = Task.RUNNING
 
     def stop_production(self) -> None:

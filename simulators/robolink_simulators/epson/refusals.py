@@ -34,6 +34,25 @@ class RefusalKind(StrEnum):
     NOT_SIMULATED = "not_simulated"
     SUBSCRIPT = "subscript"
     TYPE_MISMATCH = "type_mismatch"
+    NO_SUCH_FILE = "no_such_file"
+    TASK_GONE = "task_gone"
+    RETURN_WITHOUT_GOSUB = "return_without_gosub"
+    INPUT_COUNT = "input_count"
+    EXCESSIVE_LOOP = "excessive_loop"
+    NO_SUCH_FUNCTION = "no_such_function"
+    TASK_NUMBER = "task_number"
+    NOT_IN_THIS_TASK = "not_in_this_task"
+    LOCK_MISUSED = "lock_misused"
+    ROBOT_IN_USE = "robot_in_use"
+    PORT_NOT_OPEN = "port_not_open"
+    PORT_OF_OTHER_TASK = "port_of_other_task"
+    PORT_IN_USE = "port_in_use"
+    PORT_ADDRESS = "port_address"
+    PORT_UNSET = "port_unset"
+    PORT_OPEN_ALREADY = "port_open_already"
+    PORT_BROKEN = "port_broken"
+    PORT_TIMED_OUT = "port_timed_out"
+    PORT_LINE_TOO_LONG = "port_line_too_long"
 
 
 class SpelRefusal(Exception):
@@ -48,6 +67,18 @@ class SpelRefusal(Exception):
         super().__init__(text)
         self.kind = kind
         self.text = text
+
+
+class RaisedError(SpelRefusal):
+    """An error that a program raises by its number: ``Error 8001``.
+
+    Attributes:
+        number: Which.
+    """
+
+    def __init__(self, number: int) -> None:
+        super().__init__(RefusalKind.SYNTAX, f"Error {number}")
+        self.number = number
 
 
 class OutOfReach(SpelRefusal):

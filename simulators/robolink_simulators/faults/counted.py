@@ -1,8 +1,9 @@
 """Faults that wait for their request. Counted, never rolled."""
 
+import random
 from collections.abc import Callable, Collection, Iterable
 from heapq import heappop, heappush
-from typing import Final, Generic, Protocol, TypeVar
+from typing import Final, Generic, Protocol, TypeVar, cast
 
 from robolink_simulators.faults.links import AnyAction, LinkKind, links_of, require_possible
 
@@ -39,6 +40,7 @@ class CountedFaults(Generic[AnyFault]):
 
     Args:
         faults: What to plan; more may be added at any time.
+        seed: Decides what no fault says: which byte and bit is garbled.
         links: The links on which the device may be served. A fault counts the requests of
             those on which it can happen.
 
@@ -51,7 +53,10 @@ class CountedFaults(Generic[AnyFault]):
         FaultNotPossibleError: There is no such fault on any of them.
     """
 
-    def __init__(self, faults: Iterable[AnyFault] = (), *, links: Collection[LinkKind]) -> None:
+    def __init__(
+        self, faults: Iterable[AnyFault] = (), seed: int = 1, *, links: Collection[LinkKind]
+    ) -> None:
+        self.reseed(seed)
         self._links: Final = frozenset(links)
         self._groups: dict[tuple[str, frozenset[LinkKind]], _Waiting[AnyFault]] = {}
         self._added = 0
@@ -70,6 +75,24 @@ class CountedFaults(Generic[AnyFault]):
         group = self._groups.setdefault((fault.match, links_of(fault.action)), _Waiting())
         self._added += 1
         heappush(group.due, (group.seen + fault.on_exchange, self._added, fault))
+
+    def plan(self, faults: Iterable[Planned], seed: int, served: Collection[LinkKind]) -> None:
+        """Plan what a file says, for a device that is served on certain links.
+
+        Raises:
+            FaultNotPossibleError: One of the faults can happen on none of these links. Nothing
+                is planned then.
+        """
+        wanted = tuple(faults)
+        for fault in wanted:
+            require_possible(fault.action, self._links.intersection(served) or served)
+        self.reseed(seed)
+        for fault in wanted:
+            self.add(cast("AnyFault", fault))
+
+    def reseed(self, seed: int) -> None:
+        """Draw by another seed from here on."""
+        self._random = random.Random(f"faults {seed}")
 
     def clear(self) -> None:
         """Plan nothing any more; what fired stays told."""

@@ -77,7 +77,7 @@ class PlcFaultAction(Enum):
     FOREIGN_NODE = auto()
     """CAN: another node with our number answers for an object that nobody asked for (F51)."""
     ECHO = auto()
-    """CAN: the client's own frame comes back to it from the bus, as an answer (F51)."""
+    """CAN: the client's own frame comes back to it from the bus (F51)."""
 
 
 Order = Literal["low_first", "high_first", "pairs_swapped", "halves_swapped"]

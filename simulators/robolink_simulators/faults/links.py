@@ -88,8 +88,6 @@ _NOT_ON_CAN: Final = frozenset(
         PlcFaultAction.SHIFT_MAP,  # objects have numbers, and no neighbours
         PlcFaultAction.RESET,
         PlcFaultAction.HALF_OPEN,
-        PlcFaultAction.DISCONNECT,
-        PlcFaultAction.DISCONNECT_BEFORE,
     }
 )
 

@@ -1,6 +1,5 @@
 """The plan of a byte stream: what leaves instead of a reply, and what arrives of a request."""
 
-import random
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from enum import Enum, auto
@@ -59,8 +58,7 @@ class FaultPlan(CountedFaults[Fault]):
         *,
         links: Collection[LinkKind] = EPSON_LINKS | PLC_LINKS,
     ) -> None:
-        super().__init__(faults, links=links)
-        self._random = random.Random(f"faults {seed}")
+        super().__init__(faults, seed, links=links)
         self._before = b"\r\n"
 
     @classmethod

@@ -121,7 +121,7 @@ class Steps:
             if self.phase == "writing":
                 self.phase = "proving"
         elif point is Checkpoint.QUESTION:
-            self.request = "asked"
+            self.request = "on the pin" if what == "done" else "asked"
 
     def _changing(self, request: str) -> None:
         if request.startswith("calibrate"):

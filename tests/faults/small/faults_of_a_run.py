@@ -1,5 +1,6 @@
 """All small faults of a whole calibration: which there are, and a run with each one."""
 
+import random
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -209,3 +210,12 @@ def planned(kind: str) -> tuple[Planned, ...]:
         for pair, (request, reply) in recorded(kind).replies.items()
         for group in groups_at(kind, pair, request, reply)
     )
+
+
+def drawn(kind: str, count: int, seed: int) -> list[Planned]:
+    """Return as many runs as are asked for, each of another pair; nothing is decoded for it."""
+    chance, pairs = random.Random(seed), recorded(kind).replies
+    return [
+        Planned(kind, pair, chance.choice(faults_at(kind, pair, pairs[pair][1])), 1)
+        for pair in chance.sample(sorted(pairs), count)
+    ]

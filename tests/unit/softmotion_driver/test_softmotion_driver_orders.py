@@ -44,6 +44,7 @@ def test_a_number_that_the_plc_still_shows_is_not_used(cell, plc):
     assert plc.executed[0].sequence == 43
 
 
+@pytest.mark.fault("F29")
 def test_numbers_go_on_behind_the_last_one_and_skip_zero(cell, plc):
     plc.now = replace(plc.now, ack_head=65535)
     cell.met().take()
@@ -88,6 +89,7 @@ def test_a_silent_plc_gets_no_second_block(cell, plc, controller):
     assert cell.link.closed
 
 
+@pytest.mark.fault("F25", "F26")
 def test_a_lost_answer_to_the_write_is_not_followed_by_another_write(cell, plc, controller):
     cell.link.recovers = True
     cell.link.lose_answer("write_command")
@@ -120,6 +122,7 @@ def test_a_plc_that_starts_anew_in_the_middle_of_a_command_leaves_it_unknown(cel
     assert len(cell.open_requests()) == 1
 
 
+@pytest.mark.fault("F14", "F29")
 def test_a_plc_that_started_anew_before_a_command_is_told_nothing(cell, plc, controller):
     plc.restart()
     with pytest.raises(TransportBrokenError, match="started anew"):

@@ -39,6 +39,18 @@ sim.add_command(softmotion)
     help="Where to listen; port 0 takes a free one.",
 )
 @click.option(
+    "--serial",
+    type=click.Choice(["pty"]),
+    help="Remote RS232 on a pseudo terminal, whose path is printed, in place of --tcp.",
+)
+@click.option(
+    "--baud",
+    type=click.IntRange(0, 4_000_000),
+    default=0,
+    show_default=True,
+    help="How slow that line is, in real time; 0 carries everything at once.",
+)
+@click.option(
     "--robot",
     default="T6-602S",
     show_default=True,
@@ -65,6 +77,8 @@ sim.add_command(softmotion)
 def epson(
     *,
     address: str,
+    serial: str | None,
+    baud: int,
     robot: str,
     seed: int,
     password_env: str | None,
@@ -72,11 +86,12 @@ def epson(
     speed: float,
     options: tuple[str, ...],
     world: tuple[str, ...],
+    faults: Path | None,
     profile: Path | None,
     replay: Path | None,
     allow_remote: bool,
 ) -> None:
-    """Serve a simulated EPSON controller with Remote Ethernet until Ctrl-C.
+    """Serve a simulated EPSON controller with Remote Ethernet, or RS232, until Ctrl-C.
 
     A second port, assist, stands in for the person at the cell: it looks at the tip, knows
     the truth, and presses the emergency stop.
@@ -91,7 +106,9 @@ def epson(
             serve_recording(replay, listen, allow_remote=allow_remote, wait=stopped.wait)
         return
     from robolink_simulators.epson import EpsonSimulator
+    from robolink_simulators.faults import LinkKind
 
+    from robolink_cli.commands.simulate.planned_faults import plan_faults
     from robolink_cli.commands.simulate.serving import world_from
     from robolink_cli.commands.simulate.serving_epson import (
         habits,
@@ -109,7 +126,9 @@ def epson(
         state_path=state,
         world=world_from(world),
     )
-    serve_epson(simulator, listen, speed=speed, allow_remote=allow_remote)
+    plan_faults(simulator, faults, {LinkKind.EPSON_SERIAL if serial else LinkKind.EPSON_TCP})
+    place = None if serial else listen
+    serve_epson(simulator, place, speed=speed, allow_remote=allow_remote, baud=baud)
 
 
 @sim.command()

@@ -211,6 +211,7 @@ class EpsonGroup(MotionGroupCore):
                 controller=self._link.identity,
                 request=statement,
             )
+        self._link.window.require_abort(statement)
 
     def _require_motors(self, statement: str) -> None:
         if not self.motors_on():

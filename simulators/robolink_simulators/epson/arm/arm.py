@@ -125,6 +125,11 @@ class Arm:
         return self._joints
 
     @property
+    def now_ns(self) -> int:
+        """The instant last given."""
+        return self._now_ns
+
+    @property
     def moving(self) -> bool:
         """Whether a motion is under way."""
         return self._travel is not None

@@ -171,6 +171,15 @@ class PointTable:
         """Return the number of the point with a name."""
         return self._labels.get(name.lower())
 
+    def labels(self) -> dict[str, int]:
+        """Return the number of each label, in lower case."""
+        return dict(self._labels)
+
+    def clear(self) -> None:
+        """Forget every point and label."""
+        self._points.clear()
+        self._labels.clear()
+
     def get(self, number: int) -> Point:
         """Return a stored point.
 

@@ -5,8 +5,8 @@ Source: docs/reference/epson.md 1.2 note 4.
 
 import math
 import re
-from collections.abc import Sequence
-from typing import Final
+from collections.abc import MutableSequence, Sequence
+from typing import Any, Final
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
@@ -21,6 +21,13 @@ _RANGES: Final = {
     VariableType.INTEGER: (-(2**15), 2**15 - 1),
     VariableType.LONG: (-(2**31), 2**31 - 1),
 }
+_SHOWN_AS: Final = {
+    **{kind.lower(): kind for kind in VariableType},
+    "ubyte": VariableType.INTEGER,
+    "short": VariableType.INTEGER,
+}
+"""Types of programs; those that the wire does not know are shown as wider ones (assumed)."""
+
 _DIGITS: Final = {VariableType.REAL: 6, VariableType.DOUBLE: 14}
 _TRUTH: Final = {"true": True, "-1": True, "1": True, "false": False, "0": False}
 _MAX_STRING: Final = 255
@@ -39,7 +46,7 @@ class _Variable:
         self.kind = kind
         self.bounds = bounds
         start: Value = "" if kind is VariableType.STRING else 0
-        self._values: list[Value] = [start] * math.prod(bound + 1 for bound in bounds)
+        self._values: MutableSequence[Any] = [start] * math.prod(bound + 1 for bound in bounds)
 
     def index(self, subscripts: Sequence[int]) -> int:
         """Return where an element stands."""
@@ -51,15 +58,20 @@ class _Variable:
             position = position * (bound + 1) + i
         return position
 
+    def share(self, values: MutableSequence[Any]) -> None:
+        """Hold what a program's variable holds."""
+        self._values = values
+
     def row(self, subscripts: Sequence[int], count: int) -> list[Value]:
         """Return ``count`` elements; the last subscript runs and must not pass its bound."""
         start = self.index(subscripts)
         if subscripts[-1] + count - 1 > self.bounds[-1]:
             raise RequestRefused(ErrorCode.NO_SUCH_VARIABLE)
-        return self._values[start : start + count]
+        return list(self._values[start : start + count])
 
     def get(self, subscripts: Sequence[int]) -> Value:
-        return self._values[self.index(subscripts)]
+        value: Value = self._values[self.index(subscripts)]
+        return value
 
     def set(self, subscripts: Sequence[int], value: Value) -> None:
         self._values[self.index(subscripts)] = value
@@ -92,6 +104,21 @@ class Variables:
                     remedy=tr("Declare it without a value and set its elements."),
                 )
             variable.set((), value)
+        self._variables[name.lower()] = variable
+
+    def adopt(
+        self, name: str, type_name: str, bounds: tuple[int, ...], values: MutableSequence[Any]
+    ) -> None:
+        """Show a Global Preserve variable of a program, as Remote Ethernet's types allow.
+
+        Args:
+            name: Its name.
+            type_name: Its type as SPEL+ has it, in lower case.
+            bounds: Its highest subscripts.
+            values: What it holds; the program and the remote client share it.
+        """
+        variable = _Variable(_SHOWN_AS.get(type_name, VariableType.LONG), bounds)
+        variable.share(values)
         self._variables[name.lower()] = variable
 
     def get(self, reference: str, *rest: str) -> tuple[str, ...]:

@@ -1,5 +1,6 @@
 """Which request is served now, and what it does (docs/reference/epson.md 1.2)."""
 
+from collections.abc import Callable
 from functools import lru_cache
 
 from robolink.protocols.epson_text import (
@@ -23,7 +24,11 @@ _HIGHEST_FUNCTION = {5: 7, 7: 63, 8: 63}
 
 
 class CommandDesk:
-    """Serves every command but Login, Logout, Execute and Abort."""
+    """Serves every command but Login, Logout, Execute and Abort.
+
+    Attributes:
+        starter: Starts the function of that number, where a program is loaded; raises Refusal.
+    """
 
     def __init__(
         self,
@@ -38,6 +43,7 @@ class CommandDesk:
         self._machine = machine
         self._condition = condition
         self._options = options
+        self.starter: Callable[[int], None] | None = None
         self._served: dict[str, Served] = {
             **io_commands(machine),
             **query_commands(machine, condition, card, options),
@@ -132,7 +138,10 @@ class CommandDesk:
         return ()
 
     def _start(self, function: str) -> Fields:
-        number(function, _HIGHEST_FUNCTION[self._options.rc_plus])
+        chosen = number(function, _HIGHEST_FUNCTION[self._options.rc_plus])
+        if self.starter is not None:
+            self.starter(chosen)
+            return ()
         return self._turn(Task.RUNNING)
 
     def _stop(self) -> Fields:

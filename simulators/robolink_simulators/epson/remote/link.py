@@ -1,9 +1,13 @@
-"""One client's connection to the simulated controller: codec, login, what leaves and when."""
+"""One client's connection to the simulated controller: codec, login, what leaves and when.
+
+On a serial line nothing is connected: EOT begins, and silence ends a request that was cut short.
+"""
 
 from collections.abc import Sequence
 from typing import Final, Protocol
 
 from robolink.errors import LocalProtocolError, RemoteProtocolError
+from robolink.protocols.epson_binary import Dialect, EpsonBinaryCodec, Opening
 from robolink.protocols.epson_text import (
     NEED_DATA,
     BadRequest,
@@ -22,6 +26,8 @@ from robolink_simulators.faults.departing import DepartingReplies
 
 _SILENCE_NS: Final = 100_000_000
 """How long nothing must come for a request without a line end to be whole (inferred)."""
+
+_ACK: Final = b"\x06"
 
 _TERMINATORS: Final = {"crlf": b"\r\n", "cr": b"\r", "lf": b"\n"}
 
@@ -61,14 +67,22 @@ class EpsonServerLink:
     stays after its logout (assumed).
     """
 
-    def __init__(self, controller: ServedRequest, now_ns: int) -> None:
+    def __init__(
+        self, controller: ServedRequest, now_ns: int, *, dialect: Dialect | None = None
+    ) -> None:
         options = controller.options
         self._controller = controller
-        self._codec = EpsonTextCodec(
-            Role.DEVICE,
-            terminator=_TERMINATORS[options.terminator],
-            unterminated=options.requests_end_with_silence,
+        self._codec: EpsonTextCodec | EpsonBinaryCodec = (
+            EpsonTextCodec(
+                Role.DEVICE,
+                terminator=_TERMINATORS[options.terminator],
+                unterminated=options.requests_end_with_silence,
+            )
+            if dialect is None
+            else EpsonBinaryCodec(Role.DEVICE, dialect)
         )
+        self._serial = dialect is not None
+        self._turned_on = not self._serial
         self._outbox = DepartingReplies()
         self._late: list[Request | BadRequest] = []
         self._hung_up = False
@@ -130,8 +144,7 @@ class EpsonServerLink:
             self._catch_up()
         if self._silent_from_ns is not None and now_ns >= self._silent_from_ns:
             self._silent_from_ns = None
-            self._codec.end_of_request()
-            self._serve()
+            self._end_request()
         deadline = self._login_deadline()
         if deadline is not None and now_ns >= deadline:
             self.cut()
@@ -198,14 +211,25 @@ class EpsonServerLink:
     def _read(self, data: bytes) -> None:
         self._codec.receive_data(data)
         self._serve()
-        begun = self._controller.options.requests_end_with_silence and self._codec.bytes_held
+        by_silence = self._serial or self._controller.options.requests_end_with_silence
+        begun = by_silence and self._codec.bytes_held
         self._silent_from_ns = self._controller.now_ns + _SILENCE_NS if begun else None
+
+    def _end_request(self) -> None:
+        broken = self._codec.end_of_request()
+        if isinstance(broken, (Request, BadRequest)) and self._turned_on:
+            self._controller.take(self, broken)
+        self._serve()
 
     def _serve(self) -> None:
         while not (self._over or self._stalled or self._outbox.half_open):
             if (event := self._codec.next_event()) is NEED_DATA:
                 return
-            if isinstance(event, (Request, BadRequest)):
+            if isinstance(event, Opening):
+                self._turned_on = True
+                if self._controller.options.rs232_eot_answer == "ack":
+                    self.push(_ACK)
+            elif isinstance(event, (Request, BadRequest)) and self._turned_on:
                 self._controller.take(self, event)
 
     def _end(self) -> None:

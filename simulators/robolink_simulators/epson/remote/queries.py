@@ -62,7 +62,7 @@ def query_commands(
         "getrobotserial": of_robot(lambda robot: (robot.serial,)),
         "getmotor": of_robot(_drives),
         "gethofs": of_robot(lambda _: ("0.000",) * _AXES, counted=False),
-        "geterrmsg": _messages(card, options),
+        "geterrmsg": _messages(card, options, condition),
         "geterrfunc": lambda code: _function_of(condition, number(code)),
         "gethealthcont": lambda: health,
         "gethealthrb": of_robot(lambda _: health, counted=False),
@@ -156,7 +156,7 @@ def _drives(robot: DrivenRobot) -> Fields:
     return (str(int(robot.motors_on)), str(int(robot.power_high)))
 
 
-def _messages(card: ControllerCard, options: EpsonOptions) -> Served:
+def _messages(card: ControllerCard, options: EpsonOptions, condition: Condition) -> Served:
     numbers = asdict(options.numbers)
     texts = {value: name.replace("_", " ").capitalize() for name, value in numbers.items()}
     texts[int(ErrorCode.TIMED_OUT)] = "Remote time-out"
@@ -164,6 +164,9 @@ def _messages(card: ControllerCard, options: EpsonOptions) -> Served:
     def serve(code: str, language: str) -> Fields:
         number(language, _HIGHEST_LANGUAGE)
         own = card.messages.get(number(code))
+        failure = condition.failure
+        if failure is not None and failure[0] == number(code):
+            own = failure[1]  # of the program that failed, with its line
         return (own or texts.get(number(code), f"Error {number(code)}"),)
 
     return serve

@@ -11,11 +11,13 @@ from robolink_simulators.epson.spel.tree import (
     Base,
     Binary,
     Coordinates,
+    Distance,
     Expression,
     If,
     KeywordStatement,
     LabelledPoint,
     Literal,
+    Meanwhile,
     Modifier,
     ModifierKind,
     MotionOptions,
@@ -23,9 +25,13 @@ from robolink_simulators.epson.spel.tree import (
     Name,
     PointExpression,
     PointFunction,
+    PointPair,
+    PointRange,
     Print,
     Statement,
     StoredPoint,
+    SwitchOnTheWay,
+    Target,
     Unary,
     Until,
 )
@@ -72,16 +78,18 @@ class TreeBuilder(Transformer[Token, tuple[Statement, ...]]):
         """Build a keyword statement."""
         return KeywordStatement(word.lower(), items or (), trailing is not None)
 
-    def motion(self, verb: Token, *parts: PointExpression | MotionOptions) -> MotionStatement:
+    def motion(self, verb: Token, *parts: Target | MotionOptions) -> MotionStatement:
         """Build a motion and join its options, which stand in any order."""
-        targets = tuple(part for part in parts if isinstance(part, PointExpression))
+        targets = tuple(part for part in parts if not isinstance(part, MotionOptions))
         options = [part for part in parts if isinstance(part, MotionOptions)]
         words = frozenset[str]().union(*(option.words for option in options))
         limz = next((option.limz for option in options if option.limz is not None), None)
         untils = [option.until for option in options if option.until is not None]
         until = untils[0] if untils else None
         ljm = next((option.ljm for option in options if option.ljm is not None), None)
-        return MotionStatement(verb.lower(), targets, MotionOptions(words, limz, ljm, until))
+        meanwhile = tuple(part for option in options for part in option.meanwhile)
+        joined = MotionOptions(words, limz, ljm, until, meanwhile)
+        return MotionStatement(verb.lower(), targets, joined)
 
     def plain_option(self, word: Token) -> MotionOptions:
         """Build CP, ROT or an arch number."""
@@ -99,6 +107,35 @@ class TreeBuilder(Transformer[Token, tuple[Statement, ...]]):
         """Build Till or Find with or without a condition."""
         until = Until(word.lower(), condition)
         return MotionOptions(frozenset({until.word}), until=until)
+
+    def parallel(self, *parts: Meanwhile | None) -> MotionOptions:
+        """Build what stands inside ``!...!``."""
+        return MotionOptions(meanwhile=tuple(part for part in parts if part is not None))
+
+    def distance(self, word: Token) -> Distance:
+        """Build ``D50``."""
+        return Distance(float(word[1:]))
+
+    def point_range(self, _: Token, first: Expression, last: Expression) -> PointRange:
+        """Build ``P(3:5)``."""
+        return PointRange(first, last)
+
+    def signed_number(self, sign: Token | None, word: Token) -> Literal:
+        """Build an angle or a radius of Arc."""
+        value = number_value(word)
+        return Literal(-value if sign == "-" else value)
+
+    def switch_on_the_way(self, word: Token, number: Expression) -> SwitchOnTheWay:
+        """Build an output that Pass switches."""
+        return SwitchOnTheWay(word.lower(), number)
+
+    def point_pair(self, local: PointExpression, base: PointExpression) -> PointPair:
+        """Build ``(P1:P11)``."""
+        return PointPair(local, base)
+
+    def empty_call(self, word: Token) -> Name:
+        """Build ``f()``."""
+        return Name(word.lower(), ())
 
     def assign_point(self, word: Token, value: Expression | Coordinates) -> AssignPoint:
         """Build ``P1 = ...``."""

@@ -10,7 +10,8 @@ from lark import Lark, Token
 from lark.exceptions import LarkError
 
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
-from robolink_simulators.epson.spel.build import TreeBuilder
+from robolink_simulators.epson.spel.line_build import ProgramBuilder
+from robolink_simulators.epson.spel.line_tree import LineNode
 from robolink_simulators.epson.spel.tree import Statement
 
 _PROGRAM_WORDS = """
@@ -66,6 +67,41 @@ _FUNCTION_WORDS = """
 FUNCTION_ONLY: Final = frozenset(_FUNCTION_WORDS.split())
 """Words that are functions and never statements (docs/reference/spel.md 13, class F)."""
 
+_OF_PROGRAMS_ALONE = """
+    rundialog simget gshow declare vrun vget vset vload vsave vcls vdeftool vdefarm vdeflocal
+    vgocenter vteach vstatsreset vstatssave vstatsshow vcreateobject vcreatesequence
+    vdeleteobject vdeletesequence vsaveimage vloadmodel vsavemodel vxcalib vxcalsave vxcalload
+    vxcaldelete chdir chdrive rmdir closedb opendb selectdb updatedb deletedb
+    setpriority copyfile aopen bopen
+"""
+
+_UNSIMULATED_FUNCTIONS = """
+    opencom chkcom folderexists fileexists eof freefile curdir$ curdrive$ currobot ptrq atrq
+    avgspeed peakspeed olrate sense till vxcalinfo vxcalpoints getrobotinsidebox
+    getrobotinsideplane hand_on hand_off aio_in aio_inw aio_out aio_outw recover latchpos
+    recoverpos lookup singularityangle diffpoint difftoolorientation windowsstatus insidebox
+    insideplane loadtype projectname$ robotname hour joint restart setcom here eval
+"""
+
+_WITH_A_FORM_OF_THEIR_OWN = """
+    opencom opennet parsestr eresume error fmtstr input line read redim setcom setnet signal
+    taskwait waitnet waitsig write writebin readbin close closecom closenet flush cont restart
+    tmreset resetelapsedtime randomize loadpoints savepoints
+"""
+
+WINDOW_ONLY: Final = frozenset(
+    ["where", "sysconfig", "workque_list", "cnv_quelist", "history", "clearhistory"]
+)
+"""Statements that no program may hold (docs/reference/spel.md 13, class D)."""
+
+UNSIMULATED: Final = (
+    NOT_SIMULATED | OF_OTHER_ROBOTS | frozenset(_OF_PROGRAMS_ALONE.split())
+) - frozenset(_WITH_A_FORM_OF_THEIR_OWN.split())
+"""Statements that a program may hold and that are refused when it comes to them."""
+
+UNSIMULATED_FUNCTIONS: Final = FUNCTION_ONLY | frozenset(_UNSIMULATED_FUNCTIONS.split())
+"""Functions that a program may call and that are refused when it comes to them."""
+
 _REFUSED_WORDS: Final = (
     (PROGRAM_ONLY, RefusalKind.NOT_ALLOWED_HERE, "is allowed in programs only"),
     (FUNCTION_ONLY, RefusalKind.FUNCTION_ONLY, "is a function and no statement"),
@@ -79,11 +115,13 @@ _STATEMENT_WORDS = re.compile(r"""(?:^|;)\s*([a-z][a-z0-9_]*\$?)|"[^"]*"|'.*""",
 @lru_cache(maxsize=1)
 def _parser() -> Lark:
     grammar = files(__package__).joinpath("grammar.lark").read_text(encoding="utf-8")
+    grammar = grammar.replace("@UNSIMULATED@", "|".join(map(re.escape, sorted(UNSIMULATED))))
     return Lark(
         grammar,
         parser="lalr",
         lexer="contextual",
-        transformer=TreeBuilder(),
+        start=["start", "program_line"],
+        transformer=ProgramBuilder(),
         g_regex_flags=re.IGNORECASE,
     )
 
@@ -96,10 +134,20 @@ def parse(text: str) -> tuple[Statement, ...]:
         Refusal: The line is not SPEL+, or holds a statement that only programs may use.
     """
     try:
-        statements: Sequence[Statement] = _parser().parse(text)  # type: ignore[assignment]
+        statements: Sequence[Statement] = _parser().parse(text, start="start")  # type: ignore[assignment]
     except LarkError as error:
         raise _refusal(text, error) from error
     return tuple(statements)
+
+
+def parse_program_line(text: str) -> tuple[LineNode, ...]:
+    """Return the statements in one line of a program, without its label.
+
+    Raises:
+        UnexpectedInput: It is not SPEL+; says where, and what could have stood there.
+    """
+    nodes: tuple[LineNode, ...] = _parser().parse(text, start="program_line")  # type: ignore[assignment]
+    return nodes
 
 
 def _refusal(text: str, error: LarkError) -> SpelRefusal:

@@ -94,10 +94,34 @@ class Coordinates:
     modifiers: tuple[Modifier, ...] = ()
 
 
+@dataclass(frozen=True, slots=True)
+class PointPair:
+    """``(P1:P11)``: a point seen from a local, and the same place seen from the base."""
+
+    local: PointExpression
+    base: PointExpression
+
+
+@dataclass(frozen=True, slots=True)
+class ResultSlot:
+    """What a called function gave: the compiler puts it where the call stood."""
+
+    index: int
+
+
+@dataclass(frozen=True, slots=True)
+class ByReference:
+    """``ByRef name``, ``ByRef name()`` or ``ByRef name(3)`` among the arguments of a call."""
+
+    target: Name
+
+
 Base = StoredPoint | LabelledPoint | PointFunction
 """What a point expression begins with."""
 
-Expression = Literal | Name | Unary | Binary | PointExpression
+Expression = (
+    Literal | Name | Unary | Binary | PointExpression | PointPair | ResultSlot | ByReference
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,21 +150,62 @@ class Until:
 
 
 @dataclass(frozen=True, slots=True)
+class Distance:
+    """``D50`` inside ``!...!``: what follows waits for that part of the way."""
+
+    percent: float
+
+
+@dataclass(frozen=True, slots=True)
+class PrintTo:
+    """``Print #201, ...``."""
+
+    channel: Expression
+    items: tuple[Expression, ...]
+    newline: bool
+
+
+Meanwhile = Distance | Print | PrintTo | KeywordStatement
+"""What may stand inside ``!...!``."""
+
+
+@dataclass(frozen=True, slots=True)
 class MotionOptions:
-    """The words behind a motion's target."""
+    """The words behind a motion's target; ``meanwhile`` is what stands inside ``!...!``."""
 
     words: frozenset[str] = frozenset()
     limz: Expression | None = None
     ljm: Expression | None = None
     until: Until | None = None
+    meanwhile: tuple[Meanwhile, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class PointRange:
+    """``P(3:5)``: the points from one number to another."""
+
+    first: Expression
+    last: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class SwitchOnTheWay:
+    """``On 2`` among the points of Pass; ``word`` is lower case."""
+
+    word: str
+    number: Expression
+
+
+Target = PointExpression | PointRange | SwitchOnTheWay | Literal
+"""What stands between the commas of a motion; a number is an angle or a radius of Arc."""
 
 
 @dataclass(frozen=True, slots=True)
 class MotionStatement:
-    """``Go``, ``Move``, ``Jump`` ... and their points; ``verb`` is lower case."""
+    """``Go``, ``Move``, ``Jump`` ... and their targets; ``verb`` is lower case."""
 
     verb: str
-    targets: tuple[PointExpression, ...]
+    targets: tuple[Target, ...]
     options: MotionOptions
 
 
@@ -180,6 +245,8 @@ class If:
 
 Statement = (
     Print
+    | PrintTo
+    | Distance
     | KeywordStatement
     | MotionStatement
     | AssignPoint

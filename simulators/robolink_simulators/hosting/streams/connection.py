@@ -11,7 +11,8 @@ from robolink_simulators.hosting.seam import DeviceLink, ResettableLink
 
 _CHUNK_BYTES: Final = 65536
 _MOST_UNSENT: Final = 1 << 20
-_NO_TIME: Final = struct.pack("HH" if sys.platform == "win32" else "ii", 1, 0)
+NO_TIME: Final = struct.pack("HH" if sys.platform == "win32" else "ii", 1, 0)
+"""For SO_LINGER: a socket that lingers for no time is reset when it is closed."""
 
 
 class Connection:
@@ -84,5 +85,5 @@ class Connection:
             self.finished = True
             self._selector.unregister(self._client)
             if reset:  # to linger for no time is to reset
-                self._client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _NO_TIME)
+                self._client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, NO_TIME)
             self._client.close()

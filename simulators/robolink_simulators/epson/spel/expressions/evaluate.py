@@ -1,5 +1,6 @@
 """Expressions to values."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, Final
 
@@ -15,65 +16,34 @@ from robolink_simulators.epson.memory.points import (
 )
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.request_refusals import RequestRefused
-from robolink_simulators.epson.spel.expressions.functions import PLAIN_FUNCTIONS
+from robolink_simulators.epson.spel.expressions.closures import Run, Scope, check_count, closure
+from robolink_simulators.epson.spel.expressions.data_types import Variable
 from robolink_simulators.epson.spel.expressions.joint_functions import printed_pulses
 from robolink_simulators.epson.spel.expressions.machine_functions import (
-    MACHINE_FUNCTIONS,
     POINT_FUNCTIONS,
     coordinates_of,
 )
-from robolink_simulators.epson.spel.expressions.operators import binary, unary
-from robolink_simulators.epson.spel.expressions.state_functions import STATE_FUNCTIONS
 from robolink_simulators.epson.spel.expressions.values import (
     Number,
     Value,
     as_integer,
     as_number,
     as_point,
-    checked,
     out_of_range,
 )
 from robolink_simulators.epson.spel.session import Session
 from robolink_simulators.epson.spel.tree import (
     Base,
-    Binary,
     Coordinates,
     Expression,
     LabelledPoint,
-    Literal,
     Modifier,
     ModifierKind,
     Name,
     PointExpression,
     PointFunction,
     StoredPoint,
-    Unary,
 )
-
-CONSTANTS: Final[dict[str, Value]] = {
-    "true": True,
-    "false": False,
-    "on": 1,
-    "off": 0,
-    "high": 1,
-    "low": 0,
-    "righty": 1,
-    "lefty": 2,
-    "above": 1,
-    "below": 2,
-    "noflip": 1,
-    "flip": 2,
-    "j1": 1,
-    "j2": 2,
-    "j3": 4,
-    "j4": 8,
-    "j5": 16,
-    "j6": 32,
-    "cr": "\r",
-    "lf": "\n",
-    "crlf": "\r\n",
-}
-"""Predefined constants (docs/reference/spel.md 1.2)."""
 
 FARTHEST: Final = 1e9
 """Largest coordinate that a point may have (assumed), in mm or degrees."""
@@ -83,11 +53,45 @@ _ELBOWS = {"A": Elbow.ABOVE, "B": Elbow.BELOW}
 _WRISTS = {"NF": Wrist.NO_FLIP, "F": Wrist.FLIP}
 
 
-class Evaluator:
-    """Evaluates parsed expressions against one session."""
+_MOST_REMEMBERED: Final = 2000
 
-    def __init__(self, session: Session) -> None:
+
+class WindowScope:
+    """What names stand for in the command window: points by their labels, and variables."""
+
+    def named(self, name: str, arguments: Sequence[Expression] | None) -> None:  # noqa: ARG002
+        """Know no names before those of the language."""
+        return
+
+    def unknown(self, name: str, arguments: Sequence[Expression] | None) -> Run:
+        """Look a name up when it is needed.
+
+        Raises:
+            Refusal: It is called as a function that the language does not have.
+        """
+        if arguments is not None:
+            raise SpelRefusal(RefusalKind.NAME_UNDEFINED, f"Nothing is called {name}")
+        return lambda t: t.of_the_project(name)
+
+
+class Evaluator:
+    """Works parsed expressions out against one session.
+
+    Attributes:
+        session: What expressions can reach.
+        scope: What names stand for where the present statement stands.
+        variables: Those of the function that runs.
+        results: What functions gave that the present statement called.
+        blends: Whether a motion with CP lets the next statement begin before it ends.
+    """
+
+    def __init__(self, session: Session, scope: Scope | None = None) -> None:
         self.session = session
+        self.scope: Scope = scope or WindowScope()
+        self.variables: list[Variable] = []
+        self.results: list[Any] = []
+        self.blends = False
+        self._remembered: dict[int, tuple[Expression, Run]] = {}
 
     def value(self, expression: Expression) -> Value:
         """Return what an expression is worth now.
@@ -95,17 +99,30 @@ class Evaluator:
         Raises:
             Refusal: It cannot be evaluated.
         """
-        match expression:
-            case Literal(value):
-                return checked(value)
-            case Name(name, arguments):
-                return self._named(name, arguments)
-            case Unary(operator, operand):
-                return unary(operator, self.value(operand))
-            case Binary(operator, left, right):
-                return binary(operator, self.value(left), self.value(right))
-            case PointExpression():
-                return self.point(expression)
+        return self.closure(expression)(self)
+
+    def write_to(self, channel: int, text: str, *, ends: bool) -> None:  # noqa: ARG002
+        """Print to a port.
+
+        Raises:
+            Refusal: The command window has none open.
+        """
+        raise SpelRefusal(RefusalKind.NOT_SIMULATED, f"Port {channel} of the command window")
+
+    def closure(self, expression: Expression) -> Run:
+        """Return what works an expression out; the last ones are remembered.
+
+        Raises:
+            Refusal: It makes no sense here.
+        """
+        known = self._remembered.get(id(expression))
+        if known is not None and known[0] is expression:
+            return known[1]
+        run = closure(expression, self.scope)
+        if len(self._remembered) >= _MOST_REMEMBERED:
+            self._remembered.clear()
+        self._remembered[id(expression)] = (expression, run)
+        return run
 
     def shown(self, expression: Expression) -> Value:
         """Return what an expression is worth to Print; AglToPls shows as pulses there."""
@@ -138,34 +155,11 @@ class Evaluator:
             point = point.plus(self._base(expression.other), expression.sign)
         return _bounded(self._modified(point, expression.modifiers))
 
-    def _named(self, name: str, arguments: tuple[Expression, ...] | None) -> Value:
-        if arguments is None and name in CONSTANTS:
-            return CONSTANTS[name]
-        if name == "pdef" and arguments is not None and len(arguments) == 1:
-            return self.session.machine.points.defined(self._point_number(arguments[0]))
-        given = arguments or ()
-        if name in PLAIN_FUNCTIONS:
-            counts, plain = PLAIN_FUNCTIONS[name]
-            _check_count(name, given, counts)
-            return checked(plain([self.value(argument) for argument in given]))
-        if name in MACHINE_FUNCTIONS:
-            counts, function = MACHINE_FUNCTIONS[name]
-            _check_count(name, given, counts)
-            values = [self.value(argument) for argument in given]
-            return checked(function(self.session, values))
-        if name in STATE_FUNCTIONS:
-            counts, state = STATE_FUNCTIONS[name]
-            _check_count(name, given, counts)
-            return checked(state(self.session, [self.value(argument) for argument in given]))
-        if arguments is None:
-            return self._of_the_project(name)
-        raise SpelRefusal(RefusalKind.NAME_UNDEFINED, f"Nothing is called {name}")
-
-    def _of_the_project(self, name: str) -> Value:
-        """Return a point by its label, or a variable.
+    def of_the_project(self, name: str) -> Value:
+        """Return a point by its label, a variable, or the number of an input or output.
 
         Raises:
-            Refusal: Nothing is called so; labels of inputs and outputs are not simulated.
+            Refusal: Nothing is called so.
         """
         number = self.session.machine.points.labelled(name)
         if number is not None:
@@ -175,12 +169,23 @@ class Evaluator:
                 return self.session.variables.read(name)
             except RequestRefused as refused:
                 raise SpelRefusal(RefusalKind.SUBSCRIPT, f"{name} is an array") from refused
+        labelled = self.session.machine.io_labels.get(name)
+        if labelled is not None:
+            return labelled.number
         raise SpelRefusal(RefusalKind.NAME_UNDEFINED, f"Nothing is called {name}")
 
-    def _point_number(self, argument: Expression) -> int:
-        # PDef(P1), PDef(P(n)) and PDef(1) all name point 1 (docs/reference/spel.md 5.1).
+    def point_number(self, argument: Expression) -> int:
+        """Return the number of a point: of P1, P(n), a label or a number.
+
+        Raises:
+            Refusal: It names no point.
+        """
         if isinstance(argument, PointExpression):
             return self.stored_number(argument)
+        if isinstance(argument, Name) and argument.arguments is None:
+            number = self.session.machine.points.labelled(argument.name)
+            if number is not None:
+                return number
         return self.integer(argument)
 
     def stored_number(self, expression: Expression) -> int:
@@ -192,6 +197,10 @@ class Evaluator:
         match expression:
             case PointExpression(StoredPoint(number), 0, None, ()):
                 return self.integer(number)
+            case PointExpression(LabelledPoint(name), 0, None, ()) | Name(name, None) if (
+                labelled := self.session.machine.points.labelled(name)
+            ) is not None:
+                return labelled
             case _:
                 raise SpelRefusal(RefusalKind.SYNTAX, "A stored point such as P1 is needed")
 
@@ -199,9 +208,9 @@ class Evaluator:
         if isinstance(base, StoredPoint):
             return self.session.machine.points.get(self.integer(base.number))
         if isinstance(base, LabelledPoint):
-            return as_point(self._named(base.name, None))
+            return as_point(self.value(Name(base.name)))
         counts, function = POINT_FUNCTIONS[base.name]
-        _check_count(base.name, base.arguments, counts)
+        check_count(base.name, base.arguments, counts)
         return function(self.session, [self.value(argument) for argument in base.arguments])
 
     def _modified(self, point: Point, modifiers: tuple[Modifier, ...]) -> Point:
@@ -222,11 +231,6 @@ class Evaluator:
             return point.with_axis(modifier.word, amount)
         tilts = self.session.machine.model.six_axes
         return (_tilted if tilts else _shifted)(point, modifier.word, amount)
-
-
-def _check_count(name: str, arguments: tuple[Expression, ...], counts: range) -> None:
-    if len(arguments) not in counts:
-        raise SpelRefusal(RefusalKind.SYNTAX, f"{name} does not take {len(arguments)} arguments")
 
 
 def _bounded(point: Point) -> Point:

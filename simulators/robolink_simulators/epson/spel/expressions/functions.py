@@ -2,11 +2,12 @@
 
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Final
 
 from robolink_simulators.epson.spel.build import number_value
 from robolink_simulators.epson.spel.expressions.printing import formatted, number_text
+from robolink_simulators.epson.spel.expressions.text_functions import TEXT_FUNCTIONS
 from robolink_simulators.epson.spel.expressions.values import (
     Value,
     as_integer,
@@ -16,7 +17,7 @@ from robolink_simulators.epson.spel.expressions.values import (
     out_of_range,
 )
 
-Arguments = Sequence[Value]
+Arguments = list[Value]
 Function = Callable[[Arguments], Value]
 
 _LEADING_NUMBER = re.compile(
@@ -146,5 +147,6 @@ PLAIN_FUNCTIONS: Final[dict[str, tuple[range, Function]]] = {
     "mid$": (range(2, 4), _mid),
     "instr": (range(2, 3), _find),
     "fmtstr$": (range(2, 3), _fmtstr),
+    **TEXT_FUNCTIONS,
 }
 """Name to the numbers of arguments allowed and the function."""

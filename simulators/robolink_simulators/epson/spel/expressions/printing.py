@@ -19,6 +19,8 @@ CRLF: Final = "\r\n"
 LONGEST_PRINT: Final = 256
 """Bytes that one Print may show (docs/reference/spel.md 3.2); what more does is assumed to be an
 error."""
+LONGEST_PRINT_TO: Final = 1024
+"""Bytes that one Print to a TCP/IP port may send (docs/reference/spel.md 3.2)."""
 
 _EXPONENT_FROM = 1e14
 _EXPONENT_BELOW = 1e-4
@@ -76,7 +78,13 @@ def point_line(number: int, point: Point, model: RobotModel) -> str:
     return f"P{number:<3} = XY({values} ) {flags}"
 
 
-def joined(values: Sequence[Value], options: EpsonOptions, model: RobotModel) -> str:
+def joined(
+    values: Sequence[Value],
+    options: EpsonOptions,
+    model: RobotModel,
+    *,
+    longest: int = LONGEST_PRINT,
+) -> str:
     """Return what Print shows for its items.
 
     Raises:
@@ -90,8 +98,8 @@ def joined(values: Sequence[Value], options: EpsonOptions, model: RobotModel) ->
         if position and (is_number or options.comma_blank == "always"):
             text += " "
         text += value_text(value, options, model)
-    if len(text) > LONGEST_PRINT:
-        raise out_of_range(f"Print of more than {LONGEST_PRINT} bytes")
+    if len(text) > longest:
+        raise out_of_range(f"Print of more than {longest} bytes")
     return text
 
 

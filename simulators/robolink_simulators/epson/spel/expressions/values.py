@@ -11,7 +11,8 @@ Value = bool | int | float | str | Point
 
 LONGEST_STRING = 255
 _TRUE = -1
-_LARGEST_INT = 2**63 - 1
+LARGEST_INT = 2**63 - 1
+_LARGEST_UNSIGNED = 2**64 - 1
 
 
 def out_of_range(text: str) -> SpelRefusal:
@@ -80,11 +81,11 @@ def checked(value: Value) -> Value:
     """Refuse a result that its type cannot hold (what happens is left open: an error here).
 
     Raises:
-        Refusal: Beyond Int64, not finite, or a string of more than 255 characters.
+        Refusal: Beyond Int64 and UInt64, not finite, or a string of more than 255 characters.
     """
     if isinstance(value, float) and not math.isfinite(value):
         raise out_of_range("Overflow")
-    if isinstance(value, int) and abs(value) > _LARGEST_INT:
+    if isinstance(value, int) and not -LARGEST_INT <= value <= _LARGEST_UNSIGNED:
         raise out_of_range("Overflow")
     if isinstance(value, str) and len(value) > LONGEST_STRING:
         raise out_of_range("String longer than 255 characters")

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import pairwise
 from typing import Final
 
 from robolink.model import Pose, rotate_xy
@@ -23,12 +22,17 @@ from robolink_simulators.epson.spel.expressions.joint_functions import least_mot
 from robolink_simulators.epson.spel.expressions.values import out_of_range
 from robolink_simulators.epson.spel.statements.jump import jump, jump3
 from robolink_simulators.epson.spel.statements.legs import arc_leg, go_leg, line_leg
-from robolink_simulators.epson.spel.tree import MotionStatement
+from robolink_simulators.epson.spel.statements.passing import passing
+from robolink_simulators.epson.spel.tree import (
+    MotionStatement,
+    PointExpression,
+    PointRange,
+    SwitchOnTheWay,
+)
 
 _SAME_MM = 0.001
 _SAME_DEG = 0.001
 
-# CP blends into the next motion; here every motion ends at rest (assumed simplification).
 # LJM leaves a SCARA's point unchanged (documented); TGo and BGo move six axes
 # the least. C0 to C7 all rise to LimZ, as C7 does.
 _UNTIL_WORDS: Final = frozenset({"till", "find"})
@@ -64,7 +68,7 @@ def plan(evaluator: Evaluator, motion: MotionStatement) -> list[Leg]:
         raise SpelRefusal(RefusalKind.SYNTAX, f"{motion.verb} knows no {', '.join(sorted(wrong))}")
     if len(motion.options.words & {*_UNTIL_WORDS, "sense"}) > 1:
         raise SpelRefusal(RefusalKind.SYNTAX, "A motion takes one of Till, Find and Sense")
-    points = [evaluator.point(target) for target in motion.targets]
+    points = _points(evaluator, motion)
     if motion.verb != "pass" and len(points) != _WAYPOINTS.get(motion.verb, 1):
         raise SpelRefusal(RefusalKind.SYNTAX, f"{motion.verb} does not take {len(points)} points")
     require_drives(machine)
@@ -78,7 +82,7 @@ def plan(evaluator: Evaluator, motion: MotionStatement) -> list[Leg]:
         case "arc":
             return [arc_leg(machine, *(machine.pose_of(point) for point in points))]
         case "pass":
-            return _passing(machine, points)
+            return passing(evaluator, motion, points)
         case verb:
             target = _TARGETS[verb](machine, points[0])
             if verb.endswith("move"):
@@ -89,6 +93,31 @@ def plan(evaluator: Evaluator, motion: MotionStatement) -> list[Leg]:
             ljm = motion.options.ljm
             flag = 1 if ljm is None else evaluator.integer(ljm)
             return [go_leg(machine, machine.arm.joints, least_motion(machine, target, flag))]
+
+
+def _points(evaluator: Evaluator, motion: MotionStatement) -> list[Point]:
+    """Return the points of a motion.
+
+    Raises:
+        Refusal: Something else stands among its targets, or cannot be evaluated.
+    """
+    points = list[Point]()
+    for target in motion.targets:
+        match target:
+            case PointExpression():
+                points.append(evaluator.point(target))
+            case PointRange(first, last):
+                table = evaluator.session.machine.points
+                ends = evaluator.integer(first), evaluator.integer(last)
+                points += [table.get(number) for number in range(ends[0], ends[1] + 1)]
+            case SwitchOnTheWay():
+                if motion.verb != "pass":
+                    raise SpelRefusal(RefusalKind.SYNTAX, f"{motion.verb} switches nothing")
+            case _ if motion.verb == "arc":
+                raise SpelRefusal(RefusalKind.NOT_SIMULATED, "Arc by an angle or a radius")
+            case _:
+                raise SpelRefusal(RefusalKind.SYNTAX, f"{motion.verb} needs a point")
+    return points
 
 
 def require_drives(machine: Machine) -> None:
@@ -103,12 +132,6 @@ def require_drives(machine: Machine) -> None:
     if machine.settings.free_joints:
         free = ", ".join(map(str, sorted(machine.settings.free_joints)))
         raise SpelRefusal(RefusalKind.JOINT_FREE, f"Joint {free} is free")
-
-
-def _passing(machine: Machine, points: list[Point]) -> list[Leg]:
-    """Go by each point; here each is stood at for an instant (assumed simplification)."""
-    joints = [machine.arm.joints, *(machine.joints_for(point) for point in points)]
-    return [go_leg(machine, a, b) for a, b in pairwise(joints)]
 
 
 def _absolute(_: Machine, point: Point) -> Point:

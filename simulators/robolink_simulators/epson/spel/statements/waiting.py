@@ -6,6 +6,7 @@ Source: docs/reference/spel.md 4.6, 7.1.
 from typing import Final
 
 from robolink.timing import NS_PER_S
+from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
 from robolink_simulators.epson.spel.expressions.printing import number_text
@@ -25,7 +26,8 @@ LONGEST_WAIT_S: Final = 2_147_483
 
 NEVER_NS: Final = 2**62
 
-_JUDGING: Final = frozenset({"=", "<>", "<", ">", "<=", ">=", "and", "or", "xor", "mask"})
+_COMPARISONS: Final = frozenset({"=", "<>", "<", ">", "<=", ">="})
+_JUDGING: Final = _COMPARISONS | {"and", "or", "xor", "mask"}
 _EVENT_WORDS = """
     sw in inw oport out outw memsw memin meminw ctr getrobotinsidebox getrobotinsideplane
     mcalcomplete motor lof erroron safetyon estopon teachon pauseon athome latchstate windowsstatus
@@ -54,8 +56,8 @@ class Waiting:
     """A Wait under way.
 
     Args:
-        evaluator: What evaluates the condition. A variable on its right side is read each time
-            (documented: once, when the wait begins).
+        evaluator: What evaluates the condition. What is compared with is worked out once, when
+            the wait begins (documented).
         condition: What is waited for.
         start_ns: When it began.
         limit_s: The time that the statement names, ``None`` for TMOut's.
@@ -65,11 +67,16 @@ class Waiting:
         self, evaluator: Evaluator, condition: Expression, start_ns: int, limit_s: float | None
     ) -> None:
         self._evaluator = evaluator
-        self._condition = condition
+        self._condition = _with_right_sides(evaluator, condition)
         self._own_limit = limit_s is not None
         session = evaluator.session
-        seconds = (session.memory.wait_limit_s or None) if limit_s is None else limit_s
-        self._end_ns = NEVER_NS if seconds is None else start_ns + round(seconds * NS_PER_S)
+        self._seconds = (session.memory.wait_limit_s or None) if limit_s is None else limit_s
+        self.restart(start_ns)
+
+    def restart(self, now_ns: int) -> None:
+        """Begin its time anew, as after a pause (docs/reference/spel.md 4.6)."""
+        seconds = self._seconds
+        self._end_ns = NEVER_NS if seconds is None else now_ns + round(seconds * NS_PER_S)
 
     def holds(self) -> bool:
         """Tell whether the condition holds now.
@@ -105,6 +112,21 @@ class Waiting:
         if not self._own_limit:
             raise SpelRefusal(RefusalKind.WAIT_TIMED_OUT, "The time of TMOut ran out")
         return True
+
+
+def _with_right_sides(evaluator: Evaluator, condition: Expression) -> Expression:
+    """Return a condition whose right sides are values."""
+    match condition:
+        case Binary(sign, left, right) if sign in _COMPARISONS:
+            value = evaluator.value(right)
+            return condition if isinstance(value, Point) else Binary(sign, left, Literal(value))
+        case Binary(sign, left, right):
+            sides = _with_right_sides(evaluator, left), _with_right_sides(evaluator, right)
+            return Binary(sign, *sides)
+        case Unary(sign, operand):
+            return Unary(sign, _with_right_sides(evaluator, operand))
+        case _:
+            return condition
 
 
 def wait_limit(evaluator: Evaluator, command: KeywordStatement) -> float | None:

@@ -1,6 +1,5 @@
 """One exchange on a fieldbus, as the simulated PLC sees it, and what goes wrong with it."""
 
-import random
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
@@ -91,8 +90,7 @@ class WireFaults(CountedFaults[PlcFault]):
     """
 
     def __init__(self, faults: Iterable[PlcFault] = (), seed: int = 1) -> None:
-        super().__init__(faults, links=MAILBOX_LINKS)
-        self._random = random.Random(f"plc faults {seed}")
+        super().__init__(faults, seed, links=MAILBOX_LINKS)
         self._before: dict[str, Words] = {}
 
     @classmethod

@@ -1,0 +1,182 @@
+"""Expressions turned into closures: looked at once, then worked out as often as needed.
+
+The command window and programs share this way and everything that it leads to, so that a line
+means the same in both; only what a plain name stands for differs (:class:`Scope`).
+"""
+
+import operator
+from collections.abc import Callable, Sequence
+from typing import Any, Final, Protocol
+
+from robolink_simulators.epson.memory.points import Point
+from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
+from robolink_simulators.epson.spel.expressions.constants import CONSTANTS
+from robolink_simulators.epson.spel.expressions.data_types import Variable
+from robolink_simulators.epson.spel.expressions.functions import PLAIN_FUNCTIONS
+from robolink_simulators.epson.spel.expressions.machine_functions import MACHINE_FUNCTIONS
+from robolink_simulators.epson.spel.expressions.operators import binary, unary
+from robolink_simulators.epson.spel.expressions.state_functions import STATE_FUNCTIONS
+from robolink_simulators.epson.spel.expressions.values import LARGEST_INT, Value, checked
+from robolink_simulators.epson.spel.session import Session
+from robolink_simulators.epson.spel.tree import (
+    Binary,
+    ByReference,
+    Expression,
+    Literal,
+    Name,
+    PointExpression,
+    PointPair,
+    ResultSlot,
+    Unary,
+)
+
+
+class Surroundings(Protocol):
+    """What an expression is worked out in: the command window, or a task.
+
+    Attributes:
+        session: What expressions can reach.
+        variables: Those of the function that runs.
+        results: What functions gave that the present statement called.
+    """
+
+    session: Session
+    variables: list[Variable]
+    results: list[Any]
+
+    def point(self, expression: PointExpression) -> Point:
+        """Return a point."""
+        ...
+
+    def point_number(self, argument: Expression) -> int:
+        """Return the number of a point."""
+        ...
+
+    def of_the_project(self, name: str) -> Value:
+        """Return what a name of the project stands for."""
+        ...
+
+
+Run = Callable[[Surroundings], Value]
+"""What works an expression out."""
+
+_WHOLE: Final[dict[str, Callable[[int, int], int]]] = {
+    "+": operator.add,
+    "-": operator.sub,
+    "*": operator.mul,
+    "and": operator.and_,
+    "or": operator.or_,
+    "xor": operator.xor,
+    "mask": operator.and_,
+}
+_JUDGED: Final[dict[str, Callable[[int, int], bool]]] = {
+    "=": operator.eq,
+    "<>": operator.ne,
+    "<": operator.lt,
+    ">": operator.gt,
+    "<=": operator.le,
+    ">=": operator.ge,
+}
+
+
+class Scope(Protocol):
+    """What names stand for where an expression stands."""
+
+    def named(self, name: str, arguments: Sequence[Expression] | None) -> Run | None:
+        """Return what a name of the program's own stands for, ``None`` if it is not one."""
+        ...
+
+    def unknown(self, name: str, arguments: Sequence[Expression] | None) -> Run:
+        """Return what a name stands for that the language does not know.
+
+        Raises:
+            Refusal: Nothing is called so.
+        """
+        ...
+
+
+def closure(expression: Expression, scope: Scope) -> Run:
+    """Return what works an expression out.
+
+    Raises:
+        Refusal: It makes no sense whatever the values are.
+    """
+    match expression:
+        case Literal(value):
+            checked(value)
+            return lambda _: value
+        case Name(name, arguments):
+            return _named(name, arguments, scope)
+        case Unary(sign, operand):
+            inner = closure(operand, scope)
+            return lambda t: unary(sign, inner(t))
+        case Binary(sign, left, right):
+            return _binary(sign, closure(left, scope), closure(right, scope))
+        case PointExpression():
+            return lambda t: t.point(expression)
+        case ResultSlot(index):
+            return lambda t: t.results[index]
+        case PointPair() | ByReference():
+            raise SpelRefusal(RefusalKind.SYNTAX, "This is no value")
+
+
+def _binary(sign: str, left: Run, right: Run) -> Run:
+    """Apply an operator; two whole numbers, the usual case, take a short way to the same."""
+    whole, judged = _WHOLE.get(sign), _JUDGED.get(sign)
+    if judged is not None:
+
+        def compare(t: Surroundings) -> Value:
+            a, b = left(t), right(t)
+            if type(a) is int and type(b) is int:
+                return judged(a, b)
+            return binary(sign, a, b)
+
+        return compare
+    if whole is None:
+        return lambda t: binary(sign, left(t), right(t))
+
+    def combine(t: Surroundings) -> Value:
+        a, b = left(t), right(t)
+        if type(a) is int and type(b) is int and -LARGEST_INT <= (c := whole(a, b)) <= LARGEST_INT:
+            return c
+        return binary(sign, a, b)
+
+    return combine
+
+
+def _named(name: str, arguments: tuple[Expression, ...] | None, scope: Scope) -> Run:
+    own = scope.named(name, arguments)
+    if own is not None:
+        return own
+    if arguments is None and name in CONSTANTS:
+        constant = CONSTANTS[name]
+        return lambda _: constant
+    given = arguments or ()
+    if name == "pdef" and len(given) == 1:
+        # PDef(P1), PDef(P(n)), PDef(label) and PDef(1) all name point 1
+        # (docs/reference/spel.md 5.1).
+        return lambda t: t.session.machine.points.defined(t.point_number(given[0]))
+    inner = tuple(closure(argument, scope) for argument in given)
+    if name in PLAIN_FUNCTIONS:
+        counts, plain = PLAIN_FUNCTIONS[name]
+        check_count(name, given, counts)
+        return lambda t: checked(plain([run(t) for run in inner]))
+    if name in MACHINE_FUNCTIONS:
+        counts, function = MACHINE_FUNCTIONS[name]
+        check_count(name, given, counts)
+        return lambda t: checked(function(t.session, [run(t) for run in inner]))
+    if name in STATE_FUNCTIONS:
+        counts, state = STATE_FUNCTIONS[name]
+        check_count(name, given, counts)
+        return lambda t: checked(state(t.session, [run(t) for run in inner]))
+    return scope.unknown(name, arguments)
+
+
+def check_count(name: str, arguments: Sequence[Expression], counts: range) -> None:
+    """Refuse a wrong number of arguments.
+
+    Raises:
+        Refusal: The function does not take so many.
+    """
+    if len(arguments) not in counts:
+        raise SpelRefusal(RefusalKind.SYNTAX, f"{name} does not take {len(arguments)} arguments")

@@ -1,0 +1,1 @@
+"""SPEL+ programs: from files to operations that tasks carry out."""

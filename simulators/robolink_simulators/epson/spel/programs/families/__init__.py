@@ -1,0 +1,1 @@
+"""Statements that only programs know, by family: tasks, ports, texts. A family is one module."""

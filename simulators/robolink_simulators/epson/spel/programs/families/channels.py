@@ -1,0 +1,291 @@
+"""Network statements (docs/reference/spel.md 17); serial ports and files are not simulated."""
+
+import re
+from collections.abc import Callable
+from typing import Final
+
+from robolink.messages import tr
+from robolink.timing import NS_PER_S
+from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
+from robolink_simulators.epson.spel.expressions.closures import Run
+from robolink_simulators.epson.spel.expressions.data_types import Variable
+from robolink_simulators.epson.spel.expressions.functions import PLAIN_FUNCTIONS
+from robolink_simulators.epson.spel.expressions.values import as_integer, as_number, as_text
+from robolink_simulators.epson.spel.line_tree import ChannelStatement
+from robolink_simulators.epson.spel.programs.emitter import Emitter
+from robolink_simulators.epson.spel.programs.scope import Reference
+from robolink_simulators.epson.spel.tasks.compiled import Operation
+from robolink_simulators.epson.spel.tasks.ports import PortSettings
+from robolink_simulators.epson.spel.tasks.task import SpelTask
+from robolink_simulators.epson.spel.tasks.waits import Blocking
+from robolink_simulators.epson.spel.tree import ByReference, Expression, Name
+
+_TERMINATORS: Final = {"cr": b"\r", "lf": b"\n", "crlf": b"\r\n"}
+_SEPARATORS: Final = re.compile(r"\s*,\s*|\s+")
+_BYTE: Final = 0xFF
+
+
+def _channel(emitter: Emitter, node: ChannelStatement) -> Callable[[SpelTask], int]:
+    if node.channel is None:
+        raise emitter.fault(tr("{word} needs a port", word=node.word), expected=("#201",))
+    run = emitter.run(node.channel)
+    return lambda t: as_integer(run(t))
+
+
+def _set(emitter: Emitter, node: ChannelStatement) -> Operation:
+    """SetNet #n, host, port, terminator, flow, time [, protocol ...]."""
+    number = _channel(emitter, node)
+    host, port, end, *rest = node.items if len(node.items) > 2 else (*node.items, None, None, None)
+    if host is None or port is None:
+        raise emitter.fault(tr("SetNet needs a host and a port"))
+    ending = _TERMINATORS.get(end.name if isinstance(end, Name) else "crlf")
+    if ending is None:
+        raise emitter.fault(tr("a line ends with one of these"), expected=("CR", "LF", "CRLF"))
+    runs = (emitter.run(host), emitter.run(port))
+    time = emitter.run(rest[1]) if len(rest) > 1 and rest[1] is not None else None
+    protocol = rest[2] if len(rest) > 2 else None
+    if isinstance(protocol, Name) and protocol.name.startswith("udp"):
+        return _refusing("UDP")
+
+    def go(t: SpelTask) -> None:
+        address = (as_text(runs[0](t)), as_integer(runs[1](t)))
+        seconds = 0.0 if time is None else float(as_number(time(t)))
+        t.runner.ports.configure(number(t), PortSettings(address, ending, seconds))
+
+    return go
+
+
+def _open(emitter: Emitter, node: ChannelStatement) -> Operation:
+    number = _channel(emitter, node)
+    if node.role not in ("client", "server"):
+        raise emitter.fault(tr("OpenNet needs a role"), expected=("As Client", "As Server"))
+    server = node.role == "server"
+    return lambda t: t.runner.ports.open(number(t), t, server=server)
+
+
+def _close(emitter: Emitter, node: ChannelStatement) -> Operation:
+    if node.items == (Name("all"),):
+        return lambda t: t.runner.ports.close_all()
+    number = _channel(emitter, node)
+    return lambda t: t.runner.ports.close(number(t))
+
+
+def _timed(t: SpelTask, out: bool) -> None:
+    t.session.memory.timed_out = out
+
+
+def _await(emitter: Emitter, node: ChannelStatement) -> Operation:
+    """WaitNet: how it ended is told by TW (docs/reference/spel.md 4.6)."""
+    number = _channel(emitter, node)
+    limit = emitter.run(node.items[0]) if node.items else None
+
+    def go(t: SpelTask) -> Blocking:
+        at = number(t)
+        end_ns = None
+        if limit is not None:
+            end_ns = t.now_ns + round(float(as_number(limit(t))) * NS_PER_S)
+        return Blocking(
+            lambda: t.runner.ports.connected(at),
+            lambda: _timed(t, False),
+            end_ns=end_ns,
+            out_of_time=lambda: _timed(t, True),
+            polled=True,
+        )
+
+    return go
+
+
+def _reading(t: SpelTask, at: int, ready: Callable[[], bool], take: Callable[[], None]) -> Blocking:
+    """Return a read that waits for what it needs, for the port's time, or for the link's end."""
+    seconds = t.runner.ports.timeout_s(at)
+
+    def late() -> None:
+        raise SpelRefusal(RefusalKind.PORT_TIMED_OUT, f"Port {at}: nothing came in time")
+
+    end_ns = t.now_ns + round(seconds * NS_PER_S) if seconds else None
+    return Blocking(ready, take, end_ns=end_ns, out_of_time=late, polled=True)
+
+
+def _line(t: SpelTask, at: int, take: Callable[[str], None]) -> Blocking:
+    ports = t.runner.ports
+
+    def ready() -> bool:
+        return ports.lines(at, t) > 0 or not ports.connected(at) or _foreign(t, at)
+
+    def taken() -> None:
+        line = ports.line(at, t)
+        if line is not None:
+            take(line)
+
+    return _reading(t, at, ready, taken)
+
+
+def _foreign(t: SpelTask, at: int) -> bool:
+    return bool(t.runner.ports.owner_number(at) != t.task_number)
+
+
+def _into(emitter: Emitter, item: Expression) -> Reference:
+    given = item.target if isinstance(item, ByReference) else item
+    if not isinstance(given, Name):
+        raise emitter.fault(tr("a variable is needed"))
+    return emitter.variable(given)
+
+
+def _store(variable: Variable, value: str | int) -> None:
+    variable.values[0] = variable.kind.store(value)
+
+
+def _input(emitter: Emitter, node: ChannelStatement) -> Operation:
+    """Input #n, variables: texts and numbers between commas or blanks."""
+    number = _channel(emitter, node)
+    references = [_into(emitter, item) for item in node.items]
+
+    def go(t: SpelTask) -> Blocking:
+        variables = [reference(t) for reference in references]
+
+        def take(line: str) -> None:
+            parts = _SEPARATORS.split(line.strip()) if line.strip() else []
+            if len(parts) != len(variables):
+                raise SpelRefusal(RefusalKind.INPUT_COUNT, f"{len(parts)} data came")
+            for variable, part in zip(variables, parts, strict=True):
+                text = variable.kind.name == "string"
+                variable.values[0] = variable.kind.store(part if text else _value(part))
+
+        return _line(t, number(t), take)
+
+    return go
+
+
+def _value(text: str) -> int | float:
+    return as_number(PLAIN_FUNCTIONS["val"][1]([text]))
+
+
+def _line_input(emitter: Emitter, node: ChannelStatement) -> Operation:
+    number = _channel(emitter, node)
+    if len(node.items) != 1:
+        raise emitter.fault(tr("Line Input takes one variable"))
+    reference = _into(emitter, node.items[0])
+
+    def go(t: SpelTask) -> Blocking:
+        variable = reference(t)
+        return _line(t, number(t), lambda line: _store(variable, line))
+
+    return go
+
+
+def _bytes(t: SpelTask, at: int, count: int, take: Callable[[bytes], None]) -> Blocking:
+    ports = t.runner.ports
+
+    def ready() -> bool:
+        waiting = ports.waiting_bytes(at, t)
+        return waiting < 0 or waiting >= count or not ports.connected(at)
+
+    def taken() -> None:
+        data = ports.bytes(at, count, t)
+        if data is not None:
+            take(data)
+
+    return _reading(t, at, ready, taken)
+
+
+def _read(emitter: Emitter, node: ChannelStatement) -> Operation:
+    """Read #n, s$, count."""
+    number, (item, amount) = _channel(emitter, node), _two(emitter, node)
+    reference, count = _into(emitter, item), emitter.run(amount)
+
+    def go(t: SpelTask) -> Blocking:
+        variable, wanted = reference(t), as_integer(count(t))
+        return _bytes(t, number(t), wanted, lambda data: _store(variable, data.decode("latin-1")))
+
+    return go
+
+
+def _two(emitter: Emitter, node: ChannelStatement) -> tuple[Expression, Expression]:
+    if len(node.items) != 2:
+        raise emitter.fault(tr("{word} takes a variable and a count", word=node.word))
+    return node.items[0], node.items[1]
+
+
+def _holder(emitter: Emitter, item: Expression) -> Reference:
+    given = item.target if isinstance(item, ByReference) else item
+    if isinstance(given, Name) and emitter.scope.is_array(given.name) and not given.arguments:
+        return emitter.array(given)
+    return _into(emitter, item)
+
+
+def _read_binary(emitter: Emitter, node: ChannelStatement) -> Operation:
+    """ReadBin #n, variable, or ReadBin #n, array(), count."""
+    number = _channel(emitter, node)
+    reference = _holder(emitter, node.items[0])
+    count = emitter.run(node.items[1]) if len(node.items) > 1 else None
+
+    def go(t: SpelTask) -> Blocking:
+        variable = reference(t)
+        wanted = 1 if count is None else as_integer(count(t))
+        if not 0 <= wanted <= len(variable.values):
+            raise SpelRefusal(RefusalKind.SUBSCRIPT, f"{wanted} bytes do not fit")
+
+        def take(data: bytes) -> None:
+            for index, byte in enumerate(data):
+                variable.values[index] = variable.kind.store(byte)
+
+        return _bytes(t, number(t), wanted, take)
+
+    return go
+
+
+def _write(emitter: Emitter, node: ChannelStatement) -> Operation:
+    """Write #n, text: nothing is added to it."""
+    number = _channel(emitter, node)
+    if len(node.items) != 1:
+        raise emitter.fault(tr("Write takes one text"))
+    text = emitter.run(node.items[0])
+    return lambda t: t.runner.ports.write(number(t), as_text(text(t)), t, ends=False)
+
+
+def _write_binary(emitter: Emitter, node: ChannelStatement) -> Operation:
+    number = _channel(emitter, node)
+    item, count = node.items[0], node.items[1:]
+    run: Run | None = emitter.run(count[0]) if count else None
+    if run is None:
+        value = emitter.run(item)
+        return lambda t: t.runner.ports.write_bytes(
+            number(t), bytes([as_integer(value(t)) & _BYTE]), t
+        )
+    reference = _holder(emitter, item)
+
+    def go(t: SpelTask) -> None:
+        wanted, values = as_integer(run(t)), reference(t).values
+        if not 0 <= wanted <= len(values):
+            raise SpelRefusal(RefusalKind.SUBSCRIPT, f"There are no {wanted} bytes")
+        data = bytes(as_integer(value) & _BYTE for value in values[:wanted])
+        t.runner.ports.write_bytes(number(t), data, t)
+
+    return go
+
+
+def _refusing(word: str) -> Operation:
+    def go(_: SpelTask) -> None:
+        raise SpelRefusal(RefusalKind.NOT_SIMULATED, f"{word} is not simulated")
+
+    return go
+
+
+def _other(emitter: Emitter, node: ChannelStatement) -> Operation:  # noqa: ARG001
+    return _refusing(node.word)
+
+
+CHANNEL_STATEMENTS: Final[dict[str, Callable[[Emitter, ChannelStatement], Operation]]] = {
+    "setnet": _set,
+    "opennet": _open,
+    "closenet": _close,
+    "waitnet": _await,
+    "input": _input,
+    "line input": _line_input,
+    "read": _read,
+    "readbin": _read_binary,
+    "write": _write,
+    "writebin": _write_binary,
+    "*": _other,
+}
+"""Keyword to what compiles it; ``*`` for those that are refused when they are come to."""

@@ -1,0 +1,253 @@
+"""Tasks: Xqt, Quit, Halt, Resume, TaskWait; locks, signals, and errors that a program raises.
+
+Source: docs/reference/spel.md 4.4, 4.5.
+"""
+
+from collections.abc import Callable
+from typing import Final
+
+from robolink.messages import tr
+from robolink.timing import NS_PER_S
+from robolink_simulators.epson.condition import Task
+from robolink_simulators.epson.refusals import RaisedError, RefusalKind, SpelRefusal
+from robolink_simulators.epson.spel.expressions.closures import Run
+from robolink_simulators.epson.spel.expressions.values import as_integer, as_number
+from robolink_simulators.epson.spel.line_tree import TaskStatement
+from robolink_simulators.epson.spel.programs.emitter import Emitter
+from robolink_simulators.epson.spel.tasks.compiled import Operation
+from robolink_simulators.epson.spel.tasks.functions import number_of_function
+from robolink_simulators.epson.spel.tasks.task import SpelTask, TaskKind
+from robolink_simulators.epson.spel.tasks.waits import Blocking
+from robolink_simulators.epson.spel.tree import Expression, Name
+
+_KINDS: Final = {
+    "normal": TaskKind.NORMAL,
+    "nopause": TaskKind.NO_PAUSE,
+    "noemgabort": TaskKind.NO_ABORT,
+}
+_MAY_NOT_START: Final = frozenset({TaskKind.NO_ABORT, TaskKind.TRAP})
+
+
+def _start(emitter: Emitter, node: TaskStatement) -> Operation:
+    """Xqt [number,] function[(arguments)] [, kind]."""
+    items = list(node.items)
+    kind = TaskKind.NORMAL
+    if isinstance(items[-1], Name) and items[-1].name in _KINDS:
+        kind = _KINDS[items.pop().name]  # type: ignore[union-attr]
+    named = items.pop() if items else None
+    if not isinstance(named, Name) or named.name not in emitter.functions or len(items) > 1:
+        raise emitter.fault(tr("Xqt needs a function"), expected=("Xqt 2, NAME",))
+    number = emitter.run(items[0]) if items else None
+    function, makers = emitter.given(named.name, named.arguments or ())
+
+    def go(t: SpelTask) -> None:
+        if t.kind in _MAY_NOT_START:
+            raise SpelRefusal(RefusalKind.NOT_IN_THIS_TASK, "This task starts no other")
+        wanted = None if number is None else as_integer(number(t))
+        started = TaskKind.BACKGROUND if t.kind is TaskKind.BACKGROUND else kind
+        t.runner.begin(function, [make(t) for make in makers], started, wanted, t.now_ns)
+
+    return go
+
+
+def _which(emitter: Emitter, item: Expression) -> Callable[[SpelTask], list[SpelTask]]:
+    """Return what gives the tasks that a statement names: a number, a function, or All."""
+    if isinstance(item, Name) and item.arguments is None and not emitter.scope.holds(item.name):
+        if item.name == "all":
+            return lambda t: [
+                x for x in t.runner.tasks.values() if x.kind is not TaskKind.BACKGROUND
+            ]
+        if item.name in emitter.functions:
+            name = item.name
+
+            def by_name(t: SpelTask) -> list[SpelTask]:
+                found = t.runner.tasks.get(number_of_function(t, name))
+                return [] if found is None else [found]
+
+            return by_name
+    number = emitter.run(item)
+
+    def by_number(t: SpelTask) -> list[SpelTask]:
+        found = t.runner.tasks.get(as_integer(number(t)))
+        return [] if found is None else [found]
+
+    return by_number
+
+
+def _one(emitter: Emitter, node: TaskStatement) -> Expression:
+    if len(node.items) != 1:
+        raise emitter.fault(tr("{word} takes one task", word=node.word))
+    return node.items[0]
+
+
+def _quit(emitter: Emitter, node: TaskStatement) -> Operation:
+    item = _one(emitter, node)
+    if item == Name("all"):
+        return lambda t: t.runner.quit_all()
+    which = _which(emitter, item)
+
+    def go(t: SpelTask) -> object:
+        for task in which(t):
+            t.runner.end(task)
+        return t.turn() if t.ended else None
+
+    return go
+
+
+def _halt(emitter: Emitter, node: TaskStatement) -> Operation:
+    which = _which(emitter, _one(emitter, node))
+
+    def go(t: SpelTask) -> object:
+        for task in which(t):
+            task.halted = True
+            if task.waiting is not None:
+                task.waiting.suspend(t.now_ns)
+        return t.turn() if t.halted else None
+
+    return go
+
+
+def _resume(emitter: Emitter, node: TaskStatement) -> Operation:
+    which = _which(emitter, _one(emitter, node))
+
+    def go(t: SpelTask) -> None:
+        for task in which(t):
+            if task.halted:
+                task.halted = False
+                task.now_ns = max(task.now_ns, t.now_ns)
+                if task.waiting is not None:
+                    task.waiting.go_on(t.now_ns)
+
+    return go
+
+
+def _await_task(emitter: Emitter, node: TaskStatement) -> Operation:
+    which = _which(emitter, _one(emitter, node))
+
+    def go(t: SpelTask) -> Blocking:
+        awaited = which(t)
+        return Blocking(lambda: all(task.ended for task in awaited), lambda: None)
+
+    return go
+
+
+def _numbers(emitter: Emitter, node: TaskStatement, most: int) -> list[Run]:
+    if not 1 <= len(node.items) <= most:
+        raise emitter.fault(tr("{word} takes 1 to {most} values", word=node.word, most=most))
+    return [emitter.run(item) for item in node.items]
+
+
+def _until(t: SpelTask, runs: list[Run]) -> int | None:
+    """Return when the time that a statement names is up."""
+    return t.now_ns + round(float(as_number(runs[1](t))) * NS_PER_S) if len(runs) > 1 else None
+
+
+def _timed(t: SpelTask, out: bool) -> None:
+    t.session.memory.timed_out = out
+
+
+def _lock(emitter: Emitter, node: TaskStatement) -> Operation:
+    runs = _numbers(emitter, node, 2)
+
+    def go(t: SpelTask) -> Blocking:
+        sharing, number = t.runner.sharing, as_integer(runs[0](t))
+        sharing.may_lock(number, t)
+
+        def take() -> None:
+            sharing.lock(number, t)
+            _timed(t, False)
+
+        return Blocking(
+            lambda: sharing.may_lock(number, t),
+            take,
+            end_ns=_until(t, runs),
+            out_of_time=lambda: _timed(t, True),
+        )
+
+    return go
+
+
+def _unlock(emitter: Emitter, node: TaskStatement) -> Operation:
+    (number,) = _numbers(emitter, node, 1)
+    return lambda t: t.runner.sharing.unlock(as_integer(number(t)), t)
+
+
+def _signal(emitter: Emitter, node: TaskStatement) -> Operation:
+    (number,) = _numbers(emitter, node, 1)
+    return lambda t: t.runner.sharing.signal(as_integer(number(t)))
+
+
+def _await_signal(emitter: Emitter, node: TaskStatement) -> Operation:
+    runs = _numbers(emitter, node, 2)
+
+    def go(t: SpelTask) -> Blocking:
+        sharing, number = t.runner.sharing, as_integer(runs[0](t))
+        sharing.await_signal(number, t)
+
+        def out() -> None:
+            sharing.cease(number, t)
+            _timed(t, True)
+
+        return Blocking(
+            lambda: sharing.signalled(number, t),
+            lambda: _timed(t, False),
+            end_ns=_until(t, runs),
+            out_of_time=out,
+        )
+
+    return go
+
+
+def _raise(emitter: Emitter, node: TaskStatement) -> Operation:
+    """Error [task,] number."""
+    runs = _numbers(emitter, node, 2)
+
+    def go(t: SpelTask) -> None:
+        error = RaisedError(as_integer(runs[-1](t)))
+        if len(runs) == 1:
+            raise error
+        other = t.runner.tasks.get(as_integer(runs[0](t)))
+        if other is t:
+            raise error
+        if other is not None:
+            t.runner.fail(other, error)
+
+    return go
+
+
+def _pause(emitter: Emitter, node: TaskStatement) -> Operation:  # noqa: ARG001
+    def go(t: SpelTask) -> object:
+        t.runner.turn_to(Task.PAUSED)
+        return t.turn()
+
+    return go
+
+
+def _continue(emitter: Emitter, node: TaskStatement) -> Operation:  # noqa: ARG001
+    return lambda t: t.runner.turn_to(Task.RUNNING)
+
+
+def _unsimulated(emitter: Emitter, node: TaskStatement) -> Operation:  # noqa: ARG001
+    def go(_: SpelTask) -> None:
+        raise SpelRefusal(RefusalKind.NOT_SIMULATED, f"{node.word} is not simulated")
+
+    return go
+
+
+TASK_STATEMENTS: Final[dict[str, Callable[[Emitter, TaskStatement], Operation]]] = {
+    "xqt": _start,
+    "quit": _quit,
+    "halt": _halt,
+    "resume": _resume,
+    "taskwait": _await_task,
+    "synclock": _lock,
+    "syncunlock": _unlock,
+    "signal": _signal,
+    "waitsig": _await_signal,
+    "error": _raise,
+    "pause": _pause,
+    "cont": _continue,
+    "restart": _unsimulated,
+    "startmain": _unsimulated,
+}
+"""Keyword to what compiles it."""

@@ -1,0 +1,53 @@
+"""Which family compiles a statement. A new family adds its row here."""
+
+from collections.abc import Callable
+from typing import Final
+
+from robolink.messages import tr
+from robolink_simulators.epson.spel.line_tree import (
+    AssignElement,
+    Call,
+    ChannelStatement,
+    TaskStatement,
+    Trap,
+)
+from robolink_simulators.epson.spel.programs.emitter import Emitter
+from robolink_simulators.epson.spel.programs.families.channels import CHANNEL_STATEMENTS
+from robolink_simulators.epson.spel.programs.families.control import TASK_STATEMENTS
+from robolink_simulators.epson.spel.programs.families.interrupts import compile_trap
+from robolink_simulators.epson.spel.programs.families.texts import PROCEDURES
+from robolink_simulators.epson.spel.programs.families.timers_and_files import TIMERS_AND_FILES
+from robolink_simulators.epson.spel.tasks.compiled import JumpTarget, Operation
+
+FamilyStatement = TaskStatement | ChannelStatement | Trap | Call | AssignElement
+
+PROCEDURE_TABLES: Final = (PROCEDURES, TIMERS_AND_FILES)
+"""Statements written as a call; the first table that knows a name compiles it."""
+
+_Compiler = Callable[[Emitter, Call], Operation]
+
+
+def compile_family(
+    emitter: Emitter, node: FamilyStatement, target: JumpTarget | None = None
+) -> Operation:
+    """Return the operation of a statement that only programs know.
+
+    Raises:
+        ProgramFault: It is not known, or makes no sense.
+    """
+    match node:
+        case Trap():
+            return compile_trap(emitter, node, target)
+        case TaskStatement(word):
+            return TASK_STATEMENTS[word](emitter, node)
+        case ChannelStatement(word):
+            if word not in CHANNEL_STATEMENTS:
+                return CHANNEL_STATEMENTS["*"](emitter, node)
+            return CHANNEL_STATEMENTS[word](emitter, node)
+        case Call(name):
+            for table in PROCEDURE_TABLES:
+                if name in table:
+                    return table[name](emitter, node)
+            raise emitter.fault(tr("there is no statement and no function {name}", name=name))
+        case AssignElement(name):
+            raise emitter.fault(tr("nothing is called {name}", name=name))

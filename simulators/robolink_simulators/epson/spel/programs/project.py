@@ -1,0 +1,218 @@
+"""Files to a project: every function compiled, or every fault told (docs/reference/spel.md 16)."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Final
+
+from robolink.messages import tr
+from robolink_simulators.epson.options import EpsonOptions
+from robolink_simulators.epson.spel.expressions.data_types import DataType, Variable, data_types
+from robolink_simulators.epson.spel.line_tree import (
+    BlockWord,
+    Declaration,
+    FunctionHeader,
+    LineNode,
+)
+from robolink_simulators.epson.spel.programs.emitter import Emitter
+from robolink_simulators.epson.spel.programs.families.texts import FUNCTIONS_OF_ARRAYS
+from robolink_simulators.epson.spel.programs.function_compiler import (
+    FunctionCompiler,
+    Line,
+    bounds_of,
+)
+from robolink_simulators.epson.spel.programs.scope import FunctionScope
+from robolink_simulators.epson.spel.source.faults import (
+    ProgramFault,
+    ProgramRefused,
+    SourcePlace,
+)
+from robolink_simulators.epson.spel.source.line_parser import label_of, parsed
+from robolink_simulators.epson.spel.source.source_text import Preprocessor, SourceLine
+from robolink_simulators.epson.spel.tasks.compiled import (
+    CompiledFunction,
+    LocalSlot,
+    SpelProject,
+)
+
+LONGEST_FUNCTION_NAME: Final = 64
+LONGEST_NAME: Final = 32
+
+
+@dataclass(slots=True)
+class _Outline:
+    """A function before it is compiled."""
+
+    header: FunctionHeader
+    place: SourcePlace
+    module: dict[str, Variable]
+    lines: list[Line] = field(default_factory=list)
+    end: SourcePlace | None = None
+
+
+class ProjectBuilder:
+    """Builds a project from its program files.
+
+    Args:
+        options: The controller's habits.
+        labels: Names of points, inputs and outputs, ``None`` where they are not known.
+    """
+
+    def __init__(self, options: EpsonOptions, labels: frozenset[str] | None = None) -> None:
+        self._options = options
+        self._labels = labels
+        self._types = data_types(wraps=options.integer_overflow == "wrap")
+        self._project = SpelProject()
+        self._outlines: list[_Outline] = []
+        self._faults: list[ProgramFault] = []
+
+    def build(self, files: Iterable[Path]) -> SpelProject:
+        """Return the project.
+
+        Raises:
+            ProgramRefused: Something is wrong with it; all of it is told at once.
+            ConfigError: A file cannot be read.
+        """
+        for path in files:
+            self._read(path)
+        for outline in self._outlines:
+            self._announce(outline)
+        for outline in self._outlines:
+            self._compile(outline)
+        if self._faults:
+            raise ProgramRefused(sorted(self._faults, key=lambda f: (f.place.file, f.place.line)))
+        return self._project
+
+    def _read(self, path: Path) -> None:
+        preprocessor = Preprocessor(path.parent)
+        module: dict[str, Variable] = {}
+        self._project.modules[path.name] = module
+        current: _Outline | None = None
+        for line in preprocessor.lines(path):
+            self._project.sources[line.place] = line.text.strip()
+            try:
+                current = self._line(line, module, current)
+            except ProgramFault as fault:
+                self._faults.append(fault)
+        self._faults += preprocessor.faults
+        if current is not None:
+            self._faults.append(
+                ProgramFault(current.place, tr("this is never closed"), expected=("Fend",))
+            )
+
+    def _line(
+        self, line: SourceLine, module: dict[str, Variable], current: _Outline | None
+    ) -> _Outline | None:
+        """Take a line up; return the function that is open behind it."""
+        label = label_of(line)
+        nodes: tuple[LineNode, ...] = () if label is not None else parsed(line)
+        if nodes and isinstance(nodes[0], FunctionHeader):
+            if current is not None:
+                self._faults.append(
+                    ProgramFault(
+                        line.place, tr("the function above is not closed"), expected=("Fend",)
+                    )
+                )
+            current = _Outline(nodes[0], line.place, module)
+            self._outlines.append(current)
+            return self._inside(line.place, None, nodes[1:], current) if nodes[1:] else current
+        if current is not None:
+            return self._inside(line.place, label, nodes, current)
+        for node in nodes:
+            if not isinstance(node, Declaration):
+                raise ProgramFault(
+                    line.place,
+                    tr("this cannot stand outside of functions"),
+                    expected=("Function", "Global"),
+                )
+            self._declare(node, line.place, module)
+        return None
+
+    def _inside(
+        self, place: SourcePlace, label: str | None, nodes: Sequence[LineNode], current: _Outline
+    ) -> _Outline | None:
+        if nodes and isinstance(nodes[-1], BlockWord) and nodes[-1].word == "fend":
+            current.lines.append((place, label, nodes[:-1]))
+            current.end = place
+            return None
+        current.lines.append((place, label, nodes))
+        return current
+
+    def _declare(self, node: Declaration, place: SourcePlace, module: dict[str, Variable]) -> None:
+        function = CompiledFunction("", "", place, self._scope(module))
+        emitter = Emitter(function, {}, self._options)
+        for declared in node.variables:
+            _check_length(declared.name, place)
+            bounds = bounds_of(declared.bounds, emitter) or ()
+            variable = Variable(self._types[node.type_name], bounds)
+            if node.scope in ("local", "module"):
+                module[declared.name] = variable
+                continue
+            known = self._project.shared.get(declared.name)
+            if known is None:
+                self._project.shared[declared.name] = (variable, node.scope)
+            elif (known[0].kind, known[0].bounds) != (variable.kind, bounds):
+                raise ProgramFault(
+                    place, tr("{name} is declared twice, differently", name=declared.name)
+                )
+
+    def _scope(self, module: dict[str, Variable]) -> FunctionScope:
+        undeclared: DataType | None = None
+        if self._options.undeclared != "error":
+            undeclared = self._types[self._options.undeclared]
+        return FunctionScope(self._project, module, undeclared=undeclared, labels=self._labels)
+
+    def _announce(self, outline: _Outline) -> None:
+        """Let a function be known to the others before any is compiled."""
+        header, scope = outline.header, self._scope(outline.module)
+        # A function without a type gives a number nobody reads.
+        kind = self._types[header.type_name or "integer"]
+        function = CompiledFunction(
+            header.name, header.spelled, outline.place, scope, len(header.parameters)
+        )
+        scope.declare(LocalSlot(header.name, kind))
+        for parameter in header.parameters:
+            type_ = self._types[parameter.type_name]
+            scope.declare(LocalSlot(parameter.name, type_, array=parameter.array))
+            function.by_reference.append(parameter.by_reference)
+            function.arrays.append(parameter.array)
+        function.variables = scope.variables
+        if header.name in self._project.functions:
+            text = tr("there is another function {name}", name=header.spelled)
+            self._faults.append(ProgramFault(outline.place, text))
+        if len(header.name) > LONGEST_FUNCTION_NAME:
+            self._faults.append(
+                ProgramFault(outline.place, tr("a function's name has up to 64 characters"))
+            )
+        self._project.functions.setdefault(header.name, function)
+
+    def _compile(self, outline: _Outline) -> None:
+        function = self._project.functions[outline.header.name]
+        if function.place != outline.place:
+            return
+        compiler = FunctionCompiler(
+            Emitter(function, self._project.functions, self._options, FUNCTIONS_OF_ARRAYS),
+            self._types,
+        )
+        compiler.compile(outline.lines, outline.end or outline.place)
+        self._faults += compiler.faults
+
+
+def _check_length(name: str, place: SourcePlace) -> None:
+    if len(name) > LONGEST_NAME:
+        raise ProgramFault(place, tr("a variable's name has up to 32 characters"))
+
+
+def build_project(
+    files: Iterable[Path],
+    options: EpsonOptions | None = None,
+    *,
+    labels: frozenset[str] | None = None,
+) -> SpelProject:
+    """Return the project in some program files; see :class:`ProjectBuilder`.
+
+    Raises:
+        ProgramRefused: Something is wrong with it.
+        ConfigError: A file cannot be read.
+    """
+    return ProjectBuilder(options or EpsonOptions(), labels).build(files)

@@ -1,0 +1,1 @@
+"""Program files to statements: lines, directives, and what is wrong with them."""

@@ -1,0 +1,187 @@
+"""Files of a project as lines: what a person wrote, without comments, macros in their place.
+
+Source: docs/reference/spel.md 1, 1.1; docs/reference/spel.md 16.
+"""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Final
+
+from robolink.errors import ConfigError
+from robolink.files.named import read_named
+from robolink.messages import tr
+from robolink_simulators.epson.spel.source.faults import ProgramFault, SourcePlace
+from robolink_simulators.epson.spel.source.macros import Macro, expanded
+
+LONGEST_LINE: Final = 512
+LARGEST_PROGRAM: Final = 8 * 2**20
+"""Bytes of a program's text (documented for a project, docs/reference/spel.md 16)."""
+
+_DEEPEST_INCLUDE: Final = 8
+_ENCODINGS: Final = ("utf-8-sig", "cp932", "gbk")
+
+_LINE_END = re.compile(r"\r\n|\n|\r")
+_DIRECTIVE = re.compile(r"\s*#\s*([a-z]+)\b\s*(.*?)\s*$", re.IGNORECASE)
+_NAME = re.compile(r"[a-z][a-z0-9_]*$", re.IGNORECASE)
+_DEFINITION = re.compile(r"([a-z][a-z0-9_]*)(?:\(([^)]*)\))?\s*(.*)$", re.IGNORECASE)
+_INCLUDED = re.compile(r'"([^"/\\]+)"$')
+_CODE = re.compile(r"""((?:[^'"]|"[^"]*(?:"|$))*)""")
+
+
+@dataclass(frozen=True, slots=True)
+class SourceLine:
+    """A line that holds something, comment and macros resolved."""
+
+    place: SourcePlace
+    text: str
+
+
+def decoded(content: bytes) -> str:
+    """Return the text of a project file, whatever code page its PC used.
+
+    UTF-8, code page 932 and GBK are tried, in this order; what is none of them is read byte by
+    byte, since its other letters stand in comments, texts and labels.
+    """
+    for encoding in _ENCODINGS:
+        try:
+            return content.decode(encoding)
+        except UnicodeDecodeError:
+            continue
+    return content.decode("latin-1")
+
+
+@dataclass(slots=True)
+class Preprocessor:
+    """Turns one program file into lines.
+
+    Attributes:
+        folder: Where included files are looked for.
+        faults: What was wrong with directives.
+    """
+
+    folder: Path
+    faults: list[ProgramFault] = field(default_factory=list)
+    _macros: dict[str, Macro] = field(default_factory=dict)
+    _branches: list[tuple[bool, bool]] = field(default_factory=list)
+    _size: int = 0
+
+    def lines(self, path: Path) -> Iterator[SourceLine]:
+        """Yield the lines of a file and of what it includes.
+
+        Raises:
+            ConfigError: The file cannot be read.
+        """
+        yield from self._file(path, depth=0)
+        if self._branches:
+            place = SourcePlace(path.name, 1)
+            self._blame(place, tr("An #ifdef is never closed by #endif."))
+            self._branches.clear()
+
+    def _file(self, path: Path, *, depth: int) -> Iterator[SourceLine]:
+        content = _content(path)
+        self._size += len(content)
+        if self._size > LARGEST_PROGRAM:
+            self._blame(SourcePlace(path.name, 1), tr("The program is larger than 8 MB."))
+            return
+        for place, text in _joined(path.name, decoded(content)):
+            code = _without_comment(text)
+            directive = _DIRECTIVE.match(code)
+            if directive is not None:
+                yield from self._directive(place, directive[1].lower(), directive[2], depth)
+                continue
+            if not all(holds for holds, _ in self._branches):
+                continue
+            if len(text) > LONGEST_LINE:
+                self._blame(place, tr("The line is longer than 512 characters."))
+            if code.strip():
+                yield SourceLine(place, expanded(code.rstrip(), self._macros))
+
+    def _directive(
+        self, place: SourcePlace, word: str, rest: str, depth: int
+    ) -> Iterator[SourceLine]:
+        match word:
+            case "ifdef" | "ifndef":
+                defined = rest.lower() in self._macros
+                self._branches.append((defined is (word == "ifdef"), False))
+            case "else" | "endif":
+                self._turn(place, word)
+            case _ if not all(holds for holds, _ in self._branches):
+                return
+            case "define":
+                self._define(place, rest)
+            case "undef":
+                self._macros.pop(rest.lower(), None)
+            case "include":
+                yield from self._include(place, rest, depth)
+            case _:
+                self._blame(place, tr("There is no directive #{word}.", word=word))
+
+    def _turn(self, place: SourcePlace, word: str) -> None:
+        if not self._branches or (word == "else" and self._branches[-1][1]):
+            self._blame(place, tr("#{word} without an #ifdef.", word=word))
+            return
+        holds, _ = self._branches.pop()
+        if word == "else":
+            self._branches.append((not holds, True))
+
+    def _define(self, place: SourcePlace, rest: str) -> None:
+        match = _DEFINITION.match(rest)
+        if match is None:
+            self._blame(place, tr("#define needs a name."))
+            return
+        name, given, text = match.groups()
+        parameters = tuple(p.strip() for p in given.split(",")) if given else ()
+        if any(_NAME.match(parameter) is None for parameter in parameters) or len(parameters) > 8:
+            self._blame(place, tr("#define takes up to 8 names in its parentheses."))
+            return
+        # With an empty text every occurrence of the name is deleted; for #ifdef it is defined.
+        self._macros[name.lower()] = Macro(parameters, text)
+
+    def _include(self, place: SourcePlace, rest: str, depth: int) -> Iterator[SourceLine]:
+        match = _INCLUDED.match(rest)
+        if match is None:
+            self._blame(place, tr("#include needs the name of a file, without a path, in quotes."))
+            return
+        wanted = match[1].lower()
+        found = [path for path in sorted(self.folder.iterdir()) if path.name.lower() == wanted]
+        if not found:
+            self._blame(place, tr("There is no file {name} beside it.", name=match[1]))
+        elif depth >= _DEEPEST_INCLUDE:
+            self._blame(place, tr("Files include each other more than 8 deep."))
+        else:
+            yield from self._file(found[0], depth=depth + 1)
+
+    def _blame(self, place: SourcePlace, text: str) -> None:
+        self.faults.append(ProgramFault(place, text))
+
+
+def _content(path: Path) -> bytes:
+    try:
+        return read_named(path, most_bytes=LARGEST_PROGRAM)
+    except OSError as error:
+        raise ConfigError(
+            tr("{path} cannot be read: {why}.", path=path, why=error.strerror or error),
+            remedy=tr("Give the file of a SPEL+ program, whose name ends in .prg."),
+        ) from error
+
+
+def _without_comment(text: str) -> str:
+    match = _CODE.match(text)
+    return text if match is None else match[1]
+
+
+def _joined(name: str, text: str) -> Iterator[tuple[SourcePlace, str]]:
+    """Yield lines; one that ends in a blank and an underscore goes on in the next (extension)."""
+    held, first = "", 0
+    for number, line in enumerate(_LINE_END.split(text), start=1):
+        code = _without_comment(line).rstrip()
+        first = first or number
+        if code.endswith((" _", "\t_")):
+            held += code[:-1]
+            continue
+        yield SourcePlace(name, first), held + line
+        held, first = "", 0
+    if held:
+        yield SourcePlace(name, first), held

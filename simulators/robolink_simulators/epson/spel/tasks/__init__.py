@@ -1,0 +1,1 @@
+"""SPEL+ tasks: programs under way, side by side, in simulated time."""

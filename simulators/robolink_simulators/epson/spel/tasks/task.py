@@ -1,0 +1,233 @@
+"""One task: where it is in which function, and what it remembers."""
+
+from dataclasses import dataclass, field, replace
+from enum import IntEnum, StrEnum
+from typing import Any, Final
+
+from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
+from robolink_simulators.epson.spel.expressions.data_types import Variable
+from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
+from robolink_simulators.epson.spel.session import Session, WindowMemory
+from robolink_simulators.epson.spel.tasks.compiled import CompiledFunction, JumpTarget, Operation
+from robolink_simulators.epson.spel.tasks.waits import Blocking, TaskWaiting
+
+DEEPEST_CALL: Final = 200
+"""Functions that may call each other (recursion is not mentioned; bounded here)."""
+
+
+class TaskKind(StrEnum):
+    """How a task goes on when the controller stops (docs/reference/spel.md 4.5)."""
+
+    NORMAL = "normal"
+    NO_PAUSE = "nopause"
+    NO_ABORT = "noemgabort"
+    TRAP = "trap"
+    BACKGROUND = "background"
+
+
+class TaskState(IntEnum):
+    """What TaskState tells."""
+
+    NONE = 0
+    RUNNING = 1
+    WAITING = 2
+    HALTED = 3
+    PAUSED = 4
+    FAILED = 5
+
+
+@dataclass(slots=True)
+class CallFrame:
+    """A function under way.
+
+    Attributes:
+        function: Which.
+        pc: Where it goes on when what it called has returned.
+        variables: Its own.
+        results: What functions gave that it called, and ends of its loops.
+        slot: Where the caller keeps the result.
+        handler: Where errors are dealt with.
+        failed_pc: The operation whose error is being dealt with.
+        returns: Where Return goes.
+    """
+
+    function: CompiledFunction
+    variables: list[Variable]
+    slot: int
+    pc: int = 0
+    results: list[Any] = field(default_factory=list)
+    handler: JumpTarget | None = None
+    failed_pc: int | None = None
+    returns: list[int] = field(default_factory=list)
+
+
+@dataclass(frozen=True, slots=True)
+class TaskFailure:
+    """An error of a task.
+
+    Attributes:
+        number: What Err tells.
+        text: The controller's sentence.
+        task: Number of the task.
+        function: Its function.
+        file: Its file.
+        line: Line in the file.
+    """
+
+    number: int
+    text: str
+    task: int
+    function: str
+    file: str
+    line: int
+
+    def __str__(self) -> str:
+        return f"{self.text} (task {self.task}, {self.function}, {self.file}:{self.line})"
+
+
+class SpelTask(Evaluator):
+    """A task; the runner lets it go on.
+
+    Attributes:
+        task_number: 1 to 32, 65 to 80 in the background, 257 to 267 for traps.
+        kind: How it takes stops.
+        runner: What lets it go on: a ``ProgramRunner``, which makes tasks and is not known here.
+        operations: Those of the function that runs.
+        pc: Which of them is next.
+        frame: The function that runs.
+        now_ns: Until when it has come.
+        waiting: What it waits for, or the statement that takes time.
+        halted: Whether Halt has stopped it.
+        ended: Whether it is over.
+        failure: Its last error.
+        loop_passes: Passes of loops since it gave others a turn.
+    """
+
+    def __init__(
+        self,
+        number: int,
+        kind: TaskKind,
+        runner: Any,  # noqa: ANN401 - see above
+        session: Session,
+        now_ns: int,
+    ) -> None:
+        super().__init__(replace(session, memory=WindowMemory()))
+        self.blends = True
+        self.task_number = number
+        self.kind = kind
+        self.runner = runner
+        self.operations: list[Operation] = []
+        self.pc = 0
+        self.now_ns = now_ns
+        self.started_ns = now_ns
+        self.frames: list[CallFrame] = []
+        self.waiting: TaskWaiting | None = None
+        self.halted = False
+        self.ended = False
+        self.failure: TaskFailure | None = None
+        self.loop_passes = 0
+
+    @property
+    def frame(self) -> CallFrame:
+        """The function that runs."""
+        return self.frames[-1]
+
+    @property
+    def present_ns(self) -> int:
+        """The instant of what is being carried out, inside ``!...!`` too."""
+        return max(self.now_ns, self.session.machine.arm.now_ns)
+
+    @property
+    def state(self) -> TaskState:
+        """What TaskState tells of it."""
+        if self.ended:
+            return TaskState.NONE
+        if self.halted:
+            return TaskState.HALTED
+        return TaskState.RUNNING if self.waiting is None else TaskState.WAITING
+
+    @property
+    def name(self) -> str:
+        """The function that it was started with."""
+        return self.frames[0].function.spelled if self.frames else ""
+
+    def enter(self, function: CompiledFunction, given: list[Variable], slot: int) -> None:
+        """Go on in a function.
+
+        Raises:
+            Refusal: Functions call each other too deeply.
+        """
+        if len(self.frames) >= DEEPEST_CALL:
+            raise SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, "Functions call too deeply")
+        first, rest = function.variables[:1], function.variables[1 + len(given) :]
+        variables = [Variable(slot_.kind, slot_.bounds) for slot_ in (*first, *rest)]
+        variables[1:1] = given
+        if self.frames:
+            self.frames[-1].pc = self.pc
+        frame = CallFrame(function, variables, slot, results=[None] * function.result_slots)
+        self.frames.append(frame)
+        self._take_up(frame)
+
+    def leave(self) -> None:
+        """Return from the function; the task ends with its first one."""
+        frame = self.frames.pop()
+        if not self.frames:
+            self.frames.append(frame)
+            self.ended = True
+            return
+        caller = self.frames[-1]
+        caller.results[frame.slot] = frame.variables[0].values[0]
+        self._take_up(caller)
+
+    def turn(self) -> TaskWaiting:
+        """Return a wait that is over at once, after the other tasks have had their turn."""
+        return Blocking(lambda: True, lambda: None)
+
+    def write_to(self, channel: int, text: str, *, ends: bool) -> None:
+        """Print to a port.
+
+        Raises:
+            Refusal: It is not open, or not this task's.
+        """
+        self.runner.ports.write(channel, text, self, ends=ends)
+
+    def unwind(self, depth: int, pc: int) -> None:
+        """Go on at an operation of a function that is under way, leaving those it called."""
+        del self.frames[depth + 1 :]
+        self.frames[depth].pc = pc
+        self._take_up(self.frames[depth])
+
+    def _take_up(self, frame: CallFrame) -> None:
+        self.operations = frame.function.operations
+        self.pc = frame.pc
+        self.variables = frame.variables
+        self.results = frame.results
+        self.scope = frame.function.scope
+
+    def count_pass(self) -> None:
+        """Note a pass of a loop.
+
+        Raises:
+            Refusal: Too many without a turn for others (documented: 2556).
+        """
+        self.loop_passes += 1
+        if self.loop_passes > self.session.options.loop_passes:
+            self.loop_passes = 0
+            raise SpelRefusal(RefusalKind.EXCESSIVE_LOOP, "Excessive loop detected")
+
+    def fail(self, number: int, text: str) -> bool:
+        """Take an error: go to where it is dealt with; tell whether there is such a place."""
+        frame = self.frame
+        place = frame.function.places[self.pc - 1]
+        self.frame.pc = self.pc
+        self.failure = TaskFailure(
+            number, text, self.task_number, frame.function.spelled, place.file, place.line
+        )
+        self.session.memory.last_error = number
+        for depth in range(len(self.frames) - 1, -1, -1):
+            candidate = self.frames[depth]
+            if candidate.handler is not None and candidate.failed_pc is None:
+                candidate.failed_pc = candidate.pc - 1
+                self.unwind(depth, candidate.handler.pc)
+                return True
+        return False

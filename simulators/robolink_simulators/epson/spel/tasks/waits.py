@@ -1,0 +1,111 @@
+"""What a task waits for: a statement that takes time, a signal, a lock, a port."""
+
+from collections.abc import Callable
+from typing import Final, Protocol
+
+from robolink_simulators.epson.spel.statement_execution import StatementExecution
+from robolink_simulators.epson.spel.statements.waiting import NEVER_NS
+
+POLL_NS: Final = 10_000_000
+"""How often what happens outside the controller is looked at, in ns.
+
+A condition that holds for less than 0.01 s may be missed (docs/reference/spel.md 16).
+"""
+
+
+class TaskWaiting(Protocol):
+    """Something that a task waits for."""
+
+    def due_ns(self, seen_ns: int) -> int:
+        """Return when it has to be looked at again; nothing came before ``seen_ns``."""
+        ...
+
+    def look(self, now_ns: int) -> bool:
+        """Look at it; tell whether it is over.
+
+        Raises:
+            Refusal: It ended with an error.
+        """
+        ...
+
+    def suspend(self, now_ns: int) -> None:
+        """Hold it while the task is paused."""
+        ...
+
+    def go_on(self, now_ns: int) -> None:
+        """Let it go on."""
+        ...
+
+
+class StatementWaiting:
+    """A statement of the machine that takes time."""
+
+    def __init__(self, execution: StatementExecution) -> None:
+        self.execution = execution
+
+    def due_ns(self, seen_ns: int) -> int:
+        """Return when something of it happens next."""
+        return self.execution.due_ns(seen_ns)
+
+    def look(self, now_ns: int) -> bool:
+        """Carry out what is due."""
+        self.execution.advance(now_ns)
+        return self.execution.done
+
+    def suspend(self, now_ns: int) -> None:
+        """Stop its motion."""
+        self.execution.suspend(now_ns)
+
+    def go_on(self, now_ns: int) -> None:
+        """Go on with its motion, or begin its time anew."""
+        self.execution.go_on(now_ns)
+
+
+class Blocking:
+    """Waits until something is ready, or its time is up.
+
+    Args:
+        ready: Tells whether it is; asked again whenever another task has done something.
+        take: Called once when it is.
+        end_ns: When its time is up, ``None`` for never.
+        out_of_time: Called once when it is.
+        polled: Whether it can become ready without a task doing anything.
+    """
+
+    def __init__(
+        self,
+        ready: Callable[[], bool],
+        take: Callable[[], None],
+        *,
+        end_ns: int | None = None,
+        out_of_time: Callable[[], None] | None = None,
+        polled: bool = False,
+    ) -> None:
+        self._ready = ready
+        self._take = take
+        self._end_ns = NEVER_NS if end_ns is None else end_ns
+        self._out_of_time = out_of_time
+        self._polled = polled
+
+    def due_ns(self, seen_ns: int) -> int:
+        """Return when it is ready or its time is up, as far as is known."""
+        if self._ready():
+            return seen_ns
+        return min(self._end_ns, seen_ns + POLL_NS) if self._polled else self._end_ns
+
+    def look(self, now_ns: int) -> bool:
+        """Take what is ready, or note that its time is up."""
+        if self._ready():
+            self._take()
+            return True
+        if now_ns < self._end_ns:
+            return False
+        if self._out_of_time is not None:
+            self._out_of_time()
+        return True
+
+    def suspend(self, now_ns: int) -> None:
+        """Wait on: signals and locks of other tasks do not stop for a pause (assumed)."""
+
+    def go_on(self, now_ns: int) -> None:
+        """Wait on."""

@@ -1,0 +1,82 @@
+"""sim --faults: what is planned happens to any client, and each time it is told."""
+
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+from robolink_cli import main
+
+LOST = """
+schema = "robolink/faults/1"
+link = "{link}"
+[[fault]]
+action = "{action}"
+match = "{match}"
+"""
+
+
+@pytest.fixture
+def plan(tmp_path):
+    def write(link, action, match=""):
+        path = tmp_path / "plan.toml"
+        path.write_text(LOST.format(link=link, action=action, match=match), encoding="utf-8")
+        return str(path)
+
+    return write
+
+
+@pytest.mark.parametrize("as_json", [True, False])
+def test_a_lost_answer_is_told_by_the_simulator_and_ends_the_client_in_doubt(
+    state_folder, capsys, plan, as_json
+):
+    path = plan("epson+tcp", "drop_reply", "TLSet 2, XY")
+    arguments = ["sim", "epson", "--tcp", "127.0.0.1:0", "--faults", path]
+    paths = os.pathsep.join(path for path in sys.path if path)
+    with subprocess.Popen(
+        [sys.executable, "-m", "robolink_cli", *(["--json"] if as_json else []), *arguments],
+        env={**os.environ, "PYTHONPATH": paths},
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as served:
+        assert served.stdout is not None
+        try:
+            said = [served.stdout.readline() for _ in range(1 if as_json else 5)]
+            url = json.loads(said[0])["url"] if as_json else said[1].split()[-1]
+            tool = ["tool", "set", "2", "--x", "10", "--y", "0", "--z", "-50"]
+            assert main.run(["-c", url, "--timeout", "1", *tool]) == 6
+            told = served.stdout.readline()
+        finally:
+            served.terminate()
+        assert served.wait(timeout=20) == 0
+    capsys.readouterr()
+    if not as_json:
+        assert told.startswith('FAULT drop_reply: $Execute,"TLSet 2, XY(')
+        return
+    document = json.loads(told)
+    assert document["schema"] == "robolink/fault/1"
+    assert document["fault"] == {"action": "drop_reply", "match": "TLSet 2, XY"}
+    assert document["request"].startswith('$Execute,"TLSet 2, XY(10')
+    assert document["simulated_s"] > 0
+
+
+@pytest.mark.parametrize(
+    ("command", "link", "action", "told"),
+    [
+        (["epson"], "softmotion+can", "echo", "echo cannot happen on epson+tcp"),
+        (["softmotion"], "softmotion+can", "echo", "echo cannot happen on softmotion+modbus-tcp"),
+        (["softmotion"], "epson+tcp", "lose_login", "lose_login cannot happen on softmotion"),
+        (
+            ["epson"],
+            "epson+tcp",
+            "drop_replay",
+            "line 5, fault 1, action: is not known",
+        ),
+    ],
+)
+def test_what_cannot_happen_is_refused_before_anything_is_served(
+    state_folder, capsys, plan, command, link, action, told
+):
+    assert main.run(["sim", *command, "--faults", plan(link, action)]) == 2
+    assert told in capsys.readouterr().err

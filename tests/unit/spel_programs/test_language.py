@@ -1,0 +1,255 @@
+"""Whole programs: functions, types, blocks. Pages are those of the language reference."""
+
+import pytest
+
+LOOP = "Function main\n{}\nFend\n"
+
+
+def test_a_loop_leaves_its_variable_past_the_limit(printed):
+    """Check 29: p. 345."""
+    assert printed("Integer i", "For i = 0 To 3", "Next", "Print i") == ["4"]
+
+
+@pytest.mark.parametrize(("test", "passes"), [("top", "0"), ("bottom", "1")])
+def test_whether_a_loop_past_its_end_makes_a_pass_is_an_option(printed, test, passes):
+    """Part 4.3, open."""
+    lines = ("Integer i, n", "For i = 5 To 3", "n = n + 1", "Next i", "Print n")
+    assert printed(*lines, for_test=test) == [passes]
+
+
+def test_a_loop_counts_down_and_by_fractions(printed):
+    """P. 344, 557."""
+    lines = ("Real r", "Integer n", "For r = 1 To 0 Step -0.25", "n = n + 1", "Next r")
+    assert printed(*lines, "Print n, r") == ["5 -0.25"]
+
+
+@pytest.mark.parametrize(
+    "loop",
+    [
+        ("Do", "x = x + 1", "Loop Until x = 3"),
+        ("Do While x < 3", "x = x + 1", "Loop"),
+        ("Do Until (x = 3)", "x = x + 1", "Loop"),
+        ("Do", "x = x + 1", "If x = 3 Then Exit Do", "Loop"),
+        ("Do", "x = x + 1", "Loop While x < 3"),
+    ],
+)
+def test_every_kind_of_do_makes_three_passes(printed, loop):
+    """Check 30: p. 289."""
+    assert printed("Integer x", *loop, "Print x") == ["3"]
+
+
+@pytest.mark.parametrize(("value", "shown"), [("3", ["three", "After"]), ("4", ["other", "After"])])
+def test_select_runs_one_case_and_does_not_fall_through(printed, value, shown):
+    """Check 31: p. 714."""
+    lines = (f"Select {value}", "Case 3", 'Print "three"', "Case 3", 'Print "again"')
+    end = ("Default", 'Print "other"', "Send", 'Print "After"')
+    assert printed(*lines, *end) == shown
+
+
+def test_select_takes_texts_conditions_and_comparisons(printed):
+    """P. 794, 853; ``Case < 1`` is in a public program."""
+    lines = ("String s$", 's$ = "b"', "Select s$", 'Case "a"', "Print 1", 'Case "b"', "Print 2")
+    more = ("Send", "Select True", 'Case s$ = "b"', "Print 3", "Send")
+    less = ("Select 0", "Case < 1", "Print 4", "Send")
+    assert printed(*lines, *more, *less) == ["2", "3", "4"]
+
+
+def test_branches_stand_in_blocks_and_on_lines(printed):
+    """P. 419; ambiguity 5: Else on a line belongs to the nearest If."""
+    lines = (
+        "Integer a",
+        "If a = 1 Then",
+        "Print 1",
+        "ElseIf a = 0 Then",
+        "Print 2",
+        "Else",
+        "Print 3",
+        "EndIf",
+        "If a = 0 Then If a = 1 Then Print 4 Else Print 5; Print 6",
+        "If a = 9 Then Print 7; Print 8",
+        "If a = 0 Then ' a comment is no statement",
+        "Print 9",
+        "EndIf",
+    )
+    assert printed(*lines) == ["2", "5", "6", "9"]
+
+
+def test_by_reference_needs_the_word_on_both_sides(cell):
+    """Check 37: p. 184, 347."""
+    shown = cell(
+        "Function main\nInteger x\nx = 4\nf(ByRef x)\nPrint x\nf x\nPrint x\nFend\n"
+        "Function f(ByRef v As Integer)\nv = v + 1\nFend\n"
+    ).run()
+    assert shown == ["5", "5"]
+
+
+def test_arrays_and_their_elements_are_given_by_reference(cell):
+    shown = cell(
+        "Function main\nInteger a(2), i\ni = 1\nfill(ByRef a())\none(ByRef a(i))\n"
+        "Print a(0), a(1), a(2)\nFend\n"
+        "Function fill(ByRef b() As Integer)\nInteger k\nFor k = 0 To UBound(b)\nb(k) = k * 10\n"
+        "Next\nFend\nFunction one(ByRef v As Integer)\nv = v + 1\nFend\n"
+    ).run()
+    assert shown == ["0 11 20"]
+
+
+def test_a_function_is_called_in_every_way_that_programs_write(cell):
+    """P. 184; bare names and own results that are read stand in public programs."""
+    shown = cell(
+        "Function main\nCall say(1)\nsay(2)\nsay 3\nPrint twice(twice(3)) + seven\n"
+        "If twice(2) = 4 Then Print fact(5)\nFend\n"
+        "Function say(n As Integer)\nPrint n\nFend\n"
+        "Function twice(n As Integer) As Integer\ntwice = n\ntwice = twice + n\nFend\n"
+        "Function seven As Integer\nseven = 7\nFend\n"
+        "Function fact(n As Long) As Long\nIf n < 2 Then\nfact = 1\nElse\nfact = n * fact(n - 1)\n"
+        "EndIf\nFend\n"
+    ).run()
+    assert shown == ["1", "2", "3", "19", "120"]
+
+
+def test_a_condition_calls_its_function_at_each_pass(cell):
+    shown = cell(
+        "Integer n\nFunction main\nDo While more()\nPrint n\nLoop\nFend\n"
+        "Function more() As Boolean\nWait 0.1\nn = n + 1\nmore = n < 3\nFend\n"
+    ).run()
+    assert shown == ["1", "2"]
+
+
+@pytest.mark.parametrize(
+    ("kind", "given", "held"),
+    [
+        ("UByte", "&H0581 / &H0100", "5"),
+        ("UShort", "7 / 2", "3"),
+        ("Byte", "-128", "-128"),
+        ("UInt32", "&HFFFFFFFF", "4294967295"),
+        ("UInt64", "&HFFFFFFFFFFFFFFFF", "18446744073709551615"),
+        ("Int32", "((&HFFFFFFFE Xor &HFFFFFFFF) + 1) * -1", "-2"),
+        ("Real", "1 / 3", "0.3333333"),
+        ("Double", "1 / 3", "0.33333333333333"),
+        ("Boolean", "5", "-1"),
+        ("Integer", "-1.9", "-1"),
+        ("Long", "2147483647", "2147483647"),
+    ],
+)
+def test_a_variable_holds_what_its_type_can(printed, kind, given, held):
+    """Part 2, 2.1: a fraction is cut, as EPSON's own library needs it."""
+    assert printed(f"{kind} v", f"v = {given}", "Print v") == [held]
+
+
+@pytest.mark.parametrize(
+    ("kind", "given"), [("Byte", 128), ("UByte", -1), ("Integer", 32768), ("UInt32", -1)]
+)
+def test_a_number_that_does_not_fit_is_an_error_or_begins_again(failure, printed, kind, given):
+    """Part 2.1, open."""
+    assert failure(f"{kind} v", f"v = {given}").line == 3
+    wrapped = printed(f"{kind} v", f"v = {given}", "Print v", integer_overflow="wrap")
+    assert wrapped == [
+        {128: "-128", 32768: "-32768", -1: "255"}[given] if kind != "UInt32" else "4294967295"
+    ]
+
+
+def test_scopes_are_local_module_and_global(cell):
+    """P. 167, 351."""
+    made = cell(
+        "Global Integer g\nInteger m\nFunction main\nInteger m\nm = 1\ng = 2\nother\nPrint m, g\n"
+        "more\nFend\nFunction other\nPrint m, g\nm = 7\ng = g + 1\nFend\n",
+        files={"two.prg": "Static Integer m\nFunction more\nPrint m, g\nFend\n"},
+    )
+    assert made.run() == ["0 2", "1 3", "0 3"]
+
+
+@pytest.mark.parametrize(("option", "second"), [("cleared", "1 2"), ("kept", "2 2")])
+def test_globals_keep_or_lose_their_values_at_a_start(cell, option, second):
+    """Check 14 of programs: p. 351; Preserve keeps."""
+    made = cell(
+        "Global Integer g\nGlobal Preserve Integer p\nFunction main\ng = g + 1\np = p + 1\n"
+        "Print g, p\nFend\n",
+        globals_at_start=option,
+    )
+    assert made.run() == ["1 1"]
+    assert made.run() == [second]
+
+
+def test_arrays_grow_and_say_how_far_they_go(printed, failure):
+    """P. 683, 860."""
+    lines = ("Integer a(1), b(1, 2)", "a(1) = 5", "Redim Preserve a(3)", "b(1, 2) = 4")
+    shown = printed(*lines, "Print a(1), a(3), UBound(a), UBound(b, 2), b(1, 2)")
+    assert shown == ["5 0 3 2 4"]
+    assert failure("Integer a(1)", "a(2) = 1").number == 2231
+
+
+def test_subroutines_return_to_where_they_were_called(printed, failure):
+    """P. 357."""
+    assert printed("GoSub s", "Print 2", "GoTo e", "s:", "Print 1", "Return", "e:") == ["1", "2"]
+    assert failure("Return").number == 2383
+
+
+def test_directives_choose_and_replace(cell):
+    """P. 58 to 63; a macro with a semicolon stands in EPSON's library (check 19 of programs)."""
+    made = cell(
+        '#include "d.inc"\n#ifdef LOUD\n#define WORD "loud"\n#else\n#define WORD "quiet"\n#endif\n'
+        "Function main\nInteger f\nPrint WORD ' WORD\nIf 0 Then SET(f, 3)\nPrint f\n"
+        'SET(f, LAST)\nPrint f, "LAST"\nFend\n',
+        files={"d.inc": "#define SET(v, n) v = n; Print v\n#define LAST 9\n#undef LOUD\n"},
+    )
+    assert made.run() == ["quiet", "0", "9", "9LAST"]
+
+
+def test_files_come_in_several_code_pages(cell):
+    text = '\' \u4f4d\u7f6e\nFunction other\nPrint "\u3042"\nFend\n'
+    made = cell("Function main\nother\nFend\n", files={"o.prg": text.encode("cp932")})
+    assert made.run() == ["\u3042"]
+
+
+def test_forms_of_public_programs_are_taken(printed):
+    """Part 2 of the page of programs: semicolons at line ends, P00, ``''`` comments."""
+    lines = (
+        "Integer n, d(8)",
+        "n = 0;",
+        "d(7) = &H03;",
+        "P00 = XY(1, 2, 3, 4)  '' old",
+        "n = d(7) /2",
+    )
+    assert printed(*lines, "Print n, CX(P0)") == ["1 1"]
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        (LOOP.format("Print (1"), "main.prg:2:9: the line ends too early"),
+        (LOOP.format("If 1 The"), "main.prg:2:6: this cannot stand here: The"),
+        (LOOP.format("x = 1"), "main.prg:2: nothing is called x"),
+        (LOOP.format("Foo 1"), "there is no statement and no function foo"),
+        (LOOP.format("GoTo away"), "error 3108"),
+        (LOOP.format("For i = 1 To 2\nNext"), "main.prg:2: nothing is called i"),
+        (LOOP.format("Do"), "main.prg:2: this is never closed (expected Loop)"),
+        (LOOP.format("Do\nEndIf"), "nothing that this belongs to is open (expected Loop)"),
+        (LOOP.format("Where"), "where is for the command window only"),
+        (LOOP.format("Integer a\nInteger A"), "a is declared twice"),
+        (LOOP.format("Exit For"), "there is no such loop around it"),
+        ("Function main\nPrint 1\n", "this is never closed (expected Fend)"),
+        ("Print 1\n", "this cannot stand outside of functions"),
+        ('#include "none.inc"\n', "There is no file none.inc"),
+        (LOOP.format("Print f(1)") + "Function f\nFend\n", "f takes 0 arguments"),
+        (LOOP.format("Print 1") + "Function MAIN\nFend\n", "there is another function MAIN"),
+        (LOOP.format("'" + "x" * 600), "longer than 512"),
+    ],
+)
+def test_what_is_wrong_is_told_with_its_place(faults, text, told):
+    found = faults(text, files={"robot1.pts": ""}, points=["robot1.pts"])
+    assert any(told in fault for fault in found), found
+    assert len(found) <= 2
+
+
+def test_every_fault_of_a_project_is_told_at_once(faults):
+    found = faults(LOOP.format("Print )\nPrint (\nGoTo nowhere"))
+    assert [fault.split(":")[1] for fault in found] == ["2", "3", "4"]
+
+
+def test_undeclared_names_become_variables_where_an_option_says_so(printed):
+    """P. 304, 569: samples use them."""
+    assert printed("a = 1.5", "Print a * 2", undeclared="double") == ["3"]
+
+
+def test_an_unknown_statement_is_refused_and_never_passed_over(failure):
+    assert failure("Print 1", "VRun seq", "Print 2").number == 2199

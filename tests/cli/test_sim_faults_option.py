@@ -4,9 +4,13 @@ import json
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from robolink_cli import main
+from robolink_cli.commands.simulate.planned_faults import plan_faults
+from robolink_simulators.epson import EpsonSimulator
+from robolink_simulators.faults import LinkKind
 
 LOST = """
 schema = "robolink/faults/1"
@@ -27,23 +31,21 @@ def plan(tmp_path):
     return write
 
 
-@pytest.mark.parametrize("as_json", [True, False])
 def test_a_lost_answer_is_told_by_the_simulator_and_ends_the_client_in_doubt(
-    state_folder, capsys, plan, as_json
+    state_folder, capsys, plan
 ):
     path = plan("epson+tcp", "drop_reply", "TLSet 2, XY")
     arguments = ["sim", "epson", "--tcp", "127.0.0.1:0", "--faults", path]
     paths = os.pathsep.join(path for path in sys.path if path)
     with subprocess.Popen(
-        [sys.executable, "-m", "robolink_cli", *(["--json"] if as_json else []), *arguments],
+        [sys.executable, "-m", "robolink_cli", "--json", *arguments],
         env={**os.environ, "PYTHONPATH": paths},
         stdout=subprocess.PIPE,
         text=True,
     ) as served:
         assert served.stdout is not None
         try:
-            said = [served.stdout.readline() for _ in range(1 if as_json else 5)]
-            url = json.loads(said[0])["url"] if as_json else said[1].split()[-1]
+            url = json.loads(served.stdout.readline())["url"]
             tool = ["tool", "set", "2", "--x", "10", "--y", "0", "--z", "-50"]
             assert main.run(["-c", url, "--timeout", "1", *tool]) == 6
             told = served.stdout.readline()
@@ -51,14 +53,18 @@ def test_a_lost_answer_is_told_by_the_simulator_and_ends_the_client_in_doubt(
             served.terminate()
         assert served.wait(timeout=20) == 0
     capsys.readouterr()
-    if not as_json:
-        assert told.startswith('FAULT drop_reply: $Execute,"TLSet 2, XY(')
-        return
     document = json.loads(told)
     assert document["schema"] == "robolink/fault/1"
     assert document["fault"] == {"action": "drop_reply", "match": "TLSet 2, XY"}
     assert document["request"].startswith('$Execute,"TLSet 2, XY(10')
     assert document["simulated_s"] > 0
+
+
+def test_a_person_is_told_in_words(capsys, plan):
+    simulator = EpsonSimulator()
+    plan_faults(simulator, Path(plan("epson+tcp", "drop_reply")), {LinkKind.EPSON_TCP})
+    simulator.connect(0).receive(b"$Login,secret\r\n", 0)
+    assert capsys.readouterr().out == "FAULT drop_reply: $Login,***\n"
 
 
 @pytest.mark.parametrize(

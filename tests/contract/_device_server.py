@@ -10,6 +10,13 @@ import serial
 from serial.rfc2217 import PortManager
 
 
+class _Port(serial.Serial):  # type: ignore[misc]
+    """A port without modem lines, as a pseudo terminal is; asking it for one is an error."""
+
+    cts = dsr = ri = cd = property(lambda _: False)
+    dtr = rts = property(lambda _: True, lambda _, __: None)
+
+
 class _Client:
     """What pyserial's port manager writes to."""
 
@@ -30,7 +37,7 @@ def device_server(port_path: str, *, rfc2217: bool) -> Iterator[int]:
     """
     with (
         socket.create_server(("127.0.0.1", 0)) as listener,
-        serial.Serial(port_path, timeout=0) as port,
+        _Port(port_path, timeout=0) as port,
     ):
         over, end = socket.socketpair()
         arguments = (listener, port, over, rfc2217)

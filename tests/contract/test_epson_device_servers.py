@@ -12,7 +12,7 @@ from tests.contract._device_server import device_server
 
 
 # pyserial 3.5 starts its reader of RFC 2217 in an old way.
-@pytest.mark.filterwarnings("ignore:setDaemon")
+@pytest.mark.filterwarnings("ignore:set(Daemon|Name):DeprecationWarning")
 @pytest.mark.parametrize("kind", ["socket", "rfc2217"])
 def test_a_tool_is_written_and_read_back_through_a_device_server(kind):
     simulator = EpsonSimulator(seed=3)

@@ -34,7 +34,7 @@ from tests.faults._bending_relay import BendingRelay
 OLD, NEW = ToolOffset(12.5, -3.25, -20.0), ToolOffset(12.75, -3.0, -20.5)
 WRITE = "TLSet 1, XY"
 SLOT = 15
-TIMEOUT_S = 0.3
+TIMEOUT_S = 0.6
 _names = count()
 
 

@@ -151,8 +151,11 @@ def _opened(
 ) -> "SerialTransport":
     import serial
 
-    # A device server keeps its port to one client itself, as far as it does.
-    alone = {} if "://" in device else {"exclusive": True}
+    more: dict[str, object] = {}
+    if not device.startswith("rfc2217:"):
+        more["write_timeout"] = timeout_s  # pyserial has none there
+    if "://" not in device:
+        more["exclusive"] = True  # a device server keeps its port to one client itself
     try:
         port = serial.serial_for_url(
             device,
@@ -160,8 +163,7 @@ def _opened(
             parity=settings.parity,
             stopbits=settings.stop_bits,
             timeout=_SLICE_S,
-            write_timeout=timeout_s,
-            **alone,
+            **more,
         )
     except ValueError as error:
         raise ConfigError(

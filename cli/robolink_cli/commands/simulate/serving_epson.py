@@ -19,6 +19,7 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import Secret
 from robolink_cli.commands.simulate.serving import Termination, announce, named_values
+from robolink_cli.console.render import note
 
 
 def serve_epson(
@@ -49,6 +50,18 @@ def serve_epson(
         assist = stack.enter_context(serve_assist(simulator, clock=clock))
         _announce(url, assist.url, simulator.machine.model.name, simulator.seed)
         stopped.wait()
+
+
+def load_programs(
+    simulator: EpsonSimulator, programs: Sequence[Path], points: Sequence[Path]
+) -> None:
+    """Load a project; what its tasks print is shown beside the announcement.
+
+    Raises:
+        ConfigError: It cannot be built, or a file cannot be read.
+    """
+    runner = simulator.load(programs, points)
+    runner.on_print = lambda text: note(text.rstrip("\r\n"))
 
 
 def password_in(variable: str | None) -> Secret | None:

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import click
 
+from robolink.messages import tr
 from robolink_cli.commands.simulate.sim_plc import sim_plc
 from robolink_cli.commands.simulate.sim_softmotion import softmotion
 from robolink_cli.options.simulation import simulation_options
@@ -72,6 +73,21 @@ sim.add_command(softmotion)
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
     help="Serve a dialogue that --record has written, in place of a simulator.",
 )
+@click.option(
+    "--program",
+    "programs",
+    multiple=True,
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="SPEL+ program (.prg) that Start runs: main, or mainN. May be repeated.",
+)
+@click.option(
+    "--points",
+    multiple=True,
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Point file (.pts) of the programs. May be repeated.",
+)
 @simulation_options
 @json_option
 def epson(
@@ -89,6 +105,8 @@ def epson(
     faults: Path | None,
     profile: Path | None,
     replay: Path | None,
+    programs: tuple[Path, ...],
+    points: tuple[Path, ...],
     allow_remote: bool,
 ) -> None:
     """Serve a simulated EPSON controller with Remote Ethernet, or RS232, until Ctrl-C.
@@ -112,6 +130,7 @@ def epson(
     from robolink_cli.commands.simulate.serving import world_from
     from robolink_cli.commands.simulate.serving_epson import (
         habits,
+        load_programs,
         password_in,
         serial_of,
         serve_epson,
@@ -127,6 +146,10 @@ def epson(
         world=world_from(world),
     )
     plan_faults(simulator, faults, {LinkKind.EPSON_SERIAL if serial else LinkKind.EPSON_TCP})
+    if programs:
+        load_programs(simulator, programs, points)
+    elif points:
+        raise click.UsageError(tr("--points goes with --program."))
     place = None if serial else listen
     serve_epson(simulator, place, speed=speed, allow_remote=allow_remote, baud=baud)
 

@@ -33,6 +33,12 @@ test: check ## Install everything, check the sources and run the tests.
 soak: $(VENV)/.installed-dev docs ## Run the tests that make test leaves out for their length; build the pages.
 	$(BIN)/python -m pytest -n 2 -m soak
 
+# ROWS="F01 F25" takes some of them.
+ROWS :=
+.PHONY: faults
+faults: $(VENV)/.installed-dev ## Run the fault catalogue, F01 to F80, and print what it shows.
+	@$(BIN)/python -m tests.faults.catalogue $(ROWS)
+
 # Their files are called judge_*.py: a plain pytest, which takes test_*.py, leaves them out.
 .PHONY: peers
 peers: $(VENV)/.installed-dev ## Let mbpoll, libmodbus and tshark judge the field buses.

@@ -208,9 +208,11 @@ class NotReadyReason(StrEnum):
     HIGH_POWER = "high_power"
     WRONG_TOOL = "wrong_tool"
     NO_REMOTE_TIMEOUT = "no_remote_timeout"
+    NO_ABORT = "no_abort"
     EDGE_PASSED = "edge_passed"
     DRY_RUN = "dry_run"
     VIRTUAL_IO = "virtual_io"
+    OTHER_ROBOT = "other_robot"
 
 
 class NotReadyError(ControllerError):

@@ -17,12 +17,13 @@ sessions of a process share it: a program may hold an EPSON robot and a PLC at a
 
 import signal
 import threading
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from enum import StrEnum
 from types import FrameType, TracebackType
 from typing import Final
+
+from robolink import ambient
 
 
 class EndedBy(StrEnum):
@@ -129,7 +130,7 @@ class _Handler:
         a closed output, must not break the cleaning up after the first.
         """
         if self._commands:
-            now_s = time.monotonic()
+            now_s = ambient.monotonic_ns() / 1e9
             if self.ended_by is not None and now_s - self._ended_s < _PATIENCE_S:
                 return
             self.ended_by, self._ended_s = self.ended_by or by, now_s

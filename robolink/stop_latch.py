@@ -15,6 +15,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from enum import Enum, auto
 
+from robolink import ambient
 from robolink.errors import ControllerError, StoppedError, UnclearAnswerError
 from robolink.messages import tr
 
@@ -48,7 +49,7 @@ class StopLatch:
     def __init__(self, controller: str) -> None:
         self._controller = controller
         self._closed = False
-        self._stops = threading.Condition()
+        self._stops = ambient.waiting_room()
         self._under_way = 0
         self._permits = threading.local()
         self._put_back: set[int] = set()

@@ -4,9 +4,13 @@ Whoever waits does so on an injected :class:`Clock`, in integer nanoseconds of a
 monotonic time. Wall time appears in records only, as a label.
 """
 
-import time
 from functools import lru_cache
-from typing import NamedTuple, Protocol, Self
+from typing import TYPE_CHECKING, NamedTuple, Protocol, Self
+
+from robolink import ambient
+
+if TYPE_CHECKING:
+    from datetime import datetime
 
 NS_PER_S = 1_000_000_000
 
@@ -29,12 +33,12 @@ class SystemClock:
 
     def now_ns(self) -> int:
         """Return the machine's monotonic time in nanoseconds."""
-        return time.monotonic_ns()
+        return ambient.monotonic_ns()
 
     def sleep(self, seconds: float) -> None:
         """Block the calling thread."""
         if seconds > 0:
-            time.sleep(seconds)
+            ambient.sleep(seconds)
 
 
 class Deadline(NamedTuple):
@@ -60,7 +64,7 @@ class Deadline(NamedTuple):
 
 def wall_label() -> str:
     """Return the wall-clock time, ISO 8601 UTC, as a label for people."""
-    return _label(int(time.time()))
+    return _label(int(ambient.wall_s()))
 
 
 @lru_cache(maxsize=1)
@@ -68,3 +72,10 @@ def _label(second: int) -> str:
     from datetime import UTC, datetime  # here, because most users of clocks need no calendar
 
     return datetime.fromtimestamp(second, UTC).isoformat(timespec="seconds")
+
+
+def wall_time() -> "datetime":
+    """Return the wall-clock time in UTC, which may jump: for labels and due days only."""
+    from datetime import UTC, datetime  # as above
+
+    return datetime.fromtimestamp(ambient.wall_s(), UTC)

@@ -52,6 +52,10 @@ def pytest_collection_modifyitems(config, items):
     # Two processes share the tests by their names, so a name may hold no address in memory.
     if changing := [item.nodeid for item in items if " at 0x" in item.nodeid]:
         raise pytest.UsageError(f"give this test ids that are alike in each run: {changing[0]}")
+    for item in items:
+        # The process that prints the table of faults sees reports, not items.
+        rows = {row for mark in item.iter_markers("fault") for row in mark.args}
+        item.user_properties += [("fault", row) for row in sorted(rows)]
     if "soak" in config.option.markexpr:
         return
     left_out = [item for item in items if item.get_closest_marker("soak")]

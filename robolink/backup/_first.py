@@ -40,9 +40,10 @@ def keep_first_backup(
     """
     if not controller.outcomes.durable:
         return None
-    identity, *former = controller.outcomes.names
-    path = first_backup_path(identity)
-    if any(first_backup_path(name).exists() for name in (identity, *former)):
+    outcomes = controller.outcomes
+    names = (outcomes.robot,) if outcomes.robot else outcomes.names
+    path = first_backup_path(names[0])
+    if any(first_backup_path(name).exists() for name in names):
         return None
     backup = take_backup(controller)
     # Before it is there: a backup that is not on record is a sign that the record was lost.

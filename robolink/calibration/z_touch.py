@@ -76,6 +76,7 @@ def solve_z_touch(
     flange: Pose | None = None,
     latency_s: float | None = None,
     deceleration_mm_s2: float = USUAL_DECELERATION_MM_S2,
+    deceleration_told: bool = False,
     sigma_mm: float | None = None,
     tolerance: Tolerance = PROBE_TOLERANCE,
 ) -> ZTouchResult:
@@ -91,6 +92,8 @@ def solve_z_touch(
         latency_s: Of the trigger, when an earlier measurement found it.
         deceleration_mm_s2: How the robot brakes. What that shifts Z by, where the speeds cannot
             show it, is a row of the budget.
+        deceleration_told: Whether the controller tells so: then the way of braking is taken out
+            of each reading, and the row stays as wide as that.
         sigma_mm: Standard deviation of one reading, when it is known.
         tolerance: Residuals above which the result carries a warning.
 
@@ -106,7 +109,9 @@ def solve_z_touch(
         _require_two_speeds(touches)
     plane = _plane(flange, stored)
     speeds = [touch.speed_mm_s for touch in touches]
-    found = fit_touches([touch.z_mm for touch in touches], speeds, latency_s)
+    ahead_s2_per_mm = 1 / (2 * deceleration_mm_s2) if deceleration_told else 0.0
+    heights = [touch.z_mm + ahead_s2_per_mm * touch.speed_mm_s**2 for touch in touches]
+    found = fit_touches(heights, speeds, latency_s)
     require_plausible(found, sigma_mm)
     result = _result(found, len(touches), _length(plane, surface_z_mm, found.flange_z_mm, stored))
     result = judged(

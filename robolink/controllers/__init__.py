@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from robolink.controllers.motion_group import MotionGroupCore as MotionGroupCore
     from robolink.controllers.polled_motion import PolledGroup as PolledGroup
     from robolink.controllers.preserving import Preserver as Preserver
+    from robolink.controllers.reaching import connect_when_reachable as connect_when_reachable
     from robolink.controllers.registry import CONTROLLERS_GROUP as CONTROLLERS_GROUP
     from robolink.controllers.registry import ConnectionTerms as ConnectionTerms
     from robolink.controllers.registry import ControllerOpener as ControllerOpener
@@ -33,6 +34,7 @@ else:
             "motion_group": "MotionGroupCore",
             "polled_motion": "PolledGroup",
             "preserving": "Preserver",
+            "reaching": "connect_when_reachable",
             "registry": "CONTROLLERS_GROUP ConnectionTerms ControllerOpener connect",
             "resolving": "MarkerResolver",
             "stopping": "stop_now stop_requests",

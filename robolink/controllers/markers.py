@@ -15,6 +15,7 @@ from robolink.errors import (
     JournalError,
     OutcomeUnknownError,
     RemoteProtocolError,
+    RobolinkError,
     StoppedError,
     TransportError,
 )
@@ -229,19 +230,23 @@ class MarkerStore:
         try:
             yield
         except (TransportError, RemoteProtocolError) as error:
-            doubt = OutcomeUnknownError(
-                tr(
-                    "No clear answer came to {request!r}: it may or may not have run ({cause})",
-                    request=request,
-                    cause=error.what,
-                ),
-                remedy=tr(
-                    "It was not sent again. Look at the robot, connect again and run "
-                    "'robolink recover'; motion is blocked until then."
-                ),
-                controller=self._identity,
+            raise self.unproved(request, error) from error
+
+    def unproved(self, request: str, error: RobolinkError) -> OutcomeUnknownError:
+        """Return the error for a request after which ``error`` tells nothing of what it did."""
+        doubt = OutcomeUnknownError(
+            tr(
+                "No clear answer came to {request!r}: it may or may not have run ({cause})",
                 request=request,
-                raw=error.raw,
-            )
-            note_standing(doubt, self.ledger.standing())
-            raise doubt from error
+                cause=error.what,
+            ),
+            remedy=tr(
+                "It was not sent again. Look at the robot, connect again and run "
+                "'robolink recover'; motion is blocked until then."
+            ),
+            controller=self._identity,
+            request=request,
+            raw=error.raw,
+        )
+        note_standing(doubt, self.ledger.standing())
+        return doubt

@@ -14,6 +14,7 @@ from robolink.model import (
     MotionProfile,
     MotionTerms,
     MotionUntilInput,
+    Path,
     Pose,
     WorkBox,
 )
@@ -58,6 +59,14 @@ class MotionGroupCore(ABC):
             tr("{group} of {identity}", group=self.name, identity=self._driver.identity),
             tr("Nothing stops it when this computer falls silent."),
         )
+
+    def obstacle(self, target: Pose, path: Path) -> str:
+        """Return why the arm could not go there so; nothing where this kind cannot tell."""
+        return ""
+
+    def deceleration_mm_s2(self) -> float | None:
+        """Return how it brakes in straight movements; nothing where this kind does not tell."""
+        return None
 
     def require_able(self, purpose: str) -> None:
         """Refuse what no movement could begin in now; see the model."""

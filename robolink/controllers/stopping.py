@@ -9,6 +9,7 @@ only.
 from contextlib import suppress
 from typing import TYPE_CHECKING, Final, NamedTuple
 
+from robolink import ambient
 from robolink.errors import (
     ConnectError,
     RejectedError,
@@ -112,15 +113,12 @@ class _Means(NamedTuple):
 
 
 def _stop_epson(link: LinkUrl, means: _Means) -> "ControllerStatus":
+    from robolink.controllers.epson.link.line import open_line
     from robolink.controllers.epson.link.stopping import StopLine
-    from robolink.transport import open_transport
 
-    transport = open_transport(link, timeout_s=means.timeout_s, clock=means.clock)
-    if means.trace is not None:
-        from robolink.transport import TracingTransport
-
-        transport = TracingTransport(transport, means.trace)
-    line = StopLine(transport, timeout_s=means.timeout_s)
+    traces = () if means.trace is None else (means.trace,)
+    opened = open_line(link, timeout_s=means.timeout_s, clock=means.clock, traces=traces)
+    line = StopLine(opened, timeout_s=means.timeout_s)
     try:
         line.login(means.password)
         flags, code = line.stop()
@@ -135,8 +133,6 @@ def _stop_epson(link: LinkUrl, means: _Means) -> "ControllerStatus":
 
 
 def _stop_group(link: LinkUrl, means: _Means) -> "ControllerStatus":
-    import os
-
     from robolink.controllers.softmotion.link.commands import CommandSender
     from robolink.controllers.softmotion.link.snapshots import Snapshots
     from robolink.controllers.softmotion.link.stopping import bring_group_to_rest
@@ -144,7 +140,7 @@ def _stop_group(link: LinkUrl, means: _Means) -> "ControllerStatus":
     from robolink.transport import open_quick_link
 
     mailbox = open_quick_link(link, timeout_s=means.timeout_s, clock=means.clock)
-    owner = int.from_bytes(os.urandom(4)) or 1  # a token that nobody else has
+    owner = ambient.random_number(32)  # a token that nobody else has
     wire = MailboxWire(mailbox, owner=owner, timeout_s=means.timeout_s)
     try:
         snapshots = Snapshots(wire)

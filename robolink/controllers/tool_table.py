@@ -107,6 +107,10 @@ class ToolTableCore(ABC):
     def _require_clearable(self, tool: int) -> None:
         """Refuse a clear that the state would not allow."""
 
+    def _is_in_force(self, tool: int) -> bool:
+        """Whether the tool that reads as selected is what the machine works with."""
+        return True
+
     def _require_selectable(self, request: str) -> None:
         """Refuse a selection that the state would not allow; before anything is read for it."""
 
@@ -195,7 +199,7 @@ class ToolTableCore(ABC):
     def preview_select(self, tool: int) -> tuple[str, ...]:
         """Return what :meth:`select` would send besides its reads."""
         self._require_defined(tool)
-        if self.selected() == tool:
+        if self.selected() == tool and self._is_in_force(tool):
             return ()
         return (self._as_sent(self._select_request(tool)),)
 
@@ -213,7 +217,7 @@ class ToolTableCore(ABC):
             self._require_selectable(request)
             before = self._selected()
             self._driver.markers.ledger.saw_selected(before)
-            if before == tool:
+            if before == tool and self._is_in_force(tool):
                 return
             if before is None:  # what was in force could not be put back, nor the new one proved
                 raise RejectedError(

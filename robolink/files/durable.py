@@ -5,6 +5,8 @@ import re
 from collections.abc import Iterable
 from pathlib import Path
 
+from robolink import ambient
+
 
 def state_folder(kind: str) -> Path:
     """Return the folder for one kind of record.
@@ -55,9 +57,7 @@ def write_whole(
         FileExistsError: It is there already and may not go.
         OSError: It cannot be written.
     """
-    from uuid import uuid4
-
-    draft = path.with_name(f".{uuid4().hex}.new")
+    draft = path.with_name(f".{ambient.random_bytes(16).hex()}.new")
     try:
         descriptor = os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode)
         with open(descriptor, "wb") as file:

@@ -74,6 +74,11 @@ class GlancingLog:
         return self._log().names
 
     @property
+    def robot(self) -> str:
+        """See the model."""
+        return self._log().robot
+
+    @property
     def remarks(self) -> tuple[str, ...]:
         """Nothing, unless the journal was opened."""
         return () if self._opened is None else self._opened.remarks

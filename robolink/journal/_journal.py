@@ -170,14 +170,17 @@ class Journal:
         """Return the names under which a controller is on record, its identity first.
 
         Args:
-            controller: Its identity, an address at which it was met, or a name of before.
+            controller: Its identity, an address at which it was met, or a name of before. Of a
+                controller with several robots that is all of them; the name of a robot is that
+                robot alone.
 
         Raises:
             JournalError: It cannot be read.
         """
         with self._store.read() as tables:
             identity = tables.names.meant(controller)
-            return (identity, *tables.names.former(identity))
+            former, robots = tables.names.former(identity), tables.names.robots(identity)
+            return (identity, *former, *robots)
 
     def addresses_of(self, controller: str) -> tuple[str, ...]:
         """Return the URLs, without options, at which a controller was met, the latest first.

@@ -62,6 +62,11 @@ class LookingLog:
         return (self._address,) if self._reader is None else self._reader.names
 
     @property
+    def robot(self) -> str:
+        """Of several robots the one whose record this is, as far as the journal can be read."""
+        return "" if self._reader is None else self._reader.robot
+
+    @property
     def remarks(self) -> tuple[str, ...]:
         """None: what a person should know once is kept for when it can be recorded."""
         return ()

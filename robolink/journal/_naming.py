@@ -25,15 +25,24 @@ class Names:
     Attributes:
         identity: What goes on record from now on.
         former: Under which earlier entries, and possibly markers, stand.
+        robot: Of several robots the one in force: entries go on record under its name.
+        robots: Under which entries of all its robots stand.
     """
 
     identity: str
     former: tuple[str, ...] = ()
+    robot: str = ""
+    robots: tuple[str, ...] = ()
 
     @property
     def all(self) -> tuple[str, ...]:
         """Every one, the identity first."""
-        return (self.identity, *self.former)
+        return (self.identity, *self.former, *self.robots)
+
+    @property
+    def record(self) -> str:
+        """Under which name entries go on record."""
+        return self.robot or self.identity
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,12 +54,16 @@ class _Meeting:
         before: Who was met at this address last, empty for nobody.
         elsewhere: Where else this controller was met.
         unclaimed: Names of before under which something stands that is nobody's yet.
+        new_robots: Robots that the journal did not know to be this controller's.
+        shared: Whether something stands under the controller's name that is no robot's.
     """
 
     names: Names
     before: str = ""
     elsewhere: tuple[str, ...] = ()
     unclaimed: tuple[str, ...] = ()
+    new_robots: tuple[str, ...] = ()
+    shared: bool = False
 
 
 class Naming:
@@ -98,24 +111,26 @@ class Naming:
             rows = tables.names
             if found is None:
                 name = rows.meant(self._text)
-                return _Meeting(Names(name, rows.former(name)))
+                return _Meeting(_listed(rows, name))
             before = rows.at(found.address)
             if found.certain:
                 return _meeting(rows, found, before)
             # Too busy to tell: taken for whom it was last, until it can be asked.
             name = before or found.name
-            return _Meeting(Names(name, rows.former(name)))
+            return _Meeting(_listed(rows, name))
 
     def _recorded(self, found: Identity, meeting: _Meeting, signature: Signature) -> bool:
         """Keep what is new; return whether the journal took it."""
         name = meeting.names.identity
-        if meeting.before == name and not meeting.unclaimed:
+        if meeting.before == name and not (meeting.unclaimed or meeting.new_robots):
             return True
         try:
             with self._store.write() as tables:
                 tables.names.meet(found.address, name, wall_label())
                 for former in meeting.unclaimed:
                     tables.names.carry_over(former, name)
+                for robot in meeting.new_robots:
+                    tables.names.note_robot(robot, name)
                 tables.entries.append(name, signature, "", _entries(found, meeting))
         except JournalError:
             # Looking goes on without; the next intent will say what the journal has to say.
@@ -124,8 +139,15 @@ class Naming:
         return True
 
 
+def _listed(rows: "NameRows", name: str) -> Names:
+    """Return the names of a controller that does not tell which of its robots is in force."""
+    return Names(name, rows.former(name), robots=rows.robots(name))
+
+
 def _meeting(rows: "NameRows", found: Identity, before: str) -> _Meeting:
     name, former = found.name, rows.former(found.name)
+    known = rows.robots(name)
+    new_robots = tuple(robot for robot in found.robots if robot not in known)
     unclaimed = tuple(
         text
         for text in dict.fromkeys((found.address, found.place))
@@ -134,7 +156,15 @@ def _meeting(rows: "NameRows", found: Identity, before: str) -> _Meeting:
         if rows.in_use(text)
     )
     elsewhere = tuple(text for text in rows.addresses_of(name) if text != found.address)
-    return _Meeting(Names(name, (*former, *unclaimed)), before, elsewhere, unclaimed)
+    robots = (*known, *new_robots)
+    return _Meeting(
+        Names(name, (*former, *unclaimed), found.robot, robots),
+        before,
+        elsewhere,
+        unclaimed,
+        new_robots,
+        shared=bool(new_robots) and rows.in_use(name),
+    )
 
 
 def _is_lent(text: str) -> bool:
@@ -148,6 +178,7 @@ def _is_lent(text: str) -> bool:
 
 def _entries(found: Identity, meeting: _Meeting) -> list[NewEntry]:
     said = [_other_than_before(found, meeting), _also_elsewhere(found, meeting)]
+    said.append(_nobodys(found, meeting))
     said += [
         tr("What stands under {name} is on record of {own}.", name=name, own=found.name)
         for name in meeting.unclaimed
@@ -158,6 +189,7 @@ def _entries(found: Identity, meeting: _Meeting) -> list[NewEntry]:
 
 def _remarks(found: Identity, meeting: _Meeting) -> tuple[str, ...]:
     said = [_other_than_before(found, meeting), _also_elsewhere(found, meeting)]
+    said.append(_nobodys(found, meeting))
     if not (found.own or meeting.before):
         said.append(
             tr(
@@ -190,4 +222,16 @@ def _also_elsewhere(found: Identity, meeting: _Meeting) -> str:
         address=found.address,
         name=found.name,
         others=", ".join(meeting.elsewhere),
+    )
+
+
+def _nobodys(found: Identity, meeting: _Meeting) -> str:
+    if not meeting.shared:
+        return ""
+    return tr(
+        "Each of the {count} robots of {name} has its own record from now on. What stands under "
+        "that name does not tell which of them it is about: it stays listed, and nothing is "
+        "compared with it or undone by it. Places of stations are learnt again for each robot.",
+        count=len(found.robots),
+        name=found.name,
     )

@@ -1,10 +1,11 @@
 """The journal as the driver of one controller uses it."""
 
-import threading
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
+from robolink import ambient
 from robolink.errors import JournalError, OutcomeUnknownError
 from robolink.journal._lease import Lease
 from robolink.journal._naming import Names, Naming
@@ -54,7 +55,7 @@ class JournalOutcomeLog:
         self.durable = store.durable
         self._journal = journal
         self._store = store
-        self._lock = threading.RLock()
+        self._lock = ambient.reentrant_lock()
         self._naming = Naming(store, controller)
         self._holder, self._clock = holder or this_process(), clock or BootClock()
         self._lease = Lease(store, controller, self._holder, self._clock)
@@ -85,6 +86,15 @@ class JournalOutcomeLog:
         return self._named().all
 
     @property
+    def robot(self) -> str:
+        """Of a controller with several robots the one whose record this is; empty for one.
+
+        Raises:
+            JournalError, TransportError, RemoteProtocolError: As for :attr:`identity`.
+        """
+        return self._named().robot
+
+    @property
     def remarks(self) -> tuple[str, ...]:
         """What a person should know about who the controller is, once, in sentences."""
         return self._naming.remarks
@@ -103,15 +113,16 @@ class JournalOutcomeLog:
             LeaseLostError: Somebody else was, since :meth:`look` or since the lease was taken.
         """
         with self._lock:
-            name = self._named().identity
+            names = self._named()
+            name = names.identity
             self._require_sound()
             self._lease.prepare()
             with self._store.write(_untouched()) as tables:
                 grip = self._lease.secure(tables.leases, marker.request, self.signature.operator)
-                first = tables.markers.put(name, marker)
+                first = tables.markers.put(name, _of_robot(marker, names.robot))
                 told = _beginning(marker, first=first)
                 entries = (*grip.entries, *told)
-                tables.entries.append(name, self.signature, self.change, entries)
+                tables.entries.append(names.record, self.signature, self.change, entries)
             self._begun.add(marker.operation)
             self._lease.settle(grip)
             if told and self.durable and not self._traced:
@@ -128,15 +139,15 @@ class JournalOutcomeLog:
                 was true here need not be true any more.
         """
         with self._lock:
-            name = self._named().identity
+            names = self._named()
             last = not self._holds and not self._begun - {operation}
             with self._store.write(_left_open()) as tables:
                 if last:
                     self._lease.release(tables.leases)
-                known = tables.markers.remove(name, operation)
+                known = tables.markers.remove(names.identity, operation)
                 if operation in self._begun and not known:
                     raise self._settled_by_another()
-                tables.entries.append(name, self.signature, self.change, entries)
+                tables.entries.append(names.record, self.signature, self.change, entries)
             self._begun.discard(operation)
             if last:
                 self._lease.forget()
@@ -147,7 +158,7 @@ class JournalOutcomeLog:
         Raises:
             JournalError: It is not stored.
         """
-        name = self._named().identity
+        name = self._named().record
         with self._store.write() as tables:
             tables.entries.append(name, self.signature, self.change, entries)
 
@@ -172,7 +183,7 @@ class JournalOutcomeLog:
     def recorded(
         self, *, tool: int | None = None, change: str = "", kinds: Collection[EntryKind] = ()
     ) -> Iterator[Recorded]:
-        """Yield what is on record about this controller, newest first.
+        """Yield what is on record about this controller, or its robot in force, newest first.
 
         Args:
             tool: Only entries about this tool.
@@ -183,7 +194,7 @@ class JournalOutcomeLog:
             JournalError: It cannot be read.
         """
         return self._journal.entries(
-            controller=self.identity, tool=tool, change=change or None, kinds=kinds
+            controller=self._named().record, tool=tool, change=change or None, kinds=kinds
         )
 
     def look(self) -> None:
@@ -223,7 +234,7 @@ class JournalOutcomeLog:
             JournalError: It cannot be stored.
         """
         with self._lock:
-            name = self._named().identity
+            name = self._named().record
             self._require_sound()
             self._lease.prepare()
             with self._store.write(_untouched()) as tables:
@@ -261,7 +272,7 @@ class JournalOutcomeLog:
             LeaseHeldError: Yet another has taken it at once.
         """
         with self._lock:
-            name = self._named().identity
+            name = self._named().record
             with self._store.write(_untouched()) as tables:
                 ended = self._lease.end(tables.leases, reason)
                 entries = () if ended is None else (ended,)
@@ -301,6 +312,11 @@ class JournalOutcomeLog:
                 with suppress(JournalError), self._store.write() as tables:
                     self._lease.release(tables.leases)
                 self._lease.forget()
+
+
+def _of_robot(marker: Marker, robot: str) -> Marker:
+    """Return a marker that says on which of several robots it was begun."""
+    return replace(marker, details={"robot": robot, **marker.details}) if robot else marker
 
 
 def _beginning(marker: Marker, *, first: bool) -> tuple[NewEntry, ...]:

@@ -1,11 +1,11 @@
 """Which process holds a lease, and whether it still lives."""
 
 import os
-import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from robolink import ambient
 from robolink.model import Signature
 
 _DEAD_STATES: Final = ("Z", "X")
@@ -54,13 +54,12 @@ class BootClock:
 
     def now_ns(self) -> int:
         """Return the nanoseconds since the system was started."""
-        boottime = getattr(time, "CLOCK_BOOTTIME", None)
-        return time.monotonic_ns() if boottime is None else time.clock_gettime_ns(boottime)
+        return ambient.boot_ns()
 
     def sleep(self, seconds: float) -> None:
         """Block the calling thread."""
         if seconds > 0:
-            time.sleep(seconds)
+            ambient.sleep(seconds)
 
 
 def this_process(operator: str = "") -> LeaseHolder:

@@ -19,12 +19,18 @@ class Identity:
         place: The name that it has where it says nothing of itself: its resolved address.
         certain: Whether asking once more would tell the same. A controller that is busy may
             be unable to answer just now.
+        robot: Of a controller with several robots, the name of the one in force: tools, taught
+            points and places are each robot's own, and on record as its own. Empty where there
+            is one robot.
+        robots: The names of all of them, in the controller's order.
     """
 
     name: str
     address: str
     place: str
     certain: bool = True
+    robot: str = ""
+    robots: tuple[str, ...] = ()
 
     @property
     def own(self) -> bool:

@@ -23,6 +23,7 @@ from robolink.procedures import MovingSource, approach_path
 from robolink.runner import (
     Ask,
     Confirm,
+    Consider,
     Look,
     Move,
     Notify,
@@ -165,6 +166,10 @@ def _follow(
             if isinstance(step, (Notify, Confirm)):
                 # What it would say depends on poses that nobody took.
                 step = procedure.send(None)
+                continue
+            if isinstance(step, Consider):
+                # Where the poses will really be is not known yet, so neither what is in the way.
+                step = procedure.send(("",) * len(step.moves))
                 continue
             answer = here
             if isinstance(step, Ask):

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import asdict, fields
-from datetime import datetime
 
 from robolink.calibration import CalibrationResult, VerifyResult
 from robolink.errors import CalibrationError, RobolinkError
@@ -13,6 +12,7 @@ from robolink.nozzle_change._proposal import Proposal
 from robolink.procedures import jog_mm
 from robolink.runner import SeenAt, TouchedAt
 from robolink.stations import Gauge
+from robolink.timing import wall_time
 
 
 def calibration_entry(
@@ -40,7 +40,7 @@ def calibration_entry(
         "tip": plain_offset(proposal.tip),
         "notes": list(proposal.notes),
         # Entries are labelled in UTC; whoever stood there knows it by the clock on the wall.
-        "local_time": datetime.now().astimezone().isoformat(timespec="seconds"),
+        "local_time": wall_time().astimezone().isoformat(timespec="seconds"),
         **({} if facts is None else {"facts": asdict(facts)}),
         "gauges": [] if gauge is None else [asdict(gauge)],
         **_result(result),

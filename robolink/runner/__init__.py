@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from robolink.runner._settings import RunSettings as RunSettings
     from robolink.runner._steps import Ask as Ask
     from robolink.runner._steps import Confirm as Confirm
+    from robolink.runner._steps import Consider as Consider
     from robolink.runner._steps import Look as Look
     from robolink.runner._steps import Move as Move
     from robolink.runner._steps import Notify as Notify
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from robolink.runner._steps import Seek as Seek
     from robolink.runner._steps import SeenAt as SeenAt
     from robolink.runner._steps import Step as Step
+    from robolink.runner._steps import TakenStep as TakenStep
     from robolink.runner._steps import TeachPrompt as TeachPrompt
     from robolink.runner._steps import TouchedAt as TouchedAt
     from robolink.runner._yes_no import ask_yes_no as ask_yes_no
@@ -46,7 +48,8 @@ __getattr__ = lazy_exports(
         "_place_question": "MOST_REFUSED inputs_of",
         "_runner": "POLL_S Runner StepDone ask_for_pose",
         "_settings": "RunSettings",
-        "_steps": "Ask Confirm Look Move Notify Procedure Seek SeenAt Step TeachPrompt TouchedAt",
+        "_steps": "Ask Confirm Consider Look Move Notify Procedure Seek SeenAt Step TakenStep "
+        "TeachPrompt TouchedAt",
         "_yes_no": "ask_yes_no yes_or_no",
     },
 )

@@ -12,6 +12,7 @@ from robolink.errors import (
     ControllerFaultError,
     DeclinedError,
     HeartbeatLostError,
+    LimitError,
     NotReadyError,
     NotReadyReason,
     StoppedError,
@@ -35,13 +36,14 @@ from robolink.runner._settings import RunSettings
 from robolink.runner._steps import (
     Ask,
     Confirm,
+    Consider,
     Look,
     Move,
     Notify,
     Procedure,
     Seek,
     SeenAt,
-    Step,
+    TakenStep,
 )
 from robolink.runner._yes_no import ask_yes_no
 from robolink.sensing import seen_once
@@ -70,7 +72,7 @@ class StepDone:
             asked.
     """
 
-    step: Step
+    step: TakenStep
     pose: Pose | None = None
     accepted: bool | None = None
 
@@ -125,6 +127,9 @@ class Runner:
             while True:
                 checkpoint(Checkpoint.STEP, type(step).__name__)
                 self._require_going()
+                if isinstance(step, Consider):
+                    step = procedure.send(tuple(map(self._obstacle, step.moves)))
+                    continue
                 try:
                     done = self._take(step)
                 except CalibrationError as error:
@@ -178,7 +183,7 @@ class Runner:
             self._operator.tell(way_in_words(before, after))
         return after
 
-    def _take(self, step: Step) -> StepDone:
+    def _take(self, step: TakenStep) -> StepDone:
         if isinstance(step, Notify):
             self._operator.tell(step.text)
             return StepDone(step)
@@ -195,6 +200,13 @@ class Runner:
         if isinstance(step, Seek):
             return self._seek(step)
         return self.move(step.target, step.path)
+
+    def _obstacle(self, move: Move) -> str:
+        try:
+            self._settings.box.check(move.target)
+        except LimitError as error:
+            return error.what
+        return self._group.obstacle(move.target, move.path)
 
     def _look(self, step: Look) -> SeenAt:
         camera = self._camera

@@ -158,6 +158,20 @@ class TouchedAt(Pose):
 
 
 @dataclass(frozen=True, slots=True)
+class Consider:
+    """Find out which movements could not be made; answered with one text for each of them.
+
+    Nothing moves. The text says why not; it is empty where nothing is known against it, and in a
+    look ahead, where the places are only foreseen.
+
+    Attributes:
+        moves: The movements, each for itself; their order does not count.
+    """
+
+    moves: tuple[Move, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Notify:
     """Let a person know how it goes; answered with ``None``."""
 
@@ -174,7 +188,10 @@ class Confirm:
     question: str
 
 
-Step = Move | Ask | Seek | Look | Notify | Confirm
+TakenStep = Move | Ask | Seek | Look | Notify | Confirm
+"""What happens in the cell, or to a person; it is told of and foreseen."""
+
+Step = TakenStep | Consider
 
 T = TypeVar("T")
 

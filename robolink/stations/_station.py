@@ -2,11 +2,12 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from datetime import UTC, date, datetime, timedelta
+from datetime import date, datetime, timedelta
 from enum import StrEnum
 from typing import Final
 
 from robolink.messages import tr
+from robolink.timing import wall_time
 
 AGREEING_MM: Final = 2.0
 """So far may the cell file be from what was learnt: a search finds the station still."""
@@ -125,7 +126,7 @@ class Station:
         """
         if not self.gauge_due:
             return False
-        today = (now or datetime.now(UTC)).date()
+        today = (now or wall_time()).date()
         return date.fromisoformat(self.gauge_due) < today
 
     def gauge_on_record(self) -> Gauge | None:
@@ -160,7 +161,7 @@ class Station:
 
     def _check(self, now: datetime | None) -> str:
         due = self.check_due
-        if due is not None and (now or datetime.now(UTC)) >= due:
+        if due is not None and (now or wall_time()) >= due:
             return tr(
                 "The check of station {id} has been due since {due}: learn it again.",
                 id=self.id,

@@ -21,6 +21,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Final, Protocol
 
+from robolink import ambient
 from robolink.closing import ClosedAtExit
 from robolink.errors import RobolinkError
 from robolink.files.durable import make_folder, state_folder
@@ -78,7 +79,7 @@ class StopListener(ClosedAtExit):
     ) -> None:
         self._controller = controller
         self._heard = heard
-        self._token = os.urandom(16).hex()
+        self._token = ambient.random_bytes(16).hex()
         folder = state_folder(KIND)
         make_folder(folder)
         file = f"{os.getpid()}-{self._token[:8]}"

@@ -4,7 +4,15 @@ import math
 from dataclasses import dataclass
 
 from robolink.messages import tr
-from robolink.model import Controller, EntryKind, Recorded, ToolOffset, describe_offset, read_offset
+from robolink.model import (
+    PROOFS,
+    Controller,
+    EntryKind,
+    Recorded,
+    ToolOffset,
+    describe_offset,
+    read_offset,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,10 +55,6 @@ class ChangedSince:
             "restored project."
         )
         return " ".join(part for part in (changed, by, causes) if part)
-
-
-PROOFS = (EntryKind.READ_BACK, EntryKind.DONE, EntryKind.NOT_APPLIED, EntryKind.ROLLED_BACK)
-"""Entries whose value was read from the controller."""
 
 
 def last_proof(controller: Controller, tool: int) -> Recorded | None:

@@ -1,6 +1,6 @@
 """Settles open markers of every kind: those of the driver, and those of whole changes."""
 
-from robolink.errors import ConfigError, OutcomeUnknownError
+from robolink.errors import ConfigError, NotReadyError, NotReadyReason, OutcomeUnknownError
 from robolink.messages import tr
 from robolink.model import (
     Controller,
@@ -36,9 +36,11 @@ class Settler:
 
         Raises:
             ConfigError: The marker was written by something else.
+            NotReadyError: It is about a robot that is not in force.
         """
         if marker.kind is MarkerKind.HISTORY:
             return self._without_record(marker)
+        self._require_robot(marker)
         if marker.kind is not MarkerKind.CHANGE:
             return self._controller.resolver.examine(marker)
         tools = self._controller.tools
@@ -97,6 +99,22 @@ class Settler:
                 details={"request": marker.request, **marker.details},
             ),
         )
+
+    def _require_robot(self, marker: Marker) -> None:
+        """Refuse to judge by one robot's tools what was begun on another robot."""
+        begun_on, in_force = marker.details.get("robot"), self._controller.outcomes.robot
+        if begun_on and begun_on != in_force:
+            raise NotReadyError(
+                tr(
+                    "{request!r} was begun on {robot}; {other} is in force now.",
+                    request=marker.request,
+                    robot=begun_on,
+                    other=in_force or self._controller.outcomes.identity,
+                ),
+                reason=NotReadyReason.OTHER_ROBOT,
+                remedy=tr("Choose that robot on the controller, then run 'robolink recover'."),
+                controller=self._controller.identity,
+            )
 
     def _put_back(self, marker: Marker) -> None:
         self._controller.begin(

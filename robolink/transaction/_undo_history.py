@@ -2,8 +2,7 @@
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink.model import EntryKind, OutcomeLog, Recorded, ToolOffset, read_offset
-from robolink.transaction._history import PROOFS
+from robolink.model import PROOFS, EntryKind, OutcomeLog, Recorded, ToolOffset, read_offset
 from robolink.ways import Way, way
 
 _ENDS = (EntryKind.DONE, EntryKind.ROLLED_BACK)

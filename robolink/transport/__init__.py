@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from robolink.transport._registry import open_transport as open_transport
     from robolink.transport._url import LinkUrl as LinkUrl
     from robolink.transport._url import parse_url as parse_url
+    from robolink.transport._url_options import UrlOptions as UrlOptions
     from robolink.transport.stream.contract import Transport as Transport
     from robolink.transport.stream.dialogue import Dialogue as Dialogue
     from robolink.transport.stream.dialogue import DialogueLog as DialogueLog
@@ -43,5 +44,6 @@ else:
             ),
             "stream.trace": "SECRET_PLACEHOLDER Direction TraceSink TracingTransport",
             "_url": "LinkUrl parse_url",
+            "_url_options": "UrlOptions",
         },
     )

@@ -22,7 +22,10 @@ if TYPE_CHECKING:
 
 TRANSPORTS_GROUP = "robolink.transports"
 
-_MEDIA = {"tcp": ("robolink.transport.stream.tcp", "open_tcp")}
+_MEDIA = {
+    "tcp": ("robolink.transport.stream.tcp", "open_tcp"),
+    "serial": ("robolink.transport.stream.serial_port", "open_serial_line"),
+}
 _MAILBOX_MEDIA = {
     "modbus-tcp": ("robolink.transport.modbus.mailbox", "open_modbus_link"),
     "modbus-rtu": ("robolink.transport.modbus.mailbox", "open_modbus_link"),

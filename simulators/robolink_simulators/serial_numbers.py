@@ -5,8 +5,9 @@ one on its port.
 """
 
 import random
-import secrets
 from typing import Final
+
+from robolink import ambient
 
 _HIGHEST: Final = 0xFFFF_FFFF
 
@@ -19,7 +20,7 @@ def drawn_number(origin: str = "") -> int:
     """
     if origin:
         return random.Random(f"serial {origin}").randint(1, _HIGHEST)
-    return 1 + secrets.randbelow(_HIGHEST)
+    return ambient.random_number(32)
 
 
 def drawn_serial(origin: str = "") -> str:

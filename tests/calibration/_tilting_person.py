@@ -9,7 +9,7 @@ import numpy as np
 from robolink.calibration import rotation_of
 from robolink.model import Hand, Pose, ToolOffset
 from robolink.procedures import TouchPlan
-from robolink.runner import Ask, Confirm, Move, Notify, TeachPrompt
+from robolink.runner import Ask, Confirm, Consider, Move, Notify, TeachPrompt
 
 STORED = ToolOffset(12.0, -3.5, -20.0)
 TIP = ToolOffset(12.4, -3.2, -20.5)
@@ -38,11 +38,22 @@ def turned_deg(one, other):
 class Person:
     """Touches the pin with an error, and keeps where the flange went."""
 
-    def __init__(self, start=UPRIGHT, *, sigma_mm=0.01, slips=(), accepts=0, seed=1, stiff=False):
+    def __init__(
+        self,
+        start=UPRIGHT,
+        *,
+        sigma_mm=0.01,
+        slips=(),
+        accepts=0,
+        seed=1,
+        stiff=False,
+        reaches=None,
+    ):
         self._random = random.Random(seed)
         self._here = start
         self._sigma_mm, self._slips, self._accepts = sigma_mm, set(slips), accepts
         self._stiff = stiff
+        self.reaches = reaches
         self.steps, self.touches, self.offers, self.told = [], [], [], []
 
     def run(self, procedure, tip=TIP):
@@ -53,6 +64,9 @@ class Person:
                 answer = self._answer(procedure.send(answer), tip)
         except StopIteration as finished:
             return finished.value
+
+    def _obstacle(self, target):
+        return "" if self.reaches is None or self.reaches(target) else "out of reach."
 
     def _error(self):
         return [self._random.gauss(0, self._sigma_mm) for _ in "xyz"]
@@ -76,6 +90,8 @@ class Person:
                 before, self._here = self._here, replace(step.target, **kept)
                 self.steps.append((step, before, self._here))
                 return self._here
+            case Consider():
+                return tuple(self._obstacle(move.target) for move in step.moves)
             case Notify():
                 self.told.append(step.text)
                 return None

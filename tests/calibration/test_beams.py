@@ -142,11 +142,11 @@ def test_what_cannot_be_used_is_named():
 
 @pytest.mark.parametrize("stated", [None, 0.02 / math.sqrt(2)])
 @pytest.mark.parametrize("angles", [(0.0,), (0.0, 180.0)])
-def test_the_interval_holds_the_truth(angles, stated):
+def test_the_interval_holds_the_truth(angles, stated, trials):
     moved = len(angles) > 1
 
     def measure(rng):
         seen = travels(TIP, angles=angles, repeats=2, rng=rng, sigma_mm=0.02)
         return solve_crossed_beams(seen, TRUE, sigma_mm=stated, beams_may_have_moved=moved)
 
-    assert_honest(coverage(measure, TIP), stated=stated is not None)
+    assert_honest(coverage(measure, TIP, trials), trials, stated=stated is not None)

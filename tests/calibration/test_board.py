@@ -141,7 +141,7 @@ def test_marks_in_the_wrong_order_or_scale_do_not_fit():
         solve_board_fit(fiducials(3), DRAWING)
 
 
-def test_the_intervals_of_two_fiducials_hold_the_truth_with_the_stated_sigma():
+def test_the_intervals_of_two_fiducials_hold_the_truth_with_the_stated_sigma(trials):
     spread = 0.02
 
     def measure(rng):
@@ -150,14 +150,14 @@ def test_the_intervals_of_two_fiducials_hold_the_truth_with_the_stated_sigma():
         return solve_board(first, seen_at((-13.0, 0.5), POSES[1], shake[1]), sigma_mm=spread)
 
     truth = (2.0, 2.5, math.degrees(math.atan2(4, 30)))
-    assert_honest(coverage(measure, truth))
+    assert_honest(coverage(measure, truth, trials), trials)
 
 
 @pytest.mark.parametrize("count", [3, 4])
 @pytest.mark.parametrize("stated", [None, 0.02])
-def test_the_intervals_of_a_fit_hold_the_truth(count, stated):
+def test_the_intervals_of_a_fit_hold_the_truth(count, stated, trials):
     def measure(rng):
         sights = fiducials(count, rng.normal(0, 0.02, (4, 2)))
         return solve_board_fit(sights, DRAWING[:count], sigma_mm=stated)
 
-    assert_honest(coverage(measure, BOARD), stated=stated is not None)
+    assert_honest(coverage(measure, BOARD, trials), trials, stated=stated is not None)

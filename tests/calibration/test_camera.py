@@ -49,7 +49,7 @@ def test_without_a_stated_sigma_there_is_no_interval():
     assert result.dof == 0
 
 
-def test_the_interval_holds_the_truth():
+def test_the_interval_holds_the_truth(trials):
     tip = (10.0, -4.0)
     angle = math.radians(37)
     at = (
@@ -61,7 +61,7 @@ def test_the_interval_holds_the_truth():
         dx, dy = rng.normal(0, 0.03, 2)
         return solve_up_camera(look((300, 80, 37), (at[0] + dx, at[1] + dy)), sigma_mm=0.03)
 
-    assert_honest(coverage(measure, tip))
+    assert_honest(coverage(measure, tip, trials), trials)
 
 
 def test_bad_input_is_named():

@@ -145,16 +145,17 @@ def test_a_bad_camera_is_doubted():
 
 
 @pytest.mark.parametrize("count", [5, 9])
-def test_the_interval_holds_the_truth_with_noise_in_the_pixels(count):
+def test_the_interval_holds_the_truth_with_noise_in_the_pixels(count, trials):
     plan = (PLACES + TURNS)[:3] + TURNS[:2] if count == 5 else PLACES + TURNS
     # A pixel is not quite square here, so the noise in mm is not quite round.
-    assert_honest(coverage(lambda rng: solve_camera_affine(pictures(plan, rng, 0.3)), TIP))
+    shares = coverage(lambda rng: solve_camera_affine(pictures(plan, rng, 0.3)), TIP, trials)
+    assert_honest(shares, trials)
 
 
-def test_the_interval_holds_the_truth_with_the_stated_sigma():
+def test_the_interval_holds_the_truth_with_the_stated_sigma(trials):
     plan, pixel_mm = [*PLACES[:3], TURNS[1]], 0.0121
 
     def measure(rng):
         return solve_camera_affine(pictures(plan, rng, 0.3), sigma_mm=0.3 * pixel_mm)
 
-    assert_honest(coverage(measure, TIP))
+    assert_honest(coverage(measure, TIP, trials), trials)

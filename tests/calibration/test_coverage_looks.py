@@ -13,7 +13,6 @@ HELD = ToolOffset(12.3, -3.9, -20.0, 1.2)
 DRAWING = ((20.0, 12.5), (-20.0, 12.5), (-20.0, -12.5), (20.0, -12.5))
 SIGMA_MM = 0.01
 OFF_MM = (0.3, -0.2)
-TRIALS = 700
 
 
 def seen(mark, u_deg):
@@ -33,18 +32,17 @@ def shaken(sightings, random):
 
 @pytest.mark.parametrize("stated", [False, True])
 @pytest.mark.parametrize("angles_deg", [(0, 60, 120, 180), (0, 90, 180)])
-def test_a_tip(angles_deg, stated):
+def test_a_tip(angles_deg, stated, trials):
     exact, sigma = [seen(TIP, u_deg) for u_deg in angles_deg], SIGMA_MM if stated else None
     assert_honest(
-        coverage(
-            lambda r: solve_camera_round(shaken(exact, r), sigma_mm=sigma), TIP, trials=TRIALS
-        ),
+        coverage(lambda r: solve_camera_round(shaken(exact, r), sigma_mm=sigma), TIP, trials),
+        trials,
         stated=stated,
     )
 
 
 @pytest.mark.parametrize("stated", [False, True])
-def test_a_board_at_two_angles_that_do_not_balance(stated):
+def test_a_board_at_two_angles_that_do_not_balance(stated, trials):
     marks = [
         (HELD.x_mm + dx, HELD.y_mm + dy)
         for dx, dy in (rotate_xy(place[0], place[1], HELD.u_deg) for place in DRAWING)
@@ -55,8 +53,9 @@ def test_a_board_at_two_angles_that_do_not_balance(stated):
         coverage(
             lambda r: solve_board_round(shaken(exact, r), DRAWING * 2, sigma_mm=sigma),
             truth,
-            trials=TRIALS,
+            trials,
         ),
+        trials,
         stated=stated,
     )
 

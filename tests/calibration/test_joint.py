@@ -6,10 +6,8 @@ import pytest
 from robolink.calibration import JointTouch, solve_joint, solve_n_angle, solve_pivot
 from robolink.model import ToolOffset
 from tests.calibration._simulated import (
-    LEAST,
-    MOST,
     PIN,
-    TRIALS,
+    assert_honest,
     pivoting,
     refused,
     shaken,
@@ -103,10 +101,10 @@ def test_what_cannot_be_told_apart_is_refused():
         solve_joint([JointTouch(touching(TIPS[t], 0.0), t) for t in (1, 2)])
 
 
-def test_the_intervals_of_offsets_and_difference_hold_the_truth():
+def test_the_intervals_of_offsets_and_difference_hold_the_truth(trials):
     rng, hits = np.random.default_rng(4), np.zeros(6)
     truth = np.array([*TIPS[1], *TIPS[2], 32.4, -8.3])
-    for _ in range(TRIALS):
+    for _ in range(trials):
         result = solve_joint(planar(rng, 0.05))
         difference = result.difference(1, 2)
         found = [*xy(result.tools[1]), *xy(result.tools[2]), *difference.vector_mm]
@@ -116,4 +114,4 @@ def test_the_intervals_of_offsets_and_difference_hold_the_truth():
             *difference.half_width95_mm,
         ]
         hits += np.abs(np.array(found) - truth) <= np.array(halves)
-    assert all(LEAST <= share <= MOST for share in hits / TRIALS), hits / TRIALS
+    assert_honest(hits / trials, trials)

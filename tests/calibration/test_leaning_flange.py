@@ -36,7 +36,7 @@ from robolink.calibration import (
 )
 from robolink.calibration.z_touch import Touch
 from robolink.model import Pose, ToolOffset
-from tests.calibration._simulated import LEAST, TRIALS, refused
+from tests.calibration._simulated import assert_honest, refused
 
 TIP = ToolOffset(12.0, -5.0, 120.0)
 STORED = ToolOffset(12.3, -5.2, 120.0, 7.0)
@@ -283,13 +283,13 @@ def test_poses_of_a_tool_or_a_local_are_no_flange_poses_in_the_base(code, tool, 
             call()
 
 
-def test_what_the_height_is_unsure_by_is_in_the_interval():
+def test_what_the_height_is_unsure_by_is_in_the_interval(trials):
     # A stored Z that is off by its own sigma, 8 degrees of lean, and noise of the looks.
     rng, hits = np.random.default_rng(7), np.zeros(2)
     lean, sigma = (8.0, 180.0), 0.005
     poses = [flange(u, lean) for u in TURNS]
     exact = [seen(pose) for pose in poses]
-    for _ in range(TRIALS):
+    for _ in range(trials):
         looks = [
             Sighting(s.flange, s.x_mm + dx, s.y_mm + dy)
             for s, (dx, dy) in zip(exact, rng.normal(0, sigma, (4, 2)).tolist(), strict=True)
@@ -298,7 +298,7 @@ def test_what_the_height_is_unsure_by_is_in_the_interval():
         result = solve_camera_round(looks, height=height, sigma_mm=sigma)
         hits += np.abs(np.subtract(xy(result), (12, -5))) <= result.half_width95
     # The widest of what is stated and what is seen is never too narrow, and a little wide.
-    assert all(LEAST <= share <= 0.995 for share in hits / TRIALS), hits / TRIALS
+    assert_honest(hits / trials, trials, most=0.995)
     unaware = solve_camera_round(exact, stored=STORED, sigma_mm=sigma)
     assert max(result.half_width95) > 3 * max(unaware.half_width95)
     assert ("height_not_assessed" in result.notes, "height_not_assessed" in unaware.notes) == (

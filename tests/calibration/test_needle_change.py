@@ -7,7 +7,7 @@ import pytest
 
 from robolink.calibration import NeedleChain, NeedleLimits, solve_needle_change
 from robolink.model import Pose, ToolOffset, rotate_xy
-from tests.calibration._simulated import LEAST, MOST, TRIALS, refused
+from tests.calibration._simulated import assert_honest, refused
 
 FLANGE = Pose(300, 90, -10, 130, tool=0)
 OLD = ToolOffset(12, -3, -20, 30)
@@ -74,11 +74,11 @@ def test_a_shift_that_no_needle_makes_is_refused():
         solve_needle_change(FLANGE, (1, 2), (1, 2, 3), stored=OLD, chain=FRESH, sigma_mm=0.01)
 
 
-def test_the_interval_holds_the_truth_at_every_length_of_the_chain():
+def test_the_interval_holds_the_truth_at_every_length_of_the_chain(trials):
     # The stored offset has the error of its own calibration, and each change adds its own.
     rng = np.random.default_rng(5)
     truth, hits = np.array([12.2, -3.1, -20.0]), np.zeros(3)
-    for _ in range(TRIALS):
+    for _ in range(trials):
         stored = ToolOffset(*(truth + rng.normal(0, FRESH.sigma_mm, 3)).tolist())
         chain = FRESH
         for _ in range(3):
@@ -87,4 +87,4 @@ def test_the_interval_holds_the_truth_at_every_length_of_the_chain():
             stored, chain = result.offset, result.chain
         found = np.array(result.offset.components()[:3])
         hits += np.abs(found - truth) <= np.array(result.half_width95)
-    assert all(LEAST <= share <= MOST for share in hits / TRIALS), hits / TRIALS
+    assert_honest(hits / trials, trials)

@@ -39,7 +39,7 @@ def test_a_four_axis_pose_needs_no_tilt():
     assert solve_one_touch(flange, Pin(*PIN)).offset.z_mm == pytest.approx(TIP[2])
 
 
-def test_the_interval_holds_the_truth_with_the_pin_s_own_error_in_it():
+def test_the_interval_holds_the_truth_with_the_pin_s_own_error_in_it(trials):
     flange = pivoting(TIP, (40, 10, 0))
 
     def measure(rng):
@@ -48,7 +48,7 @@ def test_the_interval_holds_the_truth_with_the_pin_s_own_error_in_it():
         pin = Pin(x, y, z, 0.04)
         return solve_one_touch(touched, pin, sigma_mm=0.03)
 
-    assert_honest(coverage(measure, TIP))
+    assert_honest(coverage(measure, TIP, trials), trials)
 
 
 def test_without_a_stated_sigma_there_is_no_interval():

@@ -8,7 +8,7 @@ import pytest
 
 from robolink.calibration import Sighting, runout_report
 from robolink.model import Pose
-from tests.calibration._simulated import TRIALS, assert_honest, refused
+from tests.calibration._simulated import assert_honest, refused
 
 TIP, CENTRE = 0.25 - 0.1j, 0.05 + 0.02j
 
@@ -69,12 +69,12 @@ def test_a_short_arc_or_few_sightings_are_refused():
 
 @pytest.mark.parametrize("stated", [None, 0.01])
 @pytest.mark.parametrize("count", [4, 9])
-def test_the_interval_of_the_offset_holds_the_truth(count, stated):
+def test_the_interval_of_the_offset_holds_the_truth(count, stated, trials):
     rng, hits = np.random.default_rng(3), np.zeros(2)
-    for _ in range(TRIALS):
+    for _ in range(trials):
         report = runout_report(turning(count, rng=rng, sigma_mm=0.01), sigma_mm=stated)
         hits += np.abs(np.subtract(report.tip_mm, (TIP.real, TIP.imag))) <= report.half_width95_mm
-    assert_honest(hits / TRIALS, stated=stated is not None)
+    assert_honest(hits / trials, trials, stated=stated is not None)
 
 
 @pytest.mark.parametrize(

@@ -89,9 +89,13 @@ def test_a_turn_or_a_short_way_is_refused():
         solve(six(second=(0, 0, 4)))
 
 
-def test_the_intervals_of_all_six_hold_the_truth():
+def test_the_intervals_of_all_six_hold_the_truth(trials):
     exact = six()
-    assert_honest(coverage(lambda rng: solve(shaken(exact, rng, 0.05, axes=3)), (*TIP, *ANGLES)))
+
+    def measure(rng):
+        return solve(shaken(exact, rng, 0.05, axes=3))
+
+    assert_honest(coverage(measure, (*TIP, *ANGLES), trials), trials)
 
 
 def test_a_stated_sigma_takes_the_place_of_the_scatter():

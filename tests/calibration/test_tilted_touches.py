@@ -8,6 +8,7 @@ import pytest
 from robolink.calibration import rotation_of
 from robolink.errors import CalibrationError
 from robolink.methods import OverPin, Tilt, informative_tilts, measure_pivot, verify_by_tilting
+from robolink.methods.pivot.tilts import proving_tilts
 from robolink.model import Path, Pose, ToolOffset
 from robolink.procedures import SamplingPolicy
 from tests.calibration._tilting_person import (
@@ -16,6 +17,7 @@ from tests.calibration._tilting_person import (
     PLAN,
     STORED,
     TIP,
+    UPRIGHT,
     Person,
     tip_mm,
     turned_deg,
@@ -88,6 +90,50 @@ def test_a_robot_that_does_not_take_up_the_tilt_stands_lifted_and_is_refused():
     assert refused.value.code == "not_tilted"
     assert len(person.touches) == 1
     assert tip_mm(person.steps[-1][2])[2] > PIN[2] + PLAN.lift_mm - 1.0
+
+
+def leans_to_one_side(pose):
+    """Tell what an arm takes up that stands against a wall."""
+    return float(rotation_of(pose)[0, 2]) > -0.02
+
+
+def test_tilts_out_of_reach_are_replaced_by_others_before_the_tool_tilts():
+    person = Person(UPRIGHT, reaches=leans_to_one_side)
+    result = course(person)
+    assert all(leans_to_one_side(there) for _, _, there in person.steps)
+    assert "cannot be taken up over this pin: out of reach. Others are taken" in person.told[0]
+    assert len(person.touches) == 6
+    errors = np.subtract(result.offset.components()[:3], TIP.components()[:3])
+    assert (np.abs(errors) <= result.half_width95).all()
+    # Nothing is said, and nothing chosen anew, where all of them are in reach.
+    free = Person(UPRIGHT)
+    course(free)
+    assert not any("cannot be taken up" in text for text in free.told)
+
+
+def test_an_arm_that_takes_up_hardly_any_tilt_is_refused_before_it_tilts():
+    person = Person(UPRIGHT, reaches=lambda pose: turned_deg(pose, UPRIGHT) < 5)
+    with pytest.raises(CalibrationError, match="out of reach") as refused:
+        course(person)
+    assert refused.value.code == "not_tilted"
+    assert len(person.touches) == 1
+    assert all(turned_deg(there, UPRIGHT) < 1e-3 for _, _, there in person.steps)
+
+
+def test_a_proof_tilts_where_the_arm_can_and_else_proves_nothing():
+    start = Pose(300.0, 100.0, -60.0, 87.0, 8.0, -5.0, tool=1)
+    over = OverPin(start, tuple(PIN.tolist()), ToolOffset())
+    for reaches, able in ((lambda pose: abs(rotation_of(pose)[0, 2]) < 0.3, True), (bool, True)):
+        person = Person(start, sigma_mm=0.0, reaches=reaches)
+        proof = verify_by_tilting(PLAN, over=over, tilts=proving_tilts(20.0), tolerance_mm=0.1)
+        assert person.run(proof, ToolOffset()).passed is able
+        assert all(reaches(touch) for touch in person.touches)
+        assert turned_deg(*person.touches[:2]) > 20
+    person = Person(start, reaches=lambda pose: turned_deg(pose, start) < 5)
+    with pytest.raises(CalibrationError) as refused:
+        person.run(verify_by_tilting(PLAN, over=over, tilts=proving_tilts(20.0), tolerance_mm=0.1))
+    assert refused.value.code == "not_tilted"
+    assert person.steps == []
 
 
 def test_the_interval_holds_the_truth_about_as_often_as_it_says():

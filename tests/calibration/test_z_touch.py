@@ -50,12 +50,14 @@ def test_too_little_is_named():
 
 @pytest.mark.parametrize("stated", [None, 0.01])
 @pytest.mark.parametrize("speeds", [SPEEDS, SPEEDS[1:]])
-def test_the_interval_holds_the_truth(speeds, stated):
+def test_the_interval_holds_the_truth(speeds, stated, trials):
     assert_honest(
         coverage(
             lambda rng: solve_z_touch(touches(speeds, rng, 0.01), SURFACE, sigma_mm=stated),
             (LENGTH,),
+            trials,
         ),
+        trials,
         stated=stated is not None,
     )
 
@@ -104,6 +106,19 @@ def test_an_overshoot_is_seen_with_a_latency_that_is_known_too():
     result = solve_z_touch(touches(THREE, overshoot=0.001), SURFACE, latency_s=LATENCY)
     assert result.overshoot_s2_per_mm == pytest.approx(0.001)
     assert result.offset.z_mm == pytest.approx(LENGTH)
+
+
+def test_braking_that_the_controller_tells_is_taken_out_with_two_speeds_too():
+    seen = touches((2.0, 1.0, 2.0, 1.0), overshoot=1 / (2 * 200))
+    assumed = solve_z_touch(seen, SURFACE)
+    assert assumed.offset.z_mm - LENGTH == pytest.approx(-0.005)  # overshoot v1 v2
+    told = solve_z_touch(seen, SURFACE, deceleration_mm_s2=200, deceleration_told=True)
+    assert told.offset.z_mm == pytest.approx(LENGTH)
+    assert told.latency_s == pytest.approx(LATENCY)
+    # As wide as what was taken out: that the robot does brake so is the controller's word.
+    assert told.budget is not None
+    (row,) = [row for row in told.budget.rows if row.name == "braking"]
+    assert row.u_mm == pytest.approx(0.005 / 3**0.5)
 
 
 @pytest.mark.parametrize("overshoot", [0.01, -0.001])

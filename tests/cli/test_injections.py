@@ -83,7 +83,8 @@ SPEL = ('x";Motor On;"', "x;Go P1", "x)+Reset", "x,1", "x\r\n$Stop", "x'", "a b"
 
 
 @pytest.mark.parametrize("text", SPEL)
-def test_a_name_or_value_says_nothing_else_to_a_controller(run, simulator, text):
+@pytest.mark.fault("F72")
+def test_f72_a_name_or_value_says_nothing_else_to_a_controller(run, simulator, text):
     simulator.variables.declare("g_text$", VariableType.STRING, value="old")
     before = len(simulator.log)
     for words in (

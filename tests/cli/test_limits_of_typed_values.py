@@ -69,6 +69,7 @@ def person(monkeypatch, request):
     return person
 
 
+@pytest.mark.fault("F39")
 def test_an_operator_may_not_write_a_sign_error_and_is_told_the_figure(cell, tools):
     for more in ((), ("--yes",), ("--accept-jump", "30")):
         code, _, err = cell("anna", *SIGN_ERROR, *more)
@@ -78,6 +79,7 @@ def test_an_operator_may_not_write_a_sign_error_and_is_told_the_figure(cell, too
     assert tools.get(1) == STORED
 
 
+@pytest.mark.fault("F39")
 def test_off_a_terminal_an_engineer_says_beforehand_how_far(cell, tools):
     for more in ((), ("--yes",), ("--accept-jump", "23.9")):
         code, _, err = cell("eva", *SIGN_ERROR, *more)

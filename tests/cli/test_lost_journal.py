@@ -109,6 +109,7 @@ def _sql(path, *statements):
 
 
 @pytest.mark.parametrize("how", BENT)
+@pytest.mark.fault("F62")
 def test_what_was_bent_is_noticed_before_a_write_and_keeps_nobody_from_looking(
     run, changed, simulator, how
 ):
@@ -123,6 +124,7 @@ def test_what_was_bent_is_noticed_before_a_write_and_keeps_nobody_from_looking(
     assert run("journal", "verify")[0] == 1
 
 
+@pytest.mark.fault("F62")
 def test_a_bent_page_of_the_markers_is_noticed(run, changed, simulator):
     simulator.machine.tools.select(1)
     connection = sqlite3.connect(changed)

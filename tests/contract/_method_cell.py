@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import pytest
 from robolink_cli import main
 from robolink_simulators.cell.clock import ManualClock
 
@@ -18,6 +19,12 @@ from robolink.model import Recorded, ToolOffset
 from tests.contract._sensor_cell import SensorCell, plc_sensor_cell, sensor_cell
 
 KINDS = ("epson", "plc")
+
+
+def on(kind: str) -> list[Any]:
+    """Return both kinds, of which the other one is left to ``make soak``."""
+    return [one if one == kind else pytest.param(one, marks=pytest.mark.soak) for one in KINDS]
+
 
 CELL = """
 [cells.a]
@@ -129,20 +136,22 @@ class MethodCell:
 
 
 @contextmanager
-def epson_cell(kind: str) -> Iterator[SensorCell]:
+def epson_cell(kind: str, seed: int = 3) -> Iterator[SensorCell]:
     """Set a cell up around the usual EPSON robot, or around another one by its name."""
     robot: dict[str, Any] = {} if kind == "epson" else {"robot": kind}
-    with sensor_cell(**robot) as cell:
+    with sensor_cell(seed, **robot) as cell:
         cell.simulator.machine.motors_on = True
         yield cell
 
 
 @contextmanager
-def method_cell(kind: str, folder: Path, monkeypatch: Any) -> Iterator[MethodCell]:
+def method_cell(
+    kind: str, folder: Path, monkeypatch: Any, *, seed: int = 3
+) -> Iterator[MethodCell]:
     """Set a cell up with its cell file; ``kind`` is one of :data:`KINDS` or an EPSON robot."""
     for name in [name for name in os.environ if name.startswith("ROBOLINK")]:
         monkeypatch.delenv(name)
-    with plc_sensor_cell() if kind == "plc" else epson_cell(kind) as cell:
+    with plc_sensor_cell(seed) if kind == "plc" else epson_cell(kind, seed) as cell:
         path = folder / "robolink.toml"
         path.write_text(CELL.format(url=cell.url, beams=cell.place_mm, plate=cell.plate))
         monkeypatch.setenv("ROBOLINK_CONFIG", str(path))

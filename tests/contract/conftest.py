@@ -11,6 +11,7 @@ from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.options import EpsonOptions
 from robolink_simulators.hosting.in_process.epson import register, unregister
+from robolink_simulators.hosting.streams.epson_serial import serve_serial
 from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 
 import robolink
@@ -35,7 +36,10 @@ class Cell:
 @contextmanager
 def served(backend: str, simulator: EpsonSimulator) -> Iterator[Cell]:
     """Offer ``simulator`` on ``backend``."""
-    if backend == "sim":
+    if backend == "pty":
+        with serve_serial(simulator, clock=ScaledClock(SPEED)) as line:
+            yield Cell(line.url, simulator)
+    elif backend == "sim":
         name = f"contract-{next(_names)}"
         register(name, simulator)
         try:
@@ -47,12 +51,29 @@ def served(backend: str, simulator: EpsonSimulator) -> Iterator[Cell]:
             yield Cell(host.url, simulator)
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config, items):
+    """Leave out what a serial line has no frame for, and the greater part of the rest to soak."""
+    impossible = []
+    for item in items:
+        given = getattr(item, "callspec", None)
+        if given is None or "pty" not in (given.params.get("cell"), given.params.get("serve")):
+            continue
+        if item.get_closest_marker("remote_ethernet"):
+            impossible.append(item)
+        elif not item.get_closest_marker("on_serial"):
+            item.add_marker(pytest.mark.soak)
+    if impossible:
+        config.hook.pytest_deselected(items=impossible)
+        items[:] = [item for item in items if item not in impossible]
+
+
 @pytest.fixture(autouse=True)
 def _own_state_folder(tmp_path, monkeypatch):
     monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
 
 
-@pytest.fixture(params=["sim", "tcp", "hardware"])
+@pytest.fixture(params=["sim", "tcp", "pty", "hardware"])
 def cell(request) -> Iterator[Cell]:
     """A controller with the default habits: simulated, served, or real."""
     if request.param == "hardware":
@@ -70,7 +91,7 @@ def cell(request) -> Iterator[Cell]:
         yield cell
 
 
-@pytest.fixture(params=["sim", "tcp"])
+@pytest.fixture(params=["sim", "tcp", "pty"])
 def serve(request):
     """A maker of cells around a simulator of the test's own."""
     return lambda simulator: served(request.param, simulator)

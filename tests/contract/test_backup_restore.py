@@ -46,6 +46,7 @@ def disorder(simulator):
     tools.select(1)
 
 
+@pytest.mark.remote_ethernet
 def test_a_backup_holds_every_tool_and_which_controller_it_was(serve, simulator):
     with serve(simulator) as cell, cell.connect() as controller:
         backup = take_backup(controller)

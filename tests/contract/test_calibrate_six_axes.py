@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from robolink_simulators.epson.arm.joints import Joints
 from robolink_simulators.epson.memory.points import Point
 
 from robolink.calibration import rotation_of
@@ -16,39 +17,83 @@ pytestmark = pytest.mark.simulator_only
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "recipes" / "five-axes-pivot.toml"
 ROBOTS = ("C8-C901S", "C8-C1401CR", "C12-C1401S", "CX4-A601SR", "CX7-A701S")
+SENSOR_SIGMA_MM = 0.004
+SEED, PLATE_SEED = 8, 5
+"""Of the cells. With some thirty intervals of 95 % a seed in which none misses is one in five."""
+
 PLANAR = ("GX4-C351S-L", "GX8-C652SR", "RS4-C351S", "RS6-C552C")
 
 
 @pytest.fixture
 def at(tmp_path, monkeypatch, request):
-    with method_cell(request.param, tmp_path, monkeypatch) as cell:
+    name, seed = request.param
+    with method_cell(name, tmp_path, monkeypatch, seed=seed) as cell:
         yield cell
 
 
-def each(*names, chosen):
+def each(*names, chosen, seed=SEED):
     """Run a test on several robots; on those that are not chosen in the long tests only."""
     robots = [
-        pytest.param(name, marks=() if name in chosen else pytest.mark.soak) for name in names
+        pytest.param((name, seed), id=name, marks=() if name in chosen else pytest.mark.soak)
+        for name in names
     ]
     return pytest.mark.parametrize("at", robots, indirect=True)
 
 
+def interval_mm(fit, axis):
+    """Return half of the 95 % interval of an axis, as it was told.
+
+    Where something is known of the sensor, with that, expanded; else by the scatter.
+    """
+    budget = fit["budget"]
+    known = budget is not None and budget["type_b_mm"] > 0
+    return budget["expanded_mm"] if known else fit["half_width95"][f"{axis}_mm"]
+
+
+def wrong_mm(document, truth, axes):
+    """Return by how much each axis is wrong, and the half of its interval."""
+    found, fit = document["proposed"], document["fit"]
+    return [
+        (found[f"{axis}_mm"] - getattr(truth, f"{axis}_mm"), interval_mm(fit, axis))
+        for axis in axes
+    ]
+
+
 def recovered(done, truth, axes="xy"):
-    """Tell whether the truth lies in the stated interval, four times as wide for safety."""
+    """Prove that the truth lies in the stated interval, no wider.
+
+    An interval of 95 % misses now and then: the cells here are those of one seed, in which none
+    does. How often it holds over many is counted in the long tests, below.
+    """
     assert done.code == 0, done.err[-1500:] + done.out[-500:]
-    document = done.document
-    half = document["fit"]["half_width95"]
-    for axis in axes:
-        wrong = document["proposed"][f"{axis}_mm"] - getattr(truth, f"{axis}_mm")
-        assert abs(wrong) <= 4 * half.get(f"{axis}_mm", 0.02) + 0.002, (axis, wrong, half)
-    assert document["verification"]["passed"]
-    return document
+    for wrong, half in wrong_mm(done.document, truth, axes):
+        assert abs(wrong) <= half, (axes, wrong, half)
+    assert done.document["verification"]["passed"]
+    return done.document
+
+
+def mount(at):
+    """Put sensors up that switch a few micrometres to and fro, as real ones do."""
+    at.cell.mount_beams(at.cell.beams(), noise_mm=SENSOR_SIGMA_MM)
+    at.cell.mount_plate(noise_mm=SENSOR_SIGMA_MM)
 
 
 @each(*ROBOTS, chosen={"C8-C1401CR"})
 def test_a_pivot_recovers_the_whole_tip(at):
     document = recovered(at.calibrate("pivot", "--count", "4"), at.truth, "xyz")
     assert document["measured"] == ["x_mm", "y_mm", "z_mm"]
+
+
+@each("C8-C901S", "CX4-A601S", chosen={"C8-C901S"})
+def test_a_pivot_near_a_singular_wrist_takes_other_tilts(at):
+    """Joint 5 stands at -25 degrees: leaning by 20 one way would bring it to -5."""
+    simulator = at.cell.simulator
+    simulator.machine.arm.place(Joints(0.0, -10.0, -55.0, 0.0, -25.0, 0.0), simulator.now_ns)
+    x_mm, y_mm, z_mm = at.world.tip_mm()
+    at.world.pin_mm = (x_mm + 3.0, y_mm - 3.0, z_mm - 4.0)
+    done = at.calibrate("pivot", "--count", "5")
+    recovered(done, at.truth, "xyz")
+    assert "of the 4 tilts of the plan cannot be taken up over this pin" in done.err
 
 
 @each(*ROBOTS, chosen={"C12-C1401S"})
@@ -71,18 +116,18 @@ def test_angles_and_then_one_touch_recover_two_needles(at):
     for axis in ("x_mm", "y_mm", "z_mm"):
         change = getattr(at.truth, axis) - getattr(tip, axis)
         error = getattr(at.stored, axis) - getattr(before, axis) - change
-        assert abs(error) <= 3 * done.document["fit"]["half_width95"][axis], axis
+        assert abs(error) <= done.document["fit"]["half_width95"][axis], axis
 
 
 @each(*ROBOTS, *PLANAR, chosen={"C8-C901S"})
 def test_beams_recover_the_tip(at):
-    at.mount()
+    mount(at)
     recovered(at.calibrate("beams", "--station", "BEAMS-02"), at.truth)
 
 
-@each(*ROBOTS, *PLANAR, chosen={"C8-C1401CR"})
+@each(*ROBOTS, *PLANAR, chosen={"C8-C1401CR"}, seed=PLATE_SEED)
 def test_a_plate_recovers_the_length(at):
-    at.mount()
+    mount(at)
     recovered(at.calibrate("z-touch", "--station", "PLATE"), at.truth, "z")
 
 
@@ -146,5 +191,50 @@ def test_a_recipe_measures_writes_and_proves(at, tmp_path):
     (tool,) = done.document["tools"]
     halves = tool["fit"]["half_width95"]
     for axis, half in halves.items():
-        assert abs(getattr(at.stored, axis) - getattr(at.truth, axis)) <= 2 * half < 0.1
+        assert abs(getattr(at.stored, axis) - getattr(at.truth, axis)) <= half < 0.1
     assert tool["verification"]["passed"]
+
+
+def touch_at_angles(at):
+    return at.calibrate("n-angle", "--station", "PIN-07", "--count", "4"), "xy"
+
+
+def tilt_over_a_pin(at):
+    return at.calibrate("pivot", "--count", "4"), "xyz"
+
+
+def cross_beams(at):
+    mount(at)
+    return at.calibrate("beams", "--station", "BEAMS-02"), "xy"
+
+
+def touch_a_plate(at):
+    mount(at)
+    return at.calibrate("z-touch", "--station", "PLATE"), "z"
+
+
+def look_with_a_camera(at):
+    place = ",".join(map(str, at.world.camera.middle_mm))
+    usual = ("--station", "CAM", "--sensor", at.cell.url)
+    return at.calibrate("camera-affine", "--at", place, *usual), "xy"
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("robot", ["C8-C901S", "CX4-A601SR"])
+@pytest.mark.parametrize(
+    "measure",
+    [touch_at_angles, tilt_over_a_pin, cross_beams, touch_a_plate, look_with_a_camera],
+)
+def test_the_interval_of_each_method_holds_the_truth_about_as_often_as_it_says(
+    measure, robot, tmp_path, monkeypatch
+):
+    """Counted over cells with other seeds; 60 of them tell 95 % from 85 %, not from 98 %."""
+    held = []
+    for seed in range(200, 260):
+        folder = tmp_path / str(seed)
+        folder.mkdir()
+        with method_cell(robot, folder, monkeypatch, seed=seed) as at:
+            done, axes = measure(at)
+            assert done.code == 0, done.err[-1500:]
+            held += [abs(wrong) <= half for wrong, half in wrong_mm(done.document, at.truth, axes)]
+    assert sum(held) / len(held) >= 0.87

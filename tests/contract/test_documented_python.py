@@ -277,6 +277,15 @@ def nothing(stack: ExitStack) -> dict[str, Any]:
     return {}
 
 
+def a_fault_plan(stack: ExitStack) -> dict[str, Any]:
+    page = (ROOT / "docs" / "fault-plans.md").read_text(encoding="utf-8")
+    Path("lost.toml").write_text(page.partition("```toml\n")[2].partition("```")[0])
+    stack.callback(in_process.unregister, "faulty-cell")
+    given = dict[str, Any]()
+    given["then"] = lambda: given["simulator"].faults.fired and len(given["drawn"]) > 10
+    return given
+
+
 MAKERS = {
     "README.md 1": with_password,
     "README.md 2": two_tools,
@@ -290,6 +299,7 @@ MAKERS = {
     "extending.md 2": a_camera_for_a_recipe,
     "extending.md 3": a_panel,
     "extending.md 4": an_acme_arm,
+    "fault-plans.md 1": a_fault_plan,
     "io-and-variables.md 1": with_variables,
     "journal.md 1": a_journal,
     "plc-maps.md 1": a_map,

@@ -43,6 +43,7 @@ def check_all_is_put_back(simulator, url):
     assert open_journal().log(url).open_markers() == ()
 
 
+@pytest.mark.fault("F24")
 def test_a_window_that_is_closed_during_a_movement_aborts_it(simulator, url):
     start = simulator.machine.arm.flange()
     terminal = Terminal("jog", "-c", url, "--speed", "1", "--yes", controlling=True)

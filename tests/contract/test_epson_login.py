@@ -17,6 +17,7 @@ from robolink.model import ControllerState
 CANARY = "k4nar1envogel"
 
 
+@pytest.mark.on_serial
 def test_status_after_the_login(cell):
     with cell.connect() as controller:
         status = controller.status()
@@ -37,8 +38,11 @@ def test_the_right_password_opens(serve):
             assert controller.status().ready
 
 
+@pytest.mark.on_serial
+@pytest.mark.fault("F16")
 @pytest.mark.parametrize("password", ["canary-wrong", None])
-def test_a_wrong_password_is_tried_once_and_shown_nowhere(serve, password):
+@pytest.mark.fault("F71")
+def test_f16_a_wrong_password_is_tried_once_and_shown_nowhere(serve, password):
     simulator = EpsonSimulator(password=Secret(CANARY))
     with serve(simulator) as cell, pytest.raises(LoginRefusedError) as caught:
         cell.connect(password=password)
@@ -50,6 +54,8 @@ def test_a_wrong_password_is_tried_once_and_shown_nowhere(serve, password):
     assert CANARY not in shown
 
 
+@pytest.mark.fault("F71")
+@pytest.mark.remote_ethernet
 def test_the_login_frame_is_in_no_trace(serve):
     lines = []
     with serve(EpsonSimulator(password=Secret(CANARY))) as cell:
@@ -59,6 +65,7 @@ def test_the_login_frame_is_in_no_trace(serve):
     assert CANARY.encode() not in b"".join(data for _, _, data in lines)
 
 
+@pytest.mark.remote_ethernet
 @pytest.mark.parametrize("habit", ["ignored", "closed"])
 def test_a_second_client_is_told_that_another_one_is_logged_in(serve, options, habit):
     with serve(EpsonSimulator(options=options(second_client=habit))) as cell:
@@ -95,8 +102,9 @@ def bring_about(simulator, state):
         (acts.get(state) or getattr(panel, state))()
 
 
+@pytest.mark.fault("F17", "F20")
 @pytest.mark.parametrize("state", STATES)
-def test_a_state_that_forbids_a_write_is_named_before_anything_is_written(serve, state):
+def test_f17_a_state_that_forbids_a_write_is_named_before_anything_is_written(serve, state):
     simulator = EpsonSimulator(seed=3)
     reason, words = STATES[state]
     with serve(simulator) as cell, cell.connect() as controller:

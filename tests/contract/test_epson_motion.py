@@ -36,6 +36,7 @@ def start(controller, dx_mm=0.0, dz_mm=5.0, **pose):
     return group, target
 
 
+@pytest.mark.on_serial
 def test_a_straight_move_arrives(controller):
     group, target = start(controller)
     motion = group.move_to(target, STRAIGHT, box=EVERYWHERE)
@@ -79,6 +80,7 @@ def test_a_target_for_another_tool_is_refused(controller):
     assert caught.value.reason == "wrong_tool"
 
 
+@pytest.mark.fault("F23")
 def test_a_remote_timeout_of_never_forbids_motion(cell):
     with cell.connect(remote_timeout_s=0) as controller:
         controller.motors(True)
@@ -100,6 +102,7 @@ def test_motors_off_are_named_and_nothing_moves(cell):
         controller.motors(True)
 
 
+@pytest.mark.on_serial
 def test_a_stop_from_another_thread_gets_in_while_one_waits(controller, monkeypatch):
     group, target = start(controller, dz_mm=30)
     motion = group.move_to(target, MotionProfile(Path.STRAIGHT, 1, 1.0), box=EVERYWHERE)
@@ -131,6 +134,7 @@ def test_a_move_that_takes_too_long_is_aborted_and_its_end_is_seen(controller):
     assert group.pose().z_mm < target.z_mm - 1
 
 
+@pytest.mark.fault("F21", "F22")
 @pytest.mark.parametrize("danger", ["press_estop", "open_guard"])
 def test_an_emergency_stop_or_an_open_guard_ends_the_move_and_nothing_is_resent(cell, danger):
     with cell.connect() as controller:

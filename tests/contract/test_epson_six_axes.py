@@ -5,8 +5,10 @@ from itertools import count
 
 import pytest
 from robolink_simulators.cell.clock import ManualClock
+from robolink_simulators.cell.frames import transposed
 from robolink_simulators.epson import EpsonSimulator
 from robolink_simulators.epson.arm.joints import Joints
+from robolink_simulators.epson.arm.kinematics import continued, forward, frame_of
 from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.hosting.in_process.epson import register, unregister
 
@@ -98,6 +100,46 @@ def test_a_straight_way_to_a_singular_wrist_is_refused_before_it_is_sent(arm):
         go(controller, replace(singular, z_mm=singular.z_mm), STRAIGHT)
     assert machine.arm.moves_started == started
     go(controller, singular, JOINT)  # from joint to joint it may
+
+
+def test_a_straight_way_past_the_axis_of_joint_1_is_refused_before_it_is_sent(arm):
+    """The wrist 12 mm beside the axis: joint 1 would have to swing round."""
+    simulator, controller = arm
+    machine = simulator.machine
+    model = machine.model
+    near = Joints(20.0, -3.0, 20.0, 30.0, 70.0, 0.0)
+    flange = forward(model, near)
+    x, y, _ = wrist_mm(flange, model)
+    aside = replace(flange, x_mm=flange.x_mm - 0.98 * x + 12.0, y_mm=flange.y_mm - 0.98 * y)
+    machine.arm.place(continued(model, aside, near), simulator.now_ns)
+    started = machine.arm.moves_started
+    here = controller.groups[0].pose()
+    # Past the axis, which stays on its left.
+    x, y, _ = wrist_mm(here, model)
+    with pytest.raises(LimitError, match="too near to its axis"):
+        go(controller, replace(here, x_mm=here.x_mm - y, y_mm=here.y_mm + x), STRAIGHT)
+    assert machine.arm.moves_started == started
+    go(controller, replace(here, z_mm=here.z_mm + 5), STRAIGHT)
+
+
+def wrist_mm(flange, model):
+    """Return where the centre of the wrist is."""
+    axis = transposed(frame_of(flange).rotation)[2]
+    at = flange.coordinates()[:3]
+    return tuple(p - model.lengths_mm[5] * a for p, a in zip(at, axis, strict=True))
+
+
+def test_what_stands_in_the_way_is_told_before_anything_moves(arm):
+    simulator, controller = arm
+    machine, group = simulator.machine, controller.groups[0]
+    here, stands = group.pose(), machine.arm.joints
+    assert group.obstacle(here, Path.STRAIGHT) == ""
+    assert "cannot reach" in group.obstacle(replace(here, y_mm=here.y_mm + 3000), Path.JOINT)
+    machine.arm.place(Joints(*stands[:4], 4.0, stands[5]), simulator.now_ns)
+    singular = group.pose()
+    assert "Joint 5" in group.obstacle(singular, Path.STRAIGHT)
+    assert group.obstacle(singular, Path.JOINT) == ""
+    assert machine.arm.moves_started == 0
 
 
 def test_a_place_out_of_reach_is_refused_and_the_controller_stays_ready(arm):

@@ -38,6 +38,7 @@ def test_there_are_fifteen_tools_and_the_flange_reads_as_zero(controller):
     assert controller.tools.read(0) == ToolOffset()
 
 
+@pytest.mark.on_serial
 def test_one_listing_and_single_reads_agree(controller):
     listed = controller.tools.read_all()
     for tool in (1, 2, SCRATCH):
@@ -48,6 +49,7 @@ def test_one_listing_and_single_reads_agree(controller):
             assert listed[tool].matches(single, 0.0005)
 
 
+@pytest.mark.on_serial
 def test_a_write_is_read_back_and_receipted(controller):
     before = controller.tools.read(SCRATCH)
     receipt = controller.tools.write(SCRATCH, NEW, expected=before)
@@ -62,6 +64,7 @@ def test_an_equal_value_is_not_written_again_whatever_was_expected(controller):
     assert receipt.skipped
 
 
+@pytest.mark.fault("F36")
 def test_a_value_equal_after_rounding_is_not_written_again(controller):
     controller.tools.write(SCRATCH, NEW, expected=ANY)
     nearly = ToolOffset(NEW.x_mm + 0.0004, NEW.y_mm, NEW.z_mm)
@@ -125,8 +128,9 @@ def test_tool_0_is_never_written(controller):
     assert controller.exchanges == sent
 
 
+@pytest.mark.fault("F37")
 @pytest.mark.parametrize("bad", [float("nan"), float("inf"), None, "12"])
-def test_a_component_that_is_no_number_is_refused_before_anything_is_sent(bad):
+def test_f37_a_component_that_is_no_number_is_refused_before_anything_is_sent(bad):
     with pytest.raises(ConfigError, match="x_mm"):
         ToolOffset(bad)
 

@@ -10,7 +10,20 @@ from robolink_simulators.hosting.in_process.epson import register, unregister
 
 import robolink
 from robolink.controllers.epson import EpsonController
-from robolink.model import MotionProfile, Path, ToolOffset, WorkBox
+from robolink.errors import NotReadyError, OutcomeUnknownError
+from robolink.model import (
+    ANY,
+    Marker,
+    MarkerKind,
+    MotionProfile,
+    Path,
+    ToolOffset,
+    Verdict,
+    WorkBox,
+    plain_offset,
+)
+from robolink.timing import wall_label
+from robolink.transaction import Wanted, change_tools, plan_undo, recover, undo
 from tests.contract._method_cell import method_cell
 
 pytestmark = pytest.mark.simulator_only
@@ -52,6 +65,49 @@ def test_what_belongs_to_a_robot_is_that_of_the_robot_in_force(cell):
     assert scara.tools.get(4).components()[3:] == (10.0, 0.0, 0.0)
 
 
+def test_each_robot_is_undone_by_its_own_record(cell):
+    """Tool 4 of robot 1 and tool 4 of robot 2 are two tools."""
+    robots = cell.machine.robots
+    old, new = ToolOffset(1.0, 2.0, 30.0), ToolOffset(1.5, 2.5, 30.5)
+    for number, shift_mm in ((1, 0.0), (2, 100.0)):
+        cell.machine.choose(number)
+        with robolink.connect(cell.url) as controller:
+            for offset in (old, new):
+                moved = replace(offset, x_mm=offset.x_mm + shift_mm)
+                change_tools(controller, [Wanted(4, moved, ANY)])
+    cell.machine.choose(1)
+    with robolink.connect(cell.url) as controller:
+        undo(controller, plan_undo(controller, tool=4))
+        # A statement that a person typed puts the other robot in force, and its record.
+        assert isinstance(controller, EpsonController)
+        first = controller.outcomes.robot
+        controller.execute_raw("Robot 2")
+        assert controller.outcomes.robot != first
+        undo(controller, plan_undo(controller, tool=4))
+    assert robots[0].tools.get(4) == old
+    assert robots[1].tools.get(4) == replace(old, x_mm=101.0)
+
+
+def test_what_was_begun_on_one_robot_is_not_judged_by_the_tools_of_another(cell):
+    cell.machine.choose(2)
+    offset = ToolOffset(1.0, 2.0, 30.0)
+    details = {"tool": 4, "requested": plain_offset(offset), "before": None}
+    marker = Marker("op", MarkerKind.SET, "TLSet 4, XY(...)", wall_label(), details)
+    with robolink.connect(cell.url) as controller:
+        controller.outcomes.begin(marker)
+    cell.machine.robots[0].tools.set(4, offset)  # it would look done
+    cell.machine.choose(1)
+    with robolink.connect(cell.url) as controller:
+        with pytest.raises(OutcomeUnknownError):
+            controller.require_settled("Go P1")
+        with pytest.raises(NotReadyError, match="was begun on"):
+            recover(controller)
+    cell.machine.choose(2)
+    with robolink.connect(cell.url) as controller:
+        (settled,) = recover(controller).settled
+        assert settled.verdict is Verdict.NOT_APPLIED
+
+
 def test_motors_of_one_robot_or_of_all():
     simulator = EpsonSimulator(BOTH)
     link = simulator.connect(0)
@@ -80,7 +136,7 @@ def test_both_robots_are_calibrated_one_after_the_other(tmp_path, monkeypatch):
         assert done.code == 0, done.err
         machine.choose(2)
         machine.motors_on = True
-        done = at.calibrate("pivot", "--station", "PIN-08", "--count", "4")
+        done = at.calibrate("pivot", "--station", "PIN-07", "--count", "4")
         assert done.code == 0, done.err
         for robot, world, axes in zip(machine.robots, cells, (2, 3), strict=True):
             held, true = robot.tools.get(1).components(), world.tips[1].components()

@@ -31,6 +31,7 @@ def asked(simulator):
     return [text for _, direction, text in simulator.log if direction == ">"]
 
 
+@pytest.mark.on_serial
 def test_inputs_are_read_by_bit_byte_and_word(simulator, connected):
     for bit in (0, 3, 8, 511):
         simulator.machine.inputs.set(bit, True)
@@ -49,6 +50,7 @@ def test_memory_is_read_by_bit_byte_and_word(simulator, connected):
     assert (io.read_memory_byte(1), io.read_memory_word(0)) == (0x80, 0x8002)
 
 
+@pytest.mark.on_serial
 def test_an_output_and_a_memory_bit_are_switched_once_and_read_back(simulator, connected):
     for switch, bank in (
         (connected.io.set_output, simulator.machine.outputs),
@@ -91,6 +93,7 @@ def test_a_bit_that_this_controller_lacks_is_refused_by_it(connected):
     assert caught.value.code == 12
 
 
+@pytest.mark.remote_ethernet
 @pytest.mark.parametrize("answer", ["2", "", "0F ", "1F", "on"])
 def test_a_bit_that_is_neither_0_nor_1_ends_in_an_error(simulator, connected, answer):
     simulator._desk._served["getio"] = lambda at: (answer,)
@@ -98,6 +101,7 @@ def test_a_bit_that_is_neither_0_nor_1_ends_in_an_error(simulator, connected, an
         connected.io.read_input(0)
 
 
+@pytest.mark.remote_ethernet
 @pytest.mark.parametrize("answer", ["0", "F", "FFF", "0x0F", "GG", " 0F", "+1", "1_0"])
 def test_hexadecimal_text_is_read_strictly(simulator, connected, answer):
     simulator._desk._served["getiobyte"] = lambda at: (answer,)
@@ -112,6 +116,7 @@ def test_an_output_that_does_not_follow_is_an_error_and_is_not_sent_again(simula
     assert asked(simulator).count("$SetIO,3,1") == 1
 
 
+@pytest.mark.remote_ethernet
 @pytest.mark.parametrize(
     ("prepare", "reason"),
     [
@@ -146,6 +151,7 @@ def test_nothing_is_set_in_a_state_that_forbids_it_and_all_is_read(
     assert connected.outcomes.open_markers() == ()
 
 
+@pytest.mark.remote_ethernet
 @pytest.mark.parametrize(
     ("kind", "value"),
     [
@@ -168,12 +174,14 @@ def test_a_variable_of_each_type_is_written_and_read_back(connected, kind, value
     assert connected.variables.write(name, value, VariableType(kind)).skipped
 
 
+@pytest.mark.remote_ethernet
 def test_a_string_is_written_and_read_back(connected):
     connected.variables.write("VERSION$", "cell 7 / rev. A-2", "string")
     assert connected.variables.read("VERSION$", "String") == "cell 7 / rev. A-2"
     assert connected.variables.text("VERSION$") == "cell 7 / rev. A-2"
 
 
+@pytest.mark.remote_ethernet
 def test_elements_of_an_array_are_read_from_a_subscript_on(simulator, connected):
     for i in range(3):
         simulator.variables.set(f"g_Real_table(2,{i + 1})", str(i + 0.5), "Real")
@@ -184,6 +192,7 @@ def test_elements_of_an_array_are_read_from_a_subscript_on(simulator, connected)
     assert caught.value.code == 15
 
 
+@pytest.mark.remote_ethernet
 def test_an_array_that_comes_back_short_is_not_taken(simulator, connected):
     simulator._desk._served["getvariable"] = lambda *asked: ("1", "2")
     with pytest.raises(RemoteProtocolError, match="3 elements"):
@@ -243,6 +252,7 @@ def test_what_no_request_can_ask_for_is_refused_here(connected, kind, count):
         connected.variables.read_array("g_Long_table", (0, 0), kind, count=count)
 
 
+@pytest.mark.remote_ethernet
 def test_alarms_are_listed_and_reset(simulator, connected):
     assert connected.alarms.list() == ()
     simulator.panel.raise_alarm(501)
@@ -256,6 +266,7 @@ def test_alarms_are_listed_and_reset(simulator, connected):
         connected.alarms.reset(0)
 
 
+@pytest.mark.remote_ethernet
 def test_an_alarm_that_comes_back_is_an_error(simulator, connected):
     simulator.panel.raise_alarm(501)
     simulator._desk._served["resetalm"] = lambda number: ()
@@ -263,12 +274,14 @@ def test_an_alarm_that_comes_back_is_an_error(simulator, connected):
         connected.alarms.reset(501)
 
 
+@pytest.mark.remote_ethernet
 def test_alarms_that_contradict_their_count_are_not_taken(simulator, connected):
     simulator._desk._served["getalm"] = lambda: ("2", "501")
     with pytest.raises(RemoteProtocolError, match="2 alarms"):
         connected.alarms.list()
 
 
+@pytest.mark.remote_ethernet
 def test_facts_name_the_controller_and_the_robot(simulator, connected):
     serial = simulator.machine.serial
     assert connected.facts() == ControllerFacts(
@@ -295,6 +308,7 @@ def test_older_firmware_prints_its_robot_and_hides_the_rest(serve, options):
         simulator.panel.stop_production()
 
 
+@pytest.mark.remote_ethernet
 def test_facts_of_two_robots_are_read_and_a_strange_answer_is_left_out(simulator, connected):
     simulator._desk._served["getrobotinfo"] = lambda: ("2", "3", "T6-602S", "5", "C8-C901S")
     simulator._desk._served["getrobotserial"] = lambda robot: ("2", "A1", " B2 ")

@@ -7,7 +7,7 @@ from robolink_cli.prompts import operator as _operator
 
 from robolink.journal import EntryKind
 from robolink.model import ToolOffset
-from tests.contract._method_cell import KINDS, method_cell
+from tests.contract._method_cell import method_cell, on
 
 pytestmark = pytest.mark.simulator_only
 
@@ -25,12 +25,13 @@ def station_z(arm):
     return arm.recorded(EntryKind.STATION)[0].details["z_mm"]
 
 
-@pytest.fixture(params=KINDS)
-def cell(request, tmp_path, monkeypatch):
-    with method_cell(request.param, tmp_path, monkeypatch) as cell:
+@pytest.fixture
+def cell(kind, tmp_path, monkeypatch):
+    with method_cell(kind, tmp_path, monkeypatch) as cell:
         yield cell
 
 
+@pytest.mark.parametrize("kind", on("plc"))
 def test_half_a_millimetre_shorter_is_refused_where_nobody_decides(cell):
     method = ("two-pose", *AT_PIN)
     first = cell.calibrate(*method)

@@ -70,7 +70,8 @@ def test_nothing_listens_there():
         open_mailbox_link(url, timeout_s=1.0)
 
 
-def test_a_serial_port_is_opened_by_one_program_alone():
+@pytest.mark.fault("F55")
+def test_f55_a_serial_port_is_opened_by_one_program_alone():
     with modbus_rtu() as (far_end, _):
         with closing(open_mailbox_link(far_end.url)):
             with pytest.raises(ConnectError, match="cannot be opened"):
@@ -102,7 +103,8 @@ def test_a_cut_serial_cable_times_out_and_a_mended_one_serves_on():
             assert link.read_response() == RESPONSE
 
 
-def test_an_adapter_that_hears_itself_is_named_on_opening():
+@pytest.mark.fault("F53")
+def test_f53_an_adapter_that_hears_itself_is_named_on_opening():
     with modbus_rtu(echo=True) as (far_end, _):
         with pytest.raises(RemoteProtocolError, match="returns what is sent"):
             open_mailbox_link(far_end.url, timeout_s=0.5)

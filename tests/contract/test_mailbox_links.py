@@ -99,8 +99,9 @@ def test_a_beat_is_the_heartbeat_word_alone(far_end, link):
         assert far_end.command() == [*COMMAND[:62], 0x0102, COMMAND[63]]
 
 
+@pytest.mark.fault("F32", "F35")
 @pytest.mark.parametrize("serial", [False, True], ids=["tcp", "rtu"])
-def test_each_exchange_over_modbus_is_one_request(serial):
+def test_f35_each_exchange_over_modbus_is_one_request_for_registers(serial):
     with ExitStack() as stack:
         far_end = (
             stack.enter_context(modbus_rtu())[0] if serial else stack.enter_context(modbus_tcp())
@@ -123,6 +124,7 @@ def test_each_exchange_over_modbus_is_one_request(serial):
     ]
 
 
+@pytest.mark.fault("F49")
 def test_threads_never_get_each_others_answers(far_end, link):
     far_end.put_response(RESPONSE)
     far_end.put_slot(3, SLOT)

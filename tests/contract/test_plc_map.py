@@ -157,6 +157,7 @@ def test_a_preview_is_what_is_sent_first_and_sends_nothing(served, controller):
     assert controller.tools.preview_write(1, NEW) == ()
 
 
+@pytest.mark.fault("F43")
 def test_a_write_that_is_acknowledged_and_not_done_is_noticed(served, controller):
     first = f"fc16 {served.map.slots[1].span.start}"
     served.plc.faults.add(Fault(FaultAction.IGNORE_WRITE, match=first))
@@ -243,6 +244,8 @@ def test_on_a_serial_line_a_unit_that_is_not_there_is_silent_and_a_closed_line_i
         robolink.connect(served.url)
 
 
+@pytest.mark.fault("F70")
+@pytest.mark.fault("F34")
 def test_a_map_of_another_machine_is_found_out_when_connecting(tmp_path):
     text = (MAPS / "commit-bit.toml").read_text(encoding="utf-8")
     shifted = tmp_path / "shifted.toml"

@@ -82,6 +82,7 @@ def test_30_virtual_minutes_at_a_prompt_keep_the_session(simulator, controller):
     assert not simulator.condition.error
 
 
+@pytest.mark.fault("F75")
 def test_the_status_goes_out_at_least_every_5_s(simulator, controller):
     ask(controller, SlowOperator(clock_of(NAME), HALF_AN_HOUR_S))
     asked_ns = [now_ns for now_ns, _, text in simulator.log if text == "$GetStatus"]

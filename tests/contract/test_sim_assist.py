@@ -151,6 +151,7 @@ def end_of(connection):
     return heard
 
 
+@pytest.mark.fault("F74")
 def test_a_web_page_gets_nothing_done_at_the_assist_port(assisted):
     _, assist, simulator = assisted
     with door(assist) as browser:
@@ -171,6 +172,7 @@ def test_a_web_page_gets_nothing_done_at_the_assist_port(assisted):
     ],
     ids=["none", "wrong", "null", "empty", "list", "surrogate"],
 )
+@pytest.mark.fault("F74")
 def test_nobody_gets_in_at_the_assist_port_without_its_token(assisted, first):
     _, assist, simulator = assisted
     with door(assist) as stranger:

@@ -123,6 +123,7 @@ def test_the_remaining_vectors():
         assert client.ask("$GetMotor,0") == "#GetMotor,1,1,0"
 
 
+@pytest.mark.fault("F42")
 def test_a_second_execute_is_refused_while_the_first_one_runs():
     with served() as host, raw(host.url) as client:
         client.socket.sendall(b'$Execute,"Move Here +X(-50)"\r\n')
@@ -221,7 +222,8 @@ def test_a_closed_host_leaves_no_thread():
     assert threading.active_count() == before
 
 
-def test_only_loopback_is_served_unless_told_otherwise():
+@pytest.mark.fault("F73")
+def test_f73_only_loopback_is_served_unless_told_otherwise():
     for address in ("0.0.0.0", "192.0.2.1", "::", "example.com"):
         with pytest.raises(ConfigError, match="other machines"):
             serve_tcp(EpsonSimulator(), address)

@@ -152,6 +152,7 @@ def test_a_move_that_takes_too_long_is_halted_and_its_end_is_seen(cell, group):
     assert cell.open_requests == []
 
 
+@pytest.mark.fault("F21")
 @pytest.mark.parametrize("danger", ["press_estop", "fail_axis"])
 def test_an_emergency_stop_or_a_failing_drive_ends_the_move_and_nothing_is_sent_again(
     cell, controller, group, danger

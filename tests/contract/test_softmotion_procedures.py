@@ -63,6 +63,7 @@ def test_the_machine_is_named_and_its_start_is_numbered(cell, controller):
         assert again.mailbox_facts().boot_id == facts.boot_id + 1
 
 
+@pytest.mark.fault("F70")
 def test_a_start_of_the_plc_is_told_as_one_on_every_link(cell, controller):
     cell.restart()
     with pytest.raises(TransportBrokenError, match="started anew") as ended:

@@ -75,6 +75,7 @@ def test_only_the_user_himself_may_read_where_to_knock(controller):
     ],
     ids=["wrong", "none", "bytes", "list", "nothing", "umlaut", "surrogate", "deep", "digits"],
 )
+@pytest.mark.fault("F74")
 def test_without_the_token_nothing_is_stopped(controller, said):
     with StopListener(controller, url_of(controller)):
         holder = holder_of(controller)

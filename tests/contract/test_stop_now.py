@@ -45,6 +45,7 @@ def left_moving(cell, **options):
     controller._link.session.close()
 
 
+@pytest.mark.on_serial
 @pytest.mark.parametrize("habits", HABITS, ids=str)
 def test_a_movement_whose_client_died_is_brought_to_rest(serve, habits):
     simulator = EpsonSimulator(seed=7, options=EpsonOptions(**habits))
@@ -61,7 +62,8 @@ def test_a_movement_whose_client_died_is_brought_to_rest(serve, habits):
 
 @pytest.mark.parametrize("action", [FaultAction.DROP_REPLY, FaultAction.DISCONNECT])
 @pytest.mark.parametrize("request_", ["Abort", "Stop", "GetStatus"])
-def test_a_lost_answer_is_no_reason_to_leave_it_moving(serve, request_, action):
+@pytest.mark.fault("F76")
+def test_f76_a_lost_answer_is_no_reason_to_leave_it_moving(serve, request_, action):
     simulator = EpsonSimulator(seed=7)
     with serve(simulator) as cell:
         left_moving(cell)
@@ -71,6 +73,7 @@ def test_a_lost_answer_is_no_reason_to_leave_it_moving(serve, request_, action):
         assert simulator.faults.pending == ()
 
 
+@pytest.mark.fault("F01")
 def test_the_late_end_of_an_execute_does_not_disturb_a_stop(serve):
     simulator = EpsonSimulator(seed=7)
     with serve(simulator) as cell:
@@ -80,6 +83,7 @@ def test_the_late_end_of_an_execute_does_not_disturb_a_stop(serve):
         assert stop_now(cell.url).state is ControllerState.READY
 
 
+@pytest.mark.remote_ethernet
 @pytest.mark.parametrize("second", ["ignored", "closed"])
 def test_beside_a_client_that_is_logged_in_nobody_answers(serve, second):
     simulator = EpsonSimulator(seed=7, options=EpsonOptions(second_client=second))

@@ -16,7 +16,7 @@ from robolink.methods import NAngleSource, TwoPoseSource
 from robolink.nozzle_change import AcceptanceCriteria, ChangePlan, NozzleChange, ToolPlan
 from robolink.procedures import TouchPlan
 from robolink.runner import TouchedAt
-from tests.contract._method_cell import KINDS, method_cell
+from tests.contract._method_cell import method_cell, on
 from tests.contract.test_calibrate_pivot import plc, run, slot
 
 __all__ = ["plc"]
@@ -38,9 +38,9 @@ number = 1
 """
 
 
-@pytest.fixture(params=KINDS)
-def cell(request, tmp_path, monkeypatch):
-    with method_cell(request.param, tmp_path, monkeypatch) as cell:
+@pytest.fixture
+def cell(kind, tmp_path, monkeypatch):
+    with method_cell(kind, tmp_path, monkeypatch) as cell:
         cell.lengthen(0.0, 0.4, -0.3)
         yield cell
 
@@ -64,7 +64,15 @@ def check_refused(cell, done, code, *, exit_code=7):
     assert cell.recorded(EntryKind.REFUSED)[0].details["code"] == code
 
 
-@pytest.mark.parametrize(("method", "true_touches"), [("two-pose", 0), ("n-angle", 1)])
+@pytest.mark.parametrize(
+    ("kind", "method", "true_touches"),
+    [
+        ("plc", "two-pose", 0),
+        ("epson", "n-angle", 1),
+        pytest.param("epson", "two-pose", 0, marks=pytest.mark.soak),
+        pytest.param("plc", "n-angle", 1, marks=pytest.mark.soak),
+    ],
+)
 def test_enter_alone_is_refused_and_nothing_is_proposed(cell, method, true_touches):
     has_habit(cell, person_stays_share=1, person_stays_from_touch=1 + true_touches)
     done = cell.calibrate(method)
@@ -73,15 +81,16 @@ def test_enter_alone_is_refused_and_nothing_is_proposed(cell, method, true_touch
     assert cell.recorded(EntryKind.INTENT, EntryKind.CALIBRATION) == []
 
 
-@pytest.mark.parametrize("kind", ["n-angle"])
-def test_enter_alone_is_refused_in_a_recipe_too(cell, kind, tmp_path):
+@pytest.mark.parametrize("kind", on("epson"))
+def test_enter_alone_is_refused_in_a_recipe_too(cell, tmp_path):
     has_habit(cell, person_stays_share=1)
     path = tmp_path / "recipe.toml"
-    path.write_text(RECIPE.format(kind=kind))
+    path.write_text(RECIPE.format(kind="n-angle"))
     done = cell.run("recalibrate", str(path), "--assist", cell.cell.url, "--yes", "--json")
     check_refused(cell, done, "not_touched")
 
 
+@pytest.mark.parametrize("kind", on("plc"))
 def test_enter_alone_in_the_proof_brings_the_old_value_back(cell):
     has_habit(cell, person_stays_share=1, person_stays_from_touch=3)
     done = cell.calibrate("two-pose")
@@ -90,6 +99,7 @@ def test_enter_alone_in_the_proof_brings_the_old_value_back(cell):
     assert cell.recorded(EntryKind.ROLLED_BACK)
 
 
+@pytest.mark.parametrize("kind", on("plc"))
 def test_enter_alone_is_refused_by_one_touch(cell):
     assert cell.calibrate("n-angle", "--station", "PIN-07", "--count", "4").code == 0
     known = cell.stored
@@ -100,6 +110,7 @@ def test_enter_alone_is_refused_by_one_touch(cell):
     assert cell.stored == known
 
 
+@pytest.mark.parametrize("kind", on("epson"))
 def test_enter_alone_teaches_no_station(cell):
     has_habit(cell, person_stays_share=1)
     words = ("--tool", "1", "--assist", cell.cell.url, "--yes", "--json")
@@ -139,6 +150,7 @@ def test_enter_alone_is_refused_by_a_pivot_and_its_proof(plc, true_touches):
     assert tip == plc.world.tips[1]
 
 
+@pytest.mark.parametrize("kind", on("plc"))
 def test_an_answer_typed_ahead_is_asked_again_and_the_tip_is_the_true_one(cell):
     has_habit(cell, person_types_ahead=True)
     done = cell.calibrate("two-pose")
@@ -197,13 +209,17 @@ class SameJog(AssistedOperator):
         return self.jog
 
 
+JOGS = [(TwoPoseSource(), "z-2"), (NAngleSource((180.0, 90.0, -90.0)), "x+0.1 z-2")]
+
+
 @pytest.mark.parametrize(
-    ("source", "jog"),
+    ("kind", "source", "jog"),
     [
-        (TwoPoseSource(), "z-2"),
-        (NAngleSource((180.0, 90.0, -90.0)), "x+0.1 z-2"),
+        pytest.param("epson", *JOGS[0], id="epson-two-pose"),
+        pytest.param("plc", *JOGS[1], id="plc-n-angle"),
+        pytest.param("plc", *JOGS[0], id="plc-two-pose", marks=pytest.mark.soak),
+        pytest.param("epson", *JOGS[1], id="epson-n-angle", marks=pytest.mark.soak),
     ],
-    ids=["two-pose", "n-angle"],
 )
 def test_the_same_jog_each_time_is_refused_from_the_python_api(cell, source, jog):
     with robolink.connect(cell.cell.url) as controller:
@@ -249,6 +265,7 @@ def test_the_right_height_beside_the_pin_is_no_touch(arm, source, kind, codes):
     assert (arm.stored.x_mm, arm.stored.y_mm) == (12.0, -3.5)
 
 
+@pytest.mark.parametrize("kind", on("epson"))
 def test_a_touch_at_a_perfect_stored_offset_is_taken_as_it_is(cell):
     cell.lengthen(0.0, -0.4, 0.3)
     done = cell.calibrate("n-angle", "--count", "4")
@@ -279,6 +296,7 @@ def test_the_standoffs_of_two_runs_differ_unless_the_seed_is_given(arm):
     assert standoffs(5) == standoffs(5)
 
 
+@pytest.mark.parametrize("kind", on("plc"))
 def test_a_contact_input_counts_and_takes_the_sideways_part_away(cell):
     has_habit(cell, contact_input=CONTACT, person_presses_mm=0.03, eye_sigma_mm=0.02)
     done = cell.calibrate("n-angle", "--count", "4", "--contact-input", str(CONTACT))

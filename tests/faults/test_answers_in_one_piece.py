@@ -23,6 +23,7 @@ def simulator():
     unregister(NAME)
 
 
+@pytest.mark.fault("F06")
 def test_an_end_of_movement_that_came_with_the_status_is_not_waited_for(simulator):
     with robolink.connect(simulator.url) as controller:
         group = controller.groups[0]

@@ -87,7 +87,8 @@ def little_is_held() -> Iterator[None]:
 
 
 @pytest.mark.parametrize("flood", FLOODS)
-def test_an_epson_controller_that_floods_is_named_and_left(flood):
+@pytest.mark.fault("F66")
+def test_f66_an_epson_controller_that_floods_is_named_and_left(flood):
     with flooding(b"#Login,0\r\n", FLOODS[flood]) as port, little_is_held():
         controller = None
         with pytest.raises(RobolinkError) as caught:
@@ -109,6 +110,7 @@ STRAYS = {
 
 
 @pytest.mark.parametrize("stray", STRAYS)
+@pytest.mark.fault("F66")
 def test_a_modbus_server_that_floods_is_named_at_once(stray):
     """No time-out: it is told what it is, long before the deadline, after some 16 kB."""
     with flooding(b"", STRAYS[stray]) as port, little_is_held():
@@ -161,6 +163,7 @@ LINE_FLOODS = {
 
 @pytest.mark.parametrize("answers", [False, True], ids=["from the beginning", "later"])
 @pytest.mark.parametrize("flood", LINE_FLOODS)
+@pytest.mark.fault("F66")
 def test_a_serial_line_that_floods_is_named_at_once(flood, answers):
     with flooded_line(LINE_FLOODS[flood], answers=answers) as device, little_is_held():
         url = parse_url(f"softmotion+modbus-rtu://{device}?baud=19200&parity=none&stopbits=1")
@@ -176,6 +179,7 @@ def test_a_serial_line_that_floods_is_named_at_once(flood, answers):
         assert "sends without an end" in what
 
 
+@pytest.mark.fault("F66")
 def test_a_can_node_that_floods_is_named_before_anything_is_sent(monkeypatch):
     clock = FakeClock()
     bus = ScriptedBus(clock, node_with(0))

@@ -86,6 +86,7 @@ def check_last_line(cell: NozzleCell, line: str) -> None:
     assert line.endswith(selected)
 
 
+@pytest.mark.fault("F24")
 def test_a_second_signal_during_the_cleaning_up_breaks_nothing(tmp_path, monkeypatch):
     with served_cell(tmp_path / "cell", monkeypatch) as cell:
         started: SimpleQueue[ClientProcess] = SimpleQueue()
@@ -117,6 +118,7 @@ def test_a_second_signal_during_the_cleaning_up_breaks_nothing(tmp_path, monkeyp
         check_last_line(cell, client.err.splitlines()[-1])
 
 
+@pytest.mark.fault("F24")
 @pytest.mark.parametrize("share", range(SHARES))
 def test_ctrl_c_at_each_step_leaves_no_tool_selected_that_is_not_the_cell_s_own(
     tmp_path, monkeypatch, requests, share

@@ -70,7 +70,8 @@ def check_motion_is_allowed_again(cell):
 
 
 @pytest.mark.parametrize("share", range(SHARES))
-def test_sigkill_at_each_step_leaves_the_old_or_the_new_value_and_resolve_ends_it(
+@pytest.mark.fault("F60")
+def test_f60_sigkill_at_each_step_leaves_the_old_or_the_new_value_and_resolve_ends_it(
     tmp_path, monkeypatch, requests, share
 ):
     steps = steps_of(requests, share)

@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.faults import Fault, FaultAction, FaultPlan
+from robolink_simulators.hosting.in_process.epson import register, unregister
 
 import robolink
 from robolink import ToolOffset
@@ -75,8 +76,9 @@ def test_a_lost_answer_to_a_write_is_unknown_blocks_motion_and_is_settled_by_rea
     assert len(writes) == 1
 
 
+@pytest.mark.fault("F25")
 @pytest.mark.parametrize("how", LOST)
-def test_a_lost_answer_to_a_move_is_unknown_and_the_move_is_never_sent_twice(serve, how):
+def test_f25_a_lost_answer_to_a_move_is_unknown_and_the_move_is_never_sent_twice(serve, how):
     simulator = simulator_with(LOST[how], MOVE)
     with serve(simulator) as url:
         with robolink.connect(url, timeout_s=0.3) as controller:
@@ -96,6 +98,29 @@ def test_a_lost_answer_to_a_move_is_unknown_and_the_move_is_never_sent_twice(ser
             lift(controller).wait(timeout_s=60)
 
 
+@pytest.mark.fault("F26")
+def test_f26_whichever_answer_is_lost_a_movement_is_begun_once():
+    """In process and in simulated time: one run for each answer, until none was lost."""
+    for lost in range(100):
+        fault = Fault(FaultAction.DROP_REPLY, on_exchange=lost)
+        simulator = EpsonSimulator(seed=5, faults=[fault])
+        register("lost-one", simulator)
+        try:
+            with robolink.connect("epson+sim://lost-one", timeout_s=0.3) as controller:
+                lift(controller).wait(timeout_s=60)
+        except RobolinkError:
+            pass
+        finally:
+            unregister("lost-one")
+        assert simulator.machine.arm.moves_started <= 1, f"answer {lost}"
+        sent = [text for _, way, text in simulator.log if way == ">" and MOVE in text]
+        assert len(sent) <= 1, f"answer {lost}"
+        if simulator.faults.pending:
+            break
+    assert 10 < lost < 99
+
+
+@pytest.mark.fault("F59")
 def test_a_value_that_was_changed_meanwhile_is_a_conflict(serve):
     simulator = simulator_with(FaultAction.DROP_REPLY, WRITE)
     with serve(simulator) as url:
@@ -110,6 +135,7 @@ def test_a_value_that_was_changed_meanwhile_is_a_conflict(serve):
             assert "neither" in finding.sentence
 
 
+@pytest.mark.fault("F43")
 def test_a_write_that_is_acknowledged_but_not_applied_is_found_by_reading_back(serve):
     simulator = simulator_with(FaultAction.IGNORE_WRITE, WRITE)
     with serve(simulator) as url, robolink.connect(url) as controller:
@@ -136,7 +162,8 @@ def test_a_read_that_fails_ends_the_session_and_lies_about_nothing(serve, match,
             assert controller.tools.read(1) == truth
 
 
-def test_a_doubled_answer_is_never_taken_for_the_next_one(serve):
+@pytest.mark.fault("F09")
+def test_f09_a_doubled_answer_is_never_taken_for_the_next_one(serve):
     simulator = simulator_with(FaultAction.DUPLICATE_REPLY, "Print TLSet(1)")
     with serve(simulator) as url, robolink.connect(url) as controller:
         with pytest.raises((RemoteProtocolError, TransportError)):
@@ -145,7 +172,8 @@ def test_a_doubled_answer_is_never_taken_for_the_next_one(serve):
                 assert controller.tools.selected() == 1
 
 
-def test_a_late_answer_dies_with_its_connection(serve):
+@pytest.mark.fault("F01")
+def test_f01_a_late_answer_dies_with_its_connection(serve):
     simulator = EpsonSimulator(
         seed=5,
         faults=[Fault(FaultAction.DELAY, on_exchange=0, match="Print Tool", seconds=30.0)],
@@ -159,6 +187,7 @@ def test_a_late_answer_dies_with_its_connection(serve):
             assert controller.tools.read(1) == simulator.machine.tools.get(1)
 
 
+@pytest.mark.fault("F05")
 def test_an_answer_in_pieces_is_the_same_answer(serve):
     simulator = EpsonSimulator(
         seed=5,
@@ -185,7 +214,7 @@ def unclear():
             plan = FaultPlan(seed=seed)
             fault = Fault(FaultAction.GARBLE_REPLY, match=match, position=position)
             ((_, bent),) = plan.departures(b"#Execute,0\r\n", [fault])
-            assert bent is not None
+            assert isinstance(bent, bytes)
             if bent.startswith(shown.encode()) and bent[9:10].isdigit():
                 return EpsonSimulator(seed=seed, faults=[fault])
         raise AssertionError("no seed bends it so")
@@ -266,11 +295,12 @@ def seed_that_bends_digits(position):
     fault = Fault(FaultAction.GARBLE_REPLY, position=position)
     for seed in range(100):
         ((_, bent),) = FaultPlan(seed=seed).departures(b"5" * (position + 1), [fault])
-        if bent is not None and bent.isdigit():
+        if isinstance(bent, bytes) and bent.isdigit():
             return seed
     raise AssertionError("no seed bends it so")
 
 
+@pytest.mark.fault("F07")
 @pytest.mark.parametrize(
     "query", ["Print Speed(1)", "Print SpeedS(2)", "Print Power", "Print Tool"]
 )

@@ -43,6 +43,7 @@ def test_a_lost_answer_is_unknown_blocks_motion_and_is_settled_by_reading(serve,
         assert len(sent) == 1
 
 
+@pytest.mark.fault("F59")
 def test_a_value_that_is_neither_old_nor_new_is_a_conflict(serve):
     simulator = EpsonSimulator(seed=5, faults=[Fault(FaultAction.DROP_REPLY, match="$SetVar")])
     with serve(simulator) as url:

@@ -83,8 +83,11 @@ def check(case: Case, how: str, at: Instant, folder) -> None:
             check_put_right(cell, disturbance, offered=bool(at.number % 2))
 
 
+@pytest.mark.fault("F21", "F22", "F24")
 @pytest.mark.parametrize(("name", "how"), TESTS)
-def test_a_run_that_is_disturbed_leaves_all_or_nothing_and_says_what(tmp_path, instants, name, how):
+def test_f21_f22_f24_a_disturbed_run_leaves_all_or_nothing_and_says_what(
+    tmp_path, instants, name, how
+):
     case, whole = CASES[name], instants(name)
     if name.startswith("PLC"):
         whole = without_inner_polls(whole, POLLS)

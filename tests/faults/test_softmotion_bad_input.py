@@ -28,6 +28,7 @@ from robolink.errors import (
     OutcomeUnknownError,
     RejectedError,
     RemoteProtocolError,
+    TransportError,
 )
 from robolink.journal import memory_journal
 from robolink.model import ToolOffset, Verdict, WorkBox
@@ -74,6 +75,7 @@ def lift(controller):
     return group.move_to(above(group.pose(), 20.0), SLOW, box=ANYWHERE)
 
 
+@pytest.mark.fault("F33")
 @pytest.mark.parametrize(
     ("order", "meaning"),
     [
@@ -82,7 +84,7 @@ def lift(controller):
         ("halves_swapped", "halves swapped"),
     ],
 )
-def test_another_word_order_is_named_and_nothing_is_written(order, meaning):
+def test_f33_another_word_order_is_named_and_nothing_is_written(order, meaning):
     with plc_with(word_order=order) as cell:
         with pytest.raises(RemoteProtocolError, match=r"\+0 registers") as refusal:
             cell.connect()
@@ -91,7 +93,8 @@ def test_another_word_order_is_named_and_nothing_is_written(order, meaning):
         check_nothing_was_written(cell)
 
 
-def test_a_shifted_map_is_named_with_its_shift_and_nothing_is_written():
+@pytest.mark.fault("F34")
+def test_f34_a_shifted_map_is_named_with_its_shift_and_nothing_is_written():
     with plc_with(response=3, slots=500) as cell:
         cell.url = cell.url.replace("response=3", "response=0")
         with pytest.raises(RemoteProtocolError, match=r"\+3 registers") as refusal:
@@ -110,6 +113,7 @@ def test_a_unit_that_is_not_there_is_named():
     assert simulator.exchanges == 0
 
 
+@pytest.mark.fault("F70")
 def test_a_layout_of_another_major_version_is_refused_and_nothing_is_written(cell):
     response = cell.simulator.plc.response
     cell.simulator.plc.response = lambda now_ns: encode_response(
@@ -121,7 +125,8 @@ def test_a_layout_of_another_major_version_is_refused_and_nothing_is_written(cel
     check_nothing_was_written(cell)
 
 
-def test_a_mailbox_that_stands_still_is_not_met(cell):
+@pytest.mark.fault("F69")
+def test_f69_a_mailbox_that_stands_still_is_not_met(cell):
     cell.simulator.panel.freeze()
     with pytest.raises(ConnectError, match="stands still") as refusal:
         cell.connect()
@@ -129,7 +134,8 @@ def test_a_mailbox_that_stands_still_is_not_met(cell):
     check_nothing_was_written(cell)
 
 
-def test_a_heartbeat_that_freezes_during_a_movement_leaves_it_unknown_and_blocks_the_next(cell):
+@pytest.mark.fault("F69")
+def test_f69_a_heartbeat_that_freezes_during_a_movement_leaves_it_unknown_and_blocks_the_next(cell):
     with cell.connect() as controller:
         motion = lift(controller)
         cell.simulator.panel.freeze()
@@ -142,7 +148,8 @@ def test_a_heartbeat_that_freezes_during_a_movement_leaves_it_unknown_and_blocks
     assert cell.movements_started == 1
 
 
-def test_a_watchdog_that_zeroes_a_command_before_the_plc_saw_it_leaves_it_not_applied():
+@pytest.mark.fault("F30")
+def test_f30_a_watchdog_that_zeroes_a_command_before_the_plc_saw_it_leaves_it_not_applied():
     fault = PlcFault(PlcFaultAction.ZERO_INPUTS, match="write_command WRITE_TOOL")
     with plc_with(fault, program_cycle_us=20_000) as cell:
         with cell.connect(timeout_s=TIMEOUT_S) as controller:
@@ -156,7 +163,8 @@ def test_a_watchdog_that_zeroes_a_command_before_the_plc_saw_it_leaves_it_not_ap
         assert cell.slot_changes(SCRATCH) == 0
 
 
-def test_a_watchdog_that_zeroes_what_was_written_ends_the_movement_at_once():
+@pytest.mark.fault("F30")
+def test_f30_a_watchdog_that_zeroes_what_was_written_ends_the_movement_at_once():
     fault = PlcFault(PlcFaultAction.ZERO_INPUTS, match="write_command MOVE_LINEAR", seconds=0.02)
     with plc_with(fault) as cell, cell.connect() as controller:
         group = controller.groups[0]
@@ -170,6 +178,7 @@ def test_a_watchdog_that_zeroes_what_was_written_ends_the_movement_at_once():
         assert cell.movements_started == 1
 
 
+@pytest.mark.fault("F13")
 @pytest.mark.parametrize(
     ("seconds", "held", "verdict"),
     [(0.0, None, Verdict.NOT_APPLIED), (0.03, NEW, Verdict.DONE)],
@@ -190,6 +199,7 @@ def test_a_start_of_the_plc_in_the_middle_of_a_write_leaves_it_for_recover(secon
         assert cell.commands.count("WRITE_TOOL") == 1
 
 
+@pytest.mark.fault("F13")
 def test_a_start_of_the_plc_in_the_middle_of_a_movement_moves_nothing_afterwards(cell):
     with cell.connect() as controller:
         motion = lift(controller)
@@ -219,7 +229,8 @@ def test_an_owner_that_died_is_named_and_displaced_after_its_silence(cell):
     assert (cell.slot_changes(SCRATCH), cell.slot_changes(3)) == (1, 1)
 
 
-def test_an_owner_that_falls_silent_while_it_moves_is_halted_and_not_displaced(cell):
+@pytest.mark.fault("F23")
+def test_f23_an_owner_that_falls_silent_while_it_moves_is_halted_and_not_displaced(cell):
     with cell.connect() as controller:
         motion = lift(controller)
         cell.clock.advance(0.6)
@@ -262,6 +273,7 @@ def test_a_missing_permit_is_named_whether_it_is_seen_before_or_only_by_the_plc(
         assert cell.open_requests == []
 
 
+@pytest.mark.fault("F11")
 def test_a_can_node_whose_heartbeat_is_lost_leaves_the_movement_unknown(tmp_path):
     simulator = SoftMotionSimulator()
     with serve_canopen(simulator, CanPlace("virtual", tmp_path.name)) as host:
@@ -274,3 +286,23 @@ def test_a_can_node_whose_heartbeat_is_lost_leaves_the_movement_unknown(tmp_path
     assert "motion is blocked" in unknown.value.remedy
     assert [marker.request for marker in outcomes.open_markers()] == [unknown.value.request]
     assert simulator.plc.group.movements_started == 1
+
+
+@pytest.mark.fault("F70")
+def test_f70_a_program_that_is_exchanged_during_a_session_is_told_nothing_more(cell):
+    with cell.connect() as controller:
+        controller.take()
+        response = cell.simulator.plc.response
+        cell.simulator.plc.response = lambda now_ns: encode_response(
+            replace(decode_response(response(now_ns)), version=0x0200)
+        )
+        for change in (
+            lambda: controller.tools.write(SCRATCH, NEW, expected=None),
+            lambda: controller.tools.select(0),
+            lambda: lift(controller),
+        ):
+            with pytest.raises((RemoteProtocolError, TransportError)):
+                change()
+    assert cell.commands == []
+    assert cell.slot_changes(SCRATCH) == 0
+    assert cell.movements_started == 0

@@ -31,7 +31,8 @@ def written_by(step: Step) -> bool:
 
 
 @pytest.mark.parametrize("program", ["one tool", "two tools"])
-def test_a_change_on_a_plc_killed_at_each_step_is_recovered_as_a_whole(tmp_path, program):
+@pytest.mark.fault("F57", "F58")
+def test_f57_f58_a_change_on_a_plc_killed_at_each_step_is_recovered_as_a_whole(tmp_path, program):
     with plc_change_cell(tmp_path / "whole") as cell:
         all_steps = cell.steps_of(program)
         right = {tool: NEW[tool] if tool in cell.writes() else OLD[tool] for tool in OLD}
@@ -48,7 +49,8 @@ def test_a_change_on_a_plc_killed_at_each_step_is_recovered_as_a_whole(tmp_path,
     print(f"PLC, {program}: {len(steps)} kill points of {len(all_steps)}")  # noqa: T201 - for pytest -s
 
 
-def test_a_recovery_on_a_plc_killed_at_each_step_may_be_run_again(tmp_path):
+@pytest.mark.fault("F80")
+def test_f80_a_recovery_on_a_plc_killed_at_each_step_may_be_run_again(tmp_path):
     program = "two tools"
     with plc_change_cell(tmp_path / "change") as cell:
         half = next(step for step in cell.steps_of(program) if written_by(step))

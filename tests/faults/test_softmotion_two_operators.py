@@ -56,6 +56,7 @@ def bob(cell, folder):
     return OperatorProcess(cell.url, folder, "Bob", {1: BOBS}, stepwise=False).end()
 
 
+@pytest.mark.fault("F46")
 def test_who_shares_the_journal_is_told_who_has_the_lease(cell):
     ann = about_to(cell, "tool write")
     refused = bob(cell, cell.folder)
@@ -67,6 +68,7 @@ def test_who_shares_the_journal_is_told_who_has_the_lease(cell):
     assert cell.values_written() == [ANNS]
 
 
+@pytest.mark.fault("F46")
 def test_who_shares_no_journal_is_told_which_client_owns_the_mailbox(cell, other_pc):
     ann = about_to(cell, "journal write")
     refused = bob(cell, other_pc)
@@ -78,7 +80,8 @@ def test_who_shares_no_journal_is_told_which_client_owns_the_mailbox(cell, other
 
 
 @pytest.mark.parametrize("frozen_before", ["journal write", "tool write"])
-def test_a_frozen_owner_whose_mailbox_was_taken_writes_nothing_when_it_comes_back(
+@pytest.mark.fault("F47")
+def test_f47_a_frozen_owner_whose_mailbox_was_taken_writes_nothing_when_it_comes_back(
     cell, clock, other_pc, frozen_before
 ):
     ann = about_to(cell, frozen_before)
@@ -146,7 +149,8 @@ OVERTAKEN = frozenset({"RemoteProtocolError"})
 """The same to somebody who has asked for the mailbox and has written nothing yet."""
 
 
-def test_every_order_of_their_steps_ends_with_one_writer_after_the_other(tmp_path):
+@pytest.mark.fault("F46")
+def test_f46_every_order_of_their_steps_ends_with_one_writer_after_the_other(tmp_path):
     whole = os.environ.get("ROBOLINK_ALL_KILL_POINTS") == "1"
 
     @contextmanager

@@ -85,6 +85,7 @@ def test_a_second_terminal_stops_a_plc_itself(plc, beside, capsys):
     assert main.run(jog) == 0
 
 
+@pytest.mark.fault("F23")
 def test_a_movement_left_by_a_killed_jog_is_stopped(epson, beside, capsys):
     simulator, url = epson
     process = beside("-c", url, "jog", "x-5", "--speed", "1", "--yes")

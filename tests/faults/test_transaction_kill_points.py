@@ -41,7 +41,8 @@ LEFT: dict[str, tuple[str, str, str, list[int]]] = {
 
 
 @pytest.mark.parametrize("program", CHANGES)
-def test_a_change_killed_at_each_step_is_recovered_as_a_whole(tmp_path, program):
+@pytest.mark.fault("F57", "F58")
+def test_f57_f58_a_change_killed_at_each_step_is_recovered_as_a_whole(tmp_path, program):
     with change_cell(tmp_path / "whole") as cell:
         all_steps = cell.steps_of(program)
         right = {tool: NEW[tool] if tool in cell.writes() else OLD[tool] for tool in OLD}
@@ -80,7 +81,8 @@ def check_killed_recovery(cell: ChangeCell, left: str, all_steps: list[Step], st
 
 
 @pytest.mark.parametrize("left", LEFT)
-def test_a_recovery_killed_at_each_step_may_be_run_again(tmp_path, left):
+@pytest.mark.fault("F80")
+def test_f80_a_recovery_killed_at_each_step_may_be_run_again(tmp_path, left):
     program = LEFT[left][0]
     with change_cell(tmp_path / "change") as cell:
         change_steps = cell.steps_of(program)

@@ -52,7 +52,8 @@ ALIKE = ("one tool", "two tools")
 
 
 @pytest.mark.parametrize("pair", PAIRS)
-def test_every_order_of_their_steps_ends_with_one_writer_after_the_other(tmp_path, pair):
+@pytest.mark.fault("F46")
+def test_f46_every_order_of_their_steps_ends_with_one_writer_after_the_other(tmp_path, pair):
     whole = ALL or pair == "one tool"
     orders = Interleavings(alike=pair in ALIKE, most=None if whole else 5)
     ends = follow_orders(
@@ -123,6 +124,7 @@ def test_every_order_that_makes_a_difference_is_followed_once(ann, bob):
 
 
 @pytest.mark.parametrize("second_client", ["ignored", "closed"])
+@pytest.mark.fault("F46")
 def test_who_is_not_let_in_is_told_who_has_the_lease(tmp_path, second_client):
     with change_cell(tmp_path / "cell", second_client=second_client) as cell:
         ann = OperatorProcess(cell.url, cell.folder, "Ann", {1: WANTED[0]})
@@ -138,7 +140,8 @@ def test_who_is_not_let_in_is_told_who_has_the_lease(tmp_path, second_client):
         assert cell.writes() == [1]
 
 
-def test_a_frozen_holder_whose_lease_was_taken_sends_nothing_when_it_comes_back(tmp_path):
+@pytest.mark.fault("F47")
+def test_f47_a_frozen_holder_whose_lease_was_taken_sends_nothing_when_it_comes_back(tmp_path):
     with change_cell(tmp_path / "cell", SharedSimulator) as cell:
         ann = OperatorProcess(cell.url, cell.folder, "Ann", NEW)
         # The whole change, the write of tool 1 and its end are stored; that of tool 2 is next.

@@ -123,7 +123,17 @@ COMMANDS = {
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-@pytest.mark.parametrize("broken", BROKEN, ids=lambda broken: broken.__name__)
+@pytest.mark.parametrize(
+    "broken",
+    [
+        pytest.param(full_disk, marks=pytest.mark.fault("F61")),
+        read_only,
+        pytest.param(corrupt, marks=pytest.mark.fault("F62")),
+        pytest.param(newer, marks=pytest.mark.fault("F62")),
+        pytest.param(locked, marks=pytest.mark.fault("F63")),
+    ],
+    ids=lambda broken: broken.__name__,
+)
 def test_without_a_journal_nothing_is_changed(cell: NozzleCell, monkeypatch, broken, command):
     cause, remedy = BROKEN[broken]
     path = Path(os.environ["ROBOLINK_JOURNAL"])

@@ -11,6 +11,7 @@ from robolink_simulators.epson import EpsonSimulator
 from robolink_simulators.hosting.in_process.transport import InProcessTransport
 
 from robolink.controllers.epson import open_epson
+from robolink.controllers.epson.link.line import text_line
 from robolink.errors import RemoteProtocolError, RobolinkError
 from robolink.journal import memory_journal
 from robolink.model import ANY, Signature, ToolOffset
@@ -165,6 +166,7 @@ class Distorting(InProcessTransport):
 OLD, NEW = ToolOffset(12.5, -3.25, -20.0), ToolOffset(12.75, -3.0, -20.5)
 
 
+@pytest.mark.fault("F07")
 @fuzzed(20, 2500, data=st.data(), at=st.integers(0, 7))
 def test_the_driver_claims_nothing_that_is_not_so_whatever_is_answered(data, at):
     simulator, clock = EpsonSimulator(seed=3), ManualClock()
@@ -180,7 +182,7 @@ def test_the_driver_claims_nothing_that_is_not_so_whatever_is_answered(data, at)
 
     link.edit = edit
     said = None
-    controller = open_epson(link, outcomes=outcomes, timeout_s=0.5)
+    controller = open_epson(text_line(link), outcomes=outcomes, timeout_s=0.5)
     try:
         with suppress(RobolinkError):
             controller.status()

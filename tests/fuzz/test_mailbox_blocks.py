@@ -148,6 +148,7 @@ READS = (
 )
 
 
+@pytest.mark.fault("F07")
 @fuzzed(15, 2500, data=st.data())
 def test_the_driver_reads_or_refuses_whatever_a_plc_answers(data):
     cell = Cell()

@@ -64,6 +64,7 @@ def test_a_stop_that_was_accepted_is_no_rest_while_the_flag_is_on():
 
 
 @pytest.mark.parametrize("shown", [RUNNING, READY])
+@pytest.mark.fault("F76")
 def test_no_rest_in_time_is_unknown(shown):
     robot = Robot(aborts=1000, shown=shown)
     with pytest.raises(OutcomeUnknownError, match="did not come to rest within 5 s"):

@@ -100,8 +100,9 @@ def test_the_probe_lies_low_word_first():
     assert encode_response(SNAPSHOT)[84:88] == (0xFEC5, 0x7BB2, 0xB0F2, 0x4028)
 
 
+@pytest.mark.fault("F07")
 @pytest.mark.parametrize("name", BLOCKS)
-def test_any_single_flipped_bit_is_refused(name):
+def test_f07_any_single_flipped_bit_is_refused(name):
     words, decode = BLOCKS[name]
     for word in range(len(words)):
         if name == "command" and word == COMMAND["client_heartbeat"].word:
@@ -119,14 +120,16 @@ def test_the_heartbeat_may_change_alone():
     assert decode_command(one) == decode_command(other) == WRITE
 
 
+@pytest.mark.fault("F28", "F32")
 @pytest.mark.parametrize("cut", range(1, 64))
-def test_a_torn_command_is_refused(cut):
+def test_f28_f32_a_torn_command_is_refused(cut):
     old = encode_command(WRITE)
     new = encode_command(Command(4712, Opcode.SELECT_TOOL, owner=1))
     assert fault_of(decode_command, new[:cut] + old[cut:]) is BlockFault.TORN
     assert fault_of(decode_command, old[:cut] + new[cut:]) is BlockFault.TORN
 
 
+@pytest.mark.fault("F31")
 @given(st.integers(1, 111), st.tuples(*[st.floats(-500, 500)] * 6), st.integers(1, 65535))
 @settings(deadline=None, max_examples=100)
 def test_a_torn_snapshot_is_refused_or_is_one_of_the_two(cut, tcp, ack):
@@ -137,11 +140,13 @@ def test_a_torn_snapshot_is_refused_or_is_one_of_the_two(cut, tcp, ack):
         assert fault_of(decode_response, torn) in (BlockFault.TORN, BlockFault.CRC)
 
 
+@pytest.mark.fault("F29", "F30")
 def test_zeroes_are_no_command():
     # What a CODESYS watchdog leaves of the holding registers.
     assert fault_of(decode_command, (0,) * 64) is BlockFault.EMPTY
 
 
+@pytest.mark.fault("F30")
 @pytest.mark.parametrize("name", ["response", "slot"])
 def test_zeroes_are_nobodys_answer(name):
     words, decode = BLOCKS[name]

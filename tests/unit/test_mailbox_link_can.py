@@ -73,6 +73,7 @@ def test_nobody_there_is_named_and_the_transfer_given_up(link_to):
     assert "terminators" in caught.value.remedy
 
 
+@pytest.mark.fault("F11")
 def test_a_lost_heartbeat_names_itself_before_anything_is_sent(link_to):
     bus, link = link_to(node_with(200))
     sent = len(bus.sent)
@@ -149,8 +150,10 @@ def test_a_refused_download_says_why_sends_nothing_more_and_keeps_the_link(link_
     link.beat(1)
 
 
+@pytest.mark.fault("F04")
 @pytest.mark.parametrize("answered", [1, 2, 19])
-def test_a_download_that_is_cut_off_is_aborted_once_and_sends_nothing_more(link_to, answered):
+@pytest.mark.fault("F52")
+def test_f52_a_download_that_is_cut_off_is_aborted_once_and_sends_nothing_more(link_to, answered):
     left = [answered]
 
     def answer(data):
@@ -174,6 +177,7 @@ def toggled(service, data):
     return bytes([service | data[0] & 0x10]) + bytes(7)
 
 
+@pytest.mark.fault("F10")
 @pytest.mark.parametrize(
     "foreign",
     [
@@ -183,6 +187,7 @@ def toggled(service, data):
         b"\x60\x00\x21\0",  # too short
     ],
 )
+@pytest.mark.fault("F51")
 def test_an_answer_that_does_not_fit_aborts_the_transfer(link_to, foreign):
     bus, link = link_to(node_with(0, lambda data: [(SDO_ANSWER, foreign)]))
     with pytest.raises(RemoteProtocolError, match="something else than object 2100h:0"):
@@ -190,6 +195,7 @@ def test_an_answer_that_does_not_fit_aborts_the_transfer(link_to, foreign):
     assert [data[0] for _, data in bus.sent[2:]] == [0x21, 0x80]
 
 
+@pytest.mark.fault("F52")
 def test_a_segment_with_the_wrong_toggle_aborts_the_transfer(link_to):
     def answer(data):
         if data[0] & 0xE0 == 0x20:
@@ -229,7 +235,8 @@ def test_a_block_of_another_size_is_refused(link_to):
         link.read_slot(3)
 
 
-def test_a_bus_error_reaches_whoever_waits(link_to):
+@pytest.mark.fault("F50")
+def test_f50_a_bus_error_reaches_whoever_waits(link_to):
     bus, link = link_to(node_with(0))
     bus.failure = can.CanOperationError("the adapter was unplugged")
     with pytest.raises(TransportBrokenError, match="unplugged") as caught:
@@ -240,6 +247,7 @@ def test_a_bus_error_reaches_whoever_waits(link_to):
 
 
 @pytest.mark.parametrize("use", ["write_command", "beat"])
+@pytest.mark.fault("F50")
 def test_a_frame_that_cannot_be_sent_is_an_error_at_once(link_to, use):
     bus, link = link_to(node_with(0))
     bus.recv = lambda timeout: None
@@ -248,6 +256,7 @@ def test_a_frame_that_cannot_be_sent_is_an_error_at_once(link_to, use):
         link.write_command((0,) * 64) if use == "write_command" else link.beat(1)
 
 
+@pytest.mark.fault("F50")
 def test_bus_off_is_named_and_lesser_error_frames_are_not_the_end(link_to):
     bus, link = link_to(node_with(0))
     bus.hear((0x04, bytes(8)), is_error_frame=True)

@@ -4,7 +4,7 @@ from contextlib import suppress
 from itertools import pairwise
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from pymodbus.framer import FramerRTU, FramerSocket
 from pymodbus.pdu import DecodePDU
@@ -34,6 +34,7 @@ def rtu(payload, unit=5):
     return FramerRTU(DecodePDU(False)).encode(payload, unit, 0)
 
 
+@pytest.mark.fault("F05")
 @settings(max_examples=50, deadline=None)
 @given(words=WORDS, cuts=st.lists(st.integers(1, 260), max_size=5), serial=st.booleans())
 def test_an_answer_in_any_pieces_is_the_answer(words, cuts, serial):
@@ -51,6 +52,7 @@ def test_an_answer_in_any_pieces_is_the_answer(words, cuts, serial):
     assert not buffer
 
 
+@pytest.mark.fault("F07")
 @settings(max_examples=50, deadline=None)
 @given(
     words=st.lists(st.integers(0, 0xFFFF), min_size=3, max_size=3),
@@ -64,6 +66,18 @@ def test_a_damaged_byte_on_a_serial_line_never_gives_another_value(words, place,
         assert RtuFraming().take(frame) is None  # it seems to be longer: more is waited for
 
 
+@pytest.mark.fault("F08")
+@settings(max_examples=50, deadline=None)
+@given(words=st.lists(st.integers(0, 0xFFFF), min_size=3, max_size=3), place=st.integers(0, 9))
+def test_f08_swapped_neighbours_on_a_serial_line_never_give_another_value(words, place):
+    frame = bytearray(rtu(read_answer(words)))
+    assume(frame[place] != frame[place + 1])
+    frame[place], frame[place + 1] = frame[place + 1], frame[place]
+    with suppress(FrameError):
+        assert RtuFraming().take(frame) is None  # it seems to be longer: more is waited for
+
+
+@pytest.mark.fault("F06")
 def test_two_frames_that_arrive_together_are_two():
     first, second = read_answer([1, 2, 3]), read_answer([4, 5, 6])
     for framing, wrap in ((RtuFraming(), rtu), (TcpFraming(), tcp)):

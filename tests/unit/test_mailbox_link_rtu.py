@@ -37,6 +37,7 @@ def over_rtu(*steps, echo=False):
     return line, ModbusClient(line, exchange, identity=IDENTITY, unit=1, timeout_s=1.0)
 
 
+@pytest.mark.fault("F03")
 def test_a_serial_line_is_proved_in_step_before_its_first_answer_is_taken():
     stale = rtu(words(41))
     line, client = over_rtu(lambda frame: [rtu(words(42))])
@@ -45,6 +46,7 @@ def test_a_serial_line_is_proved_in_step_before_its_first_answer_is_taken():
     assert [frame[1:6].hex() for frame in line.sent] == ["0400000003", "0400000001"]
 
 
+@pytest.mark.fault("F02")
 def test_on_a_serial_line_a_late_answer_is_never_taken_for_the_next():
     late = rtu(words(41))
     line, client = over_rtu(
@@ -59,6 +61,7 @@ def test_on_a_serial_line_a_late_answer_is_never_taken_for_the_next():
     assert questions == ["0400000003", "0400000001", "0300000003", "0400010001"]
 
 
+@pytest.mark.fault("F02")
 def test_on_a_serial_line_an_unanswered_probe_is_not_asked_again_in_the_same_words():
     line, client = over_rtu(lambda frame: [], lambda frame: [], lambda frame: [])
     for _ in range(3):
@@ -127,6 +130,7 @@ def test_frames_on_a_serial_line_keep_their_distance():
     assert all(later - earlier >= 2_000_000 for earlier, later in pairwise(line.sent_at_ns))
 
 
+@pytest.mark.fault("F54")
 def test_a_line_that_never_falls_silent_is_named():
     line, client = over_rtu()
     line.coming = [(step * 5_000_000, b"\xff") for step in range(1000)]
@@ -150,6 +154,7 @@ def test_what_gathered_on_a_line_before_a_question_is_no_flood():
     assert client.read_input(0, 1) == (42,)
 
 
+@pytest.mark.fault("F54")
 def test_damage_on_a_serial_line_is_an_error_and_the_line_finds_its_place_again():
     damaged = bytearray(rtu(words(41)))
     damaged[3] ^= 1
@@ -160,12 +165,14 @@ def test_damage_on_a_serial_line_is_an_error_and_the_line_finds_its_place_again(
     assert not line.closed
 
 
+@pytest.mark.fault("F53")
 def test_an_echo_is_stripped_where_it_is_expected():
     line, client = over_rtu(lambda frame: [frame[:3], frame[3:] + rtu(words(42))], echo=True)
     assert client.read_input(0, 1) == (42,)
     assert len(line.sent) == 2
 
 
+@pytest.mark.fault("F53")
 def test_an_echo_that_nobody_expects_is_named():
     _, client = over_rtu(lambda frame: [frame[:5], frame[5:], *honest(frame)])
     with pytest.raises(RemoteProtocolError, match="returns what is sent") as caught:
@@ -174,6 +181,7 @@ def test_an_echo_that_nobody_expects_is_named():
 
 
 @pytest.mark.parametrize("heard", [b"\x01\x04\x00\x01", rtu(words(42))])
+@pytest.mark.fault("F53")
 def test_an_echo_that_does_not_come_is_named(heard):
     _, client = over_rtu(lambda frame: [heard], echo=True)
     with pytest.raises(RemoteProtocolError, match="did not return what was sent"):

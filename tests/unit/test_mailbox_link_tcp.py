@@ -29,6 +29,7 @@ def test_the_answer_with_the_number_of_the_request_is_taken():
     assert not line.closed
 
 
+@pytest.mark.fault("F09")
 def test_a_second_copy_of_an_answer_answers_nothing():
     _, client = over_tcp(
         lambda frame: [tcp(words(7), 1), tcp(words(7), 1)], lambda frame: [tcp(words(8), 2)]
@@ -37,6 +38,7 @@ def test_a_second_copy_of_an_answer_answers_nothing():
     assert client.read_input(1, 1) == (8,)
 
 
+@pytest.mark.fault("F01")
 def test_a_timeout_ends_the_link_and_nothing_is_sent_again():
     line, client = over_tcp(lambda frame: [])
     with pytest.raises(TransportTimeoutError, match=r"40001 \(address 0\) of unit 255") as caught:
@@ -48,6 +50,7 @@ def test_a_timeout_ends_the_link_and_nothing_is_sent_again():
     assert len(line.sent) == 1
 
 
+@pytest.mark.fault("F04")
 def test_half_an_answer_is_named_and_not_taken():
     _, client = over_tcp(lambda frame: [tcp(words(1, 2), 1)[:-1]])
     with pytest.raises(TransportTimeoutError, match="answered 12 bytes, then nothing") as caught:
@@ -55,6 +58,8 @@ def test_half_an_answer_is_named_and_not_taken():
     assert len(caught.value.raw) == 12
 
 
+@pytest.mark.fault("F67")
+@pytest.mark.fault("F10")
 def test_frames_that_never_stop_do_not_move_the_deadline():
     stream = [(after / 10, tcp(words(1), 99)) for after in range(100)]
     line, client = over_tcp(lambda frame: stream)
@@ -73,6 +78,7 @@ def test_frames_that_come_in_a_flood_are_named_before_the_deadline():
     assert len(stream) - len(line.coming) < 100
 
 
+@pytest.mark.fault("F10")
 @pytest.mark.parametrize(
     "answer",
     [tcp(words(1, 2), 1), tcp(words(1, function=3), 1), tcp(words(1), 1, unit=1)],
@@ -113,7 +119,8 @@ def test_a_server_that_has_hung_up_is_noticed_before_anything_is_sent():
         (99, RemoteProtocolError, "not in the standard"),
     ],
 )
-def test_a_refused_write_is_named_and_counts_as_not_done_only_when_that_is_sure(
+@pytest.mark.fault("F56")
+def test_f56_a_refused_write_is_named_and_counts_as_not_done_only_when_that_is_sure(
     code, kind, sentence
 ):
     line, client = over_tcp(lambda frame: [tcp(bytes([0x90, code]), 1)])

@@ -120,6 +120,7 @@ def test_numbers_of_a_newer_plc_are_kept():
     assert (response.state, response.error_class, response.bits.value) == (12, 488, 4096)
 
 
+@pytest.mark.fault("F37")
 def test_what_is_not_finite_reaches_the_plc_to_be_refused_there():
     command = Command(1, Opcode.MOVE_LINEAR, pose=(float("nan"),) * 6)
     assert all(value != value for value in decode_command(encode_command(command)).pose)

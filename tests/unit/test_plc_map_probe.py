@@ -31,6 +31,7 @@ def controller_with(**changes):
     return PlcMapController(client, wrong, memory_journal(URL).log(URL))
 
 
+@pytest.mark.fault("F33", "F34")
 @pytest.mark.parametrize(
     ("changes", "hint"),
     [

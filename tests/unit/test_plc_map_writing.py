@@ -312,6 +312,7 @@ def test_a_probe_that_went_wrong_after_connecting_holds_a_write_back(commit_bit)
     assert commit_bit.plc.writes == []
 
 
+@pytest.mark.fault("F37")
 def test_values_that_no_register_can_hold_are_refused_before_anything_is_sent(no_handshake):
     with no_handshake.connect() as controller:
         sent = controller.exchanges
@@ -330,6 +331,7 @@ def test_registers_that_do_not_keep_what_is_written_are_noticed(no_handshake):
             controller.tools.write(1, ToolOffset(1.5), expected=before)
 
 
+@pytest.mark.fault("F30")
 def test_all_zeros_are_a_lost_link_or_no_tool_as_the_map_says(no_handshake, level):
     no_handshake.program.memory.zero(RegisterTable.HOLDING)
     with no_handshake.connect() as controller:
@@ -416,6 +418,7 @@ def test_an_unconfirmed_map_is_refused_before_a_person_has_measured_anything():
             NozzleChange(controller, plan, operator=Nobody()).run(write=True)
 
 
+@pytest.mark.fault("F37")
 def test_a_number_that_cannot_be_true_is_not_taken_for_an_offset(commit_bit):
     with commit_bit.connect() as controller:
         commit_bit.program.memory.write(RegisterTable.HOLDING, 100, [0x4148, 0x0000])
@@ -423,6 +426,7 @@ def test_a_number_that_cannot_be_true_is_not_taken_for_an_offset(commit_bit):
             controller.tools.read(1)
 
 
+@pytest.mark.fault("F31")
 def test_registers_that_change_between_two_looks_are_looked_at_again(commit_bit):
     with commit_bit.connect() as controller:
         wanted = controller.tools.read(1)

@@ -141,6 +141,7 @@ EULER = {
 }
 
 
+@pytest.mark.fault("F40")
 @pytest.mark.parametrize("name", EULER)
 def test_each_rule_is_the_product_of_the_matrices_that_its_name_stands_for(read, name):
     axes, letters = EULER[name]
@@ -239,6 +240,7 @@ def test_a_file_that_is_no_list_of_poses_is_refused_with_its_line(read, text):
     assert caught.value.remedy
 
 
+@pytest.mark.fault("F37")
 @pytest.mark.parametrize("value", ["NaN", "inf", "1e999", "here"])
 def test_what_is_no_finite_number_is_named_with_its_line(read, value):
     with pytest.raises(CalibrationError, match="line 3: y is") as caught:

@@ -130,6 +130,7 @@ def test_a_logout_while_a_task_runs_may_be_refused_as_well(login):
     assert client.flags() == "00100001001"
 
 
+@pytest.mark.fault("F23")
 def test_what_runs_without_its_client_ends_with_the_remote_timeout(login):
     simulator = EpsonSimulator()
     client = login(simulator)

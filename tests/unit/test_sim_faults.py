@@ -51,7 +51,7 @@ def test_garbling_flips_one_bit_and_the_same_one_for_the_same_seed():
     ((_, first),) = FaultPlan(seed=3).departures(REPLY, [fault])
     ((_, again),) = FaultPlan(seed=3).departures(REPLY, [fault])
     assert first == again
-    assert first is not None
+    assert isinstance(first, bytes)
     flipped = int.from_bytes(first, "big") ^ int.from_bytes(REPLY, "big")
     assert flipped.bit_count() == 1
     assert len(first) == len(REPLY)

@@ -51,6 +51,7 @@ def test_a_command_is_looked_at_in_the_next_cycle_of_the_program():
     assert client.now().ack_head == 1
 
 
+@pytest.mark.fault("F27")
 def test_the_same_command_again_is_acknowledged_and_not_carried_out():
     client, _ = owning()
     command = client.command(
@@ -68,6 +69,7 @@ def test_the_same_command_again_is_acknowledged_and_not_carried_out():
     assert client.slot(3).counter == 3
 
 
+@pytest.mark.fault("F28")
 def test_a_block_with_two_ends_is_not_looked_at():
     client, _ = owning()
     words = list(encode_command(client.command(Opcode.READ_TOOL)))
@@ -102,6 +104,7 @@ def test_zeroed_inputs_are_no_command():
     assert (now.ack_head, now.rejected) == (client.sequence, 0)
 
 
+@pytest.mark.fault("F28", "F32")
 def test_a_block_that_arrives_in_two_parts_is_carried_out_when_it_is_whole():
     client, simulator = owning()
     simulator.faults.add(PlcFault(PlcFaultAction.TEAR_WRITE, match="SELECT_TOOL", seconds=0.1))

@@ -95,6 +95,7 @@ def silence(client, seconds):
     client.link.clock.sleep(seconds)
 
 
+@pytest.mark.fault("F23")
 def test_a_movement_is_halted_half_a_second_after_the_last_beat_and_the_tool_stays():
     client, _ = owning()
     sequence = client.move(z=-40.0, dynamics=(10.0, 100.0, 100.0, 1000.0)).ack_head

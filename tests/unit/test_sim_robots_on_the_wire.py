@@ -1,12 +1,14 @@
 """What robots of every kind print and take over Remote Ethernet."""
 
 import json
+import math
 from collections import defaultdict
 from pathlib import Path
 
 import pytest
 from robolink_simulators.cell.frames import zyx
 from robolink_simulators.epson import EpsonSimulator
+from robolink_simulators.epson.memory.points import frame_at
 
 from robolink.model import Elbow, Posture, Wrist
 from robolink.protocols.spel import parse_point, parse_where
@@ -124,6 +126,8 @@ def test_tools_take_six_values_and_locals_lean(robot):
         ("C8-C901S", "Go XY(0, 1500, 500, 90, 0, 180)", 4001),
         ("C8-C901S", "AvoidSingularity 5", 4002),
         ("T6-602S", "AvoidSingularity 1", 4028),
+        ("GX8-C453S", "Go JA(90, 146, -280, 0)", 4001),
+        ("GX8-C453C", "Go JA(90, -138, -250, 0)", 4001),
         ("T6-602S", "Go JA(0, 0, 0, 0, 0, 0)", 4028),
     ],
 )
@@ -184,3 +188,68 @@ def test_ljm_behind_a_movement_keeps_the_wrist_or_not(robot, flag, joint_5):
     run("Tool 0; Go JA(0, -35, 5, 0, -60, 0); P1 = Here /F +Z(1)")
     assert run(f"Go P1{flag}") == "0"
     assert float(run("Print Agl(5)")) == pytest.approx(joint_5, abs=1)
+
+
+def test_joint_2_of_gx8_c453_is_narrower_where_the_shaft_is_low(robot):
+    run = robot("GX8-C453S")
+    assert run("Tool 0; P1 = AglToPls(90, 146, -280, 0)") == "0"  # a point is not a way there
+    assert run("Go P1") == "!Execute,99"
+    run.client.ask("$Reset")
+    assert run("Go JA(90, 146, -260, 0); Go JA(90, 144, -280, 0)") == "0"
+    assert robot("GX8-C452S")("Go JA(90, 146, -190, 0)") == "0"
+
+
+def tip_along(robot, statement, share):
+    """Return where the tip is after a share of a movement's time, and let it end."""
+    machine = robot.client.simulator.machine
+    robot.client.ask(f'$Execute,"{statement}"')
+    start_ns, end_ns = robot.client.simulator.now_ns, machine.arm.next_change()
+    pose = machine.tip_at(machine.arm.position_at(start_ns + round(share * (end_ns - start_ns))))
+    while not robot.client.wait(1.0):
+        pass
+    return pose.coordinates()
+
+
+def frame_of_six(values):
+    x, y, z, u, v, w = values
+    return frame_at((x, y, z, u, v, w))
+
+
+def off_line_mm(place, start, end):
+    """Return how far a place is from a line."""
+    way = [b - a for a, b in zip(start[:3], end[:3], strict=True)]
+    seen = [b - a for a, b in zip(start[:3], place[:3], strict=True)]
+    along = sum(a * b for a, b in zip(way, seen, strict=True)) / sum(a * a for a in way)
+    return math.dist(seen, [along * a for a in way])
+
+
+def test_a_line_past_the_singular_wrist_is_left_and_come_back_to(robot):
+    """Across J5 = 0 joint 4 would turn over at once: the arm takes another path and returns."""
+    run = robot("C8-C901S")
+    run("Tool 0; P1 = JA(0, -35, 5, 60, -12, 0); P2 = JA(2, -35, 5, -60, -12, 120)")
+    run("Power High; SpeedS 200; Go P1")
+    start, end = (parse_point(run(f"Print {name}")).coordinates for name in ("P1", "P2"))
+    middle = tip_along(run, "Move P2", 0.5)
+    assert off_line_mm(middle, start, end) > 0.5
+    assert parse_point(run("Print Here")).coordinates == pytest.approx(end, abs=2e-3)
+    # So slowly that joint 4 keeps up it stays on the line.
+    run("Go P1; SpeedS 0.5")
+    middle = tip_along(run, "Move P2", 0.5)
+    assert off_line_mm(middle, start, end) < 1e-3
+
+
+def test_a_held_workpiece_is_led_past_an_external_control_point(robot):
+    """The point runs straight over the workpiece; the tip does not."""
+    run = robot("C8-C901S")
+    run("Tool 1; P1 = Here; P2 = Here +X(30) +Y(20) +TLU(40) +TLV(10)")
+    assert run("Move P2 ECP") == "!Execute,99"
+    assert run.client.code() == 4013
+    run.client.ask("$Reset")
+    run("ECPSet 1, Here +X(60) +Z(-40); ECP 1; SpeedS 50")
+    start, end = (parse_point(run(f"Print {name}")).coordinates for name in ("P1", "P2"))
+    point = frame_of_six(parse_point(run("Print ECPSet(1)")).coordinates)
+    middle = tip_along(run, "Move P2 ECP", 0.5)
+    seen = [(frame_of_six(at).inverse() @ point).shift_mm for at in (middle, start, end)]
+    assert off_line_mm(*seen) < 1e-2
+    assert off_line_mm(middle, start, end) > 1.0
+    assert parse_point(run("Print Here")).coordinates == pytest.approx(end, abs=2e-3)

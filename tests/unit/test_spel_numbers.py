@@ -27,12 +27,14 @@ def test_a_decimal_has_fixed_places_and_zero_has_no_sign(value, places, text):
     assert decimal(value, places) == text
 
 
+@pytest.mark.fault("F37")
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
 def test_what_is_not_finite_is_never_written(value):
     with pytest.raises(ConfigError):
         decimal(value)
 
 
+@pytest.mark.fault("F36")
 @settings(max_examples=100, deadline=None)
 @given(st.floats(-1e9, 1e9))
 def test_a_written_decimal_reads_back_within_half_of_its_last_digit(value):
@@ -74,8 +76,9 @@ WRONG = [
 ]
 
 
+@pytest.mark.fault("F38")
 @pytest.mark.parametrize("text", [*WRONG, "1.0E+999", "1.0E5", "\u00a01", "Tool 1"])
-def test_anything_else_is_no_number(text):
+def test_f38_anything_else_is_no_number(text):
     with pytest.raises(RemoteProtocolError) as caught:
         parse_number(text)
     assert caught.value.raw == text.encode()
@@ -87,6 +90,7 @@ def test_a_printed_whole_number_is_read(text, value):
     assert parse_integer(text) == value
 
 
+@pytest.mark.fault("F38")
 @pytest.mark.parametrize("text", [*WRONG, "1.0", "9" * 5000, "True"])
 def test_anything_else_is_no_whole_number(text):
     with pytest.raises(RemoteProtocolError):

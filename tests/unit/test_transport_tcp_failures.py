@@ -140,6 +140,8 @@ def test_no_further_address_is_tried_when_the_deadline_has_passed(sockets):
     assert (len(first.tried), len(second.tried)) == (1, 0)
 
 
+@pytest.mark.fault("F75")
+@pytest.mark.fault("F11")
 def test_a_dead_peer_is_noticed_within_three_seconds(sockets):
     (made,) = sockets(None)
     dial(URL, timeout_s=3.0, deadline=Deadline.after(FakeClock(), 3.0))

@@ -12,6 +12,7 @@ import click
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.pose_tables import NOTHING_SAID, ReadingChoices
+from robolink_cli.options.numbers import decimal
 from robolink_cli.options.pose_reading import reading_options
 
 if TYPE_CHECKING:
@@ -220,7 +221,7 @@ def point_numbers(text: str) -> tuple[int, ...]:
 
 def _typed_pose(text: str) -> tuple[float, ...]:
     try:
-        numbers = tuple(float(part) for part in text.split(","))
+        numbers = tuple(decimal(part.strip()) for part in text.split(","))
     except ValueError as error:
         raise _no_pose(text) from error
     if len(numbers) not in _STATED:

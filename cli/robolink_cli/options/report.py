@@ -139,12 +139,11 @@ class ReportDraft:
 
     def finish(self, error: BaseException | None) -> "Report":
         """Return the report of a change that ended with ``error``, or well."""
-        from datetime import UTC, datetime
-
         from robolink.report import Report
+        from robolink.timing import wall_time
 
         return Report(
-            made_at=datetime.now(UTC).isoformat(timespec="seconds"),
+            made_at=wall_time().isoformat(timespec="seconds"),
             robolink_version=__version__,
             controller=self._controller,
             facts=self._facts,

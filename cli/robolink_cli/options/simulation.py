@@ -13,7 +13,9 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 def simulation_options(function: F) -> F:
-    """Add ``--seed``, ``--state``, ``--speed``, ``--option``, ``--allow-remote``, ``--world``."""
+    """Add ``--seed``, ``--state``, ``--speed``, ``--option``, ``--allow-remote``, ``--faults``,
+    ``--world``.
+    """  # noqa: D205 - one sentence over two lines
     options = (
         seed_option,
         click.option(
@@ -37,6 +39,7 @@ def simulation_options(function: F) -> F:
             help="A habit of the device; a wrong name lists them all. May be repeated.",
         ),
         allow_remote_option,
+        faults_option,
         click.option(
             "--world",
             multiple=True,
@@ -80,4 +83,13 @@ def allow_remote_option(function: F) -> F:
     """Add ``--allow-remote``."""
     return click.option(
         "--allow-remote", is_flag=True, help="Listen where other machines can reach it, too."
+    )(function)
+
+
+def faults_option(function: F) -> F:
+    """Add ``--faults``."""
+    return click.option(
+        "--faults",
+        type=click.Path(exists=True, dir_okay=False, path_type=Path),
+        help="What is planned to go wrong: a file, as docs/fault-plans.md explains.",
     )(function)

@@ -11,6 +11,7 @@ from robolink.controllers.epson.io.pending_values import PendingValues
 from robolink.controllers.epson.io.raw_statements import RawStatements
 from robolink.controllers.epson.io.variables import EpsonVariables
 from robolink.controllers.epson.link.identity import FactReader
+from robolink.controllers.epson.link.line import EpsonLine, open_line
 from robolink.controllers.epson.link.link import EpsonLink
 from robolink.controllers.epson.link.session import EpsonSession
 from robolink.controllers.epson.motion.acts import EpsonActs
@@ -32,7 +33,7 @@ from robolink.model import (
     Secret,
 )
 from robolink.protocols.epson_text import Preference
-from robolink.transport import LinkUrl, TracingTransport, Transport, open_transport
+from robolink.transport import LinkUrl
 
 
 class EpsonController(ControllerCore):
@@ -216,11 +217,12 @@ def open_epson_url(url: LinkUrl, terms: ConnectionTerms, /) -> Controller:
         LeaseHeldError: Nobody answers the login, and somebody else has the controller.
         RobolinkError: As :func:`open_epson`, and as the transport.
     """
-    transport = open_transport(url, timeout_s=terms.timeout_s, clock=terms.clock)
-    outcomes = terms.record_of(transport)
+    traces = () if terms.trace is None else (terms.trace,)
+    line = open_line(url, timeout_s=terms.timeout_s, clock=terms.clock, traces=traces)
+    outcomes = terms.record_of(line.transport)
     try:
         return open_epson(
-            transport if terms.trace is None else TracingTransport(transport, terms.trace),
+            line,
             outcomes=outcomes,
             password=terms.password,
             timeout_s=terms.timeout_s,
@@ -235,22 +237,26 @@ def open_epson_url(url: LinkUrl, terms: ConnectionTerms, /) -> Controller:
 
 
 def open_epson(
-    transport: Transport,
+    line: EpsonLine,
     *,
     outcomes: OutcomeLog,
     password: Secret | None = None,
     timeout_s: float = 3.0,
     remote_timeout_s: float = 60.0,
 ) -> EpsonController:
-    """Log in and return the controller; the transport is closed when that fails.
+    """Log in and return the controller; the line is closed when that fails.
 
     Raises:
         LoginRefusedError: Wrong or missing password. One attempt is made.
         LoginUnansweredError: Nobody answers; another client may be logged in.
     """
-    session = EpsonSession(transport, timeout_s=timeout_s)
+    session = EpsonSession(line, timeout_s=timeout_s)
     try:
         session.login(password)
+        if session.outlived:
+            from robolink.controllers.epson.link.in_step import prove_in_step
+
+            prove_in_step(session)
     except BaseException:
         session.close()
         raise

@@ -66,4 +66,6 @@ class FlangeReader(MotionGroupCore):
         """Refuse, as :meth:`move_to` does."""
         self.move_to(purpose)
 
-    move_until_input = requests_until = requests_for = terms = stop = move_to
+    move_until_input = requests_until = requests_for = obstacle = deceleration_mm_s2 = terms = (
+        stop
+    ) = move_to

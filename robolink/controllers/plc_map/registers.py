@@ -1,10 +1,10 @@
 """Reads and writes the places of a map, one exchange at a time."""
 
-import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Final, Protocol
 
+from robolink import ambient
 from robolink.checkpoints import Checkpoint, checkpoint
 from robolink.errors import RemoteProtocolError
 from robolink.interrupts import InterruptGate
@@ -72,7 +72,7 @@ class Registers:
         self.gate = InterruptGate()
         self.gate.open()
         self.latch = StopLatch(client.identity)
-        self._writing = threading.Lock()
+        self._writing = ambient.lock()
 
     def read(self, table: RegisterTable, addresses: range) -> tuple[int, ...]:
         """Return what stands there, in one request."""

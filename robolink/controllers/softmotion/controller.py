@@ -1,9 +1,9 @@
 """An axis group of a CODESYS SoftMotion PLC behind its mailbox, and meeting one."""
 
-import secrets
 from functools import cached_property
 from typing import TYPE_CHECKING, Final
 
+from robolink import ambient
 from robolink.controllers.controller_core import ControllerCore
 from robolink.controllers.registry import ConnectionTerms
 from robolink.controllers.softmotion.facts import MailboxFacts, set_kinematics
@@ -258,7 +258,7 @@ def open_softmotion(
         ConnectError: The mailbox program does not run.
         RemoteProtocolError: It is no mailbox of this version, or its words stand elsewhere.
     """
-    wire = MailboxWire(link, owner=owner or 1 + secrets.randbelow(0xFFFF_FFFF), timeout_s=timeout_s)
+    wire = MailboxWire(link, owner=owner or ambient.random_number(32), timeout_s=timeout_s)
     try:
         snapshots = Snapshots(wire)
         snapshots.meet()

@@ -25,6 +25,16 @@ _PAGE_BYTES: Final = 2048
 half of SQLite's usual size makes it about 8 % quicker; a quarter hardly more, and then the
 longer entries no longer fit."""
 
+_NOTICED: Final = {
+    "connect_timeout": int(BUSY_S),
+    "tcp_user_timeout": round(BUSY_S * 1000),
+    "keepalives_idle": 1,
+    "keepalives_interval": 1,
+    "keepalives_count": 2,
+}
+"""A server whose network is cut is missed after :data:`BUSY_S`, also in the middle of a transaction
+(docs/reference/faults.md F78); the system's own patience is two hours."""
+
 _SCHEMA_LOCK: Final = 0x726F626F  # any number that no other user of the database takes
 
 _BEGIN: Final = "BEGIN IMMEDIATE"
@@ -153,7 +163,7 @@ def _postgresql(place: JournalPlace, *, read_only: bool) -> Backend:
             place.url,
             poolclass=NullPool,
             paramstyle="format",  # prepared statements are given their values by place
-            connect_args={"connect_timeout": int(BUSY_S)},
+            connect_args=dict(_NOTICED),
         )
     except ImportError as error:
         raise JournalError(

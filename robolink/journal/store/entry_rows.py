@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
-from datetime import UTC, datetime
 from functools import lru_cache
 from typing import Any, Final, TypeAlias, TypeVar
 
@@ -12,7 +11,8 @@ from robolink.journal._records import Filter
 from robolink.journal.store.chain import canonical, digest, storable
 from robolink.journal.store.prepared import Prepared, StatementRunner
 from robolink.journal.store.tables import ENTRIES, HEAD, IN_A_CHANGE
-from robolink.model import EntryKind, NewEntry, Signature
+from robolink.model import PROOFS, EntryKind, NewEntry, Signature
+from robolink.timing import wall_time
 
 T = TypeVar("T")
 
@@ -22,8 +22,6 @@ _LOOKS: Final = 100
 """After so many in which others wrote each time something else is wrong."""
 
 # The kinds whose value was read on the controller.
-_PROVING: Final = (EntryKind.READ_BACK, EntryKind.DONE, EntryKind.ROLLED_BACK)
-
 # What is recorded of a controller without anything being changed on it.
 _NO_HISTORY: Final = (EntryKind.IDENTITY, EntryKind.RECONNECT, EntryKind.LEASE)
 
@@ -141,7 +139,7 @@ def _chained(
     head: _Head, common: Mapping[str, Any], change: str, entries: Sequence[NewEntry]
 ) -> list[dict[str, Any]]:
     number, previous = head
-    common = {**common, "at": datetime.now(UTC).isoformat(timespec="milliseconds")}
+    common = {**common, "at": wall_time().isoformat(timespec="milliseconds")}
     rows = []
     details, text = None, ""
     for entry in entries:
@@ -190,7 +188,7 @@ def _common(controller: str, signature: Signature) -> dict[str, Any]:
 
 
 def _fields(entry: NewEntry, change: str) -> dict[str, Any]:
-    proves = entry.kind in _PROVING and "value" in entry.details
+    proves = entry.kind in PROOFS and "value" in entry.details
     return {
         "kind": entry.kind.value,
         "change": storable(entry.change or change),

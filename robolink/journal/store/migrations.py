@@ -154,10 +154,29 @@ def _names_metadata() -> MetaData:
     return metadata
 
 
-MIGRATIONS: tuple[Callable[[Connection], None], ...] = (_first_tables, _names)
+def _robots(connection: Connection) -> None:
+    """Let each robot of a controller with several have its own record.
+
+    Entries of before tell only the controller. They are chained and stay as they are: listed,
+    exported and verified under its name, and taken for none of its robots
+    (docs/decisions/0025-each-robot-of-a-controller-has-its-record.md).
+    """
+    _create(connection, _robots_metadata)
+
+
+def _robots_metadata() -> MetaData:
+    metadata = MetaData()
+    Table("robots", metadata, Column("name", Text, primary_key=True), _text("controller"))
+    return metadata
+
+
+MIGRATIONS: tuple[Callable[[Connection], None], ...] = (_first_tables, _names, _robots)
 
 NAMED: Final = 2
 """From this version on a journal tells names from addresses."""
+
+OF_ROBOTS: Final = 3
+"""From this version on it tells the robots of one controller from each other."""
 
 
 def stored_version(connection: Connection, name: str) -> int:

@@ -11,7 +11,14 @@ from sqlalchemy import BindParameter, bindparam, func, insert, select, update
 
 from robolink.journal.store.chain import storable
 from robolink.journal.store.prepared import UNLESS_THERE, Prepared, StatementRunner
-from robolink.journal.store.tables import ADDRESSES, ENTRIES, FORMER_NAMES, LEASES, MARKERS
+from robolink.journal.store.tables import (
+    ADDRESSES,
+    ENTRIES,
+    FORMER_NAMES,
+    LEASES,
+    MARKERS,
+    ROBOTS,
+)
 
 _OF: Final[BindParameter[object]] = bindparam("of_name")
 _TO: Final[BindParameter[object]] = bindparam("to_name")
@@ -40,6 +47,11 @@ _SUCCEED: Final = Prepared(insert(FORMER_NAMES).values(name=_OF, controller=_TO)
 _PASS_ON: Final = Prepared(
     update(FORMER_NAMES).where(FORMER_NAMES.c.controller == _OF).values(controller=_TO)
 )
+_ROBOTS_OF: Final = Prepared(
+    select(ROBOTS.c.name).where(ROBOTS.c.controller == _OF).order_by(ROBOTS.c.name)
+)
+_ROBOT: Final = Prepared(insert(ROBOTS).values(name=_OF, controller=_TO), UNLESS_THERE)
+_MOVE_ROBOT: Final = Prepared(update(ROBOTS).where(ROBOTS.c.name == _OF).values(controller=_TO))
 _MOVE_MARKERS: Final = Prepared(
     update(MARKERS).where(MARKERS.c.controller == _OF).values(controller=_TO)
 )
@@ -67,11 +79,13 @@ class NameRows:
         runner: Runs statements.
         known: Whether the journal has these tables: one that an older robolink made, opened
             for reading only, has none, and there each name is its own.
+        robots_known: Whether it has that of the robots.
     """
 
-    def __init__(self, runner: StatementRunner, *, known: bool) -> None:
+    def __init__(self, runner: StatementRunner, *, known: bool, robots_known: bool) -> None:
         self._runner = runner
         self._known = known
+        self._robots_known = robots_known
 
     def at(self, address: str) -> str:
         """Return who was met last at an address, empty for nobody."""
@@ -92,6 +106,10 @@ class NameRows:
     def former(self, controller: str) -> tuple[str, ...]:
         """Return the other names under which a controller has entries."""
         return self._all(_FORMER, controller)
+
+    def robots(self, controller: str) -> tuple[str, ...]:
+        """Return the names under which robots of a controller have entries of their own."""
+        return self._all(_ROBOTS_OF, controller) if self._robots_known else ()
 
     def in_use(self, name: str) -> bool:
         """Whether anything is on record under ``name`` itself."""
@@ -118,6 +136,18 @@ class NameRows:
         for statement in (_PASS_ON, _MOVE_MARKERS, _MOVE_LEASE):
             self._runner.run(statement, values)
         return True
+
+    def note_robot(self, robot: str, controller: str) -> None:
+        """Make a robot one of a controller's; what is open under its name goes there too.
+
+        Entries stay the robot's. A marker or a lease under its name is from when it was the
+        only robot of that controller, and they hold for the whole controller.
+        """
+        values = _pair(robot, controller)
+        if not self._runner.run(_ROBOT, values):
+            self._runner.run(_MOVE_ROBOT, values)
+        for statement in (_MOVE_MARKERS, _MOVE_LEASE):
+            self._runner.run(statement, values)
 
     def _one(self, statement: Prepared, name: str) -> str:
         rows = self._runner.rows(statement, {"of_name": storable(name)}) if self._known else ()

@@ -7,7 +7,6 @@ the whole journal; ``verify`` reads the rest.
 """
 
 import os
-import threading
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
 from typing import Final
@@ -15,6 +14,7 @@ from typing import Final
 from sqlalchemy import Connection, Engine
 from sqlalchemy.exc import SQLAlchemyError
 
+from robolink import ambient
 from robolink.checkpoints import Checkpoint, checkpoint
 from robolink.errors import JournalError
 from robolink.journal._places import JournalPlace
@@ -56,7 +56,11 @@ class Tables:
         self.entries = EntryRows(connection, self.runner)
         self.markers = MarkerRows(self.runner)
         self.leases = LeaseRows(self.runner)
-        self.names = NameRows(self.runner, known=version >= migrations.NAMED)
+        self.names = NameRows(
+            self.runner,
+            known=version >= migrations.NAMED,
+            robots_known=version >= migrations.OF_ROBOTS,
+        )
         self.newer = version > len(migrations.MIGRATIONS)
         self.self_checks = self_checks
 
@@ -94,7 +98,7 @@ class Store:
     def __init__(self, place: JournalPlace, *, read_only: bool) -> None:
         self._place = place
         self._read_only = read_only
-        self._lock = threading.RLock()
+        self._lock = ambient.reentrant_lock()
         self._backend: Backend | None = None
         self._tables: Tables | None = None
         self._file: tuple[int, int] | None = None

@@ -63,4 +63,6 @@ ADDRESSES: Final = table(
 
 FORMER_NAMES: Final = table("former_names", column("name", Text), column("controller", Text))
 
+ROBOTS: Final = table("robots", column("name", Text), column("controller", Text))
+
 SCHEMA_VERSION: Final = table("schema_version", column("version", Integer))

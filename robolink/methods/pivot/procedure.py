@@ -15,6 +15,7 @@ from robolink.calibration import (
     solve_pivot,
 )
 from robolink.messages import tr
+from robolink.methods.pivot.reach import proving_in_reach, tilts_in_reach
 from robolink.methods.pivot.swing import tilt_in_air
 from robolink.methods.pivot.tilts import UPRIGHT, OverPin, Tilt
 from robolink.model import Pose, ToolOffset
@@ -44,7 +45,8 @@ def measure_pivot(
 
     Args:
         plan: Lift and clearance.
-        tilts: Orientations of the further touches, counted from the first one.
+        tilts: Orientations of the further touches, counted from the first one; where the arm
+            cannot take them up over this pin, others are chosen.
         stored: The offset stored now; the approaches use it. Where it is wrong by e, the tip comes
             down nearer to the pin by up to 2 e sin(tilt / 2).
         sigma_mm: Standard deviation of one coordinate of one touch, where it is known.
@@ -71,7 +73,9 @@ def pivot_then_lift(
     """Do what :func:`measure_pivot` does; return the pose of the lifted flange as well."""
     touches = PinTouches(plan, planar=False)
     first = yield from touches.first(UPRIGHT)
-    swing = _Swing(plan, OverPin.touched(first, stored), touches)
+    over = OverPin.touched(first, stored)
+    tilts = yield from tilts_in_reach(over, tilts, plan.lift_mm)
+    swing = _Swing(plan, over, touches)
     tilting = _PivotSampler(swing, stored, sigma_mm)
     result = yield from sample_sequentially(tilting, first, [UPRIGHT, *tilts], sampling)
     yield from swing.to(UPRIGHT)
@@ -106,6 +110,7 @@ def verify_by_tilting(
         CalibrationError: ``not_tilted``, and ``not_touched`` or ``typed_ahead`` with the tip drawn
             back.
     """
+    tilts = yield from proving_in_reach(over, tilts, plan.lift_mm)
     swing = _Swing(plan, over, PinTouches(plan, planar=False))
     proof = DriftProof(tolerance_mm, plan.u_drift_mm if u_mm is None else u_mm)
     by_place = {over.pose(tilt, 0.0).u_deg: tilt for tilt in tilts}

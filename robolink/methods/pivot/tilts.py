@@ -1,7 +1,7 @@
 """How a tool is tilted over a pin: in which orientations, and on which way from one to the next."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -85,14 +85,32 @@ def informative_tilts(count: int, tilt_deg: float) -> tuple[Tilt, ...]:
         count: How many.
         tilt_deg: How far the tool leans.
     """
-    choice = [Tilt(turn, lean) for turn in TURNS_DEG for lean in (tilt_deg, -tilt_deg)]
+    return best_tilts(tilts_around(tilt_deg), count)
+
+
+def tilts_around(tilt_deg: float) -> list[Tilt]:
+    """Return the orientations among which those of a measurement are chosen."""
+    return [Tilt(turn, lean) for turn in TURNS_DEG for lean in (tilt_deg, -tilt_deg)]
+
+
+def best_tilts(choice: Sequence[Tilt], count: int) -> tuple[Tilt, ...]:
+    """Return the ``count`` orientations that tell the most beside the first one, the best first."""
     turned = np.array([rotation_of(OverPin(_ANYWHERE, _ORIGIN).pose(one, 0.0)) for one in choice])
     return tuple(choice[index] for index in select_poses(turned, np.eye(3)[np.newaxis], count))
 
 
 def proving_tilts(tilt_deg: float) -> tuple[Tilt, ...]:
     """Return the orientations that prove a tip: not measured in, and half a turn apart."""
-    return Tilt(30.0, tilt_deg), Tilt(-150.0, tilt_deg)
+    return proving_pairs(tilt_deg)[0]
+
+
+def proving_pairs(tilt_deg: float) -> list[tuple[Tilt, Tilt]]:
+    """Return the pairs among which the proof chooses, the most telling first."""
+    return [
+        (Tilt(turn, lean), Tilt(turn - 180.0, lean))
+        for lean in (tilt_deg, -tilt_deg, tilt_deg / 2, -tilt_deg / 2)
+        for turn in (30.0, 90.0, 150.0)
+    ]
 
 
 def tilt_path(start: Tilt, goal: Tilt) -> Iterator[Tilt]:

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from robolink.calibration import (
+    USUAL_DECELERATION_MM_S2,
     Drift,
     FlangePlane,
     Touch,
@@ -36,6 +37,7 @@ def measure_z_touch(
     here: Pose,
     stored: ToolOffset | None,
     sigma_mm: float | None = None,
+    deceleration_mm_s2: float | None = None,
 ) -> Procedure[ZTouchResult]:
     """Measure Z of a tip by touching a surface. Runs in Tool 0; see :func:`sample_sequentially`.
 
@@ -45,6 +47,7 @@ def measure_z_touch(
         here: Where the flange is.
         stored: The offset stored now; the tip is expected there.
         sigma_mm: Standard deviation of one touch, where it is known.
+        deceleration_mm_s2: How the robot brakes, where its controller told it.
 
     Raises:
         CalibrationError: ``tilted_pose`` before anything moves; ``no_edge``, ``edge_passed``, and
@@ -52,6 +55,7 @@ def measure_z_touch(
     """
     solvable_planes([here], height_of(stored))
     probing = _ZTouchSampler(station, plan, here, stored or NO_OFFSET, here, stored, sigma_mm, here)
+    probing.deceleration_mm_s2 = deceleration_mm_s2
     first = yield from probing.take(plan.speeds_mm_s[0])
     return (yield from sample_sequentially(probing, first, plan.speeds_mm_s, plan.sampling))
 
@@ -64,6 +68,7 @@ def verify_by_touching(
     angles_deg: Sequence[float],
     tolerance_mm: float,
     aside: ToolOffset = NO_OFFSET,
+    deceleration_mm_s2: float | None = None,
 ) -> Procedure[VerifyResult]:
     """Turn about the new tip and touch the surface there again. Runs in the new tool.
 
@@ -75,6 +80,7 @@ def verify_by_touching(
         tolerance_mm: Largest drift that passes.
         aside: Where the tip is expected, seen from the frame in force; not 0 where a difference
             to a reference was written.
+        deceleration_mm_s2: As for :func:`measure_z_touch`.
 
     Raises:
         CalibrationError: As :func:`measure_z_touch`.
@@ -82,6 +88,7 @@ def verify_by_touching(
     drifts = []
     for angle_deg in angles_deg:
         probing = _ZTouchSampler(station, plan, replace(here, u_deg=angle_deg), aside, here)
+        probing.deceleration_mm_s2 = deceleration_mm_s2
         touches = []
         for speed_mm_s in plan.speeds_mm_s:
             touches.append((yield from probing.take(speed_mm_s)))
@@ -103,6 +110,7 @@ class _ZTouchSampler:
         here: Where the frame is.
         stored, sigma_mm: As for :func:`measure_z_touch`.
         flange: A pose of the flange, where the frame is the flange: Z is along its axis.
+        deceleration_mm_s2: How the robot brakes, where its controller told it.
         near: Whether the frame is at the clearance or below, not above the surface.
     """
 
@@ -114,6 +122,7 @@ class _ZTouchSampler:
     stored: ToolOffset | None = None
     sigma_mm: float | None = None
     flange: Pose | None = None
+    deceleration_mm_s2: float | None = None
     near: bool = False
 
     @property
@@ -148,6 +157,8 @@ class _ZTouchSampler:
             stored=self.stored,
             flange=self.flange,
             sigma_mm=self.sigma_mm,
+            deceleration_mm_s2=self.deceleration_mm_s2 or USUAL_DECELERATION_MM_S2,
+            deceleration_told=self.deceleration_mm_s2 is not None,
         )
 
     def foreseen(self, place: float) -> Touch:

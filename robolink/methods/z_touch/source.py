@@ -1,8 +1,12 @@
 """A surface in the cell that switches an input when a tip touches it."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
-from robolink.calibration import CalibrationResult, VerifyResult, seen_from
+from robolink.calibration import (
+    CalibrationResult,
+    VerifyResult,
+    seen_from,
+)
 from robolink.messages import tr
 from robolink.methods.z_touch.parameters import ZTouchParameters
 from robolink.model import Pose, ToolOffset
@@ -19,11 +23,13 @@ class ZTouchSource(InputSource[ZTouchParameters]):
         station: Where the surface is.
         plan: How it is touched.
         sigma_mm: Standard deviation of one touch, where it is known.
+        deceleration_mm_s2: How the robot brakes, where its controller told it.
     """
 
     station: TouchStation
     plan: ZTouchParameters = field(default_factory=ZTouchParameters)
     sigma_mm: float | None = None
+    deceleration_mm_s2: float | None = None
 
     @property
     def sentence(self) -> str:
@@ -35,12 +41,26 @@ class ZTouchSource(InputSource[ZTouchParameters]):
         """What to do when a measurement makes the tip jump."""
         return tr("Clean the tip and the surface, and look whether the nozzle sits firmly.")
 
+    def measure(
+        self, context: MeasurementContext, tool: int, stored: ToolOffset | None
+    ) -> CalibrationResult:
+        """Touch and solve; see :class:`~robolink.procedures.MovingSource`."""
+        braking = replace(self, deceleration_mm_s2=_told_braking(context))
+        return InputSource.measure(braking, context, tool, stored)
+
     def _steps(
         self, stored: ToolOffset | None, here: Pose, plan: ZTouchParameters
     ) -> Procedure[CalibrationResult]:
         from robolink.methods.z_touch.procedure import measure_z_touch  # numpy, late
 
-        return measure_z_touch(self.station, plan, here=here, stored=stored, sigma_mm=self.sigma_mm)
+        return measure_z_touch(
+            self.station,
+            plan,
+            here=here,
+            stored=stored,
+            sigma_mm=self.sigma_mm,
+            deceleration_mm_s2=self.deceleration_mm_s2,
+        )
 
     def verify(
         self,
@@ -64,5 +84,11 @@ class ZTouchSource(InputSource[ZTouchParameters]):
             angles_deg=(toward_zero(here.u_deg, self.plan.proof_turn_deg),),
             tolerance_mm=tolerance_mm,
             aside=seen_from(result.offset, tip),
+            deceleration_mm_s2=_told_braking(context),
         )
         return context.run(procedure, tip=result.offset)
+
+
+def _told_braking(context: MeasurementContext) -> float | None:
+    """Return how the robot brakes, ``None`` where its controller does not tell."""
+    return context.controller.groups[0].deceleration_mm_s2() or None

@@ -190,6 +190,19 @@ class MotionGroup(Protocol):
     def requests_for(self, target: Pose, profile: MotionProfile) -> tuple[str, ...]:
         """Return what :meth:`move_to` would send besides its reads, as it stands on the wire."""
 
+    def obstacle(self, target: Pose, path: Path) -> str:
+        """Return why the arm could not go there so, a sentence; empty where nothing is known.
+
+        Reads only, and is no promise: it is for whoever has other places to choose from. The
+        target is meant for the tool in force.
+        """
+
+    def deceleration_mm_s2(self) -> float | None:
+        """Read how it brakes in straight movements, ``None`` where it does not tell.
+
+        By that it comes to rest beyond the edge of an input that ends a movement.
+        """
+
     def require_able(self, purpose: str) -> None:
         """Refuse what no movement could begin in now; reads only.
 

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from typing import Final
 
 
 class EntryKind(StrEnum):
@@ -27,6 +28,15 @@ class EntryKind(StrEnum):
     STATION = "station"
     IDENTITY = "identity"
     BACKUP = "backup"
+
+
+PROOFS: Final = (
+    EntryKind.READ_BACK,
+    EntryKind.DONE,
+    EntryKind.NOT_APPLIED,
+    EntryKind.ROLLED_BACK,
+)
+"""Entries whose value was read from the controller: the newest tells what a tool holds."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,12 +1,12 @@
 """Durable markers of what was begun and not proved finished."""
 
-import os
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Protocol
 
+from robolink import ambient
 from robolink.errors import ConfigError
 from robolink.model._identity import Who
 from robolink.model.record.journal_entries import EntryKind, NewEntry, Recorded, Signature
@@ -24,7 +24,7 @@ class MarkerKind(StrEnum):
 
 def new_operation() -> str:
     """Return a unique id for a command or a tool change."""
-    return os.urandom(16).hex()
+    return ambient.random_bytes(16).hex()
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +77,14 @@ class OutcomeLog(Protocol):
     @property
     def names(self) -> tuple[str, ...]:
         """Every name under which the controller is on record, its identity first."""
+
+    @property
+    def robot(self) -> str:
+        """Of a controller with several robots the name of the one whose record this is.
+
+        Markers and the lease hold for the whole controller; tools, stations and what was done
+        to them are on record of the robot in force. Empty where there is one robot.
+        """
 
     @property
     def remarks(self) -> tuple[str, ...]:

@@ -1,9 +1,9 @@
 """How a tip is taken off what it touches, and how near the robot brings it again."""
 
-import secrets
 from dataclasses import dataclass, replace
 from typing import Final
 
+from robolink import ambient
 from robolink.calibration import (
     PERSON_SIGMA_Z_MM,
     PERSON_U_DRIFT_MM,
@@ -52,7 +52,7 @@ class TouchPlan:
 
 def fresh_seed() -> int:
     """Return the seed of a run: nobody can know the standoffs of a run before it."""
-    return secrets.randbits(_SEED_BITS)
+    return ambient.random_number(_SEED_BITS)
 
 
 def plain_pose(pose: Pose) -> Pose:

@@ -116,6 +116,11 @@ class EpsonTextCodec:
         """What has arrived and is part of no event yet, for messages about half a reply."""
         return self._buffer.held
 
+    @staticmethod
+    def carries(name: str) -> bool:
+        """Whether a command of this name can be sent: here all, known or not to the firmware."""
+        return bool(name)
+
     def send(self, event: Event) -> bytes:
         """Return the bytes of one message.
 

@@ -8,6 +8,7 @@ if TYPE_CHECKING:
     from robolink.protocols.spel._queries import RobotType as RobotType
     from robolink.protocols.spel._queries import list_tools as list_tools
     from robolink.protocols.spel._queries import parse_robot_type as parse_robot_type
+    from robolink.protocols.spel._queries import print_braking as print_braking
     from robolink.protocols.spel._queries import print_here as print_here
     from robolink.protocols.spel._queries import print_joint_angle as print_joint_angle
     from robolink.protocols.spel._queries import print_motor as print_motor
@@ -69,7 +70,7 @@ else:
         __name__,
         {
             "_queries": (
-                "RobotType list_tools parse_robot_type print_here print_joint_angle "
+                "RobotType list_tools parse_robot_type print_braking print_here print_joint_angle "
                 "print_motor print_output "
                 "print_point print_point_defined print_power print_real_position "
                 "print_robot print_robot_model print_robot_serial print_robot_type "

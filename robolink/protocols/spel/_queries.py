@@ -156,6 +156,11 @@ def print_speed_s(index: int) -> Statement:
     return Statement(f"Print SpeedS({_which(index)})")
 
 
+def print_braking() -> Statement:
+    """Deceleration of straight movements in mm/s^2 (docs/reference/spel.md 7.2)."""
+    return Statement("Print AccelS(2)")
+
+
 def print_joint_angle(joint: int) -> Statement:
     """The commanded angle of joint 1 to 6 in degrees, mm for a linear joint."""
     check_range(tr("A joint"), joint, 1, _LAST_JOINT)

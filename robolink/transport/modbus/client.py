@@ -4,10 +4,10 @@ Nothing is sent twice and no connection is renewed by itself
 (docs/decisions/0004-no-silent-retry.md). Addresses count from 0, as on the wire.
 """
 
-import threading
 from collections.abc import Sequence
 from typing import Protocol
 
+from robolink import ambient
 from robolink.errors import (
     ConfigError,
     RemoteProtocolError,
@@ -88,7 +88,7 @@ class ModbusClient:
         self._identity = identity
         self._unit = unit
         self._timeout_s = timeout_s
-        self._lock = threading.Lock()
+        self._lock = ambient.lock()
 
     @property
     def identity(self) -> str:

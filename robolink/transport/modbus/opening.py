@@ -1,7 +1,7 @@
 """From a URL to a Modbus client."""
 
 from dataclasses import dataclass, replace
-from typing import Final, Literal
+from typing import Final
 
 from robolink.errors import ConfigError, ConnectError, TransportTimeoutError
 from robolink.messages import tr
@@ -15,7 +15,11 @@ from robolink.transport.modbus.register_frames import RegisterRtuFraming, Regist
 from robolink.transport.modbus.rtu import RtuExchange, RtuLine
 from robolink.transport.modbus.tcp import TcpExchange
 from robolink.transport.stream.dial import dial
-from robolink.transport.stream.serial_port import SerialSettings, open_serial
+from robolink.transport.stream.serial_port import (
+    SerialSettings,
+    open_serial,
+    take_settings,
+)
 from robolink.transport.stream.tcp import TcpTransport
 
 TCP_MEDIUM: Final = "modbus-tcp"
@@ -30,8 +34,6 @@ _QUIET_CHARACTERS: Final = 10
 _QUIET_S: Final = 0.02
 """USB adapters hand over what they receive every 16 ms; a shorter pause is not silence."""
 
-_PARITIES: Final[dict[str, Literal["N", "E", "O"]]] = {"even": "E", "none": "N", "odd": "O"}
-_STOP_BITS: Final[dict[str, Literal[1, 2]]] = {"1": 1, "2": 2}
 _NO_YES: Final = {"no": False, "yes": True}
 
 
@@ -130,7 +132,7 @@ def _open_rtu(
     clock: Clock,
 ) -> ModbusClient:
     unit = options.take_int("unit", _DEFAULT_UNITS[RTU_MEDIUM], 1, 247)
-    settings = _take_settings(options)
+    settings = take_settings(options, baud=19_200, parity="even", stop_bits_without_parity="2")
     echo = options.take_choice("echo", "no", _NO_YES)
     options.finish()
     timed = settings.baud <= _FASTEST_TIMED_BAUD
@@ -158,13 +160,6 @@ def _open_rtu(
 
 def _identity(url: LinkUrl, unit: int) -> str:
     return url.identity + (f"?unit={unit}" if unit != _DEFAULT_UNITS[url.medium] else "")
-
-
-def _take_settings(options: UrlOptions) -> SerialSettings:
-    baud = options.take_int("baud", 19_200, 300, 4_000_000)
-    parity = options.take_choice("parity", "even", _PARITIES)
-    stop_bits = options.take_choice("stopbits", "2" if parity == "N" else "1", _STOP_BITS)
-    return SerialSettings(baud, parity, stop_bits)
 
 
 def _nobody_there(

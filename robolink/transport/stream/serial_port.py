@@ -4,7 +4,8 @@ pyserial waits a short slice at a time and the deadline is looked at between sli
 its own time-out would set up the whole port anew. So a deadline may be overrun by one slice.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Any, Final, Literal
 
 from robolink.errors import (
@@ -16,8 +17,9 @@ from robolink.errors import (
     TransportTimeoutError,
 )
 from robolink.messages import tr
-from robolink.timing import Clock, Deadline
+from robolink.timing import Clock, Deadline, SystemClock
 from robolink.transport._url import LinkUrl
+from robolink.transport._url_options import UrlOptions
 
 _SLICE_S: Final = 0.02
 _CHUNK_BYTES: Final = 4096
@@ -33,6 +35,11 @@ def _settings_refused() -> tuple[type[Exception], ...]:
 
 
 _REFUSALS: Final[tuple[type[Exception], ...]] = (OSError, *_settings_refused())
+
+_PARITIES: Final[Mapping[str, Literal["N", "E", "O"]]] = {"even": "E", "none": "N", "odd": "O"}
+_STOP_BITS: Final[Mapping[str, Literal[1, 2]]] = {"1": 1, "2": 2}
+_SERVERS: Final = {"socket": "socket", "rfc2217": "rfc2217"}
+_BAUD_RATES: Final = (300, 4_000_000)
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +60,57 @@ class SerialSettings:
     def character_s(self) -> float:
         """How long one character of 8 data bits takes, in seconds."""
         return (9 + (self.parity != "N") + self.stop_bits) / self.baud
+
+
+def take_settings(
+    options: UrlOptions, *, baud: int | None, parity: str, stop_bits_without_parity: str = "1"
+) -> SerialSettings:
+    """Take ``baud``, ``parity`` and ``stopbits`` from the options of a URL.
+
+    Args:
+        options: Those that nobody has taken yet.
+        baud: Where the URL names none; ``None`` where it has to.
+        parity: Where the URL names none: even, none or odd.
+        stop_bits_without_parity: Where the URL names none and there is no parity.
+
+    Raises:
+        ConfigError: One is missing, or cannot be.
+    """
+    rate = options.take_int("baud", baud, *_BAUD_RATES)
+    checked = options.take_choice("parity", parity, _PARITIES)
+    usual = stop_bits_without_parity if checked == "N" else "1"
+    return SerialSettings(rate, checked, options.take_choice("stopbits", usual, _STOP_BITS))
+
+
+def open_serial_line(
+    url: LinkUrl, *, timeout_s: float, clock: Clock | None = None
+) -> "SerialTransport":
+    """Open a line of bytes: a port of this machine, or one of a device server.
+
+    Args:
+        url: ``KIND+serial:///dev/ttyUSB0?baud=38400``, ``KIND+serial://COM3?baud=38400``, or
+            ``KIND+serial://host:4001?server=socket`` where a device server owns the port.
+            ``server=rfc2217`` sets baud rate, parity and stop bits there; with ``socket`` they
+            are set on the server itself. ``baud`` has to be said, for the factory setting of no
+            remote port is known; ``parity`` is none and ``stopbits`` 1 unless said.
+        timeout_s: Longest wait for the line to take what is sent.
+        clock: Replaces the machine's clock.
+
+    Raises:
+        ConfigError: The URL or an option is wrong.
+        ConnectError: The port, or the server, is missing, forbidden or used by another program.
+    """
+    options = UrlOptions(url)
+    settings = take_settings(options, baud=None, parity="none")
+    clock = clock or SystemClock()
+    if url.port is None:
+        options.finish()
+        return open_serial(url, settings, timeout_s=timeout_s, clock=clock)
+    server = options.take_choice("server", "", _SERVERS)
+    options.finish()
+    host = f"[{url.host}]" if ":" in url.host else url.host
+    far = f"{server}://{host}:{url.port}"
+    return _opened(far, replace(url, options={}), settings, timeout_s=timeout_s, clock=clock)
 
 
 def serial_device(url: LinkUrl) -> str:
@@ -85,18 +143,27 @@ def open_serial(
         ConfigError: The URL names no port, or the port cannot be set like this.
         ConnectError: The port is missing, forbidden or used by another program.
     """
+    return _opened(serial_device(url), url, settings, timeout_s=timeout_s, clock=clock)
+
+
+def _opened(
+    device: str, url: LinkUrl, settings: SerialSettings, *, timeout_s: float, clock: Clock
+) -> "SerialTransport":
     import serial
 
-    device = serial_device(url)
+    more: dict[str, object] = {}
+    if not device.startswith("rfc2217:"):
+        more["write_timeout"] = timeout_s  # pyserial has none there
+    if "://" not in device:
+        more["exclusive"] = True  # a device server keeps its port to one client itself
     try:
-        port = serial.Serial(
+        port = serial.serial_for_url(
             device,
             settings.baud,
             parity=settings.parity,
             stopbits=settings.stop_bits,
             timeout=_SLICE_S,
-            write_timeout=timeout_s,
-            exclusive=True,
+            **more,
         )
     except ValueError as error:
         raise ConfigError(

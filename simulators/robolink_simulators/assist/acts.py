@@ -10,6 +10,7 @@ from robolink_simulators.assist.parameters import Answer, Parameters
 from robolink_simulators.assist.plc_acts import PLC_ACTS
 from robolink_simulators.assist.world_acts import WORLD_ACTS
 from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.faults import fault_as_keys
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 
 Assisted = EpsonSimulator | SoftMotionSimulator
@@ -34,7 +35,17 @@ def perform(simulator: Assisted, request: Parameters) -> Answer:
 
 
 def _acts_at(simulator: Assisted) -> Mapping[str, Callable[[Parameters], Answer]]:
-    world = {name: partial(act, simulator.world) for name, act in WORLD_ACTS.items()}
+    world: dict[str, Callable[[Parameters], Answer]] = {
+        name: partial(act, simulator.world) for name, act in WORLD_ACTS.items()
+    }
+    world["faults"] = partial(_faults, simulator)
     if isinstance(simulator, EpsonSimulator):
         return {name: partial(act, simulator) for name, act in EPSON_ACTS.items()} | world
     return {name: partial(act, simulator) for name, act in PLC_ACTS.items()} | world
+
+
+def _faults(simulator: Assisted, _request: Parameters) -> Answer:
+    return {
+        "fired": [fault_as_keys(fault) for fault in simulator.faults.fired],
+        "pending": [fault_as_keys(fault) for fault in simulator.faults.pending],
+    }

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Final
 
 from robolink.model import Secret
+from robolink.protocols.epson_binary import Dialect
 from robolink.protocols.epson_text import BadRequest, ErrorCode, Request, StatusFlags
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.epson.arm.robots import find_robot
@@ -26,8 +27,9 @@ from robolink_simulators.epson.flash import Flash
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.variables import project_variables
 from robolink_simulators.epson.mishaps import EpsonMishaps
-from robolink_simulators.epson.options import EpsonOptions
+from robolink_simulators.epson.options import EpsonOptions, serial_dialect
 from robolink_simulators.epson.panel import EpsonPanel
+from robolink_simulators.epson.remote.bent_requests import arriving
 from robolink_simulators.epson.remote.client_slot import ClientSlot
 from robolink_simulators.epson.remote.command_window import SpelWindow
 from robolink_simulators.epson.remote.commands import CommandDesk
@@ -42,6 +44,7 @@ from robolink_simulators.epson.spel.tasks.ports import Ports
 from robolink_simulators.epson.spel.tasks.runner import ProgramRunner
 from robolink_simulators.epson.world import World
 from robolink_simulators.faults import Departure, Fault, FaultAction, FaultPlan
+from robolink_simulators.faults.links import EPSON_LINKS
 from robolink_simulators.serial_numbers import drawn_serial
 
 _LOG_LINES: Final = 2000
@@ -111,11 +114,12 @@ class EpsonSimulator:
         self.watchers: list[Callable[[], None]] = []
         self.present_ns: Callable[[], int] | None = None
         self._now_ns = 0
+        # Until when all is done: a transport asks for one and the same instant several times.
+        self._settled_ns = -1
         self._stepping = False
-        self.url = ""
-        self.seed = seed
+        self.url, self.seed = "", seed
         self.options = options or EpsonOptions()
-        self.faults = FaultPlan(faults, seed)
+        self.faults = FaultPlan(faults, seed, links=EPSON_LINKS)
         self.exchanges = 0
         self.log: deque[tuple[int, str, str]] = deque(maxlen=_LOG_LINES)
         self.on_request: RequestHook | None = None
@@ -181,7 +185,7 @@ class EpsonSimulator:
             options=self.options,
             acting=self.acting,
         )
-        self._mishaps = EpsonMishaps(self.panel)
+        self._mishaps = EpsonMishaps(self.panel, self.restart)
         self._session = interpreter.session
         self.program: ProgramRunner | None = None
 
@@ -215,13 +219,12 @@ class EpsonSimulator:
         """
         with self.acting():
             project = load_project(self._session, programs, points)
-            runner = ProgramRunner(self._session, self.condition, project, Ports(ports))
-            self.program = runner
+            self.program = ProgramRunner(self._session, self.condition, project, Ports(ports))
             if "robolink_begin" in project.preserved():
                 self._companion = None  # the real one is part of the project
-            starter = partial(_start, runner, lambda: self._now_ns)
+            starter = self.program.starter(lambda: self._now_ns)
             self._desk.starter = self.panel.starter = starter
-            return runner
+            return self.program
 
     def status_flags(self) -> StatusFlags:
         """Return the flags as they are, whatever the client may be shown."""
@@ -234,14 +237,24 @@ class EpsonSimulator:
             # A planned act happens at its own instant, in the middle of an advance.
             if self.present_ns is not None and not self._stepping:
                 self.advance(self.present_ns())
-            yield self._now_ns
+            try:
+                yield self._now_ns
+            finally:
+                self._settled_ns = -1
         for watcher in tuple(self.watchers):
             watcher()
 
     def connect(self, now_ns: int) -> EpsonServerLink:
         """Accept one client; see ``EpsonOptions.second_client``."""
+        return self._connected(None, now_ns)
+
+    def connect_serial(self, now_ns: int) -> EpsonServerLink:
+        """Listen at a serial line to whoever turns Remote RS232 on there."""
+        return self._connected(serial_dialect(self.options), now_ns)
+
+    def _connected(self, dialect: Dialect | None, now_ns: int) -> EpsonServerLink:
         self.advance(now_ns)
-        link = EpsonServerLink(self, now_ns)
+        link = EpsonServerLink(self, now_ns, dialect=dialect)
         self._links.append(link)
         if self._slot.client is not None and self.options.second_client == "closed":
             link.cut()
@@ -249,6 +262,8 @@ class EpsonSimulator:
 
     def advance(self, now_ns: int) -> None:
         """Let simulated time reach ``now_ns``, stopping wherever something changes."""
+        if now_ns == self._settled_ns:
+            return
         while (change := self.next_change()) is not None and self._now_ns < change < now_ns:
             self._step(change)
         self._step(max(now_ns, self._now_ns))
@@ -263,8 +278,7 @@ class EpsonSimulator:
             self.machine.timed_bits.next_change(),
             *[link.next_change() for link in self._links],
         )
-        changes = [time_ns for time_ns in times if time_ns is not None]
-        return min(changes) if changes else None
+        return min((time_ns for time_ns in times if time_ns is not None), default=None)
 
     def restart(self) -> None:
         """Switch off and on: links are cut, all but the flash and the variables is forgotten."""
@@ -288,18 +302,38 @@ class EpsonSimulator:
 
     def take(self, link: EpsonServerLink, event: Request | BadRequest) -> None:
         """Deal with a request of a client; while another is logged in, it is not heard."""
-        shown = shown_request(event)
+        self._settled_ns, shown = -1, shown_request(event)
         self.log.append((self._now_ns, ">", shown))
-        if self._slot.client not in (None, link):
-            if self.options.second_client == "closed":
-                link.cut()
+        if not self._slot.hears(link, cuts=self.options.second_client == "closed"):
             return
+        faults = self.faults.take(shown)
+        silence = self.options.requests_end_with_silence
+        heard = arriving(link, event, faults, self.faults, unterminated=silence)
+        if heard is None:
+            return
+        self._mishaps.strike(faults, self._now_ns)
+        if link.over:  # a restart has cut it
+            return
+        self._carry_out(link, heard, shown, faults)
+        again = partial(self._carry_out, link, heard, shown, ())
+        for fault in faults:
+            if fault.action is FaultAction.DUPLICATE_REQUEST:
+                self._mishaps.plan(self._now_ns, fault.seconds, again)
+
+    def take_late(self, link: EpsonServerLink, event: Request | BadRequest) -> None:
+        """Deal with a request that was under way while its link carried nothing."""
+        if self._slot.hears(link, cuts=self.options.second_client == "closed"):
+            self._carry_out(link, event, shown_request(event), ())
+
+    def _carry_out(
+        self,
+        link: EpsonServerLink,
+        event: Request | BadRequest,
+        shown: str,
+        faults: tuple[Fault, ...],
+    ) -> None:
         self._requests += 1
-        exchange = PendingRequest(self._requests, event.name, self.faults.take(shown), link)
-        if exchange.meets(FaultAction.DISCONNECT_BEFORE):
-            link.cut()
-            return
-        self._mishaps.strike(exchange.faults, self._now_ns)
+        exchange = PendingRequest(self._requests, event.name, faults, link)
         try:
             if self.on_request is not None:
                 self.on_request(exchange.number, shown)
@@ -311,8 +345,11 @@ class EpsonSimulator:
         """Count a reply and return what of it leaves, when."""
         self._flash.save_changes()
         self.exchanges += 1
-        self.log.append((self._now_ns, "<", shown_reply(reply)))
+        # A login that was bent may come back in its refusal.
+        echoed = bool(exchange.faults) and reply[:1] == b"!"
+        self.log.append((self._now_ns, "<", "***" if echoed else shown_reply(reply)))
         if not exchange.faults:
+            self.faults.remember(reply)
             return ((0.0, reply),)
         return self.faults.departures(reply, exchange.faults)
 
@@ -323,6 +360,7 @@ class EpsonSimulator:
 
     def forget(self, link: EpsonServerLink) -> None:
         """A connection is over; what runs goes on or not, as the option says."""
+        self._settled_ns = -1
         if self._slot.client is link:
             # Production that another device started is not this client's to supervise.
             own = self._service.unfinished and not self.condition.monitoring_only
@@ -344,27 +382,19 @@ class EpsonSimulator:
                 self._companion.publish_changes()
             self._supervise(now_ns)
             self._flash.save_changes()
+            self._settled_ns = now_ns
         finally:
             self._stepping = False
 
     def _supervise(self, now_ns: int) -> None:
         """Keep the time-outs of docs/reference/epson.md 1.1."""
-        unfinished = self._service.unfinished
-        self._slot.settle(unfinished=unfinished)
-        deadline = self._slot.deadline(unfinished=unfinished)
-        if deadline is not None and now_ns >= deadline:
-            client = self._slot.client
-            self._slot.free()
-            watches_only = self.condition.monitoring_only
-            if not watches_only or self.options.monitoring_timeout == "error":
-                self._window.interrupt(now_ns)
-                self.condition.raise_error(ErrorCode.TIMED_OUT)
-            if client is not None:
-                client.cut()
+        overdue, client = self._slot.overdue(now_ns, unfinished=self._service.unfinished)
+        watches_only = self.condition.monitoring_only
+        if overdue and (not watches_only or self.options.monitoring_timeout == "error"):
+            self._window.interrupt(now_ns)
+            self.condition.raise_error(ErrorCode.TIMED_OUT)
+        if client is not None:
+            client.cut()
         for link in self._links:
             link.supervise(now_ns)
         self._links = [link for link in self._links if not link.drained]
-
-
-def _start(runner: ProgramRunner, now_ns: Callable[[], int], number: int) -> None:
-    runner.start(f"main{number or ''}", now_ns())

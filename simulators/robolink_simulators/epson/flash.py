@@ -25,7 +25,7 @@ class Flash:
         self._path = path
         self._machine = machine
         # Nothing is written yet: a serial number that was drawn is kept at the first occasion.
-        self._written: tuple[int, ...] | None = None
+        self._written: list[tuple[int, int]] | None = None
 
     def restore(self) -> None:
         """Give the machine the tools and the serial number of the file, if there is one.
@@ -81,6 +81,6 @@ class Flash:
             document["other_tools"] = [other.tools.to_state() for other in others]
         save_state(self._path, document)
 
-    def _mark(self) -> tuple[int, ...]:
-        selected = [robot.tools.selected for robot in self._machine.robots]
-        return (self._machine.flash_writes, *selected)
+    def _mark(self) -> list[tuple[int, int]]:
+        tables = [robot.tools for robot in self._machine.robots]
+        return [(tools.flash_writes, tools.selected) for tools in tables]

@@ -1,6 +1,6 @@
 """Planned emergency stops, opened guards and errors, at once or some seconds from now."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from robolink.timing import NS_PER_S
 from robolink_simulators.epson.panel import EpsonPanel
@@ -8,11 +8,24 @@ from robolink_simulators.faults import Fault, FaultAction
 
 
 class EpsonMishaps:
-    """Does to the panel what a fault plan says, when it says."""
+    """Does to the panel what a fault plan says, when it says.
 
-    def __init__(self, panel: EpsonPanel) -> None:
+    Args:
+        panel: What hands can touch.
+        restart: Starts the controller anew.
+    """
+
+    def __init__(self, panel: EpsonPanel, restart: Callable[[], None]) -> None:
         self._panel = panel
         self._planned: list[tuple[int, Callable[[], None]]] = []
+        self._acts: Mapping[FaultAction, Callable[[], None]] = {
+            FaultAction.ESTOP: panel.press_estop,
+            FaultAction.GUARD_OPEN: panel.open_guard,
+            FaultAction.SERIOUS_ERROR: panel.raise_serious_error,
+            FaultAction.LOSE_LOGIN: panel.lose_login,
+            FaultAction.TEACH_MODE: panel.teach,
+            FaultAction.RESTART: restart,
+        }
 
     def strike(self, faults: Sequence[Fault], now_ns: int) -> None:
         """Do what is due now, and note what comes later."""
@@ -20,10 +33,14 @@ class EpsonMishaps:
             act = self._act_of(fault)
             if act is None:
                 continue
-            if fault.seconds > 0:
-                self._planned.append((now_ns + round(fault.seconds * NS_PER_S), act))
-            else:
-                act()
+            self.plan(now_ns, fault.seconds, act)
+
+    def plan(self, now_ns: int, seconds: float, act: Callable[[], None]) -> None:
+        """Have something done some time from now; at once when that is no time at all."""
+        if seconds > 0:
+            self._planned.append((now_ns + round(seconds * NS_PER_S), act))
+        else:
+            act()
 
     def next_change(self) -> int | None:
         """Return when the next one is due."""
@@ -43,12 +60,6 @@ class EpsonMishaps:
         self._planned.clear()
 
     def _act_of(self, fault: Fault) -> Callable[[], None] | None:
-        match fault.action:
-            case FaultAction.ESTOP:
-                return self._panel.press_estop
-            case FaultAction.GUARD_OPEN:
-                return self._panel.open_guard
-            case FaultAction.DEVICE_FAULT:
-                return lambda: self._panel.raise_error(fault.code)
-            case _:
-                return None
+        if fault.action is FaultAction.DEVICE_FAULT:
+            return lambda: self._panel.raise_error(fault.code)
+        return self._acts.get(fault.action)

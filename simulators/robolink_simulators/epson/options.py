@@ -14,6 +14,7 @@ from typing import Final, Literal
 from robolink.errors import ConfigError
 from robolink.files.named import read_named
 from robolink.messages import tr
+from robolink.protocols.epson_binary import Dialect, Letters, NakCode, Numbers
 from robolink_simulators.option_values import require_known, values_from_text
 
 
@@ -144,6 +145,13 @@ class EpsonOptions:
         globals_at_start: Start clears global variables that are not preserved [D for the Run
             window], or keeps them.
         ports_of_ended_task: A task that ends closes its ports, or leaves them open [U].
+        rs232_numbers: How Remote RS232 writes numbers [D in three languages, D otherwise in one].
+        rs232_nak_code: How the code of a refusal is written there [U].
+        rs232_letters: Which letters are understood: those that a manual prints, or also the
+            upper-case twins of readers, v and A [U].
+        rs232_status_flags: Flags of GetStatus there [D for RC+ 5; 11 are likely since RC+ 7].
+        rs232_word_port_bytes: Length of the number of a port of words there [U].
+        rs232_eot_answer: What EOT is answered with [U].
         numbers: Error numbers in use.
     """
 
@@ -196,11 +204,28 @@ class EpsonOptions:
     undeclared: Literal["error", "real", "double"] = "error"
     globals_at_start: Literal["cleared", "kept"] = "cleared"
     ports_of_ended_task: Literal["closed", "open"] = "closed"
+    rs232_numbers: Literal["binary", "ascii_hex"] = "binary"
+    rs232_nak_code: Literal["digits", "binary"] = "digits"
+    rs232_letters: Literal["documented", "guessed"] = "guessed"
+    rs232_status_flags: Literal[10, 11] = 10
+    rs232_word_port_bytes: Literal[1, 2] = 1
+    rs232_eot_answer: Literal["none", "ack"] = "none"
     numbers: SpelNumbers = SpelNumbers()
 
 
 PROFILE_SCHEMA: Final = "robolink/epson-profile/1"
 _NUMBERS: Final = "numbers."
+
+
+def serial_dialect(options: EpsonOptions) -> Dialect:
+    """Return how a controller with these habits speaks Remote RS232."""
+    return Dialect(
+        numbers=Numbers(options.rs232_numbers),
+        nak_code=NakCode(options.rs232_nak_code),
+        letters=Letters(options.rs232_letters),
+        status_flags=options.rs232_status_flags,
+        word_port_bytes=options.rs232_word_port_bytes,
+    )
 
 
 def option_names() -> tuple[str, ...]:

@@ -47,7 +47,7 @@ class EpsonPanel:
         self._numbers = options.numbers
         self._outputs_off_at_estop = options.outputs_off_at_estop
         self._acting = acting
-        self.starter: Callable[[int], None] | None = None
+        self.starter: Callable[[int], object] | None = None
 
     def press_estop(self) -> None:
         """Press the emergency stop: the arm stands, the motors are off, an Execute fails."""
@@ -140,6 +140,11 @@ class EpsonPanel:
         with self._acting():
             self._condition.task = Task.NONE
             self._machine.reset_motion_parameters()
+
+    def lose_login(self) -> None:
+        """Let the controller forget who is logged in; the connection stays (F15)."""
+        with self._acting():
+            self._slot.free()
 
     def cut_link(self) -> None:
         """Pull the cable of the client that is logged in."""

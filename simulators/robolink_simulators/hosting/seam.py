@@ -1,6 +1,6 @@
 """The seam between a simulated device and whatever hosts it."""
 
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 
 class DeviceLink(Protocol):
@@ -15,6 +15,15 @@ class DeviceLink(Protocol):
     @property
     def closed(self) -> bool:
         """Whether the device has ended this connection (after what is outgoing)."""
+
+
+@runtime_checkable
+class ResettableLink(Protocol):
+    """A connection that a device may end with a reset."""
+
+    @property
+    def reset(self) -> bool:
+        """Whether it has ended it so, which is told at once and differently."""
 
 
 class WireDevice(Protocol):

@@ -4,6 +4,7 @@ import threading
 
 from robolink.register_maps import RegisterMap
 from robolink_simulators.faults import Departure, FaultAction, FaultPlan
+from robolink_simulators.faults.links import PLC_LINKS
 from robolink_simulators.plc.frames import (
     ILLEGAL_ADDRESS,
     ILLEGAL_FUNCTION,
@@ -40,7 +41,7 @@ class PlcSimulator:
         self.register_map = register_map
         self.unit = unit
         self.program = PlcProgram(register_map, seed)
-        self.faults = FaultPlan(seed=seed)
+        self.faults = FaultPlan(seed=seed, links=PLC_LINKS)
         self.writes: list[str] = []
         self.lock = threading.RLock()
         self.now_ns = 0
@@ -57,22 +58,35 @@ class PlcSimulator:
         """Let simulated time reach ``now_ns``."""
         self.now_ns = max(self.now_ns, now_ns)
         self.program.advance(self.now_ns)
+        for link in self._links:
+            link.catch_up()
 
     def next_change(self) -> int | None:
         """Return when :meth:`advance` will next do something by itself, if ever."""
         changes = [self.program.next_change(), *(link.next_change() for link in self._links)]
         return min((change for change in changes if change is not None), default=None)
 
-    def serve(self, request: PlcRequest, frames: Frames) -> list[Departure]:
+    def serve(
+        self, request: PlcRequest, frames: Frames, link: PlcLink, *, counted: bool = False
+    ) -> list[Departure]:
         """Carry a request out and return what leaves for it, when."""
         if frames.shared and request.unit != self.unit:
             return []
-        met = self.faults.take(request.words)
-        actions = {fault.action for fault in met}
+        met = () if counted else self.faults.take(request.words)
+        actions = {fault.action: fault for fault in met}
         if FaultAction.DISCONNECT_BEFORE in actions:
             return [(0.0, None)]
+        if FaultAction.DROP_REQUEST in actions:
+            return []
+        if (stall := actions.get(FaultAction.STALL)) is not None:
+            link.stall(request, stall.seconds)
+            return []
         ignored = FaultAction.IGNORE_WRITE in actions
-        return self.faults.departures(self._answer(request, frames, ignored=ignored), met)
+        reply = self._answer(request, frames, ignored=ignored)
+        leaving = self.faults.departures(reply, met)
+        if (again := actions.get(FaultAction.DUPLICATE_REQUEST)) is not None:
+            leaving.append((again.seconds, self._answer(request, frames, ignored=ignored)))
+        return leaving
 
     def _answer(self, request: PlcRequest, frames: Frames, *, ignored: bool) -> bytes:
         if request.unit != self.unit:

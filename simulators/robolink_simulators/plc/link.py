@@ -1,10 +1,11 @@
 """One client's connection to the simulated PLC: what comes, what leaves and when."""
 
-from collections import deque
+from collections.abc import Sequence
 from typing import Protocol
 
 from robolink.timing import NS_PER_S
 from robolink_simulators.faults import Departure
+from robolink_simulators.faults.departing import DepartingReplies
 from robolink_simulators.plc.frames import Frames, PlcRequest
 
 
@@ -16,8 +17,13 @@ class ServedFrame(Protocol):
     def advance(self, now_ns: int) -> None:
         """Let simulated time reach ``now_ns``."""
 
-    def serve(self, request: PlcRequest, frames: Frames) -> list[Departure]:
-        """Carry a request out and return what leaves for it, when."""
+    def serve(
+        self, request: PlcRequest, frames: Frames, link: "PlcLink", *, counted: bool = False
+    ) -> list[Departure]:
+        """Carry a request out and return what leaves for it, when.
+
+        One that was ``counted`` meets no fault again.
+        """
 
 
 class PlcLink:
@@ -31,53 +37,70 @@ class PlcLink:
     def __init__(self, plc: ServedFrame, frames: Frames) -> None:
         self._plc = plc
         self._frames = frames
-        self._outbox: deque[tuple[int, bytes | None]] = deque()
+        self._outbox = DepartingReplies()
+        self._late: list[PlcRequest] = []
         self._over = False
 
     @property
     def closed(self) -> bool:
         """Whether the PLC has ended this connection, after what is outgoing."""
-        return bool(self._outbox) and self._outbox[0][1] is None and self._due
+        return self._outbox.ended(self._plc.now_ns)
+
+    @property
+    def reset(self) -> bool:
+        """Whether it has ended it with a reset."""
+        return self._outbox.reset(self._plc.now_ns)
 
     @property
     def drained(self) -> bool:
         """Whether nothing will happen on this connection any more."""
-        return self._over and (not self._outbox or self.closed)
+        return self._over and not self._late and self._outbox.empty(self._plc.now_ns)
 
     def receive(self, data: bytes, now_ns: int) -> None:
         """Take bytes from the client; ``b""`` means that the client is gone."""
         self._plc.advance(now_ns)
+        if self._outbox.half_open:
+            return
         if not data:
             self._over = True
         self._frames.feed(data)
         try:
             self._answer_all()
         except ValueError:
-            self._post(None, 0.0)
+            self._outbox.post(None, self._plc.now_ns)
+            self._over = True
 
     def outgoing(self) -> bytes:
         """Take what is ready for the client, ``b""`` for nothing."""
-        ready = b""
-        while self._outbox and self._due and (data := self._outbox[0][1]) is not None:
-            ready += data
-            self._outbox.popleft()
-        return ready
+        return self._outbox.take(self._plc.now_ns)
 
     def next_change(self) -> int | None:
-        """Return when something leaves."""
-        return self._outbox[0][0] if self._outbox and not self._due else None
+        """Return when something leaves, or the link carries again."""
+        return self._outbox.next_change(self._plc.now_ns)
 
-    def _answer_all(self) -> None:
-        while not self._over and (request := self._frames.take()) is not None:
-            for after_s, leaving in self._plc.serve(request, self._frames):
-                self._post(leaving, after_s)
+    def stall(self, request: PlcRequest, seconds: float) -> None:
+        """Carry nothing for a while; then a request arrives, and what was sent behind it."""
+        self._outbox.stalled_until_ns = self._plc.now_ns + max(1, round(seconds * NS_PER_S))
+        self._late.append(request)
+
+    def catch_up(self) -> None:
+        """Have served what was on its way while the link carried nothing."""
+        if self._late and not self._stalled:
+            late, self._late = self._late, []
+            for request in late:
+                self._depart(self._plc.serve(request, self._frames, self, counted=True))
+            self._answer_all()
 
     @property
-    def _due(self) -> bool:
-        return self._outbox[0][0] <= self._plc.now_ns
+    def _stalled(self) -> bool:
+        return self._plc.now_ns < self._outbox.stalled_until_ns
 
-    def _post(self, data: bytes | None, after_s: float) -> None:
-        at_ns = self._plc.now_ns + round(after_s * NS_PER_S)
-        # One stream: nothing overtakes what was sent before it.
-        self._outbox.append((max(at_ns, self._outbox[-1][0] if self._outbox else 0), data))
-        self._over = self._over or data is None
+    def _answer_all(self) -> None:
+        while not (self._over or self._stalled or self._outbox.half_open):
+            if (request := self._frames.take()) is None:
+                return
+            self._depart(self._plc.serve(request, self._frames, self))
+
+    def _depart(self, departures: Sequence[Departure]) -> None:
+        if not self._outbox.depart(departures, self._plc.now_ns):
+            self._over = True

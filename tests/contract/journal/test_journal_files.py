@@ -129,6 +129,7 @@ def test_an_empty_file_becomes_a_journal(path, open_anew):
     assert open_anew(str(path)).verify() == ChainVerification(0, ())
 
 
+@pytest.mark.fault("F62")
 def test_a_damaged_page_is_told_and_what_can_be_read_is_read(filled, open_anew):
     content = bytearray(filled.read_bytes())
     last = content.rindex(b"TLSet 3, XY")  # the page of the last entry or of the marker
@@ -147,6 +148,7 @@ def test_a_damaged_page_is_told_and_what_can_be_read_is_read(filled, open_anew):
     assert filled.read_bytes()[page : page + 200] == b"\xff" * 200
 
 
+@pytest.mark.fault("F61")
 def test_a_disk_that_is_full_leaves_the_journal_as_it_was(filled, open_anew):
     journal = open_anew(str(filled))
     log = journal.log("other")
@@ -164,6 +166,7 @@ def test_a_disk_that_is_full_leaves_the_journal_as_it_was(filled, open_anew):
     log.begin(marker())
 
 
+@pytest.mark.fault("F61")
 def test_nothing_is_sent_when_the_intent_finds_no_space(filled):
     program = """
         import resource, sys
@@ -231,6 +234,7 @@ def test_what_may_not_be_written_is_read(public, open_anew, of_folder, of_file, 
     assert [known.operation for known in reader.log("cell").open_markers()] == ["left open"]
 
 
+@pytest.mark.fault("F63")
 def test_a_locked_journal_is_read_and_not_written(filled, open_anew, monkeypatch):
     monkeypatch.setattr("robolink.journal.store.engines.BUSY_S", 0.1)
     holder = sqlite3.connect(filled, isolation_level=None)

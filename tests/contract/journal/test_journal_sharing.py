@@ -58,6 +58,7 @@ def test_the_lease_goes_from_one_process_to_the_next_and_fences(location, journa
     ]
 
 
+@pytest.mark.fault("F48")
 def test_of_many_that_begin_at_once_one_gets_the_lease(location, open_anew):
     logs = [open_anew(location).log(CELLS[0]) for _ in range(4)]
     for log in logs:
@@ -169,6 +170,7 @@ def test_a_migration_that_fails_leaves_the_older_form(location, journal, open_an
     assert journal.verify() == ChainVerification(1, ())
 
 
+@pytest.mark.fault("F62")
 def test_a_newer_journal_is_read_but_not_written(location, open_anew, monkeypatch):
     with monkeypatch.context() as patched:
         _newer(patched, _add_a_column)
@@ -207,6 +209,7 @@ def test_a_database_of_something_else_is_left_alone(location, journal, open_anew
         open_anew(location, read_only=True)
 
 
+@pytest.mark.fault("F63")
 def test_a_write_that_another_program_holds_up_is_refused_in_time(location, open_anew, monkeypatch):
     monkeypatch.setattr("robolink.journal.store.engines.BUSY_S", 0.2)
     journal, other = open_anew(location), open_anew(location)
@@ -218,6 +221,7 @@ def test_a_write_that_another_program_holds_up_is_refused_in_time(location, open
     journal.log(CELLS[0]).begin(marker("a"))
 
 
+@pytest.mark.fault("F78")
 def test_a_server_that_was_restarted_is_found_again(server, open_anew):
     journal = open_anew(server.empty_place())
     log = journal.log(CELLS[0])

@@ -42,12 +42,14 @@ def test_a_wrong_word_order_is_named_and_nothing_is_written(cell):
     assert cell.link.closed
 
 
+@pytest.mark.fault("F33")
 def test_swapped_bytes_in_every_word_are_named(cell):
     cell.link.response = lambda words: tuple((word & 0xFF) << 8 | word >> 8 for word in words)
     with pytest.raises(RemoteProtocolError, match="bytes swapped"):
         cell.met()
 
 
+@pytest.mark.fault("F34")
 @pytest.mark.parametrize("shift", [1, -1, 4])
 def test_a_shifted_map_is_named_with_its_distance(cell, shift):
     cell.link.response = lambda words: (*words[-shift:], *words[:-shift])
@@ -87,6 +89,7 @@ def test_a_heartbeat_that_stands_still_is_found_on_connecting(cell):
     assert cell.link.closed
 
 
+@pytest.mark.fault("F31")
 def test_a_torn_snapshot_is_read_again(cell):
     controller = cell.met()
     torn = iter([True, True, False])
@@ -94,7 +97,8 @@ def test_a_torn_snapshot_is_read_again(cell):
     assert controller.status().ready
 
 
-def test_a_snapshot_that_stays_corrupt_ends_the_session(cell):
+@pytest.mark.fault("F31")
+def test_f31_a_snapshot_that_stays_corrupt_ends_the_session(cell):
     controller = cell.met()
     reads = []
 

@@ -230,6 +230,7 @@ def test_a_movement_that_ends_badly_says_how(cell, plc, group, end, expected):
     assert cell.open_requests() == []
 
 
+@pytest.mark.fault("F25")
 @pytest.mark.parametrize("lose", ["lose_answer", "lose_request"])
 def test_a_movement_without_an_answer_is_unknown_and_blocks_the_next(cell, plc, group, lose):
     getattr(cell.link, lose)("write_command")
@@ -296,6 +297,7 @@ def test_closing_halts_what_nobody_waited_on_and_gives_the_mailbox_back(cell, pl
     assert cell.open_requests() == []
 
 
+@pytest.mark.fault("F24")
 def test_an_interrupt_of_the_person_halts_the_movement(cell, plc, group):
     motion = move(group)
 

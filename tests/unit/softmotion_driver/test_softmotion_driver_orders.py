@@ -44,6 +44,7 @@ def test_a_number_that_the_plc_still_shows_is_not_used(cell, plc):
     assert plc.executed[0].sequence == 43
 
 
+@pytest.mark.fault("F29")
 def test_numbers_go_on_behind_the_last_one_and_skip_zero(cell, plc):
     plc.now = replace(plc.now, ack_head=65535)
     cell.met().take()
@@ -88,6 +89,7 @@ def test_a_silent_plc_gets_no_second_block(cell, plc, controller):
     assert cell.link.closed
 
 
+@pytest.mark.fault("F25", "F26")
 def test_a_lost_answer_to_the_write_is_not_followed_by_another_write(cell, plc, controller):
     cell.link.recovers = True
     cell.link.lose_answer("write_command")
@@ -120,6 +122,7 @@ def test_a_plc_that_starts_anew_in_the_middle_of_a_command_leaves_it_unknown(cel
     assert len(cell.open_requests()) == 1
 
 
+@pytest.mark.fault("F14", "F29")
 def test_a_plc_that_started_anew_before_a_command_is_told_nothing(cell, plc, controller):
     plc.restart()
     with pytest.raises(TransportBrokenError, match="started anew"):
@@ -178,7 +181,7 @@ def test_a_command_that_a_stop_ends_is_not_taken_as_done(cell, plc, controller):
         controller.motors(False)
 
 
-@pytest.mark.parametrize(("lasts_ms", "looks"), [(4, 5), (40, 18), (250, 30), (2000, 210)])
+@pytest.mark.parametrize(("lasts_ms", "looks"), [(4, 5), (40, 18), (250, 30), (2000, 80)])
 def test_an_end_is_noticed_soon_and_a_long_wait_costs_few_questions(
     cell, plc, controller, lasts_ms, looks
 ):
@@ -193,7 +196,7 @@ def test_an_end_is_noticed_soon_and_a_long_wait_costs_few_questions(
     cell.link.read_head = read_head
     controller.io.read_input(3)
     late_ms = (asked_ns[-1] - asked_ns[0]) / MS - lasts_ms
-    assert late_ms <= min(lasts_ms / 4, 20)
+    assert late_ms <= min(lasts_ms / 4, 40)
     assert looks * 0.8 <= len(asked_ns) <= looks
 
 

@@ -7,6 +7,7 @@ from robolink.errors import ConfigError, RobolinkError
 from robolink.messages import tr
 from robolink.register_maps import COMPONENTS, Number, RegisterMap
 from robolink_cli.console.render import note, table
+from robolink_cli.options.numbers import decimal
 
 if TYPE_CHECKING:
     from robolink.controllers.plc_map import PlcMapController
@@ -115,7 +116,7 @@ class MapValues:
     def _require_alike(self, key: str, shown: str) -> None:
         text = shown.strip().replace(",", ".")
         try:
-            value = float(text)
+            value = decimal(text)
         except ValueError as error:
             raise ConfigError(
                 tr("{shown!r} is no number.", shown=shown),

@@ -14,6 +14,7 @@ from robolink_cli.options.consent import (
     then_select_option,
     yes_option,
 )
+from robolink_cli.options.numbers import DECIMAL
 from robolink_cli.prompts.jumps import Allowed, accept_jump, accept_jump_options, allowed_by
 from robolink_cli.prompts.questions import agree
 from robolink_cli.session.context import CliContext, controller_options
@@ -95,12 +96,12 @@ def _get_by_mode(context: CliContext, mode: str) -> None:
 
 @tool.command("set")
 @click.argument("number", type=int)
-@click.option("--x", type=float, help="mm from the flange.")
-@click.option("--y", type=float, help="mm from the flange.")
-@click.option("--z", type=float, help="mm from the flange.")
-@click.option("--u", type=float, help="Degrees about Z.")
-@click.option("--v", type=float, help="Degrees about Y; six-axis robots only.")
-@click.option("--w", type=float, help="Degrees about X; six-axis robots only.")
+@click.option("--x", type=DECIMAL, help="mm from the flange.")
+@click.option("--y", type=DECIMAL, help="mm from the flange.")
+@click.option("--z", type=DECIMAL, help="mm from the flange.")
+@click.option("--u", type=DECIMAL, help="Degrees about Z.")
+@click.option("--v", type=DECIMAL, help="Degrees about Y; six-axis robots only.")
+@click.option("--w", type=DECIMAL, help="Degrees about X; six-axis robots only.")
 @accept_jump_options
 @controller_options
 @dry_run_option

@@ -12,7 +12,7 @@ from robolink.messages import tr
 from robolink.model import ToolReceipt
 from robolink.nozzle_change import Listener, Moment, Proposal
 from robolink.procedures import MeasurementContext
-from robolink.runner import Ask, Confirm, Notify, Step, StepDone
+from robolink.runner import Ask, Confirm, Notify, StepDone, TakenStep
 from robolink_cli.console.exit_codes import error_body, exit_code
 from robolink_cli.console.output import hand_over
 from robolink_cli.console.render import note, switch_json_on
@@ -110,7 +110,7 @@ class Progress(Listener):
         self._events.emit("note", text=sentence)
 
 
-def _in_words(step: Step) -> tuple[str, str]:
+def _in_words(step: TakenStep) -> tuple[str, str]:
     """Return what kind of step it is, and what it says."""
     match step:
         case Ask():

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import asdict, replace
-from datetime import UTC, datetime
 from pathlib import Path
 
 from robolink import __version__
@@ -11,6 +10,7 @@ from robolink.journal import Journal
 from robolink.messages import tr
 from robolink.model import EntryKind, Recorded
 from robolink.report import Report, reports_of
+from robolink.timing import wall_time
 from robolink.transaction import id_of_change
 from robolink_cli.commands.record.journal_lookup import controller_meant, entries_of_change
 from robolink_cli.options.impact import ImpactRequest, judge
@@ -65,7 +65,7 @@ def reports_from(
     check, problems = _checked(journal)
     reports = reports_of(
         entries,
-        made_at=datetime.now(UTC).isoformat(timespec="seconds"),
+        made_at=wall_time().isoformat(timespec="seconds"),
         robolink_version=__version__,
         check=check,
         problems=problems,

@@ -11,6 +11,7 @@ from robolink_simulators.assist.port import serve_assist
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson import EpsonOptions, EpsonSimulator
 from robolink_simulators.epson.options import options_from_text, read_profile
+from robolink_simulators.hosting.streams.epson_serial import serve_serial
 from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 from robolink_simulators.serial_numbers import drawn_serial
 
@@ -22,28 +23,48 @@ from robolink_cli.console.render import note
 
 
 def serve_epson(
-    simulator: EpsonSimulator, address: tuple[str, int], *, speed: float, allow_remote: bool
+    simulator: EpsonSimulator,
+    address: tuple[str, int] | None,
+    *,
+    speed: float,
+    allow_remote: bool,
+    baud: int = 0,
 ) -> None:
-    """Serve a simulator and its assist port until SIGTERM or Ctrl-C."""
+    """Serve a simulator and its assist port until SIGTERM or Ctrl-C.
+
+    Args:
+        simulator: What to serve.
+        address: Where Remote Ethernet listens; ``None`` for a serial line in its place.
+        speed: How many times faster than real the simulated time passes.
+        allow_remote: Whether an address that other machines can reach is taken.
+        baud: How fast the serial line is; 0 for at once.
+    """
     clock = ScaledClock(speed)
     with ExitStack() as stack:
         stopped = stack.enter_context(Termination())
-        tcp = stack.enter_context(
-            serve_tcp(simulator, *address, clock=clock, allow_remote=allow_remote)
-        )
+        if address is None:
+            url = stack.enter_context(serve_serial(simulator, baud=baud, clock=clock)).url
+        else:
+            tcp = serve_tcp(simulator, *address, clock=clock, allow_remote=allow_remote)
+            url = stack.enter_context(tcp).url
         assist = stack.enter_context(serve_assist(simulator, clock=clock))
-        _announce(tcp.url, assist.url, simulator.machine.model.name, simulator.seed)
+        _announce(url, assist.url, simulator.machine.model.name, simulator.seed)
         stopped.wait()
 
 
 def load_programs(
     simulator: EpsonSimulator, programs: Sequence[Path], points: Sequence[Path]
 ) -> None:
-    """Load a project; what its tasks print is shown beside the announcement.
+    """Load a project, if any; what its tasks print is shown beside the announcement.
 
     Raises:
         ConfigError: It cannot be built, or a file cannot be read.
+        click.UsageError: There are points and no programs.
     """
+    if not programs:
+        if points:
+            raise click.UsageError(tr("--points goes with --program."))
+        return
     runner = simulator.load(programs, points)
     runner.on_print = lambda text: note(text.rstrip("\r\n"))
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 from robolink_simulators.assist.port import serve_assist
 from robolink_simulators.cell.clock import ScaledClock
+from robolink_simulators.faults import LinkKind
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 from robolink.errors import ConfigError
@@ -40,6 +41,17 @@ class Buses:
     unit: int
     node: int
     allow_remote: bool
+
+    @property
+    def kinds(self) -> frozenset[LinkKind]:
+        """The links that it is served on."""
+        wanted = {
+            LinkKind.MODBUS_TCP: self.modbus_tcp,
+            LinkKind.MODBUS_RTU: self.modbus_rtu,
+            LinkKind.CAN: self.can,
+        }
+        named = frozenset(kind for kind, place in wanted.items() if place is not None)
+        return named or frozenset({LinkKind.MODBUS_TCP})
 
 
 def serve_plc(simulator: SoftMotionSimulator, buses: Buses, *, speed: float) -> None:

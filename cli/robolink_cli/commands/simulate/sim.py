@@ -4,7 +4,6 @@ from pathlib import Path
 
 import click
 
-from robolink.messages import tr
 from robolink_cli.commands.simulate.sim_plc import sim_plc
 from robolink_cli.commands.simulate.sim_softmotion import softmotion
 from robolink_cli.options.simulation import simulation_options
@@ -38,6 +37,18 @@ sim.add_command(softmotion)
     default="127.0.0.1:5000",
     show_default=True,
     help="Where to listen; port 0 takes a free one.",
+)
+@click.option(
+    "--serial",
+    type=click.Choice(["pty"]),
+    help="Remote RS232 on a pseudo terminal, whose path is printed, in place of --tcp.",
+)
+@click.option(
+    "--baud",
+    type=click.IntRange(0, 4_000_000),
+    default=0,
+    show_default=True,
+    help="How slow that line is, in real time; 0 carries everything at once.",
 )
 @click.option(
     "--robot",
@@ -81,6 +92,8 @@ sim.add_command(softmotion)
 def epson(
     *,
     address: str,
+    serial: str | None,
+    baud: int,
     robot: str,
     seed: int,
     password_env: str | None,
@@ -88,13 +101,14 @@ def epson(
     speed: float,
     options: tuple[str, ...],
     world: tuple[str, ...],
+    faults: Path | None,
     profile: Path | None,
     replay: Path | None,
     programs: tuple[Path, ...],
     points: tuple[Path, ...],
     allow_remote: bool,
 ) -> None:
-    """Serve a simulated EPSON controller with Remote Ethernet until Ctrl-C.
+    """Serve a simulated EPSON controller with Remote Ethernet, or RS232, until Ctrl-C.
 
     A second port, assist, stands in for the person at the cell: it looks at the tip, knows
     the truth, and presses the emergency stop.
@@ -109,7 +123,9 @@ def epson(
             serve_recording(replay, listen, allow_remote=allow_remote, wait=stopped.wait)
         return
     from robolink_simulators.epson import EpsonSimulator
+    from robolink_simulators.faults import LinkKind
 
+    from robolink_cli.commands.simulate.planned_faults import plan_faults
     from robolink_cli.commands.simulate.serving import world_from
     from robolink_cli.commands.simulate.serving_epson import (
         habits,
@@ -128,11 +144,10 @@ def epson(
         state_path=state,
         world=world_from(world),
     )
-    if programs:
-        load_programs(simulator, programs, points)
-    elif points:
-        raise click.UsageError(tr("--points goes with --program."))
-    serve_epson(simulator, listen, speed=speed, allow_remote=allow_remote)
+    load_programs(simulator, programs, points)
+    plan_faults(simulator, faults, {LinkKind.EPSON_SERIAL if serial else LinkKind.EPSON_TCP})
+    place = None if serial else listen
+    serve_epson(simulator, place, speed=speed, allow_remote=allow_remote, baud=baud)
 
 
 @sim.command()

@@ -9,6 +9,7 @@ from robolink.messages import tr
 from robolink_cli.options.simulation import (
     DEFAULT_ADDRESS,
     allow_remote_option,
+    faults_option,
     modbus_options,
     seed_option,
 )
@@ -33,6 +34,7 @@ from robolink_cli.session.context import json_option
     help="The unit identifier that answers; 1 to 247 on a serial line.",
 )
 @seed_option
+@faults_option
 @allow_remote_option
 @json_option
 def sim_plc(
@@ -42,6 +44,7 @@ def sim_plc(
     modbus_rtu: str | None,
     unit: int,
     seed: int,
+    faults: Path | None,
     allow_remote: bool,
 ) -> None:
     """Serve a simulated PLC with the registers of any map until Ctrl-C.
@@ -49,15 +52,20 @@ def sim_plc(
     Both buses may be given; one PLC stands behind them.
     """
     from robolink_simulators.cell.clock import ScaledClock
+    from robolink_simulators.faults import LinkKind
     from robolink_simulators.plc import PlcSimulator, serve_plc, serve_plc_line
 
     from robolink.register_maps import load_map
+    from robolink_cli.commands.simulate.planned_faults import plan_faults
     from robolink_cli.commands.simulate.serving import Termination, announce, host_and_port
 
     if modbus_tcp is None and modbus_rtu is None:
         modbus_tcp = DEFAULT_ADDRESS
     register_map = load_map(map_file)
     simulator, clock = PlcSimulator(register_map, unit=unit, seed=seed), ScaledClock()
+    served = {LinkKind.PLC_TCP} if modbus_tcp is not None else set()
+    served |= {LinkKind.PLC_RTU} if modbus_rtu is not None else set()
+    plan_faults(simulator, faults, served)
     urls: dict[str, str] = {}
     with ExitStack() as stack:
         stopped = stack.enter_context(Termination())

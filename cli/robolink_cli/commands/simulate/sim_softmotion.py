@@ -51,6 +51,7 @@ def softmotion(
     speed: float,
     options: tuple[str, ...],
     world: tuple[str, ...],
+    faults: Path | None,
     allow_remote: bool,
 ) -> None:
     """Serve a simulated SoftMotion PLC with a mailbox until Ctrl-C.
@@ -62,6 +63,7 @@ def softmotion(
     from robolink_simulators.softmotion.mailbox.option_text import options_from_text
     from robolink_simulators.softmotion.mailbox.parameters import parameters_from_text
 
+    from robolink_cli.commands.simulate.planned_faults import plan_faults
     from robolink_cli.commands.simulate.serving import named_values, world_from
     from robolink_cli.commands.simulate.serving_softmotion import Buses, serve_plc
 
@@ -74,4 +76,5 @@ def softmotion(
         world=world_from(world),
     )
     buses = Buses(modbus_tcp, modbus_rtu, can, unit=unit, node=node, allow_remote=allow_remote)
+    plan_faults(simulator, faults, buses.kinds)
     serve_plc(simulator, buses, speed=speed)

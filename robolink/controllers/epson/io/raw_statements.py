@@ -5,11 +5,13 @@ Source: docs/reference/rules.md 8.
 
 from robolink.controllers.epson.link.answers import NOT_EXECUTED
 from robolink.controllers.epson.link.link import EpsonLink
+from robolink.controllers.epson.link.requests import command_class_of
 from robolink.errors import ConfigError, ControllerFaultError, RejectedError
 from robolink.messages import tr
 from robolink.model import EntryKind, Marker, MarkerKind, NewEntry, require_engineer
-from robolink.protocols.epson_text import Refusal, Reply
+from robolink.protocols.epson_text import Refusal, Reply, Request
 from robolink.protocols.spel import Statement
+from robolink.stop_latch import CommandClass
 
 
 class RawStatements:
@@ -24,12 +26,14 @@ class RawStatements:
         with self._link.lock.held(statement):
             self._link.markers.require_settled(statement)
             self._link.window.require_ready(statement)
+            if command_class_of(Request("Execute", (statement,))) is CommandClass.ACT:
+                self._link.window.require_abort(statement)
             require_engineer(
                 self._link.markers.outcomes, tr("run {statement!r} as typed", statement=statement)
             )
             with self._link.uninterrupted(), self._link.markers.ledger.block():
                 marker = self._link.markers.begin(MarkerKind.SET, statement, {"raw": True})
-                self._link.robot.forget()
+                self._link.forget_robot()
                 with self._link.markers.doubt(statement):
                     with self._link.markers.unless_stopped(marker):
                         answer = self._link.session.execute(statement)

@@ -31,8 +31,30 @@ def name_from(number: Sequence[str], robots: Sequence[str]) -> str:
     return f"epson:{'/'.join(numbers)}" if numbers else ""
 
 
+def robot_names(name: str, number: Sequence[str], robots: Sequence[str]) -> tuple[str, ...]:
+    """Return the name of each robot of a controller with several, nothing where there is one.
+
+    A robot is called as its controller would be with that robot alone, so what was on record
+    before a second one came stays its own. One without a number of its own is counted.
+
+    Args:
+        name: Of the controller.
+        number: The answer to GetContNo.
+        robots: The answer to GetRobotSerial; its first field counts the robots.
+    """
+    serials = robots[1:]
+    if len(serials) < 2:
+        return ()
+    return tuple(
+        f"{name}#{place}"
+        if serial in _UNSET or serials.count(serial) > 1
+        else name_from(number, ("1", serial))
+        for place, serial in enumerate(serials, start=1)
+    )
+
+
 class IdentityReader:
-    """Asks with two requests, which change nothing.
+    """Asks with two requests, with three where there are several robots; they change nothing.
 
     Newer firmware tells the serial numbers of controller and robots at any time, to a client
     that only monitors too (docs/reference/epson.md 1.8). Older firmware refuses the first query;
@@ -56,9 +78,11 @@ class IdentityReader:
             if number is None:
                 return self._printed(address, place)
             robots = self._asked("GetRobotSerial", "0") or ()
+            name = name_from(number, robots) or place
+            each = robot_names(name, number, robots)
+            return Identity(name, address, place, robot=self._in_force(each), robots=each)
         except _BusyNow:
             return Identity(place, address, place, certain=False)
-        return Identity(name_from(number, robots) or place, address, place)
 
     def _asked(self, name: str, *parameters: str) -> tuple[str, ...] | None:
         """Return the fields of an answer; ``None`` where the firmware does not know the query."""
@@ -71,6 +95,16 @@ class IdentityReader:
                 raise _BusyNow from error
             return None
         return tuple(field.strip() for field in fields)
+
+    def _in_force(self, robots: Sequence[str]) -> str:
+        """Return the name of the robot that Execute acts on, empty where there is one."""
+        if not robots:
+            return ""
+        fields = self._asked("GetCurRobot") or ("",)
+        number = int(fields[0]) if fields[0].isdecimal() else 0
+        if 1 <= number <= len(robots):
+            return robots[number - 1]
+        raise _BusyNow  # none is chosen yet: nothing may be put on record of one
 
     def _printed(self, address: str, place: str) -> Identity:
         try:

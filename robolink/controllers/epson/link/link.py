@@ -29,10 +29,16 @@ class EpsonLink(DriverLink):
         self.window = CommandWindow(session)
         self.preferences = Preferences(session)
         self.robot = RobotFacts(self.window)
-        outcomes.ask(IdentityReader(session, self.window).read)
+        self._reader = IdentityReader(session, self.window)
+        outcomes.ask(self._reader.read)
         super().__init__(
             session.identity, session.clock, session.latch, outcomes, gate=session.uninterrupted()
         )
+
+    def forget_robot(self) -> None:
+        """Ask anew which robot is in force, and whose record it is, when that is needed next."""
+        self.robot.forget()
+        self.markers.outcomes.ask(self._reader.read)
 
     def was_not_executed(self, refusal: RejectedError) -> bool:
         """Whether a refusal proves that nothing was done (docs/reference/epson.md 1.6)."""

@@ -1,4 +1,4 @@
-"""One login on an EPSON controller: a transport, a codec and a lock.
+"""One login on an EPSON controller: a line and a lock.
 
 Theory of operation. Remote Ethernet has no transaction numbers; an answer is known by its
 name and by its place in line (docs/reference/epson.md 1.1). So at most two requests are
@@ -12,13 +12,14 @@ bytes die with the connection and can never be taken for the answer to a later q
 (docs/reference/faults.md F01, F06, F09).
 """
 
-import threading
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 
+from robolink import ambient
 from robolink.checkpoints import Checkpoint, checkpoint
 from robolink.controllers.epson.link.answers import rejected
+from robolink.controllers.epson.link.line import EpsonLine
 from robolink.controllers.epson.link.login import PASSWORD_REFUSALS, refused, unanswered
 from robolink.controllers.epson.link.requests import command_class_of
 from robolink.errors import (
@@ -36,17 +37,14 @@ from robolink.model import Secret
 from robolink.protocols.epson_text import (
     NEED_DATA,
     EndOfStream,
-    EpsonTextCodec,
     Refusal,
     Reply,
     Request,
-    Role,
     find_command,
 )
 from robolink.protocols.spel import Statement
 from robolink.stop_latch import StopLatch
 from robolink.timing import Deadline
-from robolink.transport import Transport
 
 
 @dataclass(slots=True)
@@ -72,15 +70,16 @@ class EpsonSession:
         latch: What holds requests back while a stop is in force.
 
     Args:
-        transport: An open transport; the session owns it from here on.
+        line: An open line; the session owns it from here on.
         timeout_s: Longest wait for the answer to one request that moves nothing.
     """
 
-    def __init__(self, transport: Transport, *, timeout_s: float = 3.0) -> None:
-        self._transport = transport
+    def __init__(self, line: EpsonLine, *, timeout_s: float = 3.0) -> None:
+        self._line = line
+        self._transport = transport = line.transport
         self.identity, self.place, self.clock = transport.identity, transport.place, transport.clock
-        self._codec = EpsonTextCodec(Role.HOST)
-        self._wire = threading.Lock()
+        self._codec = line.codec
+        self._wire = ambient.lock()
         self._gate = InterruptGate()
         self._gate.open()
         self._pending: PendingExecute | None = None
@@ -98,6 +97,15 @@ class EpsonSession:
     def pending(self) -> PendingExecute | None:
         """The Execute that has not been taken as finished, if any."""
         return self._pending
+
+    @property
+    def outlived(self) -> bool:
+        """Whether bytes of an earlier session may still come: it is a serial line."""
+        return self._line.outlives_sessions
+
+    def carries(self, name: str) -> bool:
+        """Whether a command of this name can be sent over this line."""
+        return self._codec.carries(name)
 
     def login(self, password: Secret | None) -> None:
         """Log in. One attempt.
@@ -194,6 +202,8 @@ class EpsonSession:
     def _exchanging(self, request: Request) -> Iterator[None]:
         """Hold the exchange lock for ``request``, once it is legal and no stop forbids it."""
         what = _shown(request)
+        if not self._codec.carries(request.name):
+            self._line.require_carried(request.name)
         checkpoint(Checkpoint.LOCK, what)
         try:
             with self._gate, self._wire:
@@ -248,11 +258,32 @@ class EpsonSession:
         while True:
             event = self._codec.next_event()
             if event is NEED_DATA:
-                self._codec.receive_data(self._transport.receive(deadline=deadline))
+                self._codec.receive_data(self._heard(request, deadline))
             elif isinstance(event, (Reply, Refusal)) and self._answers(event, wanted):
                 return event
             else:
-                self._take_aside(event)
+                # A login that was bent on its way comes back in its refusal, password and all.
+                self._take_aside(event, hidden=wanted == "login")
+
+    def _heard(self, request: Request, deadline: Deadline) -> bytes:
+        try:
+            return self._transport.receive(deadline=deadline)
+        except TransportTimeoutError as error:
+            if not (held := self._codec.bytes_held):
+                raise
+            # Half an answer is another trouble than none: the controller is there.
+            raise TransportTimeoutError(
+                tr(
+                    "{identity} answered {count} bytes, then nothing: {request}.",
+                    identity=self.identity,
+                    count=len(held),
+                    request=_shown(request),
+                ),
+                remedy=error.remedy,
+                controller=self.identity,
+                request=_shown(request),
+                raw=held,
+            ) from error
 
     def _answers(self, event: Reply | Refusal, wanted: str) -> bool:
         name = event.name.lower()
@@ -278,7 +309,7 @@ class EpsonSession:
         while (event := self._codec.next_event()) is not NEED_DATA:
             self._take_aside(event)
 
-    def _take_aside(self, event: object) -> None:
+    def _take_aside(self, event: object, *, hidden: bool = False) -> None:
         if isinstance(event, EndOfStream):
             raise TransportBrokenError(
                 tr("{identity} closed the connection.", identity=self.identity),
@@ -300,7 +331,7 @@ class EpsonSession:
         raise RemoteProtocolError(
             tr(
                 "The controller sent an answer to a question nobody asked: {event}.",
-                event=repr(event)[:_SHOWN],
+                event="***" if hidden else repr(event)[:_SHOWN],
             ),
             remedy=tr(
                 "The connection is closed, because later answers could be mistaken. Connect "

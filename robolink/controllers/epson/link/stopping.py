@@ -6,7 +6,7 @@ which goes on without it where the controller's remote time-out is long
 served (docs/reference/epson.md 1.5), so a Stop that was accepted shows, beside the Running flag,
 that no Execute is left: whether the flag is on during an Execute is not documented.
 
-It needs a codec, a transport and a clock; nothing here looks at a record or a file, and nothing is
+It needs a line and a clock; nothing here looks at a record or a file, and nothing is
 imported that the first frame of a stop does not need.
 """
 
@@ -14,6 +14,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Final
 
+from robolink.controllers.epson.link.line import EpsonLine
 from robolink.controllers.epson.link.login import PASSWORD_REFUSALS, refused, unanswered
 from robolink.errors import (
     BusyError,
@@ -28,17 +29,14 @@ from robolink.messages import tr
 from robolink.protocols.epson_text import (
     NEED_DATA,
     EndOfStream,
-    EpsonTextCodec,
     ErrorCode,
     Refusal,
     Reply,
     Request,
-    Role,
     StatusFlags,
     parse_status,
 )
 from robolink.timing import Clock, Deadline
-from robolink.transport import Transport
 
 REST_S: Final = 5.0
 """Longest time from the first Abort to a state that shows rest (docs/reference/rules.md 5)."""
@@ -119,14 +117,15 @@ class StopLine:
     turns up unasked, such as the late answer to the Execute that it ends, is passed over.
 
     Args:
-        transport: An open transport; it is owned from here on.
+        line: An open line; it is owned from here on.
         timeout_s: Longest wait for one answer.
     """
 
-    def __init__(self, transport: Transport, *, timeout_s: float) -> None:
-        self._transport = transport
+    def __init__(self, line: EpsonLine, *, timeout_s: float) -> None:
+        self._line = line
+        self._transport = line.transport
         self._timeout_s = timeout_s
-        self._codec = EpsonTextCodec(Role.HOST)
+        self._codec = line.codec
 
     def login(self, password: str) -> None:
         """Log in. One attempt.
@@ -183,6 +182,7 @@ class StopLine:
         self._transport.close()
 
     def _ask(self, request: Request, *, secret: bool = False) -> Reply:
+        self._line.require_carried(request.name)
         deadline = Deadline.after(self._transport.clock, self._timeout_s)
         self._transport.send(self._codec.send(request), deadline=deadline, secret=secret)
         for _ in range(_STRAYS):

@@ -13,6 +13,8 @@ from robolink.controllers.epson.link.answers import (
 from robolink.controllers.epson.link.session import EpsonSession
 from robolink.errors import (
     ControllerFaultError,
+    NotReadyError,
+    NotReadyReason,
     RejectedError,
     RemoteProtocolError,
     UnclearAnswerError,
@@ -56,6 +58,29 @@ class CommandWindow:
         require_ready(status, controller=self._session.identity, request=request)
         self._was_ready = True
         return status
+
+    def require_abort(self, request: str) -> None:
+        """Hold back what could not be ended over this line once it runs.
+
+        While a statement runs, Abort alone ends it (docs/reference/epson.md 1.5), and no manual
+        prints its letter on Remote RS232 (docs/reference/epson.md 2.2).
+
+        Raises:
+            NotReadyError: This line has no Abort.
+        """
+        if self._session.carries("Abort"):
+            return
+        raise NotReadyError(
+            tr("Nothing that was begun over this serial line could be stopped over it."),
+            reason=NotReadyReason.NO_ABORT,
+            remedy=tr(
+                "Nothing was sent. Move over Remote Ethernet; or see with 'robolink "
+                "verify-controller' that the controller knows the letter A, and write "
+                "letters=guessed into the URL."
+            ),
+            controller=self._session.identity,
+            request=request,
+        )
 
     @contextmanager
     def proving_ready(self, request: str) -> Iterator[None]:

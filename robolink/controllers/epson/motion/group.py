@@ -9,7 +9,7 @@ from robolink.controllers.epson.link.stopping import bring_to_rest
 from robolink.controllers.epson.motion.movement import EpsonMotion
 from robolink.controllers.epson.motion.positions import read_position
 from robolink.controllers.epson.motion.power_and_speed import Settings
-from robolink.controllers.epson.motion.singularities import require_clear
+from robolink.controllers.epson.motion.singularities import obstacle_of, require_clear
 from robolink.controllers.epson.motion.until_input import (
     EpsonMotionUntilInput,
     read_input,
@@ -94,6 +94,16 @@ class EpsonGroup(MotionGroupCore):
         """Return what :meth:`move_to` would send besides its reads, as it stands on the wire."""
         return executes((*self.settings.statements(profile), self._statement_for(target, profile)))
 
+    def obstacle(self, target: Pose, path: Path) -> str:
+        """Return why six axes could not go there so; four are not asked."""
+        if not self._six_axes:
+            return ""
+        return obstacle_of(self._link.window, self._flagged(target), path)
+
+    def deceleration_mm_s2(self) -> float:
+        """Read AccelS: ``Till`` brakes with it (docs/reference/spel.md 7.1)."""
+        return spel.parse_number(self._link.window.printed(spel.print_braking()))
+
     def require_able(self, purpose: str) -> None:
         """Refuse what no movement could begin in now; see :class:`robolink.model.MotionGroup`."""
         self._require_supervision(purpose)
@@ -151,7 +161,7 @@ class EpsonGroup(MotionGroupCore):
                 found = spel.parse_integer(window.printed(spel.print_selected_tool()))
                 self._require_tool(target, found, statement)
                 if self._six_axes:
-                    require_clear(window, self._flagged(target), profile)
+                    require_clear(window, self._flagged(target), profile.path)
                 self.settings.slow_down(profile)
                 last_look()
                 with link.uninterrupted():
@@ -211,6 +221,7 @@ class EpsonGroup(MotionGroupCore):
                 controller=self._link.identity,
                 request=statement,
             )
+        self._link.window.require_abort(statement)
 
     def _require_motors(self, statement: str) -> None:
         if not self.motors_on():

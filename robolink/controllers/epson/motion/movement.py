@@ -6,13 +6,16 @@ from robolink.controllers.epson.link.link import EpsonLink
 from robolink.controllers.epson.link.session import PendingExecute
 from robolink.controllers.motion_group import not_ended_in_time
 from robolink.errors import (
+    ControllerFaultError,
     RejectedError,
+    RobolinkError,
     TransportError,
     TransportTimeoutError,
     UnclearAnswerError,
 )
 from robolink.messages import tr
 from robolink.model import Marker, MotionOutcome, Pose
+from robolink.protocols.epson_text import ErrorCode, Refusal
 from robolink.timing import Deadline
 
 POLL_S = 0.1
@@ -121,15 +124,26 @@ class EpsonMotion:
             self._link.markers.clear(self._marker)
 
     def _settle(self) -> MotionOutcome:
-        answer, statement = self._pending.answer, self.statement
+        pending, answer = self._pending, self._pending.answer
         assert answer is not None  # noqa: S101 - _watch returned True
-        self._take_answer()
-        window = self._link.window
-        try:
-            window.check(statement, answer)
-        except (RejectedError, UnclearAnswerError):
-            # How an aborted statement is answered is not documented (docs/reference/epson.md 1.6).
-            if self._pending.abort_requested:
-                return MotionOutcome.STOPPED
-            raise
-        return MotionOutcome.STOPPED if self._pending.abort_requested else MotionOutcome.ARRIVED
+        with self._link.session.uninterrupted():
+            self._link.session.finish(pending)
+            # A controller that only gave up waiting (docs/reference/epson.md 1.6) may be moving
+            # still; so may one whose flags cannot be asked any more. The marker stays then.
+            gave_up = isinstance(answer, Refusal) and answer.code == ErrorCode.TIMED_OUT
+            failed: RobolinkError | None = None
+            with self._link.markers.doubt(self.statement):
+                try:
+                    self._link.window.check(self.statement, answer)
+                except UnclearAnswerError as error:
+                    if gave_up and not pending.abort_requested:
+                        raise self._link.markers.unproved(self.statement, error) from error
+                    failed = error
+                except (RejectedError, ControllerFaultError) as error:
+                    failed = error
+            self._link.markers.clear(self._marker)
+        # How an aborted statement is answered is not documented (docs/reference/epson.md 1.6).
+        aborted = pending.abort_requested
+        if failed is not None and not (aborted and not isinstance(failed, ControllerFaultError)):
+            raise failed
+        return MotionOutcome.STOPPED if aborted else MotionOutcome.ARRIVED

@@ -32,15 +32,9 @@ class Settings:
 
     def read(self) -> PowerAndSpeed:
         """Read what is in force."""
-        speed = [spel.parse_integer(self._window.printed(spel.print_speed(i))) for i in (1, 2, 3)]
-        speed_s = [
-            spel.parse_number(self._window.printed(spel.print_speed_s(i))) for i in (1, 2, 3)
-        ]
-        return PowerAndSpeed(
-            self.power_high(),
-            (speed[0], speed[1], speed[2]),
-            (speed_s[0], speed_s[1], speed_s[2]),
-        )
+        speed = (self._speed_percent(1), self._speed_percent(2), self._speed_percent(3))
+        speed_s = (self._speed_s_mm_s(1), self._speed_s_mm_s(2), self._speed_s_mm_s(3))
+        return PowerAndSpeed(self.power_high(), speed, speed_s)
 
     def statements(self, profile: MotionProfile) -> tuple[spel.Statement, ...]:
         """Return what :meth:`slow_down` sends."""
@@ -54,18 +48,19 @@ class Settings:
         """Set Power Low and the profile's speeds, and prove it.
 
         Motor On and Reset put them back, a login and Abort perhaps too (docs/reference/spel.md
-        6.3), so this is done anew before each move.
+        6.3), so this is done anew before each move. What the moves of this driver go by is read
+        back; departure and approach values count for Jump alone, which it never sends.
 
         Raises:
             NotReadyError: The controller does not show what was set; nothing may move.
         """
         for statement in self.statements(profile):
             self._window.command(statement)
-        found = self.read()
+        speed_percent, speed_mm_s = self._speed_percent(1), self._speed_s_mm_s(1)
         if (
-            found.power_high
-            or found.speed_percent[0] != profile.speed_percent
-            or abs(found.speed_s_mm_s[0] - profile.speed_mm_s) > _SLACK
+            self.power_high()
+            or speed_percent != profile.speed_percent
+            or abs(speed_mm_s - profile.speed_mm_s) > _SLACK
         ):
             raise NotReadyError(
                 tr("The controller does not confirm low power and the speed that was set."),
@@ -102,3 +97,9 @@ class Settings:
     def power_high(self) -> bool:
         """Read the power mode."""
         return spel.parse_integer(self._window.printed(spel.print_power())) != 0
+
+    def _speed_percent(self, which: int) -> int:
+        return spel.parse_integer(self._window.printed(spel.print_speed(which)))
+
+    def _speed_s_mm_s(self, which: int) -> float:
+        return spel.parse_number(self._window.printed(spel.print_speed_s(which)))

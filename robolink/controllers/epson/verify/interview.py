@@ -40,6 +40,11 @@ class Interview:
         self._no_more = ""
 
     @property
+    def serial(self) -> bool:
+        """Whether it goes over Remote RS232."""
+        return self._session.outlived
+
+    @property
     def heard(self) -> bytes:
         """All that the controller has sent so far."""
         pieces = self._log.dialogue.passages
@@ -96,6 +101,13 @@ class Interview:
             self._no_more = self._window.failure(pending.statement, pending.answer).what
             return None
         return None if too_early else reply.fields[0]
+
+    def log_out(self) -> None:
+        """Log out where that does no harm, and close."""
+        status = self.controller.status()
+        if status.remote and not (status.running or status.paused):
+            self._session.exchange("Logout")
+        self._session.close()
 
     def leave(self) -> bool | None:
         """Log out and close; tell whether Logout was answered before its line end came.

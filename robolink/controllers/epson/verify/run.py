@@ -1,18 +1,22 @@
 """One verification, from login to logout."""
 
+from dataclasses import replace
+
 from robolink.controllers.epson.controller import EpsonController
+from robolink.controllers.epson.link.line import SERIAL, open_line
 from robolink.controllers.epson.link.session import EpsonSession
 from robolink.controllers.epson.verify import text_facts as text
 from robolink.controllers.epson.verify import wire_facts as wire
 from robolink.controllers.epson.verify.interview import Interview
 from robolink.controllers.epson.verify.not_tried import not_tried
+from robolink.controllers.epson.verify.serial_facts import serial_facts
 from robolink.controllers.epson.verify.verification import Fact, Verification
 from robolink.journal import memory_journal
 from robolink.messages import tr
 from robolink.model import ControllerFacts, Secret
 from robolink.protocols import spel
 from robolink.timing import wall_label
-from robolink.transport import DialogueLog, TraceSink, TracingTransport, open_transport
+from robolink.transport import DialogueLog, LinkUrl, TraceSink, parse_url
 
 
 def verify_epson(
@@ -38,19 +42,21 @@ def verify_epson(
         ConnectError: Nobody is reached.
         LoginRefusedError: Wrong or missing password.
     """
-    transport = open_transport(url, timeout_s=timeout_s)
-    log = DialogueLog(transport.identity, wall_label())
-    traced = TracingTransport(transport, log)
-    if trace is not None:
-        traced = TracingTransport(traced, trace)
-    session = EpsonSession(traced, timeout_s=timeout_s)
+    log = DialogueLog(parse_url(url).identity, wall_label())
+    traces = (log,) if trace is None else (log, trace)
+    line = open_line(_with_every_letter(parse_url(url)), timeout_s=timeout_s, traces=traces)
+    session = EpsonSession(line, timeout_s=timeout_s)
     try:
         session.login(password)
+        if session.outlived:
+            from robolink.controllers.epson.link.in_step import prove_in_step
+
+            prove_in_step(session)
         # It only reads, and the login sees to it that nobody else is there.
         outcomes = memory_journal(session.identity).log(session.identity)
         controller = EpsonController(session, outcomes, remote_timeout_s=0.0)
         try:
-            about, facts = _found_out(Interview(controller, session, traced, log))
+            about, facts = _found_out(Interview(controller, session, line.transport, log))
         finally:
             controller.close()
     finally:
@@ -58,14 +64,17 @@ def verify_epson(
     return Verification(session.identity, about, facts, log.dialogue)
 
 
+def _with_every_letter(url: LinkUrl) -> LinkUrl:
+    """Let the letters be tried that no manual prints: of them only Abort, at rest."""
+    if url.medium != SERIAL:
+        return url
+    return replace(url, options={**url.options, "letters": "guessed"})
+
+
 def _found_out(interview: Interview) -> tuple[ControllerFacts, tuple[Fact, ...]]:
     about = interview.controller.facts()
     facts = [
-        wire.status_flags(interview),
-        wire.case_echo(interview),
-        wire.extended_queries(interview),
-        wire.command_set(interview),
-        *wire.preferences(interview),
+        *(serial_facts(interview) if interview.serial else _of_remote_ethernet(interview)),
         _served(interview),
         text.closing_quote(interview),
         text.number_lead_blank(interview),
@@ -75,10 +84,22 @@ def _found_out(interview: Interview) -> tuple[ControllerFacts, tuple[Fact, ...]]
         text.comma_blank(interview),
         *text.tool_facts(interview),
         _while_executing(interview),
-        wire.terminator(interview),
-        wire.unfinished_request(interview.leave()),
     ]
-    return about, (*facts, *not_tried())
+    if interview.serial:
+        interview.log_out()
+        return about, (*facts, *not_tried())
+    end = (wire.terminator(interview), wire.unfinished_request(interview.leave()))
+    return about, (*facts, *end, *not_tried())
+
+
+def _of_remote_ethernet(interview: Interview) -> tuple[Fact, ...]:
+    return (
+        wire.status_flags(interview),
+        wire.case_echo(interview),
+        wire.extended_queries(interview),
+        wire.command_set(interview),
+        *wire.preferences(interview),
+    )
 
 
 def _served(interview: Interview) -> Fact:

@@ -8,12 +8,12 @@ to somebody else in its place leaves it unknown. A block is written again in one
 PLC counts one more damaged block and has acknowledged nothing since. Never after a time-out.
 """
 
-import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import Final
 
+from robolink import ambient
 from robolink.checkpoints import Checkpoint, checkpoint
 from robolink.controllers.softmotion.link.answers import (
     Ended,
@@ -93,7 +93,7 @@ class CommandSender:
     def __init__(self, wire: MailboxWire, snapshots: Snapshots) -> None:
         self._wire = wire
         self._snapshots = snapshots
-        self._lock = threading.RLock()
+        self._lock = ambient.reentrant_lock()
         self._last = 0
         self.ownership = Ownership(wire, self._to_end)
 
@@ -169,11 +169,12 @@ class CommandSender:
 
     def _seen_to_end(self, draft: Command) -> Ended:
         command, now = self._send(draft)
+        begun_ns = self._wire.clock.now_ns()
         deadline = Deadline.after(self._wire.clock, COMPLETION_S)
         while (end := self._end_of(command, now)) is None:
             if deadline.expired:
                 raise self._wire.ended(self._silence(command, tr("began, and has not ended")))
-            now = self._snapshots.news(now)
+            now = self._snapshots.news(now, begun_ns=begun_ns)
         return end
 
     def _end_of(self, command: Command, now: Response) -> Ended | None:

@@ -120,6 +120,34 @@ def require_still(now: Response, *, controller: str, request: str) -> None:
         )
 
 
+def is_tool_known(now: Response) -> bool:
+    """Whether the axis group works with the tool that the mailbox set last."""
+    return bool(now.bits & Bits.TOOL_KNOWN)
+
+
+def require_tool_known(now: Response, *, controller: str, request: str) -> None:
+    """Hold back a movement whose tip the mailbox cannot vouch for (docs/reference/faults.md F44).
+
+    Raises:
+        NotReadyError: The machine's own program has set another tool than the selected slot's.
+    """
+    if not is_tool_known(now):
+        raise NotReadyError(
+            tr(
+                "Slot {slot} is selected, but the machine has given the axis group another tool.",
+                slot=now.tool_slot,
+            ),
+            reason=NotReadyReason.WRONG_TOOL,
+            remedy=tr(
+                "Nothing was moved. Select tool {slot} again, or find out which program sets the "
+                "group's tool.",
+                slot=now.tool_slot,
+            ),
+            controller=controller,
+            request=request,
+        )
+
+
 def require_enabled(now: Response, *, controller: str, request: str) -> None:
     """Hold back what an axis group in this state would refuse.
 

@@ -108,7 +108,7 @@ def _foreign(meaning: str, controller: str) -> RemoteProtocolError:
     )
 
 
-POLL_S: Final = 0.02
+POLL_S: Final = 0.04
 """Longest time from one look at the head of the response block to the next."""
 
 _SHORTEST_POLL_S: Final = 0.0005
@@ -122,6 +122,11 @@ LOOK_S: Final = 0.3
 """Longest time between two snapshots while something is awaited."""
 
 _READS: Final = 3
+
+_LEAST: Final = 1e-100
+_MOST: Final = 1e9
+"""Beyond what any tool has in any unit, rounding included. A round number whose words are in
+another order is far below; of any other one in six lies in between."""
 
 T = TypeVar("T")
 
@@ -193,29 +198,46 @@ class Snapshots:
     def slot(self, number: int, *, keep: bool = False) -> Slot:
         """Read a tool slot; needs no ownership, and raises like :meth:`take`.
 
+        A slot has no probe. So values that no tool has are looked into: a program that was
+        changed while it ran may lay them in another order (docs/reference/faults.md F33).
+
         Args:
             number: Of the slot.
             keep: Whether the session goes on after a slot that cannot be used.
         """
         name = tr("Tool slot {number}", number=number)
-        return self._whole(lambda: self._wire.read_slot(number), decode_slot, name, keep=keep)
+        slot = self._whole(lambda: self._wire.read_slot(number), decode_slot, name, keep=keep)
+        if any(value and not _LEAST < abs(value) < _MOST for value in slot.tool):
+            self.take()  # tells by the probe what is the matter, if it is the order
+            raise self._useless(name, tr("its values are those of no tool"), keep=keep)
+        return slot
 
-    def news(self, since: Response, *, wait_s: float = LOOK_S) -> Response:
+    def news(
+        self, since: Response, *, wait_s: float = LOOK_S, begun_ns: int | None = None
+    ) -> Response:
         """Return a snapshot once the head differs from ``since``, or ``wait_s`` has passed.
+
+        Args:
+            since: The last snapshot.
+            wait_s: Longest wait for something new.
+            begun_ns: When the waiting began of which this is a part; now, if not given. Who has
+                waited long looks rarely from the start.
 
         Raises:
             TransportTimeoutError: The PLC's heartbeat stands still; the session is over.
         """
         known = (since.ack_head, since.state, since.error_class, since.group_state)
         clock = self._wire.clock
-        begun_ns = looked_ns = clock.now_ns()
+        asked_ns = looked_ns = clock.now_ns()
+        until_ns = asked_ns + wait_s * NS_PER_S
+        begun_ns = asked_ns if begun_ns is None else begun_ns
         while True:
             head = self._wire.read_head()
             now_ns = clock.now_ns()
             self._heartbeat.note(head.heartbeat, now_ns)
-            waited_s = (now_ns - begun_ns) / NS_PER_S
-            if head[:4] != known or waited_s >= wait_s:
+            if head[:4] != known or now_ns >= until_ns:
                 break
+            waited_s = (now_ns - begun_ns) / NS_PER_S
             period_s = min(max(waited_s / _POLLS_PER_WAIT, _SHORTEST_POLL_S), POLL_S)
             clock.sleep(period_s - (now_ns - looked_ns) / NS_PER_S)
             looked_ns = clock.now_ns()
@@ -251,11 +273,14 @@ class Snapshots:
             except RemoteProtocolError as error:
                 self._wire.ended(error)
                 raise
+        raise self._useless(name, cause, keep=keep)
+
+    def _useless(self, name: str, cause: str, *, keep: bool) -> RobolinkError:
         useless = RemoteProtocolError(
             tr("{name} cannot be used: {cause}.", name=name, cause=cause),
             remedy=tr("Connect again; if it stays so, compare the PLC's register map."),
         )
-        raise useless if keep else self._wire.ended(useless)
+        return useless if keep else self._wire.ended(useless)
 
     def _look_back(self, link: MailboxLink) -> RobolinkError | None:
         """Return that the PLC has started anew, when it is that which ended the session.

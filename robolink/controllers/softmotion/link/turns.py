@@ -7,11 +7,12 @@ every other thread is let in by the waiter alone: one exchange, just after a bea
 waiter's own. Then no two exchanges lie between two beats.
 """
 
-import threading
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Final
+
+from robolink import ambient
+from robolink.timing import NS_PER_S
 
 _PATIENCE_S: Final = 1.0
 """Longest time without a sign of the waiter: the PLC has ended by then what moved."""
@@ -24,7 +25,7 @@ class Turns:
     """Lets threads onto the wire. That one exchange follows another is the link's own lock."""
 
     def __init__(self) -> None:
-        self._changed = threading.Condition()
+        self._changed = ambient.waiting_room()
         self._waiters = 0
         self._waiting = 0
         self._let_in = 0
@@ -36,7 +37,7 @@ class Turns:
         """Have the say over who comes in, for as long as this thread waits on a movement."""
         with self._changed:
             self._waiters += 1
-            self._sign_s = time.monotonic()
+            self._sign_s = _now_s()
             self._changed.wait_for(self._nobody_inside, _LONGEST_EXCHANGE_S)
         try:
             yield
@@ -48,13 +49,13 @@ class Turns:
     def let_one_in(self) -> bool:
         """Let another thread have one exchange and wait for its end; False when none wants it."""
         with self._changed:
-            self._sign_s = time.monotonic()
+            self._sign_s = _now_s()
             if not self._waiting:
                 return False
             self._let_in = 1
             self._changed.notify_all()
             self._changed.wait_for(self._nobody_inside, _LONGEST_EXCHANGE_S)
-            self._sign_s = time.monotonic()
+            self._sign_s = _now_s()
             return True
 
     @contextmanager
@@ -65,7 +66,7 @@ class Turns:
             try:
                 # Real time: a clock that stands still would keep this thread out for ever.
                 while self._waiters and not self._let_in:
-                    left_s = self._sign_s + _PATIENCE_S - time.monotonic()
+                    left_s = self._sign_s + _PATIENCE_S - _now_s()
                     if left_s <= 0:
                         break
                     self._changed.wait(left_s)
@@ -82,3 +83,7 @@ class Turns:
 
     def _nobody_inside(self) -> bool:
         return not self._inside and not (self._let_in and self._waiting)
+
+
+def _now_s() -> float:
+    return ambient.monotonic_ns() / NS_PER_S

@@ -11,6 +11,7 @@ from robolink.controllers.softmotion.link.condition import (
     require_permit,
     require_power,
     require_still,
+    require_tool_known,
 )
 from robolink.controllers.softmotion.link.mailbox import Mailbox
 from robolink.controllers.softmotion.link.stopping import bring_group_to_rest
@@ -186,6 +187,7 @@ class SoftMotionGroup(MotionGroupCore):
                 mailbox.wire.motions.require_room(request, controller=mailbox.identity)
                 now = self._require_startable(draft, request)
                 self._require_tool(target, now.tool_slot, request)
+                require_tool_known(now, controller=mailbox.identity, request=request)
                 with mailbox.uninterrupted():
                     motion = self._started(target, draft, request)
                     self._current = [*(m for m in self._current if not m.settled), motion]

@@ -136,6 +136,7 @@ class SoftMotionMotion:
         mailbox, sequence = self._mailbox, self.command.sequence
         if self.settled:
             return True
+        begun_ns = mailbox.wire.clock.now_ns()
         slow = mailbox.wire.whole_look_s > 0
         # On a slow line the block that showed its acceptance, or a later one, has to do.
         now = mailbox.snapshots.latest if slow else mailbox.snapshots.take()
@@ -144,7 +145,8 @@ class SoftMotionMotion:
                 raise mailbox.wire.ended(self._vanished())
             if deadline.expired:
                 return False
-            now = mailbox.snapshots.news(now, wait_s=self._patience_s(deadline))
+            wait_s = self._patience_s(deadline)
+            now = mailbox.snapshots.news(now, wait_s=wait_s, begun_ns=begun_ns)
         return True
 
     def _patience_s(self, deadline: Deadline) -> float:

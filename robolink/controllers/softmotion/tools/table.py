@@ -9,7 +9,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from robolink.controllers.softmotion.link.answers import describe
-from robolink.controllers.softmotion.link.condition import require_enabled, require_still
+from robolink.controllers.softmotion.link.condition import (
+    is_tool_known,
+    require_enabled,
+    require_still,
+)
 from robolink.controllers.softmotion.link.mailbox import Mailbox
 from robolink.controllers.softmotion.tools.group_tool import GroupTool
 from robolink.controllers.softmotion.tools.slot_write import SlotWrite
@@ -93,6 +97,10 @@ class SoftMotionToolTable(ToolTableCore):
 
     def _selected(self) -> int:
         return self._mailbox.snapshots.take().tool_slot
+
+    def _is_in_force(self, tool: int) -> bool:
+        now = self._mailbox.snapshots.take()
+        return now.tool_slot == tool and is_tool_known(now)
 
     def _select_request(self, tool: int) -> str:
         return describe(_select_draft(tool))

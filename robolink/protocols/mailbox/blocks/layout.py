@@ -94,17 +94,21 @@ class Layout:
         """Whether a checksum guards it."""
         return "crc" in self._by_name
 
+    def before(self, name: str) -> "Layout":
+        """Return the fields before one, as a layout of their own: what stands there anyhow."""
+        end = self._by_name[name].word
+        return Layout(*(field for field in self.fields if field.word < end))
+
     def at(self, name: str) -> slice:
         """Return where a field lies in the words of its block."""
         field = self._by_name[name]
         return slice(field.word, field.end)
 
-    def pack(self, values: Mapping[str, Any], *, seal: bool = True) -> Words:
+    def pack(self, values: Mapping[str, Any]) -> Words:
         """Return the words of every field but ``crc``, which is worked out.
 
         Args:
             values: By field name; what is missing is 0.
-            seal: Whether ``crc`` is needed; without it the checksum stays 0.
 
         Raises:
             BlockError: A value does not fit its field.
@@ -117,7 +121,7 @@ class Layout:
             words: Words = self._registers.unpack(self._image.pack(*parts))
         except (struct.error, OverflowError) as error:
             raise BlockError(BlockFault.VALUE) from error
-        if not (seal and self.guarded):
+        if not self.guarded:
             return words
         crc = self._by_name["crc"]
         return (*words[: crc.word], crc16(words[: crc.word]), *words[crc.end :])

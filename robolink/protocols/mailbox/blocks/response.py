@@ -79,12 +79,11 @@ _NAMES: Final = tuple(field.name for field in fields(Response))
 _in_order: Final = attrgetter(*_NAMES)
 
 
-def encode_response(response: Response, *, seal: bool = True) -> Words:
+def encode_response(response: Response) -> Words:
     """Return the 112 words of a snapshot.
 
     Args:
         response: What it says.
-        seal: Whether somebody reads as far as the checksum; else it stays 0.
 
     Raises:
         BlockError: A value does not fit its field.
@@ -96,8 +95,7 @@ def encode_response(response: Response, *, seal: bool = True) -> Words:
             "answer": response.answer.pose,
             "finished": tuple(number for end in response.finished for number in end),
             "ack_tail": response.ack_head,
-        },
-        seal=seal,
+        }
     )
 
 

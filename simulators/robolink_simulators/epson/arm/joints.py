@@ -39,6 +39,22 @@ def check_ranges(model: RobotModel, joints: Joints) -> None:
             )
 
 
+def check_depth(model: RobotModel, joints: Joints) -> None:
+    """Refuse to go where a model holds its joint 2 to less, the shaft being low.
+
+    Raises:
+        OutOfReach: Names the joint and the range there.
+    """
+    if model.narrow_below is None:
+        return
+    below_mm, most_deg = model.narrow_below
+    if joints.j3_mm < below_mm - 1e-9 and abs(joints[1]) > most_deg + 1e-9:
+        raise OutOfReach(
+            f"Joint 2 outside its range below Z {below_mm:.0f}: {joints[1]:.3f}, "
+            f"allowed {-most_deg:.3f} to {most_deg:.3f}"
+        )
+
+
 def within(low: float, high: float, angle_deg: float) -> float:
     """Return the angle, whole turns away, that lies next to the middle of a range."""
     middle = (low + high) / 2

@@ -9,7 +9,7 @@ from typing import Final
 from robolink.model import Hand, Pose, Posture, ToolOffset, rotate_xy
 from robolink_simulators.cell.frames import ORIGIN, Frame, printed_angles, zyx
 from robolink_simulators.epson.arm import scara, six_axes
-from robolink_simulators.epson.arm.joints import Joints, check_ranges
+from robolink_simulators.epson.arm.joints import Joints, check_depth, check_ranges
 from robolink_simulators.epson.arm.robots import RobotModel
 
 PLAIN: Final = Posture()
@@ -59,6 +59,7 @@ def inverse(model: RobotModel, flange: Pose, hand: Hand, posture: Posture | None
     """
     joints = solve(model, flange, hand, posture)
     check_ranges(model, joints)
+    check_depth(model, joints)
     return joints
 
 

@@ -40,6 +40,9 @@ class Mount(StrEnum):
 
 
 _ROBOT_TYPES: Final = {Mechanism.SCARA: 3, Mechanism.SIX_AXIS: 5, Mechanism.FOLDED_SCARA: 6}
+_NARROW_BELOW: Final = {"GX8-C453S": (-270.0, 145.0), "GX8-C453C": (-240.0, 137.5)}
+"""Height in mm below which joint 2 is held to fewer degrees (the maker's manual of GX8)."""
+
 _TURN: Final = 360.0
 _ON_A_WALL: Final = "w"
 
@@ -89,6 +92,11 @@ class RobotModel:
     def evidence(self) -> Evidence:
         """Whether the lengths are the vendor's."""
         return Evidence.VENDOR if self.source.startswith("ROS2") else Evidence.SECOND_HAND
+
+    @property
+    def narrow_below(self) -> tuple[float, float] | None:
+        """Below which height in mm joint 2 is held to how many degrees, ``None`` for nowhere."""
+        return _NARROW_BELOW.get(self.name)
 
     @property
     def axes(self) -> int:

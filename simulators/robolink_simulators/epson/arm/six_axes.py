@@ -7,6 +7,8 @@ times that of Tool 0 with all joints at 0. A ceiling robot is the table robot tu
 """
 
 import math
+from collections.abc import Sequence
+from itertools import groupby
 from typing import Final, NamedTuple
 
 from robolink.model import Elbow, Hand, Pose, Posture, Wrist
@@ -21,6 +23,11 @@ down, docs/reference/epson-robots.md, "Flags")."""
 
 FIRST_TURN_DEG: Final = 180.0
 
+SINGULARITY_ANGLE_DEG: Final = 10.0
+SINGULARITY_SPEED: Final = 0.10
+SINGULARITY_DIST_MM: Final = 30.0
+
+_J1, _J4, _J5 = 0, 3, 4
 _STRAIGHT = 1e-7
 _ROUNDING = 1e-12
 
@@ -231,3 +238,45 @@ def _in_half_turn(angle_deg: float, flag: int) -> float:
     even = flag % 2 == 0
     by_deg = FIRST_TURN_DEG * (flag if even else flag + 1)
     return angle_deg + (by_deg if (angle_deg > 0) is even else -by_deg)
+
+
+def singular_stretches(
+    model: RobotModel, knots: Sequence[Joints], rate: float
+) -> tuple[tuple[int, int], ...]:
+    """Return the first and the last knot of each stretch near a singular place.
+
+    The neighbourhoods are those of AvoidSingularity with its defaults (documented,
+    docs/reference/epson-robots.md, "Singularities"): joint 5 within SingularityAngle of 0 while
+    joint 4 is faster than SingularitySpeed, and the wrist within SingularityDist of the axis of
+    joint 1. There joint 1 has to be as fast (assumed, or a slow line beside it would be left too).
+
+    Args:
+        model: The robot.
+        knots: The joints at even shares of the way.
+        rate: How much of the way a second holds.
+    """
+    per_s = rate * (len(knots) - 1)
+    near = [_is_near(model, knots[i], knots[i + 1], per_s) for i in range(len(knots) - 1)]
+    found = list[tuple[int, int]]()
+    for inside, steps in groupby(range(len(near)), near.__getitem__):
+        numbers = list(steps)
+        if inside:
+            found.append((numbers[0], numbers[-1] + 1))
+    return tuple(found)
+
+
+def _is_near(model: RobotModel, before: Joints, after: Joints, per_s: float) -> bool:
+    def fast(joint: int) -> bool:
+        speed = abs(after[joint] - before[joint]) * per_s
+        return speed > SINGULARITY_SPEED * model.top_speed[joint]
+
+    if abs(before[_J5]) < SINGULARITY_ANGLE_DEG and fast(_J4):
+        return True
+    return fast(_J1) and _from_axis_mm(model, before) < SINGULARITY_DIST_MM
+
+
+def _from_axis_mm(model: RobotModel, joints: Joints) -> float:
+    """Return how far the centre of the wrist is from the axis of joint 1."""
+    frame = flange_frame(model, joints)
+    x, y = (frame.shift_mm[i] - model.lengths_mm[5] * frame.rotation[i][2] for i in (0, 1))
+    return math.hypot(x, y)

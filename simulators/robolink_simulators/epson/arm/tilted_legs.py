@@ -5,9 +5,10 @@ last (assumed). Hand, elbow and wrist stay, every joint turns on from where it w
 that the flags of the target name are not looked at (assumed).
 
 Near a singularity the joints would have to be faster than they can. A controller that avoids it
-leaves the way and comes back (documented, docs/reference/epson-robots.md, "Singularities"); here it
-keeps to the way and is slower (assumed simplification). One that does not avoid it stops with the
-error for joint speed, here before anything moves (assumed).
+leaves the way and comes back (documented, docs/reference/epson-robots.md, "Singularities"): here
+from joint to joint, between where the way enters the neighbourhood and where it leaves it (how it
+goes is assumed). One that does not avoid it stops with the error for joint speed, here before
+anything moves (assumed).
 """
 
 import cmath
@@ -30,6 +31,7 @@ from robolink_simulators.cell.frames import (
 from robolink_simulators.epson.arm.arc import circle_through, plan_arc
 from robolink_simulators.epson.arm.joints import Joints, check_ranges
 from robolink_simulators.epson.arm.kinematics import (
+    forward,
     frame_of,
     hand_of,
     pose_of_frame,
@@ -38,7 +40,7 @@ from robolink_simulators.epson.arm.kinematics import (
 )
 from robolink_simulators.epson.arm.ramps import BrakedRamp, Ramp, TimeLaw
 from robolink_simulators.epson.arm.robots import RobotModel
-from robolink_simulators.epson.arm.six_axes import solve_near
+from robolink_simulators.epson.arm.six_axes import singular_stretches, solve_near
 from robolink_simulators.epson.arm.trajectory import Leg, LinePace, plan_move
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 
@@ -70,6 +72,31 @@ class _Course:
 
 
 @dataclass(frozen=True, slots=True)
+class _HeldCourse:
+    """The way of an external control point, straight as a held workpiece sees it.
+
+    The tip is no straight line then. That the orientation of the point runs evenly is assumed.
+    """
+
+    model: RobotModel
+    point: Frame
+    first: Pose
+    seen: tuple[Frame, Frame]
+    axis: Vector
+    angle_deg: float
+    to_flange: Frame
+
+    def flange(self, share: float) -> Frame:
+        """Return the frame of the flange after a share of the way."""
+        start, end = self.seen
+        pairs = zip(start.shift_mm, end.shift_mm, strict=True)
+        x, y, z = (a + (b - a) * share for a, b in pairs)
+        turn = about(self.axis, self.angle_deg * share)
+        seen = Frame((x, y, z), product(turn, start.rotation))
+        return self.point @ seen.inverse() @ self.to_flange
+
+
+@dataclass(frozen=True, slots=True)
 class TiltedLeg:
     """A leg of six axes along a course.
 
@@ -77,11 +104,13 @@ class TiltedLeg:
         course: Where the flange goes.
         knots: The joints at even shares of it, both ends included.
         ramp: How the share grows with time, ``None`` for a leg that stays.
+        detours: Numbers of the knots between which it goes from joint to joint instead.
     """
 
-    course: _Course
+    course: _Course | _HeldCourse
     knots: tuple[Joints, ...]
     ramp: TimeLaw | None
+    detours: tuple[tuple[int, int], ...] = ()
 
     @property
     def duration_ns(self) -> int:
@@ -93,13 +122,22 @@ class TiltedLeg:
         share = self._share_at(elapsed_ns)
         if share >= 1:
             return self.knots[-1]
-        near = self.knots[int(share * (len(self.knots) - 1))]
+        at = share * (len(self.knots) - 1)
+        near = self.knots[int(at)]
+        if self._off_course(at):
+            following = zip(near, self.knots[int(at) + 1], strict=True)
+            return Joints(*(a + (b - a) * (at - int(at)) for a, b in following))
         return solve_near(self.course.model, self.course.flange(share), near)
 
     def flange_at(self, elapsed_ns: int) -> Pose:
         """Return the pose of the flange that long after the start."""
-        course = self.course
-        return pose_of_frame(course.flange(self._share_at(elapsed_ns)), course.first, tool=0)
+        course, share = self.course, self._share_at(elapsed_ns)
+        if self._off_course(share * (len(self.knots) - 1)):
+            return forward(course.model, self.joints_at(elapsed_ns))
+        return pose_of_frame(course.flange(share), course.first, tool=0)
+
+    def _off_course(self, at: float) -> bool:
+        return any(first <= at < last for first, last in self.detours)
 
     def braked(self, elapsed_ns: int) -> "TiltedLeg":
         """Return the same leg, left to come to rest."""
@@ -147,6 +185,39 @@ def plan_line(
 
     _require_same_posture(model, near, ends[1])
     course = _course(model, way, ends, offset)
+    return _leg(course, length_mm, pace, near=near, avoiding=avoiding)
+
+
+def plan_about_point(
+    model: RobotModel,
+    ends: tuple[Pose, Pose],
+    pace: LinePace,
+    *,
+    point: Frame,
+    offset: ToolOffset | None,
+    near: Joints,
+    avoiding: bool = True,
+) -> Leg:
+    """Plan a leg in which an external control point runs straight over the held workpiece.
+
+    Args:
+        model: The robot, of six axes.
+        ends: Where the tip is and where it goes.
+        pace: How fast the point may be on the workpiece.
+        point: The external control point, in the base.
+        offset: The tool in force.
+        near: The joints at the start.
+        avoiding: Whether singularities are avoided.
+
+    Raises:
+        Refusal: As :func:`plan_line`.
+    """
+    _require_same_posture(model, near, ends[1])
+    start, end = (frame_of(pose).inverse() @ point for pose in ends)
+    axis, angle_deg = axis_and_angle(product(end.rotation, transposed(start.rotation)))
+    to_flange = tool_frame(offset).inverse()
+    course = _HeldCourse(model, point, ends[0], (start, end), axis, angle_deg, to_flange)
+    length_mm = math.dist(start.shift_mm, end.shift_mm)
     return _leg(course, length_mm, pace, near=near, avoiding=avoiding)
 
 
@@ -204,7 +275,7 @@ def _course(
 
 
 def _leg(
-    course: _Course, length_mm: float, pace: LinePace, *, near: Joints, avoiding: bool
+    course: _Course | _HeldCourse, length_mm: float, pace: LinePace, *, near: Joints, avoiding: bool
 ) -> TiltedLeg:
     """Look at the whole way before anything moves, as for a SCARA (assumed)."""
     model, angle_deg = course.model, course.angle_deg
@@ -221,12 +292,23 @@ def _leg(
         decel = accel
     else:
         return TiltedLeg(course, (near,), None)
+    detours = singular_stretches(model, knots, rate) if avoiding else ()
+    for first, last in detours:
+        knots[first : last + 1] = _from_joint_to_joint(knots[first], knots[last], last - first)
     fastest = _fastest(model, knots)
     if rate > fastest and not avoiding:
         raise SpelRefusal(
             RefusalKind.JOINT_TOO_FAST, "A joint would be too fast near a singularity"
         )
-    return TiltedLeg(course, tuple(knots), Ramp.fastest(min(rate, fastest), accel, decel))
+    ramp = Ramp.fastest(min(rate, fastest), accel, decel)
+    return TiltedLeg(course, tuple(knots), ramp, detours)
+
+
+def _from_joint_to_joint(first: Joints, last: Joints, steps: int) -> list[Joints]:
+    shares = (step / steps for step in range(steps + 1))
+    return [
+        Joints(*(a + (b - a) * share for a, b in zip(first, last, strict=True))) for share in shares
+    ]
 
 
 def _fastest(model: RobotModel, knots: list[Joints]) -> float:

@@ -11,7 +11,7 @@ from typing import Final, Protocol
 
 from robolink.model import Hand, Pose, Posture, ToolOffset
 from robolink.timing import NS_PER_S
-from robolink_simulators.epson.arm.joints import Joints, check_ranges
+from robolink_simulators.epson.arm.joints import Joints, check_depth, check_ranges
 from robolink_simulators.epson.arm.kinematics import flange_of, forward, hand_of, posture_of, solve
 from robolink_simulators.epson.arm.ramps import BrakedRamp, Ramp, TimeLaw
 from robolink_simulators.epson.arm.robots import RobotModel
@@ -169,6 +169,7 @@ def plan_go(
         OutOfReach: ``end`` lies outside a joint's range.
     """
     check_ranges(model, end)
+    check_depth(model, end)
     deltas = [b - a for a, b in zip(start, end, strict=True)]
     shares = [abs(d) / top for d, top in zip(deltas, model.top_speed, strict=True)]
     longest = max(shares)
@@ -231,7 +232,8 @@ def plan_move(
         ramp = Ramp.fastest(pace.turn_deg_s / turn_deg, accel, accel)
     leg = LineLeg(model, start, end, offset, hand, posture_of(model, near), ramp)
     steps = math.ceil(min(length_mm / _CHECK_EVERY_MM + turn_deg / _CHECK_EVERY_DEG, _MOST_CHECKS))
-    check_ranges(model, leg.joints_after(1.0))
-    for step in range(1, steps):
-        check_ranges(model, leg.joints_after(step / steps))
+    for step in (steps, *range(1, steps)):
+        joints = leg.joints_after(step / steps if steps else 1.0)
+        check_ranges(model, joints)
+        check_depth(model, joints)
     return leg

@@ -32,6 +32,14 @@ class ClientSlot:
         self.client = client
         self._heard_ns = now_ns
 
+    def hears(self, link: Client, *, cuts: bool) -> bool:
+        """Tell whether a connection is listened to; whoever comes second may be cut off."""
+        if self.client in (None, link):
+            return True
+        if cuts:
+            link.cut()
+        return False
+
     def heard(self, now_ns: int) -> None:
         """The client sent a request."""
         self._heard_ns = now_ns
@@ -56,3 +64,13 @@ class ClientSlot:
         if self._heard_ns is None or not self._timeout_ns or not counted:
             return None
         return self._heard_ns + self._timeout_ns
+
+    def overdue(self, now_ns: int, *, unfinished: bool) -> tuple[bool, Client | None]:
+        """Return whether the silence has lasted too long, and whose it was; its place is free."""
+        self.settle(unfinished=unfinished)
+        deadline = self.deadline(unfinished=unfinished)
+        if deadline is None or now_ns < deadline:
+            return False, None
+        client = self.client
+        self.free()
+        return True, client

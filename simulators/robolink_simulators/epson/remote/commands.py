@@ -43,7 +43,7 @@ class CommandDesk:
         self._machine = machine
         self._condition = condition
         self._options = options
-        self.starter: Callable[[int], None] | None = None
+        self.starter: Callable[[int], object] | None = None
         self._served: dict[str, Served] = {
             **io_commands(machine),
             **query_commands(machine, condition, card, options),

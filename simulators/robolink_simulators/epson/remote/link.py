@@ -1,10 +1,13 @@
-"""One client's connection to the simulated controller: codec, login, what leaves and when."""
+"""One client's connection to the simulated controller: codec, login, what leaves and when.
 
-from collections import deque
+On a serial line nothing is connected: EOT begins, and silence ends a request that was cut short.
+"""
+
 from collections.abc import Sequence
 from typing import Final, Protocol
 
 from robolink.errors import LocalProtocolError, RemoteProtocolError
+from robolink.protocols.epson_binary import Dialect, EpsonBinaryCodec, Opening
 from robolink.protocols.epson_text import (
     NEED_DATA,
     BadRequest,
@@ -19,9 +22,12 @@ from robolink.timing import NS_PER_S
 from robolink_simulators.epson.options import EpsonOptions
 from robolink_simulators.epson.remote.exchange import PendingRequest
 from robolink_simulators.faults import Departure
+from robolink_simulators.faults.departing import DepartingReplies
 
 _SILENCE_NS: Final = 100_000_000
 """How long nothing must come for a request without a line end to be whole (inferred)."""
+
+_ACK: Final = b"\x06"
 
 _TERMINATORS: Final = {"crlf": b"\r\n", "cr": b"\r", "lf": b"\n"}
 
@@ -41,6 +47,9 @@ class ServedRequest(Protocol):
     def take(self, link: "EpsonServerLink", event: Request | BadRequest) -> None:
         """Deal with a request."""
 
+    def take_late(self, link: "EpsonServerLink", event: Request | BadRequest) -> None:
+        """Deal with a request that was counted already: it meets no fault again."""
+
     def leaving(self, exchange: PendingRequest, reply: bytes) -> Sequence[Departure]:
         """Count a reply and return what of it leaves, when."""
 
@@ -58,15 +67,26 @@ class EpsonServerLink:
     stays after its logout (assumed).
     """
 
-    def __init__(self, controller: ServedRequest, now_ns: int) -> None:
+    def __init__(
+        self, controller: ServedRequest, now_ns: int, *, dialect: Dialect | None = None
+    ) -> None:
         options = controller.options
         self._controller = controller
-        self._codec = EpsonTextCodec(
-            Role.DEVICE,
-            terminator=_TERMINATORS[options.terminator],
-            unterminated=options.requests_end_with_silence,
+        self._codec: EpsonTextCodec | EpsonBinaryCodec = (
+            EpsonTextCodec(
+                Role.DEVICE,
+                terminator=_TERMINATORS[options.terminator],
+                unterminated=options.requests_end_with_silence,
+            )
+            if dialect is None
+            else EpsonBinaryCodec(Role.DEVICE, dialect)
         )
-        self._outbox: deque[tuple[int, bytes | None]] = deque()
+        self.dialect = dialect
+        self._serial = dialect is not None
+        self._turned_on = not self._serial
+        self._outbox = DepartingReplies()
+        self._late: list[Request | BadRequest] = []
+        self._hung_up = False
         self._over = False
         self._anonymous_since_ns: int | None = now_ns
         self._silent_from_ns: int | None = None
@@ -74,15 +94,26 @@ class EpsonServerLink:
     @property
     def closed(self) -> bool:
         """Whether the controller has ended this connection, after what is outgoing."""
-        return bool(self._outbox) and self._outbox[0][1] is None and self._due
+        return self._outbox.ended(self._controller.now_ns)
+
+    @property
+    def reset(self) -> bool:
+        """Whether it has ended it with a reset."""
+        return self._outbox.reset(self._controller.now_ns)
+
+    @property
+    def over(self) -> bool:
+        """Whether the controller knows of no connection here any more."""
+        return self._over
 
     def receive(self, data: bytes, now_ns: int) -> None:
         """Take bytes from the client; ``b""`` means that it is gone."""
         self._controller.advance(now_ns)
-        if self._over:
+        if self._over or self._outbox.half_open:
             return
         if not data:
-            self._end()
+            self._hung_up = True
+            self._leave()
             return
         try:
             self._read(data)
@@ -92,25 +123,16 @@ class EpsonServerLink:
     @property
     def drained(self) -> bool:
         """Whether nothing will happen on this connection any more."""
-        return self._over and (not self._outbox or self.closed)
+        return self._over and self._outbox.empty(self._controller.now_ns)
 
     def outgoing(self) -> bytes:
         """Take what is ready for the client, ``b""`` for nothing."""
-        if not self._outbox:
-            return b""
-        ready = b""
-        while self._outbox and self._due:
-            data = self._outbox[0][1]
-            if data is None:
-                break
-            ready += data
-            self._outbox.popleft()
-        return ready
+        return self._outbox.take(self._controller.now_ns)
 
     def next_change(self) -> int | None:
         """Return when something leaves, or when the login time-out passes."""
-        leaving = self._outbox[0][0] if self._outbox else None
-        if leaving is not None and leaving > self._controller.now_ns:
+        leaving = self._outbox.next_change(self._controller.now_ns)
+        if leaving is not None:
             return leaving
         login_ns, silent_ns = self._login_deadline(), self._silent_from_ns
         if login_ns is None or silent_ns is None:
@@ -119,10 +141,11 @@ class EpsonServerLink:
 
     def supervise(self, now_ns: int) -> None:
         """End a request after which nothing came; cut whoever did not log in for too long."""
+        if self._late and not self._stalled:
+            self._catch_up()
         if self._silent_from_ns is not None and now_ns >= self._silent_from_ns:
             self._silent_from_ns = None
-            self._codec.end_of_request()
-            self._serve()
+            self._end_request()
         deadline = self._login_deadline()
         if deadline is not None and now_ns >= deadline:
             self.cut()
@@ -149,39 +172,66 @@ class EpsonServerLink:
 
     def push(self, data: bytes) -> None:
         """Send bytes that nobody asked for."""
-        self._post(data, self._controller.now_ns)
+        self._outbox.post(data, self._controller.now_ns)
 
     def cut(self) -> None:
         """End the connection from the controller's side, after what is on its way."""
         if not self._over:
-            self._post(None, self._controller.now_ns)
+            self._outbox.post(None, self._controller.now_ns)
             self._end()
 
+    def stall(self, event: Request | BadRequest, seconds: float) -> None:
+        """Carry nothing for a while; then a request arrives, and what was sent behind it."""
+        self._outbox.stalled_until_ns = self._controller.now_ns + max(1, round(seconds * NS_PER_S))
+        self._late.append(event)
+
     @property
-    def _due(self) -> bool:
-        return self._outbox[0][0] <= self._controller.now_ns
+    def _stalled(self) -> bool:
+        return self._controller.now_ns < self._outbox.stalled_until_ns
+
+    def _catch_up(self) -> None:
+        late, self._late = self._late, []
+        for event in late:
+            if not self._over:
+                self._controller.take_late(self, event)
+        try:
+            self._serve()
+        except RemoteProtocolError:
+            self.cut()
+        self._leave()
+
+    def _leave(self) -> None:
+        """Let the controller notice that the client is gone, once it can."""
+        if self._hung_up and not self._over and not self._stalled:
+            self._end()
 
     def _depart(self, departures: Sequence[Departure]) -> None:
-        now_ns = self._controller.now_ns
-        for after_s, data in departures:
-            self._post(data, now_ns + round(after_s * NS_PER_S))
-            if data is None:
-                self._end()
+        if not self._outbox.depart(departures, self._controller.now_ns):
+            self._end()
 
     def _read(self, data: bytes) -> None:
         self._codec.receive_data(data)
         self._serve()
-        begun = self._controller.options.requests_end_with_silence and self._codec.bytes_held
+        by_silence = self._serial or self._controller.options.requests_end_with_silence
+        begun = by_silence and self._codec.bytes_held
         self._silent_from_ns = self._controller.now_ns + _SILENCE_NS if begun else None
 
-    def _serve(self) -> None:
-        while not self._over and (event := self._codec.next_event()) is not NEED_DATA:
-            if isinstance(event, (Request, BadRequest)):
-                self._controller.take(self, event)
+    def _end_request(self) -> None:
+        broken = self._codec.end_of_request()
+        if isinstance(broken, (Request, BadRequest)) and self._turned_on:
+            self._controller.take(self, broken)
+        self._serve()
 
-    def _post(self, data: bytes | None, at_ns: int) -> None:
-        # One stream: nothing overtakes what was sent before it.
-        self._outbox.append((max(at_ns, self._outbox[-1][0] if self._outbox else 0), data))
+    def _serve(self) -> None:
+        while not (self._over or self._stalled or self._outbox.half_open):
+            if (event := self._codec.next_event()) is NEED_DATA:
+                return
+            if isinstance(event, Opening):
+                self._turned_on = True
+                if self._controller.options.rs232_eot_answer == "ack":
+                    self.push(_ACK)
+            elif isinstance(event, (Request, BadRequest)) and self._turned_on:
+                self._controller.take(self, event)
 
     def _end(self) -> None:
         self._over = True

@@ -15,6 +15,7 @@ from robolink.messages import tr
 from robolink.protocols.mailbox import COMMAND
 from robolink.timing import NS_PER_S
 from robolink_simulators.cell.clock import ScaledClock
+from robolink_simulators.faults import LinkKind
 from robolink_simulators.hosting.fieldbus.canopen_objects import (
     MailboxObjects,
     object_dictionary,
@@ -163,7 +164,7 @@ class CanopenHost(ClosedAtExit):
         if len(data) == 2 and self._node.nmt.state == "OPERATIONAL":
             with self._simulator.lock:
                 word = int.from_bytes(data, "little")
-                self._simulator.write(_BEAT, (word,), self._clock.now_ns())
+                self._simulator.write(_BEAT, (word,), self._clock.now_ns(), LinkKind.CAN)
 
 
 def serve_canopen(

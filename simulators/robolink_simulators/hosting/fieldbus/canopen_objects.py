@@ -23,6 +23,7 @@ from robolink.protocols.mailbox import (
     electronic_data_sheet,
     slot_start,
 )
+from robolink_simulators.faults import LinkKind
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 from robolink_simulators.softmotion.mailbox.words.exchange import ServedAccess
 
@@ -120,11 +121,11 @@ class MailboxObjects:
 
     def _read(self, first: int, count: int) -> ServedAccess:
         with self._simulator.lock:
-            return self._simulator.read(first, count, self._present())
+            return self._simulator.read(first, count, self._present(), LinkKind.CAN)
 
     def _put(self, first: int, words: Words) -> None:
         with self._simulator.lock:
-            served = self._simulator.write(first, words, self._present())
+            served = self._simulator.write(first, words, self._present(), LinkKind.CAN)
         self._answering.let_go(served)
 
     def _given(self, served: ServedAccess, count: int | None = None) -> bytes:

@@ -7,6 +7,7 @@ from robolink.closing import ClosedAtExit
 from robolink.errors import ConnectError
 from robolink.messages import tr
 from robolink_simulators.cell.clock import ScaledClock
+from robolink_simulators.faults import LinkKind
 from robolink_simulators.hosting.fieldbus.modbus_server import ModbusServerThread, SerialLine
 from robolink_simulators.hosting.fieldbus.plc_registers import PlcRegisters
 from robolink_simulators.hosting.loopback import require_loopback
@@ -121,7 +122,8 @@ def serve_modbus_rtu(
     try:
         cable = SerialCable(baud)
         port = SerialLine(cable.far, unit)
-        server = ModbusServerThread(PlcRegisters(simulator, clock), clock, port)
+        registers = PlcRegisters(simulator, clock, LinkKind.MODBUS_RTU)
+        server = ModbusServerThread(registers, clock, port)
     except (ImportError, AttributeError, OSError) as error:
         raise no_pseudo_terminal(error) from error
     options = {**PTY_LINE, **_client_options(simulator.options.mailbox)}

@@ -7,9 +7,11 @@ is kept in its own registers.
 
 import asyncio
 import logging
+import socket
 import threading
 from collections.abc import Callable, Coroutine
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Final
 
 from pymodbus.constants import ExcCodes
@@ -19,7 +21,9 @@ from pymodbus.server import ModbusSerialServer, ModbusTcpServer
 from pymodbus.simulator import DataType, SimData, SimDevice
 
 from robolink_simulators.cell.clock import ScaledClock
+from robolink_simulators.faults import PlcFault, PlcFaultAction
 from robolink_simulators.hosting.fieldbus.plc_registers import PlcRegisters
+from robolink_simulators.hosting.streams.connection import NO_TIME
 from robolink_simulators.softmotion.mailbox.words.exchange import ServedAccess
 from robolink_simulators.softmotion.mailbox.words.places import REGISTERS, Bank
 
@@ -31,6 +35,7 @@ _COIL_FUNCTIONS: Final = frozenset({1, 2, 5, 15})
 _WORD_BITS: Final = 16
 _NANOSECONDS: Final = 1_000_000_000
 _ALL_UNITS: Final = 0
+_SPLIT_S: Final = 0.01
 _SETTLING_S: Final = 0.02
 """A connection made just now has to be accepted before it can be closed."""
 
@@ -67,6 +72,7 @@ class ModbusServerThread:
     ) -> None:
         self._registers = registers
         self._clock = clock
+        self._met: tuple[PlcFault, ...] = ()
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._run, name="modbus host", daemon=True)
         self._thread.start()
@@ -114,6 +120,7 @@ class ModbusServerThread:
             server = ModbusSerialServer(self._device(), port=place.path, **habits)
         else:
             server = ModbusTcpServer(self._device(), address=place, **habits)
+        self._watch_connections(server)
         try:
             await server.serve_forever(background=True)
         except RuntimeError as error:  # it keeps the reason to itself
@@ -165,14 +172,62 @@ class ModbusServerThread:
         if served.cut:
             self._cut()
         if served.delay_s:
-            at_ns = self._clock.now_ns() + round(served.delay_s * _NANOSECONDS)
-            await asyncio.sleep(self._clock.real_seconds(at_ns))
-        if not served.answered:
-            raise NoSuchIdException
+            await asyncio.sleep(self._real_seconds(served.delay_s))
+        if served.meets(PlcFaultAction.RESET):
+            self._each_transport(_reset)
+        elif served.meets(PlcFaultAction.HALF_OPEN):
+            self._each_transport(lambda transport: transport.pause_reading())
+        elif served.answered:
+            self._met = served.met  # the answer is packed and sent before anything else runs
+            return
+        raise NoSuchIdException
+
+    def _real_seconds(self, simulated_s: float) -> float:
+        at_ns = self._clock.now_ns() + round(simulated_s * _NANOSECONDS)
+        return self._clock.real_seconds(at_ns)
+
+    def _watch_connections(self, server: Server) -> None:
+        """Have the frames of each connection pass through here before they leave."""
+        usual: Any = server.callback_new_connection
+
+        def accepted() -> Any:  # noqa: ANN401 - a handler, for which pymodbus has no public name
+            handler: Any = usual()
+            handler.trace_packet = partial(self._sent, handler)
+            return handler
+
+        server.callback_new_connection = accepted  # type: ignore[method-assign]
+
+    def _sent(self, handler: Any, sending: bool, data: bytes) -> bytes:  # noqa: ANN401 - as above
+        """Return what leaves at once instead of a frame."""
+        if not sending or not self._met:
+            return data
+        met, self._met = self._met, ()
+        for fault in met:
+            middle = len(data) // 2 if fault.position is None else fault.position % len(data)
+            match fault.action:
+                case PlcFaultAction.TRUNCATE_REPLY:
+                    data = data[:middle]
+                case PlcFaultAction.DUPLICATE_REPLY:
+                    data = data + data
+                case PlcFaultAction.SPLIT_REPLY:
+                    late_s = self._real_seconds(fault.seconds or _SPLIT_S)
+                    self._loop.call_later(late_s, handler.transport.write, data[middle:])
+                    data = data[:middle]
+        return data
 
     def _cut(self) -> None:
         for connection in tuple(self._server.active_connections.values()):
             connection.close()
+
+    def _each_transport(self, act: Callable[[Any], None]) -> None:
+        for connection in tuple(self._server.active_connections.values()):
+            act(connection.transport)
+
+
+def _reset(transport: Any) -> None:  # noqa: ANN401 - asyncio's, of any kind
+    """End a connection by a reset: to linger for no time is to reset."""
+    transport.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, NO_TIME)
+    transport.abort()
 
 
 def _only_for(unit: int) -> Callable[[bool, ModbusPDU], ModbusPDU | None]:

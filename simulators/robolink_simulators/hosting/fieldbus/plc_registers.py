@@ -5,6 +5,7 @@ from dataclasses import replace
 from typing import Final
 
 from robolink_simulators.cell.clock import ScaledClock
+from robolink_simulators.faults import LinkKind
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 from robolink_simulators.softmotion.mailbox.words.exchange import ServedAccess
 from robolink_simulators.softmotion.mailbox.words.places import (
@@ -26,9 +27,16 @@ class PlcRegisters:
     Args:
         simulator: The PLC.
         clock: The simulated time.
+        link: The kind of link that they are served on.
     """
 
-    def __init__(self, simulator: SoftMotionSimulator, clock: ScaledClock) -> None:
+    def __init__(
+        self,
+        simulator: SoftMotionSimulator,
+        clock: ScaledClock,
+        link: LinkKind = LinkKind.MODBUS_TCP,
+    ) -> None:
+        self._link = link
         self._simulator = simulator
         self._clock = clock
         self._places = places_of(simulator.options.mailbox)
@@ -46,7 +54,7 @@ class PlcRegisters:
                 if place.written:
                     part = self._simulator.plc.program.inbox.words[first : first + end - start]
                 else:
-                    served = self._simulator.read(first, end - start, now_ns)
+                    served = self._simulator.read(first, end - start, now_ns, self._link)
                     part = served.words
                 if part:
                     words[start - address : end - address] = part
@@ -62,7 +70,7 @@ class PlcRegisters:
             for place, start, end in self._parts(Bank.HOLDING, address, len(words)):
                 if place.written:
                     part = words[start - address : end - address]
-                    served = self._simulator.write(start - place.start, part, now_ns)
+                    served = self._simulator.write(start - place.start, part, now_ns, self._link)
             return served
 
     def switch(self, coil: int, bits: Sequence[bool]) -> ServedAccess:

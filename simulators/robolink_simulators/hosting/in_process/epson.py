@@ -12,12 +12,13 @@ from robolink.transport import LinkUrl
 from robolink_simulators.cell.world_parameters import from_options, plain
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.options import option_names, options_from_text
+from robolink_simulators.faults import LinkKind, read_fault_file
 from robolink_simulators.hosting.in_process.named import NamedSimulators, seed_from_text
 from robolink_simulators.hosting.in_process.transport import InProcessTransport
 from robolink_simulators.option_values import require_known
 from robolink_simulators.serial_numbers import drawn_serial
 
-_OWN_OPTIONS: Final = ("robot", "seed", "state", "split")
+_OWN_OPTIONS: Final = ("robot", "seed", "state", "split", "faults")
 
 _named: Final = NamedSimulators[EpsonSimulator]("epson+sim")
 
@@ -32,8 +33,9 @@ def open_epson(
 
     Args:
         link_url: ``epson+sim://NAME``, with ``robot``, ``seed``, ``state`` (a file that keeps
-            the tools), ``split`` (1 cuts what arrives into random pieces), ``world.NAME`` (see
-            ``WorldParameters``) and any field of ``EpsonOptions`` as options.
+            the tools), ``faults`` (a fault plan, docs/fault-plans.md), ``split`` (1 cuts what
+            arrives into random pieces), ``world.NAME`` (see ``WorldParameters``) and any field
+            of ``EpsonOptions`` as options.
         timeout_s: Not needed; part of the contract of an opener.
         clock: A :class:`~robolink_simulators.cell.clock.ManualClock` becomes the clock of a new
             simulator. Any other clock is left aside: simulated time is the simulator's own.
@@ -73,7 +75,7 @@ def _made(name: str, options: Mapping[str, str]) -> EpsonSimulator:
     require_known(habits, (*_OWN_OPTIONS, *option_names()), kind="EPSON")
     state = known.get("state")
     seed = seed_from_text(known.get("seed", "1"))
-    return EpsonSimulator(
+    simulator = EpsonSimulator(
         known.get("robot", "T6-602S"),
         seed=seed,
         serial=drawn_serial(f"{name.lower()} {seed}"),
@@ -81,3 +83,7 @@ def _made(name: str, options: Mapping[str, str]) -> EpsonSimulator:
         state_path=Path(state) if state else None,
         world=from_options(options),
     )
+    if "faults" in known:
+        file = read_fault_file(Path(known["faults"]))
+        simulator.faults.plan(file.faults, file.seed, {LinkKind.EPSON_SIM})
+    return simulator

@@ -21,6 +21,7 @@ from robolink.protocols.mailbox import (
 )
 from robolink.transport import MailboxHead
 from robolink_simulators.cell.clock import ManualClock
+from robolink_simulators.faults import PlcFaultAction
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 from robolink_simulators.softmotion.mailbox.words.exchange import ServedAccess
 
@@ -124,7 +125,7 @@ class InProcessMailboxLink:
                 )
             self._clock.advance(self._exchange_s / 2)
             served = serve(self._clock.now_ns())  # the simulator follows before it serves
-            if served.cut:
+            if served.cut or served.meets(PlcFaultAction.RESET):
                 raise self._ended(
                     TransportBrokenError(
                         tr("{identity} cut the connection.", identity=self._identity),
@@ -132,7 +133,8 @@ class InProcessMailboxLink:
                         controller=self._identity,
                     )
                 )
-            if not served.answered or served.delay_s > self._timeout_s:
+            silent = not served.answered or served.meets(PlcFaultAction.HALF_OPEN)
+            if silent or served.delay_s > self._timeout_s:
                 self._pass(self._timeout_s)
                 raise self._ended(
                     TransportTimeoutError(
@@ -141,7 +143,10 @@ class InProcessMailboxLink:
                         controller=self._identity,
                     )
                 )
-            self._pass(self._exchange_s / 2 + served.delay_s)
+            if served.delay_s:
+                self._pass(served.delay_s)
+            # What comes due in this half is done, at its own instant, before the next request.
+            self._clock.advance(self._exchange_s / 2)
             return served.words
 
     def _pass(self, seconds: float) -> None:

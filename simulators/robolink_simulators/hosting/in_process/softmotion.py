@@ -7,6 +7,7 @@ from typing import Final
 from robolink.timing import Clock
 from robolink.transport import LinkUrl
 from robolink_simulators.cell.world_parameters import from_options, plain
+from robolink_simulators.faults import LinkKind, read_fault_file
 from robolink_simulators.hosting.in_process.mailbox_link import InProcessMailboxLink
 from robolink_simulators.hosting.in_process.named import NamedSimulators, seed_from_text
 from robolink_simulators.option_values import require_known
@@ -18,7 +19,7 @@ from robolink_simulators.softmotion.mailbox.simulator import (
     SoftMotionSimulator,
 )
 
-_OWN_OPTIONS: Final = ("kinematics", "seed", "state")
+_OWN_OPTIONS: Final = ("kinematics", "seed", "state", "faults")
 
 _named: Final = NamedSimulators[SoftMotionSimulator]("softmotion+sim")
 
@@ -30,9 +31,10 @@ def open_softmotion(
 
     Args:
         link_url: ``softmotion+sim://NAME``, with ``kinematics`` (``+Kin_CAxis`` is written
-            ``%2BKin_CAxis``), ``seed``, ``state`` (a file that keeps what is retained), any
-            parameter of the kinematics, ``world.NAME`` (see ``WorldParameters``), and any field
-            of ``GroupOptions`` and ``MailboxOptions`` as options.
+            ``%2BKin_CAxis``), ``seed``, ``state`` (a file that keeps what is retained),
+            ``faults`` (a fault plan, docs/fault-plans.md), any parameter of the kinematics,
+            ``world.NAME`` (see ``WorldParameters``), and any field of ``GroupOptions`` and
+            ``MailboxOptions`` as options.
         timeout_s: Longest wait for an answer, in simulated time.
         clock: A :class:`~robolink_simulators.cell.clock.ManualClock` becomes the clock of a new
             simulator. Any other clock is left aside: simulated time is the simulator's own.
@@ -60,7 +62,7 @@ def _made(options: Mapping[str, str]) -> SoftMotionSimulator:
     state = options.get("state")
     habits = {name: value for name, value in options.items() if name in option_names()}
     parameters = {name: value for name, value in options.items() if name in of_machine}
-    return SoftMotionSimulator(
+    simulator = SoftMotionSimulator(
         kinematics,
         seed=seed_from_text(options.get("seed", "1")),
         parameters=parameters_from_text(parameters),
@@ -68,3 +70,7 @@ def _made(options: Mapping[str, str]) -> SoftMotionSimulator:
         state_path=Path(state) if state else None,
         world=from_options(options),
     )
+    if "faults" in options:
+        file = read_fault_file(Path(options["faults"]))
+        simulator.faults.plan(file.faults, file.seed, {LinkKind.MAILBOX_SIM})
+    return simulator

@@ -8,7 +8,7 @@ from robolink.messages import tr
 from robolink.timing import Deadline
 from robolink.transport import LinkUrl
 from robolink_simulators.cell.clock import ManualClock
-from robolink_simulators.hosting.seam import DeviceLink, WireDevice
+from robolink_simulators.hosting.seam import DeviceLink, ResettableLink, WireDevice
 
 _CHUNK_BYTES = 65536
 
@@ -79,11 +79,7 @@ class InProcessTransport:
         with self._lock:
             self._pump()
             if self._link.closed:
-                raise TransportBrokenError(
-                    tr("{identity} cut the connection.", identity=self._identity),
-                    remedy=tr("Connect again."),
-                    controller=self._identity,
-                )
+                raise self._broken()
             if data:
                 self._link.receive(data, self._clock.now_ns())
 
@@ -135,9 +131,18 @@ class InProcessTransport:
         self._device.advance(self._clock.now_ns())
         self._arrived += self._link.outgoing()
 
+    def _broken(self) -> TransportBrokenError:
+        return TransportBrokenError(
+            tr("{identity} cut the connection.", identity=self._identity),
+            remedy=tr("Connect again."),
+            controller=self._identity,
+        )
+
     def _taken(self) -> bytes | None:
         self._pump()
         if not self._arrived:
+            if isinstance(self._link, ResettableLink) and self._link.reset:
+                raise self._broken()
             return b"" if self._link.closed else None
         most = min(len(self._arrived), _CHUNK_BYTES)
         count = most if self._splitter is None else self._splitter.randint(1, most)

@@ -3,12 +3,16 @@
 import contextlib
 import selectors
 import socket
+import struct
+import sys
 from typing import Final
 
-from robolink_simulators.hosting.seam import DeviceLink
+from robolink_simulators.hosting.seam import DeviceLink, ResettableLink
 
 _CHUNK_BYTES: Final = 65536
 _MOST_UNSENT: Final = 1 << 20
+NO_TIME: Final = struct.pack("HH" if sys.platform == "win32" else "ii", 1, 0)
+"""For SO_LINGER: a socket that lingers for no time is reset when it is closed."""
 
 
 class Connection:
@@ -49,7 +53,7 @@ class Connection:
         if self._unsent:
             self._send()
         if self._link.closed and not self._unsent:
-            self._close()
+            self._close(reset=isinstance(self._link, ResettableLink) and self._link.reset)
 
     def drop(self, now_ns: int) -> None:
         """The host stops serving."""
@@ -76,8 +80,10 @@ class Connection:
             self._watched = events
             self._selector.modify(self._client, events, self.serve)
 
-    def _close(self) -> None:
+    def _close(self, *, reset: bool = False) -> None:
         if not self.finished:
             self.finished = True
             self._selector.unregister(self._client)
+            if reset:  # to linger for no time is to reset
+                self._client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, NO_TIME)
             self._client.close()

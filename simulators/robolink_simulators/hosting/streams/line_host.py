@@ -24,6 +24,7 @@ class LineHost(WireHost):
         device: What to serve.
         clock: The simulated time.
         lock: Held while the device is touched.
+        baud: As slowly as a line at this rate; 0 carries everything at once.
 
     Attributes:
         cable: The client takes its near end.
@@ -33,9 +34,14 @@ class LineHost(WireHost):
     """
 
     def __init__(
-        self, device: WireDevice, *, clock: ScaledClock, lock: AbstractContextManager[object]
+        self,
+        device: WireDevice,
+        *,
+        clock: ScaledClock,
+        lock: AbstractContextManager[object],
+        baud: int = 0,
     ) -> None:
-        self.cable = SerialCable()
+        self.cable = SerialCable(baud)
         self._line = os.open(self.cable.far, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         self._link = device.connect(clock.now_ns())
         super().__init__(device, clock=clock, lock=lock)

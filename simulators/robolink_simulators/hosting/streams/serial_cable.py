@@ -65,5 +65,5 @@ def no_pseudo_terminal(error: Exception) -> ConnectError:
     """Return the error of a system that gave no cable."""
     return ConnectError(
         tr("The simulator cannot open a pseudo terminal: {cause}.", cause=error),
-        remedy=tr("Use Modbus TCP; pseudo terminals exist on Unix only."),
+        remedy=tr("Serve over TCP; pseudo terminals exist on Unix only."),
     )

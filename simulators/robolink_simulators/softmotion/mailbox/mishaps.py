@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 
 from robolink.timing import NS_PER_S
-from robolink_simulators.softmotion.mailbox.faults import PlcFault, PlcFaultAction
+from robolink_simulators.faults import PlcFault, PlcFaultAction
 from robolink_simulators.softmotion.mailbox.panel import PlcPanel
 
 Act = Callable[[], None]
@@ -19,6 +19,8 @@ class PlcMishaps:
             PlcFaultAction.RESTART: panel.restart,
             PlcFaultAction.FREEZE: panel.freeze,
             PlcFaultAction.ZERO_INPUTS: panel.zero_inputs,
+            PlcFaultAction.FREEZE_HEARTBEAT: panel.freeze_heartbeat,
+            PlcFaultAction.TAKE_OWNERSHIP: panel.take_ownership,
             PlcFaultAction.ESTOP: panel.press_estop,
             PlcFaultAction.WITHDRAW_PERMIT: panel.withdraw_permit,
         }
@@ -48,6 +50,12 @@ class PlcMishaps:
             act()
 
     def _act_of(self, fault: PlcFault) -> Act | None:
-        if fault.action is PlcFaultAction.AXIS_ERROR:
-            return lambda: self._panel.fail_axis(0, fault.code)
-        return self._acts.get(fault.action)
+        match fault.action:
+            case PlcFaultAction.AXIS_ERROR:
+                return lambda: self._panel.fail_axis(0, fault.code)
+            case PlcFaultAction.WORD_ORDER:
+                return lambda: self._panel.lay_words(fault.order)
+            case PlcFaultAction.SHIFT_MAP:
+                return lambda: self._panel.shift_map(fault.position or 1)
+            case _:
+                return self._acts.get(fault.action)

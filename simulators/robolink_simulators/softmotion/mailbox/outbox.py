@@ -1,6 +1,7 @@
 """What the mailbox program gives out: the response block and the tool slots (docs/mailbox.md)."""
 
 from dataclasses import replace
+from typing import Any, Final
 
 from robolink.protocols.mailbox import (
     DEVICE,
@@ -8,6 +9,7 @@ from robolink.protocols.mailbox import (
     RESPONSE,
     SLOT,
     SLOTS,
+    VERSION,
     Bits,
     CommandState,
     ErrorClass,
@@ -27,6 +29,24 @@ from robolink_simulators.softmotion.mailbox.program import MailboxProgram
 from robolink_simulators.softmotion.mailbox.retained import RetainedMemory
 from robolink_simulators.softmotion.mailbox.words.image import arranged
 from robolink_simulators.softmotion.mailbox.words.units import UserUnits
+
+HEAD: Final = RESPONSE.before("boot_id")
+"""The beginning of the response block, as far as it tells how a command is getting on."""
+
+# Their numbers alone: they are looked at in every answer, and an enumeration is slow to add.
+_BITS: Final = tuple(
+    bit.value
+    for bit in (
+        Bits.POWERED,
+        Bits.TOOL_KNOWN,
+        Bits.BUSY,
+        Bits.JOGGING,
+        Bits.SIMULATED,
+        Bits.OWNED,
+        Bits.INTERRUPTED,
+        Bits.PERMITTED,
+    )
+)
 
 
 class Outbox:
@@ -58,6 +78,10 @@ class Outbox:
         self._order = order
         self._identified = identified
 
+    def lay_words(self, order: WordOrder) -> None:
+        """Lay values of several words in another order from now on."""
+        self._order = order
+
     def words(self, program: MailboxProgram, heartbeat: int) -> Words:
         """Return response, slots and device block, one behind the other."""
         response = self.response(program, heartbeat)
@@ -75,10 +99,11 @@ class Outbox:
         )
         return arranged(RESPONSE, encode_response(told), self._order)
 
-    def beginning(self, program: MailboxProgram, heartbeat: int) -> Words:
-        """Return the words before the position: of these clients ask all the time."""
-        told = encode_response(self._without_position(program, heartbeat), seal=False)
-        return arranged(RESPONSE, told, self._order)[: RESPONSE.at("tcp").start]
+    def head(self, program: MailboxProgram, heartbeat: int) -> Words:
+        """Return the words before ``boot_id``: for these clients ask all the time."""
+        told = self._told_of_command(program)
+        told |= {"version": VERSION, "plc_heartbeat": heartbeat}
+        return arranged(HEAD, HEAD.pack(told), self._order)
 
     def slot(self, number: int) -> Words:
         """Return a tool slot."""
@@ -91,16 +116,10 @@ class Outbox:
         return arranged(DEVICE, encode_device_id(self._memory.device_id), self._order)
 
     def _without_position(self, program: MailboxProgram, heartbeat: int) -> Response:
-        group, jobs, status = self._group, program.jobs, self._group.status()
+        group, jobs = self._group, program.jobs
         job = jobs.acknowledged
         return Response(
-            ack_head=job.command.sequence if job else 0,
-            state=job.state if job else CommandState.EMPTY,
-            error_class=job.error_class if job else ErrorClass.NONE,
-            raw_error=(job.raw if job else 0) or (status.error.number if status.error else 0),
-            opcode_echo=job.command.opcode if job else 0,
-            group_state=GroupState(group.state.value),
-            bits=self._bits(program, status),
+            **self._told_of_command(program),
             plc_heartbeat=heartbeat,
             boot_id=self._memory.boot_id,
             tool_slot=self._tools.selected,
@@ -116,16 +135,29 @@ class Outbox:
             ack_owner=job.command.owner if job else 0,
         )
 
+    def _told_of_command(self, program: MailboxProgram) -> dict[str, Any]:
+        """Return how the acknowledged command and the group are, by field."""
+        job, status = program.jobs.acknowledged, self._group.status()
+        return {
+            "ack_head": job.command.sequence if job else 0,
+            "state": job.state if job else CommandState.EMPTY,
+            "error_class": job.error_class if job else ErrorClass.NONE,
+            "raw_error": (job.raw if job else 0) or (status.error.number if status.error else 0),
+            "opcode_echo": job.command.opcode if job else 0,
+            "group_state": GroupState(self._group.state.value),
+            "bits": self._bits(program, status),
+        }
+
     def _bits(self, program: MailboxProgram, status: GroupStatus) -> Bits:
         job = program.jobs.acknowledged
-        shown = {
-            Bits.POWERED: status.powered,
-            Bits.TOOL_KNOWN: self._tools.tool_known,
-            Bits.BUSY: job is not None and not job.state.final,
-            Bits.JOGGING: status.jogging,
-            Bits.SIMULATED: True,
-            Bits.OWNED: program.ownership.holder != 0,
-            Bits.INTERRUPTED: status.interrupted_movement != 0,
-            Bits.PERMITTED: program.permitted,
-        }
-        return Bits(sum(bit.value for bit, on in shown.items() if on))
+        shown = (
+            status.powered,
+            self._tools.tool_known,
+            job is not None and not job.state.final,
+            status.jogging,
+            True,
+            program.ownership.holder != 0,
+            status.interrupted_movement != 0,
+            program.permitted,
+        )
+        return Bits(sum(bit for bit, on in zip(_BITS, shown, strict=True) if on))

@@ -10,6 +10,8 @@ from robolink_simulators.softmotion.mailbox.retained import RetainedMemory
 SILENCE_NS: Final = 10 * NS_PER_S
 """After this long without a sign of its owner a mailbox may be taken, if nothing moves."""
 
+_A_STRANGER: Final = 0x5EE7_0001
+
 
 class MailboxOwnership:
     """The owner's token; a PLC start clears it, and keeps the epoch.
@@ -72,6 +74,10 @@ class MailboxOwnership:
         else:
             stale = command.owner == self.holder
             raise Rejected(ErrorClass.STALE_EPOCH if stale else ErrorClass.NOT_OWNER)
+
+    def seize(self, now_ns: int) -> None:
+        """Let a client take it that nobody here knows, because a person at it insists."""
+        self._take(_A_STRANGER, now_ns, insists=True, moving=False)
 
     def _take(self, owner: int, now_ns: int, *, insists: bool, moving: bool) -> None:
         silent = now_ns - self._heard_ns >= SILENCE_NS and not moving

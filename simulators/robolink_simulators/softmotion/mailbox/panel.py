@@ -5,6 +5,8 @@ from contextlib import AbstractContextManager
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink.protocols.mailbox import WordOrder
+from robolink_simulators.faults.fieldbus import Order
 from robolink_simulators.softmotion.kinematics.coordinates import CoordRef
 from robolink_simulators.softmotion.mailbox.plc import Plc
 from robolink_simulators.softmotion.smc_errors import BlockRefused
@@ -116,6 +118,26 @@ class PlcPanel:
         """Let the mailbox program go on."""
         with self._acting():
             self._plc.thaw()
+
+    def freeze_heartbeat(self) -> None:
+        """Let the heartbeat alone stand still, as when only the motion task has died (F69)."""
+        with self._acting() as now_ns:
+            self._plc.freeze_heartbeat(now_ns)
+
+    def lay_words(self, order: Order) -> None:
+        """Change the program so that it lays values of several words in another order (F33)."""
+        with self._acting():
+            self._plc.lay_words(WordOrder[order.upper()])
+
+    def shift_map(self, words: int) -> None:
+        """Change the project: clients read and write so many words behind what they mean (F34)."""
+        with self._acting():
+            self._plc.shift = words
+
+    def take_ownership(self) -> None:
+        """Let somebody else insist on the mailbox (F46)."""
+        with self._acting() as now_ns:
+            self._plc.program.ownership.seize(now_ns)
 
     def restart(self) -> None:
         """Start the PLC anew; what is retained stays."""

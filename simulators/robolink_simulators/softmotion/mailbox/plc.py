@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from typing import Final
 
 from robolink.protocols.mailbox import (
+    COMMAND_WORDS,
     DEVICE_START,
-    RESPONSE,
     RESPONSE_WORDS,
     SLOT_WORDS,
     WordOrder,
@@ -18,7 +18,7 @@ from robolink_simulators.softmotion.group.condition import SmcGroupState
 from robolink_simulators.softmotion.kinematics.coordinates import CoordRef
 from robolink_simulators.softmotion.mailbox.commands.tools import ToolDesk
 from robolink_simulators.softmotion.mailbox.option_text import PlcOptions
-from robolink_simulators.softmotion.mailbox.outbox import Outbox
+from robolink_simulators.softmotion.mailbox.outbox import HEAD, Outbox
 from robolink_simulators.softmotion.mailbox.program import MailboxProgram
 from robolink_simulators.softmotion.mailbox.retained import RetainedMemory
 from robolink_simulators.softmotion.mailbox.words.units import UserUnits
@@ -40,6 +40,7 @@ class Plc:
         tools: Slots and the tool in force.
         program: The mailbox program since the last start.
         starts: PLC starts so far.
+        shift: How many words behind what they mean clients read and write.
         estop_pressed: Whether the drives are kept without power.
     """
 
@@ -50,6 +51,7 @@ class Plc:
         self._kinematics = model.kinematics
         self.group = AxisGroup(model.kinematics, model.limits, options.group)
         self.memory = RetainedMemory(options.mailbox.device_id)
+        self._order = WordOrder[options.mailbox.word_order.upper()]
         self._units = UserUnits(options.mailbox.unit_um)
         self.tools = ToolDesk(self.group, self.memory, self._units, parameters)
         self._outbox = Outbox(
@@ -57,10 +59,12 @@ class Plc:
             self.memory,
             self.tools,
             self._units,
-            order=WordOrder[options.mailbox.word_order.upper()],
+            order=self._order,
             identified=options.mailbox.identified,
         )
         self.starts = 0
+        self.shift = 0
+        self._beating_until_ns: int | None = None
         self.estop_pressed = False
         self._start_ns = 0
         self._frozen: Words | None = None
@@ -80,7 +84,7 @@ class Plc:
         self.group.restart(self._kinematics)
         self.memory.boot_id = next_number(self.memory.boot_id)
         self.starts += 1
-        self._start_ns, self._frozen = now_ns, None
+        self._start_ns, self._frozen, self._beating_until_ns = now_ns, None, None
         self.tools.forget()
         permitted = self.program.permitted
         self.program = self._new_program()
@@ -98,6 +102,16 @@ class Plc:
     def freeze(self, now_ns: int) -> None:
         """Stop the mailbox program; what moves goes on."""
         self._frozen = self.output(now_ns)
+
+    def freeze_heartbeat(self, now_ns: int) -> None:
+        """Stop the heartbeat, and nothing else, until the next start."""
+        self._beating_until_ns = now_ns
+
+    def lay_words(self, order: WordOrder) -> None:
+        """Lay values of several words in another order from now on."""
+        self._order = order
+        self._outbox.lay_words(order)
+        self.program.inbox.lay_words(order)
 
     def thaw(self) -> None:
         """Let the mailbox program go on."""
@@ -131,9 +145,12 @@ class Plc:
 
     def read(self, first: int, count: int, now_ns: int) -> Words:
         """Return words of response, slots and device block."""
+        if self.shift:
+            shifted = self.output(now_ns)[first + self.shift :][:count]
+            return shifted + (0,) * (count - len(shifted))
         slot, offset = divmod(first - RESPONSE_WORDS, SLOT_WORDS)
-        if self._frozen is None and first + count <= RESPONSE.at("tcp").start:
-            told = self._outbox.beginning(self.program, self._heartbeat(now_ns))
+        if self._frozen is None and first + count <= HEAD.words:
+            told = self._outbox.head(self.program, self._heartbeat(now_ns))
             return told[first : first + count]
         if first + count <= RESPONSE_WORDS:
             return self.response(now_ns)[first : first + count]
@@ -143,11 +160,20 @@ class Plc:
             return self._outbox.slot(slot + 1)[offset : offset + count]
         return self.output(now_ns)[first : first + count]
 
+    def write(self, first: int, words: Words, now_ns: int) -> None:
+        """Take words of the command block that a client has written."""
+        room = COMMAND_WORDS - first - self.shift
+        if room > 0 and words:
+            self.program.write(first + self.shift, words[:room], now_ns)
+
     def _heartbeat(self, now_ns: int) -> int:
         cycle_ns = self._options.group.cycle_us * 1000
-        return (now_ns - self._start_ns) // cycle_ns & 0xFFFF
+        until_ns = now_ns if self._beating_until_ns is None else self._beating_until_ns
+        return (until_ns - self._start_ns) // cycle_ns & 0xFFFF
 
     def _new_program(self) -> MailboxProgram:
-        return MailboxProgram(
+        program = MailboxProgram(
             self.group, self.memory, self.tools, self._units, options=self._options.mailbox
         )
+        program.inbox.lay_words(self._order)
+        return program

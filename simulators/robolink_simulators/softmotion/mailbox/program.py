@@ -106,14 +106,16 @@ class MailboxProgram:
     def run(self, now_ns: int) -> None:
         """Do what is due now."""
         self._follow()
-        if self._look_ns is not None and now_ns >= self._look_ns:
+        looks = self._look_ns is not None and now_ns >= self._look_ns
+        if looks:
             self._look_ns = None
             self._note_beat(now_ns)
             command = self.inbox.new_command()
             if command is not None:
                 self._accept(command, now_ns)
         self._supervise(now_ns)
-        self._follow()
+        if looks:
+            self._follow()
 
     def zero_inputs(self, now_ns: int) -> None:
         """Take the zeros that a fieldbus leaves when its watchdog expires."""
@@ -191,8 +193,10 @@ class MailboxProgram:
         """Halt what moves when nobody stands behind it any more; the tool stays."""
         moving = self.jobs.moving
         self._watch.watch(moving=bool(moving), now_ns=now_ns)
+        if not moving:
+            return
         cause = self._reason_to_end(now_ns)
-        if not moving or not cause:
+        if not cause:
             return
         for job in moving:
             job.cause = job.cause or cause

@@ -1,12 +1,12 @@
 """What a PLC keeps over a restart: its number, the tool slots, and two counters."""
 
 import json
-import secrets
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
 
+from robolink import ambient
 from robolink.errors import ConfigError
 from robolink.files.named import read_named
 from robolink.messages import tr
@@ -36,7 +36,7 @@ class RetainedMemory:
     """
 
     def __init__(self, device_id: int = 0) -> None:
-        self.device_id = device_id or 1 + secrets.randbelow(0xFFFF_FFFF)
+        self.device_id = device_id or ambient.random_number(32)
         self.boot_id = 0
         self.epoch = 0
         self._slots = dict.fromkeys(SLOTS, Slot())

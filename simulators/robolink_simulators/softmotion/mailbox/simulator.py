@@ -15,9 +15,9 @@ from typing import Any, Final
 
 from robolink.protocols.mailbox import COMMAND, Opcode, Words
 from robolink_simulators.cell.world_parameters import WorldParameters
+from robolink_simulators.faults import LinkKind, PlcFault, PlcFaultAction
 from robolink_simulators.softmotion.catalogue import machine_named
 from robolink_simulators.softmotion.kinematics.coordinates import CoordRef
-from robolink_simulators.softmotion.mailbox.faults import PlcFault, PlcFaultAction
 from robolink_simulators.softmotion.mailbox.mishaps import PlcMishaps
 from robolink_simulators.softmotion.mailbox.option_text import PlcOptions
 from robolink_simulators.softmotion.mailbox.panel import PlcPanel
@@ -106,6 +106,7 @@ class SoftMotionSimulator:
         self._now_ns = 0
         self._stepping = False
         self._requests = 0
+        self._overtaken: list[tuple[int, Words]] = []
         self.faults = WireFaults(faults, seed)
         given = dict(parameters or {})
         self.plc = Plc(machine_named(kinematics, given), given, self.options)
@@ -161,23 +162,33 @@ class SoftMotionSimulator:
         changes = [time_ns for time_ns in times if time_ns is not None]
         return min(changes) if changes else None
 
-    def read(self, first: int, count: int, now_ns: int) -> ServedAccess:
-        """Serve a client that reads words of response and slots."""
+    def read(
+        self, first: int, count: int, now_ns: int, link: LinkKind = LinkKind.MAILBOX_SIM
+    ) -> ServedAccess:
+        """Serve a client that reads words of response and slots, over a kind of link."""
         shown = shown_read(first, count)
-        return self._serve(shown, now_ns, lambda _: self.plc.read(first, count, self._now_ns))
+        return self._serve(shown, now_ns, link, lambda _: self.plc.read(first, count, self._now_ns))
 
-    def write(self, first: int, words: Sequence[int], now_ns: int) -> ServedAccess:
+    def write(
+        self,
+        first: int,
+        words: Sequence[int],
+        now_ns: int,
+        link: LinkKind = LinkKind.MAILBOX_SIM,
+    ) -> ServedAccess:
         """Serve a client that writes words of the command block."""
         shown = shown_write(first, words, _opcode_name(words))
-        return self._serve(shown, now_ns, lambda faults: self._take(first, words, faults))
+        return self._serve(shown, now_ns, link, lambda faults: self._take(first, words, faults))
 
     def snapshot(self, now_ns: int) -> ServedAccess:
-        """Serve a client that has the response copied to where it reads it later."""
-        return self._serve("snapshot", now_ns, lambda _: self.plc.response(self._now_ns))
+        """Serve a client that has the response copied to where it reads it later, over CAN."""
+        return self._serve(
+            "snapshot", now_ns, LinkKind.CAN, lambda _: self.plc.response(self._now_ns)
+        )
 
     def read_copy(self, words: Words, now_ns: int) -> ServedAccess:
-        """Serve a client that reads a copy of the response that was made before."""
-        return self._serve(shown_read(0, len(words)), now_ns, lambda _: words)
+        """Serve a client that reads a copy of the response that was made before, over CAN."""
+        return self._serve(shown_read(0, len(words)), now_ns, LinkKind.CAN, lambda _: words)
 
     def hear(self, now_ns: int) -> None:
         """Note a valid request, for the fieldbus's watchdog."""
@@ -189,15 +200,22 @@ class SoftMotionSimulator:
         self.plc.make_ready(CoordRef(x_mm, y_mm, z_mm))
 
     def _serve(
-        self, shown: str, now_ns: int, carry_out: Callable[[Sequence[PlcFault]], Words]
+        self,
+        shown: str,
+        now_ns: int,
+        link: LinkKind,
+        carry_out: Callable[[Sequence[PlcFault]], Words],
     ) -> ServedAccess:
         self.hear(now_ns)
         self._requests += 1
         number = self._requests
         self.log.append((self._now_ns, ">", shown))
-        faults = self.faults.take(shown)
-        if any(fault.action is PlcFaultAction.DISCONNECT_BEFORE for fault in faults):
+        faults = self.faults.take(shown, link)
+        actions = {fault.action for fault in faults}
+        if PlcFaultAction.DISCONNECT_BEFORE in actions:
             return ServedAccess(answered=False, cut=True)
+        if PlcFaultAction.DROP_REQUEST in actions:
+            return ServedAccess(answered=False)
         self._mishaps.strike(faults, self._now_ns)
         try:
             if self.on_request is not None:
@@ -209,23 +227,42 @@ class SoftMotionSimulator:
         self.log.append((self._now_ns, "<", shown))
         if self.on_reply is not None:
             self.on_reply(number, shown)
-        return self.faults.leaving(words, faults)
+        return self.faults.leaving(shown, words, faults)
 
     def _take(self, first: int, words: Sequence[int], faults: Sequence[PlcFault]) -> Words:
         words = self.faults.arriving(words, faults)
-        torn = next((it for it in faults if it.action is PlcFaultAction.TEAR_WRITE), None)
-        if any(fault.action is PlcFaultAction.IGNORE_WRITE for fault in faults):
+        planned = {fault.action: fault for fault in faults}
+        if PlcFaultAction.IGNORE_WRITE in planned:
             return ()
+        if PlcFaultAction.REORDER_WRITE in planned:
+            self._overtaken.append((first, words))
+            return ()
+        stall = planned.get(PlcFaultAction.STALL)
+        if stall is not None:
+            self._mishaps.plan(self._now_ns, stall.seconds, lambda: self._store(first, words))
+            return ()
+        again = planned.get(PlcFaultAction.DUPLICATE_REQUEST)
+        if again is not None:
+            self._mishaps.plan(self._now_ns, again.seconds, lambda: self._store(first, words))
+        torn = planned.get(PlcFaultAction.TEAR_WRITE)
         if torn is not None:
-            middle = len(words) // 2 if torn.position is None else torn.position
-            words, late = words[:middle], words[middle:]
-            late_s = torn.seconds or _TORN_S
-            self._mishaps.plan(self._now_ns, late_s, lambda: self._store(first + middle, late))
+            self._tear(first, words, torn)
+            return ()
         self._store(first, words)
         return ()
 
+    def _tear(self, first: int, words: Words, torn: PlcFault) -> None:
+        """Store the first words, and the rest later."""
+        middle = len(words) // 2 if torn.position is None else torn.position % len(words)
+        late = words[middle:]
+        late_s = torn.seconds or _TORN_S
+        self._mishaps.plan(self._now_ns, late_s, lambda: self._store(first + middle, late))
+        self._store(first, words[:middle])
+
     def _store(self, first: int, words: Words) -> None:
-        self.plc.program.write(first, words, self._now_ns)
+        overtaken, self._overtaken = self._overtaken, []
+        for start, piece in ((first, words), *overtaken):
+            self.plc.write(start, piece, self._now_ns)
 
     def _step(self, now_ns: int) -> None:
         self._now_ns = now_ns

@@ -136,8 +136,9 @@ class GroupMotion:
         Raises:
             Refused: A blended corner leaves the workspace.
         """
-        for axis in self._axes():
-            axis.advance(now_ns)
+        if self._singles:
+            for axis in self._axes():
+                axis.advance(now_ns)
         values = self.queue.axes_at(now_ns)
         if values is not None:
             if len(self.queue.running) > 1:
@@ -164,13 +165,16 @@ class GroupMotion:
     def next_change(self, now_ns: int) -> int | None:
         """Return when something ends or begins; every cycle where each has to be looked at."""
         running = self.queue.running
-        changes = [self.queue.next_change(now_ns)]
+        if self.jog is not None or len(running) > 1 or (running and running[0].watch):
+            cycle_ns = (now_ns // self._cycle_ns + 1) * self._cycle_ns
+        elif not self._singles:
+            return self.queue.next_change(now_ns)
+        else:
+            cycle_ns = None
+        changes = [cycle_ns, self.queue.next_change(now_ns)]
         if self._singles:
             changes += [axis.next_change() for axis in self._axes()]
-        if self.jog is not None or len(running) > 1 or (running and running[0].watch):
-            changes.append((now_ns // self._cycle_ns + 1) * self._cycle_ns)
-        known = [change for change in changes if change is not None]
-        return min(known) if known else None
+        return min((change for change in changes if change is not None), default=None)
 
     def _place(self, values: AxisValues) -> None:
         for axis, value in zip(self._axes(), values, strict=True):

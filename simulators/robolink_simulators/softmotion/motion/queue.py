@@ -105,14 +105,15 @@ class MovementQueue:
 
     def next_change(self, now_ns: int) -> int | None:
         """Return the cycle in which a movement ends or begins, after ``now_ns``."""
-        if self.empty:
+        if self._running:
+            due_ns = self._running[0].rest_ns
+            if self._corner_ahead():
+                due_ns = min(due_ns, self._running[0].falls_ns)
+        elif self._waiting:
+            due_ns = now_ns
+        else:
             return None
-        instants = [movement.rest_ns for movement in self._running[:1]]
-        if self._waiting and not self._running:
-            instants.append(now_ns)
-        elif self._corner_ahead():
-            instants.append(self._running[0].falls_ns)
-        return self._cycle_after(min(instants), now_ns)
+        return self._cycle_after(due_ns, now_ns)
 
     def settle(self, now_ns: int) -> list[Movement]:
         """Take off what has come to rest by now, and return it."""
@@ -131,7 +132,7 @@ class MovementQueue:
             self._running.append(movement)
 
     def _corner_ahead(self) -> bool:
-        if len(self._running) != 1 or not self._waiting:
+        if not self._waiting or len(self._running) != 1:
             return False
         return self._waiting[0].can_blend_from(self._running[0])
 

@@ -15,6 +15,7 @@ from robolink_cli.commands.measure.calibrate.live import calibrate_live
 from robolink_cli.commands.measure.calibrate.request import CalibrationRequest
 from robolink_cli.commands.measure.calibrate.stations import station_at
 from robolink_cli.options.motion import refuse_motion_options
+from robolink_cli.options.numbers import decimal
 from robolink_cli.options.pose_source import PoseSource
 
 
@@ -102,7 +103,7 @@ def _station(
 
 def _three(text: str) -> tuple[float, float, float]:
     try:
-        x_mm, y_mm, z_mm = (float(part) for part in text.split(","))
+        x_mm, y_mm, z_mm = (decimal(part.strip()) for part in text.split(","))
     except ValueError as error:
         raise _no_place(text) from error
     if not all(map(isfinite, (x_mm, y_mm, z_mm))):

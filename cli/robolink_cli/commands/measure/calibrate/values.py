@@ -10,6 +10,7 @@ from annotated_types import Ge, Gt, Le
 from robolink.messages import tr
 from robolink.methods import ParameterField, fields_of
 from robolink.methods.declaration.fields import bare, refusals
+from robolink_cli.options.numbers import DECIMAL, decimal
 
 _NUMBERS = (float, int)
 
@@ -55,7 +56,7 @@ def _number(kind: type[Any], metadata: tuple[object, ...]) -> click.ParamType[An
             case Le(le):
                 limits["max"] = le
     if not limits:
-        return click.FLOAT if kind is float else click.INT
+        return DECIMAL if kind is float else click.INT
     made: click.ParamType[Any] = (_FloatInside if kind is float else _IntInside)(**limits)
     made.metadata = metadata  # type: ignore[attr-defined]
     return made
@@ -73,7 +74,7 @@ class _FloatInside(click.FloatRange):
         ctx: click.Context | None,
     ) -> float:
         """Return the number."""
-        number: float = click.FLOAT.convert(value, param, ctx)
+        number: float = DECIMAL.convert(value, param, ctx)
         if not math.isfinite(number):
             self.fail(tr("must be a finite number"), param, ctx)
         for why in refusals(number, float, self.metadata):
@@ -178,7 +179,7 @@ def _parsed(
     kind: click.ParamType[Any], text: str, param: click.Parameter | None, ctx: click.Context | None
 ) -> tuple[float, ...]:
     try:
-        numbers = tuple(float(part) for part in text.split(","))
+        numbers = tuple(decimal(part.strip()) for part in text.split(","))
     except ValueError:
         kind.fail(tr("must be numbers with commas between them"), param, ctx)
     if not all(map(math.isfinite, numbers)):

@@ -8,6 +8,7 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.pose_tables import NOTHING_SAID, ReadingChoices
 from robolink_cli.console.render import emit_json, json_is_on
+from robolink_cli.options.numbers import DECIMAL
 from robolink_cli.options.pose_reading import reading_options
 from robolink_cli.session.context import json_option
 
@@ -20,9 +21,9 @@ from robolink_cli.session.context import json_option
     help="FILE holds poses only, of any kind that 'robolink poses show' reads.",
 )
 @reading_options
-@click.option("--sigma", "sigma_mm", type=float, help="Standard deviation of one placement, mm.")
+@click.option("--sigma", "sigma_mm", type=DECIMAL, help="Standard deviation of one placement, mm.")
 @click.option(
-    "--threshold", "threshold_mm", type=float, help="Residual that a robust method rejects, mm."
+    "--threshold", "threshold_mm", type=DECIMAL, help="Residual that a robust method rejects, mm."
 )
 @click.option(
     "--accept-residuals",

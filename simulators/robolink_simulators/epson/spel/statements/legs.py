@@ -6,9 +6,11 @@ from dataclasses import replace
 from robolink.model import Pose
 from robolink_simulators.epson.arm.joints import Joints
 from robolink_simulators.epson.arm.motion_parameters import MotionPhase
-from robolink_simulators.epson.arm.tilted_legs import plan_circle, plan_line
+from robolink_simulators.epson.arm.tilted_legs import plan_about_point, plan_circle, plan_line
 from robolink_simulators.epson.arm.trajectory import JointLeg, Leg, LinePace, plan_go
 from robolink_simulators.epson.machine import Machine
+from robolink_simulators.epson.memory.points import frame_at
+from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 
 _PERCENT = 100
 
@@ -49,6 +51,29 @@ def line_leg(machine: Machine, start: Pose, end: Pose, *, near: Joints) -> Leg:
         line_pace(machine),
         offset=machine.offset,
         near=near,
+        avoiding=bool(machine.settings.avoid_singularity),
+    )
+
+
+def held_leg(machine: Machine, end: Pose) -> Leg:
+    """Plan a leg about the external control point in force, from where the tip is.
+
+    Raises:
+        Refusal: None is in force (the number of that error is assumed), the robot has four axes
+            (not simulated), or as :func:`line_leg`.
+    """
+    if not machine.model.six_axes:
+        raise SpelRefusal(RefusalKind.NOT_SIMULATED, "Move ... ECP on four axes is not simulated")
+    number = machine.control_points.selected
+    if not number:
+        raise SpelRefusal(RefusalKind.ECP_UNDEFINED, "No external control point is in force")
+    return plan_about_point(
+        machine.model,
+        (machine.tip(), end),
+        line_pace(machine),
+        point=frame_at(machine.control_points.get(number)),
+        offset=machine.offset,
+        near=machine.arm.joints,
         avoiding=bool(machine.settings.avoid_singularity),
     )
 

@@ -21,7 +21,7 @@ from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
 from robolink_simulators.epson.spel.expressions.joint_functions import least_motion
 from robolink_simulators.epson.spel.expressions.values import out_of_range
 from robolink_simulators.epson.spel.statements.jump import jump, jump3
-from robolink_simulators.epson.spel.statements.legs import arc_leg, go_leg, line_leg
+from robolink_simulators.epson.spel.statements.legs import arc_leg, go_leg, held_leg, line_leg
 from robolink_simulators.epson.spel.statements.passing import passing
 from robolink_simulators.epson.spel.tree import (
     MotionStatement,
@@ -43,7 +43,7 @@ _WORDS: Final = {
     "tgo": frozenset({"cp"}) | _UNTIL_WORDS,
     "bgo": frozenset({"cp"}) | _UNTIL_WORDS,
     "pass": frozenset({"cp", "ljm"}),
-    "move": _LINE_WORDS,
+    "move": _LINE_WORDS | {"ecp"},
     "tmove": _LINE_WORDS,
     "bmove": _LINE_WORDS,
     "arc": _LINE_WORDS,
@@ -85,6 +85,8 @@ def plan(evaluator: Evaluator, motion: MotionStatement) -> list[Leg]:
             return passing(evaluator, motion, points)
         case verb:
             target = _TARGETS[verb](machine, points[0])
+            if "ecp" in motion.options.words:
+                return [held_leg(machine, machine.pose_of(target))]
             if verb.endswith("move"):
                 return [_line(machine, target, rot="rot" in motion.options.words)]
             least = machine.model.six_axes and (verb != "go" or "ljm" in motion.options.words)

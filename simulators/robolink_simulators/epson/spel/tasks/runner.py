@@ -78,6 +78,10 @@ class ProgramRunner:
         """Until when everything has been done."""
         return self._seen_ns
 
+    def starter(self, now_ns: Callable[[], int]) -> Callable[[int], object]:
+        """Return what begins main0 to main63 by its number, at the present time."""
+        return lambda number: self.start(f"main{number or ''}", now_ns())
+
     def start(self, name: str, now_ns: int) -> SpelTask:
         """Start a function as Start does, as task 1.
 

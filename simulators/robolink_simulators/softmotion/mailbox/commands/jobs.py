@@ -146,6 +146,8 @@ class Jobs:
 
     def follow(self) -> None:
         """Look how far everything is, and note what has ended."""
+        if not self._unfinished:
+            return
         for job in self._unfinished:
             job.follow(self._group)
             if job.state.final and (job.is_movement or job.state is CommandState.ABORTED):

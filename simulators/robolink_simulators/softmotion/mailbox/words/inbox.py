@@ -50,6 +50,10 @@ class Inbox:
         """Take what a client writes from a word on."""
         self._image[first : first + len(words)] = words
 
+    def lay_words(self, order: WordOrder) -> None:
+        """Lay values of several words in another order from now on."""
+        self._order = order
+
     def zero(self) -> None:
         """Zero all, as a fieldbus does when its watchdog expires (documented)."""
         self._image = [0] * COMMAND_WORDS

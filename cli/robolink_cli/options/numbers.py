@@ -1,0 +1,51 @@
+"""Decimal numbers as a person types them: ASCII, and nothing that only Python calls a number.
+
+``float()`` reads full-width digits, ``1_0`` and numbers with blanks around them; whoever typed one
+of these meant something else, or pasted it (docs/faults.md, "Numbers").
+"""
+
+import re
+from typing import Any, Final
+
+import click
+
+from robolink.messages import tr
+
+_NUMBER: Final = re.compile(
+    r"[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?|[+-]?(?:nan|inf(?:inity)?)", re.ASCII | re.IGNORECASE
+)
+"""What is not finite is let through, to be refused by name where it is used."""
+
+
+def decimal(text: str) -> float:
+    """Return the number that ``text`` is.
+
+    Raises:
+        ValueError: It is none.
+    """
+    if not _NUMBER.fullmatch(text):
+        raise ValueError(repr(text))
+    return float(text)
+
+
+class DecimalNumber(click.ParamType[float]):
+    """The type of an option that takes a decimal number."""
+
+    name = "float"
+
+    def convert(
+        self,
+        value: Any,  # noqa: ANN401 - click's form
+        param: click.Parameter | None,
+        ctx: click.Context | None,
+    ) -> float:
+        """Return the number."""
+        if not isinstance(value, str):
+            return float(value)
+        try:
+            return decimal(value)
+        except ValueError:
+            self.fail(tr("{text!r} is not a decimal number.", text=value), param, ctx)
+
+
+DECIMAL: Final = DecimalNumber()

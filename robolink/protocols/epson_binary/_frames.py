@@ -1,0 +1,220 @@
+"""Cutting the stream of a serial line into frames, by length and check sum.
+
+A frame is a first byte (STX for a request, ACK for a success, NAK for a refusal), a letter, data,
+ETX, and the XOR of everything from the letter through ETX (docs/reference/epson.md 2.1). Numbers
+in the data may be 02, 03, 06 or 15, so no byte is ever searched for where the letter tells how
+long the data is. Text has no length; it ends at the first ETX behind which the right check sum
+stands, a quoted one only behind its closing quote. What a frame is therefore never depends on how
+the stream was cut into chunks.
+"""
+
+from dataclasses import dataclass
+from functools import reduce
+from operator import xor
+from typing import Final
+
+from robolink.errors import RemoteProtocolError
+from robolink.messages import tr
+from robolink.protocols._role import Role
+from robolink.protocols.epson_binary._dialect import Dialect, Numbers
+from robolink.protocols.epson_binary._letters import BY_BYTE, Data, Letter
+
+STX: Final = 0x02
+ETX: Final = 0x03
+EOT: Final = 0x04
+ACK: Final = 0x06
+NAK: Final = 0x15
+QUOTE: Final = ord('"')
+
+_LEAD: Final = 2
+"""The first byte and the letter."""
+
+_TAIL: Final = 2
+"""ETX and the check sum."""
+
+_CODE_BYTES: Final = 2
+_STATUS_DIGITS: Final = 4
+_STATUS_FLAGS: Final = (10, 11)
+_COMMA: Final = ord(",")
+
+
+def check_sum(checked: bytes) -> int:
+    """Return the XOR of the bytes from the letter through ETX.
+
+    It does not see two bytes that changed places, nor the same bit flipped in two of them: what
+    is written over it has to be read back.
+    """
+    return reduce(xor, checked, 0)
+
+
+def framed(first: int, letter: int, data: bytes) -> bytes:
+    """Return one frame as it stands on the line."""
+    checked = bytes([letter, *data, ETX])
+    return bytes([first, *checked, check_sum(checked)])
+
+
+@dataclass(frozen=True, slots=True)
+class SerialFrame:
+    """What was received as one.
+
+    Attributes:
+        first: STX, ACK, NAK, or EOT, which stands alone.
+        letter: The byte behind it.
+        data: What stands between the letter and ETX.
+        intact: Whether ETX and the check sum are right.
+    """
+
+    first: int
+    letter: int = 0
+    data: bytes = b""
+    intact: bool = True
+
+
+def width(part: Data, dialect: Dialect) -> int:
+    """Return how many bytes a number takes on the line, 0 for what has no length."""
+    match part:
+        case Data.BYTE | Data.HEX_BYTE:
+            count = 1
+        case Data.WORD | Data.HEX_WORD:
+            count = 2
+        case Data.WORD_PORT:
+            count = dialect.word_port_bytes
+        case _:
+            return 0
+    return count if dialect.numbers is Numbers.BINARY else 2 * count
+
+
+class FrameBuffer:
+    """Holds what has arrived and hands out whole frames.
+
+    Args:
+        role: A host takes answers; a device takes requests, and EOT between them.
+        dialect: How numbers are written.
+        max_frame: Most bytes of one frame.
+    """
+
+    __slots__ = ("_data", "_dialect", "_max_frame", "_role", "_scanned", "_sum")
+
+    def __init__(self, role: Role, dialect: Dialect, max_frame: int) -> None:
+        self._data = bytearray()
+        self._dialect = dialect
+        self._max_frame = max_frame
+        self._role = role
+        self._scanned, self._sum = 1, 0  # of a text: what was looked at, and its check sum
+
+    @property
+    def held(self) -> bytes:
+        """The bytes that no frame has used yet."""
+        return bytes(self._data)
+
+    def __bool__(self) -> bool:
+        return bool(self._data)
+
+    def append(self, data: bytes) -> None:
+        """Add what was received."""
+        self._data += data
+
+    def take(self) -> SerialFrame | None:
+        """Return the next frame, ``None`` while it is not whole.
+
+        Raises:
+            RemoteProtocolError: What a host received is no answer, or it is too long for one.
+        """
+        if self._role is Role.DEVICE:
+            self._skip_noise()
+        if not self._data:
+            return None
+        if self._data[0] == EOT and self._role is Role.DEVICE:
+            del self._data[0]
+            return SerialFrame(EOT)
+        self._check_first()
+        length = self._length() if len(self._data) >= _LEAD else None
+        if length is None and len(self._data) > self._max_frame:
+            raise RemoteProtocolError(
+                tr("A message is longer than {limit} bytes.", limit=self._max_frame),
+                remedy=tr("Check that a controller is at the other end, then connect again."),
+                raw=bytes(self._data[:80]),
+            )
+        if length is None or len(self._data) < length:
+            return None
+        return self._cut(length)
+
+    def give_up(self) -> SerialFrame | None:
+        """Return what is held as one frame that is not intact, ``None`` where nothing is."""
+        if not self._data:
+            return None
+        letter = self._data[1] if len(self._data) > 1 else 0
+        frame = SerialFrame(self._data[0], letter, bytes(self._data[_LEAD:]), intact=False)
+        self._data.clear()
+        self._scanned, self._sum = 1, 0
+        return frame
+
+    def _skip_noise(self) -> None:
+        begin = next((i for i, byte in enumerate(self._data) if byte in (STX, EOT)), None)
+        del self._data[: len(self._data) if begin is None else begin]
+
+    def _check_first(self) -> None:
+        known = (STX,) if self._role is Role.DEVICE else (ACK, NAK)
+        if self._data[0] not in known:
+            raise RemoteProtocolError(
+                tr("{data!r} begins no answer of Remote RS232.", data=bytes(self._data[:20])),
+                remedy=tr(
+                    "Check baud rate, parity and stop bits on both ends, and that the control "
+                    "device is Remote RS232; then connect again."
+                ),
+                raw=bytes(self._data[:80]),
+            )
+
+    def _length(self) -> int | None:
+        """Return how long the frame at the start is, ``None`` while that cannot be told."""
+        if self._data[0] == NAK:
+            return _LEAD + _CODE_BYTES + _TAIL
+        letter = BY_BYTE.get(self._data[1])
+        if letter is None:
+            return self._text_length(_LEAD)
+        return self._layout_length(letter)
+
+    def _layout_length(self, letter: Letter) -> int | None:
+        parts = letter.request if self._role is Role.DEVICE else letter.reply
+        end = _LEAD
+        for part in parts:
+            fixed = width(part, self._dialect)
+            if fixed:
+                end += fixed
+            elif part is Data.STATUS:
+                return self._status_length()
+            else:
+                return self._text_length(end, quoted=part is Data.QUOTED)
+        return end + _TAIL
+
+    def _status_length(self) -> int | None:
+        """Flags are 00 or 01, digits are not; so where they end is seen."""
+        body = self._data[_LEAD : _LEAD + max(_STATUS_FLAGS) + 1]
+        flags = next((i for i, byte in enumerate(body) if byte not in (0, 1)), None)
+        if flags is None:
+            return None if len(body) <= max(_STATUS_FLAGS) else len(self._data)
+        comma = int(body[flags] == _COMMA)
+        return _LEAD + flags + comma + _STATUS_DIGITS + _TAIL
+
+    def _text_length(self, start: int, *, quoted: bool = False) -> int | None:
+        """Return where a text ends that begins at ``start``, with its ETX and check sum.
+
+        The sum runs along with the search: each byte is looked at once, however it arrives.
+        """
+        data = self._data
+        quoted = quoted and len(data) > start and data[start] == QUOTE
+        while self._scanned + 1 < len(data):
+            at = self._scanned
+            self._sum ^= data[at]
+            self._scanned += 1
+            closes = not quoted or (at > start + 1 and data[at - 1] == QUOTE)
+            if at >= start and data[at] == ETX and closes and self._sum == data[at + 1]:
+                return at + _TAIL
+        return None
+
+    def _cut(self, length: int) -> SerialFrame:
+        whole = bytes(self._data[:length])
+        del self._data[:length]
+        self._scanned, self._sum = 1, 0
+        intact = whole[-_TAIL] == ETX and check_sum(whole[1:-1]) == whole[-1]
+        return SerialFrame(whole[0], whole[1], whole[_LEAD:-_TAIL], intact)

@@ -1,0 +1,140 @@
+"""Faults that wait for their request. Counted, never rolled."""
+
+import random
+from collections.abc import Callable, Collection, Iterable
+from heapq import heappop, heappush
+from typing import Final, Generic, Protocol, TypeVar, cast
+
+from robolink_simulators.faults.links import AnyAction, LinkKind, links_of, require_possible
+
+
+class Planned(Protocol):
+    """A fault that waits for its request."""
+
+    @property
+    def action(self) -> AnyAction:
+        """What goes wrong."""
+
+    @property
+    def on_exchange(self) -> int:
+        """Which of the requests that match, counted from 0."""
+
+    @property
+    def match(self) -> str:
+        """Text that a request must contain to be counted; empty counts all."""
+
+
+AnyFault = TypeVar("AnyFault", bound=Planned)
+
+
+class _Waiting(Generic[AnyFault]):
+    """Faults that count the same requests: how many came, and which fault each number meets."""
+
+    def __init__(self) -> None:
+        self.seen = 0
+        self.due: list[tuple[int, int, AnyFault]] = []
+
+
+class CountedFaults(Generic[AnyFault]):
+    """Counts requests and hands out the faults that are due.
+
+    Args:
+        faults: What to plan; more may be added at any time.
+        seed: Decides what no fault says: which byte and bit is garbled.
+        links: The links on which the device may be served. A fault counts the requests of
+            those on which it can happen.
+
+    Attributes:
+        fired: What has been handed out.
+        on_fired: Told of each fault that is handed out, and of the request that it meets,
+            passwords hidden. What it raises goes to the host.
+
+    Raises:
+        FaultNotPossibleError: There is no such fault on any of them.
+    """
+
+    def __init__(
+        self, faults: Iterable[AnyFault] = (), seed: int = 1, *, links: Collection[LinkKind]
+    ) -> None:
+        self.reseed(seed)
+        self._links: Final = frozenset(links)
+        self._groups: dict[tuple[str, frozenset[LinkKind]], _Waiting[AnyFault]] = {}
+        self._added = 0
+        self.fired: list[AnyFault] = []
+        self.on_fired: Callable[[AnyFault, str], None] | None = None
+        for fault in faults:
+            self.add(fault)
+
+    def add(self, fault: AnyFault) -> None:
+        """Plan one more; its count starts with the next request.
+
+        Raises:
+            FaultNotPossibleError: There is no such fault on any link of the device.
+        """
+        require_possible(fault.action, self._links)
+        group = self._groups.setdefault((fault.match, links_of(fault.action)), _Waiting())
+        self._added += 1
+        heappush(group.due, (group.seen + fault.on_exchange, self._added, fault))
+
+    def plan(self, faults: Iterable[Planned], seed: int, served: Collection[LinkKind]) -> None:
+        """Plan what a file says, for a device that is served on certain links.
+
+        Raises:
+            FaultNotPossibleError: One of the faults can happen on none of these links. Nothing
+                is planned then.
+        """
+        wanted = tuple(faults)
+        for fault in wanted:
+            require_possible(fault.action, self._links.intersection(served) or served)
+        self.reseed(seed)
+        for fault in wanted:
+            self.add(cast("AnyFault", fault))
+
+    def reseed(self, seed: int) -> None:
+        """Draw by another seed from here on."""
+        self._random = random.Random(f"faults {seed}")
+
+    def clear(self) -> None:
+        """Plan nothing any more; what fired stays told."""
+        self._groups.clear()
+
+    def require_possible(self, served: Collection[LinkKind]) -> None:
+        """Refuse what waits and can happen on none of the links that are served.
+
+        Raises:
+            FaultNotPossibleError: Names the first of them.
+        """
+        for fault in self.pending:
+            require_possible(fault.action, served)
+
+    @property
+    def pending(self) -> tuple[AnyFault, ...]:
+        """What has not fired yet, in the order in which it was planned."""
+        waiting = [item for group in self._groups.values() for item in group.due]
+        return tuple(fault for _, _, fault in sorted(waiting, key=lambda item: item[1]))
+
+    def take(self, request: str, link: LinkKind | None = None) -> tuple[AnyFault, ...]:
+        """Count one request and return the faults that it meets, in the order of planning.
+
+        Args:
+            request: What it is, passwords hidden.
+            link: The link that it came over; ``None`` for any.
+        """
+        if not self._groups:
+            return ()
+        due: list[tuple[int, AnyFault]] = []
+        for key, group in tuple(self._groups.items()):
+            if key[0] not in request or (link is not None and link not in key[1]):
+                continue
+            while group.due and group.due[0][0] == group.seen:
+                _, number, fault = heappop(group.due)
+                due.append((number, fault))
+            group.seen += 1
+            if not group.due:
+                del self._groups[key]
+        faults = tuple(fault for _, fault in sorted(due, key=lambda item: item[0]))
+        self.fired += faults
+        if self.on_fired is not None:
+            for fault in faults:
+                self.on_fired(fault, request)
+        return faults

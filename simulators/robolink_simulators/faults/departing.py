@@ -1,0 +1,80 @@
+"""The replies of one link on their way out: late, held back, or stuck on a dead link."""
+
+from collections import deque
+from collections.abc import Sequence
+
+from robolink.timing import NS_PER_S
+from robolink_simulators.faults.plan import Departure, HeldBack, LinkEnd
+
+
+class DepartingReplies:
+    """What leaves on one link, and when. One stream: nothing overtakes what was sent before it.
+
+    Attributes:
+        half_open: Whether the link carries nothing any more, either way, and nobody knows.
+        stalled_until_ns: Until when it carries nothing; 0 for a link that works.
+    """
+
+    def __init__(self) -> None:
+        self._waiting: deque[tuple[int, bytes | LinkEnd | None]] = deque()
+        self._held: list[HeldBack] = []
+        self.half_open = False
+        self.stalled_until_ns = 0
+
+    def depart(self, departures: Sequence[Departure], now_ns: int) -> bool:
+        """Let replies leave as planned; False when the device has ended the link with them."""
+        for after_s, leaving in departures:
+            if leaving is LinkEnd.HALF_OPEN:
+                self.half_open = True
+            elif isinstance(leaving, HeldBack):
+                self._held.append(leaving)
+            elif isinstance(leaving, bytes):
+                self.post(self._with_held(leaving), now_ns + round(after_s * NS_PER_S))
+            else:
+                self.post(leaving, now_ns + round(after_s * NS_PER_S))
+                return False
+        return True
+
+    def post(self, leaving: bytes | LinkEnd | None, at_ns: int) -> None:
+        """Let something leave at an instant, or as soon as what was sent before it has left."""
+        self._waiting.append((max(at_ns, self._waiting[-1][0] if self._waiting else 0), leaving))
+
+    def take(self, now_ns: int) -> bytes:
+        """Take what has left by now."""
+        ready = b""
+        while self._due(now_ns) and isinstance(data := self._waiting[0][1], bytes):
+            ready += data
+            self._waiting.popleft()
+        return ready
+
+    def ended(self, now_ns: int) -> bool:
+        """Tell whether the device has ended the link, after what was to leave."""
+        return self._due(now_ns) and not isinstance(self._waiting[0][1], bytes)
+
+    def reset(self, now_ns: int) -> bool:
+        """Tell whether it ended the link with a reset."""
+        return self._due(now_ns) and self._waiting[0][1] is LinkEnd.RESET
+
+    def next_change(self, now_ns: int) -> int | None:
+        """Return when something leaves, or the link carries again."""
+        if self.half_open:
+            return None
+        if self.stalled_until_ns > now_ns:
+            return self.stalled_until_ns
+        leaving_ns = self._waiting[0][0] if self._waiting else 0
+        return leaving_ns if leaving_ns > now_ns else None
+
+    def empty(self, now_ns: int) -> bool:
+        """Tell whether nothing will leave any more."""
+        return not self._waiting or self.ended(now_ns)
+
+    def _due(self, now_ns: int) -> bool:
+        if not self._waiting or self.half_open or now_ns < self.stalled_until_ns:
+            return False
+        return self._waiting[0][0] <= now_ns
+
+    def _with_held(self, data: bytes) -> bytes:
+        for held in self._held:
+            data = data + held.data if held.overtaken else held.data + data
+        self._held.clear()
+        return data

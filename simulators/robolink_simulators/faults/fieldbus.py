@@ -1,0 +1,112 @@
+"""Faults of a PLC with a mailbox, and of the field bus to it."""
+
+from dataclasses import dataclass
+from enum import Enum, auto
+from typing import Literal
+
+
+class PlcFaultAction(Enum):
+    """What goes wrong with one exchange, or after it."""
+
+    DROP_REQUEST = auto()
+    """The request never arrives: nothing is carried out and no answer leaves (F25)."""
+    DUPLICATE_REQUEST = auto()
+    """What is written arrives again ``seconds`` later (F27)."""
+    STALL = auto()
+    """The request arrives ``seconds`` late, however little patience its sender had (F12)."""
+    REORDER_WRITE = auto()
+    """Acknowledged, but it arrives only behind the next write (F28)."""
+    DELAY = auto()
+    """The answer leaves ``seconds`` late (F01)."""
+    DROP_REPLY = auto()
+    """Carried out, but no answer leaves (F25)."""
+    GARBLE_REPLY = auto()
+    """Bit ``bit`` of the word at ``position`` of the answer is flipped (F07)."""
+    TEAR_REPLY = auto()
+    """The last word of the answer is of another moment (F31)."""
+    STALE_REPLY = auto()
+    """The answer is the one that such a read had before; it waits until there is one (F02)."""
+    ZERO_REPLY = auto()
+    """Every word of the answer is zero (F30)."""
+    TRUNCATE_REPLY = auto()
+    """Only the first ``position`` bytes of the answer's frame leave (F04)."""
+    DUPLICATE_REPLY = auto()
+    """The frame of the answer leaves twice (F09)."""
+    SPLIT_REPLY = auto()
+    """The bytes of the frame behind ``position`` leave ``seconds`` later (F05)."""
+    GARBLE_WRITE = auto()
+    """Bit ``bit`` of the word at ``position`` of what is written arrives flipped (F07)."""
+    TEAR_WRITE = auto()
+    """The words from ``position`` on arrive ``seconds`` later than those before (F32)."""
+    IGNORE_WRITE = auto()
+    """Acknowledged, and nothing arrives (F43)."""
+    DISCONNECT = auto()
+    """Carried out, then the link is cut (F11)."""
+    DISCONNECT_BEFORE = auto()
+    """The link is cut and nothing is carried out."""
+    RESET = auto()
+    """Carried out, then the connection is reset (F75)."""
+    HALF_OPEN = auto()
+    """Carried out; from then on the connection carries nothing, and neither end is told (F11)."""
+    RESTART = auto()
+    """The PLC starts anew ``seconds`` after the request came in (F13)."""
+    FREEZE = auto()
+    """The mailbox program stands still from ``seconds`` after the request on."""
+    FREEZE_HEARTBEAT = auto()
+    """The PLC's heartbeat stands still from ``seconds`` after the request on; the rest does not
+    (F69)."""
+    ZERO_INPUTS = auto()
+    """What clients have written is zeroed ``seconds`` after the request (F30)."""
+    WORD_ORDER = auto()
+    """From ``seconds`` after the request on the program lays values in ``order`` (F33)."""
+    SHIFT_MAP = auto()
+    """From ``seconds`` after the request on clients read and write ``position`` words behind what
+    they mean, 1 where none is given (F34)."""
+    TAKE_OWNERSHIP = auto()
+    """Somebody else insists on the mailbox ``seconds`` after the request (F46)."""
+    ESTOP = auto()
+    """The emergency stop is pressed ``seconds`` after the request came in (F21)."""
+    AXIS_ERROR = auto()
+    """Axis 0 fails with error ``code`` ``seconds`` after the request came in."""
+    WITHDRAW_PERMIT = auto()
+    """The machine's permit is withdrawn ``seconds`` after the request came in."""
+    LOSE_SEGMENT = auto()
+    """CAN: segment ``position`` of the answer never leaves (F52)."""
+    WRONG_TOGGLE = auto()
+    """CAN: segment ``position`` of the answer has the toggle bit of the one before (F52)."""
+    FOREIGN_NODE = auto()
+    """CAN: another node with our number answers for an object that nobody asked for (F51)."""
+    ECHO = auto()
+    """CAN: the client's own frame comes back to it from the bus (F51)."""
+
+
+Order = Literal["low_first", "high_first", "pairs_swapped", "halves_swapped"]
+"""The four orders in which a PLC may lay the words of a value."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlcFault:
+    """One planned fault. It fires once.
+
+    Attributes:
+        action: What goes wrong.
+        on_exchange: Which of the requests that ``match``, counted from 0.
+        match: Text that a request must contain to be counted; empty counts all. Requests
+            read ``write_command MOVE_LINEAR 7``, ``beat``, ``read_head``, ``read_response``,
+            ``read_slot 3``, ``snapshot``.
+        seconds: A delay in simulated time, where the action has one.
+        code: Error number of AXIS_ERROR.
+        position: Index of a word, a byte of a frame, or a segment; ``None`` takes the middle.
+            Past the end it counts from the front again.
+        bit: Which bit of that word, 0 to 15; ``None`` draws it from the plan's seed.
+        order: Of WORD_ORDER.
+    """
+
+    action: PlcFaultAction
+    on_exchange: int = 0
+    match: str = ""
+    seconds: float = 0.0
+    code: int = 16
+    position: int | None = None
+    bit: int | None = None
+    order: Order = "high_first"

@@ -1,0 +1,126 @@
+"""Which fault can happen on which link: a field bus has no login, a serial line no reset."""
+
+from collections.abc import Collection
+from enum import StrEnum
+from typing import Final
+
+from robolink.errors import ConfigError
+from robolink.messages import tr
+from robolink_simulators.faults.fieldbus import PlcFaultAction
+from robolink_simulators.faults.stream import FaultAction
+
+AnyAction = FaultAction | PlcFaultAction
+
+
+class LinkKind(StrEnum):
+    """A way to a simulated controller; the value is the scheme of its URLs."""
+
+    EPSON_TCP = "epson+tcp"
+    EPSON_SERIAL = "epson+serial"
+    EPSON_SIM = "epson+sim"
+    PLC_TCP = "plc+modbus-tcp"
+    PLC_RTU = "plc+modbus-rtu"
+    MODBUS_TCP = "softmotion+modbus-tcp"
+    MODBUS_RTU = "softmotion+modbus-rtu"
+    CAN = "softmotion+can"
+    MAILBOX_SIM = "softmotion+sim"
+
+
+class FaultNotPossibleError(ConfigError):
+    """A fault was planned for a link on which there is no such thing.
+
+    Attributes:
+        action: The fault.
+    """
+
+    def __init__(self, what: str, *, action: AnyAction, remedy: str = "") -> None:
+        super().__init__(what, remedy=remedy)
+        self.action = action
+
+
+EPSON_LINKS: Final = frozenset({LinkKind.EPSON_TCP, LinkKind.EPSON_SERIAL, LinkKind.EPSON_SIM})
+PLC_LINKS: Final = frozenset({LinkKind.PLC_TCP, LinkKind.PLC_RTU})
+MAILBOX_LINKS: Final = frozenset(
+    {LinkKind.MODBUS_TCP, LinkKind.MODBUS_RTU, LinkKind.CAN, LinkKind.MAILBOX_SIM}
+)
+_LINES: Final = frozenset({LinkKind.EPSON_SERIAL, LinkKind.PLC_RTU, LinkKind.MODBUS_RTU})
+_STREAMS: Final = EPSON_LINKS | PLC_LINKS
+_FRAMED: Final = frozenset({LinkKind.MODBUS_TCP, LinkKind.MODBUS_RTU})
+
+_OF_EPSON: Final = frozenset(
+    {
+        FaultAction.GARBLE_REQUEST,  # a PLC's frames have a length: half of one is no request
+        FaultAction.TRUNCATE_REQUEST,
+        FaultAction.RESTART,
+        FaultAction.LOSE_LOGIN,
+        FaultAction.TEACH_MODE,
+        FaultAction.ESTOP,
+        FaultAction.GUARD_OPEN,
+        FaultAction.DEVICE_FAULT,
+        FaultAction.SERIOUS_ERROR,
+    }
+)
+_OF_CONNECTIONS: Final[frozenset[AnyAction]] = frozenset(
+    {
+        FaultAction.RESET,
+        FaultAction.HALF_OPEN,
+        PlcFaultAction.RESET,
+        PlcFaultAction.HALF_OPEN,
+    }
+)
+_OF_CAN: Final = frozenset(
+    {
+        PlcFaultAction.LOSE_SEGMENT,
+        PlcFaultAction.WRONG_TOGGLE,
+        PlcFaultAction.FOREIGN_NODE,
+        PlcFaultAction.ECHO,
+    }
+)
+_OF_FRAMES: Final = frozenset(
+    {
+        PlcFaultAction.TRUNCATE_REPLY,
+        PlcFaultAction.DUPLICATE_REPLY,
+        PlcFaultAction.SPLIT_REPLY,
+    }
+)
+_NOT_ON_CAN: Final = frozenset(
+    {
+        PlcFaultAction.SHIFT_MAP,  # objects have numbers, and no neighbours
+        PlcFaultAction.RESET,
+        PlcFaultAction.HALF_OPEN,
+    }
+)
+
+
+def links_of(action: AnyAction) -> frozenset[LinkKind]:
+    """Return the links on which a fault can happen."""
+    if isinstance(action, FaultAction):
+        links = EPSON_LINKS if action in _OF_EPSON else _STREAMS
+    elif action in _OF_CAN:
+        links = frozenset({LinkKind.CAN})
+    elif action in _OF_FRAMES:
+        links = _FRAMED
+    elif action in _NOT_ON_CAN:
+        links = MAILBOX_LINKS - {LinkKind.CAN}
+    else:
+        links = MAILBOX_LINKS
+    return links - _LINES if action in _OF_CONNECTIONS else links
+
+
+def require_possible(action: AnyAction, served: Collection[LinkKind]) -> None:
+    """Refuse a fault that cannot happen on any of the links that are served.
+
+    Raises:
+        FaultNotPossibleError: Names the fault, the links, and those where it could happen.
+    """
+    links = links_of(action)
+    if links.isdisjoint(served):
+        raise FaultNotPossibleError(
+            tr(
+                "The fault {action} cannot happen on {links}.",
+                action=action.name.lower(),
+                links=", ".join(sorted(served)),
+            ),
+            remedy=tr("It can on: {links}.", links=", ".join(sorted(links))),
+            action=action,
+        )

@@ -1,0 +1,90 @@
+"""Serves a simulated EPSON controller with Remote RS232 on a pseudo terminal."""
+
+from urllib.parse import urlencode
+
+from robolink.protocols.epson_binary import Dialect
+from robolink_simulators.cell.clock import ScaledClock
+from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.epson.options import serial_dialect
+from robolink_simulators.epson.remote.link import EpsonServerLink
+from robolink_simulators.hosting.streams.line_host import LineHost
+from robolink_simulators.hosting.streams.serial_cable import no_pseudo_terminal
+
+_SHOWN_BAUD = 115_200
+"""A pseudo terminal has no rate; a client has to name one all the same."""
+
+
+def serve_serial(
+    simulator: EpsonSimulator,
+    *,
+    baud: int = 0,
+    clock: ScaledClock | None = None,
+) -> "EpsonLineHost":
+    """Serve a simulated controller at a serial line; close the host, or use it as a context.
+
+    Args:
+        simulator: What to serve.
+        baud: As slowly as a line at this rate, in real time; 0 carries everything at once.
+        clock: The simulated time; real time by default.
+
+    Raises:
+        ConnectError: This system has no pseudo terminals.
+    """
+    try:
+        return EpsonLineHost(simulator, clock=clock or ScaledClock(), baud=baud)
+    except (ImportError, AttributeError, OSError) as error:
+        raise no_pseudo_terminal(error) from error
+
+
+class _SerialFace:
+    """A controller as its serial port shows it; see ``hosting.seam.WireDevice``."""
+
+    def __init__(self, simulator: EpsonSimulator) -> None:
+        self._simulator = simulator
+        self.advance = simulator.advance
+        self.next_change = simulator.next_change
+
+    def connect(self, now_ns: int) -> EpsonServerLink:
+        """Listen at the port."""
+        return self._simulator.connect_serial(now_ns)
+
+
+class EpsonLineHost(LineHost):
+    """A controller at the far end of a serial cable.
+
+    Attributes:
+        url: Where a client finds it, with all that it must know of the dialect.
+    """
+
+    def __init__(self, simulator: EpsonSimulator, *, clock: ScaledClock, baud: int) -> None:
+        face = _SerialFace(simulator)
+        super().__init__(face, clock=clock, lock=simulator.lock, baud=baud)
+        self._simulator = simulator
+        options = {"baud": str(baud or _SHOWN_BAUD), **_told(serial_dialect(simulator.options))}
+        self.url = f"epson+serial://{self.cable.near}?{urlencode(options)}"
+        simulator.url = simulator.url or self.url
+        simulator.present_ns = clock.now_ns
+        simulator.watchers.append(self.wake)
+
+    def close(self) -> None:
+        """Stop serving and unplug the cable. Idempotent."""
+        super().close()
+        if self.wake in self._simulator.watchers:
+            self._simulator.watchers.remove(self.wake)
+            if self._simulator.url == self.url:
+                self._simulator.url = ""
+
+
+def _told(dialect: Dialect) -> dict[str, str]:
+    """Return the options that a client has to give, since the usual ones are others."""
+    usual = Dialect()
+    return {
+        name: str(value)
+        for name, value in (
+            ("numbers", dialect.numbers),
+            ("nak_code", dialect.nak_code),
+            ("letters", dialect.letters),
+            ("word_port_bytes", dialect.word_port_bytes),
+        )
+        if value != getattr(usual, name)
+    }

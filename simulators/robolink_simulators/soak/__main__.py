@@ -1,0 +1,99 @@
+"""``python -m robolink_simulators.soak``: run seeds, replay one, shrink one, make a test of it."""
+
+import sys
+import time
+from pathlib import Path
+
+import click
+
+from robolink.timing import wall_label
+from robolink_simulators.soak.cell import live_through
+from robolink_simulators.soak.history import CellKind, History
+from robolink_simulators.soak.results import ResultsFile, SeedResult, summed_up
+from robolink_simulators.soak.shrinking import as_test, shrink
+
+
+class SeedRange(click.ParamType[range]):
+    """``A-B``, both included, or one number."""
+
+    name = "seeds"
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> range:
+        """Return the seeds."""
+        first, _, last = str(value).partition("-")
+        if not (first.isdigit() and (last or first).isdigit()):
+            self.fail(f"{value!r} is not like 0-499", param, ctx)
+        return range(int(first), int(last or first) + 1)
+
+
+@click.command()
+@click.option("--seeds", type=SeedRange(), help="Run these: 0-499. What was run is passed over.")
+@click.option("--seed", type=int, help="This one, for --replay, --shrink and --write-test.")
+@click.option("--hours", type=click.IntRange(1), default=20, show_default=True, help="A seed.")
+@click.option("--kind", type=click.Choice([kind.value for kind in CellKind]), help="Of the cell.")
+@click.option("--replay", is_flag=True, help="Tell the whole story, event by event.")
+@click.option("--shrink", "shrinks", is_flag=True, help="Leave out all that is not needed.")
+@click.option("--write-test", type=click.Path(path_type=Path), help="Write the test of it there.")
+@click.option(
+    "--results",
+    type=click.Path(path_type=Path),
+    default=Path("build/soak/results.jsonl"),
+    show_default=True,
+    help="Where a line for each seed is kept.",
+)
+def main(
+    seeds: range | None,
+    seed: int | None,
+    hours: int,
+    kind: str | None,
+    replay: bool,
+    shrinks: bool,
+    write_test: Path | None,
+    results: Path,
+) -> None:
+    """Run whole simulated cells against seeded disturbances, and check the rules all the time."""
+    own = None if kind is None else CellKind(kind)
+    if seed is not None:
+        sys.exit(_one(History.drawn(seed, hours, own), replay, shrinks, write_test))
+    if seeds is None:
+        click.echo("\n".join(summed_up(ResultsFile(results).results())) or "nothing was run yet")
+        return
+    sys.exit(_range(seeds, hours, own, ResultsFile(results)))
+
+
+def _one(history: History, replay: bool, shrinks: bool, write_test: Path | None) -> int:
+    story = live_through(history)
+    if story.broken and (shrinks or write_test):
+        rule = story.broken[0].rule
+        story = live_through(shrink(history, rule))
+        if write_test is not None:
+            write_test.write_text(as_test(story.history, rule), encoding="utf-8")
+    told = story.told()
+    if replay and not story.broken:
+        told = "\n".join((told, *story.lines()))
+    click.echo(told)
+    return 1 if story.broken else 0
+
+
+def _range(seeds: range, hours: int, kind: CellKind | None, results: ResultsFile) -> int:
+    done, failed = results.done(hours), False
+    for seed in seeds:
+        if seed in done:
+            continue
+        begun_s = time.process_time()
+        story = live_through(History.drawn(seed, hours, kind))
+        result = SeedResult.of(story, ended_at=wall_label(), cpu_s=time.process_time() - begun_s)
+        results.add(result)
+        failed |= bool(story.broken)
+        click.echo(
+            f"seed {seed} {story.history.kind}: {story.hours} h, {story.events} events, "
+            f"{story.hash[:16]} " + ("; ".join(result.broken) or "every rule held")
+        )
+    click.echo("\n".join(summed_up(results.results())))
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    main()

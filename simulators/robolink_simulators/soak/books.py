@@ -1,0 +1,104 @@
+"""The journal as it stands on the disk, read past the library, for the rules."""
+
+import json
+import sqlite3
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from robolink.model import ToolOffset, read_offset
+
+
+@dataclass(frozen=True, slots=True)
+class BookedMarker:
+    """A marker as the tables have it.
+
+    Attributes:
+        operation: Its id.
+        kind: What it stands for.
+        request: What was begun.
+        details: What is needed to settle it.
+    """
+
+    operation: str
+    kind: str
+    request: str
+    details: Mapping[str, Any]
+
+
+class Books:
+    """Reads the journal's tables over a connection of its own.
+
+    Args:
+        path: The journal's file.
+
+    Attributes:
+        trusted: Whether nobody has damaged or deleted it lately.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.trusted = True
+        self._path = path
+        self._connection: sqlite3.Connection | None = None
+
+    def close(self) -> None:
+        """Close the connection; the next look opens another one."""
+        if self._connection is not None:
+            self._connection.close()
+            self._connection = None
+
+    def markers(self) -> list[BookedMarker]:
+        """Return what is open, oldest first; nothing where it cannot be read."""
+        rows = self._rows("SELECT operation, kind, request, details FROM markers ORDER BY id")
+        return [
+            BookedMarker(operation, kind, request, json.loads(details))
+            for operation, kind, request, details in rows
+        ]
+
+    def holder(self) -> Mapping[str, Any] | None:
+        """Return who holds the lease, ``None`` for nobody."""
+        for token, holder in self._rows("SELECT token, holder FROM leases"):
+            if token:
+                found: Mapping[str, Any] = json.loads(holder)
+                return found
+        return None
+
+    def last_number(self) -> int:
+        """Return the number of the newest entry."""
+        return next((row[0] for row in self._rows("SELECT max(number) FROM entries") if row[0]), 0)
+
+    def head(self) -> str:
+        """Return the newest hash of the chain."""
+        return next((str(row[0]) for row in self._rows("SELECT hash FROM head")), "")
+
+    def value_of(self, tool: int) -> tuple[bool, ToolOffset | None]:
+        """Return whether a value of a tool is on record as proved, and the newest one."""
+        rows = self._rows(
+            "SELECT details FROM entries WHERE proved_tool = ? ORDER BY number DESC LIMIT 1", tool
+        )
+        for (text,) in rows:
+            return True, read_offset(json.loads(text).get("value"))
+        return False, None
+
+    def verdicts(self, after: int, tool: int) -> list[tuple[str, str]]:
+        """Return kind and verdict of the entries about a tool, behind a number."""
+        return self._rows(
+            "SELECT kind, verdict FROM entries WHERE number > ? AND tool = ? ORDER BY number",
+            after,
+            tool,
+        )
+
+    def _rows(self, statement: str, *values: object) -> list[Any]:
+        if not self._path.exists():
+            return []
+        with suppress(sqlite3.Error):
+            if self._connection is None:
+                self._connection = sqlite3.connect(
+                    f"file:{self._path}?mode=ro", uri=True, check_same_thread=False, timeout=0
+                )
+            return self._connection.execute(statement, values).fetchall()
+        self.trusted = False
+        self.close()
+        return []

@@ -1,0 +1,380 @@
+"""One cell through its history: people at work, what gets in the way, and the rules."""
+
+import os
+import random
+import shutil
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager, suppress
+from pathlib import Path
+from typing import Any, Final
+from unittest import mock
+
+from robolink.ambient import replaced
+from robolink.checkpoints import Checkpoint, observed
+from robolink.errors import JournalError, OutcomeUnknownError, RobolinkError
+from robolink.interrupts import one_ending, output_closed
+from robolink.model import ToolOffset
+from robolink.timing import NS_PER_S
+from robolink.transaction import Wanted, change_tools
+from robolink_simulators.cell.clock import ManualClock
+from robolink_simulators.faults import DiskFault, FaultyDisk
+from robolink_simulators.soak.books import Books
+from robolink_simulators.soak.computer import VirtualComputer, VirtualProcess
+from robolink_simulators.soak.history import CellKind, Disturbance, Hindrance, History, Hour
+from robolink_simulators.soak.people import (
+    OTHERS_TOOL,
+    carry_out,
+    describe,
+    habits_in,
+    put_right,
+    wish_of,
+)
+from robolink_simulators.soak.plant.epson import PASSWORD, EpsonPlant
+from robolink_simulators.soak.plant.machine import PlantMachine, SentRequest
+from robolink_simulators.soak.plant.softmotion import SoftMotionPlant
+from robolink_simulators.soak.rules import Rulebook
+from robolink_simulators.soak.story import Story
+from robolink_simulators.soak.surroundings import SeededSurroundings
+from robolink_simulators.soak.threads import Killed, TurnTaking
+
+_PLANTS: Final = {CellKind.EPSON: EpsonPlant, CellKind.SOFTMOTION: SoftMotionPlant}
+_TRIES: Final = 8
+"""How often people try to get a cell going again; each time they look longer."""
+
+_PAST_THE_SYSTEM: Final = ("bent", "truncated", "lost")
+"""What happens to the journal's file while nobody has it open."""
+
+_ON_WIRE: Final = (Hindrance.WIRE, Hindrance.MACHINE, Hindrance.PENDANT)
+
+
+class VirtualCell:
+    """A machine, a computer, a disk and people, in virtual time.
+
+    Args:
+        history: What happens to it.
+        folder: For its disk; empty.
+    """
+
+    def __init__(self, history: History, folder: Path) -> None:
+        self.story = Story(history)
+        self._history = history
+        self._clock = ManualClock()
+        self._rng = random.Random(f"cell {history.seed}")
+        self._turns = TurnTaking(self._clock, self._rng, self._note_turn)
+        self._surroundings = SeededSurroundings(self._clock, self._turns, self._rng)
+        self._disk = FaultyDisk(folder)
+        self._folder = folder
+        self._waiting: list[tuple[Disturbance, int]] = []
+        self._at_work: VirtualProcess | None = None
+        self._others: list[VirtualProcess] = []
+        self._hour = history.hours[0] if history.hours else None
+
+    def run(self) -> Story:
+        """Run the whole history."""
+        with ExitStack() as stack:
+            environment = {"ROBOLINK_STATE_DIR": str(self._folder / "state")}
+            stack.enter_context(mock.patch.dict(os.environ, environment))
+            stack.enter_context(replaced(self._surroundings))
+            stack.enter_context(self._disk)
+            stack.enter_context(observed(self._at_checkpoint))
+            self._computer = VirtualComputer(self._folder, self._surroundings)
+            self._books = Books(self._computer.journal)
+            stack.callback(self._books.close)
+            self._plant: PlantMachine = _PLANTS[self._history.kind](
+                self._clock, self, self._history.seed
+            )
+            self._rules = Rulebook(self.story, self._plant, self._books)
+            for hour in self._history.hours:
+                self._live_through(hour)
+            self._look_for_the_password()
+        return self.story
+
+    # What the machine's wire, and the checkpoints, tell.
+
+    def leaving(self, process: VirtualProcess, sent: SentRequest) -> None:
+        """See a request before it leaves; a dead process sends nothing."""
+        if not process.alive:
+            raise Killed
+        self._note(f"p{process.number} > {sent.text}")
+        self._rules.leaving(process, sent)
+
+    def passed(self, process: VirtualProcess, text: str) -> None:
+        """See that something has passed on the wire."""
+        if not process.alive:
+            raise Killed
+        if text.startswith("wire received"):
+            self._note(f"p{process.number} < {text}")
+        self._pass_point(process, text)
+
+    def _at_checkpoint(self, point: Checkpoint, what: str) -> None:
+        process = self._turns.current.owner
+        if not isinstance(process, VirtualProcess):
+            return
+        if not process.alive:
+            raise Killed
+        self._pass_point(process, f"{point} {what}")
+
+    def _pass_point(self, process: VirtualProcess, text: str) -> None:
+        if process is self._at_work and self._waiting:
+            due = [d for d, left in self._waiting if d.match in text and not left]
+            self._waiting = [
+                (d, left - (d.match in text))
+                for d, left in self._waiting
+                if left or d.match not in text
+            ]
+            for disturbance in due:
+                self._happen(process, disturbance, text)
+        self._turns.pass_on()
+        if not process.alive:
+            raise Killed
+
+    def _note(self, text: str) -> None:
+        self.story.note(self._clock.now_ns(), text.replace(str(self._folder), "DISK"))
+
+    def _note_turn(self, name: str) -> None:
+        self._note(f"-- {name} goes on")
+
+    # What gets in the way.
+
+    def _happen(self, process: VirtualProcess, disturbance: Disturbance, text: str) -> None:
+        self._note(f"!! {disturbance} ({text})")
+        self.story.met[disturbance.kind] += 1
+        match disturbance.kind:
+            case Hindrance.STOP:
+                self._turns.start("stop", process, lambda: self._stop(process))
+            case Hindrance.KILL:
+                self._kill(process)
+            case Hindrance.POWER_CUT:
+                self._cut_power(process, disturbance)
+            case Hindrance.SECOND_PERSON:
+                self._rules.now.crowded = True
+                other = self._computer.start("carl")
+                self._others.append(other)
+                self._turns.start("carl", other, lambda: self._second_person(other))
+            case Hindrance.DISK:
+                self._disk.begin(DiskFault[disturbance.what])
+            case Hindrance.CLOCK:
+                self._surroundings.wall_jump_s += disturbance.seconds
+            case Hindrance.INTERRUPT:
+                if self._turns.current.name == "main":
+                    output_closed()
+
+    def _cut_power(self, process: VirtualProcess, disturbance: Disturbance) -> None:
+        self._books.close()
+        if disturbance.what:
+            # The disk said that it had kept what it may not have: nobody can rely on the rest.
+            self._books.trusted = False
+        process.alive = False
+        self._computer.cut_power(self._clock.now_ns(), self._disk, self._rng.getrandbits(32))
+        self._kill(process)
+
+    def _kill(self, process: VirtualProcess) -> None:
+        process.alive = False
+        self._plant.hang_up(process)
+        raise Killed
+
+    def _stop(self, process: VirtualProcess) -> None:
+        controller = process.controller
+        if controller is None:
+            return
+        try:
+            controller.stop()
+        except RobolinkError as error:
+            self._note(f"stop: {describe(error)}")
+            return
+        self._note("stop: acknowledged")
+        if process.alive:
+            process.stopped_ns = self._clock.now_ns()
+            self._rules.stopped(process)
+
+    def _second_person(self, process: VirtualProcess) -> None:
+        """Somebody else at another terminal changes another tool."""
+        try:
+            with self._connected(process) as controller:
+                held = controller.tools.read(OTHERS_TOOL)
+                offset = ToolOffset(7.0, 7.0, -float(1 + process.number % 40))
+                self._rules.now.wanted.setdefault(OTHERS_TOOL, [None]).append(offset)
+                change_tools(controller, [Wanted(OTHERS_TOOL, offset, held)])
+                self._note("carl: done")
+        except (RobolinkError, KeyboardInterrupt) as error:
+            self._note(f"carl: {describe(error)}")
+        finally:
+            process.end()
+
+    # An hour.
+
+    def _live_through(self, hour: Hour) -> None:
+        self._hour = hour
+        self._rng.seed(f"chance {self._history.seed} {hour.number}")
+        self.story.begin_hour(hour.number)
+        self._clock.advance_to(hour.number * 3600 * NS_PER_S)
+        self._note(f"hour {hour.number}: {hour.habit.person} sets out to {hour.deed}")
+        world = self._plant.simulator.world
+        world.set_up(habits_in(hour.habit))
+        world.change_nozzle()
+        self._harm_the_journal(hour)
+        self._rules.begin(hour, wish_of(hour))
+        self._arm(hour)
+        self._do(hour)
+        for fault in DiskFault:
+            self._disk.end(fault)
+        self.story.met["wire or machine"] += self._plant.disarm()
+        self._waiting = []
+        self._settle_down()
+        self._rules.left(self._plant.state())
+        if hour.habit.impatient and self._books.markers():
+            self._note(f"{hour.habit.person} tries again at once")
+            self._plant.repair()
+            self._rules.begin_again()
+            self._do(hour)
+            self._settle_down()
+            self._rules.left(self._plant.state())
+        usable, why = self._put_right(hour)
+        self._rules.at_rest(self._plant.state(), usable=usable, why=why)
+        self._note(f"journal {self._books.head()}")
+        self._surroundings.wall_jump_s = 0.0
+        self._books.trusted = True
+
+    def _arm(self, hour: Hour) -> None:
+        for disturbance in hour.disturbances:
+            if disturbance.kind in _ON_WIRE:
+                self._plant.arm(disturbance)
+            elif disturbance.what not in _PAST_THE_SYSTEM:
+                self._waiting.append((disturbance, disturbance.at))
+            if disturbance.what == "SYNC_LIES":
+                self._disk.begin(DiskFault.SYNC_LIES)
+
+    def _harm_the_journal(self, hour: Hour) -> None:
+        for disturbance in hour.disturbances:
+            if disturbance.what not in _PAST_THE_SYSTEM or not self._computer.journal.exists():
+                continue
+            self._note(f"!! {disturbance}")
+            self.story.met[disturbance.kind] += 1
+            self._books.close()
+            share = (disturbance.at % 97) / 97
+            if disturbance.what == "bent":
+                self._computer.bend(share)
+            elif disturbance.what == "truncated":
+                self._computer.truncate(share)
+            else:
+                self._computer.lose()
+            self._books.trusted = False
+
+    def _do(self, hour: Hour) -> None:
+        process = self._at_work = self._computer.start(hour.habit.person)
+        me = self._turns.current
+        me.owner = process
+        error: BaseException | None = None
+        try:
+            with one_ending(), self._connected(process) as controller:
+                try:
+                    self._rules.now.report = carry_out(
+                        controller, hour, self._plant.simulator, self._note_said
+                    )
+                except BaseException as raised:
+                    error = raised
+                    raise
+                finally:
+                    stopped_ns = process.stopped_ns
+        except Killed:
+            self._plant.hang_up(process)
+        except (RobolinkError, KeyboardInterrupt, Exception) as raised:
+            error = error or raised
+        finally:
+            me.owner = None
+        if not process.alive:
+            self._end(hour, "killed")
+            self._turns.join()
+            process.end()
+            return
+        self._turns.join()
+        process.stopped_ns = stopped_ns if error is None and process.controller else None
+        self._rules.ended(process, error, self._plant.state())
+        self._end(hour, "done" if error is None else type(error).__name__)
+        self._note("done" if error is None else describe(error))
+        process.end()
+
+    def _end(self, hour: Hour, how: str) -> None:
+        self.story.endings[f"{hour.deed}: {how}"] += 1
+
+    def _note_said(self, text: str) -> None:
+        self._note(f"   {text}")
+
+    @contextmanager
+    def _connected(self, process: VirtualProcess) -> Iterator[Any]:
+        outcomes = process.log(self._plant.address, self._clock)
+        with self._plant.connect(process, outcomes) as controller:
+            process.controller = controller
+            yield controller
+
+    def _settle_down(self) -> None:
+        """Let whatever was under way on the machine come to its end."""
+        self._turns.join()
+        for process in self._others:
+            self._plant.hang_up(process)
+        self._others = []
+        self._at_work = None
+        self._clock.advance(90.0)
+        self._plant.simulator.advance(self._clock.now_ns())
+
+    def _put_right(self, hour: Hour) -> tuple[bool, str]:
+        """Let the people get the cell going again; return whether that came off, and why not."""
+        why = ""
+        for attempt in range(_TRIES):
+            self._plant.repair()
+            process = self._computer.start(hour.habit.person)
+            self._turns.current.owner = process
+            try:
+                with self._connected(process) as controller:
+                    if put_right(controller, hour.habit, self._note_said):
+                        return True, ""
+                why = "something stays open"
+            except JournalError as error:
+                why = describe(error)
+                self._note(f"sets the journal aside: {why}")
+                process.end()
+                self._books.close()
+                self._computer.set_aside()
+                self._books.trusted = False
+            except OutcomeUnknownError as error:
+                why = describe(error)
+            except RobolinkError as error:
+                why = describe(error)
+            finally:
+                self._turns.current.owner = None
+                process.end()
+            self._note(f"try {attempt + 1}: {why}")
+            self._clock.advance(30.0 * 2**attempt)
+            self._plant.simulator.advance(self._clock.now_ns())
+        return False, why
+
+    def _look_for_the_password(self) -> None:
+        lines = "\n".join(self.story.lines())
+        shown = [str(path.name) for path in self._computer.files() if _holds_password(path)]
+        self._rules.hold("NoPasswordShown", PASSWORD not in lines and not shown, f"in {shown}")
+
+
+def _holds_password(path: Path) -> bool:
+    with suppress(OSError):
+        return PASSWORD.encode() in path.read_bytes()
+    return False
+
+
+def live_through(history: History, replacements: Mapping[str, object] | None = None) -> Story:
+    """Run a history on a disk in memory, where there is one; nothing of it stays.
+
+    Args:
+        history: What happens.
+        replacements: Put in the place of what is found under a dotted name, for as long as it
+            takes: defects that the rules have to find.
+    """
+    memory = Path("/dev/shm")
+    folder = Path(tempfile.mkdtemp(prefix="soak-", dir=memory if memory.is_dir() else None))
+    try:
+        with ExitStack() as stack:
+            for name, replacement in (replacements or {}).items():
+                stack.enter_context(mock.patch(name, replacement))
+            return VirtualCell(history, folder).run()
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)

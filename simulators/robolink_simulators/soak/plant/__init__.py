@@ -1,0 +1,1 @@
+"""The machines that stand in a virtual cell, as the adversary sees and disturbs them."""

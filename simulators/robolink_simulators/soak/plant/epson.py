@@ -1,0 +1,202 @@
+"""An EPSON controller in a virtual cell, and the link that leads to it."""
+
+import re
+from typing import Final
+
+from robolink.controllers.epson import open_epson
+from robolink.controllers.epson.link.line import text_line
+from robolink.model import Controller, OutcomeLog, Secret, ToolOffset
+from robolink.timing import Deadline
+from robolink.transport import parse_url
+from robolink_simulators.cell.clock import ManualClock
+from robolink_simulators.cell.world_parameters import WorldParameters
+from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.faults import Fault, FaultAction
+from robolink_simulators.hosting.in_process.transport import InProcessTransport
+from robolink_simulators.soak.computer import VirtualProcess
+from robolink_simulators.soak.history import Disturbance, Hindrance
+from robolink_simulators.soak.plant.machine import (
+    MachineState,
+    PlantMachine,
+    SentKind,
+    SentRequest,
+    WireTap,
+)
+
+PASSWORD: Final = "canary-7413-remote"
+"""The controller's; it must turn up nowhere."""
+
+_MOVES: Final = re.compile(r'\$Execute,"(?:Move|Go|Jump3?|BGo|BMove|TGo|TMove|Arc3?) ')
+_WRITES: Final = re.compile(r'\$Execute,"(?:TLSet (\d+), |TLClr (\d+))')
+_SELECTS: Final = re.compile(r'\$Execute,"Tool (\d+)"')
+_STOPS: Final = re.compile(r"\$(?:Abort|Stop)")
+_SOME_ERROR: Final = 2000
+_UNSEEN: Final = frozenset(
+    {FaultAction.GARBLE_REQUEST, FaultAction.GARBLE_REPLY, FaultAction.SWAP_BYTES}
+)
+"""Text has no checksum: a digit that is another digit cannot be told from the right one."""
+
+
+class EpsonPlant(PlantMachine):
+    """An EPSON SCARA on Remote Ethernet.
+
+    Args:
+        clock: The virtual time.
+        tap: Told of everything on the wire.
+        seed: Decides its world.
+    """
+
+    kind = "epson"
+    address = "epson+sim://cell"
+
+    def __init__(self, clock: ManualClock, tap: WireTap, seed: int) -> None:
+        super().__init__(clock, tap)
+        self._simulator = EpsonSimulator(
+            "T6-602S",
+            seed=seed,
+            password=Secret(PASSWORD),
+            serial=f"SOAK{seed:06d}",
+            world=WorldParameters(),
+        )
+        self._simulator.present_ns = clock.now_ns
+        self._simulator.on_request = self._requested
+        self._links: dict[int, InProcessTransport] = {}
+        self._moves = 0
+        self._planned: list[tuple[Disturbance, int]] = []
+
+    @property
+    def simulator(self) -> EpsonSimulator:
+        """The simulated controller."""
+        return self._simulator
+
+    def connect(self, process: VirtualProcess, outcomes: OutcomeLog) -> Controller:
+        """Log in."""
+        link = TappedTransport(self._simulator, self.clock, process, self.tap, self.address)
+        self._links[process.number] = link
+        return open_epson(text_line(link), outcomes=outcomes, password=Secret(PASSWORD))
+
+    def hang_up(self, process: VirtualProcess) -> None:
+        """Close the connection of a process that died."""
+        link = self._links.pop(process.number, None)
+        if link is not None:
+            link.close()
+
+    def state(self) -> MachineState:
+        """Return its tools and the selected one."""
+        memory = self._simulator.machine.tools
+        return MachineState(dict(memory.defined()), memory.selected)
+
+    @property
+    def moving(self) -> bool:
+        """Whether the arm moves."""
+        return self._simulator.machine.arm.moving
+
+    @property
+    def movements(self) -> int:
+        """How many statements of movement have come in, but for those that the wire repeated."""
+        return self._moves
+
+    def arm(self, disturbance: Disturbance) -> None:
+        """Plan a fault of the wire, or what somebody does at the controller."""
+        if disturbance.kind is Hindrance.PENDANT:
+            self._planned.append((disturbance, disturbance.at))
+            return
+        action = FaultAction[disturbance.what]
+        self.undecided |= action in _UNSEEN
+        self._simulator.faults.add(
+            Fault(
+                action,
+                disturbance.at,
+                disturbance.match,
+                seconds=disturbance.seconds,
+                code=_SOME_ERROR,
+                position=disturbance.position,
+            )
+        )
+
+    def disarm(self) -> int:
+        """Forget what was planned; return how much was met."""
+        faults = self._simulator.faults
+        met = len(faults.fired)
+        faults.clear()
+        faults.fired.clear()
+        self._planned.clear()
+        return met
+
+    def write_by_hand(self, tool: int, offset: ToolOffset) -> None:
+        """Write a tool at the pendant."""
+        self._simulator.machine.tools.set(tool, offset)
+        self.touched.add(tool)
+
+    def repair(self) -> None:
+        """Release, close, switch back to automatic; restart after a serious error."""
+        panel, condition = self._simulator.panel, self._simulator.condition
+        panel.release_estop()
+        panel.close_guard()
+        panel.auto()
+        if condition.serious:
+            self._simulator.restart()
+
+    def _requested(self, _number: int, text: str) -> None:
+        repeated = FaultAction.DUPLICATE_REQUEST in {f.action for f in self._simulator.faults.fired}
+        if _MOVES.match(text) and not repeated:
+            self._moves += 1
+        waiting: list[tuple[Disturbance, int]] = []
+        for disturbance, left in self._planned:
+            if disturbance.match not in text:
+                waiting.append((disturbance, left))
+            elif left:
+                waiting.append((disturbance, left - 1))
+            else:
+                old = self.state().tools.get(1, ToolOffset(12.0, -3.5, -20.0))
+                self.write_by_hand(1, ToolOffset(old.x_mm + 0.5, old.y_mm - 0.25, old.z_mm))
+        self._planned = waiting
+
+
+class TappedTransport(InProcessTransport):
+    """A process's connection, on which the adversary sees everything.
+
+    Args:
+        simulator: Where it leads.
+        clock: The virtual time.
+        process: Whose it is.
+        tap: Told of everything.
+        address: Its URL.
+    """
+
+    def __init__(
+        self,
+        simulator: EpsonSimulator,
+        clock: ManualClock,
+        process: VirtualProcess,
+        tap: WireTap,
+        address: str,
+    ) -> None:
+        self._process = process
+        self._tap = tap
+        super().__init__(parse_url(address), simulator, clock, simulator.lock, durable=True)
+
+    def send(self, data: bytes, *, deadline: Deadline, secret: bool = False) -> None:
+        """See :meth:`robolink.transport.Transport.send`."""
+        text = "$Login" if secret else data.decode("ascii", "replace").strip()
+        self._tap.leaving(self._process, _classified(text))
+        super().send(data, deadline=deadline, secret=secret)
+        self._tap.passed(self._process, f"wire sent {text}")
+
+    def receive(self, *, deadline: Deadline) -> bytes:
+        """See :meth:`robolink.transport.Transport.receive`."""
+        data = super().receive(deadline=deadline)
+        self._tap.passed(self._process, f"wire received {data!r}")
+        return data
+
+
+def _classified(text: str) -> SentRequest:
+    written = _WRITES.match(text)
+    if written:
+        return SentRequest(SentKind.WRITE, text, int(written.group(1) or written.group(2)))
+    selected = _SELECTS.match(text)
+    if selected:
+        return SentRequest(SentKind.SELECT, text, int(selected.group(1)))
+    if _MOVES.match(text):
+        return SentRequest(SentKind.MOVE, text)
+    return SentRequest(SentKind.STOP if _STOPS.match(text) else SentKind.OTHER, text)

@@ -1,0 +1,148 @@
+"""What a machine in a virtual cell is to the adversary, whatever its kind."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Final, Protocol
+
+from robolink.model import Controller, OutcomeLog, ToolOffset
+from robolink_simulators.cell.clock import ManualClock
+from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.soak.computer import VirtualProcess
+from robolink_simulators.soak.history import Disturbance
+from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
+
+_ALIKE: Final = 0.0006
+"""Half of the last of three decimals, and room for rounding: mm and degrees."""
+
+
+class SentKind(StrEnum):
+    """What a request on the wire does to the machine."""
+
+    MOVE = "move"
+    WRITE = "write"
+    SELECT = "select"
+    STOP = "stop"
+    OTHER = "other"
+
+
+@dataclass(frozen=True, slots=True)
+class SentRequest:
+    """A request as it leaves a process.
+
+    Attributes:
+        kind: What it does.
+        text: As it stands on the wire, or in words.
+        tool: Which tool, where it is about one.
+    """
+
+    kind: SentKind
+    text: str
+    tool: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class MachineState:
+    """What a machine keeps.
+
+    Attributes:
+        tools: Every tool that is defined.
+        selected: The tool in force, 0 for none.
+    """
+
+    tools: Mapping[int, ToolOffset]
+    selected: int
+
+
+class WireTap(Protocol):
+    """Who is told of all that crosses the wire."""
+
+    def leaving(self, process: VirtualProcess, sent: SentRequest) -> None:
+        """See a request before it leaves.
+
+        Raises:
+            Killed: The process is dead, so nothing leaves.
+        """
+
+    def passed(self, process: VirtualProcess, text: str) -> None:
+        """See that a request or an answer has passed; the process may be killed here."""
+
+
+class PlantMachine(ABC):
+    """A simulated controller with its world.
+
+    Args:
+        clock: The virtual time.
+        tap: Told of everything on the wire.
+
+    Attributes:
+        touched: Tools that somebody past this computer has written since the last look.
+        moved_itself: Whether the tool in force was changed past this computer since then.
+        undecided: Whether what was written may have arrived bent, so that for a while the machine
+            may hold what nobody wanted.
+    """
+
+    kind: str
+    address: str
+
+    def __init__(self, clock: ManualClock, tap: WireTap) -> None:
+        self.clock = clock
+        self.tap = tap
+        self.touched: set[int] = set()
+        self.moved_itself = False
+        self.undecided = False
+
+    @property
+    @abstractmethod
+    def simulator(self) -> EpsonSimulator | SoftMotionSimulator:
+        """The simulated controller."""
+
+    @abstractmethod
+    def connect(self, process: VirtualProcess, outcomes: OutcomeLog) -> Controller:
+        """Connect a process to it.
+
+        Raises:
+            RobolinkError: That fails.
+        """
+
+    @abstractmethod
+    def hang_up(self, process: VirtualProcess) -> None:
+        """Close what a process that died had open."""
+
+    @abstractmethod
+    def state(self) -> MachineState:
+        """Return what it keeps now."""
+
+    @property
+    @abstractmethod
+    def moving(self) -> bool:
+        """Whether something moves."""
+
+    @property
+    @abstractmethod
+    def movements(self) -> int:
+        """How many movements it has begun, ever."""
+
+    @abstractmethod
+    def arm(self, disturbance: Disturbance) -> None:
+        """Plan a fault of the wire or of the machine."""
+
+    @abstractmethod
+    def disarm(self) -> int:
+        """Forget what was planned and was not met; return how much was met."""
+
+    @abstractmethod
+    def write_by_hand(self, tool: int, offset: ToolOffset) -> None:
+        """Let somebody write a tool at the machine's own panel."""
+
+    @abstractmethod
+    def repair(self) -> None:
+        """Let a person at the machine do what is to be done there: buttons, doors, switches."""
+
+    def same(self, one: ToolOffset | None, other: ToolOffset | None) -> bool:
+        """Whether it stores two offsets alike."""
+        if one is None or other is None:
+            return one is other
+        pairs = zip(one.components(), other.components(), strict=True)
+        return all(abs(a - b) <= _ALIKE for a, b in pairs)

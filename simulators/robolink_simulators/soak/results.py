@@ -1,0 +1,139 @@
+"""What was run so far: a line for each seed, so that a range can be gone on with, and sums."""
+
+import json
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from functools import cache
+from hashlib import sha256
+from pathlib import Path
+
+import robolink
+import robolink_simulators
+from robolink_simulators.soak.story import Story
+
+
+@dataclass(frozen=True, slots=True)
+class SeedResult:
+    """How one seed went.
+
+    Attributes:
+        seed: The seed.
+        kind: What stood in the cell.
+        hours: Virtual hours.
+        events: Events, over all of which the hash is.
+        hash: SHA-256 over them.
+        disturbances: How many were drawn.
+        met: How many came to pass.
+        checks: How often a rule was looked at.
+        certified: Tips that were proved where no habit was in the way.
+        inside: How many of those lay within what was stated.
+        broken: Rules that did not hold, in words.
+        source: Which state of the code it was; see :func:`source_digest`.
+        ended_at: When, as a label.
+        cpu_s: What it took.
+    """
+
+    seed: int
+    kind: str
+    hours: int
+    events: int
+    hash: str
+    disturbances: int
+    met: int
+    checks: int
+    certified: int
+    inside: int
+    broken: tuple[str, ...]
+    source: str
+    ended_at: str
+    cpu_s: float
+
+    @classmethod
+    def of(cls, story: Story, *, ended_at: str, cpu_s: float) -> "SeedResult":
+        """Return the result of a story."""
+        return cls(
+            story.history.seed,
+            story.history.kind.value,
+            story.hours,
+            story.events,
+            story.hash,
+            story.history.disturbances,
+            sum(story.met.values()),
+            sum(story.checks.values()),
+            len(story.certified),
+            sum(story.certified),
+            tuple(map(str, story.broken)),
+            source_digest(),
+            ended_at,
+            round(cpu_s, 2),
+        )
+
+
+@cache
+def source_digest() -> str:
+    """Return what tells this state of the code from another: a hash over its sources."""
+    digest = sha256()
+    for package in (robolink, robolink_simulators):
+        root = Path(str(package.__file__)).parent
+        for path in sorted(root.rglob("*.py")):
+            digest.update(str(path.relative_to(root)).encode() + path.read_bytes())
+    return digest.hexdigest()[:12]
+
+
+class ResultsFile:
+    """Keeps results, a JSON document a line.
+
+    Args:
+        path: The file; it need not be there.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+
+    def results(self) -> list[SeedResult]:
+        """Return what is in it; a line that was cut short by a kill is passed over."""
+        if not self._path.exists():
+            return []
+        found = []
+        for line in self._path.read_text(encoding="utf-8").splitlines():
+            try:
+                values = json.loads(line)
+            except ValueError:
+                continue
+            found.append(SeedResult(**{**values, "broken": tuple(values["broken"])}))
+        return found
+
+    def done(self, hours: int) -> set[int]:
+        """Return the seeds that this state of the code has run for so many hours."""
+        return {r.seed for r in self.results() if r.hours == hours and r.source == source_digest()}
+
+    def add(self, result: SeedResult) -> None:
+        """Add a result."""
+        self._path.parent.mkdir(parents=True, exist_ok=True)
+        with self._path.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(asdict(result)) + "\n")
+
+
+def summed_up(results: Iterable[SeedResult]) -> list[str]:
+    """Return the sums over results, as lines: of each state of the code, and of all."""
+    by_source: dict[str, list[SeedResult]] = {}
+    for result in results:
+        by_source.setdefault(result.source, []).append(result)
+    lines = []
+    for source, group in by_source.items():
+        broken = Counter(text.split(" in hour")[0] for r in group for text in r.broken)
+        certified, inside = sum(r.certified for r in group), sum(r.inside for r in group)
+        combined = sha256("".join(r.hash for r in sorted(group, key=lambda r: r.seed)).encode())
+        lines += [
+            f"source {source}: {sum(r.hours for r in group)} virtual hours, {len(group)} seeds "
+            f"({min(r.seed for r in group)} to {max(r.seed for r in group)}), "
+            f"{sum(r.events for r in group)} events, {sum(r.met for r in group)} of "
+            f"{sum(r.disturbances for r in group)} disturbances met, "
+            f"{sum(r.checks for r in group)} checks of rules",
+            f"  certified tips within what was stated: {inside} of {certified}",
+            f"  rules broken: {dict(broken) or 'none'}",
+            f"  hash over all hashes {combined.hexdigest()[:16]}, last at "
+            f"{max(r.ended_at for r in group)}, {sum(r.cpu_s for r in group):.0f} s of CPU",
+        ]
+    return lines

@@ -1,0 +1,276 @@
+"""Threads that run one at a time, in the order that a seed says.
+
+Each is a real thread, so that what belongs to a thread is its own; but only the one whose turn it
+is runs, and the turn passes at checkpoints and at locks only. A thread that waits gives the turn
+away; where everybody waits for a time, virtual time goes on to the first of them.
+"""
+
+import random
+import threading
+from collections.abc import Callable
+from types import TracebackType
+from typing import Final, Protocol
+
+from robolink.timing import NS_PER_S
+from robolink_simulators.cell.clock import ManualClock
+
+_REAL_PATIENCE_S: Final = 300.0
+"""Nothing here waits in real time; a thread that never passes its turn on is a defect."""
+
+
+class Killed(BaseException):
+    """The process to which this thread belongs is dead; raised again at each further point."""
+
+
+class DeadlockError(RuntimeError):
+    """Every thread waits for another one."""
+
+
+class Mortal(Protocol):
+    """What a thread belongs to."""
+
+    @property
+    def alive(self) -> bool:
+        """Whether it still runs."""
+
+
+class SteppedThread:
+    """One thread of a history.
+
+    Args:
+        name: Of the thread, in the event log.
+        owner: The process it belongs to; ``None`` for the outer one.
+
+    Attributes:
+        error: What ended it, ``None`` for nothing.
+        over: Whether it has ended.
+    """
+
+    def __init__(self, name: str, owner: Mortal | None) -> None:
+        self.name = name
+        self.owner = owner
+        self.error: BaseException | None = None
+        self.over = False
+        self.ready: Callable[[], bool] | None = None
+        self.until_ns: int | None = None
+        self.turn = threading.Semaphore(0)
+
+    def can_go_on(self, now_ns: int) -> bool:
+        """Tell whether what it waits for is there, its time has come, or its process is dead."""
+        if self.over:
+            return False
+        if self.ready is None or self.ready() or (self.owner is not None and not self.owner.alive):
+            return True
+        return self.until_ns is not None and now_ns >= self.until_ns
+
+
+class TurnTaking:
+    """Decides whose turn it is.
+
+    Args:
+        clock: The virtual time.
+        rng: Draws who goes on.
+        note: Told when the turn passes to another thread, with its name.
+    """
+
+    def __init__(
+        self,
+        clock: ManualClock,
+        rng: random.Random,
+        note: Callable[[str], None] = lambda _name: None,
+    ) -> None:
+        self.rng = rng
+        self._clock = clock
+        self._note = note
+        self._main = SteppedThread("main", None)
+        self._threads = [self._main]
+        self._favoured: SteppedThread | None = None
+        self._by_ident = {threading.get_ident(): self._main}
+
+    @property
+    def current(self) -> SteppedThread:
+        """The thread that runs."""
+        return self._by_ident[threading.get_ident()]
+
+    @property
+    def alone(self) -> bool:
+        """Whether there is no other thread."""
+        return len(self._threads) == 1
+
+    def start(self, name: str, owner: Mortal | None, work: Callable[[], None]) -> SteppedThread:
+        """Begin another thread; it runs when its turn comes.
+
+        Half of the time it is favoured, or whoever began it: then the other one stands still at
+        one point for as long as that can go on, which a fair draw at each point never shows.
+        """
+        thread = SteppedThread(name, owner)
+
+        def run() -> None:
+            thread.turn.acquire()
+            self._by_ident[threading.get_ident()] = thread
+            try:
+                work()
+            except BaseException as error:
+                thread.error = error
+            finally:
+                del self._by_ident[threading.get_ident()]
+                self._end(thread)
+
+        self._threads.append(thread)
+        self._favoured = self.rng.choice((thread, thread, self.current, None))
+        threading.Thread(target=run, name=f"soak {name}", daemon=True).start()
+        return thread
+
+    def pass_on(self) -> None:
+        """Let the seed say who goes on: this thread, or another one."""
+        if not self.alone:
+            self._hand_over(self._drawn())
+
+    def wait_until(self, ready: Callable[[], bool], timeout_s: float | None = None) -> bool:
+        """Let others run until ``ready`` holds, or the time is over; return whether it holds.
+
+        Raises:
+            Killed: The thread's process has died meanwhile.
+            DeadlockError: Nobody can go on, ever.
+        """
+        me = self.current
+        me.ready = ready
+        if timeout_s is not None:
+            me.until_ns = self._clock.now_ns() + round(timeout_s * NS_PER_S)
+        try:
+            while not me.can_go_on(self._clock.now_ns()):
+                self._hand_over(self._drawn())
+            if me.owner is not None and not me.owner.alive:
+                raise Killed
+            return ready()
+        finally:
+            me.ready = me.until_ns = None
+
+    def join(self) -> None:
+        """Let every other thread run to its end."""
+        me = self.current
+        self.wait_until(lambda: all(other.over for other in self._threads if other is not me))
+        self._threads, self._favoured = [me], None
+
+    def _drawn(self) -> SteppedThread:
+        while True:
+            now_ns = self._clock.now_ns()
+            ready = [thread for thread in self._threads if thread.can_go_on(now_ns)]
+            if self._favoured in ready:
+                return self._favoured
+            if ready:
+                return ready[0] if len(ready) == 1 else self.rng.choice(ready)
+            times = [t.until_ns for t in self._threads if not t.over and t.until_ns is not None]
+            if not times:
+                waiting = ", ".join(t.name for t in self._threads if not t.over)
+                message = f"everybody waits: {waiting}"
+                raise DeadlockError(message)
+            self._clock.advance_to(min(times))
+
+    def _hand_over(self, to: SteppedThread) -> None:
+        me = self.current
+        if to is me:
+            return
+        self._note(to.name)
+        to.turn.release()
+        if not me.turn.acquire(timeout=_REAL_PATIENCE_S):
+            message = f"the turn never came back to {me.name}"
+            raise DeadlockError(message)
+
+    def _end(self, thread: SteppedThread) -> None:
+        thread.over = True
+        # Whoever waits for the last thread is the main one; somebody always can go on.
+        following = self._drawn()
+        self._note(following.name)
+        following.turn.release()
+
+
+class SteppedLock:
+    """A lock at which the turn passes on.
+
+    Args:
+        turns: Decides who goes on.
+        reentrant: Whether its holder may take it again.
+    """
+
+    def __init__(self, turns: TurnTaking, *, reentrant: bool) -> None:
+        self._turns = turns
+        self._reentrant = reentrant
+        self._holder: SteppedThread | None = None
+        self._depth = 0
+
+    def acquire(self, blocking: bool = True, timeout: float = -1) -> bool:
+        """See :class:`robolink.ambient.WaitingLock`."""
+        me = self._turns.current
+        if self._holder is me and self._reentrant:
+            self._depth += 1
+            return True
+        if self._holder is not None:
+            if not blocking:
+                return False
+            limit_s = None if timeout < 0 else timeout
+            if not self._turns.wait_until(lambda: self._holder is None, limit_s):
+                return False
+        self._holder, self._depth = me, 1
+        return True
+
+    def release(self) -> None:
+        """See :class:`robolink.ambient.WaitingLock`."""
+        self._depth -= 1
+        if not self._depth:
+            self._holder = None
+
+    def __enter__(self) -> bool:
+        return self.acquire()
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.release()
+
+
+class SteppedRoom:
+    """A condition variable in which waiting takes virtual time only."""
+
+    def __init__(self, turns: TurnTaking) -> None:
+        self._turns = turns
+        self._lock = SteppedLock(turns, reentrant=True)
+        self._news = 0
+
+    def wait(self, timeout: float | None = None) -> bool:
+        """See :class:`robolink.ambient.WaitingRoom`."""
+        seen = self._news
+        self._lock.release()
+        try:
+            return self._turns.wait_until(lambda: self._news != seen, timeout)
+        finally:
+            self._lock.acquire()
+
+    def wait_for(self, predicate: Callable[[], bool], timeout: float | None = None) -> bool:
+        """See :class:`robolink.ambient.WaitingRoom`."""
+        if predicate():
+            return True
+        self._lock.release()
+        try:
+            self._turns.wait_until(predicate, timeout)
+        finally:
+            self._lock.acquire()
+        return predicate()
+
+    def notify_all(self) -> None:
+        """See :class:`robolink.ambient.WaitingRoom`."""
+        self._news += 1
+
+    def __enter__(self) -> bool:
+        return self._lock.acquire()
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._lock.release()

@@ -1,0 +1,68 @@
+"""One bit of the file is another, wherever it is: refused, or told, or without a meaning (F62)."""
+
+import random
+import sqlite3
+
+import pytest
+
+from robolink.errors import JournalError
+from robolink.journal import EntryKind, NewEntry
+from tests.contract.journal._acts import marker
+
+SAMPLE = 40
+
+
+@pytest.mark.fault("F62")
+def test_f62_no_bent_bit_is_taken_for_the_record_or_costs_it(tmp_path, open_anew):
+    path = tmp_path / "journal.db"
+    journal = open_anew(str(path))
+    log = journal.log("cell")
+    log.append(*[NewEntry(EntryKind.RAW, tool=2, verdict=f"entry {n}") for n in range(30)])
+    log.begin(marker("left open"))
+    log.close()
+    right = list(journal.entries())
+    journal.close()
+    with sqlite3.connect(path) as connection:
+        connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+    connection.close()
+    whole, drawn = path.read_bytes(), random.Random(62)
+    written = [place for place, byte in enumerate(whole) if byte]
+    ends = {"refused": 0, "told": 0, "without a meaning": 0}
+    for _ in range(SAMPLE):
+        bent = bytearray(whole)
+        place = drawn.choice(written)
+        bent[place] ^= 1 << drawn.randrange(8)
+        path.write_bytes(bent)
+        ends[self_judged(path, open_anew, right)] += 1
+        for beside in path.parent.glob(f"{path.name}-*"):
+            beside.unlink()
+    assert ends["refused"] + ends["told"] >= 5, ends
+    print(ends)  # noqa: T201 - for pytest -s
+
+
+def self_judged(path, open_anew, right):
+    """Begin to change something with a bent file; say what became of it."""
+    journal = None
+    try:
+        journal = open_anew(str(path))
+        journal.log("cell").begin(marker("another"))
+    except JournalError:
+        assert len(path.read_bytes()) >= 4096, "it was made anew over what was there"
+        return "refused"
+    finally:
+        if journal is not None:
+            journal.close()
+    again = open_anew(str(path))
+    try:
+        problems = again.verify().problems
+        found = list(again.entries())[1:]
+        names = {known.operation for known in again.log("cell").open_markers()}
+    except JournalError:
+        return "told"
+    finally:
+        again.close()
+    if problems:
+        return "told"
+    assert found == right
+    assert names == {"left open", "another"}
+    return "without a meaning"

@@ -1,0 +1,39 @@
+"""``make faults``: run the tests of the fault catalogue and say which rows they show.
+
+``python -m tests.faults.catalogue [F01 F25 ...]``; without numbers all rows. Ends with 1 when a
+row failed or the run broke off. A row that could not be shown here is told as such, with its
+reason, and never as passed.
+"""
+
+import sys
+from collections import Counter
+
+import pytest
+
+from tests.faults.catalogue._rows import rows
+from tests.faults.catalogue._shown_by import showings
+from tests.faults.catalogue._verdicts import Listener, judged
+
+
+def main(wanted: list[str]) -> int:
+    """Run and print; return what the process ends with."""
+    chosen = [row for row in rows() if row.id in wanted or not wanted]
+    if unknown := set(wanted) - {row.id for row in chosen}:
+        print(f"no such row: {', '.join(sorted(unknown))}", file=sys.stderr)
+        return 2
+    numbers = {row.id for row in chosen}
+    nodes = [s.node for s in showings() if numbers & set(s.faults)]
+    listener = Listener()
+    # An expression that speaks of soak brings those that take long as well (tests/conftest.py).
+    everything = ["-m", "fault and (soak or not soak)", "--quiet", "--no-header", "-r", "fE"]
+    ended = pytest.main([*everything, "-n", "2", *nodes], plugins=[listener]) if nodes else 0
+    verdicts = [judged(row, showings(), listener.ends) for row in chosen]
+    print("\n".join(["", *(verdict.line for verdict in verdicts), ""]))
+    count = Counter(verdict.word for verdict in verdicts)
+    words = ("passed", "in part", "FAILED", "not run")
+    print(f"{len(verdicts)} faults: " + ", ".join(f"{count[word]} {word}" for word in words))
+    return 1 if count["FAILED"] or ended else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

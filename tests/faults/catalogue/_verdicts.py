@@ -1,0 +1,79 @@
+"""What a run of the marked tests says of each row. What did not run has not passed."""
+
+from collections import defaultdict
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+from tests.faults.catalogue._rows import Row
+from tests.faults.catalogue._shown_by import Showing
+
+
+@dataclass(slots=True)
+class Ends:
+    """How the parameters of one test ended."""
+
+    passed: int = 0
+    failed: int = 0
+    why_skipped: list[str] = field(default_factory=list)
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """One line of the table."""
+
+    row: Row
+    word: str
+    """``passed``, ``in part``, ``FAILED`` or ``not run``."""
+    tests: int
+    """How many tests passed, each parameter counted."""
+    why: str
+    """What is missing, or failed; empty where all of the row was shown."""
+
+    @property
+    def line(self) -> str:
+        """The line as it is printed."""
+        count = f"{self.tests:4d} tests" if self.tests != 1 else "   1 test "
+        why = f" ({self.why})" if self.why else ""
+        return f"{self.row.id}  {self.word:8}{count}  {self.row.fault}{why}"
+
+
+def judged(row: Row, showings: Iterable[Showing], ends: dict[str, dict[str, Ends]]) -> Verdict:
+    """Return what a run says of ``row``.
+
+    Args:
+        row: the row.
+        showings: the tests that bear any row's number.
+        ends: by row, by name of the test as pytest has it without parameters, how it ended.
+    """
+    of_row = ends.get(row.id, {})
+    passed = sum(end.passed for end in of_row.values())
+    if broken := sorted(node for node, end in of_row.items() if end.failed):
+        return Verdict(row, "FAILED", passed, "; ".join(broken))
+    expected = {s.node for s in showings if row.id in s.faults}
+    missing = sorted(n for n in expected if n not in of_row or not of_row[n].passed)
+    reasons = list(dict.fromkeys(w for end in of_row.values() for w in end.why_skipped))
+    left = [*missing, *reasons, row.not_shown]
+    if passed:
+        why = "; ".join(filter(None, left))
+        return Verdict(row, "in part" if why else "passed", passed, why)
+    return Verdict(row, "not run", 0, row.not_run or "; ".join(filter(None, left)) or "no test")
+
+
+class Listener:
+    """A pytest plug-in that hears how each marked test ended, also from other processes."""
+
+    def __init__(self) -> None:
+        self.ends: dict[str, dict[str, Ends]] = defaultdict(lambda: defaultdict(Ends))
+
+    def pytest_runtest_logreport(self, report) -> None:
+        """Count one phase of one test."""
+        test = report.nodeid.partition("[")[0]
+        # The rows travel with the report: in the process that prints there are no items.
+        for row in {value for key, value in report.user_properties if key == "fault"}:
+            end = self.ends[row][test]
+            if report.failed:
+                end.failed += 1
+            elif report.skipped:
+                end.why_skipped.append(str(report.longrepr[2]).removeprefix("Skipped: "))
+            elif report.when == "call":
+                end.passed += 1

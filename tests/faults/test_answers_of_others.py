@@ -1,0 +1,148 @@
+"""An answer that is late, old, joined to another, doubled or unasked never answers a question.
+
+Each over a real link: TCP sockets, pseudo terminals, a virtual CAN bus. The values that are asked
+for differ from each other, so an answer in the wrong place shows.
+"""
+
+import os
+from contextlib import contextmanager
+
+import pytest
+from robolink_simulators.cell.clock import ScaledClock
+from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_rtu
+from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+from robolink_simulators.softmotion.mailbox import PlcFault, PlcFaultAction, SoftMotionSimulator
+
+import robolink
+from robolink import ToolOffset
+from robolink.errors import RemoteProtocolError, RobolinkError, TransportError
+from tests.contract._softmotion_cell import served
+from tests.faults._bending_relay import BendingRelay
+from tests.unit._scripted_modbus import rtu, words
+
+TIMEOUT_S = 0.3
+LATE_S = 0.4
+SLOTS = {2: ToolOffset(1, 2, 3, 4), 3: ToolOffset(-5, -6, -7, -8), 4: ToolOffset(9, 10, 11, 12)}
+
+
+@contextmanager
+def relayed(**bends):
+    """An EPSON controller behind a relay: its simulator, its URL, the relay."""
+    simulator = EpsonSimulator(seed=5)
+    for tool, value in SLOTS.items():
+        simulator.machine.tools.set(tool, value)
+    with serve_tcp(simulator, clock=ScaledClock(40.0)) as host:
+        port = int(host.url.rpartition(":")[2].partition("?")[0])
+        with BendingRelay(port, **bends) as relay:
+            yield simulator, host.url.replace(str(port), str(relay.port)), relay
+
+
+def asked(controller, tools):
+    """Read tools; no value is another tool's. Return how many were answered."""
+    answered = 0
+    for tool in tools:
+        try:
+            value = controller.tools.read(tool)
+        except RobolinkError:
+            continue
+        assert controller.tools.same(value, SLOTS[tool]), f"tool {tool} was answered with {value}"
+        answered += 1
+    return answered
+
+
+@pytest.mark.parametrize(
+    "link",
+    [
+        pytest.param("modbus-tcp", marks=pytest.mark.fault("F01")),
+        pytest.param("can-virtual", marks=pytest.mark.fault("F01")),
+        pytest.param("modbus-rtu", marks=pytest.mark.fault("F02")),
+    ],
+)
+def test_f01_f02_a_late_answer_of_a_plc_answers_no_other_question(link):
+    with served(link, SoftMotionSimulator(seed=7)) as cell:
+        with cell.connect(timeout_s=TIMEOUT_S) as controller:
+            for slot, value in SLOTS.items():
+                controller.tools.write(slot, value, expected=None)
+            late = PlcFault(PlcFaultAction.DELAY, match="read_slot 2", seconds=LATE_S)
+            cell.simulator.faults.add(late)
+            asked(controller, [2, 3, 4, 3, 2])
+            assert cell.simulator.faults.fired == [late]
+        with cell.connect(timeout_s=TIMEOUT_S) as controller:
+            assert asked(controller, SLOTS) == len(SLOTS)
+
+
+@pytest.mark.fault("F03")
+@pytest.mark.parametrize("length", [3, 36, 112])
+def test_f03_old_answers_on_a_serial_line_are_thrown_away(length):
+    """As long as the answer to the first question, to that for a slot, to that for the block."""
+    simulator = SoftMotionSimulator(seed=7)
+    with serve_modbus_rtu(simulator, clock=ScaledClock()) as host:
+        with robolink.connect(host.url) as controller:
+            for slot, value in SLOTS.items():
+                controller.tools.write(slot, value, expected=None)
+        assert host._cable is not None
+        far_end = os.open(host._cable.far, os.O_WRONLY | os.O_NOCTTY)
+        os.write(far_end, rtu(words(*[0x4242] * length)))
+        os.close(far_end)
+        with robolink.connect(host.url) as controller:
+            assert asked(controller, SLOTS) == len(SLOTS)
+
+
+@pytest.mark.fault("F03")
+@pytest.mark.parametrize(
+    "old", [b'#Execute,"3"\r\n', b"#GetStatus,00100000001,0000\r\n", b"#Login,0\r\n", b"\x00~"]
+)
+def test_f03_old_bytes_on_a_new_connection_answer_nothing(old):
+    with relayed(greeting=old) as (_, url, _):
+        try:
+            controller = robolink.connect(url, timeout_s=TIMEOUT_S)
+        except (RemoteProtocolError, TransportError):
+            return
+        # What looks like the answer to the login cannot be told from it; the true one is then
+        # one too many, and ends the session.
+        with controller:
+            assert asked(controller, [2, 3, 4]) == 0
+
+
+@pytest.mark.fault("F06", "F10")
+@pytest.mark.parametrize(
+    "more", [b'#Execute,"3"\r\n', b"#GetStatus,00100000001,0000\r\n", b"!Execute,99\r\n"]
+)
+def test_f06_f10_an_answer_that_nobody_asked_for_ends_the_session(more):
+    doubled: list[bytes] = []
+
+    def joined(data):
+        if b"TLDEF" in sent[-1].upper() and not doubled:
+            doubled.append(data)
+            return data + more
+        return data
+
+    sent = [b""]
+
+    def heard(data):
+        sent.append(data)
+        return data
+
+    with relayed(to_server=heard, to_client=joined) as (_, url, _):
+        with robolink.connect(url, timeout_s=TIMEOUT_S) as controller:
+            asked(controller, [2, 3, 4, 2])
+            assert doubled
+            with pytest.raises((RemoteProtocolError, TransportError)):
+                controller.status()
+        with robolink.connect(url) as controller:
+            assert asked(controller, SLOTS) == len(SLOTS)
+
+
+@pytest.mark.fault("F10")
+def test_f10_bytes_that_a_controller_pushes_by_itself_are_named():
+    simulator = EpsonSimulator(seed=5)
+    with serve_tcp(simulator, clock=ScaledClock(40.0)) as host:
+        with robolink.connect(host.url, timeout_s=TIMEOUT_S) as controller:
+            before = controller.tools.read(1)
+            simulator.push(b'#Execute,"7"\r\n')
+            with pytest.raises(RemoteProtocolError, match="nobody asked"):
+                while True:
+                    assert controller.tools.selected() == 1
+        with robolink.connect(host.url) as controller:
+            assert controller.tools.read(1) == before

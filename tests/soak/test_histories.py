@@ -1,0 +1,43 @@
+"""Whole cells against seeded disturbances: a sample; ``make soak`` runs many more."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+from robolink_simulators.soak import run
+
+HOURS = 10
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_every_rule_holds_in_forty_disturbed_hours(seed):
+    story = run(seed, HOURS)
+    assert story.broken == [], story.told()
+    assert story.hours == HOURS
+    assert sum(story.met.values()) >= HOURS // 3  # they came to pass, and were not only drawn
+
+
+def test_one_seed_is_one_history_in_every_process():
+    program = "from robolink_simulators.soak import run; print(run(5, 3).hash, run(6, 3).hash)"
+    found = {
+        subprocess.run(
+            [sys.executable, "-c", program],
+            env={**os.environ, "PYTHONHASHSEED": seed},
+            check=True,
+            capture_output=True,
+            text=True,
+        ).stdout
+        for seed in ("1", "2")
+    }
+    assert found == {f"{run(5, 3).hash} {run(6, 3).hash}\n"}
+    assert run(7, 3).hash not in found.pop()
+
+
+@pytest.mark.soak
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize("first", range(1000, 1050, 5))
+def test_every_rule_holds_in_a_thousand_disturbed_hours(first):
+    for seed in range(first, first + 5):
+        story = run(seed, 20)
+        assert story.broken == [], story.told()

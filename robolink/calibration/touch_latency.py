@@ -25,6 +25,7 @@ OVERSHOOT_S2_PER_MM = (0.0, 0.005)
 """What braking can have: 0.005 is a deceleration of 100 mm/s^2."""
 
 _BEYOND_SIGMAS = 3.0
+_AS_RARE = 0.9973
 
 _OVERSHOOT_QUANTILE = 0.99
 
@@ -112,8 +113,11 @@ def require_plausible(found: TouchFit, sigma_mm: float | None) -> None:
     """
     residuals = found.fit.residuals
     dof = residuals.size - found.fit.rank
-    scatter = math.sqrt(float(residuals @ residuals) / dof) if dof > 0 else 0.0
-    slack = _BEYOND_SIGMAS * max(scatter, sigma_mm or 0.0)
+    slack = _BEYOND_SIGMAS * (sigma_mm or 0.0)
+    if dof > 0:
+        # Of a scatter that a few touches tell, as many as are as rare: Student's t.
+        scatter = math.sqrt(float(residuals @ residuals) / dof)
+        slack = max(slack, math.sqrt(f_quantile(_AS_RARE, 1, dof)) * scatter)
     low, high = LATENCY_S
     if not low - slack * found.latency_gain <= found.latency_s <= high + slack * found.latency_gain:
         raise _implausible(

@@ -43,11 +43,11 @@ def each(*names, chosen, seed=SEED):
 def interval_mm(fit, axis):
     """Return half of the 95 % interval of an axis, as it was told.
 
-    Where something is known of the sensor, with that, expanded; else by the scatter.
+    Two are told: by the scatter, and expanded with what is known of the sensor. The latter is the
+    narrower one where a few touches scatter much: its degrees of freedom are an approximation.
     """
-    budget = fit["budget"]
-    known = budget is not None and budget["type_b_mm"] > 0
-    return budget["expanded_mm"] if known else fit["half_width95"][f"{axis}_mm"]
+    budget, half = fit["budget"], fit["half_width95"][f"{axis}_mm"]
+    return half if budget is None else max(half, budget["expanded_mm"])
 
 
 def wrong_mm(document, truth, axes):
@@ -106,7 +106,7 @@ def test_six_points_recover_the_orientation_too(at):
     assert abs(seen - true).max() < 0.01
 
 
-@each(*ROBOTS, *PLANAR, chosen={"CX4-A601SR", "RS4-C351S"})
+@each(*ROBOTS, *PLANAR, chosen={"CX4-A601SR"})
 def test_angles_and_then_one_touch_recover_two_needles(at):
     recovered(at.calibrate("n-angle", "--station", "PIN-07", "--count", "4"), at.truth)
     before, tip = at.stored, at.truth
@@ -131,7 +131,7 @@ def test_a_plate_recovers_the_length(at):
     recovered(at.calibrate("z-touch", "--station", "PLATE"), at.truth, "z")
 
 
-@each(*ROBOTS, *PLANAR, chosen={"CX7-A701S", "RS6-C552C"})
+@each(*ROBOTS, *PLANAR, chosen={"CX7-A701S"})
 def test_a_camera_is_found_and_then_recovers_the_tip_and_a_board(at):
     place = ",".join(map(str, at.world.camera.middle_mm))
     usual = ("--station", "CAM", "--sensor", at.cell.url)
@@ -220,6 +220,7 @@ def look_with_a_camera(at):
 
 
 @pytest.mark.soak
+@pytest.mark.timeout(900)
 @pytest.mark.parametrize("robot", ["C8-C901S", "CX4-A601SR"])
 @pytest.mark.parametrize(
     "measure",

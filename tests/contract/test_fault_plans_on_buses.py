@@ -101,7 +101,8 @@ def test_the_segment_that_is_lost_is_the_one_that_the_plan_says(segment, tmp_pat
                 link.read_slot(3)
             while not asked or asked[-1][0] != 0x80:  # the transfer is given up last
                 link.clock.sleep(0.01)
-    assert len(asked) == 1 + (position + 1) + 1
+    begun = next(n for n, frame in enumerate(asked) if frame[1:4] == b"\x00\x22\x03")
+    assert len(asked[begun:]) == 1 + (position + 1) + 1
 
 
 def test_a_command_whose_last_acknowledgement_is_lost_was_carried_out(tmp_path):

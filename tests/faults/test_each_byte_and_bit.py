@@ -141,7 +141,7 @@ def test_f07_no_request_with_a_bent_bit_leaves_a_value_that_nobody_noticed():
                 simulator.machine.tools.set(1, OLD)
                 bent_at[:] = [place, 1]
                 said = None
-                with robolink.connect(url, timeout_s=0.3) as controller:
+                with robolink.connect(url, timeout_s=1.0) as controller:
                     try:
                         change_tools(controller, [Wanted(1, NEW, OLD)])
                     except RobolinkError as error:

@@ -157,7 +157,7 @@ def served_with_time_out(request):
 @pytest.mark.fault("F19")
 def test_f19_a_write_that_the_controller_timed_out_is_read_and_not_called_refused():
     simulator, host, relay, url = served_with_time_out(b"TLSet 1, XY")
-    with host, relay, robolink.connect(url, timeout_s=0.5) as controller:
+    with host, relay, robolink.connect(url, timeout_s=2.0) as controller:
         with pytest.raises(UnclearAnswerError, match="neither that it ran nor") as unclear:
             controller.tools.write(1, NEW, expected=OLD)
         assert "shows that it did run" in unclear.value.remedy
@@ -170,12 +170,12 @@ def test_f19_a_write_that_the_controller_timed_out_is_read_and_not_called_refuse
 def test_f19_a_movement_that_the_controller_timed_out_is_unproved_and_blocks_the_next():
     simulator, host, relay, url = served_with_time_out(b"Move XY")
     with host, relay:
-        with robolink.connect(url, timeout_s=0.5) as controller:
+        with robolink.connect(url, timeout_s=2.0) as controller:
             with pytest.raises(OutcomeUnknownError, match="Execute,19"):
                 lift(controller, 5.0, MotionProfile(Path.STRAIGHT, 5, 20.0)).wait(timeout_s=60)
             with pytest.raises(OutcomeUnknownError, match="recover"):
                 lift(controller)
-        with robolink.connect(url, timeout_s=0.5) as controller:
+        with robolink.connect(url, timeout_s=2.0) as controller:
             (finding,) = recover(controller).left
             assert finding.verdict is Verdict.LOOK
             controller.resolver.settle(finding)

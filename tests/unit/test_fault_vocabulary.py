@@ -122,6 +122,7 @@ def test_nobody_is_told_of_a_half_open_link(login, connect):
     assert other.ask("$Login,") == ""  # the first one still has the only place
     simulator.advance(simulator.now_ns + 61_000_000_000)  # until the remote time-out
     assert other.ask("$Login,") == "#Login,0"
+    assert simulator._links == [other.link]  # nothing is kept of the dead one
 
 
 @pytest.mark.parametrize("action", ["reset", "half_open", "restart"])
@@ -315,3 +316,6 @@ def test_a_fault_counts_only_requests_of_links_that_can_have_it():
 def test_a_line_cannot_be_reset():
     with pytest.raises(FaultNotPossibleError, match="reset"):
         FaultPlan([Fault(FaultAction.RESET)], links={LinkKind.EPSON_SERIAL})
+    simulator = EpsonSimulator(faults=[Fault(FaultAction.RESET)])  # for one on a network
+    assert simulator.faults.take("$GetStatus", LinkKind.EPSON_SERIAL) == ()
+    assert len(simulator.faults.take("$GetStatus", LinkKind.EPSON_TCP)) == 1

@@ -43,7 +43,7 @@ from robolink_simulators.epson.spel.programs.loading import load_project
 from robolink_simulators.epson.spel.tasks.ports import Ports
 from robolink_simulators.epson.spel.tasks.runner import ProgramRunner
 from robolink_simulators.epson.world import World
-from robolink_simulators.faults import Departure, Fault, FaultAction, FaultPlan
+from robolink_simulators.faults import Departure, Fault, FaultAction, FaultPlan, LinkKind
 from robolink_simulators.faults.links import EPSON_LINKS
 from robolink_simulators.serial_numbers import drawn_serial
 
@@ -306,7 +306,7 @@ class EpsonSimulator:
         self.log.append((self._now_ns, ">", shown))
         if not self._slot.hears(link, cuts=self.options.second_client == "closed"):
             return
-        faults = self.faults.take(shown)
+        faults = self.faults.take(shown, LinkKind.EPSON_SERIAL if link.dialect else None)
         silence = self.options.requests_end_with_silence
         heard = arriving(link, event, faults, self.faults, unterminated=silence)
         if heard is None:

@@ -66,7 +66,7 @@ class DepartingReplies:
 
     def empty(self, now_ns: int) -> bool:
         """Tell whether nothing will leave any more."""
-        return not self._waiting or self.ended(now_ns)
+        return self.half_open or not self._waiting or self.ended(now_ns)
 
     def _due(self, now_ns: int) -> bool:
         if not self._waiting or self.half_open or now_ns < self.stalled_until_ns:

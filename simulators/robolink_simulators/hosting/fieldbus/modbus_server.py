@@ -10,6 +10,7 @@ import logging
 import socket
 import threading
 from collections.abc import Callable, Coroutine
+from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Final
@@ -72,6 +73,9 @@ class ModbusServerThread:
     ) -> None:
         self._registers = registers
         self._clock = clock
+        # A device on a serial line answers one request after the other. The server here would
+        # answer the next one while a late answer waits, and the late one to whoever asks then.
+        self._turn = asyncio.Lock() if isinstance(place, SerialLine) else nullcontext()
         self._met: tuple[PlcFault, ...] = ()
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._run, name="modbus host", daemon=True)
@@ -149,6 +153,18 @@ class ModbusServerThread:
         values: list[int] | list[bool] | None,
     ) -> ExcCodes | None:
         """Do a request on our registers; ``registers`` are those that are answered with."""
+        async with self._turn:
+            return await self._carried_out(function, start, address, count, registers, values)
+
+    async def _carried_out(
+        self,
+        function: int,
+        start: int,
+        address: int,
+        count: int,
+        registers: list[int],
+        values: list[int] | list[bool] | None,
+    ) -> ExcCodes | None:
         coils = function in _COIL_FUNCTIONS
         first = address // _WORD_BITS if coils else address
         if values is None and function not in _READS:

@@ -29,9 +29,18 @@ test: check ## Install everything, check the sources and run the tests.
 
 # What takes many minutes or asks a package index; docs/contributing.md says what stands for it
 # in `make test`.
+# Seeds of the adversary, and virtual hours a seed. What was run with the same sources is passed
+# over, so a range can be gone on with; build/soak/results.jsonl keeps a line a seed.
+SEEDS :=
+HOURS := 20
+
 .PHONY: soak
-soak: $(VENV)/.installed-dev docs ## Run the tests that make test leaves out for their length; build the pages.
+soak: $(VENV)/.installed-dev $(if $(SEEDS),,docs) ## Run what make test leaves out for its length; SEEDS=0-499 the adversary only.
+ifeq ($(SEEDS),)
 	$(BIN)/python -m pytest -n 2 -m soak
+else
+	$(BIN)/python -m robolink_simulators.soak --seeds $(SEEDS) --hours $(HOURS)
+endif
 
 # ROWS="F01 F25" takes some of them.
 ROWS :=

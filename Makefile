@@ -12,6 +12,7 @@ PYTHON ?= $(firstword $(foreach name,python3.11 python3.12 python3.13 python3,$(
 VENV := .venv
 BIN := $(VENV)/bin
 PEER := $(VENV)/bench-peer
+JUDGES := $(VENV)/judges
 WHEELHOUSE := wheelhouse
 POT := robolink/locale/robolink.pot
 
@@ -50,13 +51,17 @@ faults: $(VENV)/.installed-dev ## Run the fault catalogue, F01 to F80, and print
 
 # Their files are called judge_*.py: a plain pytest, which takes test_*.py, leaves them out.
 .PHONY: peers
-peers: $(VENV)/.installed-dev ## Let mbpoll, libmodbus and tshark judge the field buses.
+peers: $(VENV)/.installed-dev $(JUDGES) ## Let mbpoll, libmodbus and tshark judge the field buses.
 	@{ command -v mbpoll && command -v tshark && command -v cc && pkg-config --exists libmodbus; } \
 		>/dev/null || { \
 		echo "Not all judges are here. On Debian and Ubuntu:" \
 			"apt-get install mbpoll libmodbus-dev pkg-config gcc tshark" >&2; \
 		exit 1; }
-	$(BIN)/python -m pytest -o 'python_files=judge_*.py' tests/peers
+	PYTHONPATH=$(JUDGES) $(BIN)/python -m pytest -o 'python_files=judge_*.py' tests/peers
+
+# It needs pyserial and nothing else. Without it its judge is left out, and says so.
+$(JUDGES): $(VENV)/.installed-dev
+	$(BIN)/python -m pip install --quiet --no-deps --target $@ minimalmodbus==2.1.1 || true
 
 .PHONY: check
 check: $(VENV)/.installed-dev ## Check style, types and who imports whom.

@@ -6,6 +6,7 @@ from benchmarks.kinematics import measure_kinematics
 from benchmarks.mailbox import measure_mailbox
 from benchmarks.nozzle_change import measure_nozzle_change
 from benchmarks.solvers import measure_solvers
+from benchmarks.spel_programs import measure_spel_programs
 from benchmarks.start_up import measure_start_up
 from benchmarks.stopping import measure_stopping
 from benchmarks.table import print_table
@@ -25,6 +26,7 @@ def main() -> None:
             *measure_stopping(),
             *measure_solvers(),
             *measure_kinematics(),
+            *measure_spel_programs(),
         ]
     )
 

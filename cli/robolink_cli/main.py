@@ -145,7 +145,7 @@ COMMANDS: Final = {
     ),
     "spel": (
         "robolink_cli.commands.companions.spel:spel",
-        tr("The companion program for the controller's project."),
+        tr("SPEL+ programs: check them, run them, write the companion."),
     ),
     "plc": (
         "robolink_cli.commands.companions.plc:plc",

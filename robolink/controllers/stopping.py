@@ -72,7 +72,7 @@ def stop_now(
     kinds = {"epson": _stop_epson, "softmotion": _stop_group, "plc": _stop_map}
     stop = kinds.get(link.kind, _stop_other)
     given = password if isinstance(password, str) else password.reveal() if password else ""
-    means = _Means(given, timeout_s, clock, trace, met)
+    means = _Means(given, timeout_s, clock, trace, met, ambient.random_number(32))
     for tries_left in reversed(range(_TRIES)):
         try:
             return stop(link, means)
@@ -110,6 +110,9 @@ class _Means(NamedTuple):
     clock: "Clock | None"
     trace: "TraceSink | None"
     met: "Callable[[str], None] | None"
+    owner: int
+    """The token of all tries in a mailbox. With one of its own, a try would be overtaken by the one
+    before it, whose answer was lost and whose command is acknowledged only now."""
 
 
 def _stop_epson(link: LinkUrl, means: _Means) -> "ControllerStatus":
@@ -140,8 +143,7 @@ def _stop_group(link: LinkUrl, means: _Means) -> "ControllerStatus":
     from robolink.transport import open_quick_link
 
     mailbox = open_quick_link(link, timeout_s=means.timeout_s, clock=means.clock)
-    owner = ambient.random_number(32)  # a token that nobody else has
-    wire = MailboxWire(mailbox, owner=owner, timeout_s=means.timeout_s)
+    wire = MailboxWire(mailbox, owner=means.owner, timeout_s=means.timeout_s)
     try:
         snapshots = Snapshots(wire)
         commands = CommandSender(wire, snapshots)

@@ -15,7 +15,7 @@ PIN = (310.0, 95.0, -40.0)
 TRIALS = 2000
 SAMPLE = 500
 """A quarter of the trials, and so bounds twice as wide: an interval that is narrower by a quarter,
-or wider by two fifths, is still found."""
+or wider by a half, is still found."""
 
 LEAST, MOST = 0.93, 0.97
 """What a 95 % interval may hold in 2,000 trials (the standard deviation is 0.5 %)."""

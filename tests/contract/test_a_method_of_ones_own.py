@@ -10,7 +10,7 @@ from robolink_cli.commands.measure.calibrate import calibrate
 from robolink.methods import find_method, method_names, register
 from robolink.model import EntryKind
 from robolink.recipe import json_schema, load_recipe
-from tests.contract._method_cell import KINDS, method_cell
+from tests.contract._method_cell import method_cell, on
 from tests.contract.plate_touch import METHOD
 from tests.contract.plate_touch.parameters import PlateTouchParameters
 
@@ -29,7 +29,7 @@ number = 1
 """
 
 
-@pytest.fixture(params=KINDS)
+@pytest.fixture(params=on("epson"))
 def cell(request, tmp_path, monkeypatch):
     with method_cell(request.param, tmp_path, monkeypatch) as cell, register(METHOD):
         cell.mount()

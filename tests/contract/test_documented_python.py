@@ -309,6 +309,7 @@ MAKERS = {
     "solvers.md 1": four_poses,
     "softmotion-controller.md 1": one_plc,
     "softmotion-controller.md 2": a_connected_plc,
+    "spel-programs.md 1": nothing,
     "stopping.md 1": with_password,
     "stopping.md 2": with_password,
 }

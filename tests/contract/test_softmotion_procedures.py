@@ -31,7 +31,16 @@ OTHER = ToolOffset(1.0, 2.0, 3.0, 0.0, 20.0)
 TIMEOUT_S = 0.4
 
 
-@pytest.fixture(params=BACKENDS)
+# The bus of one process is left to make soak: the one between processes asks more.
+IN_PROCESS = "can-virtual"
+
+
+@pytest.fixture(
+    params=[
+        pytest.param(name, marks=pytest.mark.soak if name == IN_PROCESS else ())
+        for name in BACKENDS
+    ]
+)
 def cell(request):
     with served(request.param) as cell:
         yield cell

@@ -3,7 +3,6 @@
 from contextlib import suppress
 from typing import Any
 
-import pytest
 from hypothesis import strategies as st
 from robolink_simulators.plc.frames import LineFrames, PlcRequest, TcpFrames
 
@@ -133,7 +132,6 @@ FRAMES = st.lists(BYTES, max_size=8).map(bytes) | st.builds(
 
 
 @fuzzed(40, 20_000, nth=st.integers(0, 40), other=FRAMES)
-@pytest.mark.fault("F52")
 def test_a_transfer_over_can_ends_with_its_object_or_an_error(nth, other):
     clock = FakeClock()
     bus: Any = ScriptedBus(clock, Node(nth + 2, other))

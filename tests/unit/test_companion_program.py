@@ -1,24 +1,27 @@
 """robolink_tools.prg is legal SPEL+, and the simulated companion does what it says.
 
-The simulator's grammar knows expressions, not programs. So the few forms of line that the
-program has are taken apart here, every one must be of a known form, and each expression goes
-through the simulator's own interpreter.
+The program itself runs on the simulated controller, and what it stores is compared with what
+the simulated companion stores. Its lines have few forms, every one of which must be known here.
 """
 
 import random
 import re
+from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
 from robolink_simulators.epson.arm.robots import find_robot
 from robolink_simulators.epson.companion import LAST_COUNT, Companion
+from robolink_simulators.epson.condition import Condition
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.variables import Variables
 from robolink_simulators.epson.options import EpsonOptions
-from robolink_simulators.epson.spel import Interpreter
+from robolink_simulators.epson.spel.programs.loading import load_project
+from robolink_simulators.epson.spel.session import Session
+from robolink_simulators.epson.spel.tasks.ports import Ports
+from robolink_simulators.epson.spel.tasks.runner import ProgramRunner
 
 from robolink.model import ToolOffset
-from robolink.protocols.spel import parse_number
 
 PROGRAM = Path(__file__).parents[2] / "companions" / "epson" / "robolink_tools.prg"
 FORBIDDEN = re.compile(
@@ -56,93 +59,45 @@ def formed(line):
 
 
 class Program:
-    """Runs the program on a machine, its expressions by the simulator's interpreter."""
+    """The program itself, run by the simulator on a machine; its variables are read and set."""
 
     def __init__(self, machine):
-        self.interpreter = Interpreter(machine, EpsonOptions(), random.Random(1))
-        self.values = {}
-        self.lines = [formed(line) for line in program_lines()]
-        for form, parts in self.lines:
-            if form in ("global", "local"):
-                self.declare(parts[1])
-
-    def declare(self, names):
-        for name, bound in DECLARED.findall(names):
-            self.values[name] = [0.0] * (int(bound) + 1) if bound else 0.0
+        options, condition = EpsonOptions(globals_at_start="kept"), Condition(monitoring_only=False)
+        session = Session(machine, options, random.Random(1), condition, Variables("-1"), {})
+        project = load_project(session, [PROGRAM])
+        self.runner = ProgramRunner(session, condition, project, Ports())
+        self.values = Values(project.preserved())
 
     def call(self):
-        form_at = [form for form, _ in self.lines]
-        self.run(form_at.index("function") + 1, form_at.index("end"))
-
-    def run(self, at, end):
-        while at < end:
-            form, parts = self.lines[at]
-            if form == "for":
-                close = self.close_of(at, "for", "next")
-                for value in range(self.number(parts[1]), self.number(parts[2]) + 1):
-                    self.values[parts[0]] = float(value)
-                    self.run(at + 1, close)
-                at = close
-            elif form == "if":
-                close = self.close_of(at, "if", "endif")
-                other = self.else_of(at, close)
-                if self.evaluate(parts[0]):
-                    self.run(at + 1, other)
-                else:
-                    self.run(other + 1, close)
-                at = close
-            elif form == "assign":
-                self.assign(*parts)
-            else:
-                assert form == "local"
-            at += 1
-
-    def close_of(self, at, opener, closer):
-        depth = 0
-        for place in range(at, len(self.lines)):
-            depth += (self.lines[place][0] == opener) - (self.lines[place][0] == closer)
-            if depth == 0:
-                return place
-        raise AssertionError(f"{opener} without {closer}")
-
-    def else_of(self, at, close):
-        depth = 0
-        for place in range(at + 1, close):
-            form = self.lines[place][0]
-            depth += (form == "if") - (form == "endif")
-            if form == "else" and depth == 0:
-                return place
-        return close
-
-    def assign(self, name, index, expression):
-        value = self.evaluate(expression)
-        if index is None:
-            assert isinstance(self.values[name], float)
-            self.values[name] = value
-        else:
-            self.values[name][self.number(index)] = value
-
-    def number(self, expression):
-        return int(self.evaluate(expression))
-
-    def evaluate(self, expression):
-        """Put the variables' values in, then let the simulator evaluate the rest."""
-        for name, value in self.values.items():
-            if isinstance(value, list):
-                for element, index in re.findall(rf"(\b{name}\(([^()]+)\))", expression):
-                    shown = f"({value[self.number(index)]!r})"
-                    expression = expression.replace(element, shown)
-        for name, value in self.values.items():
-            if not isinstance(value, list):
-                expression = re.sub(rf"\b{name}\b(?!\()", f"({value!r})", expression)
-        execution = self.interpreter.start(f"Print {expression}", 0)
-        execution.advance(0)
-        assert execution.error is None, (expression, execution.error)
-        return parse_number(execution.output)
+        self.runner.start("RobolinkPublish", self.runner.now_ns)
+        self.runner.advance(self.runner.now_ns + 10**9)
+        assert self.runner.failure is None
+        assert self.runner.tasks == {}
 
     def published(self):
         names = ("robolink_begin", "robolink_end", "robolink_state", "robolink_tool")
         return [self.values[name] for name in names]
+
+
+class Values(Mapping[str, object]):
+    """The program's variables: lists for arrays, numbers for the others."""
+
+    def __init__(self, variables):
+        self._variables = variables
+
+    def __getitem__(self, name):
+        variable = self._variables[name]
+        values = [float(value) for value in variable.values]
+        return values if variable.bounds else values[0]
+
+    def __setitem__(self, name, value):
+        self._variables[name].values[0] = int(value)
+
+    def __iter__(self):
+        return iter(self._variables)
+
+    def __len__(self):
+        return len(self._variables)
 
 
 @pytest.fixture

@@ -3,7 +3,7 @@
 import math
 import random
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final, Protocol
 
 from robolink_simulators.cell.frames import cross, dot, subtract
@@ -72,12 +72,18 @@ class LightBeam:
     nozzle_radius_mm: float = 0.25
     radius_mm: float = 0.0
     tilt_deg: float = 0.0
+    _way: Direction = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        # A search asks in each millisecond.
+        heading, tilt = math.radians(self.heading_deg), math.radians(self.tilt_deg)
+        level = math.cos(tilt)
+        way = (level * math.cos(heading), level * math.sin(heading), math.sin(tilt))
+        object.__setattr__(self, "_way", way)
 
     def trips(self, tip_mm: XyzMm, shaft: Direction = STANDING) -> bool:
         """Tell whether the nozzle breaks the beam: two lines that pass each other closely."""
-        heading, tilt = math.radians(self.heading_deg), math.radians(self.tilt_deg)
-        level = math.cos(tilt)
-        beam = (level * math.cos(heading), level * math.sin(heading), math.sin(tilt))
+        beam = self._way
         to_beam, across = subtract(self.through_mm, tip_mm), cross(shaft, beam)
         area = dot(across, across)
         if area < _PARALLEL * dot(shaft, shaft):

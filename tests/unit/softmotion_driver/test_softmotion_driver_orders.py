@@ -200,6 +200,16 @@ def test_an_end_is_noticed_soon_and_a_long_wait_costs_few_questions(
     assert looks * 0.8 <= len(asked_ns) <= looks
 
 
+@pytest.mark.parametrize("wait_s", [0.05, 0.12, 0.21, 0.3])
+def test_a_wait_without_news_ends_when_it_is_over(plc, controller, wait_s):
+    # A jog is released then, however long the pause between two looks.
+    snapshots = controller._mailbox.snapshots
+    now, begun_ns = snapshots.take(), plc.clock.now_ns()
+    snapshots.news(now, wait_s=wait_s)
+    waited_s = (plc.clock.now_ns() - begun_ns) / 1e9
+    assert wait_s <= waited_s < wait_s + 0.005
+
+
 def test_enabling_is_proved_and_not_repeated(plc, controller):
     plc.now = replace(plc.now, group_state=GroupState.DISABLED)
     controller.motors(True)

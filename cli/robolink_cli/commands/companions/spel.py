@@ -1,10 +1,11 @@
-"""spel export: the companion program for the controller's own project."""
+"""spel: programs that run on the controller itself."""
 
 from pathlib import Path
 
 import click
 
 from robolink.messages import tr
+from robolink_cli.commands.companions.spel_programs import check, run
 from robolink_cli.console.render import emit_json, json_is_on, say
 from robolink_cli.session.context import json_option
 
@@ -12,6 +13,10 @@ from robolink_cli.session.context import json_option
 @click.group()
 def spel() -> None:
     """Programs that a controller's project can hold."""
+
+
+spel.add_command(check)
+spel.add_command(run)
 
 
 @spel.command("export")

@@ -19,6 +19,7 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import Secret
 from robolink_cli.commands.simulate.serving import Termination, announce, named_values
+from robolink_cli.console.render import note
 
 
 def serve_epson(
@@ -49,6 +50,23 @@ def serve_epson(
         assist = stack.enter_context(serve_assist(simulator, clock=clock))
         _announce(url, assist.url, simulator.machine.model.name, simulator.seed)
         stopped.wait()
+
+
+def load_programs(
+    simulator: EpsonSimulator, programs: Sequence[Path], points: Sequence[Path]
+) -> None:
+    """Load a project, if any; what its tasks print is shown beside the announcement.
+
+    Raises:
+        ConfigError: It cannot be built, or a file cannot be read.
+        click.UsageError: There are points and no programs.
+    """
+    if not programs:
+        if points:
+            raise click.UsageError(tr("--points goes with --program."))
+        return
+    runner = simulator.load(programs, points)
+    runner.on_print = lambda text: note(text.rstrip("\r\n"))
 
 
 def password_in(variable: str | None) -> Secret | None:

@@ -72,6 +72,21 @@ sim.add_command(softmotion)
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
     help="Serve a dialogue that --record has written, in place of a simulator.",
 )
+@click.option(
+    "--program",
+    "programs",
+    multiple=True,
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="SPEL+ program (.prg) that Start runs: main, or mainN. May be repeated.",
+)
+@click.option(
+    "--points",
+    multiple=True,
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Point file (.pts) of the programs. May be repeated.",
+)
 @simulation_options
 @json_option
 def epson(
@@ -89,6 +104,8 @@ def epson(
     faults: Path | None,
     profile: Path | None,
     replay: Path | None,
+    programs: tuple[Path, ...],
+    points: tuple[Path, ...],
     allow_remote: bool,
 ) -> None:
     """Serve a simulated EPSON controller with Remote Ethernet, or RS232, until Ctrl-C.
@@ -112,6 +129,7 @@ def epson(
     from robolink_cli.commands.simulate.serving import world_from
     from robolink_cli.commands.simulate.serving_epson import (
         habits,
+        load_programs,
         password_in,
         serial_of,
         serve_epson,
@@ -126,6 +144,7 @@ def epson(
         state_path=state,
         world=world_from(world),
     )
+    load_programs(simulator, programs, points)
     plan_faults(simulator, faults, {LinkKind.EPSON_SERIAL if serial else LinkKind.EPSON_TCP})
     place = None if serial else listen
     serve_epson(simulator, place, speed=speed, allow_remote=allow_remote, baud=baud)

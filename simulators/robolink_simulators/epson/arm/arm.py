@@ -117,6 +117,7 @@ class Arm:
         self._joints = joints
         self._now_ns = 0
         self._travel: _Travel | None = None
+        self._seen: tuple[_Travel, int, Pose] | None = None
         self._turned: _Ways = (0.0,) * model.axes
 
     @property
@@ -152,9 +153,15 @@ class Arm:
         if self._travel is None:
             return self.true_flange()
         if not self.backlash_deg and not self.backlash_mm:
-            return self._travel.flange_at(now_ns)  # a search asks each millisecond
+            return self._seen_at(self._travel, now_ns)
         before, then = (self._travel.joints_at(t) for t in (now_ns - _LOOK_BACK_NS, now_ns))
         return forward(self.model, self._trailing(then, self._ways(before, then)))
+
+    def _seen_at(self, travel: _Travel, now_ns: int) -> Pose:
+        """Return where the flange is; a search asks in each millisecond, once for each beam."""
+        if self._seen is None or self._seen[0] is not travel or self._seen[1] != now_ns:
+            self._seen = (travel, now_ns, travel.flange_at(now_ns))
+        return self._seen[2]
 
     def real_position(self, rng: random.Random, noise_mm: float) -> Pose:
         """Return the flange pose as RealPos measures it.

@@ -84,3 +84,7 @@ class PalletTable:
         if columns * rows > _MOST_PLACES:
             raise SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, f"{columns * rows} places")
         self._pallets[number] = Pallet(tuple(corners), columns, rows)
+
+    def clear(self, number: int) -> None:
+        """Forget a pallet; one that is not defined may be forgotten."""
+        self._pallets.pop(number, None)

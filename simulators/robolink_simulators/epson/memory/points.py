@@ -131,6 +131,18 @@ class LocalTable:
             )
         self._locals[number] = local
 
+    def clear(self, number: int) -> None:
+        """Forget local 1 to 15; one that is not defined may be forgotten.
+
+        Raises:
+            Refusal: There is no such local to forget.
+        """
+        if not 1 <= number <= HIGHEST_LOCAL:
+            raise SpelRefusal(
+                RefusalKind.VALUE_OUT_OF_RANGE, f"There is no local {number} to clear"
+            )
+        self._locals.pop(number, None)
+
     def to_base(self, point: Point) -> Point:
         """Express a point in the base frame."""
         local = self.get(point.local)

@@ -38,12 +38,12 @@ _WORDS_NOT_SIMULATED = """
     limittorque limittorquelp limittorquestop limzmargin mcordr msgbox olaccel olrate opencom
     opennet outreal parsestr performmode plane plocal ptpboost ptrq qpdecelr qpdecels shutdown
     softcp speedrlimitation syncrobots taskstate tclim tcspeed time xylim xylimmode diffpoint
-    arc3 atclr bgo boxclr calib clearpoints closecom closenet close cls copy ctreset curve cvmove
+    arc3 atclr bgo boxclr calib closecom closenet close cls copy ctreset curve cvmove
     date del eresume error exportpoints flush fmtstr homeclr hofsjointaccuracy importpoints
-    input inputbox jtran latchenable line loadpoints localclr mcal mkdir opbcd palletclr
+    input inputbox latchenable line loadpoints mcal mkdir
     pdescription planeclr ptclr ptran qp randomize read redim rename resetelapsedtime savepoints
-    setcom setin setinreal setinw setlatch setnet setsw signal simset taskwait tc tmreset toff ton
-    vcal vcalpoints waitnet waitpos waitsig write writebin xylimclr abortmotion
+    setcom setinreal setlatch setnet signal simset taskwait tc tmreset toff ton
+    vcal vcalpoints waitnet waitsig write writebin xylimclr abortmotion
     cont restart recover vdefgetmotionrange vdefsetmotionrange vshowmodel vtrain
     sysconfig workque_list cnv_quelist history clearhistory
 """

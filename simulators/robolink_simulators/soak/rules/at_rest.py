@@ -29,6 +29,7 @@ class RestRules:
                 f"tool {state.selected} is selected in place of "
                 f"{self._on.now.before.selected}, and nothing on record says so",
             )
+        self._note_what_others_changed(state)
         if not self._on.books.trusted:
             return
         markers = self._on.books.markers()
@@ -41,10 +42,17 @@ class RestRules:
             ]
             self._agrees(tool, holds, named)
 
+    def _note_what_others_changed(self, state: MachineState) -> None:
+        """Note values that no journal can be right about, until they are written again.
+
+        A hand at the pendant wrote them, or the disk has lost what it said that it had kept.
+        """
+        for tool in {*self._on.now.first.tools, *state.tools}:
+            if tool in self._on.plant.touched or not self._on.books.trusted:
+                self._by_others[tool] = state.tools.get(tool)
+
     def _agrees(self, tool: int, holds: ToolOffset | None, named: Sequence[BookedMarker]) -> None:
         known, value = self._on.books.value_of(tool)
-        if tool in self._on.plant.touched:
-            self._by_others[tool] = holds
         if tool in self._by_others and self._on.plant.same(self._by_others[tool], holds):
             return
         if tool in self._on.plant.touched or named:
@@ -75,6 +83,7 @@ class RestRules:
             begun <= len(self._on.now.moves) or not self._on.books.trusted,
             f"{begun} movements were begun under {len(self._on.now.moves)} markers",
         )
+        self._note_what_others_changed(state)
         if not self._on.books.trusted:
             return
         for tool in {*self._on.now.first.tools, *state.tools}:

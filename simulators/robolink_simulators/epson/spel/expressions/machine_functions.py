@@ -24,6 +24,7 @@ from robolink_simulators.epson.spel.expressions.values import (
     as_integer,
     as_number,
     as_point,
+    as_text,
     out_of_range,
 )
 from robolink_simulators.epson.spel.session import Session
@@ -88,6 +89,45 @@ def _pulses(session: Session, arguments: Arguments) -> Value:
     return _item(pulses_of(session.machine, session.machine.arm.joints), arguments)
 
 
+def _decimal(session: Session, arguments: Arguments) -> Value:
+    """Return a byte of inputs as two decimal digits, each of four bits."""
+    byte = session.machine.inputs.get_byte(as_integer(arguments[0]))
+    tens, units = byte >> 4, byte & 0xF
+    if tens > 9 or units > 9:
+        raise out_of_range(f"{byte:#x} is no decimal code")
+    return tens * 10 + units
+
+
+def _label_of(session: Session, arguments: Arguments) -> Value:
+    """Return IOLabel$(type, width, number), nothing where there is none."""
+    place = tuple(as_integer(argument) for argument in arguments)
+    for label in session.machine.io_labels.values():
+        if (label.kind, label.width, label.number) == place:
+            return label.name
+    return ""
+
+
+def _number_of(session: Session, arguments: Arguments) -> Value:
+    label = session.machine.io_labels.get(as_text(arguments[0]).lower())
+    if label is None:
+        raise SpelRefusal(RefusalKind.NAME_UNDEFINED, f"Nothing is called {arguments[0]}")
+    return label.number
+
+
+def _point_number(session: Session, arguments: Arguments) -> Value:
+    number = session.machine.points.labelled(as_text(arguments[0]))
+    if number is None:
+        raise SpelRefusal(RefusalKind.POINT_UNDEFINED, f"No point is called {arguments[0]}")
+    return number
+
+
+def _point_label(session: Session, arguments: Arguments) -> Value:
+    """Return the label of a point that is told by its number, nothing where it has none."""
+    number = as_integer(arguments[0])
+    labels = session.machine.points.labels()
+    return next((name for name, at in labels.items() if at == number), "")
+
+
 MACHINE_FUNCTIONS: Final[dict[str, tuple[range, MachineFunction]]] = {
     **{f"c{axis.lower()}": (range(1, 2), _coordinate(axis)) for axis in AXES},
     **{name: (range(2), function) for name, function in FLAG_FUNCTIONS.items()},
@@ -141,6 +181,12 @@ MACHINE_FUNCTIONS: Final[dict[str, tuple[range, MachineFunction]]] = {
     "robottype": (range(1), lambda s, _: s.machine.model.robot_type),
     "robotmodel$": (range(1), lambda s, _: s.machine.model.name),
     "robotserial$": (range(1), lambda s, _: s.machine.serial),
+    "inbcd": (range(1, 2), _decimal),
+    "iolabel$": (range(3, 4), _label_of),
+    "ionumber": (range(1, 2), _number_of),
+    "iodef": (range(1, 2), lambda s, a: as_text(a[0]).lower() in s.machine.io_labels),
+    "pnumber": (range(1, 2), _point_number),
+    "plabel$": (range(1, 2), _point_label),
     "ctrldev": (range(1), lambda s, _: s.machine.control_device),
 }
 """Name to the numbers of arguments allowed and the function."""

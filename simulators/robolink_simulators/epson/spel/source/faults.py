@@ -49,12 +49,16 @@ class ProgramRefused(ConfigError):
     """A project that cannot be built.
 
     Attributes:
-        faults: All that is wrong with it, in the order of the lines.
+        faults: All that is wrong with it, at least one, in the order of the lines.
     """
 
     def __init__(self, faults: Iterable[ProgramFault]) -> None:
         self.faults = tuple(faults)
         super().__init__(
-            tr("The program was not built:\n{faults}", faults="\n".join(map(str, self.faults))),
-            remedy=tr("Mend the lines that are named."),
+            tr(
+                "The program cannot be built. Faults: {count}. The first is {fault}.",
+                count=len(self.faults),
+                fault=self.faults[0],
+            ),
+            remedy=tr("Mend the line that is named."),
         )

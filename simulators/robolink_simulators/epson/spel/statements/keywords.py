@@ -9,6 +9,7 @@ from typing import Final, NamedTuple
 from robolink.model import ToolOffset
 from robolink.protocols.spel import PrintedWhere, format_tool_listing, format_where
 from robolink.timing import NS_PER_S
+from robolink_simulators.epson.arm.joints import Joints
 from robolink_simulators.epson.arm.trajectory import Leg
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.bits import BitBank
@@ -26,6 +27,7 @@ from robolink_simulators.epson.spel.expressions.values import out_of_range
 from robolink_simulators.epson.spel.statements.legs import go_leg
 from robolink_simulators.epson.spel.statements.motion import require_drives
 from robolink_simulators.epson.spel.statements.points import POINT_STATEMENTS, point_argument
+from robolink_simulators.epson.spel.statements.ports_and_bits import BIT_STATEMENTS
 from robolink_simulators.epson.spel.statements.robot import ROBOT_SETTINGS
 from robolink_simulators.epson.spel.statements.settings import SETTINGS, accel
 from robolink_simulators.epson.spel.statements.waiting import (
@@ -73,6 +75,8 @@ def run_command(evaluator: Evaluator, command: KeywordStatement) -> StatementOut
         if setting is None:
             return StatementOutcome(accel(session.machine, numbers, session.options.accel_max))
         return StatementOutcome(setting(session.machine, numbers))
+    if command.name in BIT_STATEMENTS:
+        return StatementOutcome(BIT_STATEMENTS[command.name](evaluator, command))
     if command.name in POINT_STATEMENTS:
         return StatementOutcome(POINT_STATEMENTS[command.name](evaluator, command))
     return _HANDLERS[command.name](evaluator, command)
@@ -228,6 +232,25 @@ def _home(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
     return StatementOutcome(legs=[_leg_to_pulses(machine, home)])
 
 
+def _turn_joint(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
+    """Move one joint by some degrees or mm (JTran)."""
+    joint, by = _expect(command, 2)
+    machine, number = evaluator.session.machine, evaluator.integer(joint)
+    if not 1 <= number <= machine.model.axes:
+        raise out_of_range(f"There is no joint {number}")
+    require_drives(machine)
+    values = list(machine.arm.joints)
+    values[number - 1] += float(evaluator.number(by))
+    return StatementOutcome(legs=[go_leg(machine, machine.arm.joints, Joints(*values))])
+
+
+def _await_position(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
+    """Wait until the robot stands (WaitPos)."""
+    _expect(command, 0)
+    arm = evaluator.session.machine.arm
+    return StatementOutcome(duration_ns=max(0, (arm.next_change() or arm.now_ns) - arm.now_ns))
+
+
 def _leg_to_pulses(machine: Machine, counts: Sequence[int]) -> Leg:
     return go_leg(machine, machine.arm.joints, joints_at_pulses(machine, counts))
 
@@ -274,6 +297,8 @@ _HANDLERS: Final[dict[str, Callable[[Evaluator, KeywordStatement], StatementOutc
     "base": _base,
     "pulse": _pulse,
     "home": _home,
+    "jtran": _turn_joint,
+    "waitpos": _await_position,
     "on": _on,
     "off": _off,
     "memon": _on,

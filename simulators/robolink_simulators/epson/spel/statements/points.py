@@ -125,11 +125,32 @@ def _no_control_point(evaluator: Evaluator, command: KeywordStatement) -> str:
     return ""
 
 
+def _clear_points(evaluator: Evaluator, command: KeywordStatement) -> str:
+    _expect(command, 0)
+    evaluator.session.machine.points.clear()
+    return ""
+
+
+def _clear_local(evaluator: Evaluator, command: KeywordStatement) -> str:
+    (number,) = _expect(command, 1)
+    evaluator.session.machine.locals.clear(evaluator.integer(number))
+    return ""
+
+
+def _clear_pallet(evaluator: Evaluator, command: KeywordStatement) -> str:
+    (number,) = _expect(command, 1)
+    evaluator.session.machine.pallets.clear(evaluator.integer(number))
+    return ""
+
+
 POINT_STATEMENTS: Final[dict[str, Callable[[Evaluator, KeywordStatement], str]]] = {
     "here": _here,
     "plist": _plist,
     "pdel": _pdel,
     "plabel": _label,
+    "clearpoints": _clear_points,
+    "localclr": _clear_local,
+    "palletclr": _clear_pallet,
     "pallet": _pallet,
     "local": _local,
     "ecpset": _control_point,

@@ -141,7 +141,7 @@ class ProgramRunner:
                 self._burst(task, max(limit_ns, task.now_ns))
             else:
                 self._look(task, task.waiting, due_ns)
-            self._seen_ns = max(self._seen_ns, min(task.now_ns, now_ns))
+            self._seen_ns = max(self._seen_ns, due_ns, min(task.now_ns, now_ns))
             self._tidy()
             self.traps.look(self._seen_ns)
         self._seen_ns = max(self._seen_ns, now_ns)

@@ -82,7 +82,8 @@ class TaskFailure:
     line: int
 
     def __str__(self) -> str:
-        return f"{self.text} (task {self.task}, {self.function}, {self.file}:{self.line})"
+        where = f"{self.file}:{self.line} in {self.function} of task {self.task}"
+        return f"{self.text} at {where}".replace(",", ";").replace('"', "'")
 
 
 class SpelTask(Evaluator):

@@ -1,0 +1,174 @@
+"""spel check and spel run: a person's own SPEL+ programs, without a controller."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import click
+
+from robolink.errors import ControllerFaultError
+from robolink.messages import tr
+from robolink_cli.console.render import emit_json, json_is_on, note, say
+from robolink_cli.session.context import json_option
+
+if TYPE_CHECKING:
+    from robolink_simulators.epson import EpsonSimulator
+    from robolink_simulators.epson.spel.tasks.task import TaskFailure
+
+LONGEST_RUN_S: Final = 3600.0
+
+_FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
+
+
+def programs_argument(function: Any) -> Any:  # noqa: ANN401 - a decorator of click
+    """Add ``FILE...`` and ``--points``."""
+    function = click.option(
+        "--points",
+        multiple=True,
+        type=_FILE,
+        metavar="FILE",
+        help="Point file of the project, for its labels too. May be repeated.",
+    )(function)
+    return click.argument("files", metavar="FILE...", nargs=-1, required=True, type=_FILE)(function)
+
+
+@click.command("check")
+@programs_argument
+@json_option
+def check(files: tuple[Path, ...], points: tuple[Path, ...]) -> None:
+    """Build SPEL+ programs and tell every fault with its file, line and column.
+
+    All files together are one project. Point files and IOLabels.dat that lie beside them are
+    read for the names in them. Nothing runs and no controller is asked.
+    """
+    from robolink_simulators.epson.spel.programs.loading import check_project
+    from robolink_simulators.epson.spel.source.faults import ProgramRefused
+
+    try:
+        project, labels_known = check_project(files, points)
+    except ProgramRefused as refused:
+        for fault in refused.faults:
+            note(str(fault))
+        raise
+    names = sorted(function.spelled for function in project.functions.values())
+    if json_is_on():
+        document = {"files": [str(p) for p in files], "functions": names}
+        emit_json("robolink/spel-check/1", {**document, "labels_known": labels_known})
+        return
+    say(tr("{count} functions, no fault found.", count=len(names)))
+    if not labels_known:
+        note(
+            tr(
+                "No point file and no IOLabels.dat lies beside the programs: names that nobody "
+                "declares were taken for labels."
+            )
+        )
+
+
+@click.command("run")
+@programs_argument
+@click.option(
+    "--function",
+    default="main",
+    show_default=True,
+    help="The function to start; it takes no arguments.",
+)
+@click.option("--trace", is_flag=True, help="Show each statement before it is carried out.")
+@click.option("--robot", default="T6-602S", show_default=True, help="Model of the robot.")
+@click.option(
+    "--option",
+    "options",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="A habit of the controller; a wrong name lists them all. May be repeated.",
+)
+@click.option(
+    "--for",
+    "most_s",
+    type=click.FloatRange(min=0.001, max=1e7),
+    default=LONGEST_RUN_S,
+    show_default=True,
+    metavar="SECONDS",
+    help="Simulated time after which a program that goes on is left.",
+)
+@json_option
+def run(
+    *,
+    files: tuple[Path, ...],
+    points: tuple[Path, ...],
+    function: str,
+    trace: bool,
+    robot: str,
+    options: tuple[str, ...],
+    most_s: float,
+) -> None:
+    """Run SPEL+ programs on a simulated controller and show what they print.
+
+    Simulated time does not wait, unless a TCP/IP port is open. Nothing but this machine is
+    reached, and no robot moves.
+    """
+    from robolink_simulators.epson import EpsonSimulator
+
+    from robolink_cli.commands.simulate.serving_epson import habits
+
+    simulator = EpsonSimulator(robot, options=habits(options, None))
+    printed = list[str]()
+    ended = _run(simulator, (files, points), function, most_s, trace=trace, printed=printed)
+    program = simulator.program
+    if program is not None and program.failure is not None:
+        raise _failed(program.failure)
+    if json_is_on():
+        seconds = simulator.now_ns / 1e9
+        document = {"printed": "".join(printed), "ended": ended, "simulated_s": seconds}
+        emit_json("robolink/spel-run/1", document)
+    elif not ended:
+        note(tr("It still ran after {seconds:g} s of simulated time.", seconds=most_s))
+
+
+def _run(
+    simulator: "EpsonSimulator",
+    project: tuple[Sequence[Path], Sequence[Path]],
+    function: str,
+    most_s: float,
+    *,
+    trace: bool,
+    printed: list[str],
+) -> bool:
+    """Run a program to its end; tell whether that came in time."""
+    from robolink_simulators.epson.refusals import SpelRefusal
+    from robolink_simulators.epson.spel.tasks.driving import run_to_end
+
+    runner = simulator.load(*project)
+
+    def show(text: str) -> None:
+        printed.append(text)
+        say(text.rstrip("\r\n"))
+
+    runner.on_print = show
+    if trace:
+        runner.on_statement = lambda task, file, line, text: note(
+            f"{task.now_ns / 1e9:12.6f} {task.task_number:3} {file}:{line}: {text}"
+        )
+    try:
+        runner.start(function, simulator.now_ns)
+    except SpelRefusal as refusal:
+        raise click.UsageError(
+            tr("There is no function {name} without arguments.", name=function)
+        ) from refusal
+    return run_to_end(runner, simulator.advance, simulator.next_change, most_s=most_s)
+
+
+def _failed(failure: "TaskFailure") -> ControllerFaultError:
+    return ControllerFaultError(
+        tr(
+            "Error {number} in {function}, {file}:{line}, task {task}: {text}.",
+            number=failure.number,
+            function=failure.function,
+            file=failure.file,
+            line=failure.line,
+            task=failure.task,
+            text=failure.text,
+        ),
+        code=failure.number,
+        remedy=tr("Mend that line, or let OnErr deal with the error."),
+    )

@@ -1,0 +1,70 @@
+"""Statements that set virtual inputs and ports in decimal code (docs/reference/spel.md 8)."""
+
+from collections.abc import Callable
+from typing import Final
+
+from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
+from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
+from robolink_simulators.epson.spel.expressions.values import out_of_range
+from robolink_simulators.epson.spel.tree import KeywordStatement
+
+_HIGHEST_BYTE: Final = 0xFF
+_HIGHEST_WORD: Final = 0xFFFF
+_HIGHEST_DECIMAL: Final = 99
+
+
+def _two(evaluator: Evaluator, command: KeywordStatement) -> tuple[int, int]:
+    if len(command.arguments) != 2:
+        raise SpelRefusal(RefusalKind.SYNTAX, f"{command.name} takes a number and a value")
+    first, second = command.arguments
+    return evaluator.integer(first), evaluator.integer(second)
+
+
+def _virtual(evaluator: Evaluator) -> None:
+    """Inputs of a real controller are not set by a program (documented)."""
+    if not evaluator.session.options.virtual_io:
+        raise SpelRefusal(RefusalKind.NOT_ALLOWED_HERE, "Virtual I/O is off")
+
+
+def _set_switch(evaluator: Evaluator, command: KeywordStatement) -> str:
+    _virtual(evaluator)
+    number, on = _two(evaluator, command)
+    evaluator.session.machine.inputs.set(number, bool(on))
+    return ""
+
+
+def _set_byte(evaluator: Evaluator, command: KeywordStatement) -> str:
+    _virtual(evaluator)
+    port, value = _two(evaluator, command)
+    if not 0 <= value <= _HIGHEST_BYTE:
+        raise out_of_range(f"Not a byte: {value}")
+    evaluator.session.machine.inputs.set_byte(port, value)
+    return ""
+
+
+def _set_word(evaluator: Evaluator, command: KeywordStatement) -> str:
+    _virtual(evaluator)
+    port, value = _two(evaluator, command)
+    if not 0 <= value <= _HIGHEST_WORD:
+        raise out_of_range(f"Not a word: {value}")
+    inputs = evaluator.session.machine.inputs
+    inputs.set_byte(2 * port, value & _HIGHEST_BYTE)
+    inputs.set_byte(2 * port + 1, value >> 8)
+    return ""
+
+
+def _decimal(evaluator: Evaluator, command: KeywordStatement) -> str:
+    port, value = _two(evaluator, command)
+    if not 0 <= value <= _HIGHEST_DECIMAL:
+        raise out_of_range(f"Not two digits: {value}")
+    evaluator.session.machine.outputs.set_byte(port, value // 10 << 4 | value % 10)
+    return ""
+
+
+BIT_STATEMENTS: Final[dict[str, Callable[[Evaluator, KeywordStatement], str]]] = {
+    "setsw": _set_switch,
+    "setin": _set_byte,
+    "setinw": _set_word,
+    "opbcd": _decimal,
+}
+"""Keyword to what carries it out."""

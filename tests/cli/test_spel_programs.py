@@ -1,0 +1,94 @@
+"""spel check, spel run, and a program in a served controller, as a person types them."""
+
+import json
+from types import SimpleNamespace
+
+import pytest
+
+GOOD = (
+    'Function main\n  Print "one", 2\n  Wait 0.5\n  other\nFend\nFunction other\n  Print 3\nFend\n'
+)
+
+
+@pytest.fixture
+def ended(run):
+    """Return how a command ended: code, out and err."""
+
+    def ran(*arguments):
+        return SimpleNamespace(**dict(zip(("code", "out", "err"), run(*arguments), strict=True)))
+
+    return ran
+
+
+@pytest.fixture
+def program(tmp_path):
+    def write(text, name="main.prg"):
+        path = tmp_path / name
+        path.write_text(text)
+        return str(path)
+
+    return write
+
+
+def test_check_tells_how_many_functions_there_are(ended, program):
+    end = ended("spel", "check", program(GOOD), "--json")
+    assert end.code == 0
+    document = json.loads(end.out)
+    assert document["functions"] == ["main", "other"]
+    assert document["labels_known"] is False
+
+
+def test_check_tells_every_fault_with_its_place(ended, program):
+    path = program("Function main\nPrint (\nGoTo away\nFend\n")
+    end = ended("spel", "check", path)
+    assert end.code == 2
+    assert "main.prg:2:8: the line ends too early (expected " in end.err
+    assert "main.prg:3: error 3108" in end.err
+
+
+def test_check_takes_all_files_as_one_project(ended, program):
+    first = program("Function main\n  other\n  washpos\nFend\n")
+    second = program("Function other\nFend\n", "two.prg")
+    end = ended("spel", "check", first, second)
+    assert end.code == 2
+    assert "there is no statement and no function washpos" in end.err
+    assert end.err.count("main.prg:") == 2  # in the list, and as the first
+
+
+def test_run_prints_and_traces(ended, program):
+    end = ended("spel", "run", program(GOOD), "--trace")
+    assert end.code == 0
+    assert end.out == "one 2\n3\n"
+    steps = [line.split(": ", 1)[1] for line in end.err.splitlines() if "main.prg:" in line]
+    assert steps == ['Print "one", 2', "Wait 0.5", "other", "Print 3", "Fend", "Fend"]
+
+
+def test_run_leaves_a_program_that_goes_on(ended, program):
+    path = program("Function main\nDo\nWait 1\nLoop\nFend\n")
+    end = ended("spel", "run", path, "--for", "60", "--json")
+    assert end.code == 0
+    document = json.loads(end.out)
+    assert document["ended"] is False
+    assert 58 < document["simulated_s"] <= 60
+
+
+def test_run_tells_where_a_program_failed(ended, program):
+    end = ended("spel", "run", program("Function main\nGo P900\nFend\n"))
+    assert end.code == 5
+    assert "Error 7007 in main, main.prg:2" in end.err
+    end = ended("spel", "run", program(GOOD), "--function", "nobody")
+    assert end.code == 2
+    assert "no function nobody" in end.err
+
+
+def test_points_alone_are_no_program(ended, program):
+    end = ended("sim", "epson", "--tcp", "127.0.0.1:0", "--points", program("", "a.pts"))
+    assert end.code == 2
+    assert "--program" in end.err
+
+
+def test_a_program_with_faults_is_not_served(ended, program):
+    path = program("Function main\nPrint (\nFend\n")
+    end = ended("sim", "epson", "--tcp", "127.0.0.1:0", "--program", path)
+    assert end.code == 2
+    assert "main.prg:2:8" in end.err

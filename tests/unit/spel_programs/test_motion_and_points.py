@@ -1,0 +1,220 @@
+"""Points, labels, tools and motion of programs. Pages are those of the language reference."""
+
+import pytest
+
+PTS = """ENVT0100,LM:,DS:,CS:,MA:,EI:
+sVersion="2.0.0"
+nNumberOfPoints=2
+Point1 {
+\tnNumber=4
+\tsLabel="washpos"
+\tsDescription=""
+\trX=200.5
+\trY=100
+\trZ=-20
+\trU=30
+\tnLocal=0
+\tnHand=2
+}
+Point2 {
+\tnNumber=5
+\tsLabel="\u4f4d\u7f6e"
+\trX=1
+\tnUndefined=262143
+}
+"""
+LABELS = """sRCVersion="7.5.4"
+InputBitLabels {
+\tnNumberOfLabels=1
+\tLabel1 {
+\t\tnBit=8
+\t\tsLabel="partHere"
+\t\tsDescription=""
+\t}
+}
+OutputBitLabels {
+\tLabel1 {
+\t\tnBit=3
+\t\tsLabel="lamp"
+\t}
+}
+"""
+
+
+def main(*lines):
+    return "\n".join(["Function main", *lines, "Fend"])
+
+
+def test_points_come_from_files_with_their_labels(cell):
+    """P. 590; check 11 of programs: labels in other letters."""
+    made = cell(
+        main("Print CX(washpos), Hand(P4), PDef(P5)", "washpos = XY(1, 2, 3, 4)", "Print CX(P4)"),
+        files={"robot1.pts": PTS.encode("gbk")},
+        points=["robot1.pts"],
+    )
+    assert made.run() == ["200.5 2 0", "1"]
+
+
+def test_points_are_saved_loaded_and_merged_in_the_controller(cell):
+    """P. 513, 712; a file that the project lacks is 7213."""
+    made = cell(
+        main(
+            "P9 = XY(9, 0, 0, 0)",
+            'SavePoints "two.pts"',
+            "ClearPoints",
+            "P8 = XY(8, 0, 0, 0)",
+            'LoadPoints "robot1.pts", Merge',
+            "Print PDef(P8), PDef(P9), CX(washpos)",
+            'LoadPoints "two.pts"',
+            "Print PDef(P8), PDef(P9)",
+            'LoadPoints "three.pts"',
+        ),
+        files={"robot1.pts": PTS},
+        points=["robot1.pts"],
+    )
+    assert made.run() == ["-1 0 200.5", "0 -1"]
+    assert made.runner.failure.number == 7213
+
+
+def test_a_name_of_no_point_and_no_input_is_a_fault_of_the_build(cell, faults):
+    found = faults(main("Go nowhere"), files={"robot1.pts": PTS}, points=["robot1.pts"])
+    assert found == ["main.prg:2: Nothing is called nowhere"]
+
+
+def test_inputs_and_outputs_have_labels(cell):
+    """P. 446 to 448."""
+    made = cell(
+        main("On lamp", 'Print Oport(3), Sw(partHere), IONumber("lamp"), IOLabel$(1, 1, 3)'),
+        files={"IOLabels.dat": LABELS},
+    )
+    assert made.run() == ["1 0 3lamp"]
+
+
+def test_a_named_point_takes_modifiers_and_starts_motions(cell):
+    """Ambiguities 2, 8: flags and shifts behind a point."""
+    made = cell(
+        main(
+            "P1 = Here",
+            'PLabel 1, "home1"',
+            "Go home1 -X(20) -Z(5)",
+            "P2 = Here :Z(-1) /R",
+            "Print CX(P1) - CX(Here), CZ(P2), Hand(P2)",
+        ),
+        files={"robot1.pts": PTS.replace("washpos", "home1")},
+        points=["robot1.pts"],
+    )
+    assert made.run() == ["20 -1 1"]
+
+
+def test_an_output_switches_half_way(printed):
+    """P. 55 to 57; ambiguity 3: what stands between ! and ! belongs to the motion."""
+    lines = (
+        "Real way",
+        "Xqt follow",
+        "way = CX(Here)",
+        "Move Here -X(40) !D50; On 5; D75; Off 5!",
+        "Print Oport(5), Tmr(0) > 0.5",
+        "Wait 1",
+        "Fend",
+        "Function follow",
+        "Wait Sw(0) Or Oport(5) = On",
+        "Real x",
+        "x = CX(CurPos)",
+        "Wait Oport(5) = Off",
+        'Print "moved", (x - CX(CurPos)) > 9',
+    )
+    assert printed(*lines) == ["moved -1", "0 -1"]
+
+
+def test_what_outlasts_a_motion_holds_the_next_statement(printed):
+    """P. 57."""
+    lines = ("TmReset 1", 'Go Here +Z(-1) !Wait 3; Print "done"!', "Print Int(Tmr(1))")
+    assert printed(*lines) == ["done", "3"]
+
+
+def test_d0_of_a_jump_comes_after_its_rise(printed):
+    """P. 57: the part of the way leaves out what is vertical."""
+    lines = ("Go Here +Z(-50)", "P1 = Here -X(60)", "Print Int(Agl(3) + .5) < -49")
+    rest = ("Jump P1 !D0; Print Int(Agl(3) + .5)!", "Print Int(Agl(3) + .5) < -49")
+    assert printed(*lines, *rest) == ["-1", "0", "-1"]
+
+
+def test_a_motion_with_cp_lets_the_next_statement_begin_while_it_slows_down(printed):
+    """P. 250; WaitPos waits for its end (p. 885)."""
+    lines = ("P1 = Here", "Move P1 -X(40) CP", "Print CX(P1) - CX(CurPos) < 39.9", "WaitPos")
+    assert printed(*lines, "Print CX(P1) - CX(CurPos)") == ["-1", "40"]
+    back = ("P1 = Here", "CP On", "Move P1 -X(40)", "Move P1", "WaitPos")
+    assert printed(*back, "Print Dist(P1, Here) < .001") == ["-1"]
+
+
+def test_till_stops_a_motion_that_a_program_watches(printed):
+    """Check 28: p. 829, 831; ambiguity 4: options in any order."""
+    lines = ("Xqt switch", "P1 = Here", "Move P1 -X(80) Till Sw(0) = Off And MemSw(2) = On")
+    rest = ("Print TillOn, Dist(P1, Here) < 79", "Fend", "Function switch", "Wait 0.3", "MemOn 2")
+    assert printed(*lines, *rest) == ["-1 -1"]
+    jump = ("Go Here +Z(-20)", "P1 = Here -X(10)", "Jump P1 Sense LimZ -10 C0", "Print JS")
+    assert printed(*jump) == ["0"]
+
+
+def test_a_pass_switches_outputs_at_its_points(printed):
+    """P. 604."""
+    lines = (
+        "P1 = Here -X(20)",
+        "P2 = Here -X(40)",
+        "P3 = Here -Y(20)",
+        "Xqt follow",
+        "Pass P1, On 2, P(2:3)",
+        "Print Dist(P3, CurPos) < .001",
+        "Wait .1",
+        "Fend",
+        "Function follow",
+        "Wait Oport(2) = On",
+        "Print Dist(P1, CurPos) < 1",
+    )
+    assert printed(*lines) == ["-1", "-1"]
+
+
+def test_a_program_sets_and_takes_a_tool(printed):
+    """P. 837, 849."""
+    lines = (
+        "TLSet 3, XY(10, 0, 5, 45)",
+        "Tool 3",
+        "Print Tool, CX(TLSet(3)), TLDef(3)",
+        "Tool 0",
+        "TLClr 3",
+        "Print TLDef(3)",
+    )
+    assert printed(*lines) == ["3 10 -1", "0"]
+
+
+def test_one_joint_is_turned_and_freed(printed):
+    """P. 470, 753."""
+    lines = ("Real a", "a = Agl(4)", "JTran 4, -5", "Print a - Agl(4)", "SFree 1", "Print SFree(1)")
+    assert printed(*lines, "SLock 1", "Print SFree(1)") == ["5", "1", "0"]
+
+
+@pytest.mark.parametrize(
+    ("expression", "shown"),
+    [
+        ("LShift(1, 4), RShift(-1, 28)", "16 15"),
+        ("BSet(0, 3), BClr(15, 0), BTst(8, 3)", "8 14 1"),
+        ('Asc("A"), Len(Space$(3)), UCase$("ab") + LCase$("CD")', "65 3ABcd"),
+        ('LSet$("a", 3) + RSet$("b", 2) + Trim$("  c ")', "a   bc"),
+        ("True And 5 > 3, 2 And 5 > 3", "-1 2"),
+        ("-2 ** 2, 2 ** 3 ** 2", "-4 64"),
+        ("InBCD(0), MyTask, Ctr", None),
+    ],
+)
+def test_functions_of_bits_and_texts(printed, failure, faults, expression, shown):
+    """P. 77 to 161, 491, 524, 707; 54 for the order of operators."""
+    if shown is None:
+        assert faults(main(f"Print {expression}")) == []
+    else:
+        assert printed(f"Print {expression}") == [shown]
+
+
+def test_virtual_inputs_are_set_where_they_are_virtual(printed, failure):
+    """P. 723 to 727."""
+    lines = ("SetSw 3, 1", "SetIn 1, &H25", "Print Sw(3), InBCD(1)", "OpBCD 0, 47", "Print Out(0)")
+    assert printed(*lines, virtual_io=True) == ["1 25", "71"]
+    assert failure("SetSw 3, 1").number == 2119

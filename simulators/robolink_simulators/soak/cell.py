@@ -11,7 +11,7 @@ from unittest import mock
 from robolink.ambient import replaced
 from robolink.checkpoints import Checkpoint, observed
 from robolink.errors import JournalError, RobolinkError
-from robolink.interrupts import one_ending, output_closed
+from robolink.interrupts import EndedBy, Interrupted, one_ending, output_closed
 from robolink.model import ToolOffset
 from robolink.timing import NS_PER_S
 from robolink.transaction import Wanted, change_tools
@@ -283,6 +283,8 @@ class VirtualCell:
             error = error or raised
         finally:
             me.owner = None
+        if isinstance(error, Interrupted) and error.by is not EndedBy.OUTPUT_CLOSED:
+            raise error  # a real one: whoever runs this wants it to end
         if not process.alive:
             self._end(hour, "killed")
             self._turns.join()

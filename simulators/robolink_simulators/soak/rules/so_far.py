@@ -51,6 +51,7 @@ class HourSoFar:
         movements: How many the machine had begun.
         wanted: What each tool may hold.
         report: Of a tip that was measured and proved.
+        last_move: The last movement that has left.
         crowded: Whether a second person was at work.
         typed_by_others: What they typed, by tool.
     """
@@ -65,6 +66,7 @@ class HourSoFar:
     moves: dict[str, int] = field(default_factory=dict)
     wanted: dict[int, list[ToolOffset | None]] = field(default_factory=dict)
     report: ChangeReport | None = None
+    last_move: str = ""
     crowded: bool = False
     typed_by_others: list[tuple[int, ToolOffset]] = field(default_factory=list)
 

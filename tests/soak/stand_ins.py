@@ -7,7 +7,6 @@ import contextlib
 import sqlite3
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import replace
 from typing import Any
 
 from robolink.checkpoints import Checkpoint, checkpoint
@@ -214,15 +213,6 @@ def shown_whole(session: EpsonSession, event: object, *, hidden: bool = False) -
 def keeping(controller: Any, *, keep: bool) -> Settler:
     """Keep what nobody verified, whatever the person said."""
     return Settler(controller, keep=True)
-
-
-_entry = putting_back._entry
-
-
-def value_not_recorded(*given: Any) -> Any:
-    """Put a roll-back on record without the value that is held since."""
-    entry = _entry(*given)
-    return replace(entry, details={k: v for k, v in entry.details.items() if k != "value"})
 
 
 def requested_believed(write: Any) -> Any:

@@ -152,6 +152,10 @@ DEFECTS: Final = (
             _WIRE: stand_ins.still_usable,
         },
         CellKind.SOFTMOTION,
+        missed_because=(
+            "a block that comes twice under one number is carried out once, so no rule "
+            "forbids it any more"
+        ),
     ),
     KnownDefect(
         "another client's acknowledgement is taken for ours",

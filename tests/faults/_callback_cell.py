@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from robolink_simulators.cell.workplace import exchanged
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.epson import EpsonSimulator
 from robolink_simulators.epson.memory.points import Point
@@ -53,6 +54,9 @@ Function main
   Print rl_code$
   ended = 1
 Fend
+Function main2
+  RobolinkRestore
+Fend
 Function TouchAll(first As Integer, last As Integer) As Boolean
   Integer i
   TouchAll = True
@@ -69,6 +73,9 @@ Function TouchAll(first As Integer, last As Integer) As Boolean
   Next i
 Fend
 """
+
+
+NOMINAL = ToolOffset(12, -3.5, -20)
 
 
 class PowerCut(BaseException):
@@ -237,14 +244,23 @@ class CallbackCell:
             self.simulator.machine.points.store(number, Point.at(pose))
 
     def change_needle(self):
-        self.simulator.world.change_nozzle()
+        """Put another needle on: its tip is some tenths of a mm from the nominal one."""
+        self.simulator.world.tips[1] = exchanged(NOMINAL, self.rng)
         self.teach(11, MEASURED)
         self.teach(21, PROVED)
 
     def run(self, most_s=600.0):
         """Start production, let it go on until the program ends; return what it printed."""
+        self.start()
+        return self.go_on(most_s)
+
+    def start(self):
+        """Start production."""
         self.runner.console.clear()
         self.simulator.panel.start_production()
+
+    def go_on(self, most_s=600.0):
+        """Let the program go on to its end; return what it printed."""
         end_ns = self.simulator.now_ns + round(most_s * NS)
         while self.runner.tasks:
             change = self.simulator.next_change()
@@ -258,9 +274,46 @@ class CallbackCell:
 
     def lose_power(self):
         """Switch the controller off and on."""
+        self.runner.on_statement = None
         self.simulator.restart()
         self.relay.pump()
         self.simulator.machine.switch_all_motors(True)
+
+    def run_until(self, cut_at):
+        """Start production and cut the power before a statement, by its number from 0.
+
+        Returns:
+            The statement, ``None`` where the program ended before.
+        """
+        at, reached = 0, None
+
+        def count(_task, file, line, text):
+            nonlocal at, reached
+            if at == cut_at:
+                reached = (file, line, text)
+                raise PowerCut
+            at += 1
+
+        self.runner.on_statement = count
+        try:
+            self.run()
+        except PowerCut:
+            self.lose_power()
+        self.runner.on_statement = None
+        return reached
+
+    def statements(self):
+        """Run the program once; return its statements in their order."""
+        found = []
+        self.runner.on_statement = lambda _t, file, line, text: found.append((file, line, text))
+        self.run()
+        self.runner.on_statement = None
+        return found
+
+    def restore(self):
+        """Start the program that puts the old value back, and nothing else."""
+        self.runner.start("main2", self.simulator.now_ns)
+        self.go_on()
 
     def entries(self, kind=None):
         kinds = () if kind is None else (kind,)

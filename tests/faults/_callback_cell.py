@@ -19,7 +19,7 @@ from robolink_simulators.epson import EpsonSimulator
 from robolink_simulators.epson.memory.points import Point
 
 from robolink.journal import memory_journal
-from robolink.model import Pose, ToolOffset, new_operation
+from robolink.model import EntryKind, Pose, ToolOffset, new_operation
 from robolink.serving import CallbackConversation, CallbackLimits, CallbackServer
 
 COMPANION = Path(__file__).parents[2] / "companions" / "epson" / "recal.prg"
@@ -315,9 +315,19 @@ class CallbackCell:
         self.runner.start("main2", self.simulator.now_ns)
         self.go_on()
 
-    def entries(self, kind=None):
+    def entries(self, kind=None, *, limit=None):
+        """Return what is on record, newest first."""
         kinds = () if kind is None else (kind,)
-        return list(self.journal.entries(controller=IDENTITY, kinds=kinds))
+        return list(self.journal.entries(controller=IDENTITY, kinds=kinds, limit=limit))
+
+    def require_whole(self, old):
+        """Make sure that the tool is as it was, or one that was proved and is right; tell which."""
+        if self.tool.rounded(3) == old.rounded(3):
+            return False
+        (newest,) = self.entries(EntryKind.VERIFY, limit=1)
+        assert list(newest.details["requested"]) == list(self.tool.rounded(3).components())
+        assert self.error_mm < 0.03
+        return True
 
     def open_markers(self):
         return [marker for _, marker in self.journal.open_markers()]
@@ -325,6 +335,3 @@ class CallbackCell:
     def close(self):
         self.server.close()
         self.relay.close()
-
-
-__all__ = ["Bend", "CallbackCell", "PowerCut", "ToolOffset"]

@@ -190,6 +190,13 @@ def test_every_disturbed_exchange_ends_so(tmp_path, number, kind):
     disturbed(tmp_path, number, kind)
 
 
+def test_a_value_that_was_bent_on_its_way_is_never_written(cell):
+    cell.relay.bend = lambda at, _line: Bend(bend_answer=True) if at == 7 else None
+    written = cell.simulator.machine.flash_writes
+    assert cell.run() == ["no_answer"]
+    assert cell.simulator.machine.flash_writes == written
+
+
 def test_an_open_change_of_somebody_else_gives_no_value(cell):
     """The PC was the control device before, and something of its own is not settled."""
     from robolink.model import Marker, MarkerKind, new_operation

@@ -10,7 +10,6 @@ import pytest
 
 from robolink import checkpoints
 from robolink.checkpoints import Checkpoint
-from robolink.model import EntryKind
 from tests.faults._callback_cell import IDENTITY, CallbackCell
 
 
@@ -24,18 +23,6 @@ def cell(tmp_path):
     made.change_needle()
     yield made
     made.close()
-
-
-def require_whole(cell, old):
-    """The tool is the old one, or one that was proved and is right."""
-    if cell.tool.rounded(3) == old.rounded(3):
-        return False
-    newest = cell.entries(EntryKind.VERIFY)[0]
-    assert list(newest.details["requested"][:3]) == [
-        round(value, 3) for value in cell.tool.components()[:3]
-    ]
-    assert cell.error_mm < 0.02
-    return True
 
 
 def points_of(statements, chosen):
@@ -56,7 +43,7 @@ def cut_at_each(cell, chosen, *, least):
         old = cell.tool
         assert cell.run_until(point) is not None
         cell.restore()
-        ends.add(require_whole(cell, old))
+        ends.add(cell.require_whole(old))
     cell.change_needle()
     assert cell.run() == ["kept"]
     assert cell.open_markers() == []
@@ -131,7 +118,7 @@ def test_the_pc_goes_before_and_after_everything_that_it_stores(cell):
         log = cell.journal.log(IDENTITY)
         log.take_over("the PC was switched off")
         log.close()
-        ends.add(require_whole(cell, old))
+        ends.add(cell.require_whole(old))
     assert ends == {True, False}
     cell.change_needle()
     assert cell.run() == ["kept"]

@@ -12,6 +12,7 @@ PYTHON ?= $(firstword $(foreach name,python3.11 python3.12 python3.13 python3,$(
 VENV := .venv
 BIN := $(VENV)/bin
 PEER := $(VENV)/bench-peer
+JUDGES := $(VENV)/judges
 WHEELHOUSE := wheelhouse
 POT := robolink/locale/robolink.pot
 
@@ -29,9 +30,18 @@ test: check ## Install everything, check the sources and run the tests.
 
 # What takes many minutes or asks a package index; docs/contributing.md says what stands for it
 # in `make test`.
+# Seeds of the adversary, and virtual hours a seed. What was run with the same sources is passed
+# over, so a range can be gone on with; build/soak/results.jsonl keeps a line a seed.
+SEEDS :=
+HOURS := 20
+
 .PHONY: soak
-soak: $(VENV)/.installed-dev docs ## Run the tests that make test leaves out for their length; build the pages.
+soak: $(VENV)/.installed-dev $(if $(SEEDS),,docs) ## Run what make test leaves out for its length; SEEDS=0-499 the adversary only.
+ifeq ($(SEEDS),)
 	$(BIN)/python -m pytest -n 2 -m soak
+else
+	$(BIN)/python -m robolink_simulators.soak --seeds $(SEEDS) --hours $(HOURS)
+endif
 
 # ROWS="F01 F25" takes some of them.
 ROWS :=
@@ -41,13 +51,17 @@ faults: $(VENV)/.installed-dev ## Run the fault catalogue, F01 to F80, and print
 
 # Their files are called judge_*.py: a plain pytest, which takes test_*.py, leaves them out.
 .PHONY: peers
-peers: $(VENV)/.installed-dev ## Let mbpoll, libmodbus and tshark judge the field buses.
+peers: $(VENV)/.installed-dev $(JUDGES) ## Let mbpoll, libmodbus and tshark judge the field buses.
 	@{ command -v mbpoll && command -v tshark && command -v cc && pkg-config --exists libmodbus; } \
 		>/dev/null || { \
 		echo "Not all judges are here. On Debian and Ubuntu:" \
 			"apt-get install mbpoll libmodbus-dev pkg-config gcc tshark" >&2; \
 		exit 1; }
-	$(BIN)/python -m pytest -o 'python_files=judge_*.py' tests/peers
+	PYTHONPATH=$(JUDGES) $(BIN)/python -m pytest -o 'python_files=judge_*.py' tests/peers
+
+# It needs pyserial and nothing else. Without it its judge is left out, and says so.
+$(JUDGES): $(VENV)/.installed-dev
+	$(BIN)/python -m pip install --quiet --no-deps --target $@ minimalmodbus==2.1.1 || true
 
 .PHONY: check
 check: $(VENV)/.installed-dev ## Check style, types and who imports whom.

@@ -142,7 +142,7 @@ def test_a_wrong_number_is_a_mistake_in_the_command_and_nothing_is_sent(cell, na
 def test_text_where_a_number_belongs_is_a_usage_error(cell, value):
     shown = cell.run("tool", "set", "1", "--x", value)
     assert shown.code == 2
-    assert f"'--x': '{value}' is not a valid" in shown.err
+    assert f"'--x': '{value}' is not a decimal number" in shown.err
     check_refused_as_document(cell.run("tool", "set", "1", "--x", value, "--json"), 2)
     assert cell.requests == []
 

@@ -137,7 +137,7 @@ BAD = {
     "completion": (["tcsh"], "is not one of"),
     "serve": (["--spel", "nowhere"], "no address to listen on"),
     "spel export": (["golden.json"], "is a file"),
-    "spel check": (["golden.json"], "cannot be built"),
+    "spel check": (["nowhere.prg"], "does not exist"),
     "spel run": (["nowhere.prg"], "does not exist"),
 }
 """What is a mistake in the command: exit code 2, and at most reads are sent."""

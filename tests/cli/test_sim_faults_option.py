@@ -47,7 +47,7 @@ def test_a_lost_answer_is_told_by_the_simulator_and_ends_the_client_in_doubt(
         try:
             url = json.loads(served.stdout.readline())["url"]
             tool = ["tool", "set", "2", "--x", "10", "--y", "0", "--z", "-50"]
-            assert main.run(["-c", url, "--timeout", "1", *tool]) == 6
+            assert main.run(["-c", url, "--timeout", "4", *tool]) == 6
             told = served.stdout.readline()
         finally:
             served.terminate()

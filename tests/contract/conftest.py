@@ -19,6 +19,8 @@ import robolink
 SPEED = 40.0
 """Simulated seconds per real second on the socket."""
 
+PSEUDO_TERMINALS = hasattr(os, "openpty")
+
 _names = count()
 
 
@@ -59,7 +61,7 @@ def pytest_collection_modifyitems(config, items):
         given = getattr(item, "callspec", None)
         if given is None or "pty" not in (given.params.get("cell"), given.params.get("serve")):
             continue
-        if item.get_closest_marker("remote_ethernet"):
+        if item.get_closest_marker("remote_ethernet") or not PSEUDO_TERMINALS:
             impossible.append(item)
         elif not item.get_closest_marker("on_serial"):
             item.add_marker(pytest.mark.soak)

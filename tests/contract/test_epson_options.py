@@ -79,6 +79,8 @@ def test_every_option_with_named_values_is_varied_here():
         "login_timeout_s",
         "remote_timeout_s",
         "numbers",
+        # Of the serial line alone: tests/contract/test_epson_serial_line.py.
+        *(field.name for field in fields(EpsonOptions) if field.name.startswith("rs232_")),
         # Of programs alone: tests/unit/spel_programs.
         "statement_us",
         "loop_passes",

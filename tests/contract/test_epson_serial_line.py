@@ -39,14 +39,25 @@ def line(**habits):
 
 
 @pytest.mark.parametrize("numbers", ["binary", "ascii_hex"])
-@pytest.mark.parametrize("nak_code", ["digits", "binary"])
-def test_every_reading_of_the_manual_is_spoken_at_both_ends(numbers, nak_code):
-    with line(rs232_numbers=numbers, rs232_nak_code=nak_code, rs232_eot_answer="ack") as (_, url):
-        with robolink.connect(url) as controller:
-            assert controller.tools.read(1) is not None
-            with pytest.raises(RejectedError) as caught:
-                controller.io.read_input(65535)  # type: ignore[union-attr]
-            assert caught.value.code == 12
+@pytest.mark.parametrize(
+    ("nak_code", "flags", "port_bytes"), [("digits", 10, 1), ("binary", 11, 2)]
+)
+def test_every_reading_of_the_manual_is_spoken_at_both_ends(numbers, nak_code, flags, port_bytes):
+    habits = {
+        "rs232_numbers": numbers,
+        "rs232_nak_code": nak_code,
+        "rs232_status_flags": flags,
+        "rs232_word_port_bytes": port_bytes,
+        "rs232_eot_answer": "ack",
+    }
+    with line(**habits) as (simulator, url), robolink.connect(url) as controller:
+        assert controller.status().ready
+        assert controller.tools.read(1) is not None
+        simulator.machine.inputs.set(17, True)
+        assert controller.io.read_input_word(1) == 2  # type: ignore[union-attr]
+        with pytest.raises(RejectedError) as caught:
+            controller.io.read_input(65535)  # type: ignore[union-attr]
+        assert caught.value.code == 12
 
 
 def test_numbers_that_are_written_otherwise_are_noticed_on_connecting():

@@ -13,6 +13,7 @@ from robolink_simulators.epson.options import (
 from robolink_simulators.epson.spel.expressions.machine_functions import MACHINE_FUNCTIONS
 from robolink_simulators.faults import Fault, FaultAction
 from robolink_simulators.hosting.in_process.epson import register, unregister
+from robolink_simulators.hosting.streams.epson_serial import serve_serial
 from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 
 from robolink.controllers.epson.verify import redacted, verify_epson
@@ -123,7 +124,28 @@ def test_every_fact_has_a_finding_and_names_an_option_that_exists(cell):
     assert len(named) == len(set(named))
     assert set(named) <= set(option_names())
     ours = {"companion"}
-    assert {name for name in option_names() if "." not in name} - set(named) == ours
+    of_programs = {"statement_us", "loop_passes", "for_test", "integer_overflow", "undeclared"}
+    of_programs |= {"globals_at_start", "ports_of_ended_task"}
+    others = {name for name in option_names() if "." not in name} - set(named)
+    serial = {name for name in others if name.startswith("rs232_")}
+    assert others - serial == ours | of_programs
+    assert serial  # asked for on a serial line alone
+
+
+@pytest.mark.parametrize("letters", ["documented", "guessed"])
+def test_on_a_serial_line_it_finds_out_what_the_manuals_leave_open(letters):
+    simulator = EpsonSimulator(options=EpsonOptions(rs232_letters=letters))
+    with serve_serial(simulator) as line:
+        found = verify_epson(line.url.replace("&letters=guessed", ""))
+    settled = {fact.option: fact.value for fact in found.facts if fact.value is not None}
+    assert settled["rs232_letters"] == letters
+    assert settled["rs232_numbers"] == "binary"
+    assert settled["rs232_nak_code"] == "digits"
+    assert settled["rs232_status_flags"] == 10
+    named = {fact.option for fact in found.facts if fact.option}
+    assert {name for name in option_names() if name.startswith("rs232_")} <= named
+    sent = [text for _, way, text in simulator.log if way == ">"]
+    assert not [text for text in sent if "TLSet " in text or "Go" in text or "Motors" in text]
 
 
 def test_nothing_is_written_and_nothing_moves(cell):

@@ -24,7 +24,7 @@ from tests.contract._softmotion_cell import served
 from tests.faults._bending_relay import BendingRelay
 from tests.unit._scripted_modbus import rtu, words
 
-TIMEOUT_S = 0.3
+TIMEOUT_S = 0.8
 PATIENCE_S = 2.0
 """Where nothing has to time out: the computer may be busy."""
 SLOTS = {2: ToolOffset(1, 2, 3, 4), 3: ToolOffset(-5, -6, -7, -8), 4: ToolOffset(9, 10, 11, 12)}
@@ -58,10 +58,10 @@ def asked(controller, tools):
 @pytest.mark.parametrize(
     ("link", "late_s"),
     [
-        pytest.param("modbus-tcp", 0.36, marks=pytest.mark.fault("F01")),
-        pytest.param("can-virtual", 0.36, marks=pytest.mark.fault("F01")),
-        pytest.param("modbus-rtu", 0.31, marks=pytest.mark.fault("F02")),
-        pytest.param("modbus-rtu", 0.45, marks=pytest.mark.fault("F02")),
+        pytest.param("modbus-tcp", 0.9, marks=pytest.mark.fault("F01")),
+        pytest.param("can-virtual", 0.9, marks=pytest.mark.fault("F01")),
+        pytest.param("modbus-rtu", 0.82, marks=pytest.mark.fault("F02")),
+        pytest.param("modbus-rtu", 0.95, marks=pytest.mark.fault("F02")),
     ],
 )
 def test_f01_f02_a_late_answer_of_a_plc_answers_no_other_question(link, late_s):

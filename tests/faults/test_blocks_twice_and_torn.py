@@ -21,7 +21,7 @@ from tests.unit._mailbox_client import MailboxClient
 LINKS = ["modbus-tcp", "modbus-rtu", "can-virtual"]
 SLOT = 15
 NEW = ToolOffset(11.25, -3.125, -20.5, 12.0)
-TIMEOUT_S = 0.3
+TIMEOUT_S = 0.8
 HIGHEST = 0xFFFF
 
 

@@ -34,7 +34,7 @@ from tests.faults._bending_relay import BendingRelay
 OLD, NEW = ToolOffset(12.5, -3.25, -20.0), ToolOffset(12.75, -3.0, -20.5)
 WRITE = "TLSet 1, XY"
 SLOT = 15
-TIMEOUT_S = 0.6
+TIMEOUT_S = 2.0
 _names = count()
 
 
@@ -73,7 +73,7 @@ def test_f11_f12_a_write_that_is_held_back_is_unproved_and_arrives_at_most_once(
                 began = time.monotonic()
                 with pytest.raises(OutcomeUnknownError, match="did not answer in time"):
                     controller.tools.write(1, NEW, expected=OLD)
-                assert time.monotonic() - began < TIMEOUT_S + 1
+                assert time.monotonic() - began < TIMEOUT_S + 3
                 with pytest.raises(TransportClosedError):
                     controller.tools.write(1, NEW, expected=OLD)
                 outcomes = controller.outcomes

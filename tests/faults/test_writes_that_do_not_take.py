@@ -24,6 +24,7 @@ NEW = ToolOffset(12.5, -3.0, -20.0)
 ANYWHERE = WorkBox()
 
 
+@pytest.mark.soak
 @pytest.mark.fault("F43")
 def test_f43_a_nozzle_change_ends_at_a_write_that_was_not_done(tmp_path, monkeypatch):
     with served_cell(tmp_path / "cell", monkeypatch) as cell:

@@ -38,6 +38,17 @@ def test_a_second_copy_of_an_answer_answers_nothing():
     assert client.read_input(1, 1) == (8,)
 
 
+@pytest.mark.fault("F03")
+@pytest.mark.parametrize("so_far", [0, 5])
+def test_an_old_answer_with_the_very_number_answers_nothing(so_far):
+    """A gateway kept it from an earlier connection: all of it, or its first bytes so far."""
+    old = tcp(words(99), 1)
+    rest = [old[so_far:]] if so_far else []
+    line, client = over_tcp(lambda frame: [*rest, tcp(words(7), 1)])
+    line.coming.append((0, old[:so_far] or old))
+    assert client.read_input(0, 1) == (7,)
+
+
 @pytest.mark.fault("F01")
 def test_a_timeout_ends_the_link_and_nothing_is_sent_again():
     line, client = over_tcp(lambda frame: [])

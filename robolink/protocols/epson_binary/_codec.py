@@ -62,6 +62,11 @@ class EpsonBinaryCodec:
         """What has arrived and is part of no event yet, for messages about half a reply."""
         return self._buffer.held
 
+    @property
+    def dialect(self) -> Dialect:
+        """What it takes the manuals to mean."""
+        return self._dialect
+
     def carries(self, name: str) -> bool:
         """Whether a command has a letter that may be sent."""
         letter = letter_of(name)

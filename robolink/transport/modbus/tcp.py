@@ -39,9 +39,12 @@ class TcpExchange:
         waiting = self._transport.receive_waiting()
         if waiting is not None:
             self._keep(waiting, request)
+        begun = self._leave_out_old(request)
         self._transaction = self._transaction % 0xFFFF + 1
         frame = self._framing.pack(request, self._transaction)
         self._transport.send(frame, deadline=deadline)
+        if begun:
+            self._next(request, deadline)
         while True:
             reply = self._next(request, deadline)
             if reply.transaction != self._transaction:
@@ -49,6 +52,19 @@ class TcpExchange:
             if not request.is_answered_by(reply):
                 raise errors.mismatched(self._identity, request)
             return reply
+
+    def _leave_out_old(self, request: ModbusRequest) -> bool:
+        """Drop whole frames that came before the request; return whether one more has begun.
+
+        Each connection numbers from 1, so what a gateway has kept from an earlier one may carry
+        the very number (docs/reference/faults.md F03).
+        """
+        try:
+            while self._framing.take(self._buffer) is not None:
+                pass
+        except FrameError as error:
+            raise errors.unintelligible(self._identity, request, error.raw) from error
+        return bool(self._buffer)
 
     def _next(self, request: ModbusRequest, deadline: Deadline) -> ModbusReply:
         while True:

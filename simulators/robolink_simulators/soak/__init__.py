@@ -19,17 +19,18 @@ In Python, also with a defect put in on purpose::
     story.broken        # rules that did not hold, each with its name, its hour and what was seen
     print(story.told())
 
-Where things stand: :mod:`.history` draws what happens, :mod:`.cell` runs it, :mod:`.people` act,
-:mod:`.rules` judge, reading past the driver from :mod:`.plant` and :mod:`.books`; :mod:`.threads`
-and :mod:`.surroundings` are the time, the chance and the locks, :mod:`.computer` the PC and its
-disk; :mod:`.story` tells, :mod:`.shrinking` shortens, :mod:`.results` sums up.
+Where things stand: :mod:`.history` draws what happens, :mod:`.running` and :mod:`.cell` run it,
+:mod:`.people` act, :mod:`.rules` judge, reading past the driver from :mod:`.plant` and
+:mod:`.books`; :mod:`.threads` and :mod:`.surroundings` are the time, the chance and the locks,
+:mod:`.computer` the PC and its disk; :mod:`.story` tells, :mod:`.shrinking` shortens,
+:mod:`.results` sums up.
 """
 
 from collections.abc import Mapping
 
-from robolink_simulators.soak.cell import live_through as live_through
 from robolink_simulators.soak.history import CellKind as CellKind
 from robolink_simulators.soak.history import History as History
+from robolink_simulators.soak.running import live_through as live_through
 from robolink_simulators.soak.story import Story as Story
 
 

@@ -7,9 +7,9 @@ from pathlib import Path
 import click
 
 from robolink.timing import wall_label
-from robolink_simulators.soak.cell import live_through
 from robolink_simulators.soak.history import CellKind, History
 from robolink_simulators.soak.results import ResultsFile, SeedResult, summed_up
+from robolink_simulators.soak.running import live_through
 from robolink_simulators.soak.shrinking import as_test, shrink
 
 
@@ -22,8 +22,8 @@ class SeedRange(click.ParamType[range]):
         self, value: object, param: click.Parameter | None, ctx: click.Context | None
     ) -> range:
         """Return the seeds."""
-        first, _, last = str(value).partition("-")
-        if not (first.isdigit() and (last or first).isdigit()):
+        first, dash, last = str(value).partition("-")
+        if not (first.isdigit() and (last.isdigit() or not dash)):
             self.fail(f"{value!r} is not like 0-499", param, ctx)
         return range(int(first), int(last or first) + 1)
 

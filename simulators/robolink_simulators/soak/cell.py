@@ -2,9 +2,7 @@
 
 import os
 import random
-import shutil
-import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any, Final
@@ -12,8 +10,8 @@ from unittest import mock
 
 from robolink.ambient import replaced
 from robolink.checkpoints import Checkpoint, observed
-from robolink.errors import JournalError, OutcomeUnknownError, RobolinkError
-from robolink.interrupts import one_ending, output_closed
+from robolink.errors import JournalError, RobolinkError
+from robolink.interrupts import EndedBy, Interrupted, one_ending, output_closed
 from robolink.model import ToolOffset
 from robolink.timing import NS_PER_S
 from robolink.transaction import Wanted, change_tools
@@ -148,7 +146,6 @@ class VirtualCell:
             case Hindrance.POWER_CUT:
                 self._cut_power(process, disturbance)
             case Hindrance.SECOND_PERSON:
-                self._rules.now.crowded = True
                 other = self._computer.start("carl")
                 self._others.append(other)
                 self._turns.start("carl", other, lambda: self._second_person(other))
@@ -186,7 +183,7 @@ class VirtualCell:
         self._note("stop: acknowledged")
         if process.alive:
             process.stopped_ns = self._clock.now_ns()
-            self._rules.stopped(process)
+            self._rules.stopped()
 
     def _second_person(self, process: VirtualProcess) -> None:
         """Somebody else at another terminal changes another tool."""
@@ -194,7 +191,7 @@ class VirtualCell:
             with self._connected(process) as controller:
                 held = controller.tools.read(OTHERS_TOOL)
                 offset = ToolOffset(7.0, 7.0, -float(1 + process.number % 40))
-                self._rules.now.wanted.setdefault(OTHERS_TOOL, [None]).append(offset)
+                self._rules.others_write(OTHERS_TOOL, offset)
                 change_tools(controller, [Wanted(OTHERS_TOOL, offset, held)])
                 self._note("carl: done")
         except (RobolinkError, KeyboardInterrupt) as error:
@@ -283,6 +280,8 @@ class VirtualCell:
             error = error or raised
         finally:
             me.owner = None
+        if isinstance(error, Interrupted) and error.by is not EndedBy.OUTPUT_CLOSED:
+            raise error  # a real one: whoever runs this wants it to end
         if not process.alive:
             self._end(hour, "killed")
             self._turns.join()
@@ -337,8 +336,6 @@ class VirtualCell:
                 self._books.close()
                 self._computer.set_aside()
                 self._books.trusted = False
-            except OutcomeUnknownError as error:
-                why = describe(error)
             except RobolinkError as error:
                 why = describe(error)
             finally:
@@ -359,22 +356,3 @@ def _holds_password(path: Path) -> bool:
     with suppress(OSError):
         return PASSWORD.encode() in path.read_bytes()
     return False
-
-
-def live_through(history: History, replacements: Mapping[str, object] | None = None) -> Story:
-    """Run a history on a disk in memory, where there is one; nothing of it stays.
-
-    Args:
-        history: What happens.
-        replacements: Put in the place of what is found under a dotted name, for as long as it
-            takes: defects that the rules have to find.
-    """
-    memory = Path("/dev/shm")
-    folder = Path(tempfile.mkdtemp(prefix="soak-", dir=memory if memory.is_dir() else None))
-    try:
-        with ExitStack() as stack:
-            for name, replacement in (replacements or {}).items():
-                stack.enter_context(mock.patch(name, replacement))
-            return VirtualCell(history, folder).run()
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)

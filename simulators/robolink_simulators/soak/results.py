@@ -1,8 +1,10 @@
 """What was run so far: a line for each seed, so that a range can be gone on with, and sums."""
 
 import json
+import os
 from collections import Counter
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from functools import cache
 from hashlib import sha256
@@ -32,6 +34,7 @@ class SeedResult:
         source: Which state of the code it was; see :func:`source_digest`.
         ended_at: When, as a label.
         cpu_s: What it took.
+        memory_kb: What the process held at its end, kB; 0 where that cannot be told.
     """
 
     seed: int
@@ -48,6 +51,7 @@ class SeedResult:
     source: str
     ended_at: str
     cpu_s: float
+    memory_kb: int = 0
 
     @classmethod
     def of(cls, story: Story, *, ended_at: str, cpu_s: float) -> "SeedResult":
@@ -67,7 +71,15 @@ class SeedResult:
             source_digest(),
             ended_at,
             round(cpu_s, 2),
+            _memory_kb(),
         )
+
+
+def _memory_kb() -> int:
+    with suppress(OSError, ValueError, IndexError):
+        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
+        return pages * os.sysconf("SC_PAGE_SIZE") // 1024
+    return 0
 
 
 @cache

@@ -4,8 +4,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Final
 
-from robolink_simulators.soak.cell import live_through
 from robolink_simulators.soak.history import Disturbance, Habit, History, Hour
+from robolink_simulators.soak.running import live_through
 from robolink_simulators.soak.story import Story
 
 MOST_RUNS: Final = 200

@@ -17,6 +17,8 @@ from robolink_simulators.cell.clock import ManualClock
 _REAL_PATIENCE_S: Final = 300.0
 """Nothing here waits in real time; a thread that never passes its turn on is a defect."""
 
+_LONGEST_FAVOUR: Final = 100_000
+
 
 class Killed(BaseException):
     """The process to which this thread belongs is dead; raised again at each further point."""
@@ -85,6 +87,7 @@ class TurnTaking:
         self._main = SteppedThread("main", None)
         self._threads = [self._main]
         self._favoured: SteppedThread | None = None
+        self._favour_left = 0
         self._by_ident = {threading.get_ident(): self._main}
 
     @property
@@ -118,6 +121,7 @@ class TurnTaking:
 
         self._threads.append(thread)
         self._favoured = self.rng.choice((thread, thread, self.current, None))
+        self._favour_left = _LONGEST_FAVOUR if self._favoured is thread else self.rng.randint(1, 40)
         threading.Thread(target=run, name=f"soak {name}", daemon=True).start()
         return thread
 
@@ -156,7 +160,8 @@ class TurnTaking:
         while True:
             now_ns = self._clock.now_ns()
             ready = [thread for thread in self._threads if thread.can_go_on(now_ns)]
-            if self._favoured in ready:
+            if self._favoured in ready and self._favour_left:
+                self._favour_left -= 1
                 return self._favoured
             if ready:
                 return ready[0] if len(ready) == 1 else self.rng.choice(ready)

@@ -42,15 +42,23 @@ def marked(file: Path) -> Iterator[Showing]:
         return
     name = str(file.relative_to(ROOT))
     borne = 0
-    for node in ast.parse(source).body:
+    module = ast.parse(source).body
+    all_soak = any(isinstance(node, ast.Assign) and _soaks(node) for node in module)
+    for node in module:
         if isinstance(node, ast.FunctionDef | ast.ClassDef):
             marks = [m for decorator in node.decorator_list for m in _marks(decorator, "fault")]
             borne += len(marks)
             if marks:
-                soak = any(_is_mark(decorator, "soak") for decorator in node.decorator_list)
+                soak = all_soak or any(_is_mark(d, "soak") for d in node.decorator_list)
                 yield Showing(name, node.name, tuple(_numbers(marks, name)), soak)
     if borne != sum(1 for _ in _marks(ast.parse(source), "fault")):
         raise ValueError(f"{name}: a mark `fault` belongs above a test, or to its parameters")
+
+
+def _soaks(node: ast.Assign) -> bool:
+    return ast.unparse(node.targets[0]) == "pytestmark" and any(
+        _is_mark(part, "soak") for part in ast.walk(node.value)
+    )
 
 
 def _marks(tree: ast.AST, name: str) -> Iterator[ast.Call]:

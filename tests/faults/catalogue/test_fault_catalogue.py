@@ -83,6 +83,12 @@ def test_marks_are_read_from_tests_their_parameters_and_classes(tmp_path, monkey
     assert (whole.faults, whole.soak, function.soak) == (("F04",), True, False)
 
 
+def test_a_module_that_is_left_to_soak_is_said_to_be(tmp_path, monkeypatch):
+    source = "pytestmark = pytest.mark.soak\n@pytest.mark.fault('F11')\ndef test_f11_x(): ...\n"
+    (showing,) = read(source, tmp_path, monkeypatch)
+    assert showing.soak
+
+
 @pytest.mark.parametrize(
     "source",
     ["pytestmark = pytest.mark.fault('F01')", "@pytest.mark.fault(NUMBER)\ndef test_x(): ..."],

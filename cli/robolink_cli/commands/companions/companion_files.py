@@ -10,7 +10,13 @@ from robolink.files.durable import sync_folder, write_whole
 from robolink.files.named import holds
 from robolink.messages import tr
 
-_EPSON: Final = ("epson/robolink_tools.prg", "epson/recal.prg", "LICENSE")
+_EPSON: Final = (
+    "epson/robolink_tools.prg",
+    "epson/recal.prg",
+    "epson/calc_tool.prg",
+    "epson/calc_board_tool.prg",
+    "LICENSE",
+)
 
 
 def companion_texts() -> Mapping[str, bytes]:

@@ -55,11 +55,16 @@ def serve_epson(
 def load_programs(
     simulator: EpsonSimulator, programs: Sequence[Path], points: Sequence[Path]
 ) -> None:
-    """Load a project; what its tasks print is shown beside the announcement.
+    """Load a project, if any; what its tasks print is shown beside the announcement.
 
     Raises:
         ConfigError: It cannot be built, or a file cannot be read.
+        click.UsageError: There are points and no programs.
     """
+    if not programs:
+        if points:
+            raise click.UsageError(tr("--points goes with --program."))
+        return
     runner = simulator.load(programs, points)
     runner.on_print = lambda text: note(text.rstrip("\r\n"))
 

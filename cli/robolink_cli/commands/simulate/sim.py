@@ -4,7 +4,6 @@ from pathlib import Path
 
 import click
 
-from robolink.messages import tr
 from robolink_cli.commands.simulate.sim_plc import sim_plc
 from robolink_cli.commands.simulate.sim_softmotion import softmotion
 from robolink_cli.options.simulation import simulation_options
@@ -145,11 +144,8 @@ def epson(
         state_path=state,
         world=world_from(world),
     )
+    load_programs(simulator, programs, points)
     plan_faults(simulator, faults, {LinkKind.EPSON_SERIAL if serial else LinkKind.EPSON_TCP})
-    if programs:
-        load_programs(simulator, programs, points)
-    elif points:
-        raise click.UsageError(tr("--points goes with --program."))
     place = None if serial else listen
     serve_epson(simulator, place, speed=speed, allow_remote=allow_remote, baud=baud)
 

@@ -40,11 +40,6 @@ class Interview:
         self._no_more = ""
 
     @property
-    def serial(self) -> bool:
-        """Whether it goes over Remote RS232."""
-        return self._session.outlived
-
-    @property
     def heard(self) -> bytes:
         """All that the controller has sent so far."""
         pieces = self._log.dialogue.passages

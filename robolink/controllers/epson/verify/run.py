@@ -1,9 +1,10 @@
 """One verification, from login to logout."""
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from robolink.controllers.epson.controller import EpsonController
-from robolink.controllers.epson.link.line import SERIAL, open_line
+from robolink.controllers.epson.link.line import SERIAL, EpsonLine, open_line
 from robolink.controllers.epson.link.session import EpsonSession
 from robolink.controllers.epson.verify import text_facts as text
 from robolink.controllers.epson.verify import wire_facts as wire
@@ -17,6 +18,9 @@ from robolink.model import ControllerFacts, Secret
 from robolink.protocols import spel
 from robolink.timing import wall_label
 from robolink.transport import DialogueLog, LinkUrl, TraceSink, parse_url
+
+if TYPE_CHECKING:
+    from robolink.protocols.epson_binary import Dialect
 
 
 def verify_epson(
@@ -56,12 +60,23 @@ def verify_epson(
         outcomes = memory_journal(session.identity).log(session.identity)
         controller = EpsonController(session, outcomes, remote_timeout_s=0.0)
         try:
-            about, facts = _found_out(Interview(controller, session, line.transport, log))
+            about, facts = _found_out(
+                Interview(controller, session, line.transport, log), _dialect_of(line)
+            )
         finally:
             controller.close()
     finally:
         session.close()
     return Verification(session.identity, about, facts, log.dialogue)
+
+
+def _dialect_of(line: EpsonLine) -> "Dialect | None":
+    """Return how a serial line is spoken, ``None`` for Remote Ethernet."""
+    if not line.outlives_sessions:
+        return None
+    from robolink.protocols.epson_binary import EpsonBinaryCodec
+
+    return line.codec.dialect if isinstance(line.codec, EpsonBinaryCodec) else None
 
 
 def _with_every_letter(url: LinkUrl) -> LinkUrl:
@@ -71,10 +86,12 @@ def _with_every_letter(url: LinkUrl) -> LinkUrl:
     return replace(url, options={**url.options, "letters": "guessed"})
 
 
-def _found_out(interview: Interview) -> tuple[ControllerFacts, tuple[Fact, ...]]:
+def _found_out(
+    interview: Interview, dialect: "Dialect | None"
+) -> tuple[ControllerFacts, tuple[Fact, ...]]:
     about = interview.controller.facts()
     facts = [
-        *(serial_facts(interview) if interview.serial else _of_remote_ethernet(interview)),
+        *(_of_remote_ethernet(interview) if dialect is None else serial_facts(interview, dialect)),
         _served(interview),
         text.closing_quote(interview),
         text.number_lead_blank(interview),
@@ -85,7 +102,7 @@ def _found_out(interview: Interview) -> tuple[ControllerFacts, tuple[Fact, ...]]
         *text.tool_facts(interview),
         _while_executing(interview),
     ]
-    if interview.serial:
+    if dialect is not None:
         interview.log_out()
         return about, (*facts, *not_tried())
     end = (wire.terminator(interview), wire.unfinished_request(interview.leave()))

@@ -5,22 +5,35 @@ from typing import Final
 from robolink.controllers.epson.verify.interview import Interview
 from robolink.controllers.epson.verify.verification import Fact
 from robolink.messages import tr
+from robolink.protocols.epson_binary import Dialect
 from robolink.protocols.epson_text import ErrorCode
 
 _NO_SUCH_BIT: Final = "65535"
 _CODES: Final = range(ErrorCode.NO_DOLLAR, ErrorCode.SYSTEM + 1)
 
 
-def serial_facts(interview: Interview) -> tuple[Fact, ...]:
-    """Find out which frames and letters this controller takes."""
-    return (_numbers(interview), _status_flags(interview), _nak_code(interview), _abort(interview))
+def serial_facts(interview: Interview, dialect: Dialect) -> tuple[Fact, ...]:
+    """Find out which frames and letters this controller takes.
+
+    Args:
+        interview: Asks it.
+        dialect: As the line was opened.
+    """
+    return (
+        _numbers(interview, dialect),
+        _status_flags(interview),
+        _nak_code(interview, dialect),
+        _abort(interview),
+        *_not_asked(),
+    )
 
 
-def _numbers(interview: Interview) -> Fact:
+def _numbers(interview: Interview, dialect: Dialect) -> Fact:
     """Both ends write them alike, else the line would not have been opened."""
     answer = interview.ask("GetCurRobot")
     evidence = f"GetCurRobot -> {answer if isinstance(answer, int) else ','.join(answer)}"
-    return Fact(tr("numbers on the serial line"), tr("as the URL says"), evidence=evidence)
+    name, value = tr("numbers on the serial line"), dialect.numbers.value
+    return Fact(name, value, "rs232_numbers", value, evidence)
 
 
 def _status_flags(interview: Interview) -> Fact:
@@ -32,7 +45,7 @@ def _status_flags(interview: Interview) -> Fact:
     return Fact(name, tr("{count}", count=count), option, count, ",".join(fields))
 
 
-def _nak_code(interview: Interview) -> Fact:
+def _nak_code(interview: Interview, dialect: Dialect) -> Fact:
     """A bit that no controller has is refused; the code shows how codes are written."""
     name = tr("code of a refusal")
     code = interview.ask("GetIO", _NO_SUCH_BIT)
@@ -42,7 +55,7 @@ def _nak_code(interview: Interview) -> Fact:
     if code not in _CODES:
         finding = tr("makes no sense: say nak_code=digits in the URL")
         return Fact(name, finding, "rs232_nak_code", evidence=evidence)
-    return Fact(name, tr("as the URL says"), evidence=evidence)
+    return Fact(name, dialect.nak_code.value, "rs232_nak_code", dialect.nak_code.value, evidence)
 
 
 def _abort(interview: Interview) -> Fact:
@@ -55,3 +68,12 @@ def _abort(interview: Interview) -> Fact:
         return Fact(name, tr("is understood: letters=guessed"), option, "guessed", "A -> ACK")
     finding = tr("is not understood: movements stay refused on this line")
     return Fact(name, finding, option, "documented", f"A -> NAK {answer}")
+
+
+def _not_asked() -> tuple[Fact, ...]:
+    ports = tr("not tried: a wrong length is an error that cannot be told from others")
+    opening = tr("not seen: whatever EOT is answered with is thrown away")
+    return (
+        Fact(tr("number of a port of words"), ports, "rs232_word_port_bytes"),
+        Fact(tr("answer to EOT"), opening, "rs232_eot_answer"),
+    )

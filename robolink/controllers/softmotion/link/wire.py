@@ -27,8 +27,9 @@ from robolink.stop_latch import StopLatch
 from robolink.transport import MailboxHead, MailboxLink
 
 _READS: Final = 3
-_LOOK_BACK_S: Final = 1.0
-"""Longest time for a look at what ended the session."""
+_LOOK_BACK_S: Final = 0.8
+"""Longest time for a look at what ended the session: a request to a PLC that is gone ends within
+1 s of its deadline, this look included (docs/reference/faults.md F11)."""
 
 T = TypeVar("T")
 ErrorT = TypeVar("ErrorT", bound=RobolinkError)

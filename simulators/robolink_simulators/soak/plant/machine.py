@@ -77,6 +77,7 @@ class PlantMachine(ABC):
         tap: Told of everything on the wire.
 
     Attributes:
+        numbered: Whether its commands have numbers, so that one that comes twice counts once.
         touched: Tools that somebody past this computer has written since the last look.
         moved_itself: Whether the tool in force was changed past this computer since then.
         undecided: Whether what was written may have arrived bent, so that for a while the machine
@@ -85,6 +86,7 @@ class PlantMachine(ABC):
 
     kind: str
     address: str
+    numbered: bool = False
 
     def __init__(self, clock: ManualClock, tap: WireTap) -> None:
         self.clock = clock

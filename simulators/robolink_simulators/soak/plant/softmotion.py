@@ -52,6 +52,7 @@ class SoftMotionPlant(PlantMachine):
     """
 
     kind = "softmotion"
+    numbered = True
     address = "softmotion+sim://cell"
 
     def __init__(self, clock: ManualClock, tap: WireTap, seed: int) -> None:

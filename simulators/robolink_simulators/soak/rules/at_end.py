@@ -1,0 +1,131 @@
+"""How a deed ends: what it says, against what is so."""
+
+import math
+from typing import Final
+
+from robolink_cli.console.exit_codes import BUG, UNKNOWN, exit_code
+
+from robolink.model import ToolOffset
+from robolink.nozzle_change import ChangeReport
+from robolink.standing import Effect, standing_after
+from robolink_simulators.soak.computer import VirtualProcess
+from robolink_simulators.soak.people import OTHERS_TOOL, TOOL
+from robolink_simulators.soak.plant.machine import MachineState
+from robolink_simulators.soak.rules.so_far import Grounds
+
+_SURELY_MM: Final = 0.5
+"""A tip that was certified and lies farther off than this is a wrong certificate in any case."""
+
+
+class EndRules:
+    """Looks at a deed when it has ended by itself.
+
+    Args:
+        grounds: What the rules rest on.
+    """
+
+    def __init__(self, grounds: Grounds) -> None:
+        self._on = grounds
+
+    def ended(
+        self, process: VirtualProcess, error: BaseException | None, state: MachineState
+    ) -> None:
+        """Check how a deed ended, against what the machine keeps now."""
+        if error is None:
+            self._succeeded(process, state)
+        code = 0 if error is None else exit_code(error)
+        self._on.hold("NoDefectShown", code != BUG, f"{type(error).__name__}: {error}")
+        self._told(error, code, state)
+        if self._on.books.trusted and code != UNKNOWN:
+            begun = [
+                m.request
+                for m in self._on.books.markers()
+                if m.operation not in self._on.now.old_markers and m.kind != "selection"
+            ]
+            self._on.hold(
+                "ExitCodeIsTrue",
+                not begun or self._on.now.crowded,
+                f"it ends with {code}, and {begun} is open",
+            )
+
+    def _succeeded(self, process: VirtualProcess, state: MachineState) -> None:
+        self._on.hold(
+            "NoSuccessAfterStop",
+            process.stopped_ns is None,
+            "it ends well although a stop was acknowledged",
+        )
+        for tool, offset in self._on.now.wish.typed:
+            self._on.hold(
+                "StateIsTold",
+                tool in self._on.plant.touched
+                or self._on.plant.same(state.tools.get(tool), offset),
+                f"tool {tool} was to hold {offset}, it holds {state.tools.get(tool)}",
+            )
+        report = self._on.now.report
+        if report is not None:
+            self._certified(report, state)
+
+    def _certified(self, report: ChangeReport, state: MachineState) -> None:
+        (done,) = report.tools
+        truth = self._on.plant.simulator.world.tips[TOOL]
+        found = done.proposal.offset
+        error_mm = math.hypot(found.x_mm - truth.x_mm, found.y_mm - truth.y_mm)
+        self._on.hold(
+            "StateIsTold",
+            TOOL in self._on.plant.touched or self._on.plant.same(state.tools.get(TOOL), found),
+            f"tool {TOOL} was proved as {found}, it holds {state.tools.get(TOOL)}",
+        )
+        habit = self._on.now.hour.habit
+        self._on.hold(
+            "NoProofWithoutTouch",
+            habit.stays_share < 1.0,
+            "a tip was proved that nobody brought onto the pin",
+        )
+        if habit.careful or habit.declines:
+            within_mm = done.proposal.result.known_within_mm or 0.1
+            self._on.story.certified.append(error_mm <= within_mm)
+            self._on.hold(
+                "TipIsWhereItSays",
+                error_mm <= _SURELY_MM,
+                f"the tip is {error_mm:.3f} mm from where it was proved to be",
+            )
+
+    def _told(self, error: BaseException | None, code: int, state: MachineState) -> None:
+        """Check what the end says of the controller."""
+        if error is None:
+            return
+        standing = standing_after(error)
+        foreign = self._on.plant.touched | ({OTHERS_TOOL} if self._on.now.crowded else set())
+        for tool, stands in standing.tools.items():
+            if not stands.known or tool in foreign:
+                continue
+            holds = None if stands.holds is None else ToolOffset(*stands.holds)
+            self._on.hold(
+                "StateIsTold",
+                self._on.plant.same(holds, state.tools.get(tool)),
+                f"tool {tool} is told to hold {holds}, it holds {state.tools.get(tool)}",
+            )
+        changed = [
+            tool
+            for tool in {*self._on.now.before.tools, *state.tools}
+            if not self._on.plant.same(self._on.now.before.tools.get(tool), state.tools.get(tool))
+        ]
+        for tool in changed:
+            self._on.hold(
+                "StateIsTold",
+                tool in foreign or tool in standing.tools or code == UNKNOWN,
+                f"tool {tool} has changed, which {type(error).__name__} does not say",
+            )
+        selected = standing.selected
+        if standing.selection_known and selected is not None and not self._on.plant.moved_itself:
+            self._on.hold(
+                "StateIsTold",
+                selected == state.selected,
+                f"tool {selected} is told to be selected, it is {state.selected}",
+            )
+        if standing.effect is Effect.UNCHANGED and not self._on.plant.moved_itself:
+            self._on.hold(
+                "StateIsTold",
+                state.selected == self._on.now.before.selected or bool(self._on.open_selection()),
+                f"unchanged is told, but tool {state.selected} is selected",
+            )

@@ -1,0 +1,104 @@
+"""What is left behind: before anybody acts, and when the people have put it right."""
+
+from collections.abc import Sequence
+
+from robolink.model import ToolOffset
+from robolink_simulators.soak.books import BookedMarker
+from robolink_simulators.soak.people import TOOL
+from robolink_simulators.soak.plant.machine import MachineState
+from robolink_simulators.soak.rules.so_far import Grounds
+
+
+class RestRules:
+    """Looks at machine and journal while nothing is under way.
+
+    Args:
+        grounds: What the rules rest on.
+    """
+
+    def __init__(self, grounds: Grounds) -> None:
+        self._on = grounds
+        self._by_others: dict[int, ToolOffset | None] = {}
+
+    def left(self, state: MachineState) -> None:
+        """Check what a deed left behind, however it ended, killed or not, before anybody acts."""
+        if state.selected != self._on.now.before.selected and not self._on.plant.moved_itself:
+            self._on.hold(
+                "SameToolSelected",
+                bool(self._on.open_selection()) or state.selected == self._on.now.wish.selects,
+                f"tool {state.selected} is selected in place of "
+                f"{self._on.now.before.selected}, and nothing on record says so",
+            )
+        self._note_what_others_changed(state)
+        if not self._on.books.trusted:
+            return
+        markers = self._on.books.markers()
+        for tool in {*self._on.now.before.tools, *state.tools}:
+            holds = state.tools.get(tool)
+            named = [
+                m
+                for m in markers
+                if m.details.get("tool") == tool or str(tool) in m.details.get("tools", {})
+            ]
+            self._agrees(tool, holds, named)
+
+    def _note_what_others_changed(self, state: MachineState) -> None:
+        """Note values that no journal can be right about, until they are written again.
+
+        A hand at the pendant wrote them, or the disk has lost what it said that it had kept.
+        """
+        for tool in {*self._on.now.first.tools, *state.tools}:
+            if tool in self._on.plant.touched or not self._on.books.trusted:
+                self._by_others[tool] = state.tools.get(tool)
+
+    def _agrees(self, tool: int, holds: ToolOffset | None, named: Sequence[BookedMarker]) -> None:
+        known, value = self._on.books.value_of(tool)
+        if tool in self._by_others and self._on.plant.same(self._by_others[tool], holds):
+            return
+        if tool in self._on.plant.touched or named:
+            return
+        self._on.hold(
+            "BooksAgree",
+            not known or self._on.plant.same(value, holds),
+            f"tool {tool} is on record as {value}, it holds {holds}, and nothing is open",
+        )
+        wanted = self._on.now.wanted.get(tool, [None])
+        self._on.hold(
+            "OnlyWantedValues",
+            any(self._on.plant.same(one, holds) for one in wanted),
+            f"tool {tool} holds {holds}, which nobody wanted: {wanted}",
+        )
+
+    def at_rest(self, state: MachineState, *, usable: bool, why: str) -> None:
+        """Check the cell after its people have put it right."""
+        self._on.hold("UsableAgain", usable, f"nobody gets it going again: {why}")
+        if not usable:
+            return
+        self._on.hold(
+            "SameToolSelected", state.selected == TOOL, f"tool {state.selected} is selected"
+        )
+        begun = self._on.plant.movements - self._on.now.movements
+        self._on.hold(
+            "MovesOnce",
+            begun <= len(self._on.now.moves) or not self._on.books.trusted,
+            f"{begun} movements were begun under {len(self._on.now.moves)} markers",
+        )
+        self._note_what_others_changed(state)
+        if not self._on.books.trusted:
+            return
+        for tool in {*self._on.now.first.tools, *state.tools}:
+            holds, before = state.tools.get(tool), self._on.now.first.tools.get(tool)
+            self._agrees(tool, holds, ())
+            if tool in self._on.plant.touched or self._on.plant.same(holds, before):
+                continue
+            self._on.hold("KeptOnProof", self._proved(tool, holds), f"tool {tool} keeps {holds}")
+
+    def _proved(self, tool: int, holds: ToolOffset | None) -> bool:
+        """Tell whether a new value rests on a proof, or on a person's word."""
+        typed = (*self._on.now.wish.typed, *self._on.now.typed_by_others)
+        if any(n == tool and self._on.plant.same(offset, holds) for n, offset in typed):
+            return True
+        if self._on.now.wish.undoes or self._on.now.hour.habit.keeps:
+            return True
+        verdicts = self._on.books.verdicts(self._on.now.entries, tool)
+        return any(kind == "done" and verdict == "verified" for kind, verdict in verdicts)

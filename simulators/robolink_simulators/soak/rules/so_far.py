@@ -1,0 +1,104 @@
+"""What the rules know of the hour that runs, and how they are held."""
+
+from dataclasses import dataclass, field
+from typing import Final
+
+from robolink.model import ToolOffset
+from robolink.nozzle_change import ChangeReport
+from robolink_simulators.soak.books import BookedMarker, Books
+from robolink_simulators.soak.history import Hour
+from robolink_simulators.soak.people import Wish
+from robolink_simulators.soak.plant.machine import MachineState, PlantMachine
+from robolink_simulators.soak.story import Story
+
+NAMES: Final = (
+    "MovesOnce",
+    "StillAfterStop",
+    "NoSuccessAfterStop",
+    "AtRestWhenStopped",
+    "OnlyWantedValues",
+    "KeptOnProof",
+    "NoMotionInDoubt",
+    "NothingWithoutRecord",
+    "NoWriteWithoutLease",
+    "BooksAgree",
+    "ExitCodeIsTrue",
+    "StateIsTold",
+    "SameToolSelected",
+    "TipIsWhereItSays",
+    "NoProofWithoutTouch",
+    "NoDefectShown",
+    "UsableAgain",
+    "NoPasswordShown",
+    "NothingGrows",
+)
+"""Every rule, in the order in which they are listed."""
+
+
+@dataclass(slots=True)
+class HourSoFar:
+    """What the rules know of the hour that runs.
+
+    Attributes:
+        hour: The hour.
+        wish: What its person means to be true at its end.
+        first: What the machine kept at its beginning.
+        before: What it kept at the beginning of the last try.
+        entries: The newest entry at its beginning.
+        old_markers: What was open before the last try, by operation.
+        moves: Operations under which a movement has left, with how often.
+        movements: How many the machine had begun.
+        wanted: What each tool may hold.
+        report: Of a tip that was measured and proved.
+        last_move: The last movement that has left.
+        crowded: Whether a second person was at work.
+        typed_by_others: What they typed, by tool.
+    """
+
+    hour: Hour
+    wish: Wish
+    first: MachineState
+    before: MachineState
+    entries: int
+    old_markers: frozenset[str]
+    movements: int
+    moves: dict[str, int] = field(default_factory=dict)
+    wanted: dict[int, list[ToolOffset | None]] = field(default_factory=dict)
+    report: ChangeReport | None = None
+    last_move: str = ""
+    crowded: bool = False
+    typed_by_others: list[tuple[int, ToolOffset]] = field(default_factory=list)
+
+
+class Grounds:
+    """What every rule rests on: the machine and the journal as they are, the hour so far.
+
+    Args:
+        story: Where a broken rule is noted.
+        plant: The machine.
+        books: The journal on the disk.
+
+    Attributes:
+        plant, books: See above.
+        now: The hour that runs.
+        story: See above.
+    """
+
+    now: HourSoFar
+
+    def __init__(self, story: Story, plant: PlantMachine, books: Books) -> None:
+        self.story = story
+        self.plant = plant
+        self.books = books
+
+    def hold(self, rule: str, holds: bool, sentence: str) -> None:
+        """Look at a rule; ``sentence`` says what was seen where it does not hold."""
+        self.story.checks[rule] += 1
+        if not holds:
+            self.story.break_rule(rule, sentence)
+
+    def open_selection(self) -> list[BookedMarker]:
+        """Return the markers that say that another tool may be selected than the cell's own."""
+        if not self.books.trusted:
+            return [BookedMarker("", "selection", "", {})]
+        return [m for m in self.books.markers() if m.kind == "selection" or "select" in m.details]

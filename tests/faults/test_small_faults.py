@@ -1,0 +1,72 @@
+"""One small thing goes wrong on the wire in a whole two-pose calibration, whichever it is.
+
+A request or an answer is dropped, late, doubled, cut short at any byte, or one bit of an answer
+is another, at the first exchange of each shape in each step of the calibration. By default a
+sample; ``make soak`` takes all, and ``python -m tests.faults.small`` too, which can be
+interrupted and prints the counts.
+"""
+
+import random
+from collections import Counter
+
+import pytest
+
+from tests.faults.small.cells import KINDS
+from tests.faults.small.faults_of_a_run import Pair, Planned, drawn, planned, recorded, run_with
+from tests.faults.small.outcomes import outcome
+from tests.faults.small.wire import Act, SmallFault
+
+_SAMPLE = {"EPSON": 24, "PLC": 6}
+_SHARES = 24
+
+DECISIVE = {
+    "EPSON": Pair('$Execute,"TLSet #, XY(#, #, #, #)"', "writing, TLSet #"),
+    "PLC": Pair("write_command WRITE_TOOL #", "writing, # WRITE_TOOL #"),
+}
+
+
+def told(runs: list[Planned]) -> Counter[str]:
+    """Make runs and count how they ended; fail with the first that broke a promise."""
+    ends = Counter[str]()
+    for run in runs:
+        ended = outcome(run)
+        assert not ended.startswith("WRONG"), f"{run}: {ended}"
+        ends[ended] += run.members
+    return ends
+
+
+@pytest.mark.fault("F07", "F26")
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_sample_of_small_faults_costs_no_second_movement_and_no_wrong_value(kind):
+    runs = drawn(kind, _SAMPLE[kind], seed=15)
+    ends = told(runs)
+    print(f"\n{kind}: {ends.total()} faults in {len(runs)} runs: {dict(ends)}")  # noqa: T201
+    assert len(ends) > 1
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_write_whose_answer_is_lost_ends_as_unknown_and_one_that_never_came_too(kind):
+    ends = {
+        act: run_with(kind, DECISIVE[kind], SmallFault(act))
+        for act in (Act.DROP_REQUEST, Act.DROP_REPLY)
+    }
+    assert set(ends.values()) == {"exit 6"}
+
+
+def test_each_step_of_a_calibration_is_met():
+    for kind in KINDS:
+        pairs = recorded(kind).replies
+        steps = {pair.step.partition(",")[0] for pair in pairs}
+        assert steps == {"before", "measuring", "writing", "proving"}
+        assert DECISIVE[kind] in pairs
+
+
+@pytest.mark.soak
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize("share", range(_SHARES))
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_small_fault(kind, share):
+    runs = list(planned(kind))
+    random.Random(15).shuffle(runs)
+    ends = told(runs[share::_SHARES])
+    print(f"\n{kind}, share {share}: {ends.total()} faults: {dict(ends)}")  # noqa: T201

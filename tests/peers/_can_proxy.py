@@ -1,0 +1,92 @@
+"""The faulty proxy for a CAN bus: two buses in memory and a thread that carries between them."""
+
+import threading
+import time
+from typing import Final, Self
+
+import can
+
+from tests.peers._faulty_proxy import LATE_S, Begins, Fault
+
+_REQUESTS: Final = 0x600
+_ANSWERS: Final = 0x580
+
+
+class CanProxy:
+    """Carries frames between the clients' bus and the node's; a context manager.
+
+    What goes wrong goes wrong with the answers of the node's SDO server.
+
+    Attributes:
+        frames: SDO requests that a client sent since the fault was chosen.
+
+    Args:
+        near: Name of the clients' bus.
+        far: Name of the node's bus.
+        node: Its number.
+    """
+
+    def __init__(self, near: str, far: str, node: int) -> None:
+        self.frames: list[bytes] = []
+        self._near = can.Bus(interface="virtual", channel=near)
+        self._far = can.Bus(interface="virtual", channel=far)
+        self._node = node
+        self._fault: Fault = ""
+        self._waiting: tuple[Begins, Fault] | None = None
+        self._late: list[tuple[float, can.Message]] = []
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._serve, name="faulty bus", daemon=True)
+
+    def __enter__(self) -> Self:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._ended.set()
+        self._thread.join(5)
+        self._near.shutdown()
+        self._far.shutdown()
+
+    def arm(self, fault: Fault, begins: Begins = lambda _frame: True) -> None:
+        """Choose what goes wrong, from the first request on for which ``begins`` says so."""
+        self.frames.clear()
+        self._waiting, self._fault = (begins, fault), ""
+
+    def put(self, data: bytes) -> None:
+        """Let an old answer of the node stand on the clients' bus (F03)."""
+        self._near.send(_frame(_ANSWERS + self._node, data))
+
+    def _serve(self) -> None:
+        while not self._ended.is_set():
+            asked, told = self._near.recv(0.001), self._far.recv(0.0)
+            if asked is not None:
+                if asked.arbitration_id == _REQUESTS + self._node:
+                    self._requested(bytes(asked.data))
+                if self._fault != "F11":
+                    self._far.send(_frame(asked.arbitration_id, bytes(asked.data)))
+            if told is not None:
+                self._told(told)
+            now = time.monotonic()
+            due = [message for at, message in self._late if at <= now]
+            self._late = [(at, message) for at, message in self._late if at > now]
+            for message in due:
+                self._near.send(_frame(message.arbitration_id, bytes(message.data)))
+
+    def _requested(self, data: bytes) -> None:
+        self.frames.append(data)
+        if self._waiting is not None and self._waiting[0](data):
+            self._fault, self._waiting = self._waiting[1], None
+
+    def _told(self, message: can.Message) -> None:
+        answer = message.arbitration_id == _ANSWERS + self._node
+        if self._fault == "F11" or (self._fault == "F25" and answer):
+            return
+        if self._fault == "F01" and answer:
+            self._late.append((time.monotonic() + LATE_S, message))
+            self._fault = ""
+            return
+        self._near.send(_frame(message.arbitration_id, bytes(message.data)))
+
+
+def _frame(identifier: int, data: bytes) -> can.Message:
+    return can.Message(arbitration_id=identifier, data=data, is_extended_id=False)

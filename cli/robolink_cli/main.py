@@ -145,7 +145,11 @@ COMMANDS: Final = {
     ),
     "spel": (
         "robolink_cli.commands.companions.spel:spel",
-        tr("SPEL+ programs: check them, run them, write the companion."),
+        tr("SPEL+ programs: check them, run them, write the companions."),
+    ),
+    "serve": (
+        "robolink_cli.commands.companions.serve:serve",
+        tr("Answer programs that calibrate a tool themselves."),
     ),
     "plc": (
         "robolink_cli.commands.companions.plc:plc",

@@ -22,6 +22,7 @@ WORDS = {
     "robolink_cli": "commands, options, questions, views",
     "robolink_simulators": "cell, assist, hosting, epson, softmotion, plc: the fakes",
     "recipe": "a nozzle change written down once, as TOML",
+    "serving": "running programs that calibrate a tool themselves: what is believed and kept",
     "nozzle_change": "measure, propose, ask, write, prove, keep or put back",
     "methods": "one folder a calibration method",
     "procedures": "what methods share: ways, touches, looks, sampling",

@@ -135,6 +135,7 @@ BAD = {
     "config check": (["--fix"], "No such option"),
     "config show": (["nowhere"], "nowhere"),
     "completion": (["tcsh"], "is not one of"),
+    "serve": (["--spel", "nowhere"], "no address to listen on"),
     "spel export": (["golden.json"], "is a file"),
     "spel check": (["nowhere.prg"], "does not exist"),
     "spel run": (["nowhere.prg"], "does not exist"),

@@ -22,8 +22,8 @@ In Python, also with a defect put in on purpose::
 Where things stand: :mod:`.history` draws what happens, :mod:`.running` and :mod:`.cell` run it,
 :mod:`.people` act, :mod:`.rules` judge, reading past the driver from :mod:`.plant` and
 :mod:`.books`; :mod:`.threads` and :mod:`.surroundings` are the time, the chance and the locks,
-:mod:`.computer` the PC and its disk; :mod:`.story` tells, :mod:`.shrinking` shortens,
-:mod:`.results` sums up.
+:mod:`.computer` the PC and its disk; :mod:`.story` tells,
+``shrinking`` shortens, ``results`` sums up.
 """
 
 from collections.abc import Mapping

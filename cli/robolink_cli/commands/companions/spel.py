@@ -28,7 +28,8 @@ def export(folder: Path, force: bool) -> None:
 
     robolink_tools.prg publishes the tool table while production runs: add it to the RC+ project
     and call RobolinkPublish; docs/monitor-only.md says where. robolink_vision.prg takes looks for
-    the camera vision-guide (docs/camera-and-board.md). calc_tool.prg and
+    the camera vision-guide (docs/camera-and-board.md). With recal.prg the running program
+    calibrates a tool itself (docs/spel-callback.md). calc_tool.prg and
     calc_board_tool.prg set tool 1 by Vision Guide; add them only where they are wanted. The
     licence is 0BSD: they may be used in a machine without any duty.
     """

@@ -1,0 +1,375 @@
+"""One program and what it is answered, line by line; no socket here.
+
+Each question is answered by one line. What cannot be understood ends the conversation without an
+answer, and the program, left without one, puts the old value back.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import astuple, dataclass, field
+from typing import TYPE_CHECKING, Final
+
+from robolink.errors import (
+    BusyError,
+    CalibrationError,
+    ConfigError,
+    OutcomeUnknownError,
+    RemoteProtocolError,
+    RobolinkError,
+)
+from robolink.messages import tr
+from robolink.model import (
+    EntryKind,
+    Identity,
+    NewEntry,
+    Pose,
+    Signature,
+    ToolOffset,
+    plain_offset,
+)
+from robolink.protocols.spel_callback import (
+    CallbackLine,
+    CallbackWord,
+    offset_fields,
+    read_components,
+    read_tool,
+    same_thousandths,
+)
+from robolink.serving._book import ProgramChange, begin_change, open_changes
+from robolink.serving._judging import (
+    CallbackLimits,
+    Touches,
+    measured,
+    method_named,
+    proved,
+)
+
+if TYPE_CHECKING:
+    from robolink.calibration import CalibrationResult
+    from robolink.journal import Journal, JournalOutcomeLog
+    from robolink.procedures import PoseMethod
+
+Answer = tuple[CallbackWord, tuple[str, ...]]
+
+_TOOLS: Final = range(1, 16)
+_LENGTHS: Final = {
+    CallbackWord.HELLO: 12,
+    CallbackWord.BEGIN: 9,
+    CallbackWord.POSE: 9,
+    CallbackWord.PROOF: 9,
+    CallbackWord.SOLVE: 0,
+    CallbackWord.WROTE: 8,
+    CallbackWord.JUDGE: 1,
+    CallbackWord.KEPT: 8,
+    CallbackWord.RESTORED: 8,
+    CallbackWord.BYE: 0,
+}
+"""Questions, and how many fields each has."""
+
+_UNSET: Final = frozenset({"-", "0"})
+
+
+@dataclass(slots=True)
+class _Run:
+    """One calibration of one tool, from BEGIN on."""
+
+    tool: int
+    before: ToolOffset
+    method: "PoseMethod"
+    touches: Touches = field(default_factory=Touches)
+    proofs: Touches = field(default_factory=Touches)
+    result: "CalibrationResult | None" = None
+    change: ProgramChange | None = None
+    written: bool = False
+
+
+class CallbackConversation:
+    """Answers one program.
+
+    Args:
+        journal: Where all is put on record.
+        limits: What its measurements are held to.
+        peer: From where it calls, as a person may read it.
+        signature: Who watches over it, and with what software.
+        controller: The name under which its controller is on record; without one, that of the
+            robot's serial number.
+
+    Attributes:
+        over: Whether the program has said that it is done.
+    """
+
+    def __init__(
+        self,
+        journal: "Journal",
+        limits: CallbackLimits,
+        *,
+        peer: str,
+        signature: Signature | None = None,
+        controller: str = "",
+    ) -> None:
+        self.over = False
+        self._journal = journal
+        self._limits = limits
+        self._peer = peer
+        self._signature = signature or Signature()
+        self._controller = controller
+        self._log: JournalOutcomeLog | None = None
+        self._number = 0
+        self._flag = 0
+        self._welcome = False
+        self._run: _Run | None = None
+        self._deeds: dict[CallbackWord, Callable[[Sequence[str]], Answer]] = {
+            CallbackWord.HELLO: self._hello,
+            CallbackWord.BEGIN: self._begin,
+            CallbackWord.POSE: self._pose,
+            CallbackWord.PROOF: self._pose_of_proof,
+            CallbackWord.SOLVE: self._solve,
+            CallbackWord.WROTE: self._wrote,
+            CallbackWord.JUDGE: self._judge,
+            CallbackWord.KEPT: lambda fields: self._reported(fields, kept=True),
+            CallbackWord.RESTORED: lambda fields: self._reported(fields, kept=False),
+            CallbackWord.BYE: self._bye,
+        }
+
+    def answer(self, line: CallbackLine) -> CallbackLine:
+        """Return the answer to a question.
+
+        Raises:
+            RemoteProtocolError: It makes no sense here; nothing is to be answered.
+        """
+        deed = self._deeds.get(line.word)
+        if deed is None or len(line.fields) != _LENGTHS[line.word]:
+            raise _senseless(line)
+        if line.number != self._number + 1 or (self._log is None) != (line.word == "HELLO"):
+            raise _senseless(line)
+        self._number = line.number
+        try:
+            word, fields = deed(line.fields)
+        except (CalibrationError, BusyError, ConfigError, OutcomeUnknownError) as error:
+            word, fields = self._refused(error)
+        return CallbackLine(line.number, word, fields)
+
+    def beat(self) -> None:
+        """Let others see that a change is under way."""
+        if self._log is not None:
+            self._log.beat()
+
+    def close(self) -> None:
+        """Give the lease up. What is open stays open until the program, or a person, tells."""
+        if self._log is not None:
+            self._log.close()
+
+    # What the program says of itself.
+
+    def _hello(self, fields: Sequence[str]) -> Answer:
+        serial, _robot, flag, operation, tool, *value = fields
+        if flag not in ("0", "1", "2", "3"):
+            raise RemoteProtocolError(tr("{field!r} is no state of a program.", field=flag))
+        place = f"spel@{self._peer}"
+        name = self._controller or (place if serial in _UNSET else f"epson:{serial}")
+        log = self._journal.log(name, signature=self._signature)
+        log.ask(lambda: Identity(name, f"spel://{self._peer}", place))
+        self._log, self._flag = log, int(flag)
+        if flag == "1":
+            raise CalibrationError("not_restored", tr("The program has not put its tool back."))
+        if flag in ("2", "3"):
+            self._settle(operation, _number(tool), read_tool(value), kept=flag == "2")
+        self._welcome = True
+        return CallbackWord.WELCOME, ()
+
+    def _settle(self, operation: str, tool: int, value: ToolOffset | None, *, kept: bool) -> None:
+        """Close what the program was in the middle of when the link was cut."""
+        log = self._require_log()
+        changes, _ = open_changes(log)
+        for change in changes:
+            if change.operation == operation and change.tool == tool:
+                if not (change.end_kept(value) if kept else change.end_restored(value)):
+                    raise CalibrationError(
+                        "conflict", tr("Tool {tool} holds another value.", tool=tool)
+                    )
+                return
+        log.append(
+            NewEntry(
+                EntryKind.RECONNECT,
+                operation=operation,
+                tool=tool,
+                details={"kept": kept, "reported": plain_offset(value)},
+            )
+        )
+
+    def _begin(self, fields: Sequence[str]) -> Answer:
+        if not self._welcome:
+            raise RemoteProtocolError(tr("The program was not let in."))
+        tool, before = _number(fields[0]), read_tool(fields[2:])
+        if tool not in _TOOLS:
+            raise CalibrationError("tool_number", tr("There is no tool {tool}.", tool=tool))
+        if before is None:
+            raise CalibrationError("tool_undefined", tr("Tool {tool} is not defined.", tool=tool))
+        self._require_settled(tool, before)
+        self._run = _Run(tool, before, method_named(fields[1], self._limits))
+        return CallbackWord.GO, ()
+
+    def _require_settled(self, tool: int, value: ToolOffset | None) -> None:
+        """Close what the program never wrote; refuse while anything else is open.
+
+        A program with no flag set wrote nothing: it sets the flag before it writes.
+
+        Raises:
+            CalibrationError: ``unsettled``.
+        """
+        log = self._require_log()
+        changes, others = open_changes(log)
+        for change in changes:
+            if self._flag != 0 or change.tool != tool or not change.end_never_written(value):
+                others = True
+        if others or self._in_work():
+            raise CalibrationError(
+                "unsettled", tr("Something that was begun on this controller is not settled.")
+            )
+
+    # What it measured.
+
+    def _pose(self, fields: Sequence[str]) -> Answer:
+        run = self._require_run()
+        if run.change is not None:
+            raise RemoteProtocolError(tr("The touches of the measurement were over."))
+        self._add(run.touches, fields, {run.tool: run.before})
+        return CallbackWord.OK, (str(len(run.touches.poses)),)
+
+    def _pose_of_proof(self, fields: Sequence[str]) -> Answer:
+        run = self._require_run()
+        if not run.written or run.change is None or run.change.requested is None:
+            raise RemoteProtocolError(tr("Nothing was written that could be proved."))
+        self._add(run.proofs, fields, {run.tool: run.change.requested})
+        return CallbackWord.OK, (str(len(run.proofs.poses)),)
+
+    def _add(self, touches: Touches, fields: Sequence[str], known: dict[int, ToolOffset]) -> None:
+        from robolink.calibration import flange_poses
+
+        tool, *values, seen_off, seen_on = fields
+        x, y, z, u, v, w = read_components(values)
+        taken_in = _number(tool)
+        if taken_in and taken_in not in known:
+            raise CalibrationError(
+                "tool_pose", tr("A pose was taken in tool {tool}.", tool=taken_in)
+            )
+        pose = Pose(x_mm=x, y_mm=y, z_mm=z, u_deg=u, v_deg=v, w_deg=w, tool=taken_in)
+        (flange,) = flange_poses([pose], tools=known)
+        touches.add(flange, seen_off=seen_off == "1", seen_on=seen_on == "1")
+
+    def _solve(self, _fields: Sequence[str]) -> Answer:
+        run = self._require_run()
+        if run.change is not None:
+            raise RemoteProtocolError(tr("A value was given already."))
+        result = measured(run.method, run.touches, run.before, self._limits)
+        rounded = ToolOffset(*(round(value, 3) for value in result.offset.components()))
+        run.result = result
+        run.change = begin_change(self._require_log(), run.tool, run.before, rounded)
+        run.change.note(
+            EntryKind.CALIBRATION,
+            result.method,
+            known_within_mm=result.known_within_mm,
+            warnings=list(result.warnings),
+            flange=[list(astuple(pose)[:6]) for pose in run.touches.poses],
+            peer=self._peer,
+        )
+        return CallbackWord.VALUE, (run.change.operation, *offset_fields(rounded))
+
+    # What it wrote.
+
+    def _wrote(self, fields: Sequence[str]) -> Answer:
+        run, change = self._of_change(fields[0])
+        value = read_tool(fields[1:])
+        if not same_thousandths(value, change.requested):
+            raise CalibrationError("read_back", tr("Another value was read back."))
+        change.note(EntryKind.WRITE, tr("written by the program"), reported=plain_offset(value))
+        run.written = True
+        return CallbackWord.PROVE, ()
+
+    def _judge(self, fields: Sequence[str]) -> Answer:
+        run, change = self._of_change(fields[0])
+        if run.result is None or change.requested is None or not run.written:
+            raise RemoteProtocolError(tr("Nothing was written that could be proved."))
+        proof = proved(run.proofs, run.result, change.requested, self._limits)
+        if not proof.passed:
+            raise CalibrationError(
+                "drift", tr("The tip drifts by {drift:.3f} mm.", drift=proof.max_drift_mm)
+            )
+        change.allow_keeping(
+            tr("proved by the program's own touches"),
+            max_drift_mm=proof.max_drift_mm,
+            tolerance_mm=self._limits.tolerance_mm,
+            warnings=list(proof.warnings),
+        )
+        return CallbackWord.KEEP, (change.operation,)
+
+    def _reported(self, fields: Sequence[str], *, kept: bool) -> Answer:
+        _, change = self._of_change(fields[0])
+        value = read_tool(fields[1:])
+        self._run = None
+        if not (change.end_kept(value) if kept else change.end_restored(value)):
+            raise CalibrationError(
+                "conflict", tr("Tool {tool} holds another value.", tool=change.tool)
+            )
+        return CallbackWord.DONE, ()
+
+    def _bye(self, _fields: Sequence[str]) -> Answer:
+        self.over = True
+        return CallbackWord.BYE, ()
+
+    # What stands.
+
+    def _refused(self, error: RobolinkError) -> Answer:
+        """Put a refusal on record; a program that has written puts the old value back."""
+        code = error.code if isinstance(error, CalibrationError) else _code(error)
+        run, log = self._run, self._require_log()
+        entry = NewEntry(
+            EntryKind.REFUSED,
+            tool=None if run is None else run.tool,
+            verdict=error.what,
+            details={"code": code, "peer": self._peer},
+        )
+        try:
+            log.append(entry)
+        except ConfigError:
+            code = "journal"
+        if self._in_work():
+            return CallbackWord.BACK, (code,)
+        self._run = None
+        return CallbackWord.REFUSE, (code,)
+
+    def _in_work(self) -> bool:
+        return self._run is not None and self._run.change is not None
+
+    def _require_log(self) -> "JournalOutcomeLog":
+        if self._log is None:
+            raise RemoteProtocolError(tr("The program has not said who it is."))
+        return self._log
+
+    def _require_run(self) -> _Run:
+        if self._run is None:
+            raise RemoteProtocolError(tr("No calibration was begun."))
+        return self._run
+
+    def _of_change(self, operation: str) -> tuple[_Run, ProgramChange]:
+        run = self._require_run()
+        if run.change is None or run.change.operation != operation:
+            raise RemoteProtocolError(tr("{operation!r} was not begun here.", operation=operation))
+        return run, run.change
+
+
+def _code(error: RobolinkError) -> str:
+    if isinstance(error, BusyError):
+        return "busy"
+    return "settled_by_another" if isinstance(error, OutcomeUnknownError) else "journal"
+
+
+def _number(field_text: str) -> int:
+    if not (field_text.isascii() and field_text.isdecimal() and len(field_text) <= 5):
+        raise RemoteProtocolError(tr("{field!r} is no number.", field=field_text))
+    return int(field_text)
+
+
+def _senseless(line: CallbackLine) -> RemoteProtocolError:
+    return RemoteProtocolError(
+        tr("{word} number {number} makes no sense here.", word=line.word, number=line.number)
+    )

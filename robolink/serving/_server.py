@@ -1,0 +1,166 @@
+"""Listens for programs: one thread for each that calls, and a bound on how many."""
+
+import ipaddress
+import socket
+import threading
+from collections.abc import Callable, Collection
+from contextlib import suppress
+from typing import TYPE_CHECKING, Final
+
+from robolink.errors import ConfigError, LocalProtocolError, RemoteProtocolError
+from robolink.messages import tr
+from robolink.protocols.spel_callback import NEED_DATA, CallbackCodec, encode_line
+
+if TYPE_CHECKING:
+    from robolink.serving._conversation import CallbackConversation
+
+MOST_PROGRAMS: Final = 8
+BEAT_S: Final = 1.0
+IDLE_S: Final = 900.0
+"""A program that says nothing for so long is taken for gone; its moves take minutes at most."""
+
+_CHUNK: Final = 4096
+
+
+class CallbackServer:
+    """Listens at one address of this computer.
+
+    Args:
+        host: The address; another than a loopback one only with ``allow``.
+        port: TCP port, 0 for any that is free.
+        conversation: Makes the partner of one program, given from where it calls.
+        allow: Addresses that may call; empty for this computer only.
+        tell: Told, in sentences, why a program was sent away or cut.
+
+    Attributes:
+        address: Host and port where it listens.
+
+    Raises:
+        ConfigError: It cannot listen there, or everybody could call.
+    """
+
+    def __init__(
+        self,
+        host: str,
+        port: int,
+        conversation: Callable[[str], "CallbackConversation"],
+        *,
+        allow: Collection[str] = (),
+        tell: Callable[[str], None] = lambda _sentence: None,
+    ) -> None:
+        self._allowed = frozenset(_ip(address) for address in allow)
+        if not self._allowed and not ipaddress.ip_address(_ip(host)).is_loopback:
+            raise ConfigError(
+                tr("At {host} any computer of the network could call.", host=host),
+                remedy=tr("Say which may: their addresses, one by one."),
+            )
+        self._conversation, self._tell = conversation, tell
+        self._lock = threading.Lock()
+        self._links: set[socket.socket] = set()
+        self._threads: list[threading.Thread] = []
+        self._closed = False
+        try:
+            family = socket.AF_INET6 if ":" in host else socket.AF_INET
+            self._listener = socket.create_server((host, port), family=family)
+        except OSError as error:
+            raise ConfigError(
+                tr(
+                    "Nobody can listen at {host}:{port}: {cause}.",
+                    host=host,
+                    port=port,
+                    cause=error,
+                )
+            ) from error
+        self._listener.settimeout(0.2)
+        self.address: tuple[str, int] = self._listener.getsockname()[:2]
+
+    def start(self) -> None:
+        """Begin to listen, in a thread of its own."""
+        thread = threading.Thread(target=self._listen, name="robolink-serve", daemon=True)
+        self._threads.append(thread)
+        thread.start()
+
+    def close(self) -> None:
+        """Cut every program off, each of which puts back what is not kept, and end."""
+        self._closed = True
+        with self._lock:
+            links = tuple(self._links)
+        for link in links:
+            with suppress(OSError):
+                link.shutdown(socket.SHUT_RDWR)
+        for thread in tuple(self._threads):
+            thread.join(10)
+        self._listener.close()
+
+    def _listen(self) -> None:
+        while not self._closed:
+            try:
+                link, peer = self._listener.accept()
+            except TimeoutError:
+                continue
+            except OSError:
+                return
+            if not self._admits(str(peer[0])):
+                self._tell(tr("{peer} may not call and was cut off.", peer=peer[0]))
+                link.close()
+                continue
+            with self._lock:
+                self._links.add(link)
+            thread = threading.Thread(target=self._talk, args=(link, str(peer[0])), daemon=True)
+            self._threads = [one for one in self._threads if one.is_alive()]
+            self._threads.append(thread)
+            thread.start()
+
+    def _admits(self, peer: str) -> bool:
+        with self._lock:
+            full = len(self._links) >= MOST_PROGRAMS
+        ip = _ip(peer)
+        allowed = ip in self._allowed if self._allowed else ipaddress.ip_address(ip).is_loopback
+        return allowed and not full
+
+    def _talk(self, link: socket.socket, peer: str) -> None:
+        conversation = self._conversation(peer)
+        try:
+            link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            link.settimeout(BEAT_S)
+            self._answer_all(link, conversation)
+        except (RemoteProtocolError, LocalProtocolError) as error:
+            self._tell(tr("{peer} was cut off: {cause}", peer=peer, cause=error))
+        except OSError:
+            pass  # the program puts its own value back; what is open stays so in the journal
+        finally:
+            conversation.close()
+            link.close()
+            with self._lock:
+                self._links.discard(link)
+
+    def _answer_all(self, link: socket.socket, conversation: "CallbackConversation") -> None:
+        codec, silent_s = CallbackCodec(), 0.0
+        while not (conversation.over or self._closed):
+            try:
+                data = link.recv(_CHUNK)
+            except TimeoutError:
+                silent_s += BEAT_S
+                conversation.beat()
+                if silent_s >= IDLE_S:
+                    return
+                continue
+            if not data:
+                return
+            silent_s = 0.0
+            codec.receive(data)
+            while (line := codec.next_event()) is not NEED_DATA:
+                link.sendall(encode_line(conversation.answer(line)))
+
+
+def _ip(text: str) -> str:
+    """Return an address in one spelling; an IPv4 address that came over IPv6 is itself."""
+    try:
+        found = ipaddress.ip_address(text.partition("%")[0])
+    except ValueError as error:
+        raise ConfigError(
+            tr("{address!r} is no address of a computer.", address=text),
+            remedy=tr("Write it in numbers, for example 192.168.0.20."),
+        ) from error
+    mapped = getattr(found, "ipv4_mapped", None)
+    return str(mapped or found)

@@ -1,0 +1,337 @@
+"""A cell whose running program calls back: simulated controller, real sockets, real server.
+
+Program and server talk through a relay of the test's own that passes each question on, waits for
+its answer, and only then lets simulated time go on. So no wall clock decides anything.
+"""
+
+import math
+import random
+import select
+import socket
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from robolink_simulators.cell.workplace import exchanged
+from robolink_simulators.cell.world_parameters import WorldParameters
+from robolink_simulators.epson import EpsonSimulator
+from robolink_simulators.epson.memory.points import Point
+
+from robolink.journal import memory_journal
+from robolink.model import EntryKind, Pose, ToolOffset, new_operation
+from robolink.serving import CallbackConversation, CallbackLimits, CallbackServer
+
+COMPANION = Path(__file__).parents[2] / "companions" / "epson" / "recal.prg"
+SERIAL = "SIM00001"
+IDENTITY = f"epson:{SERIAL}"
+CONTACT = 8
+NS = 1_000_000_000
+LIMITS = CallbackLimits(tolerance_mm=0.1, max_change_mm=2.0, sigma_mm=0.01)
+MEASURED = (-60, -20, 20, 60, 90)
+PROVED = (75, -75)
+MAIN = f"""
+Global Integer ended
+Function main
+  Integer i
+  ended = 0
+  RobolinkRestore
+  Tool 1
+  If RobolinkOpen("127.0.0.1", 5001) Then
+    If RobolinkBegin(1, "n-angle") Then
+      If TouchAll(11, {10 + len(MEASURED)}) Then
+        If RobolinkWrite() Then
+          If TouchAll(21, {20 + len(PROVED)}) Then
+            If RobolinkFinish() Then
+              Print "kept"
+            EndIf
+          EndIf
+        EndIf
+      EndIf
+    EndIf
+  EndIf
+  RobolinkClose
+  Print rl_code$
+  ended = 1
+Fend
+Function main2
+  RobolinkRestore
+Fend
+Function TouchAll(first As Integer, last As Integer) As Boolean
+  Integer i
+  TouchAll = True
+  For i = first To last
+    Tool 0
+    Go P(i) +Z(3)
+    RobolinkApproach({CONTACT})
+    Go P(i)
+    If TouchAll Then
+      TouchAll = RobolinkTouch({CONTACT})
+    EndIf
+    Go P(i) +Z(3)
+    Tool 1
+  Next i
+Fend
+"""
+
+
+NOMINAL = ToolOffset(12, -3.5, -20)
+
+
+class PowerCut(BaseException):
+    """The controller loses its power now."""
+
+
+@dataclass
+class Bend:
+    """What the relay does to one exchange; ``late_s`` in simulated time."""
+
+    drop_question: bool = False
+    drop_answer: bool = False
+    bend_question: bool = False
+    bend_answer: bool = False
+    cut_before: bool = False
+    cut_after: bool = False
+
+
+class Relay:
+    """Passes lines on, one exchange at a time, as far as ``bend`` lets it."""
+
+    def __init__(self, server):
+        self.server = server
+        self.listener = socket.create_server(("127.0.0.1", 0))
+        self.listener.setblocking(False)
+        self.bend: Callable[[int, bytes], Bend | None] = lambda _number, _question: None
+        self.questions = []
+        self.answers = []
+        self._program: Any = None
+        self._far: Any = None
+        self._held = b""
+
+    @property
+    def address(self):
+        return self.listener.getsockname()
+
+    def pump(self):
+        """Do what there is to do, without waiting for the program."""
+        ready, _, _ = select.select([self.listener], [], [], 0)
+        if ready:
+            self.cut()
+            self._program, _ = self.listener.accept()
+            self._far = socket.create_connection(self.server, timeout=30)
+        if self._program is None:
+            return
+        if select.select([self._program], [], [], 0)[0]:
+            try:
+                data = self._program.recv(4096)
+            except OSError:
+                data = b""
+            if not data:
+                self.cut()
+                return
+            self._held += data
+        while b"\r\n" in self._held and self._program is not None:
+            line, _, self._held = self._held.partition(b"\r\n")
+            self._exchange(line)
+
+    def _exchange(self, line):
+        self.questions.append(line)
+        bend = self.bend(len(self.questions) - 1, line) or Bend()
+        if bend.cut_before:
+            self.cut()
+            return
+        if bend.drop_question:
+            return
+        if bend.bend_question:
+            line = bent(line)
+        answer = self._asked(line)
+        self.answers.append(answer)
+        if not answer or bend.cut_after:
+            self.cut()
+        elif not bend.drop_answer:
+            if bend.bend_answer:
+                answer = bent(answer)
+            self._program.sendall(answer + b"\r\n")
+
+    def _asked(self, line):
+        answer = b""
+        try:
+            self._far.sendall(line + b"\r\n")
+            while not answer.endswith(b"\r\n"):
+                data = self._far.recv(4096)
+                if not data:
+                    return b""
+                answer += data
+        except OSError:
+            return b""
+        return answer[:-2]
+
+    def cut(self):
+        """Cut both ends off."""
+        for end in (self._program, self._far):
+            if end is not None:
+                end.close()
+        self._program = self._far = None
+        self._held = b""
+
+    def close(self):
+        self.cut()
+        self.listener.close()
+
+
+def bent(line):
+    """Return a line with one digit changed."""
+    at = max(index for index, byte in enumerate(line[:-8]) if chr(byte).isdigit())
+    return line[:at] + bytes([ord("0") + (line[at] - ord("0") + 1) % 10]) + line[at + 1 :]
+
+
+class CallbackCell:
+    """Controller, program, relay, server and journal."""
+
+    def __init__(self, folder, *, seed=1, journal=None, limits=LIMITS, main=MAIN):
+        self.rng = random.Random(f"callback {seed}")
+        self.journal = journal or memory_journal(new_operation())
+        self.limits = limits
+        self.server = self._serve()
+        self.relay = Relay(self.server.address)
+        world = WorldParameters(contact_input=CONTACT)
+        self.simulator = EpsonSimulator(serial=SERIAL, seed=seed, world=world)
+        path = Path(folder) / "main.prg"
+        path.write_text(main, encoding="ascii")
+        ports = {201: self.relay.address}
+        self.runner = self.simulator.load([COMPANION, path], ports=ports)
+
+    def _serve(self):
+        def conversation(peer):
+            return CallbackConversation(self.journal, self.limits, peer=peer)
+
+        server = CallbackServer("127.0.0.1", 0, conversation)
+        server.start()
+        return server
+
+    def restart_server(self):
+        """End the server, and start another on another port, with the same journal."""
+        self.server.close()
+        self.server = self._serve()
+        self.relay.server = self.server.address
+
+    @property
+    def tool(self):
+        return self.simulator.machine.tools.defined()[1]
+
+    @property
+    def error_mm(self):
+        """How far the stored tip lies from the true one, in the plane."""
+        true = self.simulator.world.tips[1]
+        return math.hypot(true.x_mm - self.tool.x_mm, true.y_mm - self.tool.y_mm)
+
+    def teach(self, first, angles, *, off_mm=0.0, noise_mm=0.003):
+        """Put points where the true tip is on the pin, as the program's own search finds them."""
+        true, pin = self.simulator.world.tips[1], self.simulator.world.pin_mm
+        for number, u_deg in enumerate(angles, start=first):
+            u_deg += self.rng.uniform(-2, 2)
+            c, s = math.cos(math.radians(u_deg)), math.sin(math.radians(u_deg))
+            pose = Pose(
+                x_mm=pin[0]
+                + off_mm
+                - (c * true.x_mm - s * true.y_mm)
+                + self.rng.gauss(0, noise_mm),
+                y_mm=pin[1] - (s * true.x_mm + c * true.y_mm) + self.rng.gauss(0, noise_mm),
+                z_mm=pin[2] - true.z_mm - 0.01,
+                u_deg=u_deg,
+                hand=self.simulator.machine.arm.flange().hand,
+            )
+            self.simulator.machine.points.store(number, Point.at(pose))
+
+    def change_needle(self):
+        """Put another needle on: its tip is some tenths of a mm from the nominal one."""
+        self.simulator.world.tips[1] = exchanged(NOMINAL, self.rng)
+        self.teach(11, MEASURED)
+        self.teach(21, PROVED)
+
+    def run(self, most_s=600.0):
+        """Start production, let it go on until the program ends; return what it printed."""
+        self.start()
+        return self.go_on(most_s)
+
+    def start(self):
+        """Start production."""
+        self.runner.console.clear()
+        self.simulator.panel.start_production()
+
+    def go_on(self, most_s=600.0):
+        """Let the program go on to its end; return what it printed."""
+        end_ns = self.simulator.now_ns + round(most_s * NS)
+        while self.runner.tasks:
+            change = self.simulator.next_change()
+            assert change is not None, "the program hangs"
+            assert change < end_ns, "the program hangs"
+            self.simulator.advance(change)
+            self.relay.pump()
+        self.relay.pump()
+        assert self.runner.failure is None, self.runner.failure
+        return "".join(self.runner.console).split()
+
+    def lose_power(self):
+        """Switch the controller off and on."""
+        self.runner.on_statement = None
+        self.simulator.restart()
+        self.relay.pump()
+        self.simulator.machine.switch_all_motors(True)
+
+    def run_until(self, cut_at):
+        """Start production and cut the power before a statement, by its number from 0.
+
+        Returns:
+            The statement, ``None`` where the program ended before.
+        """
+        at, reached = 0, None
+
+        def count(_task, file, line, text):
+            nonlocal at, reached
+            if at == cut_at:
+                reached = (file, line, text)
+                raise PowerCut
+            at += 1
+
+        self.runner.on_statement = count
+        try:
+            self.run()
+        except PowerCut:
+            self.lose_power()
+        self.runner.on_statement = None
+        return reached
+
+    def statements(self):
+        """Run the program once; return its statements in their order."""
+        found = []
+        self.runner.on_statement = lambda _t, file, line, text: found.append((file, line, text))
+        self.run()
+        self.runner.on_statement = None
+        return found
+
+    def restore(self):
+        """Start the program that puts the old value back, and nothing else."""
+        self.runner.start("main2", self.simulator.now_ns)
+        self.go_on()
+
+    def entries(self, kind=None, *, limit=None):
+        """Return what is on record, newest first."""
+        kinds = () if kind is None else (kind,)
+        return list(self.journal.entries(controller=IDENTITY, kinds=kinds, limit=limit))
+
+    def require_whole(self, old):
+        """Make sure that the tool is as it was, or one that was proved and is right; tell which."""
+        if self.tool.rounded(3) == old.rounded(3):
+            return False
+        (newest,) = self.entries(EntryKind.VERIFY, limit=1)
+        assert list(newest.details["requested"]) == list(self.tool.rounded(3).components())
+        assert self.error_mm < 0.03
+        return True
+
+    def open_markers(self):
+        return [marker for _, marker in self.journal.open_markers()]
+
+    def close(self):
+        self.server.close()
+        self.relay.close()

@@ -130,6 +130,7 @@ def test_an_execute_is_refused_while_a_task_moves_the_other_robot(loaded):
     assert ask('$Execute,"Move Here +X(5)"') == "!Execute,20"
     # Stop is for all of them.
     assert ask("$Stop") == "#Stop,0"
+    simulator.advance(simulator.now_ns + 10_000_000)
     assert not scara.arm.moving
     assert not six.arm.moving
     assert ask('$Execute,"Robot 2; Print Robot"').startswith('#Execute,"2')
